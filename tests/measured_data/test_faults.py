@@ -66,11 +66,6 @@ def _backward(run: Columns) -> None:
     run["t"][6000:] -= 0.02
 
 
-def _lost(run: Columns) -> None:
-    edges = np.flatnonzero(np.diff(run["encoder"])) + 1
-    run["encoder"][edges[edges > 5000][0] :] -= 1
-
-
 def _unsteady(run: Columns) -> None:
     run["t"] = run["t"] + 0.02 * run["t"] ** 2
 
@@ -78,12 +73,11 @@ def _unsteady(run: Columns) -> None:
 FAULTS: list[tuple[Any, str, tuple[str, ...], str]] = [
     (_cells, "channels.torque-in", ("dropouts: 201 cells", "at 1, 1.2 s"), "cable"),
     (_spikes, "channels.torque-in", ("spikes: 3 readings", "0.82, 1.05, 1.4002 s"), "shielding"),
-    (_stuck, "channels.torque-in", ("stuck", "400 samples", "for 0.0798"), "sensor"),
+    (_stuck, "channels.torque-in", ("stuck", "400 samples", "0.0798 s long"), "sensor"),
     (_drift, "channels.torque-in", ("drift", "N m in 1.8 s"), "drift: remove"),
     (_gap, "time", ("1 gap", "300 samples missing", "0.0602 s at 0.9998 s"), "buffer"),
     (_repeated, "time", ("repeats in 2 rows", "at 1, 1 s"), "logger"),
     (_backward, "time", ("runs backward 1 time", "0.0198 s"), "split the file"),
-    (_lost, "angle", ("1 pulse lost",), "cable"),
     (_unsteady, "turns", ("speed is not steady",), "over:"),
 ]
 
@@ -293,17 +287,6 @@ def test_lost_pulses_by_the_index(run: Columns, tmp_path: Path) -> None:
     assert "4 pulses lost in 2 turns" in one.what
     assert found.conditions[0].courses["torque-in"].turns.shape[0] == 17
     assert off(found.conditions[0]) < 0.06
-
-
-def test_lost_edges_of_a_level(run: Columns, tmp_path: Path) -> None:
-    run["encoder"] = (run["angle"] / (2 * np.pi) * 60 % 1 < 0.5) * 5.0
-    changes = {"angle/kind": "level", "angle/zero": "24 deg"}
-    whole = read(run, tmp_path, changes)
-    assert whole.findings == ()
-    run["encoder"][5000:5045] = 0.0
-    found = read(run, tmp_path, changes)
-    assert "pulses lost" in faults(found, "encoder")[0].what
-    assert off(found.conditions[0]) < 0.08
 
 
 def test_sampling_too_slow(run: Columns, tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,8 @@ import pytest
 import trunnion
 from trunnion.errors import MechanismError, Severity
 from trunnion.rig.reading.angle import _turns
-from trunnion.rig.reading.columns import ungrouped
 from trunnion.rig.reading.read import read_measured
+from trunnion.rig.reading.tables import ungrouped
 
 RATE, SPEED = 500.0, 300.0  # Hz, rpm
 
@@ -134,14 +133,3 @@ def test_sampling_that_is_slow_is_no_fault_of_the_readings(tmp_path: Path) -> No
     slow = next(one for one in found.findings if one.code == "data.sampling.slow")
     assert slow.severity is Severity.NOTE
     assert all(one.severity is Severity.NOTE for one in found.findings)
-
-
-def test_a_zero_that_every_file_replaces_is_told(tmp_path: Path) -> None:
-    mapping = recorded(tmp_path, "Zeit [ms];Winkel [°];Moment [Nm];Drehzahl [U/min]")
-    for shared, own in (("1 deg", None), (None, "2 deg"), ("1 deg", "2 deg")):
-        mapping["angle"].pop("zero", None)
-        mapping["angle"] |= {"zero": shared} if shared else {}
-        mapping["files"] = [{"file": "lauf.csv", **({"angle": {"zero": own}} if own else {})}]
-        (tmp_path / "mapping.json").write_text(json.dumps(mapping))
-        found = read_measured(tmp_path / "mapping.json")
-        assert ("data.angle.zero_unused" in {one.code for one in found.findings}) == bool(shared and own)

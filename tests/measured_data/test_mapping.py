@@ -13,9 +13,9 @@ from manual.conftest import Run, program
 from measured_data.recording import Columns, mapping, off, read, recorded, text_of
 from trunnion.errors import MechanismError, Severity
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.mapping_file import read_mapping
+from trunnion.rig.reading.mapping import read_mapping
 from trunnion.rig.reading.read import read_measured
-from trunnion.rig.reading.sensor_quantity import read_amount
+from trunnion.rig.reading.units import read_amount
 
 __all__ = ["program"]  # a fixture
 
@@ -147,7 +147,7 @@ def test_files_beside_the_mapping(tmp_path: Path, columns: Columns) -> None:
 
 
 def test_files_of_the_command_line_keep_what_was_set(tmp_path: Path, columns: Columns) -> None:
-    """By the file, else by its name; and it is told which, and which do not."""
+    """By the file, else by its name; a note names those that do not."""
     (tmp_path / "elsewhere").mkdir()
     for name in ("run.csv", "new.csv", "elsewhere/run.csv", "elsewhere/two.csv"):
         (tmp_path / name).write_text(text_of(columns), "utf-8")
@@ -161,16 +161,14 @@ def test_files_of_the_command_line_keep_what_was_set(tmp_path: Path, columns: Co
 
     beta, gamma = {"beta": pytest.approx(np.radians(15))}, {"gamma": pytest.approx(np.radians(1))}
     assert read_("run.csv") == ([{**gamma, **beta}], [])
-    values, (kept,) = read_("elsewhere/run.csv")
-    assert values == [{**gamma, **beta}]
-    assert "run.csv is read with the `set` of the file of that name in the mapping" in kept
-    assert read_("elsewhere/two.csv") == ([gamma], [])  # nothing was said of it
-    values, (lost,) = read_("run.csv", "new.csv")
+    assert read_("elsewhere/run.csv") == ([{**gamma, **beta}], [])
+    assert read_("elsewhere/two.csv") == ([gamma], [])  # nothing is stated of it
+    values, (note,) = read_("run.csv", "new.csv")
     assert values == [{**gamma, **beta}, gamma]
-    assert "new.csv is read without `set`, which the mapping states for other files" in lost
-    values, (lost,) = read_("elsewhere/run.csv", "new.csv", "./elsewhere/../elsewhere/run.csv")
-    assert values == [gamma] * 3  # which of two of a name is meant cannot be told
-    assert "elsewhere/run.csv are read without" in lost
+    assert "new.csv read without what the mapping states" in note
+    values, (note,) = read_("elsewhere/run.csv", "new.csv", "./elsewhere/../elsewhere/run.csv")
+    assert values == [gamma] * 3  # which of two of a name is meant cannot be known
+    assert "elsewhere/run.csv" in note
 
 
 UNITS: list[dict[str, Any]] = [

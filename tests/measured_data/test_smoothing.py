@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from trunnion.rig.reading.angle import coordinate, seen_edges, smoothed, unresolved
-from trunnion.rig.reading.columns import Column, DataTable
-from trunnion.rig.reading.local_polynomials import by_local_polynomials
-from trunnion.rig.reading.log import Account
+from trunnion.rig.reading.angle import coordinate, local_polynomials, seen_edges, smoothed, unresolved
 from trunnion.rig.reading.mapping import AngleSource
+from trunnion.rig.reading.tables import Column, DataTable
 from trunnion.rig.reading.timebase import Timeline
 
 Array = NDArray[np.float64]
@@ -45,7 +43,7 @@ def test_local_polynomials_are_those_of_scipy(count: int, width: int, order: int
 
     values = np.cumsum(np.random.default_rng(count).normal(size=count))
     theirs = savgol_filter(values, width, order)
-    np.testing.assert_allclose(by_local_polynomials(values, width, order), theirs, rtol=0, atol=1e-11 * np.ptp(values))
+    np.testing.assert_allclose(local_polynomials(values, width, order), theirs, rtol=0, atol=1e-11 * np.ptp(values))
 
 
 @pytest.mark.parametrize(("count", "width"), [(90, 31), (90_000, 40_001)])
@@ -53,7 +51,7 @@ def test_local_cubics_leave_a_cubic_as_it_is(count: int, width: int) -> None:
     """However many values there are: that of SciPy gives 0 from some 10⁴ on."""
     x = np.linspace(-1, 1, count)
     cubic = x**3 - 0.4 * x**2 + 2 * x + 0.7
-    assert by_local_polynomials(cubic, width, 3) == pytest.approx(cubic, abs=1e-11)
+    assert local_polynomials(cubic, width, 3) == pytest.approx(cubic, abs=1e-11)
 
 
 @pytest.mark.parametrize("per_sample", [0.97, 1.01, 1.2, 1.5, 2.4])
@@ -65,7 +63,7 @@ def test_a_count_about_as_fast_as_the_sampling(per_sample: float) -> None:
     table = DataTable("run.csv", {"n": Column(np.floor(true * per_turn), "", 0, "")})
     source = AngleSource(**{"from": "pulses"}, column="n", per_turn=per_turn)
     line = Timeline(time, None, STEP, np.empty(0, np.intp))
-    found = coordinate(source, table, line, None, Account("run.csv")).values / (2 * np.pi)
+    found = coordinate(source, table, line, None, lambda finding: None).values / (2 * np.pi)
     off = (found - true)[2000:-2000] * per_turn
     assert np.std(off) < 0.03
     assert np.ptp(off) < 0.15

@@ -15,8 +15,7 @@ from measured_data.recording import mapping, read, recorded
 from trunnion.errors import MechanismError
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
-from trunnion.rig.reading.tables import read_table
-from trunnion.rig.reading.text_tables import HEAD
+from trunnion.rig.reading.tables import HEAD, read_table
 
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")
@@ -244,7 +243,7 @@ def test_a_comma_in_another_column_is_no_sign_of_decimals(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("column", "cell", "where", "remedy"),
     [
-        ("T2", "{:.3f} Nm", "channels.brake.column", "remove the unit from the cells; state channels.brake.unit: Nm"),
+        ("T2", "{:.3f} Nm", "channels.brake.column", "remove the unit from the cells; state channels.brake.unit"),
         ("T2", "overflow", "channels.brake.column", "name a column of numbers"),
         ("encoder", "{:.0f} Imp", "angle.column", "remove the unit from the cells"),
     ],

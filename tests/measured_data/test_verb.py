@@ -72,7 +72,7 @@ def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
     assert code == 1
     assert "beta 15 deg" in out  # the other condition has its file for a name
     note, fault = err.splitlines()[:2]
-    assert note.startswith("rig.json:1: note: files: b.csv is read without `set`, which the mapping states for other")
+    assert note.startswith("rig.json:1: note: files: b.csv read without what the mapping states for other files")
     assert fault.startswith(
         "b.csv: warning: channels.brake: sign: the power delivered to brake is negative in all 19 turns"
     )

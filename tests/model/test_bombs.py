@@ -9,7 +9,7 @@ import pytest
 
 from trunnion import MechanismError, read
 from trunnion.model.units import UnitError, root
-from trunnion.rig.reading.mapping_file import read_mapping
+from trunnion.rig.reading.mapping import read_mapping
 from trunnion.rig.reading.rig_file import Rig
 
 DEEP = 20_000

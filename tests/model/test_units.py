@@ -12,7 +12,7 @@ from tests.mechanisms import four_bar
 from trunnion import Mechanism, MechanismError
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import BASES, KINDS, UnitError, root, unit
-from trunnion.rig.reading.sensor_quantity import dimensions
+from trunnion.rig.reading.units import dimensions
 
 
 @pytest.mark.parametrize(

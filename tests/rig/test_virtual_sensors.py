@@ -8,8 +8,7 @@ from pydantic import ValidationError
 
 from trunnion.errors import MechanismError
 from trunnion.rig.reading.rig_file import Sensor
-from trunnion.rig.reading.scale import scale
-from trunnion.rig.reading.sensor_quantity import read_amount
+from trunnion.rig.reading.units import read_amount, scale
 from trunnion.rig.virtual import sensors as virtual_sensors
 from trunnion.rig.virtual.sensors import SensorErrors, converted, draw, pulsed, readings, resolved, smoothed, stream
 from trunnion.rig.virtual.true_signals import phases

@@ -319,7 +319,7 @@ def schema(
 ) -> None:
     """Print the JSON Schema of model or mapping file, for editors."""
     if of is FileKind.DATA:
-        from trunnion.rig.reading.schema import schema_text
+        from trunnion.rig.reading.mapping import schema_text
 
         text = schema_text()
     else:

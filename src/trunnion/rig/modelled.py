@@ -15,9 +15,9 @@ from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import measured
 from trunnion.model.units import Kind, dimension_text, si_unit
+from trunnion.rig.reading.checks import backward_finding
 from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Condition, Measurement, Signal
-from trunnion.rig.reading.signal_checks import backward_finding
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 
@@ -215,10 +215,10 @@ def apart(measured: float, stated: float, share: float = FAR) -> bool:
 
 def refuse_backwards(driver: str, rows: Iterable[tuple[Condition, float]]) -> None:
     """MechanismError where a condition turns the other way than the model, whose speeds are in rad/s."""
-    found = [backward_finding(driver, one.speed, speed, next(iter(one.files), "")) for one, speed in rows
-             if one.speed * speed < 0]  # fmt: skip
-    if found:
-        raise MechanismError(gathered(found))
+    against = [replace(backward_finding(driver, one.speed, speed), file=next(iter(one.files), ""))
+               for one, speed in rows if one.speed * speed < 0]  # fmt: skip
+    if against:
+        raise MechanismError(gathered(against))
 
 
 def _refuse_opposed(mechanism: Mechanism, conditions: Sequence[Condition]) -> None:

@@ -12,8 +12,7 @@ from trunnion.rig.identification.fit import FAR, shared_zero
 from trunnion.rig.identification.identifiability import Combination, InseparableUnknowns
 from trunnion.rig.identification.identified import Identified
 from trunnion.rig.identification.misfit import MisfitCause
-from trunnion.rig.identification.number_text import amount, joined
-from trunnion.rig.reading.log import few_digits
+from trunnion.rig.identification.number_text import amount, few_digits, joined
 
 __all__ = ["findings_of"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-__all__ = ["amount", "decimals", "joined", "scaled"]
+__all__ = ["amount", "decimals", "few_digits", "joined", "scaled"]
 
 READ = {"rad": (180 / math.pi, "°"), "m": (1e3, "mm"), "1": (1.0, ""), "": (1.0, "")}
 
@@ -39,6 +39,11 @@ def amount(value: float, half: float | None, unit: str) -> str:
     if places < 0:
         return f"{round(value * factor, places):.0f} ± {round(half, places):.0f}{tail}"
     return f"{value * factor + 0.0:.{places}f} ± {half:.{places}f}{tail}"
+
+
+def few_digits(number: float, digits: int = 2) -> str:
+    """A number to so many digits, without a power of ten as far as that is readable."""
+    return f"{float(f'{number:.{digits}g}'):,.6g}"
 
 
 def joined(names: Sequence[str]) -> str:

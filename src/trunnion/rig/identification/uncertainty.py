@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from trunnion.rig.identification.fit import FAR, Fit
-from trunnion.rig.reading.repeated_steps import covariance_of_steps
+from trunnion.rig.reading.steps import covariance_of_steps
 
 __all__ = ["CONFIDENCE", "Covariances", "LackOfFit", "excess", "lack_of_fit", "quantile", "spread_of"]
 

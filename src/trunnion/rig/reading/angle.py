@@ -8,33 +8,35 @@ leaves it. What lessens it is the shaft, which cannot follow such errors.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import minimum_filter1d, uniform_filter1d
+from scipy.ndimage import convolve1d, median_filter, minimum_filter1d, uniform_filter1d
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.channels import compare_units
-from trunnion.rig.reading.columns import DataTable
-from trunnion.rig.reading.local_polynomials import by_local_polynomials
-from trunnion.rig.reading.log import Account, counted, times
+from trunnion.rig.reading.channels import unit_differs
+from trunnion.rig.reading.log import at_times, counted, note, warning
 from trunnion.rig.reading.mapping import AngleSource
-from trunnion.rig.reading.pulses import by_index, index_times, pulses_of
-from trunnion.rig.reading.sensor_quantity import alike, dimensions
-from trunnion.rig.reading.timebase import Timeline
+from trunnion.rig.reading.tables import Column, DataTable
+from trunnion.rig.reading.timebase import GAP, Timeline
+from trunnion.rig.reading.units import alike, dimensions
 
-__all__ = ["Coordinate", "coordinate", "seen_edges", "smoothed", "unresolved"]
+__all__ = ["Coordinate", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved", "unwrapped"]
 
 Array = NDArray[np.float64]
+Say = Callable[[Finding | str], None]  # takes a finding, or a sentence about what was done
 TURN = 2 * np.pi
-JUMP = 8.0  # times the usual step, by which a cell is off its neighbours
-SPANS = (2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # turns over which it is tried, the longest first
+SPANS = (2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # turns over which pulses are smoothed, the longest first
 ORDER = 3
 FEWEST = 5  # pulses in a span
-BOUND = 1.1  # of what a pulse may be off: more tells that the shaft itself runs unevenly
+BOUND = 1.1  # of what a pulse may be off: more shows that the shaft itself runs unevenly
 EVEN = 1.1 / np.sqrt(3.0)  # the same of the root mean square, of errors spread evenly
+STANDS = 3.0  # times the usual time of a count, from which the shaft stands or a pulse is lost
+FULL = (1 << 8, 1 << 16, 1 << 24, 1 << 32)  # at which counters usually begin anew
+SET_BACK = 20.0  # times the largest usual step, by which a counter is set back
 
 
 @dataclass(frozen=True)
@@ -52,37 +54,300 @@ class Coordinate:
     cut: float = 0.0
 
 
-def coordinate(
-    source: AngleSource, table: DataTable, line: Timeline, speed: Array | None, account: Account
-) -> Coordinate:
-    """The coordinate by its source; speed: that of the channel, rad/s, of a source `speed`."""
-    zero = float(source.zero.evaluate())
-    index = np.empty(0)
+def coordinate(source: AngleSource, table: DataTable, line: Timeline, speed: Array | None, say: Say) -> Coordinate:
+    """The coordinate of the driver by its source.
+
+    Parameters
+    ----------
+    source : the entry `angle` of the mapping.
+    table : columns of the file.
+    line : times of its rows.
+    speed : that of the channel, rad/s, of a source `speed`.
+    say : takes findings, and sentences about what was done.
+    """
+    zero, index = float(source.zero.evaluate()), np.empty(0)
     if source.index is not None:
-        index = index_times(table.columns[source.index.column].values, line, source.index.column, account)
+        index = edges(line.rows(table.columns[source.index.column].values), line).times
+        if not index.size:
+            what, remedy = f"the column '{source.index.column}' has no pulse", "check the column, or remove index"
+            say(warning("index.none", "angle.index", what, remedy))
     if source.from_ == "pulses":
-        return _of_pulses(source, table, line, index, zero, account)
+        return _of_pulses(source, table, line, index, zero, say)
     if source.from_ == "column":
-        values = _of_column(source, table, line, account)
+        values = _of_column(source, table.columns[str(source.column)], line, say)
     elif source.from_ == "time":
         assert source.speed is not None
-        rate = float(source.speed.evaluate())
-        values = rate * line.seconds
-        account.say(f"the angle is that of a constant speed of {rate:.6g} rad/s")
+        values = float(source.speed.evaluate()) * line.seconds
+        say(f"the angle is that of a constant speed of {float(source.speed.evaluate()):.6g} rad/s")
     else:
         assert speed is not None
-        values = _integrated(speed, line, account)
-    values, lag, cut = _refined(source, values, line, account)
-    values = source.sign * values
+        values = _integrated(speed, line.seconds)
+        say("the angle is the integral of the speed from the first row; its zero creeps with the sensor's error")
+    values, lag, cut = _refined(source, values, line, say)
+    values, spoilt = source.sign * values, np.empty((0, 2))
     if index.size > 1 and source.from_ in ("time", "speed"):
-        values, spoilt = _tied(values, index, line, account)
-    else:
-        spoilt = np.empty((0, 2))
-        _check_index(values, index, line, account)
+        values, spoilt = _tied(values, index, line.seconds, say)
+    elif index.size > 1:
+        at = np.interp(index, line.seconds, values)
+        far = np.flatnonzero(np.abs(np.angle(np.exp(1j * (at - at[0])))) > np.radians(5.0))
+        if far.size:
+            what = f"{counted(far.size, 'index pulse')} of {index.size} more than 5 deg off the first, "
+            remedy = "check unit and zero of the angle, and whether its sensor slips"
+            say(warning("index.off", "angle.index", what + at_times(index[far]), remedy))
     return Coordinate(values + zero, spoilt, lag, source.sign * cut)
 
 
-def _refined(source: AngleSource, values: Array, line: Timeline, account: Account) -> tuple[Array, float, float]:
+# ---- a column, a speed ----------------------------------------------------------------------------------------
+
+
+def _of_column(source: AngleSource, column: Column, line: Timeline, say: Say) -> Array:
+    unit = source.unit or column.unit
+    if not unit:
+        what = f"the column '{source.column}' has no unit; rad is assumed"
+        say(note("angle.no_unit", "angle", what, "state angle.unit"))
+    try:
+        factor, kind = dimensions(unit or "rad")
+    except UnitError as error:
+        what, remedy = f"the column '{source.column}': {error.what}", "state angle.unit in the mapping, such as deg"
+        raise MechanismError(Finding(what, "angle", f"{remedy}; in the file, {error.remedy}")) from None
+    if not alike(kind, dimensions("rad")[1]):
+        what = f"the column '{source.column}' has the unit '{unit}', which is no angle"
+        raise MechanismError(Finding(what, "angle", "name another column"))
+    if source.unit and (finding := unit_differs("angle", str(source.column), source.unit, column)):
+        say(finding)
+    values = line.rows(column.values) * factor
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size < values.size:
+        what = f"{counted(values.size - known.size, 'cell')} of '{source.column}' of {values.size:,} are no number"
+        remedy = "check the angle sensor and its cable"
+        say(warning("angle.missing", "angle", f"{what}; these rows are left out", remedy))
+    if known.size < 3:
+        return np.full(values.size, np.nan)
+    values = values.copy()
+    values[known] = np.unwrap(values[known])
+    steps = np.abs(np.diff(values[known]))
+    usual = float(np.median(steps[steps > 0])) if steps.any() else 0.0
+    if usual > TURN / 4:
+        what = f"a turn has {TURN / usual:.3g} samples: the direction of rotation cannot be determined"
+        say(warning("angle.few_samples", "angle", what, "sample at least 8 times a turn"))
+    return values
+
+
+def _integrated(speed: Array, seconds: Array) -> Array:
+    """The integral of a speed, from the first row; where it is missing it is interpolated."""
+    finite = np.isfinite(speed)
+    if np.count_nonzero(finite) < 2:
+        return np.full(speed.size, np.nan)
+    bridged = speed if finite.all() else np.interp(seconds, seconds[finite], speed[finite])
+    return np.concatenate([[0.0], np.cumsum(0.5 * (bridged[1:] + bridged[:-1]) * np.diff(seconds))])
+
+
+def _tied(values: Array, index: Array, seconds: Array, say: Say) -> tuple[Array, Array]:
+    """An angle stretched between the pulses of an index so that these are a turn apart; not known beyond them."""
+    at = np.interp(index, seconds, values)
+    way = np.sign(at[-1] - at[0]) or 1.0
+    turns = np.rint(np.diff(at) / TURN * way)
+    spoilt = np.column_stack([index[:-1], index[1:]])[turns != 1]
+    if spoilt.size:
+        what = f"{counted(len(spoilt), 'interval')} of the index, {at_times(spoilt[:, 0])}, are not one turn of the "
+        say(warning("index.not_one_turn", "angle.index", what + "angle; left out", "check index pulse and speed"))
+    say("the angle is tied to the index pulse once a turn")
+    exact = TURN * np.concatenate([[0.0], np.cumsum(np.maximum(turns, 1))])
+    inside = (seconds >= index[0]) & (seconds <= index[-1])
+    return np.where(inside, way * np.interp(values * way, at * way, exact), np.nan), spoilt
+
+
+# ---- pulses ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Pulses:
+    """Times at which counts were reached, (pulse,). crossings: whether the times are finer than the sampling."""
+
+    times: Array
+    counts: Array
+    crossings: bool = False
+
+    def slack(self, step: float) -> float:
+        """Counts from one sample to the next, in the mean while the shaft turns.
+
+        The median would be 1 of 1.2: most samples then count on by one, some by two.
+        """
+        counts, times = np.abs(np.diff(self.counts)), np.diff(self.times)
+        each = times / np.maximum(counts, 0.5)
+        turning = each < STANDS * np.median(each)
+        return step * float(np.sum(counts[turning]) / np.sum(times[turning]))
+
+
+def _of_pulses(
+    source: AngleSource, table: DataTable, line: Timeline, index: Array, zero: float, say: Say
+) -> Coordinate:
+    """The angle between pulses by interpolation in time, counted anew from every index pulse."""
+    assert source.per_turn is not None
+    readings = line.rows(table.columns[str(source.column)].values)
+    finite = np.isfinite(readings)
+    if not finite.all():
+        what = f"{counted(int(np.count_nonzero(~finite)), 'cell')} of '{source.column}' of {readings.size:,} are no "
+        what += "number; the previous reading is used there"
+        say(warning("counter.missing", "angle", what, "check the counter and its cable"))
+    until = np.inf
+    if source.kind == "level":
+        pulses = edges(readings, line)
+        until = _check_level(pulses, line, index.size > 1, say)
+    else:
+        pulses = _counted(source, readings[finite], line.seconds[finite], line.step)
+    if pulses.times.size < 2:
+        what = f"the column '{source.column}' has {counted(pulses.times.size, 'pulse')}: there are no turns"
+        raise MechanismError(Finding(what, "angle", "check that angle.column is the encoder's, and angle.kind"))
+    counts, spoilt, step, slack = pulses.counts, np.empty((0, 2)), line.step, pulses.slack(line.step)
+    if index.size > 1:
+        at = np.interp(index[[0, -1]], pulses.times, counts)
+        index = seen_edges(index, float(np.abs(at[1] - at[0])) / source.per_turn, step)
+        counts, spoilt = by_index(pulses, index, source.per_turn, step, say)
+    elif index.size == 1:
+        counts = counts - np.interp(index[0], pulses.times, counts)
+    angles, pitch = source.sign * TURN / source.per_turn * counts, TURN / source.per_turn
+    when, spans, lag = pulses.times, np.zeros(0), 0.0
+    if not pulses.crossings and slack < 1:  # a count for each event: its time is not known
+        when, spans = smoothed(when, 0.5 * step, source.per_turn, counts)
+        lag = unresolved((pulses.times - when)[spans > 0], step)
+    elif not pulses.crossings:  # an event for each sample: its count is not known
+        raw = angles
+        angles, spans = smoothed(raw, pitch * min(0.5 * slack, 0.5), source.per_turn / slack, when)
+        lag = unresolved((raw - angles)[spans > 0], pitch) / pitch * step / slack
+    usual = float(np.median(spans)) if spans.size else 0.0
+    over = f"; it is smoothed over {_turns(usual)}, with which all pulses agree" if usual > 0 else ""
+    say(f"the angle is interpolated between pulses {np.degrees(pitch):.4g} deg apart{over}")
+    values = np.interp(line.seconds, when, angles, left=np.nan, right=np.nan)
+    values[line.seconds > until] = np.nan
+    return Coordinate(values + zero, spoilt, lag)
+
+
+def _counted(source: AngleSource, readings: Array, seconds: Array, step: float) -> Pulses:
+    """The rows where the count changes; the edge lies between two samples, its time is taken in the middle.
+
+    From a to b it passes b if it counts on by one; if it jumps, half way the count is (a + b + 1)/2 in the mean.
+    """
+    if readings.size < 2:
+        return Pulses(np.empty(0), np.empty(0))
+    counts = unwrapped(source, readings, seconds)
+    at = np.flatnonzero(np.diff(counts) != 0)
+    at = at[np.diff(seconds)[at] <= GAP * step]
+    return Pulses(0.5 * (seconds[at] + seconds[at + 1]), 0.5 * (counts[at] + counts[at + 1] + 1.0))
+
+
+def unwrapped(source: AngleSource, readings: Array, seconds: Array) -> Array:
+    """A count that goes on where its counter is full; MechanismError for one that is set back otherwise.
+
+    Full it is at `wrap`; if that is not stated, at a turn or at a power of 2 that all falls show alike.
+    """
+    if source.wrap is not None:
+        return np.unwrap(readings, period=float(source.wrap))
+    steps = np.diff(readings)
+    steps *= float(np.sign(np.sum(np.sign(steps)))) or 1.0
+    usual = float(np.percentile(steps[steps > 0], 90)) if np.any(steps > 0) else 0.0
+    least = min(max(SET_BACK * usual, 1.0), 0.5 * (source.per_turn or np.inf), 0.5 * float(np.ptp(readings)))
+    back = np.flatnonzero(steps < -least)
+    if not back.size or np.ptp(readings) < 2:
+        return readings
+    for full in (source.per_turn or 0, *FULL):
+        if full and np.all(np.abs(full + steps[back] - usual) <= usual + 1):
+            return np.unwrap(readings, period=float(full))
+    fall = f"from {readings[back[0]]:,.0f} to {readings[back[0] + 1]:,.0f}"
+    what = f"the count of '{source.column}' is set back {counted(back.size, 'time')}, {at_times(seconds[back])}, first "
+    remedy = "state wrap: the count at which the counter returns to 0; or select a part by files: over:"
+    raise MechanismError(Finding(what + fall, "angle", remedy))
+
+
+def edges(readings: Array, line: Timeline) -> Pulses:
+    """Rising edges of a level: it passes the middle, having been in the lower quarter since the last one."""
+    finite = np.isfinite(readings)
+    last = np.maximum.accumulate(np.where(finite, np.arange(readings.size), 0))
+    levels = readings[last] if finite.any() else np.empty(0)
+    levels = np.where(np.isfinite(levels), levels, readings[int(np.argmax(finite))]) if levels.size else levels
+    low, high = (float(end) for end in np.percentile(levels, (0.1, 99.9))) if levels.size else (0.0, 0.0)
+    low, high = (low, high) if high > low or not levels.size else (float(levels.min()), float(levels.max()))
+    if high <= low:
+        return Pulses(np.empty(0), np.empty(0))
+    state = np.zeros(levels.size, dtype=np.int8)
+    state[levels > low + 0.6 * (high - low)] = 1
+    state[levels < low + 0.4 * (high - low)] = -1
+    known = np.flatnonzero(state)
+    after = known[1:][(state[known[1:]] == 1) & (state[known[:-1]] == -1)]
+    before = np.maximum(after - 1, 0)
+    rise = np.where(levels[after] == levels[before], 1.0, levels[after] - levels[before])
+    share = np.clip((low + 0.5 * (high - low) - levels[before]) / rise, 0, 1)
+    seconds = line.seconds[before] + share * (line.seconds[after] - line.seconds[before])
+    between = np.count_nonzero(state == 0) > 0.02 * state.size
+    return Pulses(seconds, np.arange(seconds.size, dtype=np.float64), crossings=bool(between))
+
+
+def _check_level(pulses: Pulses, line: Timeline, indexed: bool, say: Say) -> float:
+    """Until when the pulses of a level are all seen, s."""
+    if pulses.times.size < 3:
+        return np.inf
+    usual = float(np.median(np.diff(pulses.times))) / line.step
+    if usual < 2.5:
+        what, remedy = f"a pulse of the encoder has {usual:.3g} samples", "sample at least 4 times a pulse"
+        say(warning("pulses.few_samples", "angle", f"{what}: edges are missed", f"{remedy}, or record a count"))
+    gaps = line.breaks[line.seconds[line.breaks] < pulses.times[-1]]
+    if indexed or not gaps.size:
+        return np.inf
+    until = float(line.seconds[gaps[0] - 1])
+    what = f"no pulses are counted in gaps of time: the angle is not known after {until:.5g} s"
+    say(warning("pulses.gap", "angle", f"{what}; the turns from there on are left out", "record a count or an index"))
+    return until
+
+
+def by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say) -> tuple[Array, Array]:
+    """Counts from the first index pulse, set right at each; times of the turns in which pulses were lost.
+
+    With few samples a pulse the count at an index is known to about one: then its median over nine turns is taken.
+    """
+    at = np.interp(index, pulses.times, pulses.counts)
+    way = np.sign(at[-1] - at[0]) or 1.0
+    between = np.diff(at) * way
+    usual = float(np.median(between))
+    alike = np.abs(between - usual) < max(1.5, 0.01 * abs(usual))
+    if between.size > 1 and np.mean(alike) > 0.5 and abs(usual - per_turn) >= max(0.75, 0.01 * per_turn):
+        mean = float(np.mean(between[alike]))
+        what = f"from one index pulse to the next the encoder counts {mean:.4g}, angle.per_turn is {per_turn:,}"
+        remedy = f"state per_turn: {mean:.0f}, if the index comes once a turn"
+        say(warning("pulses.per_turn", "angle.per_turn", what, remedy))
+    turns = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(between / per_turn), 1.0))])
+    over = (at - at[0]) * way - per_turn * turns
+    fraction = float(np.angle(np.mean(np.exp(2j * np.pi * over)))) / (2 * np.pi)
+    level = over - fraction
+    if pulses.slack(step) > 0.25 and level.size >= 9:
+        level = median_filter(level, size=9, mode="nearest")
+    level = np.rint(level)
+    change = np.diff(level)
+    wrong = change != 0
+    if np.any(wrong):
+        lost, more = -int(change[change < 0].sum()), int(change[change > 0].sum())
+        told = [f"{counted(lost, 'pulse')} lost"] * (lost > 0) + [f"{counted(more, 'pulse')} too many"] * (more > 0)
+        where = f"in {counted(int(np.count_nonzero(wrong)), 'turn')} of {change.size}, {at_times(index[:-1][wrong])}"
+        what = f"the encoder: {' and '.join(told)} {where}; corrected at the index, these turns are left out"
+        say(warning("pulses.lost", "angle", what, "check encoder, cable and counter"))
+    turn = np.clip(np.searchsorted(index, pulses.times, side="right") - 1, 0, index.size - 1)
+    spoilt = np.column_stack([index[:-1][wrong], index[1:][wrong]])
+    return pulses.counts - at[0] - way * fraction - way * level[turn], spoilt
+
+
+def seen_edges(index: Array, turns: float, step: float) -> Array:
+    """Rising edges of an index that is too narrow for the sampling to see it in every turn.
+
+    index: taken in the middle between two samples; turns: from the first to the last of them. One that is seen in a
+    share of the turns is as wide as that share of a sample, and rose at most so long before the sample that saw it.
+    """
+    share = min((index.size - 1) / max(turns, 1.0), 1.0)
+    return index + 0.5 * step * (1.0 - share) if share < 0.95 else index
+
+
+# ---- smoothing ------------------------------------------------------------------------------------------------
+
+
+def _refined(source: AngleSource, values: Array, line: Timeline, say: Say) -> tuple[Array, float, float]:
     """An angle that is read in steps, between them as the shaft turns; standard uncertainty, s, of what is left.
 
     And that, rad, of what all readings may be off by: rounded or cut off, up to half a step, rectangular.
@@ -92,211 +357,72 @@ def _refined(source: AngleSource, values: Array, line: Timeline, account: Accoun
         return values, 0.0, 0.0
     step = float(source.resolution.evaluate())
     raw, seconds = values[known], line.seconds[known]
-    speeds = np.abs(np.diff(raw)) / np.diff(seconds)
-    turning = speeds > 0.1 * np.mean(speeds)
-    rate = float(np.sum(np.abs(np.diff(raw))[turning]) / max(np.sum(np.diff(seconds)[turning]), 1e-300)) or 1.0
+    passed, lasted = np.abs(np.diff(raw)), np.diff(seconds)
+    turning = passed / lasted > 0.1 * np.mean(passed / lasted)
+    rate = float(np.sum(passed[turning]) / max(np.sum(lasted[turning]), 1e-300)) or 1.0
     smooth, spans = smoothed(raw, 0.5 * step, TURN / (rate * line.step), seconds)
     refined = values.copy()
     refined[known] = smooth
     usual = float(np.median(spans))
-    even = f"; it is smoothed over {_turns(usual)}, with which all readings agree" if usual > 0 else ""
-    account.say(f"the angle is read in steps of {np.degrees(step):.4g} deg{even}")
+    over = f"; it is smoothed over {_turns(usual)}, with which all readings agree" if usual > 0 else ""
+    say(f"the angle is read in steps of {np.degrees(step):.4g} deg{over}")
     return refined, unresolved((raw - smooth)[spans > 0], step) / rate, step / math.sqrt(12.0)
 
 
-def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: Account) -> Array:
-    column = table.columns[str(source.column)]
-    unit = source.unit or column.unit
-    if not unit:
-        account.note(
-            "data.angle.no_unit",
-            "angle",
-            f"the column '{source.column}' has no unit; rad is assumed",
-            "state angle.unit",
-        )
-    try:
-        factor, found = dimensions(unit or "rad")
-    except UnitError as error:
-        what, remedy = f"the column '{source.column}': {error.what}", "state angle.unit in the mapping, such as deg"
-        remedy = f"{remedy}; in the file, {error.remedy}"
-        raise MechanismError(Finding(what, "angle", remedy, file=account.file)) from None
-    if not alike(found, dimensions("rad")[1]):
-        what = f"the column '{source.column}' has the unit '{unit}', which is no angle"
-        raise MechanismError(Finding(what, "angle", "name another column", file=account.file))
-    if source.unit:
-        compare_units("angle", str(source.column), source.unit, column, account)
-    values = _without_jumps(source, line.rows(column.values) * factor, line, account)
-    finite = np.flatnonzero(np.isfinite(values))
-    if finite.size < values.size:
-        what = f"{counted(values.size - finite.size, 'cell')} of '{source.column}' of {values.size:,} are no number"
-        account.warn(
-            "data.angle.missing", "angle", f"{what}; these rows are left out", "check the angle sensor and its cable"
-        )
-    if finite.size < 3:
-        return np.full(values.size, np.nan)
-    told = np.unwrap(values[finite])
-    steps = np.abs(np.diff(told))
-    moving = steps[steps > 0]
-    if moving.size and np.median(moving) > TURN / 4:
-        what = (
-            f"a turn has {TURN / float(np.median(moving)):.3g} samples: the direction of rotation cannot be determined"
-        )
-        account.warn("data.angle.few_samples", "angle", what, "sample at least 8 times a turn")
-    values[finite] = told
-    return values
-
-
-def _without_jumps(source: AngleSource, values: Array, line: Timeline, account: Account) -> Array:
-    """The angle without single cells that are far off both neighbours, which are close to each other."""
-    if values.size < 9:
-        return values
-    steps = np.abs(np.angle(np.exp(1j * np.diff(values))))
-    over = np.abs(np.angle(np.exp(1j * (values[2:] - values[:-2]))))
-    usual = float(np.nanmedian(steps)) if np.isfinite(steps).any() else 0.0
-    far = max(JUMP * usual, np.radians(5.0))
-    out = 1 + np.flatnonzero((steps[:-1] > far) & (steps[1:] > far) & (over < far / 2))
-    if not out.size or out.size > 0.1 * values.size:
-        return values
-    zeros = " zero" if np.all(values[out] == 0) else ""
-    what = (
-        f"{counted(out.size, 'cell')} of '{source.column}' of {values.size:,}{zeros} far off the ones before and after"
-    )
-    account.warn(
-        "data.angle.wild",
-        "angle",
-        f"{what}, {times(line.seconds[out])}; left out",
-        "check the angle sensor and its cable",
-    )
-    mended = values.copy()
-    mended[out] = np.nan
-    return mended
-
-
-def _integrated(speed: Array, line: Timeline, account: Account) -> Array:
-    """The integral of a speed, from the first row; where it is missing it is interpolated."""
-    finite = np.isfinite(speed)
-    if np.count_nonzero(finite) < 2:
-        return np.full(speed.size, np.nan)
-    bridged = speed if finite.all() else np.interp(line.seconds, line.seconds[finite], speed[finite])
-    steps = 0.5 * (bridged[1:] + bridged[:-1]) * np.diff(line.seconds)
-    account.say("the angle is the integral of the speed from the first row; its zero creeps with the sensor's error")
-    return np.concatenate([[0.0], np.cumsum(steps)])
-
-
-def _tied(values: Array, index: Array, line: Timeline, account: Account) -> tuple[Array, Array]:
-    """An angle stretched between the pulses of an index so that these are a turn apart; not known beyond them."""
-    at = np.interp(index, line.seconds, values)
-    way = np.sign(at[-1] - at[0]) or 1.0
-    turns = np.rint(np.diff(at) / TURN * way)
-    spoilt = np.column_stack([index[:-1], index[1:]])[turns != 1]
-    if spoilt.size:
-        told = counted(len(spoilt), "interval")
-        what = f"{told} of the index, {times(spoilt[:, 0])}, are not one turn of the angle; left out"
-        account.warn("data.index.not_one_turn", "angle.index", what, "check index pulse and speed")
-    exact = way * TURN * np.concatenate([[0.0], np.cumsum(np.maximum(turns, 1))])
-    account.say("the angle is tied to the index pulse once a turn")
-    inside = (line.seconds >= index[0]) & (line.seconds <= index[-1])
-    rising = np.interp(values * way, at * way, exact * way) * way
-    return np.where(inside, rising, np.nan), spoilt
-
-
-def _check_index(values: Array, index: Array, line: Timeline, account: Account) -> None:
-    """Tell where the index of an angle that needs none is out of place."""
-    if index.size < 2:
-        return
-    at = np.interp(index, line.seconds, np.where(np.isfinite(values), values, np.nan))
-    usual = float(np.nanmedian(np.abs(np.diff(at)))) / TURN if np.isfinite(np.diff(at)).any() else 1.0
-    if abs(usual - 1) > 0.5:
-        what = f"from one index pulse to the next the angle advances {usual:.3g} turns"
-        account.warn(
-            "data.index.turns",
-            "angle.index",
-            what,
-            "check the unit of the angle, and whether both turn with the driver",
-        )
-    offsets = np.angle(np.exp(1j * (at - at[0])))
-    far = np.flatnonzero(np.abs(offsets) > np.radians(5.0))
-    if far.size:
-        what = f"{counted(far.size, 'index pulse')} of {index.size} more than 5 deg off the first, {times(index[far])}"
-        account.warn("data.index.off", "angle.index", what, "check the angle sensor: it slips, or its readings jump")
-
-
-def _of_pulses(
-    source: AngleSource, table: DataTable, line: Timeline, index: Array, zero: float, account: Account
-) -> Coordinate:
-    """The angle between pulses by interpolation in time, counted anew from every index pulse."""
-    assert source.per_turn is not None
-    readings = line.rows(table.columns[str(source.column)].values)
-    found = pulses_of(source, readings, line, index.size > 1, account)
-    if found.times.size < 2:
-        raise MechanismError(
-            Finding(
-                f"the column '{source.column}' has {counted(found.times.size, 'pulse')}: there are no turns", "angle",
-                "check that angle.column is the encoder's, and angle.kind", file=account.file,
-            )
-        )  # fmt: skip
-    counts, spoilt = found.counts, found.spoilt
-    if index.size > 1:
-        at = np.interp(index[[0, -1]], found.times, counts)
-        index = seen_edges(index, float(np.abs(at[1] - at[0])) / source.per_turn, line.step)
-        counts, lost = by_index(found, index, source.per_turn, line.step, account)
-        spoilt = np.concatenate([spoilt, lost])
-    elif index.size == 1:
-        counts = counts - np.interp(index[0], found.times, counts)
-    turned = source.sign * TURN / source.per_turn * counts
-    pulse = 360.0 / source.per_turn
-    blur = pulse * min(0.5 * found.slack(line.step), 0.5)
-    when, spans, lag = found.times, np.zeros(0), 0.0
-    if not found.crossings and found.slack(line.step) < 1:  # a count for each event: its time is not known
-        when, spans = smoothed(when, 0.5 * line.step, source.per_turn, counts)
-        lag = unresolved((found.times - when)[spans > 0], line.step)
-    elif not found.crossings:  # an event for each sample: its count is not known
-        raw = turned
-        turned, spans = smoothed(raw, float(np.radians(blur)), source.per_turn / found.slack(line.step), found.times)
-        per_pulse = line.step / found.slack(line.step)
-        lag = unresolved((raw - turned)[spans > 0], float(np.radians(pulse))) / np.radians(pulse) * per_pulse
-    values = np.interp(line.seconds, when, turned, left=np.nan, right=np.nan)
-    if found.until is not None:
-        values[line.seconds > found.until] = np.nan
-    known = "" if found.crossings else ", each known to ± {} deg by the sampling"
-    usual = float(np.median(spans)) if spans.size else 0.0
-    even = f"; it is smoothed over {_turns(usual)}, with which all pulses agree" if usual > 0 else ""
-    account.say(
-        f"the angle is interpolated between pulses {pulse:.4g} deg apart{known}{even}",
-        None if found.crossings else blur,
-    )
-    return Coordinate(values + zero, spoilt, lag)
+def _turns(number: float) -> str:
+    return f"{number:.3g} turn{'s' * (number != 1)}"
 
 
 def smoothed(values: Array, off: float, per_turn: float, over: Array | None = None) -> tuple[Array, Array]:
-    """Values at pulses by local cubics (Savitzky and Golay, doi:10.1021/ac60214a047), and the turns of each span.
+    """Smooth values at pulses by local cubics (Savitzky and Golay, doi:10.1021/ac60214a047).
 
-    values: times, s, of pulses one count apart, or angles, rad, of pulses one sample apart; off: by which each may be
-    off, as uniformly as rounding; per_turn: pulses of a turn; over: counts of the times, or times of the angles, where
-    some are more than one apart, as near one count a sample: the values are smoothed less a straight line over them.
     Each takes the longest span in which no value is farther from the cubic than it may be, and their root mean square
-    is that of rounding; none, 0, where not even the shortest is so.
+    is that of rounding.
+
+    Parameters
+    ----------
+    values : times, s, of pulses one count apart, or angles, rad, of pulses one sample apart.
+    off : by which each may be off, as uniformly as rounding.
+    per_turn : pulses of a turn.
+    over : counts of the times, or times of the angles, where some are more than one apart, as near one count a sample:
+        the values are smoothed less a straight line over them.
+
+    Returns
+    -------
+    The values, and the turns of each span; 0 where not even the shortest is so.
     """
-    found, spans = values.copy(), np.zeros(values.size)
+    result, spans = values.copy(), np.zeros(values.size)
     if off <= 0:
-        return found, spans
+        return result, spans
     over = np.arange(values.size, dtype=np.float64) if over is None else over
     trend = values[0] + (values[-1] - values[0]) * (over - over[0]) / (over[-1] - over[0])
     for span in SPANS:
         width = 2 * int(span * per_turn / 2) + 1
         if width < FEWEST or width > values.size:
             continue
-        fitted = trend + by_local_polynomials(values - trend, width, ORDER)
+        fitted = trend + local_polynomials(values - trend, width, ORDER)
         left = np.abs(values - fitted)
         even = np.sqrt(np.maximum(uniform_filter1d(left**2, width, mode="mirror"), 0.0)) <= EVEN * off
         good = minimum_filter1d(((left <= BOUND * off) & even).astype(np.int8), width, mode="mirror") > 0
-        taken = good & (spans == 0)
-        found[taken], spans[taken] = fitted[taken], span
-    return found, spans
+        first = good & (spans == 0)
+        result[first], spans[first] = fitted[first], span
+    return result, spans
 
 
-def _turns(number: float) -> str:
-    return f"{number:.3g} turn{'s' * (number != 1)}"
+def local_polynomials(values: Array, width: int, order: int) -> Array:
+    """Each value by the polynomial nearest to the `width` values around it; near the ends by that of the outermost.
+
+    By hand: `scipy.signal` brings `scipy.stats`, and gives 0 for a width of some 10⁴ on. width: odd, above the order.
+    """
+    half = width // 2
+    places = np.arange(-half, half + 1) / half  # of one size, so that no power is lost beside another
+    middle = np.zeros(order + 1)
+    middle[0] = 1.0  # the polynomial itself, not one of its derivatives
+    weights = np.linalg.lstsq(places ** np.arange(order + 1)[:, None], middle, rcond=None)[0]
+    smooth: Array = convolve1d(values, weights[::-1], mode="constant")
+    for end, inside in ((slice(0, width), slice(0, half)), (slice(-width, None), slice(-half, None))):
+        smooth[inside] = np.polyval(np.polyfit(np.arange(width), values[end], order), np.arange(width)[inside])
+    return smooth
 
 
 def unresolved(off: Array, step: float) -> float:
@@ -308,16 +434,6 @@ def unresolved(off: Array, step: float) -> float:
     if off.size < 2:
         return 0.0
     few = int(0.005 * off.size)
-    told = np.sort(off)[few : off.size - few]
-    between = max(float(np.max(np.diff(told), initial=0.0)), step - float(told[-1] - told[0]))
+    kept = np.sort(off)[few : off.size - few]
+    between = max(float(np.max(np.diff(kept), initial=0.0)), step - float(kept[-1] - kept[0]))
     return min(between, step) / math.sqrt(12.0)
-
-
-def seen_edges(index: Array, turns: float, step: float) -> Array:
-    """Rising edges of an index that is too narrow for the sampling to see it in every turn.
-
-    index: taken in the middle between two samples; turns: from the first to the last of them. One that is seen in a
-    share of the turns is as wide as that share of a sample, and rose at most so long before the sample that saw it.
-    """
-    share = min((index.size - 1) / max(turns, 1.0), 1.0)
-    return index + 0.5 * step * (1.0 - share) if share < 0.95 else index

@@ -1,7 +1,8 @@
-"""From readings to quantities: sign, gain, zero with its uncertainty, and the zero-phase filter."""
+"""From readings to quantities: unit and gain, zero with its uncertainty, the zero-phase filter, steps and noise."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from math import comb
@@ -9,37 +10,35 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.columns import Column
-from trunnion.rig.reading.faults import outliers
-from trunnion.rig.reading.log import Account, counted, few_digits, runs, times
+from trunnion.rig.reading.checks import outliers
+from trunnion.rig.reading.log import at_times, counted, note, runs, warning
 from trunnion.rig.reading.mapping import Channel, Filter, Zero
-from trunnion.rig.reading.scale import OTHER_COLUMN, SensorScale, default_unit, scale
-from trunnion.rig.reading.sensor_quantity import HERTZ, Amount, alike, dimensions
+from trunnion.rig.reading.tables import Column
 from trunnion.rig.reading.timebase import Timeline
+from trunnion.rig.reading.units import (
+    HERTZ,
+    OTHER_COLUMN,
+    Amount,
+    SensorScale,
+    alike,
+    default_unit,
+    dimensions,
+    scale,
+)
 
 __all__ = [
-    "LOOKED_AT",
-    "ChannelReading",
-    "Zeroed",
-    "compare_units",
-    "filtered",
-    "mean_uncertainty",
-    "noise_of",
-    "read_in",
-    "reading",
-    "resolution",
-    "shown",
-    "zeroed",
-]
+    "LOOKED_AT", "ChannelReading", "Zeroed", "filtered", "mean_uncertainty", "noise_of", "reading", "resolution",
+    "unit_differs", "zeroed",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+Say = Callable[[Finding | str], None]  # takes a finding, or a sentence about what was done
 LOOKED_AT = 50_000  # readings of which the step is told
 MOST = 1e100  # SI units that a reading of 1 may mean
-FEWEST_LEVELS = 5  # of readings, from which they tell the step of a converter
-LEVELS = 8  # from which they tell it though some are left out, or the last decimal
+FEWEST_LEVELS = 3  # of readings in all files of a channel, from which they show the step of a converter
+LEVELS = 8  # from which they show it though some are left out, or the last decimal
 DECIMALS = 10  # looked for
 EXACT = 1e9  # below which a float tells whole numbers from others to 1e-6
 BRIDGED = 0.1  # of the period of the cut-off: gaps up to this are bridged for the filter
@@ -74,142 +73,119 @@ class ChannelReading:
         off = readings - zero.value
         return sign * self.scale.factor * (off - zero.drift * (seconds - zero.since) if zero.drift else off)
 
-    def live(self, zero: Amount) -> bool:
-        """Whether a zero is what the sensor gives of nothing, as 4 mA: stated of readings that are not the quantity."""
-        stated = zero.plain or alike(zero.dimensions, self.scale.of_reading)
-        return stated and not alike(self.scale.of_reading, self.scale.of_quantity)
+    def datum(self, zero: Zero | Amount, value: float, sign: int) -> float:
+        """What is measured where the sensor reads 0, if a zero is stated in the unit of the quantity; else 0.
+
+        A zero in other units, as 4 mA, is what the sensor gives of nothing.
+        """
+        if not isinstance(zero, Amount) or (
+            (zero.plain or alike(zero.dimensions, self.scale.of_reading)) and not self.scale.direct
+        ):
+            return 0.0
+        return -value * sign * self.scale.factor
+
+    @property
+    def read_in(self) -> tuple[str, float]:
+        """The unit of readings that are what is measured itself, and its factor to SI; empty of volts and the like."""
+        return (self.unit, self.scale.raw) if self.unit and self.scale.direct else ("", 1.0)
+
+    @property
+    def shown(self) -> tuple[str, float]:
+        """Unit in which figures of a channel are shown, and its size in SI."""
+        return self.read_in if self.read_in[1] != 1 else (self.scale.unit, 1.0)
 
 
-def reading(name: str, channel: Channel, column: Column, account: Account) -> ChannelReading:
+def reading(name: str, channel: Channel, column: Column, say: Say) -> ChannelReading:
     """The unit of a channel's readings: the mapping's, else the file's, else that of what it measures in SI."""
-    where = f"channels.{name}"
-    unit = channel.unit or ""
-    if channel.unit:
-        compare_units(where, channel.column, channel.unit, column, account)
+    where, unit = f"channels.{name}", channel.unit or column.unit
+    if channel.unit and (finding := unit_differs(where, channel.column, channel.unit, column)):
+        say(finding)
     if not channel.unit and column.unit:
-        unit = column.unit
-        account.say(f"unit of {name} from the file: {unit}")
+        say(f"unit of {name} from the file: {unit}")
     if not unit and (channel.gain is None or channel.gain.plain):
         unit = default_unit(channel.measures)
-        account.note(
-            "data.unit.none",
-            where,
-            f"has no unit in the mapping or the file; SI is assumed ({unit or '1'})",
-            f"state {where}.unit",
-        )
+        what = f"has no unit in the mapping or the file; SI is assumed ({unit or '1'})"
+        say(note("unit.none", where, what, f"state {where}.unit"))
     try:
-        found = scale(channel.measures, unit, channel.gain, channel.column)
-        if not MOST > abs(found.factor) > 1 / MOST:
-            what = f"a reading of 1 is {found.factor:.3g} {found.unit}, which no sensor has"
-            raise MechanismError(Finding(what, f"{where}.gain", "check unit and gain", file=account.file))
-        limit = found.reading(channel.range, "range") if channel.range else None
-        zero = abs(found.factor) * found.reading(channel.accuracy.zero, "accuracy.zero")
-        step = found.reading(channel.resolution, "resolution") if channel.resolution else 0.0
-        return ChannelReading(found, unit, limit, zero, float(channel.accuracy.gain.evaluate()), step)
+        sensor = scale(channel.measures, unit, channel.gain, channel.column)
+        if not MOST > abs(sensor.factor) > 1 / MOST:
+            what = f"a reading of 1 is {sensor.factor:.3g} {sensor.unit}, which no sensor has"
+            raise MechanismError(Finding(what, f"{where}.gain", "check unit and gain"))
+        limit = sensor.reading(channel.range, "range") if channel.range else None
+        zero = abs(sensor.factor) * sensor.reading(channel.accuracy.zero, "accuracy.zero")
+        step = sensor.reading(channel.resolution, "resolution") if channel.resolution else 0.0
+        return ChannelReading(sensor, unit, limit, zero, float(channel.accuracy.gain.evaluate()), step)
     except UnitError as error:
         remedy = error.remedy
         if not channel.unit and column.unit and not remedy.startswith(OTHER_COLUMN):  # no logger's file is written anew
             remedy = f"state {where}.unit in the mapping; in the file, {remedy}"
-        raise MechanismError(Finding(error.what, where, remedy, file=account.file)) from None
+        raise MechanismError(Finding(error.what, where, remedy)) from None
 
 
-def compare_units(where: str, name: str, unit: str, column: Column, account: Account) -> None:
-    """Tell where the file states another unit of a column than the mapping."""
+def unit_differs(where: str, name: str, unit: str, column: Column) -> Finding | None:
+    """The file states another unit of a column than the mapping."""
     stated = dimensions(unit)
     try:
-        own = dimensions(column.unit) if column.unit else stated
+        of_file = dimensions(column.unit) if column.unit else stated
     except UnitError:
-        return
-    if own[1] == HERTZ and stated[1] == dimensions("rad/s")[1] and np.isclose(stated[0] / own[0], (1, 2 * np.pi)).any():
-        return  # 1/min where the mapping says rpm, as it has to
-    if not alike(own[1], stated[1]) or own[0] != stated[0]:
-        what = f"the file has the unit '{column.unit}' for '{name}', the mapping '{unit}', which is taken"
-        if alike(own[1], stated[1]):
-            what = f"{what}: all values are {few_digits(stated[0] / own[0], 3)} times those of the file"
-        account.warn("data.unit.differs", where, what, f"correct {where}.unit, or remove it")
+        return None
+    turns = of_file[1] == HERTZ and stated[1] == dimensions("rad/s")[1]  # 1/min where the mapping has to say rpm
+    if turns and np.isclose(stated[0] / of_file[0], (1, 2 * np.pi)).any():
+        return None
+    if alike(of_file[1], stated[1]) and of_file[0] == stated[0]:
+        return None
+    what = f"the file has the unit '{column.unit}' for '{name}', the mapping '{unit}', which is taken"
+    if alike(of_file[1], stated[1]):
+        what = f"{what}: all values are {stated[0] / of_file[0]:.3g} times those of the file"
+    return warning("unit.differs", where, what, f"correct {where}.unit, or remove it")
 
 
-def shown(own: ChannelReading) -> tuple[str, float]:
-    """Unit in which figures of a channel are told, and its size in SI: that of its readings where it is another one."""
-    unit, size = read_in(own)
-    return (unit, size) if size != 1 else (own.scale.unit, 1.0)
-
-
-def read_in(own: ChannelReading) -> tuple[str, float]:
-    """The unit of readings that are what is measured itself, and its factor to SI; empty of volts and the like."""
-    raw = own.scale
-    return (own.unit, raw.raw) if own.unit and alike(raw.of_reading, raw.of_quantity) else ("", 1.0)
+# ---- zero -----------------------------------------------------------------------------------------------------
 
 
 def zeroed(
-    name: str, channel: Channel, own: ChannelReading, readings: Array, line: Timeline, remove: bool, account: Account
+    name: str, channel: Channel, sensor: ChannelReading, readings: Array, line: Timeline, remove: bool, say: Say
 ) -> Zeroed:
     """The zero of a channel: a value, or the mean over its unloaded stretches.
 
-    Two stretches or more tell a drift of the zero between them; remove: it is corrected, a straight line through them.
+    Two stretches or more show a drift of the zero between them; remove: it is corrected, a straight line through them.
     """
     if isinstance(channel.zero, Amount):
-        return Zeroed(own.scale.reading(channel.zero, "zero"))
-    where, zero = f"channels.{name}.zero", channel.zero
-    middles, means, errors = _stretches(where, zero, readings, line, account)
-    unit, raw = own.scale.unit, own.scale
-    weights = 1 / np.maximum(errors, 1e-300) ** 2 if np.all(errors > 0) else np.ones(means.size)
-    mean = float(np.average(means, weights=weights))
-    error = float(1 / np.sqrt(weights.sum())) if np.all(errors > 0) else 0.0
-    if means.size < 2 or np.ptp(middles) == 0:
-        account.say(f"zero of {name}: mean over the unloaded stretch, ± {{}} {unit}", abs(raw.factor) * error)
-        return Zeroed(mean, error, since=float(np.average(middles, weights=weights)))
-    slope = float(np.polyfit(middles, means, 1)[0])
-    span = float(np.ptp(middles))
-    change = slope * span
-    drifts = abs(change) > 5 * float(np.hypot(errors[0], errors[-1])) and change != 0
-    by = f"{raw.factor * change * channel.sign:.3g} {unit} in {span:.4g} s"
-    told = f"the zero drifts by {by}, between the unloaded stretches"
-    if drifts and remove:
-        account.warn(
-            "data.zero.drift_removed",
-            where.removesuffix(".zero"),
-            f"{told}; a straight line is subtracted",
-            "let the sensor warm up",
-        )
-        return Zeroed(float(np.mean(means)), error, slope, float(np.mean(middles)))
-    if drifts:
-        account.warn(
-            "data.zero.drift", where.removesuffix(".zero"), told, "let the sensor warm up, or state drift: remove"
-        )
-    account.say(f"zero of {name}: mean over {means.size} unloaded stretches, ± {{}} {unit}", abs(raw.factor) * error)
-    return Zeroed(mean, error, since=float(np.average(middles, weights=weights)))
-
-
-def _stretches(where: str, zero: Zero, readings: Array, line: Timeline, account: Account) -> tuple[Array, Array, Array]:
-    """Middle of the readings, their mean and its standard uncertainty, of every unloaded stretch that has values."""
-    rows = []
-    for begin, end in zero.over:
+        return Zeroed(sensor.scale.reading(channel.zero, "zero"))
+    where, rows = f"channels.{name}", []
+    for begin, end in channel.zero.over:
         low, high = np.searchsorted(line.seconds, (begin.value, end.value))
         known = np.isfinite(readings[low:high])
         part, when = readings[low:high][known], line.seconds[low:high][known]
         if (spikes := outliers(part)).any():
             what = f"spikes: {counted(int(spikes.sum()), 'reading')} of {part.size:,} in the unloaded stretch, "
-            account.warn("data.readings.spikes", where, f"{what}{times(when[spikes])}; left out", "check shielding")
+            what += f"{at_times(when[spikes])}; left out"
+            say(warning("readings.spikes", f"{where}.zero", what, "check shielding"))
             part, when = part[~spikes], when[~spikes]
-        if part.size:  # a stretch may be stated longer than the file has it
-            rows.append((float(np.mean(when)), float(np.mean(part)), mean_uncertainty(part)))
-        else:
-            what = (
-                f"there are no readings from {begin.value:g} to {end.value:g} s; the file runs from {line.seconds[0]:g}"
-            )
-            what = f"{what} to {line.seconds[-1]:g} s"
-            account.warn(
-                "data.zero.no_readings",
-                where,
-                what,
-                "state a stretch in which the sensor is not loaded",
-                Severity.ERROR,
-            )
-    if not rows:
-        raise MechanismError(account.findings[-1:])
+        if not part.size:
+            span, ends = f"{begin.value:g} to {end.value:g} s", f"{line.seconds[0]:g} to {line.seconds[-1]:g} s"
+            what = f"there are no readings from {span}; the file runs from {ends}"
+            remedy = "state a stretch in which the sensor is not loaded"
+            raise MechanismError(Finding(what, f"{where}.zero", remedy, code="data.zero.no_readings"))
+        rows.append((float(np.mean(when)), float(np.mean(part)), mean_uncertainty(part)))
     middles, means, errors = np.array(rows).T
-    return middles, means, errors
+    scatters = bool(np.all(errors > 0))
+    weights = 1 / np.maximum(errors, 1e-300) ** 2 if scatters else np.ones(means.size)
+    mean, since = (float(np.average(row, weights=weights)) for row in (means, middles))
+    error = float(1 / np.sqrt(weights.sum())) if scatters else 0.0
+    apart = float(np.ptp(middles))
+    if apart > 0:
+        slope = float(np.polyfit(middles, means, 1)[0])
+        if abs(slope * apart) > 5 * float(np.hypot(errors[0], errors[-1])):
+            by = f"{sensor.scale.factor * slope * apart * channel.sign:.3g} {sensor.scale.unit} in {apart:.4g} s"
+            what = f"the zero drifts by {by}, between the unloaded stretches"
+            what += "; a straight line is subtracted" * remove
+            remedy = "let the sensor warm up" + ("" if remove else ", or state drift: remove")
+            say(warning("zero.drift", where, what, remedy))
+            if remove:
+                return Zeroed(float(np.mean(means)), error, slope, float(np.mean(middles)))
+    say(f"zero of {name}: mean over the unloaded stretch")
+    return Zeroed(mean, error, since=since)
 
 
 def mean_uncertainty(samples: Array) -> float:
@@ -232,7 +208,10 @@ def mean_uncertainty(samples: Array) -> float:
     return float(np.sqrt(variance * max(total, 1.0) / (n - 1)))
 
 
-def filtered(values: Array, line: Timeline, low_pass: Filter, account: Account, where: str) -> Array:
+# ---- filter ---------------------------------------------------------------------------------------------------
+
+
+def filtered(values: Array, line: Timeline, low_pass: Filter, where: str) -> tuple[Array, Finding | None]:
     """A Butterworth low-pass forward and backward, 3 dB down at the cut-off after both.
 
     Gaps up to a tenth of the period of the cut-off are bridged by a straight line and are gaps again afterwards; over
@@ -241,28 +220,22 @@ def filtered(values: Array, line: Timeline, low_pass: Filter, account: Account, 
     """
     from scipy.signal import butter, sosfiltfilt  # brings scipy.stats: longer to import than all the rest
 
-    rate = 1.0 / line.step
-    cut_off = low_pass.cut_off.value
-    finite = np.isfinite(values)
-    starts, lengths = runs(~finite)
-    short = lengths * line.step <= BRIDGED / cut_off
+    rate, cut_off, finite = 1.0 / line.step, low_pass.cut_off.value, np.isfinite(values)
     hole = ~finite
-    for begin, length in zip(starts[short], lengths[short], strict=True):
-        hole[begin : begin + length] = begin == 0 or begin + length == values.size
-    if not np.any(~hole):
-        return values
-    bridged = values if finite.all() else np.interp(line.seconds, line.seconds[finite], values[finite])
+    for begin, length in zip(*runs(~finite), strict=True):
+        if length * line.step <= BRIDGED / cut_off:
+            hole[begin : begin + length] = begin == 0 or begin + length == values.size
+    if hole.all():
+        return values, None
+    bridged = np.interp(line.seconds, line.seconds[finite], values[finite])
     # both passes together are 3 dB down at the cut-off if each is where |H|² = 1/√2
     edge = np.tan(np.pi * cut_off / rate) / (np.sqrt(2.0) - 1.0) ** (1.0 / (2 * low_pass.order))
     sections = butter(low_pass.order, min(2 / np.pi * np.arctan(edge), 1 - 1e-9), output="sos")
-    breaks = np.zeros(values.size, dtype=np.bool_)
-    breaks[line.breaks] = True
     least = 3 * (2 * len(sections) + 1) + 1
     result, lost = np.full(values.size, np.nan), 0
     for begin, length in zip(*runs(~hole), strict=True):
-        cuts = begin + np.flatnonzero(breaks[begin : begin + length])
-        bounds = [begin, *cuts[cuts > begin].tolist(), begin + length]
-        for low, high in pairwise(bounds):
+        cuts = line.breaks[(line.breaks > begin) & (line.breaks < begin + length)]
+        for low, high in pairwise([begin, *cuts.tolist(), begin + length]):
             if high - low < least:
                 lost += high - low
                 continue
@@ -271,12 +244,13 @@ def filtered(values: Array, line: Timeline, low_pass: Filter, account: Account, 
                 result[low:high] = sosfiltfilt(sections, bridged[low:high], padlen=pad)
             except np.linalg.LinAlgError:
                 what = f"order {low_pass.order} at {cut_off:g} Hz of {rate:.4g} Hz cannot be computed"
-                raise MechanismError(Finding(what, "filter", "lower the order", file=account.file)) from None
-    if lost:
-        what = f"{counted(lost, 'sample')} between gaps too close for the filter; left out"
-        account.warn("data.filter.gaps", where, what, "raise the cut-off, or remove the cause of the gaps")
+                raise MechanismError(Finding(what, "filter", "lower the order")) from None
     result[~finite] = np.nan
-    return result
+    what, remedy = f"{lost:,} samples between gaps too close for the filter", "raise the cut-off, or mend the gaps"
+    return result, warning("filter.gaps", where, f"{what}; left out", remedy) if lost else None
+
+
+# ---- steps and noise ------------------------------------------------------------------------------------------
 
 
 def resolution(readings: Array) -> float:
@@ -291,13 +265,11 @@ def resolution(readings: Array) -> float:
     apart = np.diff(levels)
     apart = apart[apart > 1e-9 * float(np.ptp(np.percentile(levels, (1, 99))))]
     step = float(apart.min())
-    whole = np.rint(apart / step)
+    multiples = np.rint(apart / step)
     few = levels.size < LEVELS
-    if np.all(np.abs(apart / step - whole) < 0.01) and not (few and np.mean(whole == 1) <= 0.5):
+    if np.all(np.abs(apart / step - multiples) < 0.01) and not (few and np.mean(multiples == 1) <= 0.5):
         return step
-    if few:
-        return 0.0
-    for k in range(DECIMALS):
+    for k in range(DECIMALS * (not few)):
         scaled = levels * 10.0**k
         if np.max(np.abs(scaled)) < EXACT and np.all(np.abs(scaled - np.rint(scaled)) < 1e-6):
             return float(10.0**-k)
@@ -305,7 +277,7 @@ def resolution(readings: Array) -> float:
 
 
 def noise_of(readings: Array) -> float:
-    """Standard deviation of what is white in readings: the least that differences of first to third order tell.
+    """Standard deviation of what is white in readings: the least that differences of first to third order show.
 
     The mean of |Δᵏ| of normal deviates is σ √(2/π) √C(2k, k). A course makes the lower orders larger, noise none.
     """

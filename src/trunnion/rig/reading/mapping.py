@@ -5,29 +5,31 @@ Strict, like a model file: an unknown key, a wrong unit or a name that is not th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, Tag, WithJsonSchema, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, Tag, ValidationError, WithJsonSchema, model_validator
+from pydantic_core import PydanticCustomError
 
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.entry import Name, Part, forms, problem
+from trunnion.model.file import Lines, place, read_entries
+from trunnion.model.findings import schema_findings
+from trunnion.model.names import nearest
 from trunnion.model.quantity import Angle, AnyQuantity, Dimensionless, Quantity, Rate, Time
-from trunnion.model.units import KINDS, UnitError
-from trunnion.rig.reading.scale import MeasureText, SensorScale, scale
-from trunnion.rig.reading.sensor_quantity import Amount, Frequency, Number, UnitText, alike, dimensions
+from trunnion.model.schema import SchemaGenerator
+from trunnion.model.units import ANGLE, KINDS, UnitError
+from trunnion.rig.reading.units import Amount, Frequency, MeasureText, Number, SensorScale, UnitText, alike, scale
+from trunnion.rig.reading.units import dimensions as unit_dimensions
 
 __all__ = [
-    "AngleSource",
-    "Channel",
-    "DataMapping",
-    "File",
-    "FixedAngle",
-    "FixedNumber",
-    "FixedTime",
-    "FromData",
-    "TimeBase",
-    "Zero",
-]
+    "AngleSource", "Channel", "DataMapping", "File", "Filter", "FixedAngle", "FixedNumber", "FixedTime", "FromData",
+    "Mapped", "TimeBase", "Zero", "read_mapping", "schema_text",
+]  # fmt: skip
 
 Sign = Literal[1, -1]
 
@@ -298,6 +300,10 @@ class DataMapping(Part):
             }
         return self.model_copy(update=changes) if changes else self
 
+    def settings(self, entry: File) -> dict[str, FromData | Quantity]:
+        """What was set, for all files and for this one."""
+        return {**self.set, **entry.set}
+
     @property
     def timed(self) -> bool:
         """Whether the cycle is a time."""
@@ -316,5 +322,164 @@ def _check_spans(spans: Any) -> None:
 
 def _unit_of(text: str, si: str, needed: str) -> None:
     """An error of pydantic if a unit does not measure the same as that of SI."""
-    if not alike(dimensions(text)[1], dimensions(si)[1]):
+    if not alike(unit_dimensions(text)[1], unit_dimensions(si)[1]):
         raise problem(f"the unit '{text}' is not {needed}", f"write {needed}")
+
+
+# ---- the file -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """A mapping with the folder that its files lie below, and the lines of its entries for findings."""
+
+    mapping: DataMapping
+    folder: Path
+    file: str
+    lines: Lines
+    data: Mapping[str, Any]
+
+    def placed(self, findings: list[Finding]) -> list[Finding]:
+        """Findings about the mapping with its file and line; those of other files as they are."""
+        return place(findings, self.file, self.lines, self.data) if self.file else findings
+
+    def files(self, named: Iterable[str | os.PathLike[str]] | None) -> tuple[list[tuple[Path, File]], list[Finding]]:
+        """Data files with their entries; a note where files of the command line have less than those of the mapping.
+
+        A file of the command line has the entry of the same file, and the settings of the one entry that has its name.
+        """
+        entries, paths = self.mapping.files, [Path(one) for one in named or ()]
+        if not paths and not entries:
+            remedy = "write files: [{file: run-01.csv}], or name them after the mapping"
+            raise MechanismError(self.placed([Finding("no data file is named", "files", remedy)]))
+        if not paths:
+            return [(self.folder / entry.file, entry) for entry in entries], []
+        stated = {(self.folder / entry.file).resolve(): entry for entry in entries}
+        names = [Path(entry.file).name for entry in entries]
+        rows, bare = [], []
+        for path in paths:
+            entry = stated.get(path.resolve())
+            if entry is None:
+                like = [one for one, name in zip(entries, names, strict=True) if name == path.name]
+                unique = len(like) == 1 == [one.name for one in paths].count(path.name)
+                entry = File(file=path.name or ".", set=like[0].set if unique else {})
+                others = like if unique else entries
+                if any(one.over or one.angle or one.channels or (one.set and not unique) for one in others):
+                    bare.append(str(path))
+            rows.append((path, entry))
+        if not bare:
+            return rows, []
+        what = f"{', '.join(bare[:4])}{' …' * (len(bare) > 4)} read without what the mapping states for other files"
+        remedy = "add them to `files` with their set, over, angle or channels"
+        return rows, [Finding(what, "files", remedy, Severity.NOTE, code="data.files.less")]
+
+
+def read_mapping(source: str | os.PathLike[str] | Mapping[str, Any]) -> Mapped:
+    """A mapping from its file, or from plain data, whose files lie below the working folder.
+
+    MechanismError with every finding, each with file and line.
+    """
+    if isinstance(source, Mapping):
+        data, lines, file, folder = dict(source), Lines(), "", Path()
+    else:
+        path = Path(source)
+        data, lines = read_entries(path, "a mapping file", "write trunnion-data: 1, then files, time, angle, channels")
+        file, folder = str(path), path.parent
+    try:
+        mapping = DataMapping.model_validate(data)
+        findings = [*_check(mapping), *_check_cycle(mapping), *_check_files(mapping, folder)]
+    except ValidationError as error:
+        findings = [_explained(one, data) for one in schema_findings(error, DataMapping, data)]
+    if findings:
+        raise MechanismError(place(findings, file, lines, data) if file else findings)
+    return Mapped(mapping, folder, file, lines, data)
+
+
+def _explained(finding: Finding, data: Mapping[str, Any]) -> Finding:
+    """A file of another kind is told as such."""
+    if finding.what == "'trunnion-data' is missing":
+        if "trunnion" in data:
+            return Finding("is a model file, not a mapping file", "trunnion", "name the mapping, then the data files")
+        return Finding(finding.what, finding.where, "begin the file with trunnion-data: 1")
+    if finding.remedy == "see the examples of model files":
+        return Finding(finding.what, finding.where, "see the examples of mappings in docs/how-to/measured-data.md")
+    return finding
+
+
+def _check(mapping: DataMapping) -> Iterator[Finding]:
+    """What one part alone cannot tell: names of channels, the rate of the sampling."""
+    channels, settings = mapping.channels, {"set": mapping.set}
+    settings |= {f"files.{k}.set": file.set for k, file in enumerate(mapping.files)}
+    if not channels:
+        yield Finding("'channels' is missing", "", "write channels: {torque: {column: …, measures: …}}")
+    sources = [*channels, *(["angle"] if mapping.angle else [])]  # the mean speed by the angle
+    for key, values in settings.items():
+        for name, value in values.items():
+            if isinstance(value, FromData) and value.mean is not None and value.mean not in sources:
+                what = f"there is no channel '{value.mean}'"
+                yield Finding(what, f"{key}.{name}.mean", nearest(value.mean, sources))
+    source = mapping.angle.channel if mapping.angle else None
+    if source is not None and source not in channels:
+        yield Finding(f"there is no channel '{source}'", "angle.channel", nearest(source, channels))
+    elif source is not None and not channels[source].measures.startswith("rate:"):
+        what = f"the channel '{source}' measures {channels[source].measures}, not a speed"
+        yield Finding(what, "angle.channel", "name a channel that measures rate:DRIVER")
+    base = mapping.time
+    if mapping.filter and base and base.rate and 2 * mapping.filter.cut_off.value >= base.rate.value:
+        what = f"a cut-off of {mapping.filter.cut_off.value:g} Hz, samples come at {base.rate.value:g} Hz"
+        yield Finding(what, "filter.cut_off", f"write less than half of that, {base.rate.value / 2:g} Hz")
+
+
+def _check_cycle(mapping: DataMapping) -> Iterator[Finding]:
+    """Whether the cycle is one, and something tells where in it a row is."""
+    if mapping.cycle.check({}) not in (ANGLE, KINDS["time"].dimensions[0], None):
+        yield Finding(f"'{mapping.cycle.source}' is no angle and no time", "cycle", "write it as 360 deg or 0.5 s")
+    elif not float(mapping.cycle.evaluate()) > 0:
+        yield Finding("the cycle is not above zero", "cycle", "write it as 360 deg or 0.5 s")
+    elif mapping.angle is None and not mapping.timed:
+        remedy = "add angle: {from: …}, or write cycle: as a time"
+        yield Finding("'angle' is missing: no column gives the coordinate of the driver", "", remedy)
+
+
+def _check_files(mapping: DataMapping, folder: Path) -> Iterator[Finding]:
+    """Files outside the folder of the mapping, which is data from a stranger; entries that do not fit the mapping."""
+    home, channels = folder.resolve(), mapping.channels
+    for number, entry in enumerate(mapping.files):
+        where = f"files.{number}"
+        try:
+            inside = not Path(entry.file).is_absolute() and (folder / entry.file).resolve().is_relative_to(home)
+        except (OSError, ValueError, RuntimeError):
+            inside = False
+        if not inside:
+            what = f"'{entry.file[:80]}' is not below the folder of the mapping"
+            yield Finding(what, f"{where}.file", "put it there, or name it on the command line")
+        if entry.angle is not None and mapping.angle is None:
+            what = "states a zero of the angle, but no column gives an angle"
+            yield Finding(what, f"{where}.angle", "add angle: {from: …}, or remove it")
+        for name, change in entry.channels.items():
+            if name not in channels:
+                what = f"there is no channel '{name}'"
+                yield Finding(what, f"{where}.channels.{name}", nearest(name, channels))
+                continue
+            try:
+                change.of(channels[name])
+            except PydanticCustomError as error:
+                remedy = str((error.context or {}).get("remedy", ""))
+                yield Finding(error.message(), f"{where}.channels.{name}", remedy)
+
+
+class _Generator(SchemaGenerator):
+    """Amounts as they would be written in a file."""
+
+    def encode_default(self, dft: Any) -> Any:
+        return dft.source if isinstance(dft, Amount) else super().encode_default(dft)
+
+
+def schema_text() -> str:
+    """The JSON Schema (2020-12) of a mapping file, for editors that complete and check as you type."""
+    schema = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **DataMapping.model_json_schema(schema_generator=_Generator),
+        "title": "Trunnion mapping file",
+    }
+    return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"

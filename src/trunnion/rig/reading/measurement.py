@@ -18,7 +18,7 @@ from trunnion.errors import Finding
 from trunnion.model.units import Dimension
 from trunnion.results.attributes import finding_rows
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described
-from trunnion.rig.reading.repeated_steps import LeftOfSteps
+from trunnion.rig.reading.steps import LeftOfSteps
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -14,33 +15,28 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.arguments import strict_arguments
-from trunnion.rig.reading import faults
-from trunnion.rig.reading.angle import Coordinate, coordinate
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import BASES, Dimension, UnitError
+from trunnion.rig.reading import checks
+from trunnion.rig.reading.angle import coordinate
 from trunnion.rig.reading.channels import (
     LOOKED_AT,
     ChannelReading,
     Zeroed,
     filtered,
     noise_of,
-    read_in,
     reading,
     resolution,
-    shown,
     zeroed,
 )
-from trunnion.rig.reading.columns import DataTable, of_text
-from trunnion.rig.reading.files_named import files_of, unused_zero
-from trunnion.rig.reading.log import Account, counted, gathered, told
-from trunnion.rig.reading.mapping import DataMapping, File, FromData, Zero
-from trunnion.rig.reading.mapping_file import read_mapping
+from trunnion.rig.reading.log import counted, gathered, note, warning
+from trunnion.rig.reading.mapping import DataMapping, File, FromData, Zero, read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
-from trunnion.rig.reading.repeated_steps import LeftOfSteps, left_in_turns
-from trunnion.rig.reading.sensor_quantity import Amount, dimensions
-from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
-from trunnion.rig.reading.signal_checks import Drift, backwards, drift, signs, speeds, steady
-from trunnion.rig.reading.tables import read_table
-from trunnion.rig.reading.timebase import Timeline, timeline
+from trunnion.rig.reading.steps import LeftOfSteps, left_in_turns
+from trunnion.rig.reading.tables import DataTable, read_table
+from trunnion.rig.reading.timebase import timeline
 from trunnion.rig.reading.turns import DENSE, Turns, cut, joined, resampled, time_mean
+from trunnion.rig.reading.units import Dimensions, dimensions
 
 __all__ = ["read_measured"]
 
@@ -49,72 +45,66 @@ FEW_HARMONICS = 5.0
 SPARSE = 0.25  # samples a position, below which nearly all values are interpolated
 PASSED = 1.25  # times what a cubic between samples leaves of white noise, at the least
 PERIODS = 5.0  # of the cut-off of a filter, over which a reading reaches
-UNUSED = 0.5  # of the turns recorded, below which it is told how few are used
+UNUSED = 0.5  # of the turns recorded, below which a warning says how few are used
+MOST_VALUES = 500  # that a column may state; more, and it is a measurement
+DIGITS = 9  # by which two of its values are the same
 
 
 @strict_arguments
 def read_measured(
     mapping: str | os.PathLike[str] | Mapping[str, Any], files: Iterable[str | os.PathLike[str]] | None = None
 ) -> Measurement:
-    """The measurement that a mapping file describes: courses over the cycle, turn by turn, with what is wrong in them.
+    """Read the measurement that a mapping file describes: courses over the cycle, turn by turn, and faults in them.
 
-    mapping: its path, or its entries; files: data files instead of those it names. Faults of the data are findings of
-    the result; MechanismError, with every finding, where mapping or files cannot be read or there is no turn at all.
+    Parameters
+    ----------
+    mapping : path of the mapping, or its entries.
+    files : data files instead of those it names.
+
+    Returns
+    -------
+    The measurement; faults of the data are its findings.
+
+    Raises
+    ------
+    MechanismError
+        With every finding, where mapping or files cannot be read or there is no turn at all.
     """
     mapped = read_mapping(mapping)
+    entries, notes = mapped.files(files)
+    recordings: list[_Recording] = []
     conditions: list[Condition] = []
-    entries, notes = files_of(mapped, files)
-    accounts = [Account(str(path)) for path, _ in entries]
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers near the end of the floats
-        opened: list[_File] = []
-        for (path, entry), account in zip(entries, accounts, strict=True):
-            with _kept(account):
-                opened.append(_File(mapped.mapping.of_file(entry), path, entry, account))
-                opened[-1].find_turns()
-        steps = _steps(opened)
-        for file in opened:
-            with _kept(file.account):
-                conditions += file.conditions(steps)
-    failed = any(account.failed for account in accounts)
-    findings = [one for account in accounts for one in account.findings]
-    findings = [*findings, *notes, *unused_zero(mapped, [entry for _, entry in entries])]
-    findings = mapped.placed(findings)
-    if failed or not conditions:
+        for path, entry in entries:
+            recordings.append(_Recording(mapped.mapping.of_file(entry), path, entry))
+            with recordings[-1].failing():
+                recordings[-1].find_turns()
+        steps = _steps(recordings)
+        for recording in recordings:
+            with recording.failing():
+                conditions += recording.conditions(steps)
+    findings = mapped.placed([finding for recording in recordings for finding in recording.findings] + notes)
+    if not conditions or any(recording.failed for recording in recordings):
         raise MechanismError(gathered((one for one in findings if one.severity is not Severity.NOTE), same=True))
     name = mapped.mapping.name or Path(mapped.file).stem
-    return Measurement(
-        name,
-        tuple(_distinct(conditions)),
-        tuple(findings),
-        (_averaged(conditions, accounts), *told(accounts)),
-    )
+    return Measurement(name, tuple(_distinct(conditions)), tuple(findings), _done(conditions, recordings))
 
 
-@contextmanager
-def _kept(account: Account) -> Iterator[None]:
-    """What one file fails by is told with what the others do."""
-    try:
-        yield
-    except MechanismError as error:
-        account.findings += [one for one in error.findings if one not in account.findings]
-        account.failed = True
-
-
-def _steps(files: Sequence[_File]) -> dict[tuple[object, ...], float]:
+def _steps(recordings: Sequence[_Recording]) -> dict[tuple[object, ...], float]:
     """The step of each channel with one scale, in readings, from the levels of all files that have it.
 
-    A file whose readings span a few steps only does not tell them by itself.
+    A file whose readings span a few steps only does not show them by itself.
     """
     levels: dict[tuple[object, ...], list[Array]] = {}
-    for file in files:
-        for name, own in file.own.items():
-            levels.setdefault((name, own.unit, own.scale.factor), []).append(file.levels(name))
+    for recording in recordings:
+        for name, sensor in recording.sensors.items():
+            levels.setdefault((name, sensor.unit, sensor.scale.factor), []).append(recording.levels(name))
     return {key: resolution(np.concatenate(rows)) for key, rows in levels.items()}
 
 
-def _averaged(conditions: Sequence[Condition], accounts: Sequence[Account]) -> str:
-    """How many turns there are, and of how many if some are not used."""
-    recorded, lost = sum(one.recorded for one in accounts), sum(one.left_out for one in accounts)
+def _done(conditions: Sequence[Condition], recordings: Sequence[_Recording]) -> tuple[str, ...]:
+    """How many turns are used, and what was done to the data, each sentence once."""
+    recorded, lost = sum(one.recorded for one in recordings), sum(one.left_out for one in recordings)
     counts = [next(iter(one.courses.values())).turns.shape[0] for one in conditions]
     each = f"{min(counts):,}" if min(counts) == max(counts) else f"{min(counts):,} to {max(counts):,}"
     where = "" if len(counts) == 1 else f" in each of {len(counts):,} conditions"
@@ -123,366 +113,439 @@ def _averaged(conditions: Sequence[Condition], accounts: Sequence[Account]) -> s
         where += f" of {recorded:,.0f} recorded"
     elif lost:
         where += f", {lost:,} more left out as the findings say"
-    return f"{each} whole turns{where}; rows before, between and after them are not used"
+    sentences = [f"{each} whole turns{where}; rows before, between and after them are not used"]
+    for text in dict.fromkeys(text for one in recordings for text in one.done):
+        names = [one.path.name for one in recordings if text in one.done]
+        some = f"{', '.join(names[:4])}{' …' * (len(names) > 4)}: " if len(names) < len(recordings) else ""
+        sentences.append(f"{some}{text}")
+    return tuple(sentences)
 
 
 def _distinct(conditions: Sequence[Condition]) -> list[Condition]:
     """Conditions with different names: the file is added where two are alike, then a number."""
-    found: list[Condition] = []
-    names = [one.name for one in conditions]
-    for one in conditions:
-        name = one.name
-        if names.count(name) > 1 and one.files:
-            name = f"{name} ({', '.join(Path(file).stem for file in one.files)})"
+    taken: set[str] = set()
+    names = [condition.name for condition in conditions]
+    renamed = []
+    for condition in conditions:
+        name = condition.name
+        if names.count(name) > 1 and condition.files:
+            name = f"{name} ({', '.join(Path(file).stem for file in condition.files)})"
         plain, number = name, 2
-        while any(name == other.name for other in found):
+        while name in taken:
             name, number = f"{plain} {number}", number + 1
-        found.append(one if name == one.name else replace(one, name=name))
-    return found
+        taken.add(name)
+        renamed.append(replace(condition, name=name))
+    return renamed
+
+
+@dataclass(frozen=True)
+class _Setting:
+    """What was set in one condition of a file.
+
+    values: numbers of the model, SI, by name; dimensions: of those that were stated with a unit; means: channels whose
+    mean is the value; window: rows from the first to the last for which it was set; rows: those for which it was.
+    """
+
+    name: str
+    values: Mapping[str, float]
+    dimensions: Mapping[str, Dimension]
+    means: Mapping[str, str]
+    window: slice
+    rows: NDArray[np.bool_]
+
+    @property
+    def where(self) -> str:
+        """What a finding about the condition is about; its file says which one, where nothing is set."""
+        return f"condition {self.name}" if self.name else "turns"
 
 
 @dataclass(frozen=True)
 class _Part:
-    """One condition of a file: its setting, its turns, the courses of the channels, (turn, position), and by channel
-    what of the error by steps its turns repeat."""
+    """One condition of a file: its turns, the courses of the channels, (turn, position), and what of the error by steps
+    its turns repeat."""
 
-    setting: Setting
+    setting: _Setting
     turns: Turns
-    courses: dict[str, Array]
-    left: dict[str, LeftOfSteps]
+    courses: dict[str, Array] = field(default_factory=dict)
+    left: dict[str, LeftOfSteps] = field(default_factory=dict)
 
 
-class _File:
-    """One data file on its way to conditions."""
+class _Recording:
+    """One data file on its way to conditions. recorded: turns gone through; left_out: whole ones that are not used."""
 
-    def __init__(self, mapping: DataMapping, path: Path, entry: File, account: Account) -> None:
-        self.mapping, self.entry, self.account, self.path = mapping, entry, account, path
-        table = _table(path, mapping, entry)
-        for note in table.notes:
-            account.say(note)
-        for number, text in table.ends.items():
-            what = f"the line below the numbers is left out: '{text[:60]}'"
-            account.findings.append(
-                Finding(what, "", "", Severity.NOTE, file=account.file, line=number, code="data.rows.end")
-            )
-        self.line: Timeline = timeline(table, mapping.time, account)
-        if mapping.filter is not None:
-            self._check_filter(table)
-        self.own: dict[str, ChannelReading] = {}
-        self.lag, self.cut = 0.0, 0.0
-        self.readings: dict[str, Array] = {}
-        self.steps: dict[str, float] = {}  # SI
-        for name, channel in mapping.channels.items():
-            column = table.columns[channel.column]
-            self.own[name] = reading(name, channel, column, account)
-            self.readings[name] = np.array(self.line.rows(column.values))
-            where, limit = f"channels.{name}", self.own[name].limit
-            faults.cells(where, column, self.readings[name], self.line.seconds, account)
-            if limit is not None:
-                faults.clipped(where, self.readings[name], limit, self.own[name].unit, self.line.seconds, account)
-        self.table = table
+    def __init__(self, mapping: DataMapping, path: Path, entry: File) -> None:
+        self.mapping, self.path, self.entry = mapping, path, entry
+        self.findings: list[Finding] = []
+        self.done: list[str] = []
+        self.sensors: dict[str, ChannelReading] = {}
         self.parts: list[_Part] = []
+        self.recorded, self.left_out, self.failed = 0.0, 0, False
+
+    def say(self, finding: Finding | str | None) -> None:
+        """Take a finding, or a sentence about what was done."""
+        if isinstance(finding, str):
+            self.done.append(finding)
+        elif finding is not None:
+            self.findings.append(replace(finding, file=finding.file or str(self.path)))
+
+    @contextmanager
+    def failing(self) -> Iterator[None]:
+        """What one file fails by is reported with what the others do."""
+        try:
+            yield
+        except MechanismError as error:
+            self.failed = True
+            for finding in error.findings:
+                self.say(finding)
+
+    # ---- readings ---------------------------------------------------------------------------------------------
 
     def find_turns(self) -> None:
-        """Find the turns of each condition, and leave out what is wrong of the readings in them."""
-        mapping, account = self.mapping, self.account
-        self.zeros = {
-            name: zeroed(
-                name, channel, self.own[name], self.readings[name], self.line, mapping.drift == "remove", account
-            )
-            for name, channel in mapping.channels.items()
-        }
-        share, self.way, spoilt = self._share(self.zeros)
-        cuts, used = [], self._used()
-        for setting in settings(mapping, self.entry, self.table, self.line, account):
-            allowed = used[setting.window] & setting.rows
-            where = _where(setting)
-            turns = cut(share, self.line, setting.window, allowed, mapping.positions, spoilt, account, where)
-            gone = _gone(share[setting.window], allowed)
-            account.recorded += gone
-            if turns.numbers.size:
-                cuts.append((setting, turns))
-                if turns.numbers.size < UNUSED * gone - 2:
-                    what = f"{counted(turns.numbers.size, 'turn')} of {gone:,.0f} recorded can be used"
-                    account.warn("data.turns.lost", where, what, "correct what the other findings name")
-            else:
-                what = self._no_turn(share[setting.window], allowed)
-                account.error("data.turns.none", where, what, "check angle, or record for longer")
-        if not cuts:
-            return
-        self._check_rows(cuts)
-        self._check_zeros(cuts)
-        self.parts = [_Part(setting, turns, {}, {}) for setting, turns in cuts]
-        begin, end = (np.sort(np.concatenate([getattr(turns, one) for _, turns in cuts])) for one in ("begin", "end"))
-        low, high = np.searchsorted(self.line.seconds, begin[0]), np.searchsorted(self.line.seconds, end[-1], "right")
-        self.running = slice(int(low), int(high))
-        reach = float(np.median(end - begin)) / mapping.positions
-        reach += PERIODS / mapping.filter.cut_off.value if mapping.filter is not None else 0.0
-        span = faults.FaultSpan(int(low), int(high), begin, end, faults.WIDTH + int(reach / self.line.step))
+        """Read the file, find the turns of each condition, and leave out what is wrong of the readings in them."""
+        mapping, say = self.mapping, self.say
+        self.table = _table(self.path, mapping, self.entry)
+        if not self.table.encoding.startswith("utf-8"):
+            say(f"read in the encoding {self.table.encoding}")
+        self.line = timeline(self.table, mapping.time, say)
+        self._check_filter()
+        self.readings: dict[str, Array] = {}
+        self.zeros: dict[str, Zeroed] = {}
         for name, channel in mapping.channels.items():
-            speed = channel.measures.startswith("rate:")
-            faults.signal(f"channels.{name}", self.readings[name], self.line.seconds, span, account, speed)
+            column, where = self.table.columns[channel.column], f"channels.{name}"
+            sensor = self.sensors[name] = reading(name, channel, column, say)
+            values = self.readings[name] = np.array(self.line.rows(column.values))
+            say(checks.missing(where, column, values, self.line.seconds))
+            if sensor.limit is not None:
+                say(checks.clipped(where, values, sensor.limit, sensor.unit, self.line.seconds))
+            self.zeros[name] = zeroed(name, channel, sensor, values, self.line, mapping.drift == "remove", say)
+        self.used = np.ones(self.line.seconds.size, dtype=np.bool_)
+        if self.entry.over is not None:
+            begin, end = (one.value for one in self.entry.over)
+            self.used = (self.line.seconds >= begin) & (self.line.seconds <= end)
+        share, spoilt = self._cycles()
+        for setting in self._settings():
+            allowed = self.used[setting.window] & setting.rows
+            turns = cut(share, self.line, setting.window, allowed, mapping.positions, spoilt, say, setting.where)
+            steps = np.abs(np.diff(share[setting.window])[allowed[1:] & allowed[:-1]])
+            gone = float(np.sum(steps[np.isfinite(steps)]))
+            self.recorded, self.left_out = self.recorded + gone, self.left_out + turns.left_out
+            if not turns.numbers.size:
+                what = f"there is no whole turn: {gone:.3g} cycles in {counted(int(allowed.sum()), 'row')}"
+                say(Finding(what, setting.where, "check angle, or record for longer", code="data.turns.none"))
+                continue
+            if turns.numbers.size < UNUSED * gone - 2:
+                what = f"{counted(turns.numbers.size, 'turn')} of {gone:,.0f} recorded can be used"
+                say(warning("turns.lost", setting.where, what, "correct what the other findings name"))
+            self.parts.append(_Part(setting, turns))
+        if self.parts:
+            self._check_sampling()
+            self._find_faults()
+
+    def _check_filter(self) -> None:
+        low_pass, rate = self.mapping.filter, 1.0 / self.line.step
+        if low_pass is None:
+            return
+        cut_off, lasted = low_pass.cut_off.value, float(np.ptp(self.line.seconds))
+        if 2 * cut_off >= rate:
+            what = f"the sampling is too slow for the filter: {rate:.6g} Hz, a cut-off of {cut_off:g} Hz"
+            remedy = f"state a cut-off below {rate / 2:.4g} Hz, or sample faster"
+            raise MechanismError(Finding(what, "filter.cut_off", remedy))
+        if cut_off * lasted < 2:
+            what = f"the cut-off of {cut_off:g} Hz is slower than the recording of {lasted:.4g} s"
+            raise MechanismError(Finding(what, "filter.cut_off", "state a higher one"))
+        if not self.line.even:
+            what = "the samples are not evenly spaced in time, as a filter needs them"
+            self.say(warning("filter.uneven", "filter", what, "record at a fixed rate, or leave out the filter"))
+        passes = f"order {low_pass.order}, forward and backward, together 3 dB down at {cut_off:g} Hz"
+        self.say(f"low-pass filter: Butterworth of {passes}; gaps up to {100 / cut_off:.3g} ms are bridged for it")
+
+    def _cycles(self) -> tuple[Array, Array]:
+        """Cycles gone through by row, and stretches of time in which they are wrong; which way the coordinate runs."""
+        mapping, self.way, self.lag, self.cut = self.mapping, 1.0, 0.0, 0.0
+        cycle = float(mapping.cycle.evaluate())
+        if mapping.timed:
+            return self.line.seconds / cycle, np.empty((0, 2))
+        assert mapping.angle is not None
+        speed = None
+        if (name := mapping.angle.channel) is not None:
+            sensor = self.sensors[name]
+            if sensor.scale.unit != "rad/s":
+                what = f"the channel '{name}' is a speed in {sensor.scale.unit}, not of a turning driver"
+                raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s"))
+            sign = mapping.channels[name].sign
+            speed = sensor.quantity(self.readings[name], self.zeros[name], sign, self.line.seconds)
+        angle = coordinate(mapping.angle, self.table, self.line, speed, self.say)
+        self.lag, self.cut = angle.lag, angle.cut
+        known = np.flatnonzero(np.isfinite(angle.values) & self.used)
+        if known.size < 3:
+            raise MechanismError(Finding("no row in use has a coordinate of the driver", "angle", "check angle.column"))
+        self.way = 1.0 if angle.values[known[-1]] >= angle.values[known[0]] else -1.0
+        backward = np.repeat(self.line.spoilt[:, None], 2, axis=1)  # times
+        share = self.way * (angle.values - float(mapping.start.evaluate())) / cycle
+        return share, np.concatenate([angle.spoilt, backward])
+
+    def _settings(self) -> list[_Setting]:
+        """The conditions of the file: one, or as many as the columns that state them take different values."""
+        stated = self.mapping.settings(self.entry)
+        numbers = {path: one for path, one in stated.items() if isinstance(one, Quantity)}
+        values = {path: float(one.evaluate()) for path, one in numbers.items()}
+        texts = {path: str(one.source) for path, one in numbers.items()}
+        kinds = {path: one.check({}) for path, one in numbers.items() if not (one.expression and one.expression.bare)}
+        known_kinds = {path: kind for path, kind in kinds.items() if kind is not None}
+        taken = {path: one for path, one in stated.items() if isinstance(one, FromData)}
+        means = {path: one.mean for path, one in taken.items() if one.mean is not None}
+        columns = {path: str(one.column) for path, one in taken.items() if one.mean is None}
+        size = self.line.seconds.size
+        if not columns:
+            everywhere = np.ones(size, dtype=np.bool_)
+            return [_Setting(_named(texts), values, known_kinds, means, slice(0, size), everywhere)]
+        units = {path: taken[path].unit or self.table.columns[name].unit for path, name in columns.items()}
+        factors = {}
+        for path, unit in units.items():
+            try:
+                factors[path], exponents = dimensions(unit) if unit else (1.0, {})
+                if unit:
+                    known_kinds[path] = _dimension(exponents, unit)
+            except UnitError as error:
+                remedy = f"state the unit: set: {{{path}: {{column: …, unit: …}}}}; in the file, {error.remedy}"
+                raise MechanismError(Finding(error.what, f"set.{path}", remedy)) from None
+        raw = np.column_stack([self.line.rows(self.table.columns[name].values) for name in columns.values()])
+        known = np.isfinite(raw).all(axis=1)
+        if not known.any():
+            what = "the columns that state the condition have no numbers"
+            raise MechanismError(Finding(what, "set", "check set: {…: {column: …}}"))
+        if not known.all():
+            what = f"{counted(int(np.count_nonzero(~known)), 'row')} of {size:,} without a condition; left out"
+            self.say(warning("setting.missing", "set", what, "check the column"))
+        levels, which = np.unique(_rounded(raw[known]), axis=0, return_inverse=True)
+        if len(levels) > MOST_VALUES:
+            what = f"the columns that state the condition have {len(levels):,} different values"
+            raise MechanismError(Finding(what, "set", "a measured value is not a setting: write {mean: channel}"))
+        number = np.full(size, -1)
+        number[known] = which.ravel()
+        settings = []
+        for k in dict.fromkeys(which.ravel().tolist()):  # in the order of the file
+            rows = np.flatnonzero(number == k)
+            window = slice(int(rows[0]), int(rows[-1]) + 1)
+            own = dict(zip(columns, levels[k].tolist(), strict=True))
+            name = _named(texts | {path: f"{value:.6g} {units[path]}".strip() for path, value in own.items()})
+            si = values | {path: value * factors[path] for path, value in own.items()}
+            settings.append(_Setting(name, si, known_kinds, means, window, number[window] == k))
+        return settings
+
+    def _check_sampling(self) -> None:
+        """How turns are sampled, whether they are enough and equally fast, and what the filter leaves of them."""
+        say, positions = self.say, self.mapping.positions
+        for part in self.parts:
+            turns, where = part.turns, part.setting.where
+            if turns.numbers.size < 2:
+                what = "has one turn: there is no scatter, so no uncertainty"
+                say(warning("turns.one", where, what, "record two turns or more"))
+            say(checks.steady(turns, self.line.step, where))
+            if turns.density < 1:
+                samples = f"{turns.density * positions:.4g} samples a turn for {positions} positions"
+                what = f"the sampling is slow: {samples}; between them it is interpolated"
+                slow = warning if turns.density < SPARSE else note  # no fault of the readings
+                say(slow("sampling.slow", where, what, "state fewer positions, or sample faster"))
+            length = float(np.mean(turns.end - turns.begin))
+            passed = self.mapping.filter.cut_off.value * length if self.mapping.filter else np.inf
+            if passed < FEW_HARMONICS:
+                what = f"the filter leaves the first {passed:.2g} harmonics of a turn"
+                say(note("filter.harmonics", where, what, "state a higher cut-off"))
+            for name, channel in self.mapping.channels.items():
+                for low, high in channel.zero.over if isinstance(channel.zero, Zero) else ():
+                    if inside := int(np.sum((turns.begin < high.value) & (turns.end > low.value))):
+                        what = f"the unloaded stretch {low.value:g} to {high.value:g} s reaches into "
+                        what, remedy = what + counted(inside, "turn"), "state a stretch without load"
+                        say(warning("zero.in_turns", f"channels.{name}.zero", what, remedy))
+        most = int(min(part.turns.density for part in self.parts) * positions / DENSE)
+        if most >= positions:
+            say("values at a position: mean of the samples within half a position to either side")
+            return
+        size = 10 ** max(len(str(most)) - 2, 0)
+        tail = f"; of at most {most // size * size} positions each has four samples, which are averaged"
+        say(f"values at a position: interpolated by a cubic between four samples{tail * (most > 1)}")
+
+    def _find_faults(self) -> None:
+        """Leave out stuck readings and spikes from before the first turn to after the last."""
+        begin, end = (np.sort(np.concatenate([getattr(one.turns, key) for one in self.parts]))
+                      for key in ("begin", "end"))  # fmt: skip
+        low = int(np.searchsorted(self.line.seconds, begin[0]))
+        high = int(np.searchsorted(self.line.seconds, end[-1], "right"))
+        self.running = slice(low, high)
+        reach = float(np.median(end - begin)) / self.mapping.positions
+        reach += PERIODS / self.mapping.filter.cut_off.value if self.mapping.filter is not None else 0.0
+        span = checks.FaultSpan(low, high, begin, end, checks.WIDTH + int(reach / self.line.step))
+        for name, channel in self.mapping.channels.items():
+            where, readings, moves = f"channels.{name}", self.readings[name], not channel.measures.startswith("rate:")
+            for finding in checks.faults(where, readings, self.line.seconds, span, moves):
+                self.say(finding)
 
     def levels(self, name: str) -> Array:
         """Different readings of a channel while the drive runs."""
         readings = self.readings[name][self.running] if self.parts else np.empty(0)
         return np.unique(readings[np.isfinite(readings)])[:LOOKED_AT]
 
+    # ---- courses ----------------------------------------------------------------------------------------------
+
     def conditions(self, steps: Mapping[tuple[object, ...], float]) -> list[Condition]:
         """The conditions of the file, each with its turns. steps: of the channels, by name, unit and factor."""
         if not self.parts:
             return []
-        mapping, account, parts, zeros, way = self.mapping, self.account, self.parts, self.zeros, self.way
-        drifts = {name: self._channel(name, zeros[name], parts, steps) for name in mapping.channels}
-        whole = {name: np.concatenate([part.courses[name] for part in parts]) for name in mapping.channels}
-        if not mapping.timed:
-            turning = way * self._rate([part.turns for part in parts])
-            if not backwards(mapping.channels, [part.setting.values for part in parts], turning, account):
-                told = signs(mapping.channels, whole, self._zeros_known(zeros), turning, account)
-                units = {name: shown(own) for name, own in self.own.items()}
-                speeds(mapping.channels, whole, units, turning, told, account)
-        return [self._condition(part, zeros, drifts, way) for part in parts]
+        channels, parts = self.mapping.channels, self.parts
+        accuracies = {name: self._courses(name, steps) for name in channels}
+        together = {name: np.concatenate([part.courses[name] for part in parts]) for name in channels}
+        if not self.mapping.timed:
+            turning = self._speed(parts)
+            against = checks.backwards(channels, [part.setting.values for part in parts], turning)
+            self.say(against)
+            if against is None:
+                zeros = {name: accuracy.zero for name, accuracy in accuracies.items()}
+                wrong = list(checks.signs(channels, together, zeros, turning))
+                units = {name: sensor.shown for name, sensor in self.sensors.items()}
+                speed = checks.speeds(channels, together, units, turning)
+                for finding in wrong:
+                    self.say(finding)
+                if speed is not None and speed.where not in {finding.where for finding in wrong}:
+                    self.say(speed)
+        return [self._condition(part, accuracies) for part in parts]
 
-    def _zeros_known(self, zeros: Mapping[str, Zeroed]) -> dict[str, float]:
-        """Standard uncertainty of the zero of each channel, SI."""
-        return {
-            name: float(np.hypot(own.accuracy_zero, own.scale.factor * zeros[name].uncertainty))
-            for name, own in self.own.items()
-        }
-
-    def _named(self, setting: Setting) -> str:
-        return setting.name or self.path.stem
-
-    def _used(self) -> NDArray[np.bool_]:
-        if self.entry.over is None:
-            return np.ones(self.line.seconds.size, dtype=np.bool_)
-        begin, end = (one.value for one in self.entry.over)
-        return (self.line.seconds >= begin) & (self.line.seconds <= end)
-
-    def _share(self, zeros: Mapping[str, Zeroed]) -> tuple[Array, float, Array]:
-        """Cycles gone through by row, which way the coordinate runs, and stretches of time in which it is wrong."""
-        mapping = self.mapping
-        cycle = float(mapping.cycle.evaluate())
-        if mapping.timed:
-            return self.line.seconds / cycle, 1.0, np.empty((0, 2))
-        assert mapping.angle is not None
-        source, speed = mapping.angle, None
-        if source.channel is not None:
-            name = source.channel
-            own = self.own[name]
-            if own.scale.unit != "rad/s":
-                what = f"the channel '{name}' is a speed in {own.scale.unit}, not of a turning driver"
-                raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s", file=self.account.file))
-            speed = own.quantity(self.readings[name], zeros[name], mapping.channels[name].sign, self.line.seconds)
-        found: Coordinate = coordinate(source, self.table, self.line, speed, self.account)
-        self.lag, self.cut = found.lag, found.cut
-        known = np.flatnonzero(np.isfinite(found.values) & self._used())
-        if known.size < 3:
-            what = "no row in use has a coordinate of the driver"
-            raise MechanismError(Finding(what, "angle", "check angle.column", file=self.account.file))
-        clock = np.repeat(self.line.spoilt[:, None], 2, axis=1)
-        way = 1.0 if found.values[known[-1]] >= found.values[known[0]] else -1.0
-        start = float(mapping.start.evaluate())
-        return way * (found.values - start) / cycle, way, np.concatenate([found.spoilt, clock])
-
-    def _no_turn(self, share: Array, allowed: NDArray[np.bool_]) -> str:
-        known = share[np.isfinite(share) & allowed]
-        gone = float(np.ptp(known)) if known.size else 0.0
-        return f"there is no whole turn: {gone:.3g} cycles in {counted(int(allowed.sum()), 'row')}"
-
-    def _check_filter(self, table: DataTable) -> None:
-        assert self.mapping.filter is not None
-        rate, cut_off = 1.0 / self.line.step, self.mapping.filter.cut_off.value
-        if 2 * cut_off >= rate:
-            what = f"the sampling is too slow for the filter: {rate:.6g} Hz, a cut-off of {cut_off:g} Hz"
-            remedy = f"state a cut-off below {rate / 2:.4g} Hz, or sample faster"
-            raise MechanismError(Finding(what, "filter.cut_off", remedy, file=str(self.path)))
-        if cut_off * float(np.ptp(self.line.seconds)) < 2:
-            what = f"the cut-off of {cut_off:g} Hz is slower than the recording of {np.ptp(self.line.seconds):.4g} s"
-            raise MechanismError(Finding(what, "filter.cut_off", "state a higher one", file=str(self.path)))
-        if not self.line.even:
-            what = "the samples are not evenly spaced in time, as a filter needs them"
-            self.account.warn("data.filter.uneven", "filter", what, "record at a fixed rate, or leave out the filter")
-        order = self.mapping.filter.order
-        self.account.say(
-            f"low-pass filter: Butterworth of order {order}, forward and backward, together 3 dB down at {cut_off:g} Hz"
-            f"; gaps up to {100 / cut_off:.3g} ms are bridged for it and stay gaps"
-        )
-
-    def _check_rows(self, cuts: Sequence[tuple[Setting, Turns]]) -> None:
-        """Tell how turns are sampled, whether they are enough and equally fast, and what the filter leaves of them."""
-        account, mapping = self.account, self.mapping
-        for setting, turns in cuts:
-            where = _where(setting)
-            if turns.numbers.size < 2:
-                account.warn(
-                    "data.turns.one",
-                    where,
-                    "has one turn: there is no scatter, so no uncertainty",
-                    "record two turns or more",
-                )
-            steady(turns, self.line.step, where, account)
-            if turns.density < 1:
-                samples = f"{turns.density * mapping.positions:.4g} samples a turn for {mapping.positions} positions"
-                what = f"the sampling is slow: {samples}; between them it is interpolated"
-                severity = Severity.WARNING if turns.density < SPARSE else Severity.NOTE  # no fault of the readings
-                remedy = "state fewer positions, or sample faster"
-                account.warn("data.sampling.slow", where, what, remedy, severity)
-            length = float(np.mean(turns.end - turns.begin))
-            passed = mapping.filter.cut_off.value * length if mapping.filter else np.inf
-            if passed < FEW_HARMONICS:
-                what = f"the filter leaves the first {passed:.2g} harmonics of a turn"
-                account.note("data.filter.harmonics", where, what, "state a higher cut-off")
-        most = int(min(turns.density for _, turns in cuts) * mapping.positions / DENSE)
-        if most >= mapping.positions:
-            account.say("values at a position: mean of the samples within half a position to either side")
-            return
-        told = most // (size := 10 ** max(len(str(most)) - 2, 0)) * size  # to the two digits that are told
-        cubic = "values at a position: interpolated by a cubic between four samples"
-        tail = "; of at most {} positions each has four samples, which are averaged"
-        account.say(f"{cubic}{tail * (most > 1)}", told if most > 1 else None)
-
-    def _check_zeros(self, cuts: Sequence[tuple[Setting, Turns]]) -> None:
-        """Tell of unloaded stretches that reach into turns."""
-        for name, channel in self.mapping.channels.items():
-            for low, high in channel.zero.over if isinstance(channel.zero, Zero) else ():
-                inside = sum(int(np.sum((one.begin < high.value) & (one.end > low.value))) for _, one in cuts)
-                if inside:
-                    span = f"{low.value:g} to {high.value:g} s"
-                    what = f"the unloaded stretch {span} reaches into {counted(inside, 'turn')}"
-                    remedy = "state a stretch in which the sensor is not loaded"
-                    self.account.warn("data.zero.in_turns", f"channels.{name}.zero", what, remedy)
-
-    def _channel(
-        self, name: str, zero: Zeroed, parts: Sequence[_Part], steps: Mapping[tuple[object, ...], float]
-    ) -> Drift | None:
-        """The courses of a channel, put into the parts; the drift that is left in them."""
-        mapping, account, line = self.mapping, self.account, self.line
-        channel, own, where = mapping.channels[name], self.own[name], f"channels.{name}"
+    def _courses(self, name: str, steps: Mapping[tuple[object, ...], float]) -> Accuracy:
+        """Put the courses of a channel into the parts; the accuracy of its sensor."""
+        channel, sensor, zero, line = self.mapping.channels[name], self.sensors[name], self.zeros[name], self.line
+        where, size = f"channels.{name}", abs(sensor.scale.factor)
         readings = self.readings.pop(name)
-        step = own.resolution or steps[name, own.unit, own.scale.factor]
+        step = sensor.resolution or steps[name, sensor.unit, sensor.scale.factor]
         noise = noise_of(readings[self.running])
-        values = own.quantity(readings, zero, channel.sign, line.seconds)
-        angle = values if own.scale.unit == "rad" else None
+        values = sensor.quantity(readings, zero, channel.sign, line.seconds)
+        angle = values if sensor.scale.unit == "rad" else None
         values = values if angle is None else joined(angle)
-        if mapping.filter is not None:
-            values = filtered(values, line, mapping.filter, account, where)
-        for part in parts:
+        if self.mapping.filter is not None:
+            values, finding = filtered(values, line, self.mapping.filter, where)
+            self.say(finding)
+        for part in self.parts:
             part.courses[name] = resampled(part.turns, values, angle)
-        scatters = [float(np.median(between_turns(part.courses[name]))) / abs(own.scale.factor) for part in parts]
-        if mapping.filter is None:
-            rows = [one * max(part.turns.density, 1.0) ** 0.5 for one, part in zip(scatters, parts, strict=True)]
+        if self.mapping.filter is None:  # the scatter of turns may show less noise than neighbouring readings do
+            scatters = (float(np.median(between_turns(part.courses[name]))) / size for part in self.parts)
+            rows = [one * max(part.turns.density, 1.0) ** 0.5 for one, part in zip(scatters, self.parts, strict=True)]
             noise = min([noise, *(PASSED * one for one in rows if one >= 0)])
-        self.steps[name] = abs(own.scale.factor) * step * (noise < step / 2)  # more noise carries it over them
-        if step and noise < step / 2:
-            size = abs(own.scale.factor) * step
-            for part in parts:
-                part.left[name] = left_in_turns(part.turns, part.courses[name] / size, readings / step, noise / step)
-        if channel.measures.startswith("rate:"):  # one that creeps is the drive's
-            return None
-        found = drift([(part.turns, part.courses[name]) for part in parts])
-        if found is None:
-            return None
-        by = f"{found.change:.3g} {own.scale.unit} in {found.span:.4g} s"
-        times = f"{abs(found.change) / max(found.scatter, 1e-300):.3g} times the scatter of the turns about the line"
-        what, remedy = f"drift: the mean of a turn changes by {by}, {times}", "let sensor and bearings warm up"
-        if mapping.drift == "report":
-            account.warn("data.zero.drift_files", where, what, f"{remedy}, or state drift: remove")
-            return None
-        since = float(line.seconds[0]) if np.isnan(zero.since) else zero.since
-        account.warn(
-            "data.zero.drift_files_removed",
-            where,
-            f"{what}; a straight line is subtracted, zero at {since:.4g} s",
-            remedy,
-        )
-        for part in parts:
-            part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since), angle)
-        return found
+        coarse = bool(step) and noise < step / 2  # more noise carries readings over the steps
+        for part in self.parts if coarse else ():
+            course = part.courses[name] / (size * step)
+            part.left[name] = left_in_turns(part.turns, course, readings / step, noise / step)
+        own = size * zero.uncertainty
+        parts = [(part.turns, part.courses[name]) for part in self.parts]
+        drift = None if channel.measures.startswith("rate:") else checks.drift(parts)  # a speed that creeps is real
+        if drift is not None:
+            remove = self.mapping.drift == "remove"
+            since = float(line.seconds[0]) if np.isnan(zero.since) else zero.since
+            what = f"drift: the mean of a turn changes by {drift.change:.3g} {sensor.scale.unit} in {drift.span:.4g} s"
+            what += f", {abs(drift.change) / max(drift.scatter, 1e-300):.3g} times the scatter of the turns"
+            what += f"; a straight line is subtracted, zero at {since:.4g} s" * remove
+            remedy = "let sensor and bearings warm up" + ", or state drift: remove" * (not remove)
+            self.say(warning("zero.drift_files", where, what, remedy))
+            for part in self.parts if remove else ():
+                part.courses[name] = resampled(part.turns, values - drift.slope * (line.seconds - since), angle)
+            own = float(np.hypot(own, drift.error * drift.span / 2 if remove else 0.0))  # of the line at either end
+        datum = sensor.datum(channel.zero, zero.value, channel.sign)
+        total = float(np.hypot(sensor.accuracy_zero, own))
+        return Accuracy(total, sensor.accuracy_gain, size * step * coarse, own, datum=datum)
 
-    def _rate(self, turns: Sequence[Turns]) -> float:
-        cycle = float(self.mapping.cycle.evaluate())
-        return cycle / float(np.mean(np.concatenate([one.end - one.begin for one in turns])))
+    def _speed(self, parts: Sequence[_Part]) -> float:
+        """Of the driver, with its sign, rad/s."""
+        lengths = np.concatenate([part.turns.end - part.turns.begin for part in parts])
+        return self.way * float(self.mapping.cycle.evaluate()) / float(np.mean(lengths))
 
-    def _condition(
-        self, part: _Part, zeros: Mapping[str, Zeroed], drifts: Mapping[str, Drift | None], way: float
-    ) -> Condition:
+    def _condition(self, part: _Part, accuracies: Mapping[str, Accuracy]) -> Condition:
         """A condition with its courses, and values that are means of channels."""
-        courses = {}
-        for name, channel in self.mapping.channels.items():
-            own = self.own[name]
-            left = drifts[name]
-            extra = left.error * left.span / 2 if left else 0.0  # of the line that was taken off, at either end
-            of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
-            zero = float(np.hypot(own.accuracy_zero, of_file))
-            datum = 0.0
-            if isinstance(channel.zero, Amount) and not own.live(channel.zero):
-                datum = -zeros[name].value * channel.sign * own.scale.factor
-            accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file, datum=datum)
-            course = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, read_in(own))
-            cut = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
-            courses[name] = replace(course, accuracy=replace(accuracy, cut=cut, left=part.left.get(name)))
-        values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
-        speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
-        for path, channel_name in part.setting.means.items():
-            if channel_name not in courses:  # of the angle
-                values[path], known_as[path] = speed, dimension_of(dimensions("rad/s")[1], "rad/s")
+        mapping, setting, courses = self.mapping, part.setting, {}
+        for name, channel in mapping.channels.items():
+            sensor, accuracy = self.sensors[name], accuracies[name]
+            course = Signal(name, channel.measures, sensor.scale.unit, part.courses[name], accuracy, sensor.read_in)
+            cut_off = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
+            accuracy = replace(accuracy, cut=cut_off, left=part.left.get(name))
+            courses[name] = replace(course, accuracy=accuracy)
+        values, kinds = dict(setting.values), dict(setting.dimensions)
+        speed = np.nan if mapping.timed else self._speed([part])
+        for path, name in setting.means.items():
+            if name not in courses:  # of the angle
+                values[path], kinds[path] = speed, _dimension(dimensions("rad/s")[1], "rad/s")
                 continue
-            turns = courses[channel_name].turns
-            if not np.isfinite(turns).any():
-                what = f"the channel '{channel_name}', whose mean it is, has no value in any turn"
-                raise MechanismError(
-                    Finding(what, f"set.{path}", "correct the channel, or state it", file=str(self.path))
-                )
-            values[path] = time_mean(part.turns, turns)
-            known_as[path] = dimension_of(self.own[channel_name].scale.of_quantity, courses[channel_name].unit)
-        positions = self.mapping.positions
-        name = self._named(part.setting)
-        timed = self.mapping.timed
-        start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))
-        phase = np.arange(positions) / positions
-        duration = float(self.mapping.cycle.evaluate()) if timed else np.nan
+            if not np.isfinite(courses[name].turns).any():
+                what = f"the channel '{name}', whose mean it is, has no value in any turn"
+                raise MechanismError(Finding(what, f"set.{path}", "correct the channel, or state it"))
+            values[path] = time_mean(part.turns, courses[name].turns)
+            kinds[path] = _dimension(self.sensors[name].scale.of_quantity, courses[name].unit)
+        cycle = float(mapping.cycle.evaluate())
+        start, span, duration = float(mapping.start.evaluate()), cycle, np.nan
+        if mapping.timed:
+            start, span, duration = np.nan, np.nan, cycle
+        phase = np.arange(mapping.positions) / mapping.positions
         return Condition(
-            name, values, phase, courses, (str(self.path),), speed, start, cycle,
-            lag=self.lag, cut=self.cut, dimensions=known_as, followed=tuple(part.setting.means), duration=duration,
+            setting.name or self.path.stem, values, phase, courses, (str(self.path),), speed, start, span,
+            lag=self.lag, cut=self.cut, dimensions=kinds, followed=tuple(setting.means), duration=duration,
         )  # fmt: skip
 
 
-def _where(setting: Setting) -> str:
-    """What a finding about a condition is about; its file says which one, where nothing is set."""
-    return f"condition {setting.name}" if setting.name else "turns"
+# ---- helpers --------------------------------------------------------------------------------------------------
 
 
-def _gone(share: Array, allowed: NDArray[np.bool_]) -> float:
-    """Cycles gone through in the rows that are allowed."""
-    steps = np.diff(share)[allowed[1:] & allowed[:-1]]
-    return float(np.sum(np.abs(steps[np.isfinite(steps)])))
+def _named(texts: Mapping[str, str]) -> str:
+    """Name of a condition by what was set in it."""
+    return ", ".join(f"{path} {text}" for path, text in texts.items())
+
+
+def _dimension(exponents: Dimensions, unit: str) -> Dimension:
+    """Exponents of a unit as a dimension of the model; UnitError for volts, degrees of temperature and the like."""
+    if any(power for name, power in exponents.items() if name not in BASES[:4]):
+        raise UnitError(f"the unit '{unit}' is none that a number of a model has", "write one such as deg, mm or N m")
+    length, mass, time, angle = (Fraction(exponents.get(name, 0)) for name in BASES[:4])
+    return length, mass, time, angle
+
+
+def _rounded(values: Array) -> Array:
+    """Values to so many significant digits."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        digits = np.where(values == 0, 0, np.floor(np.log10(np.abs(values))))
+        scale = 10.0 ** (DIGITS - 1 - np.where(np.isfinite(digits), digits, 0))
+        return np.asarray(np.rint(values * scale) / scale)
 
 
 def _table(path: Path, mapping: DataMapping, entry: File) -> DataTable:
-    """The columns of a file that the mapping names; a missing one is told with the entry that names it."""
-    named = _columns(mapping, entry)
-    own = "time.column" if path.suffix.lower() == ".tdms" else ""  # which may tell its time by itself
-    wanted = [column for where, column in named.items() if where != own]
+    """The columns of a file that the mapping names; a missing one is reported with the entry that names it."""
+    named: dict[str, str | None] = {"time.column": mapping.time.column if mapping.time else None}
+    if mapping.angle is not None:
+        named["angle.column"] = mapping.angle.column
+        named["angle.index.column"] = mapping.angle.index.column if mapping.angle.index else None
+    named |= {f"channels.{name}.column": channel.column for name, channel in mapping.channels.items()}
+    for name, value in mapping.settings(entry).items():
+        named[f"set.{name}.column"] = value.column if isinstance(value, FromData) else None
+    columns = {where: column for where, column in named.items() if column is not None}
+    of_time = "time.column" if path.suffix.lower() == ".tdms" else ""  # which may state its sampling by itself
+    needed = [column for where, column in columns.items() if where != of_time]
     try:
-        table = read_table(path, wanted, [named[own]] if own in named else [])
+        table = read_table(path, needed, [columns[of_time]] if of_time in columns else [])
     except MechanismError as error:
-        told = error.findings[0].what.partition(";")[0] if "there is no column" in error.findings[0].what else ""
-        where = ", ".join(key for key, column in named.items() if f"'{column}'" in told)
+        missing = error.findings[0].figures.get("missing", ())
+        where = ", ".join(key for key, column in columns.items() if column in missing)
         raise MechanismError([replace(one, where=where) for one in error.findings]) from None
-    texts = (of_text(where, table, column) for where, column in named.items() if where != "time.column")
+    texts = (_of_text(where, table, column) for where, column in columns.items() if where != "time.column")
     if findings := [one for one in texts if one is not None]:
         raise MechanismError(findings)
     return table
 
 
-def _columns(mapping: DataMapping, entry: File) -> dict[str, str]:
-    """Columns that are read, by the entries of the mapping that name them."""
-    found: dict[str, str | None] = {"time.column": mapping.time.column if mapping.time else None}
-    if mapping.angle is not None:
-        found["angle.column"] = mapping.angle.column
-        found["angle.index.column"] = mapping.angle.index.column if mapping.angle.index else None
-    found |= {f"channels.{name}.column": channel.column for name, channel in mapping.channels.items()}
-    for name, one in stated(mapping, entry).items():
-        found[f"set.{name}.column"] = one.column if isinstance(one, FromData) else None
-    return {where: column for where, column in found.items() if column is not None}
+def _of_text(where: str, table: DataTable, name: str) -> Finding | None:
+    """A column most of whose cells are text, and no times; where: the entry that names it."""
+    column = table.columns[name]
+    numbers = int(np.count_nonzero(~np.isnan(column.values)))
+    if column.stamp or column.texts <= numbers:
+        return None
+    cells = f"text in {column.texts:,} cells and a number in {numbers:,}"
+    remedy = "name a column of numbers"
+    if column.example[:1].isdigit() or column.example[1:2].isdigit():
+        unit = f"{where.removesuffix('column')}unit"
+        remedy = f"remove the unit from the cells; state {unit} if the heading has none"
+    figures = {"texts": column.texts, "numbers": numbers}
+    what = f"'{name}' has {cells}; the first text is '{column.example}'"
+    return Finding(what, where, remedy, code="data.readings.text", figures=figures)

@@ -21,7 +21,7 @@ from trunnion.model.file import place, read_entries
 from trunnion.model.findings import schema_findings
 from trunnion.model.units import normalise
 from trunnion.rig.reading.mapping import FixedAngle, FixedNumber, FixedTime
-from trunnion.rig.reading.sensor_quantity import Amount, Frequency, Number
+from trunnion.rig.reading.units import Amount, Frequency, Number
 
 __all__ = ["FORMATS", "Accuracy", "Encoder", "Idle", "Rig", "Schedule", "Sensor", "placed_in_rig"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -9,13 +10,12 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.clock import Clock
-from trunnion.rig.reading.columns import Column, DataTable
-from trunnion.rig.reading.log import Account, counted, times
+from trunnion.rig.reading.log import at_times, counted, note, warning
 from trunnion.rig.reading.mapping import TimeBase
-from trunnion.rig.reading.sensor_quantity import dimensions
+from trunnion.rig.reading.tables import Column, DataTable
+from trunnion.rig.reading.units import dimensions
 
-__all__ = ["Timeline", "timeline"]
+__all__ = ["GAP", "Timeline", "timeline"]
 
 Array = NDArray[np.float64]
 GAP = 1.5  # times the usual step
@@ -48,125 +48,83 @@ class Timeline:
         return values if self.kept is None else values[self.kept]
 
 
-def timeline(table: DataTable, base: TimeBase | None, account: Account) -> Timeline:
-    """Time of the rows of a table by the mapping, else by what the file itself tells of its sampling."""
+def timeline(table: DataTable, base: TimeBase | None, say: Callable[[Finding | str], None]) -> Timeline:
+    """Time of the rows of a table by the mapping, else by what the file itself states of its sampling.
+
+    say: takes findings, and sentences about what was done.
+    """
+    if base is not None and base.column in table.columns:
+        column = table.columns[str(base.column)]
+        if column.stamp:
+            say("time is counted in s from the first time stamp")
+            return _stated(column.values, say)
+        if column.texts == column.values.size:
+            what = f"the column '{base.column}' has texts, such as '{column.example}', where times are needed"
+            remedy = "write them in s, as 11:40:00.0002 or as 2026-11-22 11:40:00.0002, or state time: {rate: …}"
+            raise MechanismError(Finding(what, "time.column", remedy))
+        return _stated(column.values * _factor(base, column, say), say)
     if base is not None and base.rate is not None:
-        step = 1.0 / base.rate.value
-        return Timeline(_counted(table.rows) * step, None, step, np.empty(0, dtype=np.intp))
-    if base is None or base.column not in table.columns:
-        if table.interval is None:
-            what = "no column gives the time of its rows"
-            remedy = "add time: {column: …, unit: s} or time: {rate: 2 kHz} to the mapping"
-            raise MechanismError(Finding(what, "time", remedy, file=table.file))
+        start, step = 0.0, 1.0 / base.rate.value
+    elif table.interval is not None:
         start, step = table.interval
-        account.say(f"time is that of the waveforms: every {step:.6g} s")
-        return Timeline(start + _counted(table.rows) * step, None, step, np.empty(0, dtype=np.intp))
-    column = table.columns[str(base.column)]
-    if column.clock is not None and not np.isfinite(column.values).any():
-        return _stated(_by_clock(column.clock, account), account)
-    if column.texts == column.values.size:
-        what = f"the column '{base.column}' has texts, such as '{column.example}', where times are needed"
-        remedy = "write them in s, as 11:40:00.0002 or as 2026-11-22 11:40:00.0002, or state time: {rate: …}"
-        raise MechanismError(Finding(what, "time.column", remedy, file=account.file))
-    return _stated(column.values * _factor(base, column, account), account)
+        say(f"time is that of the waveforms: every {step:.6g} s")
+    else:
+        remedy = "add time: {column: …, unit: s} or time: {rate: 2 kHz} to the mapping"
+        raise MechanismError(Finding("no column gives the time of its rows", "time", remedy))
+    return Timeline(start + np.arange(table.rows, dtype=np.float64) * step, None, step, np.empty(0, dtype=np.intp))
 
 
-def _by_clock(clock: Clock, account: Account) -> Array:
-    """Seconds since the first of the time stamps of a column."""
-    try:
-        seconds = clock.seconds()
-    except ValueError as error:
-        remedy = "write them as 2026-11-22 11:40:00.0002, or state time: {rate: …}"
-        raise MechanismError(Finding(str(error), "time.column", remedy, file=account.file)) from None
-    account.say("time is counted in s from the first time stamp, {}", clock.first)
-    return seconds
-
-
-def _counted(rows: int) -> Array:
-    return np.arange(rows, dtype=np.float64)
-
-
-def _factor(base: TimeBase, column: Column, account: Account) -> float:
+def _factor(base: TimeBase, column: Column, say: Callable[[Finding | str], None]) -> float:
     """Seconds of a unit of the column: by the mapping, else by the file, else seconds."""
-    if base.unit:
-        return dimensions(base.unit)[0]
-    if not column.unit:
-        account.note(
-            "data.time.no_unit",
-            "time",
-            f"the column '{base.column}' has no unit; seconds are assumed",
-            "state time.unit",
-        )
-        return 1.0
+    if not base.unit and not column.unit:
+        what = f"the column '{base.column}' has no unit; seconds are assumed"
+        say(note("time.no_unit", "time", what, "state time.unit"))
     try:
-        factor, found = dimensions(column.unit)
+        factor, kind = dimensions(base.unit or column.unit or "s")
     except UnitError as error:
         remedy = f"state time.unit in the mapping, such as s; in the file, {error.remedy}"
-        what = f"the column '{base.column}': {error.what}"
-        raise MechanismError(Finding(what, "time", remedy, file=account.file)) from None
-    if found != dimensions("s")[1]:
+        raise MechanismError(Finding(f"the column '{base.column}': {error.what}", "time", remedy)) from None
+    if kind != dimensions("s")[1]:
         what = f"the column '{base.column}' has the unit '{column.unit}', which is no time"
-        raise MechanismError(Finding(what, "time", "name another column", file=account.file))
+        raise MechanismError(Finding(what, "time", "name another column"))
     return factor
 
 
-def _stated(seconds: Array, account: Account) -> Timeline:
+def _stated(seconds: Array, say: Callable[[Finding | str], None]) -> Timeline:
     """Times that rise, from a column: rows whose time does not rise are left out."""
-    finite = np.isfinite(seconds)
+    finite, total = np.isfinite(seconds), seconds.size
     highest = np.maximum.accumulate(np.where(finite, seconds, -np.inf))
     rising = finite & (seconds > np.concatenate([[-np.inf], highest[:-1]]))
-    lost, total = int(np.count_nonzero(~finite)), seconds.size
-    if lost:
-        what = f"{counted(lost, 'row')} of {total:,} {'has' if lost == 1 else 'have'} no time"
-        account.warn("data.time.missing", "time", f"{what}; left out", "check the logger, or state time: {rate: …}")
+    if lost := int(np.count_nonzero(~finite)):
+        what = f"no time in {counted(lost, 'row')} of {total:,}; left out"
+        say(warning("time.missing", "time", what, "check the logger, or state time: {rate: …}"))
     kept = np.flatnonzero(rising)
     if kept.size < 3:
         what = f"the time rises in {kept.size} of {counted(total, 'row')}"
-        raise MechanismError(Finding(what, "time", "check that time.column is the right one", file=account.file))
-    spoilt = _backward(seconds, finite, rising, account)
-    clean = seconds[kept] if kept.size < total else seconds
-    steps = np.diff(clean)
-    step = float(np.median(steps))
-    _tell_gaps(clean, steps, step, account)
-    wide = steps > GAP * step
-    usual = steps[~wide] / step
-    spread = float(np.std(usual)) if usual.size else 0.0
-    return Timeline(clean, kept if kept.size < total else None, step, np.flatnonzero(wide) + 1, spread < UNEVEN, spoilt)
-
-
-def _backward(seconds: Array, finite: NDArray[np.bool_], rising: NDArray[np.bool_], account: Account) -> Array:
-    """Tell of rows whose time repeats or runs backward; the times of the latter."""
-    stated = seconds[finite]
-    steps = np.diff(stated)
+        raise MechanismError(Finding(what, "time", "check that time.column is the right one"))
+    known = seconds[finite]
+    steps = np.diff(known)
     repeated, back = np.flatnonzero(steps == 0), np.flatnonzero(steps < 0)
     if repeated.size:
-        share = repeated.size / stated.size
-        remedy = "the column is rounded: state time: {rate: …} instead" if share > 0.05 else "check the logger"
-        what = f"the time repeats in {counted(repeated.size, 'row')} of {stated.size:,}, {times(stated[repeated])}"
-        account.warn("data.time.repeats", "time", f"{what}; these rows are left out", remedy)
+        coarse = repeated.size > 0.05 * known.size
+        remedy = "the column is rounded: state time: {rate: …} instead" if coarse else "check the logger"
+        what = f"the time repeats in {counted(repeated.size, 'row')} of {known.size:,}, {at_times(known[repeated])}"
+        say(warning("time.repeats", "time", f"{what}; these rows are left out", remedy))
     if back.size:
-        out = int(np.count_nonzero(finite & ~rising)) - repeated.size
-        what = (
-            f"the time runs backward {counted(back.size, 'time')}, {times(stated[back])}, by up to {-steps.min():.4g} s"
-        )
+        times, size = f"{counted(back.size, 'time')}, {at_times(known[back])}", f"by up to {-steps.min():.4g} s"
+        what = f"the time runs backward {times}, {size}; rows are left out until it has passed"
         remedy = "split the file where a new recording begins, or check the logger's clock"
-        account.warn(
-            "data.time.backward", "time", f"{what}; {counted(max(out, 1), 'row')} left out until it has passed", remedy
-        )
-    return np.asarray(stated[back])
-
-
-def _tell_gaps(seconds: Array, steps: Array, step: float, account: Account) -> None:
-    wide = np.flatnonzero(steps > GAP * step)
-    if not wide.size:
-        return
-    missing = float(np.sum(np.rint(steps[wide] / step) - 1))
-    longest = int(wide[np.argmax(steps[wide])])
-    what = f"{counted(wide.size, 'gap')} in time, {missing:,.0f} {'sample' if missing == 1 else 'samples'} missing"
-    where = f"the longest {steps[longest]:.4g} s at {seconds[longest]:.5g} s"
-    account.warn(
-        "data.time.gaps",
-        "time",
-        f"{what}, {where}",
-        "the positions in them have fewer turns; check the logger's buffer",
-    )
+        say(warning("time.backward", "time", what, remedy))
+    clean = seconds[kept]
+    steps = np.diff(clean)
+    step = float(np.median(steps))
+    wide = steps > GAP * step
+    if (gaps := np.flatnonzero(wide)).size:
+        missing = float(np.sum(np.rint(steps[gaps] / step) - 1))
+        longest = int(gaps[np.argmax(steps[gaps])])
+        what = f"{counted(gaps.size, 'gap')} in time, {missing:,.0f} {'sample' if missing == 1 else 'samples'} missing"
+        where = f"the longest {steps[longest]:.4g} s at {clean[longest]:.5g} s"
+        remedy = "the positions in them have fewer turns; check the logger's buffer"
+        say(warning("time.gaps", "time", f"{what}, {where}", remedy))
+    even = float(np.std(steps[~wide] / step)) < UNEVEN
+    return Timeline(clean, kept if kept.size < total else None, step, np.flatnonzero(wide) + 1, even, known[back])

@@ -6,15 +6,17 @@ to the position along the slope there; with fewer it is interpolated by a cubic 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.rig.reading.log import Account, counted, times
+from trunnion.errors import Finding
+from trunnion.rig.reading.log import at_times, counted, note
 from trunnion.rig.reading.timebase import GAP, Timeline
 
-__all__ = ["Turns", "cut", "joined", "resampled", "time_mean", "turn_means"]
+__all__ = ["DENSE", "Turns", "cut", "joined", "resampled", "time_mean", "turn_means"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -29,7 +31,8 @@ class Turns:
     """Whole turns of one condition in a file, among the rows of a window.
 
     share: (row of the window,), the cycle counted on, rising, whole at the start of each; numbers: of the turns;
-    begin, end: their times, s; rows: those that belong to them; positions: how many a turn; line: time of the rows.
+    begin, end: their times, s; rows: those that belong to them; positions: how many a turn; line: time of the rows;
+    left_out: whole turns that are not used.
     """
 
     share: Array
@@ -40,6 +43,7 @@ class Turns:
     positions: int
     line: Timeline
     window: slice
+    left_out: int = 0
 
     @property
     def density(self) -> float:
@@ -54,12 +58,20 @@ def cut(
     allowed: Mask,
     positions: int,
     spoilt: Array,
-    account: Account,
+    say: Callable[[Finding], None],
     where: str,
 ) -> Turns:
-    """The whole turns among the rows of a window that are allowed; those left out are told.
+    """Find the whole turns among the rows of a window.
 
-    shares: cycles gone through, rising with time, NaN where not known; spoilt: stretches of time to leave out.
+    Parameters
+    ----------
+    shares : cycles gone through, rising with time, NaN where not known.
+    times : of the rows.
+    window, allowed : rows that are looked at, and which of them may be used.
+    positions : of a turn.
+    spoilt : stretches of time to leave out.
+    say : takes findings about turns that are left out.
+    where : what these are about.
     """
     share, line = shares[window], times.part(window)
     known = np.isfinite(share)
@@ -67,71 +79,44 @@ def cut(
     begin, end, numbers = _whole(share, highest, line)
     inside = _covered(begin, end, allowed, line)
     begin, end, numbers = begin[inside], end[inside], numbers[inside]
-    keep = np.ones(numbers.size, dtype=np.bool_)
-    lengths = end - begin
+    odd, hit = np.zeros(numbers.size, dtype=np.bool_), np.zeros(numbers.size, dtype=np.bool_)
+    left_out = 0
     if numbers.size:
-        usual = float(np.median(lengths))
-        odd = np.abs(lengths / usual - 1) > APART
-        _tell_unusual(begin, end, odd, line, account, where)
-        keep &= ~odd
-    if len(spoilt):
-        hit = np.zeros(numbers.size, dtype=np.bool_)
-        for low, high in spoilt:
-            slack = min(line.step, 0.25 * (high - low))  # an index may lie where a turn begins
-            hit |= (begin <= high - slack) & (end >= low + slack)
-        keep &= ~hit
-        account.left_out += int(np.count_nonzero(hit & ~odd)) if numbers.size else 0
+        usual = float(np.median(end - begin))
+        odd = np.abs((end - begin) / usual - 1) > APART
+        left_out = int(np.sum(np.maximum(np.rint((end - begin)[odd] / usual), 1)))  # over a gap it may be several
+    if left_out:
+        lengths = (end - begin)[odd]
+        span = f"{lengths.min():.4g} to {lengths.max():.4g} s" if odd.sum() > 1 else f"{lengths[0]:.4g} s"
+        what = f"{counted(left_out, 'turn')} left out, {at_times(begin[odd])}: {span} long where {usual:.4g} s is usual"
+        remedy = "the drive starts, stops or rests there, or rows are missing; use files: over: for the steady part"
+        say(note("turns.unusual", where, what, remedy))
+    for low, high in spoilt:
+        slack = min(line.step, 0.25 * (high - low))  # an index may lie where a turn begins
+        hit |= (begin <= high - slack) & (end >= low + slack)
+    left_out += int(np.count_nonzero(hit & ~odd))
+    keep = ~odd & ~hit
     numbers, begin, end = numbers[keep], begin[keep], end[keep]
     rows = _rows_of(share, numbers, begin, end, line, known & allowed, positions)
-    return Turns(share, numbers, begin, end, rows, positions, line, window)
-
-
-def _tell_unusual(begin: Array, end: Array, odd: Mask, line: Timeline, account: Account, where: str) -> None:
-    """Tell of turns that last too long or too short: over a gap in time, or as the drive does not run evenly."""
-    lengths = end - begin
-    usual = float(np.median(lengths))
-    gaps = line.seconds[line.breaks]
-    first = np.searchsorted(gaps, begin)
-    over = odd & (np.searchsorted(gaps, end + line.step) > first)  # a turn that a gap cuts, and those gone in it
-    if count := int(np.count_nonzero(over)):
-        gone = int(np.sum(np.maximum(np.rint(lengths[over] / usual), 1)))
-        account.left_out += gone
-        at = line.breaks[first[over]]
-        longest = float(np.max(line.seconds[at] - line.seconds[at - 1]))
-        span = f"{counted(count, 'gap')} in time, the longest {longest:.3g} s, {times(line.seconds[at - 1])}"
-        unknown = f"{'leaves' if count == 1 else 'leave'} the angle unknown"
-        what = f"{span}, {unknown}; {counted(gone, 'turn')} left out"
-        account.note("data.turns.gap", where, what, "check the logger's buffer, or record again")
-    odd = odd & ~over
-    if count := int(np.count_nonzero(odd)):
-        account.left_out += count
-        low, high = lengths[odd].min(), lengths[odd].max()
-        span = f"{low:.4g} to {high:.4g} s" if count > 1 else f"{low:.4g} s"
-        what = f"{counted(count, 'turn')} of {odd.size} {'lasts' if count == 1 else 'last'} {span}"
-        what = f"{what} where {usual:.4g} s is usual, and {'is' if count == 1 else 'are'} left out"
-        account.note(
-            "data.turns.unusual",
-            where,
-            what,
-            "the drive starts, stops or is at rest there; use files: over: to select the steady part",
-        )
+    return Turns(share, numbers, begin, end, rows, positions, line, window, left_out)
 
 
 def _whole(share: Array, highest: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]]:
     """Begin, end and number of every turn that is gone through from its start to its end, but for one sample."""
+    nothing = np.empty(0), np.empty(0), np.empty(0, dtype=np.intp)
     finite = np.isfinite(highest)
     if np.count_nonzero(finite) < 3:
-        return np.empty(0), np.empty(0), np.empty(0, dtype=np.intp)
+        return nothing
     first = int(np.argmax(finite))
     last = int(np.searchsorted(highest, highest[-1]))  # what follows stands, or is not known
     rising, seconds = highest[first : last + 1], line.seconds[first : last + 1]
     if rising.size < 3:
-        return np.empty(0), np.empty(0), np.empty(0, dtype=np.intp)
+        return nothing
     steps = np.diff(rising)
     usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     low, high = int(np.ceil(rising[0] - 1.01 * usual)), int(np.floor(rising[-1] + 1.01 * usual))
     if high - low < 1 or usual == 0 or high - low > rising.size:
-        return np.empty(0), np.empty(0), np.empty(0, dtype=np.intp)
+        return nothing
     whole = np.arange(low, high + 1)
     after = np.clip(np.searchsorted(rising, whole, side="right"), 1, rising.size - 1)
     before = after - 1
@@ -184,7 +169,7 @@ def resampled(turns: Turns, channel: Array, angle: Array | None = None) -> Array
         return np.empty((0, turns.positions))
     if turns.density >= DENSE:
         return _averaged(turns, values)
-    return _interpolated(turns, values, turns.line)
+    return _interpolated(turns, values)
 
 
 def joined(angle: Array) -> Array:
@@ -230,8 +215,9 @@ def _averaged(turns: Turns, values: Array) -> Array:
     return np.asarray(mean.reshape(-1, turns.positions)[turns.numbers - turns.numbers[0]])
 
 
-def _interpolated(turns: Turns, values: Array, line: Timeline) -> Array:
+def _interpolated(turns: Turns, values: Array) -> Array:
     """A cubic through the four samples about a position; a straight line between two where one of them is missing."""
+    line = turns.line
     known = np.isfinite(turns.share)
     highest = np.maximum.accumulate(np.where(known, turns.share, -np.inf))
     rows = np.flatnonzero(known & (turns.share > np.concatenate([[-np.inf], highest[:-1]])))
@@ -247,13 +233,10 @@ def _interpolated(turns: Turns, values: Array, line: Timeline) -> Array:
     smooth = np.all(np.isfinite(y[four]), axis=1) & np.all(apart > 0, axis=1) & np.all(apart < 3 * line.step, axis=1)
     found[smooth] = _cubic(x[four[smooth]], y[four[smooth]], wanted[smooth])
     at_end = np.abs(part - np.clip(part, 0, 1)) > 1.01  # no sample beyond: up to one step is extrapolated
-    gap = seconds[after] - seconds[after - 1] > GAP * line.step * np.maximum(1, np.rint(_usual(seconds) / line.step))
+    usual = float(np.median(np.diff(seconds)))
+    gap = seconds[after] - seconds[after - 1] > GAP * line.step * np.maximum(1, np.rint(usual / line.step))
     found[at_end | gap] = np.nan
     return np.asarray(found.reshape(-1, turns.positions))
-
-
-def _usual(seconds: Array) -> float:
-    return float(np.median(np.diff(seconds)))
 
 
 def _cubic(x: Array, y: Array, at: Array) -> Array:

@@ -18,7 +18,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.measure_table import MEASURES
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.rig_file import Sensor
-from trunnion.rig.reading.sensor_quantity import Amount, Dimensions, alike, dimensions
+from trunnion.rig.reading.units import Amount, alike, dimensions, multiplied
 
 __all__ = ["SensorChannel", "SensorErrors", "draw", "resolved", "stream"]
 
@@ -122,7 +122,7 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel
             return absent
         if amount.plain:
             return amount.value
-        own = _times(amount.dimensions, {"s": Fraction(bool(over))})
+        own = multiplied(amount.dimensions, {"s": Fraction(bool(over))})
         if alike(own, dimensions(unit)[1]):
             return amount.value
         factor, of_reading = dimensions(reading)
@@ -154,11 +154,6 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel
     return channel
 
 
-def _times(one: Dimensions, other: Dimensions, sign: int = 1) -> Dimensions:
-    """Dimensions of a product, or of a quotient with sign −1."""
-    return {key: one.get(key, Fraction(0)) + sign * other.get(key, Fraction(0)) for key in {*one, *other}}
-
-
 def _reading(sensor: Sensor, unit: str) -> tuple[str, float]:
     """Unit of the reading, and how many of these there are for an SI unit of what is measured."""
     measured = dimensions(unit)[1]
@@ -171,8 +166,8 @@ def _reading(sensor: Sensor, unit: str) -> tuple[str, float]:
         return reading, 1 / factor
     given = sensor.sensitivity
     ways = (
-        (_times(given.dimensions, measured), given.value),
-        (_times(measured, given.dimensions, -1), 1 / given.value),
+        (multiplied(given.dimensions, measured), given.value),
+        (multiplied(measured, given.dimensions, -1), 1 / given.value),
     )
     for found, value in ways:
         wanted = (sensor.unit,) if sensor.unit else READINGS

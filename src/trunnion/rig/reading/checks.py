@@ -1,0 +1,360 @@
+"""Checks of readings and of turns: each gives a finding, or nothing.
+
+Readings that are certainly wrong (missing, clipped, stuck, spikes) are made NaN; what may be true stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.special import bdtrc
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.names import as_key
+from trunnion.rig.reading.log import counted, note, places, runs, warning
+from trunnion.rig.reading.mapping import Channel
+from trunnion.rig.reading.tables import Column
+from trunnion.rig.reading.turns import Turns, turn_means
+
+__all__ = [
+    "Drift", "FaultSpan", "backward_finding", "backwards", "clipped", "drift", "faults", "missing", "outliers", "signs",
+    "speeds", "steady",
+]  # fmt: skip
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+CLIP = 0.9995  # of the range, from which a reading is at it: the top code of 12 bits is 2047/2048
+OVERLOAD = 9.9e37  # what SCPI instruments write for an overload or no number (SCPI 1999.0, 7.2.1), and more
+MOST = 0.5  # of the readings at the end of the range: more is no load that is now and then too large
+STUCK = 30  # equal readings in a row at least
+WIDTH = 7  # samples of the median that spikes are told from: up to three in a row are found
+FAR = 12.0  # robust standard deviations from it
+SEEN = 0.1  # of the span from the 1st to the 99th percentile, that a spike exceeds
+NEAR, CHANCE = 0.01, 0.025  # of a turn, in which what recurs is in the same place; chance that faults lie so close
+FEW = 4  # turns from which what comes back can be told from faults
+RPM = np.pi / 30
+STEADY = 0.03  # of the mean speed, between the slowest and the fastest turn
+CERTAIN = 6.0  # standard errors from which a slope is one
+PLAIN, SHARE = 3.0, 0.002  # times what turns scatter about the line, and share of the channel, that a drift comes to
+NEARLY_ALL = 0.95  # of the turns, in which a power has the wrong sign if the channel has it
+APART = 0.03  # of a mean speed, between the angle and the channel that reads it
+
+
+# ---- readings -------------------------------------------------------------------------------------------------
+
+
+def missing(where: str, column: Column, readings: Array, seconds: Array) -> Finding | None:
+    """Cells without a number, which all become NaN: infinite ones and codes for an overload too."""
+    size = np.abs(readings)
+    readings[np.isinf(size) | ((size >= OVERLOAD) & (size < 1e38))] = np.nan
+    mask = np.isnan(readings)
+    if not mask.any():
+        return None
+    example = f" ({counted(column.texts, 'text')} such as '{column.example}')" if column.texts else ""
+    what = f"dropouts: {counted(int(mask.sum()), 'cell')} of {readings.size:,} without a number{example}"
+    return warning("readings.missing", where, f"{what}, {places(mask, seconds)}; left out", "check cable and logger")
+
+
+def clipped(where: str, readings: Array, limit: float, unit: str, seconds: Array) -> Finding | None:
+    """Readings at the end of the range or beyond, which become NaN; an error where most of the channel is."""
+    rows = np.abs(readings) >= CLIP * limit
+    count, finite = int(np.count_nonzero(rows)), int(np.count_nonzero(np.isfinite(readings)))
+    if not count:
+        return None
+    what = f"clipped: {counted(count, 'reading')} of {finite:,} at or beyond the end of the range of {limit:.6g} "
+    what += unit or "in the unit of the readings"
+    if count > MOST * finite:  # what is left says nothing of the channel
+        remedy = "check column, unit, gain and range of the channel in the mapping; else use a larger range"
+        figures = {"count": count, "readings": finite}
+        raise MechanismError(Finding(what, where, remedy, code="data.readings.clipped", figures=figures))
+    what = f"{what}, {places(rows, seconds)}; left out, so that means there are too small"
+    readings[rows] = np.nan
+    return warning("readings.clipped", where, what, "use a larger range or a smaller load")
+
+
+def outliers(readings: Array) -> Mask:
+    """Single readings, none of them NaN, that are far off the median of those around them, beyond any doubt."""
+    off = np.abs(readings - median_filter(readings, size=WIDTH, mode="mirror"))
+    return np.asarray(off > FAR * float(np.percentile(off, 99))) if readings.size > WIDTH else off > np.inf
+
+
+@dataclass(frozen=True)
+class FaultSpan:
+    """The rows in which the drive runs, and when its turns begin and end there, s.
+
+    beside: rows before and after them that reach into the turns, by interpolation or a filter.
+    """
+
+    low: int
+    high: int
+    begin: Array
+    end: Array
+    beside: int = 0
+
+    def periodic(self, count: int) -> bool:
+        """Whether something happens in so many places that it belongs to the signal."""
+        return self.begin.size >= FEW and count >= 0.5 * self.begin.size
+
+    def recurring(self, time: Array) -> Mask:
+        """What comes back in the same place of the turn more often than chance would have it (binomial).
+
+        Once found, it does not count any more when the rest is looked at.
+        """
+        turn = np.clip(np.searchsorted(self.begin, time, side="right") - 1, 0, self.begin.size - 1)
+        phase = ((time - self.begin[turn]) / (self.end - self.begin)[turn]) % 1.0
+        own = np.zeros(phase.size, dtype=np.bool_)
+        while np.count_nonzero(~own) > 1:
+            rest = phase[~own]
+            around = np.sort(np.concatenate([rest - 1, rest, rest + 1]))
+            others = np.searchsorted(around, rest + NEAR, side="right") - np.searchsorted(around, rest - NEAR) - 1
+            again = np.asarray(bdtrc(others - 1, rest.size - 1, 2 * NEAR) < CHANCE)
+            if not again.any():
+                break
+            own[np.flatnonzero(~own)[again]] = True
+        return own
+
+    def leave_out(self, readings: Array, mask: Mask) -> str:
+        """Leave out what may be the signal's own only where there are turns enough to tell; what was done."""
+        if self.begin.size < FEW:
+            turns = counted(self.begin.size, "turn")
+            return f"left in: in {turns} it cannot be decided whether this belongs to the signal"
+        readings[mask] = np.nan
+        return "left out"
+
+
+def faults(where: str, readings: Array, seconds: Array, span: FaultSpan, moves: bool = True) -> Iterator[Finding]:
+    """Stuck readings and spikes while the drive runs, which become NaN; moves: whether the readings are to change."""
+    running = readings[span.low : span.high]
+    known = running[np.isfinite(running)]
+    if known.size < 10:
+        return
+    if known.min() == known.max():
+        what = f"reads {known[0]:.6g} in every one of {known.size:,} rows"
+        remedy = "check that the sensor is connected and the column the right one"
+        yield (warning if moves else note)("readings.constant", where, what, remedy)
+        return
+    wide = max(float(np.subtract(*np.percentile(known, (99, 1)))), 1e-300)
+    yield from _stuck(where, running, seconds[span.low : span.high], span)
+    near = slice(max(span.low - span.beside, 0), span.high + span.beside)
+    yield from _spikes(where, readings[near], seconds[near], wide, span)
+
+
+def _stuck(where: str, part: Array, time: Array, span: FaultSpan) -> Iterator[Finding]:
+    """The same reading in a row much more often than is usual for the channel."""
+    starts, lengths = runs(np.concatenate([np.diff(part) == 0, [False]]))
+    if not starts.size:
+        return
+    single = part.size - int(np.sum(lengths + 1))
+    ranks = np.sort(np.concatenate([lengths + 1, np.ones(min(single, 10 * lengths.size), dtype=np.intp)]))
+    usual = float(ranks[int(0.99 * (ranks.size - 1))])
+    long = lengths + 1 > max(STUCK, 10 * usual if usual < 0.1 * part.size else STUCK)
+    held = int(np.sum(lengths[long] + 1))
+    if not long.any() or span.periodic(int(long.sum())) or held > 0.5 * part.size:
+        return
+    bad = np.zeros(part.size, dtype=np.bool_)
+    for begin, length in zip(starts[long], lengths[long], strict=True):
+        bad[begin + 1 : begin + length + 1] = True
+    what = f"stuck: the reading does not change for {counted(held, 'sample')}, {places(bad, time)}"
+    yield warning("readings.stuck", where, f"{what}; {span.leave_out(part, bad)}", "check sensor and logger")
+
+
+def _spikes(where: str, part: Array, time: Array, wide: float, span: FaultSpan) -> Iterator[Finding]:
+    """One to three readings far from the median of those around them; wide: what the readings span."""
+    finite = np.isfinite(part)
+    if np.count_nonzero(finite) < 2 * WIDTH:
+        return
+    known = part[finite]
+    off = np.abs(known - median_filter(known, size=WIDTH, mode="nearest"))
+    ends = np.abs(known - median_filter(known, size=WIDTH, mode="mirror"))  # which a slope moves, too
+    off = np.where(ends > wide, np.maximum(off, ends), off)
+    far = off > max(FAR * 1.4826 * float(np.median(off)), 2.5 * float(np.percentile(off, 99)), SEEN * wide)
+    if span.periodic(int(runs(far)[0].size)):
+        return
+    bad = np.zeros(part.size, dtype=np.bool_)
+    bad[np.flatnonzero(finite)[far]] = True
+    bad[np.flatnonzero(bad)[span.recurring(time[bad])]] = False
+    far = bad[finite]
+    if not far.any():
+        return
+    what = f"spikes: {counted(int(far.sum()), 'reading')} of {span.high - span.low:,} up to "
+    what += f"{off[far].max() / wide:.2g} times the usual span off their neighbours, {places(bad, time)}"
+    yield warning("readings.spikes", where, f"{what}; {span.leave_out(part, bad)}", "check shielding and earth")
+
+
+# ---- turns ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A zero that creeps: slope and its standard error, SI a second, and what it amounts to over the turns.
+
+    span: from the middle of the first turn to that of the last, over which the change is.
+    """
+
+    slope: float
+    error: float
+    change: float
+    scatter: float
+    span: float
+
+
+def drift(parts: Sequence[tuple[Turns, Array]]) -> Drift | None:
+    """The slope that the means of turns have in common in all conditions of a file, where it is plain; else None."""
+    times, means, middles, largest = [], [], [], 0.0
+    for turns, course in parts:
+        mean, middle = turn_means(course), 0.5 * (turns.begin + turns.end)
+        finite = np.isfinite(mean)
+        if np.count_nonzero(finite) >= 3:
+            times.append(middle[finite] - middle[finite].mean())
+            means.append(mean[finite] - mean[finite].mean())
+            middles.append(middle[finite])
+            largest = max(largest, float(np.nanmax(np.abs(course))))
+    if not times:
+        return None
+    t, y = np.concatenate(times), np.concatenate(means)
+    free, square = t.size - len(times) - 1, float(np.sum(t**2))
+    if free < 4 or square == 0:
+        return None
+    slope = float(np.sum(t * y)) / square
+    scatter = float(np.sqrt(np.sum((y - slope * t) ** 2) / free))
+    error, span = scatter / np.sqrt(square), float(np.ptp(np.concatenate(middles)))
+    change = slope * span
+    if change == 0 or abs(slope) < CERTAIN * error or abs(change) < max(PLAIN * scatter, SHARE * largest):
+        return None
+    return Drift(slope, error, change, scatter, span)
+
+
+def steady(turns: Turns, step: float, where: str) -> Finding | None:
+    """Turns that are not equally fast, by more than the sampling can tell."""
+    lengths = turns.end - turns.begin
+    spread = float(np.ptp(1 / lengths)) / float(np.mean(1 / lengths)) if lengths.size > 1 else 0.0
+    if spread <= STEADY + 2 * step / float(np.mean(lengths)):
+        return None
+    slow, fast = 60 / float(lengths.max()), 60 / float(lengths.min())
+    what = f"the speed is not steady: {slow:.4g} to {fast:.4g} cycles a minute, {100 * spread:.3g} % between turns"
+    remedy = "state files: over: to use the steady part, or improve the speed control"
+    return warning("speed.unsteady", where, what, remedy)
+
+
+def _subjects(channels: Mapping[str, Channel], kind: str) -> dict[str, str]:
+    """Channels that measure something of a kind, by what it is of."""
+    split = {key: one.measures.partition(":") for key, one in channels.items()}
+    return {subject: key for key, (head, _, subject) in split.items() if head == kind}
+
+
+def signs(
+    channels: Mapping[str, Channel], courses: Mapping[str, Array], zeros: Mapping[str, float], turning: float
+) -> Iterator[Finding]:
+    """Channels that are likely to have the wrong sign: power in, or power out, below zero in all turns of a file.
+
+    Parameters
+    ----------
+    channels : of the mapping.
+    courses : turns of all conditions.
+    zeros : standard uncertainty of the zero of each channel, SI, within which the mean of a power shows no sign.
+    turning : mean speed of the driver by its angle, rad/s with its sign.
+    """
+    rates, drivers, loads = (_subjects(channels, kind) for kind in ("rate", "effort", "load"))
+    gives = False
+    for driver, effort in drivers.items():
+        rate = rates.get(driver)
+        if rate is None and len(drivers) > 1:
+            continue
+        against = courses[rate] if rate else np.full_like(courses[effort], turning)
+        power = _known_means(courses[effort] * against)
+        gives = gives or bool(power.size and np.mean(power > 0) > NEARLY_ALL)
+        if _negative(power, zeros[effort] * against):
+            gives = True
+            opposed = rate is not None and len(drivers) == 1 and float(np.nanmean(courses[rate])) * turning < 0
+            suspect = str(rate) if opposed else effort
+            cause = f"the sign of {suspect} is wrong, unless the load drives the motor"
+            cause = "the angle has the wrong sign" if opposed else cause
+            what = f"sign: the power into {driver} is negative in {_of(power)} ({power.mean():.4g} W): {cause}"
+            other = "" if rate else "; or sign: in angle:, if that runs backwards"
+            remedy = f"write sign: {-channels[suspect].sign}{other}"
+            yield warning("power.sign", f"channels.{suspect}", what, remedy)
+    free = [key for joint, key in rates.items() if joint not in drivers]
+    for load, key in loads.items():
+        rate = rates.get(load) or (free[0] if len(free) == 1 else None)
+        if rate is None or not gives:
+            continue
+        power = _known_means(courses[key] * courses[rate])
+        if _negative(power, zeros[key] * courses[rate]):
+            what = f"sign: the power delivered to {load} is negative in {_of(power)}"
+            what = f"{what} ({power.mean():.4g} W) while the drive delivers power"
+            remedy = f"write sign: {-channels[key].sign} (or turn that of {rate})"
+            yield warning("power.sign", f"channels.{key}", what, remedy)
+
+
+def backwards(
+    channels: Mapping[str, Channel], settings: Sequence[Mapping[str, float]], turning: float
+) -> Finding | None:
+    """An angle that runs the other way than a driver whose speed is set; turning: by the angle, rad/s."""
+    drivers = list(_subjects(channels, "effort"))
+    if len(drivers) != 1:
+        return None
+    speeds = [row[f"{drivers[0]}.speed"] for row in settings if f"{drivers[0]}.speed" in row]
+    against = next((speed for speed in speeds if speed * turning < 0), None)
+    return None if against is None else backward_finding(drivers[0], turning, against)
+
+
+def backward_finding(driver: str, measured: float, stated: float) -> Finding:
+    """An error of an angle that runs against the driver; speeds in rad/s."""
+    what = f"the angle runs backwards: {measured / RPM:.4g} rpm measured, {stated / RPM:.4g} rpm stated of {driver}"
+    speed = as_key(f"{driver}.speed")
+    remedy = f"if it does turn so, set {speed} below zero; else add sign: -1 to angle:, or remove it there"
+    figures = {"measured": measured, "stated": stated, "driver": driver}
+    return Finding(what, "angle", remedy, code="data.angle.backwards", figures=figures)
+
+
+def speeds(
+    channels: Mapping[str, Channel],
+    courses: Mapping[str, Array],
+    units: Mapping[str, tuple[str, float]],
+    turning: float,
+) -> Finding | None:
+    """An angle that turns at another mean speed than the channel of its driver reads, or the other way.
+
+    units: in which the figures of each channel are shown, with their size in SI; turning: mean speed by the angle,
+    rad/s with its sign.
+    """
+    drivers = _subjects(channels, "effort")
+    rate = _subjects(channels, "rate").get(next(iter(drivers), ""))
+    if len(drivers) != 1 or rate is None or not turning:
+        return None
+    known = courses[rate][np.isfinite(courses[rate])]
+    if not known.any():
+        return None
+    # over equal angles the mean of a speed in time is the harmonic one
+    one_way = np.all(known > 0) or np.all(known < 0)
+    speed = float(1 / np.mean(1 / known)) if one_way else float(np.mean(known))
+    ratio = turning / speed if speed else np.inf
+    if abs(ratio - 1) <= APART:
+        return None
+    (unit, size), where = units[rate], f"channels.{rate}"
+    what = f"the angle turns at {turning / size:.4g} {unit}, '{rate}' reads {speed / size:.4g} {unit}"
+    if abs(ratio + 1) <= APART:
+        return warning("rate.sign", where, f"sign: {what}", f"write sign: {-channels[rate].sign}, or turn angle.sign")
+    remedy = "check unit and gain of the channel, and per_turn or unit of angle"
+    return warning("rate.ratio", where, f"{what}, {ratio:.4g} times", remedy)
+
+
+def _known_means(course: Array) -> Array:
+    means = turn_means(course)
+    return means[np.isfinite(means)]
+
+
+def _negative(power: Array, by_zero: Array) -> bool:
+    """Whether a power is below zero in most turns, by more than an error of the zero may make it."""
+    return bool(
+        power.size and np.mean(power < 0) > NEARLY_ALL and abs(np.mean(power)) > 2 * abs(float(np.nanmean(by_zero)))
+    )
+
+
+def _of(power: Array) -> str:
+    below = int(np.count_nonzero(power < 0))
+    return f"all {counted(below, 'turn')}" if below == power.size else f"{below:,} of {counted(power.size, 'turn')}"

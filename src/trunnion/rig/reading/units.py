@@ -1,0 +1,271 @@
+"""Units of sensors: numbers such as `12 mV`, gains such as `100 mV/(N m)`, and from a reading to what it measures.
+
+The model's own quantities know mechanics only; its units are used wherever a unit is one of mechanics.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import core_schema
+
+from trunnion.model.entry import problem
+from trunnion.model.measure_table import MEASURES
+from trunnion.model.names import nearest
+from trunnion.model.units import BASES, UnitError, normalise, pound_feet, root, si_unit, unit
+
+__all__ = [
+    "Amount", "Dimensions", "Frequency", "MeasureText", "Number", "SensorScale", "UnitText", "alike", "default_unit",
+    "dimensions", "multiplied", "read_amount", "scale",
+]  # fmt: skip
+
+Dimensions = Mapping[str, Fraction]
+HERTZ: Dimensions = {"s": Fraction(-1)}
+_AMOUNT = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
+_RATIO = re.compile(r"([^/()]+?)\s*/\s*\(\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?)\s*([^/()0-9][^()]*)\)", re.DOTALL)
+_USUAL = ("s", "ms", "Hz", "kHz", "V", "mV", "A", "mA", "N", "kN", "N m", "rpm", "rad/s", "deg", "rad", "mm", "%")
+_COUNTED = {"rad", "m"}  # Hz over a speed, 60 Hz/(rev/s), are pulses over an angle or length
+_VOLT: Dimensions = {"kg": Fraction(1), "m": Fraction(2), "s": Fraction(-3), "A": Fraction(-1)}
+
+
+@dataclass(frozen=True)
+class Amount:
+    """A number with a unit, as written. value: of the number in SI; unit: empty for a plain number."""
+
+    source: float | str
+    value: float
+    unit: str
+    dimensions: Dimensions
+
+    @property
+    def plain(self) -> bool:
+        """Whether no unit is stated."""
+        return not self.unit
+
+
+def dimensions(text: str) -> tuple[float, Dimensions]:
+    """Factor to SI and exponents by base unit; UnitError for what is no unit, or one that may mean turns or radians."""
+    written = pound_feet(normalise(text))
+    try:
+        factor, exponents, names = root(written)
+    except UnitError as error:
+        near = nearest(text, _USUAL)
+        near = near if near.startswith("did you mean") else "write a unit such as mV, N m, rpm or deg"
+        raise UnitError(error.what, error.remedy or near) from None
+    if "count" in exponents:
+        raise UnitError(f"the unit '{text}' is not one of a sensor", "use units of mechanics, volts, ampere or kelvin")
+    pulses = "Hz" in names and exponents and exponents.keys() <= _COUNTED
+    if not {"A", "K"} & exponents.keys() and exponents != HERTZ and not pulses:
+        unit(written)
+    return float(factor), exponents
+
+
+def read_amount(source: object) -> Amount:
+    """A number or a text such as `12 mV`; UnitError if it is neither."""
+    if isinstance(source, bool) or not isinstance(source, (int, float, str)):
+        what = "is empty" if source is None else "is not a number with a unit"
+        raise UnitError(what, "write a number with its unit such as 12 mV")
+    found = _AMOUNT.fullmatch(normalise(source)) if isinstance(source, str) else None
+    if isinstance(source, str) and (not found or found[2].startswith(",")):
+        remedy = "write a decimal point, not a comma" if re.search(r"[0-9],[0-9]", source) else "write it as 12 mV"
+        raise UnitError(f"'{source[:40]}' is not a number with a unit", remedy)
+    number, text = (found[1], found[2]) if found else (str(source), "")
+    divisor = 1.0
+    if ratio := _RATIO.fullmatch(text):  # 1 V/(1000 rpm)
+        text, divisor = f"{ratio[1]}/({ratio[3]})", float(ratio[2])
+    factor, exponents = dimensions(text) if text else (1.0, {})
+    value = float(number) * factor / divisor if divisor else math.inf
+    if not math.isfinite(value):
+        raise UnitError(f"'{str(source)[:40]}' is not a finite number", "give a finite number")
+    return Amount(source, value, text, exponents)
+
+
+def alike(first: Dimensions, second: Dimensions) -> bool:
+    """Whether two units measure the same; beside other dimensions the angle is a pure number (N m/rad is N m)."""
+    first, second = ({key: power for key, power in each.items() if power} for each in (first, second))
+    if first == second:
+        return True
+    bare = [{key: power for key, power in each.items() if key != "rad"} for each in (first, second)]
+    return bare[0] == bare[1] and bool(bare[0]) and bare[0] != dict(HERTZ)
+
+
+def multiplied(first: Dimensions, second: Dimensions, sign: int = 1) -> Dimensions:
+    """Dimensions of a product, or of a quotient with sign −1."""
+    return {key: first.get(key, Fraction(0)) + sign * second.get(key, Fraction(0)) for key in {*first, *second}}
+
+
+def unit_name(exponents: Dimensions) -> str:
+    """SI unit of dimensions, in short."""
+    exponents = {key: power for key, power in exponents.items() if power}
+    if exponents == dict(_VOLT):
+        return "V"
+    if not set(exponents) - set(BASES[:4]):
+        length, mass, time, angle = (Fraction(exponents.get(name, 0)) for name in BASES[:4])
+        return si_unit((length, mass, time, angle))
+    return " ".join(name + ("" if power == 1 else f"^{power}") for name, power in exponents.items())
+
+
+# ---- entries of a file ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Read:
+    """Annotation that makes pydantic read a text or number as an entry of a kind."""
+
+    kind: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        """Validation by the function of its kind."""
+        return core_schema.no_info_plain_validator_function(lambda value: _stated(value, self.kind))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """A number or a text; a unit is a text."""
+        types = ["string"] if self.kind == "unit" else ["number", "string"]
+        return {"type": types, "examples": [{"unit": "mV", "frequency": "2 kHz"}.get(self.kind, "12 mV")]}
+
+
+def _stated(value: object, kind: str) -> Any:
+    """The value of a kind; a finding's error if it is none."""
+    if isinstance(value, Amount):
+        return value
+    try:
+        if kind == "unit":
+            if not isinstance(value, str):
+                raise UnitError("is not a unit", "write a unit such as mV or N m")
+            dimensions(value)
+            return value
+        if isinstance(value, str) and re.search(r"\d:\d\d:\d\d", value):
+            what = f"'{value}' is a time stamp; times are counted in seconds from the first row of the file"
+            raise UnitError(what, "write a time in seconds, such as [0 s, 0.5 s]")
+        amount = read_amount(value)
+        if kind == "frequency" and not (amount.value > 0 and (amount.plain or amount.dimensions == HERTZ)):
+            raise UnitError(f"'{value}' is not a frequency above zero", "write it as 2 kHz or 500 Hz")
+    except UnitError as error:
+        raise problem(error.what, error.remedy or "write a number with its unit such as 12 mV") from None
+    return amount
+
+
+UnitText = Annotated[str, _Read("unit")]
+Number = Annotated[Amount, _Read("amount")]
+Frequency = Annotated[Amount, _Read("frequency")]
+
+
+# ---- from readings to quantities ------------------------------------------------------------------------------
+
+OTHER_COLUMN = "name another column"
+# SI units that a kind of measure may have, the first being what a plain number is taken for
+QUANTITIES = {name: tuple(one.unit for one in kind.quantities) for name, kind in MEASURES.items()}
+
+
+def _kind(measures: str) -> str:
+    """Entry of QUANTITIES that a measure is of; empty for a name of the model's measures."""
+    head, colon, _ = measures.partition(":")
+    if colon:
+        return head
+    return "point" if re.fullmatch(r"[^.]+\.[^.]+\.[xyz]", measures) else ""
+
+
+def _measures(text: str) -> str:
+    """A measure that has a course: KIND:NAME, link.point.x or the name of one of the model."""
+    kind, (_, colon, subject) = _kind(text), text.partition(":")
+    if (kind and kind not in QUANTITIES) or (colon and not subject.strip()) or not text.strip():
+        kinds = ", ".join(f"{one}:NAME" for one in QUANTITIES if one != "point")
+        near = nearest(kind, QUANTITIES)
+        remedy = f"{near} " if near.startswith("did") else ""
+        what = f"'{text[:80]}' is not a quantity that a sensor measures"
+        raise problem(what, f"{remedy}write {kinds} or link.point.x")
+    return text
+
+
+MeasureText = Annotated[str, AfterValidator(_measures)]
+
+
+@dataclass(frozen=True)
+class SensorScale:
+    """Quantity (SI) = factor · reading.
+
+    unit: SI unit of the quantity; of_reading, of_quantity: dimensions of both; raw: of a reading in SI; measures,
+    column: what the channel is said to measure, and where.
+    """
+
+    factor: float
+    unit: str
+    raw: float
+    of_reading: Dimensions
+    of_quantity: Dimensions
+    measures: str = ""
+    column: str = ""
+
+    @property
+    def direct(self) -> bool:
+        """Whether the readings are what is measured itself, in some unit, not volts and the like."""
+        return alike(self.of_reading, self.of_quantity)
+
+    def reading(self, amount: Amount, key: str) -> float:
+        """An amount stated as readings or as quantity, in readings; UnitError if it is neither.
+
+        key: which it is; a zero lies on the side that the gain has it, of ranges and accuracies only the size counts.
+        """
+        if amount.plain:
+            return amount.value
+        if alike(amount.dimensions, self.of_reading):
+            return amount.value / self.raw
+        if alike(amount.dimensions, self.of_quantity):
+            return amount.value / (self.factor if key == "zero" else abs(self.factor))
+        others = QUANTITIES.get(_kind(self.measures), ())
+        if any(alike(amount.dimensions, dimensions(one)[1]) for one in others):  # the other one that it may be
+            raise UnitError(
+                f"the column '{self.column}' is in {unit_name(self.of_reading)}, {key} in {amount.unit}; "
+                f"{self.measures} is in {' or '.join(others)}, as its joint turns or slides",
+                f"{OTHER_COLUMN}, or write {key} in {self.unit}",
+            )
+        raise UnitError(
+            f"{key}: '{amount.source}' is neither of the readings ({unit_name(self.of_reading)}) nor of what they "
+            f"measure ({self.unit})",
+            f"write it in {self.unit}, or as a plain number in the unit of the readings",
+        )
+
+
+def default_unit(measures: str) -> str:
+    """SI unit that plain numbers of a measure are taken for; empty where nothing tells."""
+    return QUANTITIES.get(_kind(measures), ("",))[0]
+
+
+def scale(measures: str, unit: str, gain: Amount | None, column: str = "") -> SensorScale:
+    """How readings in a unit become what is measured; UnitError if they do not. A plain gain multiplies.
+
+    The gain is reading per quantity or quantity per reading: whichever gives what is measured. column: for messages.
+    """
+    raw, of_reading = dimensions(unit) if unit else (1.0, {})
+    gain = gain or Amount(1.0, 1.0, "", {})
+    if gain.value == 0:
+        raise UnitError("the gain is zero", "write reading per quantity, such as 100 mV/(N m)")
+    kind = _kind(measures)
+    possible = QUANTITIES.get(kind, ())
+    for power in (1, -1):
+        product = multiplied(of_reading, gain.dimensions, power)
+        name = next((one for one in possible if alike(product, dimensions(one)[1])), "")
+        if not kind and not {"A", "K"} & {key for key, value in product.items() if value}:
+            name = unit_name(product)
+        if name:
+            factor = raw * gain.value**power
+            return SensorScale(factor, name, raw, of_reading, dimensions(name)[1], measures, column)
+    if gain.plain and alike(of_reading, HERTZ) and kind == "rate":
+        what = f"readings in '{unit}' do not give {measures}, for they may count turns or radians"
+        raise UnitError(what, "write the unit as rpm or rad/s")
+    needed = " or ".join(possible or ("a quantity of mechanics",))
+    if gain.plain and kind and column and any(of_reading.values()) and not {"A", "K"} & of_reading.keys():
+        what = f"the column '{column}' is in {unit}; {measures} is in {needed}"
+        raise UnitError(what, f"{OTHER_COLUMN}, or correct its unit")
+    told = "" if gain.plain else f" with the gain '{gain.source}'"
+    remedy = f"state the gain, such as 100 mV/({needed.split(' or ')[0]})" if gain.plain else "check unit and gain"
+    raise UnitError(f"readings in '{unit or '1'}'{told} do not give {measures} in {needed}", remedy)

@@ -164,7 +164,7 @@ def codes_table() -> str:
     from trunnion.results.sentences.codes import SENTENCES
 
     rows = {name: (str(one.severity), one.what if isinstance(one.what, str) else "") for name, one in SENTENCES.items()}
-    for module in ("comparison", "identification/findings"):
+    for module in ("comparison", "identification/findings", "virtual/observe", "virtual/plan"):
         rows |= _codes_in(Path(trunnion.__file__).parent / f"rig/{module}.py")
     return rows_of(("code", "is", "says"), [(code(name), *row) for name, row in sorted(rows.items())])
 

@@ -14,13 +14,12 @@ from trunnion.results.sentences import finding_for
 from trunnion.results.sentences.codes import SENTENCES
 from trunnion.results.sentences.cycle import CYCLE
 from trunnion.results.sentences.dynamics import DYNAMICS
-from trunnion.results.sentences.rig import RIG
 from trunnion.results.sentences.structure import STRUCTURE
 from trunnion.results.sentences.studies import STUDIES
 
 
 def test_no_code_is_given_twice() -> None:
-    assert len(SENTENCES) == len(CYCLE) + len(RIG) + len(STRUCTURE) + len(STUDIES) + len(DYNAMICS)
+    assert len(SENTENCES) == len(CYCLE) + len(STRUCTURE) + len(STUDIES) + len(DYNAMICS)
 
 
 @pytest.mark.parametrize("code", SENTENCES)

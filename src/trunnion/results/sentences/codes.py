@@ -8,14 +8,13 @@ from typing import Any
 from trunnion.errors import Finding, Severity
 from trunnion.results.sentences.cycle import CYCLE
 from trunnion.results.sentences.dynamics import DYNAMICS
-from trunnion.results.sentences.rig import RIG
 from trunnion.results.sentences.sentence import Sentence, filled
 from trunnion.results.sentences.structure import STRUCTURE
 from trunnion.results.sentences.studies import STUDIES
 
 __all__ = ["QUIET", "SENTENCES", "finding_for"]
 
-SENTENCES: dict[str, Sentence] = {**STRUCTURE, **CYCLE, **STUDIES, **RIG, **DYNAMICS}
+SENTENCES: dict[str, Sentence] = {**STRUCTURE, **CYCLE, **STUDIES, **DYNAMICS}
 QUIET = frozenset(code for code, sentence in SENTENCES.items() if sentence.quiet)
 
 

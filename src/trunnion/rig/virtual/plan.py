@@ -7,16 +7,16 @@ that `efficiency_of` will find from the data, worked out from what is stated of 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding
-from trunnion.results.sentences import finding_for
+from trunnion.errors import Finding, Severity, counted
 from trunnion.rig.reading.efficiency import Efficiency, efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.measurement import Accuracy, Condition, Signal
-from trunnion.rig.virtual.cases import Case
+from trunnion.rig.virtual.observation import Case
 from trunnion.rig.virtual.observe import Observation
 
 __all__ = ["Expected", "Forecast", "RigPlan", "plan"]
@@ -93,7 +93,7 @@ def plan(observation: Observation) -> RigPlan:
             expected[name].append((case.number, float(np.min(steady[name])), float(np.max(steady[name])), beyond))
         forecasts.append(_forecast(observation, case, steady))
     sensors = tuple(_expected(observation, name, rows) for name, rows in expected.items())
-    return RigPlan(sensors, tuple(forecasts), tuple(_said(observation, sensors, forecasts)))
+    return RigPlan(sensors, tuple(forecasts), tuple(_findings(sensors, forecasts)))
 
 
 def _steady(observation: Observation, case: Case) -> dict[str, Array]:
@@ -139,20 +139,31 @@ def _expected(observation: Observation, name: str, rows: list[tuple[int, float, 
     return Expected(name, channel.measures, channel.reading, least, most, share, steps, channel.noise * per, clipped)
 
 
-def _said(observation: Observation, sensors: tuple[Expected, ...], forecasts: list[Forecast]) -> list[Finding]:
-    """What is to be thought about before the rig is built."""
-    found = []
+def _findings(sensors: tuple[Expected, ...], forecasts: list[Forecast]) -> Iterator[Finding]:
+    """What to think about before the rig is built."""
     for one in sensors:
+        where = f"sensors.{one.sensor}"
         if one.share < SMALL_RANGE:
-            found.append(finding_for("rig.range_wide", f"sensors.{one.sensor}.range", percent=100 * one.share))
+            what = f"the readings use {100 * one.share:.2g} % of the range: errors in % of full scale dominate"
+            remedy = "use a sensor with a smaller range"
+            yield Finding(what, f"{where}.range", remedy, Severity.NOTE, code="rig.range_wide")
         if 0 < one.steps < FEW_STEPS:
-            found.append(finding_for("rig.steps_few", f"sensors.{one.sensor}.bits", steps=one.steps))
+            what = f"the readings cover only {one.steps:.3g} steps of the converter"
+            remedy = "use a converter with more bits, or a smaller span"
+            yield Finding(what, f"{where}.bits", remedy, Severity.NOTE, code="rig.steps_few")
     measured = [one for one in forecasts if one.measured]
     off = [one for one in measured if one.measured and abs(one.bias) > one.measured.uncertainty]
     if off:
         worst = max(off, key=lambda one: abs(one.bias))
-        figures = {"count": len(off), "of": len(measured), "condition": worst.case.number, "bias": worst.bias}
-        found.append(finding_for("rig.biased", "sensors", severity=None, phrases=None, **figures))
+        what = (
+            f"in {len(off)} of {counted(len(measured), 'condition')} the bias of the efficiency exceeds its standard "
+        )
+        what += (
+            f"uncertainty, at most {worst.bias:+.2g} in condition {worst.case.number}: the sensors are too slow for "
+        )
+        remedy = "use sensors with a larger bandwidth or range, more pulses, or a lower speed"
+        yield Finding(f"{what}the cycle, or clipped", "sensors", remedy, Severity.WARNING, code="rig.biased")
     if not measured:
-        found.append(finding_for("rig.no_efficiency", "sensors"))
-    return found
+        what = "the sensors do not measure input and output power: no efficiency is predicted"
+        remedy = "measure effort: and rate: of the driver, load: of a load on a joint and rate: of that joint"
+        yield Finding(what, "sensors", remedy, Severity.NOTE, code="rig.no_efficiency")

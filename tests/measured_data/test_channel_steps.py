@@ -122,3 +122,24 @@ def test_an_angle_that_counts_backwards_is_named_once(tmp_path: Path, stated: An
         assert "residual" in trunnion.rig.compare(model.with_values({"drivers.A.speed": "-60 rpm"}), data)
         there = replace(data.conditions[0], name="forth", speed=2 * np.pi, values={"A.speed": 2 * np.pi})
         assert "residual" in trunnion.rig.compare(model, replace(data, conditions=(*data.conditions, there)))
+
+
+def test_a_channel_has_one_step_of_all_its_files(tmp_path: Path) -> None:
+    """One file spans three steps, and by itself hardly shows them; the other many."""
+    psi = np.degrees(rocker(TURN[::2]))
+    few = 100 + 0.15 * (psi - psi.min()) / np.ptp(psi)
+    for name, values in (("a", few), ("b", psi)):
+        (tmp_path / name).mkdir()
+        recorded(tmp_path / name, np.rint(10 * values) / 10, 1)
+    mapping = {
+        "trunnion-data": 1,
+        "time": {"column": "t", "unit": "s"},
+        "angle": {"from": "column", "column": "Winkel", "unit": "deg"},
+        "channels": {"psi": {"column": "psi", "measures": "rotation:D", "unit": "deg"}},
+    }
+    paths = [tmp_path / name / "a.csv" for name in ("a", "b")]
+    for files in (paths, paths[:1]):
+        for condition in read_measured(mapping, files).conditions:
+            course = condition.courses["psi"]
+            assert course.accuracy.resolution == pytest.approx(np.radians(0.1))
+            assert np.median(course.uncertainty) == pytest.approx(np.radians(0.1) / np.sqrt(6.0), rel=0.01)

@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 __all__ = ["identify"]
 
 MOST_ROWS = 24
-SAID = ("data.angle.zero_unused",)  # notes of the data that are said here too
 
 Parameters = Annotated[
     list[str] | None,
@@ -123,9 +122,7 @@ def identify(
             result = run(mechanism, measurement, wanted, channel, begin, held, sensors, guard, starts,  # type: ignore[arg-type]
                          progress=progress)  # fmt: skip
     found = gathered(  # of the notes those that tell what was set, and why intervals may be too narrow
-        one
-        for one in measurement.findings
-        if one.severity is not Severity.NOTE or one.where == "files" or one.code in SAID
+        one for one in measurement.findings if one.severity is not Severity.NOTE or one.where == "files"
     )
 
     show, sections = partial(_show, result), ["assembly", "measures"]

@@ -226,23 +226,22 @@ def held_out(mechanism: Mechanism, measurement: Measurement, hold_out: HoldOut) 
             what = f"a share of {hold_out:g} of the turns cannot be held out"
             raise MechanismError(Finding(what, "hold_out", "give a share between 0 and 1, or names of conditions"))
         return frozenset(), float(hold_out)
-    names, held = [one.name for one in measurement.conditions], set[str]()
+    conditions, held = measurement.conditions, set[str]()
     for text in [hold_out] if isinstance(hold_out, str) else hold_out:
-        value = text.strip()
-        files = {one.name: {PurePath(file).stem for file in one.files} for one in measurement.conditions}
-        parts = [name for name in names if value and text in name]
-        named = [name for name in names if name == text or text in files[name]]
-        named = named or _with_setting(mechanism, measurement, value)
-        named = named or [name for name in parts if any(f" {one}".endswith(f" {value}") for one in name.split(", "))]
-        if not named and len(parts) != 1:
+        part = text.strip()
+        exact = [one.name for one in conditions if text in (one.name, *(PurePath(file).stem for file in one.files))]
+        settings = [one.name for one in conditions if part and f" {part}," in f"{one.name},"]
+        parts = [one.name for one in conditions if part and part in one.name]
+        named = exact or _with_setting(mechanism, measurement, part) or settings or parts * (len(parts) == 1)
+        if not named:
             what = (
                 f"'{text}' is in the names of {len(parts)} conditions" if parts else f"there is no condition '{text}'"
             )
-            some = "; ".join((parts or names)[:MOST_NAMED]) + "; …" * (len(parts or names) > MOST_NAMED)
-            raise MechanismError(
-                Finding(what, "hold_out", f"name one of {some}; or a file, or a setting as NAME=VALUE")
-            )
-        held |= set(named or parts)
+            several = parts or [one.name for one in conditions]
+            some = "; ".join(several[:MOST_NAMED]) + "; …" * (len(several) > MOST_NAMED)
+            remedy = f"name one of {some}; or a file, or a setting as NAME=VALUE"
+            raise MechanismError(Finding(what, "hold_out", remedy))
+        held |= set(named)
     return frozenset(held), 0.0
 
 
@@ -390,13 +389,13 @@ def _runnable(fit: Fit) -> Array:
 def _unusable(fit: Fit, start: Array) -> Iterator[Finding]:
     """Why no position is used, if none is."""
 
-    def usable(one: Fit) -> bool:
-        masks = replace(one, variances=one.first_scatter()).allowed(start)
-        return any(bool(np.any(masks[k])) for k in one.fitted())
+    def usable(fit: Fit) -> bool:
+        masks = replace(fit, variances=fit.first_scatter()).allowed(start)
+        return any(bool(np.any(masks[k])) for k in fit.fitted())
 
     if usable(fit):
         return
-    codes = np.concatenate([np.asarray(one) for one in fit.courses(start).status])
+    codes = np.concatenate([np.asarray(status) for status in fit.courses(start).status])
     worst = list(Status)[int(np.bincount(codes).argmax())]
     if not any(np.any(np.isfinite(fit.blocks[k].mean)) for k in fit.fitted()):
         what = "no channel has a value at any position"
@@ -404,11 +403,8 @@ def _unusable(fit: Fit, start: Array) -> Iterator[Finding]:
     elif usable(replace(fit, guard=0)):
         what = "all positions are left out: each is next to a friction reversal"
         yield Finding(what, "guard", "give a smaller guard, or resample to more positions")
-    elif worst < Status.NOT_CONVERGED:
-        what = "no position of the data has a sound answer of the model: a mechanism stands or is near singular there"
-        yield Finding(what, "data", "measure at more positions")
     else:
-        what = f"no position of the data has an answer of the model: {worst.text}"
+        what = f"no position of the data has a sound answer of the model: {worst.text}"
         yield Finding(what, "start", "give start values with which the model has a solution, see `trunnion analyse`")
 
 

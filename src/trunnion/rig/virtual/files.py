@@ -6,38 +6,34 @@ says before any is written.
 
 from __future__ import annotations
 
-import errno
 import importlib.util
 import math
 import os
-import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import guard
 from trunnion.rig.reading.rig_file import FORMATS, Rig
-from trunnion.rig.virtual.cases import Case, case_names, speed_differs
+from trunnion.rig.virtual.observation import Case, Record, Recorded, case_names, speed_differs
 from trunnion.version import __version__
 
 if TYPE_CHECKING:
-    from trunnion.rig.virtual.observation import Record, Recorded
     from trunnion.rig.virtual.sensors import SensorChannel
 
-__all__ = ["MAPPING", "TRUTH", "check_folder", "check_form", "mapping_of", "truth_of", "write"]
+__all__ = [
+    "MAPPING", "TRUTH", "check_folder", "check_form", "mapping_of", "truth_of", "write",
+]  # fmt: skip
 
 MAPPING, TRUTH = "mapping.yaml", "truth.yaml"
 PACKAGES = {"parquet": "pyarrow", "tdms": "nptdms"}
 POSITIONS = (360, 180, 120, 90, 72, 60, 36, 24, 12)  # of a cycle: fewer than samples
 FEWER = 0.99
-ROWS = 100_000  # of text written at a time
 AT_REST = 0.9  # share of the idle stretch that the zero is taken from: a filter carries the run into the rest
 
 
@@ -81,90 +77,39 @@ def _of_a_rig(path: Path) -> bool:
 def write(
     observation: Recorded, folder: str | os.PathLike[str], form: str, progress: Callable[[int], None] | None = None
 ) -> list[str]:
-    """Write everything into a folder, which is made if it is not there, or nothing; the names of the files."""
+    """Write all files into a folder, which is made if it is not there, once all of them are complete; their names."""
     check_form(form)
     check_folder(observation.rig, folder, form)
-    names = []
-    units = units_of(observation)
-    with _together(Path(folder)) as temporary:
-        for done, record in enumerate(observation.records(), 1):
-            names.append(f"{record.name}.{form}")
-            WRITERS[form](record, units, temporary / names[-1], observation)
-            if progress:
-                progress(done)
-        _write_yaml(temporary / MAPPING, mapping_of(observation, form))
-        _write_yaml(temporary / TRUTH, truth_of(observation))
-    return [*names, MAPPING, TRUTH]
-
-
-@contextmanager
-def _together(folder: Path) -> Iterator[Path]:
-    """A folder for files that are to be in another one: they go there together when the block ends well, or none does.
-
-    MechanismError if they cannot be written.
-    """
+    folder, units = Path(folder), units_of(observation)
     home = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+    if not home.is_dir():
+        raise MechanismError(Finding("cannot be made a folder: it is a file", str(home), "name a folder"))
     try:
-        if home == folder and not folder.is_dir():
-            raise NotADirectoryError(errno.ENOTDIR, "it is a file")
-        temporary = Path(tempfile.mkdtemp(prefix=".rig-", dir=home))
+        with tempfile.TemporaryDirectory(prefix=".rig-", dir=home, ignore_cleanup_errors=True) as new:
+            for done, record in enumerate(observation.records(), 1):
+                WRITERS[form](record, units, Path(new) / f"{record.name}.{form}", observation)
+                if progress:
+                    progress(done)
+            _write_yaml(Path(new) / MAPPING, mapping_of(observation, form))
+            _write_yaml(Path(new) / TRUTH, truth_of(observation))
+            folder.mkdir(parents=True, exist_ok=True)
+            for path in sorted(Path(new).iterdir()):
+                path.replace(folder / path.name)
     except OSError as error:
-        what = f"cannot be made a folder: {error.strerror or error}"
-        raise MechanismError(Finding(what, str(folder), "name a folder")) from None
-    try:
-        new = temporary / "new"
-        new.mkdir()
-        yield new
-        if home == folder:
-            _move(new, folder, temporary / "old")
-        else:
-            _make(new, folder, home)
-    except OSError as error:
-        what = f"cannot be written: {error.strerror or error}; no part of it is left"
+        what = f"cannot be written: {error.strerror or error}"
         raise MechanismError(Finding(what, str(folder), "make room there, or name another folder")) from None
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-
-
-def _make(new: Path, folder: Path, home: Path) -> None:
-    """A folder that is not there yet, of one that is complete; with those above it, which go again if it cannot be."""
-    above = [one for one in folder.absolute().parents if home.absolute() in one.parents]
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        new.rename(folder)
-    except OSError:
-        for one in above:
-            with suppress(OSError):  # one that was not made
-                one.rmdir()
-        raise
-
-
-def _move(new: Path, folder: Path, old: Path) -> None:
-    """Files into a folder; those that they replace come back if one of them cannot be moved."""
-    old.mkdir()
-    moved: list[str] = []
-    try:
-        for one in sorted(new.iterdir()):
-            target = folder / one.name
-            if target.is_dir():
-                raise IsADirectoryError(errno.EISDIR, f"{one.name} is a folder")
-            moved.append(one.name)
-            if target.exists() or target.is_symlink():
-                target.rename(old / one.name)
-            one.rename(target)
-    except BaseException:
-        for name in moved:
-            if (old / name).exists():
-                (old / name).replace(folder / name)
-            elif not (new / name).exists():
-                (folder / name).unlink(missing_ok=True)
-        raise
+    return [*(f"{case.name}.{form}" for case in observation.cases), MAPPING, TRUTH]
 
 
 def _write_yaml(path: Path, data: dict[str, Any]) -> None:
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None if path.name == MAPPING else False  # the innermost groups on one line
+    yaml.allow_unicode = True
+    yaml.width = 118
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # keys as stated
     with path.open("w", encoding="utf-8", newline="\n") as stream:
         stream.write(HEADS[path.name])
-        _yaml(flowing=path.name == MAPPING).dump(data, stream)
+        yaml.dump(data, stream)
 
 
 def units_of(observation: Recorded) -> dict[str, str]:
@@ -179,26 +124,11 @@ def units_of(observation: Recorded) -> dict[str, str]:
 def _csv(record: Record, units: Mapping[str, str], path: Path, observation: Recorded) -> None:
     """Text, a column's unit in brackets behind its name, in quotes where it needs them; an empty cell: no reading."""
     head = [f"{name} [{units[name]}]" if name in units else name for name in record.columns]
-    count = len(next(iter(record.columns.values())))
     with path.open("w", encoding="utf-8", newline="") as stream:
-        stream.write(",".join(map(_quoted, head)) + "\n")
-        for low in range(0, count, ROWS):
-            cells = [_texts(values[low : low + ROWS]) for values in record.columns.values()]
-            stream.write("\n".join(map(",".join, zip(*cells, strict=True))))
-            stream.write("\n")
-
-
-def _quoted(name: str) -> str:
-    """A cell of the header, in quotes if it has a sign that may separate cells or begin a remark."""
-    return '"{}"'.format(name.replace('"', '""')) if set(name) & set(',;"#') else name
-
-
-def _texts(values: NDArray[Any]) -> list[str]:
-    """The shortest text of every number that gives the same float again; nothing for NaN."""
-    texts = list(map(repr, values.tolist()))
-    for k in np.flatnonzero(~np.isfinite(values)) if values.dtype.kind == "f" else ():
-        texts[k] = ""
-    return texts
+        quoted = ('"{}"'.format(name.replace('"', '""')) if set(name) & set(',;"#') else name for name in head)
+        stream.write(",".join(quoted) + "\n")
+        texts = [["" if one != one else repr(one) for one in row.tolist()] for row in record.columns.values()]
+        stream.write("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
 
 
 def _parquet(record: Record, units: Mapping[str, str], path: Path, observation: Recorded) -> None:
@@ -410,13 +340,3 @@ HEADS = {
     MAPPING: "# What the columns of the data files measure: for `trunnion data`, `compare` and `identify`.\n",
     TRUTH: "# True values and random errors of the virtual rig, in SI, to check results obtained from the files.\n",
 }
-
-
-def _yaml(flowing: bool) -> YAML:
-    """flowing: the innermost groups on one line."""
-    yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = None if flowing else False
-    yaml.allow_unicode = True
-    yaml.width = 118
-    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # keys as stated
-    return yaml

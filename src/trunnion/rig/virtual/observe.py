@@ -10,26 +10,33 @@ not brought up to speed, and neither motor nor brake has a dynamics of its own. 
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError, Severity, Status, counted
+from trunnion.measures.measures import Measure, named
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.reading.rig_file import Rig
-from trunnion.rig.virtual.cases import Case, case_names, case_of, channels_of, findings_of, measures_of, placed_at
-from trunnion.rig.virtual.files import mapping_of, truth_of, write
-from trunnion.rig.virtual.observation import Recorded, check_seed
-from trunnion.rig.virtual.sensors import SensorChannel, draw
-from trunnion.solve.run import prepare
+from trunnion.results.quantities import readable
+from trunnion.rig.modelled import told_at
+from trunnion.rig.reading.rig_file import Rig, Value
+from trunnion.rig.virtual import files
+from trunnion.rig.virtual.observation import Case, Recorded, case_names, check_seed, speed_differs
+from trunnion.rig.virtual.sensors import SensorChannel, draw, resolved
+from trunnion.rig.virtual.true_signals import cycle_efficiency, sampled
+from trunnion.solve.run import Run, prepare
 
-__all__ = ["observe"]
+__all__ = ["Observation", "observe"]
 
-Array = NDArray[np.float64]
+MOST_ROWS = 20_000_000
+MOST_NAMED = 20  # conditions in one finding
+BEYOND = 0.1  # of a cycle that is recorded before the first and past the last, so that their ends are there
 
 
 @strict_arguments
@@ -38,11 +45,11 @@ class Observation(Recorded):
 
     def mapping(self, form: str = "") -> dict[str, Any]:
         """The mapping that reads the files; see `files.mapping_of`."""
-        return mapping_of(self, form or self.rig.format)
+        return files.mapping_of(self, form or self.rig.format)
 
     def truth(self) -> dict[str, Any]:
         """What was drawn and what is true; see `files.truth_of`."""
-        return truth_of(self)
+        return files.truth_of(self)
 
     def write(
         self, folder: str | os.PathLike[str], form: str = "", progress: Callable[[int], None] | None = None
@@ -51,7 +58,7 @@ class Observation(Recorded):
 
         form: csv, parquet or tdms, that of the rig file if not given; progress: called with the files written.
         """
-        return write(self, folder, form or self.rig.format, progress)
+        return files.write(self, folder, form or self.rig.format, progress)
 
 
 @strict_arguments
@@ -64,41 +71,219 @@ def observe(
 ) -> Observation:
     """Put a rig to a mechanism: solve the model in all conditions of the schedule, draw the errors of the sensors.
 
-    rig: a Rig, the entries of a rig file, or its path; seed: of all random numbers: the same seed, the same readings to
-    the last bit; progress: called with the conditions done. A condition that the model cannot be in at every position,
-    because it locks or does not go together, is left out, and a finding says which and why.
-    Raises MechanismError for a rig that does not fit the mechanism, or if no condition is left.
+    A condition that the model cannot be in at every position, because it locks or does not go together, is left out,
+    and a finding says which and why.
+
+    Parameters
+    ----------
+    mechanism : the model.
+    rig : a Rig, the entries of a rig file, or its path.
+    seed : of all random numbers: the same seed, the same readings to the last bit.
+    progress : called with the conditions done.
+
+    Raises
+    ------
+    MechanismError
+        For a rig that does not fit the mechanism, or if no condition is left.
     """
     check_seed(seed)
     if not isinstance(rig, Rig):
         rig = Rig(**rig) if isinstance(rig, Mapping) else Rig.read(rig)
-    with placed_at("set"):
+    with _placed("set"):
         mechanism = mechanism.with_values(dict(rig.set_)) if rig.set_ else mechanism
     rows = rig.schedule.rows()
     channels: dict[str, SensorChannel] = {}
     cases: list[Case] = []
     for number, (name, row) in enumerate(zip(case_names(len(rows)), rows, strict=True), 1):
         key = f"conditions.{number - 1}" if rig.schedule.conditions else "over"
-        with placed_at(f"schedule.{key}", number):
+        with _placed(f"schedule.{key}", number):
             run = prepare(mechanism.with_values(dict(row)) if row else mechanism)
-        measures = measures_of(rig, run)
-        channels = channels or channels_of(rig, run, measures)
-        case = case_of(number, name, row, run, rig, measures, channels)
-        cases.append(case)
+        measures = _measures(rig, run)
+        channels = channels or _channels(rig, run, measures)
+        cases.append(_case(number, name, row, run, rig, measures, channels))
         if progress:
             progress(number)
-    findings = tuple(findings_of(cases, channels, rig))
+    findings = tuple(_findings(cases, channels, rig))
     sound = tuple(case for case in cases if case.worst.solved)
     if not sound:
-        what = (
-            f"none of the {len(rows)} conditions can be measured"
-            if len(rows) > 1
-            else "the condition cannot be measured"
-        )
+        what = f"none of the {len(rows)} conditions can" if len(rows) > 1 else "the condition cannot"
         remedy = "choose conditions in which the model has a solution at every position"
-        raise MechanismError([*findings, Finding(what, "schedule", remedy)])
+        raise MechanismError([*findings, Finding(f"{what} be measured", "schedule", remedy)])
     if any(one.severity is Severity.ERROR for one in findings):
         raise MechanismError(findings)
     skipped = tuple(case.number for case in cases if not case.worst.solved)
     drawn = {name: draw(channel, int(seed)) for name, channel in channels.items()}
     return Observation(mechanism, rig, int(seed), channels, drawn, sound, skipped, findings)
+
+
+@contextmanager
+def _placed(where: str, number: int = 0) -> Iterator[None]:
+    """What the model says of values that are set in a rig file: there, and in which condition."""
+    try:
+        yield
+    except MechanismError as error:
+        tail = f" (in condition {number})" if number else ""
+        raise MechanismError(
+            replace(one, what=f"{f'{one.where}: ' if one.where else ''}{one.what}{tail}", where=where)
+            for one in error.findings
+        ) from None
+
+
+# ---- what the rig makes of the mechanism ----------------------------------------------------------------------
+
+
+def _measures(rig: Rig, run: Run) -> list[Measure]:
+    """What each sensor measures; MechanismError with all that the model has no course of."""
+    measures: list[Measure] = []
+    findings: list[Finding] = []
+    for name, sensor in rig.sensors.items():
+        where = f"sensors.{name}.measures"
+        try:
+            measure = named(run.system.mechanism, [sensor.measures], run.values)[0]
+        except MechanismError as error:
+            findings += [replace(one, where=where) for one in error.findings]
+            continue
+        if not measure.everywhere or not measure.single(run.system):
+            what = f"'{sensor.measures}' is no number that a sensor shows at every instant{told_at(measure)}"
+            remedy = "write effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT, slide:JOINT or link.point.x"
+            findings.append(Finding(what, where, remedy))
+        measures.append(measure)
+    if findings:
+        raise MechanismError(findings)
+    if run.determinacy is not None and not all(one.of_motion for one in measures):
+        run.determinacy.refuse()
+    return measures
+
+
+def _channels(rig: Rig, run: Run, measures: Sequence[Measure]) -> dict[str, SensorChannel]:
+    """The sensors in the units of what they measure; MechanismError with all that does not fit."""
+    channels: dict[str, SensorChannel] = {}
+    findings: list[Finding] = []
+    for (name, sensor), measure in zip(rig.sensors.items(), measures, strict=True):
+        try:
+            channels[name] = resolved(name, sensor, rig.column(name), measure.unit(run.system))
+        except MechanismError as error:
+            findings += error.findings
+    driver = next(iter(run.system.mechanism.drivers), None)
+    if driver is None or run.cycle.duration <= 0:
+        remedy = "give the model a driver"
+        findings.append(Finding("the mechanism has no driver that moves", "schedule", remedy))
+    elif not run.cycle.periodic and rig.schedule.turns > 1:
+        what = f"the cycle of {driver} ends elsewhere than it starts: it cannot run {rig.schedule.turns} times on end"
+        findings.append(Finding(what, "schedule.turns", "state turns: 1"))
+    if driver and rig.encoder and not (run.system.turns(driver) and run.system.span(run.values, driver).one_way):
+        what, remedy = f"an encoder needs a driver that turns in one direction, {driver} does not", "remove the encoder"
+        findings.append(Finding(what, "encoder", f"{remedy}: positions then follow from the time"))
+    if findings:
+        raise MechanismError(findings)
+    return channels
+
+
+def _case(
+    number: int,
+    name: str,
+    row: Mapping[str, Value],
+    run: Run,
+    rig: Rig,
+    measures: Sequence[Measure],
+    channels: Mapping[str, SensorChannel],
+) -> Case:
+    """One condition with its true courses. The idle times are taken to a whole number of samples."""
+    rate, cycle, pauses = rig.rate.value, run.cycle, rig.schedule.pauses
+    before, after = (math.ceil(float(one.evaluate()) * rate - 1e-9) for one in (pauses.before, pauses.after))
+    # Samples lie half an interval off the start of the cycle, so that edges of pulses that fall on samples otherwise
+    # lie between them: a sampling clock knows nothing of the shaft.
+    lead = math.ceil(BEYOND * cycle.duration * rate) - 0.5 if cycle.periodic else 0.0
+    running = math.floor(cycle.duration * rate + 1e-9) + 1
+    if cycle.periodic:
+        running = math.ceil(lead) + math.ceil((rig.schedule.turns + BEYOND) * cycle.duration * rate)
+    if before + running + after > MOST_ROWS:
+        what = f"condition {number} takes {before + running + after:,} rows, a file at most {MOST_ROWS:,}"
+        raise MechanismError(Finding(what, "rate", "sample more slowly, or fewer turns"))
+    if running < 3:
+        what = f"a cycle of condition {number} takes {cycle.duration:.4g} s, no three samples"
+        raise MechanismError(Finding(what, "rate", "sample faster"))
+    tolerances = {i: max(one.step, one.noise) / 10 for i, one in enumerate(channels.values())}
+    true = sampled(run, measures, rate, running, lead, tolerances)
+    case = Case(number, name, row, run, before, running, after, lead, true)
+    if not case.worst.solved:
+        return case
+    for course, (sensor, channel) in zip(true.values, channels.items(), strict=True):
+        if channel.per_turn and np.min(course) < 0 < np.max(course):
+            what = f"in {case} the speed changes its sign, which pulses do not show"
+            remedy = "remove per_turn, or measure another joint"
+            raise MechanismError(Finding(what, f"sensors.{sensor}.per_turn", remedy))
+    return replace(case, efficiency=cycle_efficiency(run))
+
+
+# ---- findings -------------------------------------------------------------------------------------------------
+
+
+def _findings(cases: Sequence[Case], channels: Mapping[str, SensorChannel], rig: Rig) -> Iterator[Finding]:
+    """Conditions that cannot be, and what sensors do not show; each kind once."""
+    where = "schedule.conditions" if rig.schedule.conditions else "schedule.over"
+    for status in reversed(Status):
+        stopped = [case for case in cases if case.worst == status]
+        if stopped and not status.solved:
+            case = stopped[0]
+            places = np.flatnonzero(case.true.status >= Status.NOT_CONVERGED)
+            first = 360 * case.true.time[places[0]] / case.run.cycle.duration
+            share = f"{len(places)} of {counted(len(case.true.status), 'position')}, first at {first:.4g}° of the cycle"
+            yield Finding(
+                f"{_which(stopped)} {'is' if len(stopped) == 1 else 'are'} left out: {status.text}; in condition "
+                f"{case.number} at {share}", where,
+                "run `trunnion analyse` with these values to see where in the cycle, and why", Severity.WARNING,
+                code="rig.no_answer",
+            )  # fmt: skip
+    sound = [case for case in cases if case.worst.solved]
+    if not sound:
+        return
+    if mended := [case for case in sound if case.true.mended]:
+        most = counted(max(case.true.mended for case in mended), "position")
+        what = f"{_which(mended)}: a load has no unique value at up to {most}, because its joint is at rest; sensors "
+        what += "read 0 during a rest, and the mean of the neighbours at a single position"
+        yield Finding(what, where, "", Severity.NOTE, code="rig.load_at_rest")
+    yield from _of_encoder(sound, channels, rig)
+    for i, (name, channel) in enumerate(channels.items()):
+        peaks = {case.number: float(np.max(np.abs(case.true.values[i]))) for case in sound}
+        if clipped := [case for case in sound if peaks[case.number] > channel.limit]:
+            key = "range" if channel.limit == channel.range else "span"
+            peak, limit = (readable(size, channel.unit) for size in (max(peaks.values()), channel.limit))
+            what = f"{_which(clipped)}: {channel.measures} reaches {peak}, beyond the range of {limit}: readings are "
+            remedy = "use a sensor with a larger range"
+            yield Finding(f"{what}clipped", f"sensors.{name}.{key}", remedy, Severity.WARNING, code="rig.clipped")
+
+
+def _of_encoder(cases: Sequence[Case], channels: Mapping[str, SensorChannel], rig: Rig) -> Iterator[Finding]:
+    """Whether the angle of the driver can be known from what is recorded."""
+    driver, encoder, rate = cases[0].driver, rig.encoder, rig.rate.value
+    if encoder is not None and encoder.kind == "level":
+        spans = {case.number: float(case.run.system.span(case.run.values, driver).peak) / (2 * np.pi) for case in cases}
+        lost = [case for case in cases if 4 * spans[case.number] * encoder.per_turn > rate * (1 + 1e-9)]
+        if lost:
+            most = max(spans.values()) * encoder.per_turn
+            what = f"{_which(lost)}: some encoder pulses are lost: up to {most:.4g} pulses per second, sampled at "
+            remedy = "use a sampling rate of four times the pulse rate, or record kind: count"
+            yield Finding(f"{what}{rate:.4g} Hz", "encoder.kind", remedy, Severity.WARNING, code="rig.pulses_lost")
+    both = "the conditions turn in both directions"
+    if len({case.drive(rate)[1] > 0 for case in cases if case.named}) > 1:
+        if encoder is None:
+            remedy = "state an encoder of kind: count, or one rig for each direction"
+            what = f"{both}, and no channel measures the angle of the driver"
+            yield Finding(what, "encoder", remedy, code="rig.both_ways")
+        elif encoder.kind == "level":
+            what = f"{both}, which the level of an encoder does not distinguish"
+            yield Finding(what, "encoder.kind", "record kind: count", code="rig.both_ways_level")
+    known = encoder or any(one.measures == f"rate:{driver}" for one in channels.values())
+    if not known and speed_differs(cases):
+        what = f"the conditions differ in speed, and no channel measures the angle of {driver}"
+        yield Finding(what, "encoder", f"state an encoder, or a sensor of rate:{driver}", code="rig.no_angle")
+
+
+def _which(cases: Sequence[Case]) -> str:
+    """Conditions by number, the first with what is set."""
+    if len(cases) == 1:
+        return str(cases[0])
+    numbers = ", ".join(str(case.number) for case in cases[1:MOST_NAMED])
+    more = f" and {len(cases) - MOST_NAMED} more" if len(cases) > MOST_NAMED else ""
+    return f"{cases[0]} and condition{'s' * (len(cases) > 2)} {numbers}{more}"

@@ -7,6 +7,7 @@ that `efficiency_of` will find from the data, worked out from what is stated of 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, counted
 from trunnion.rig.reading.efficiency import Efficiency, efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.measurement import Accuracy, Condition, Signal
-from trunnion.rig.virtual.cases import Case
+from trunnion.rig.virtual.observation import Case
 from trunnion.rig.virtual.observe import Observation
 
 __all__ = ["Expected", "Forecast", "RigPlan", "plan"]
@@ -92,7 +93,7 @@ def plan(observation: Observation) -> RigPlan:
             expected[name].append((case.number, float(np.min(steady[name])), float(np.max(steady[name])), beyond))
         forecasts.append(_forecast(observation, case, steady))
     sensors = tuple(_expected(observation, name, rows) for name, rows in expected.items())
-    return RigPlan(sensors, tuple(forecasts), tuple(_said(observation, sensors, forecasts)))
+    return RigPlan(sensors, tuple(forecasts), tuple(_findings(sensors, forecasts)))
 
 
 def _steady(observation: Observation, case: Case) -> dict[str, Array]:
@@ -138,33 +139,29 @@ def _expected(observation: Observation, name: str, rows: list[tuple[int, float, 
     return Expected(name, channel.measures, channel.reading, least, most, share, steps, channel.noise * per, clipped)
 
 
-def _said(observation: Observation, sensors: tuple[Expected, ...], forecasts: list[Forecast]) -> list[Finding]:
-    """What is to be thought about before the rig is built."""
-    found = []
+def _findings(sensors: tuple[Expected, ...], forecasts: list[Forecast]) -> Iterator[Finding]:
+    """What to think about before the rig is built."""
     for one in sensors:
+        where = f"sensors.{one.sensor}"
         if one.share < SMALL_RANGE:
             what = f"the readings use {100 * one.share:.2g} % of the range: errors in % of full scale dominate"
             remedy = "use a sensor with a smaller range"
-            figures = {"percent": 100 * one.share}
-            found.append(Finding.note("rig.range_wide", f"sensors.{one.sensor}.range", what, remedy, **figures))
+            yield Finding.note("rig.range_wide", f"{where}.range", what, remedy, percent=100 * one.share)
         if 0 < one.steps < FEW_STEPS:
             what = f"the readings cover only {one.steps:.3g} steps of the converter"
             remedy = "use a converter with more bits, or a smaller span"
-            found.append(Finding.note("rig.steps_few", f"sensors.{one.sensor}.bits", what, remedy, steps=one.steps))
+            yield Finding.note("rig.steps_few", f"{where}.bits", what, remedy, steps=one.steps)
     measured = [one for one in forecasts if one.measured]
     off = [one for one in measured if one.measured and abs(one.bias) > one.measured.uncertainty]
     if off:
         worst = max(off, key=lambda one: abs(one.bias))
-        what = (
-            f"in {len(off)} of {counted(len(measured), 'condition')} the bias of the efficiency exceeds its standard "
-        )
+        what = f"in {len(off)} of {counted(len(measured), 'condition')} the bias of the efficiency exceeds its standard "
         what += f"uncertainty, at most {worst.bias:+.2g} in condition {worst.case.number}: the sensors are too slow "
         what += "for the cycle, or clipped"
         remedy = "use sensors with a larger bandwidth or range, more pulses, or a lower speed"
         figures = {"count": len(off), "of": len(measured), "condition": worst.case.number, "bias": worst.bias}
-        found.append(Finding.warning("rig.biased", "sensors", what, remedy, **figures))
+        yield Finding.warning("rig.biased", "sensors", what, remedy, **figures)
     if not measured:
         what = "the sensors do not measure input and output power: no efficiency is predicted"
         remedy = "measure effort: and rate: of the driver, load: of a load on a joint and rate: of that joint"
-        found.append(Finding.note("rig.no_efficiency", "sensors", what, remedy))
-    return found
+        yield Finding.note("rig.no_efficiency", "sensors", what, remedy)

@@ -13,13 +13,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from trunnion.cli.allocate import allocate
 from trunnion.cli.assemble import assemble
 from trunnion.cli.compare import compare
 from trunnion.cli.data import data
 from trunnion.cli.edge import status_of
-from trunnion.cli.files import guarded
+from trunnion.cli.files import guarded, named_words
 from trunnion.cli.identify import identify
 from trunnion.cli.locking import locking
 from trunnion.cli.model import exit_status, lines_of, placed, stated
@@ -66,8 +67,56 @@ if TYPE_CHECKING:
     from trunnion.results.result import Result
     from trunnion.solve.friction_method import FrictionMethod
 
+GROUPS = {
+    "Model": ("check", "examples", "schema", "studio"),
+    "Motion and forces": ("analyse", "simulate", "locking", "design"),
+    "As built": ("assemble", "play", "tolerance", "allocate"),
+    "Many mechanisms": ("sweep",),
+    "Measured data": ("rig", "data", "compare", "identify"),
+    "Pictures": ("plot", "report"),
+}
+# Each runs in a folder with the models that `trunnion examples NAME` copies; mapping.yaml is one of measured data.
+EXAMPLES = {
+    "check": ("durango-fourbar.yaml", "durango-fourbar.yaml --list"),
+    "examples": ("", "durango-fourbar"),
+    "schema": ("-o model.schema.json",),
+    "studio": ("durango-fourbar.yaml", "."),
+    "analyse": ("durango-fourbar.yaml", "durango-fourbar.yaml --set AB=2.1m --friction off -o cycle.csv"),
+    "simulate": ("flywheel-press.yaml --time 3s -o start.png", "flywheel-press.yaml --steady --report steady.html"),
+    "locking": ("drawing-press.yaml --near 1.2 -o margin.png",),
+    "design": ("durango-fourbar.yaml --fluctuation 0.02",),
+    "assemble": ("misaligned-hinges.yaml -o clearance.csv",),
+    "play": ("toleranced-slider-crank.yaml --measure piston.Q.x --at 60deg",),
+    "tolerance": ("toleranced-fourbar.yaml --samples 100000 --report yield.html",),
+    "allocate": ("toleranced-fourbar.yaml --yield 0.99 --write cheapest.yaml",),
+    "sweep": ("durango-fourbar.yaml --over AB=1.6m:2.4m:9 -o efficiency.png",),
+    "rig": ("pezzuti-cardan.yaml cardan-rig.yaml", "pezzuti-cardan.yaml cardan-rig.yaml -o lab"),
+    "data": ("lab/mapping.yaml -o turns.csv",),
+    "compare": ("pezzuti-cardan.yaml lab/mapping.yaml --report lab.html",),
+    "identify": ("pezzuti-cardan.yaml lab/mapping.yaml --parameter joint_defaults.friction.coefficient",),
+    "plot": ("durango-fourbar.yaml --kind torque -o torque.png", "durango-fourbar.yaml -o plots"),
+    "report": ("durango-fourbar.yaml -o durango.html",),
+}
+
+
+class Verbs(TyperGroup):
+    """The verbs under the questions that they answer."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the verbs, group by group."""
+        for title, names in GROUPS.items():
+            rows = [
+                (name.ljust(9), self.commands[name].get_short_help_str(68)) for name in names if name in self.commands
+            ]
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
+
+
 app = typer.Typer(
     name="trunnion",
+    cls=Verbs,
+    context_settings={"help_option_names": ["-h", "--help"]},
     help="Analysis of linkages as built, with friction, play, axis errors and tolerances.",
     no_args_is_help=True,
     add_completion=True,
@@ -85,7 +134,10 @@ class FileKind(StrEnum):
 
 def verb(function: Callable[..., None]) -> Callable[..., None]:
     """Register a verb; what its options write is said to every reader before it begins."""
-    app.command()(guarded(function))
+    name = function.__name__
+    named_words(function)
+    lines = "\n".join(f"  trunnion {name} {words}".rstrip() for words in EXAMPLES[name])
+    app.command(epilog=f"\b\nExamples:\n{lines}")(guarded(function))
     return function
 
 
@@ -107,7 +159,7 @@ def check(
         bool, typer.Option("--list", help="List what can be set, swept and measured, with units and values.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Write that list: a .json file.", show_default=False)
+        Path | None, typer.Option("--out", "-o", help="Write that list: a .json file.", show_default=False)
     ] = None,
 ) -> None:
     """Check a model: findings, mobility, structure, assembly modes."""
@@ -212,7 +264,7 @@ verb(play)
 @verb
 def plot(
     file: File,
-    out: Annotated[Path, typer.Option("--out", help="Folder, or a .png .svg .pdf .jpg file of one plot.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder, or a .png .svg .pdf .jpg file of one plot.")],
     kind: Kinds = None,
     steps: Steps = 360,
     set_: Set = None,
@@ -260,7 +312,7 @@ def plot(
 @verb
 def report(
     file: File,
-    out: Annotated[Path, typer.Option("--out", help="The HTML file to write.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The HTML file to write.")],
     steps: Steps = 360,
     set_: Set = None,
     table: TableFile = None,
@@ -315,7 +367,7 @@ def schema(
     of: Annotated[
         FileKind, typer.Option("--of", help="File: model, or data for the mapping of measured data.")
     ] = FileKind.MODEL,
-    out: Annotated[Path | None, typer.Option("--out", help="Write it to a file.", show_default=False)] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Write it to a file.", show_default=False)] = None,
 ) -> None:
     """Print the JSON Schema of model or mapping file, for editors."""
     if of is FileKind.DATA:

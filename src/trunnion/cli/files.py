@@ -1,17 +1,21 @@
-"""What every verb writes: the files that its options name, said before it begins, so that none is one that it reads."""
+"""What every verb writes: the files that its options name, said before it begins, so that none is one that it reads.
+
+Also what its help calls files, numbers and texts, which follows from the types of its options too.
+"""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator
+from enum import Enum
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
-from typer.models import OptionInfo
+from typer.models import ArgumentInfo, OptionInfo, ParameterInfo
 
 from trunnion.files import Target, writing
 
-__all__ = ["guarded", "outputs"]
+__all__ = ["guarded", "named_words", "outputs"]
 
 IN_PLACE = "write"  # the one option that may name the model itself; the verb asks for --force then
 MODEL = "file"
@@ -48,3 +52,26 @@ def _targets(names: list[str], options: dict[str, Any]) -> Iterator[Target]:
         given = options.get(name)
         for path in given if isinstance(given, list) else [given] if given is not None else []:
             yield Target(f"--{name.strip('_')}", path, options.get(MODEL) if name == IN_PLACE else None)
+
+
+# ---- help ----------------------------------------------------------------------------------------------------------
+
+
+def named_words(verb: Callable[..., None]) -> None:
+    """What the help calls the words of a verb: an argument by its name, else FILE, NUMBER, TEXT, the choices."""
+    hints = get_type_hints(verb, include_extras=True)
+    for name, hint in hints.items():
+        for info in getattr(hint, "__metadata__", ()):
+            if isinstance(info, ParameterInfo) and info.metavar is None:
+                info.metavar = name.upper() if isinstance(info, ArgumentInfo) else _word(get_args(hint)[0])
+    verb.__annotations__ = hints  # evaluated once: each evaluation of a text makes other options
+
+
+def _word(hint: Any) -> str | None:
+    """The word for a value of a type; none for a switch."""
+    kinds = [one for one in get_args(hint) if one is not type(None)]
+    if kinds:
+        return _word(kinds[0])
+    if issubclass(hint, Enum):
+        return "|".join(str(member.value) for member in hint)
+    return {Path: "FILE", int: "NUMBER", float: "NUMBER", str: "TEXT"}.get(hint)

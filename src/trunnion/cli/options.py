@@ -115,7 +115,9 @@ Report = Annotated[
 Out = Annotated[
     list[Path] | None,
     typer.Option(
-        "--out", help="Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable."
+        "--out",
+        "-o",
+        help="Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable.",
     ),
 ]
 Engine = Annotated[str, typer.Option("--engine", help="numpy, compiled, or auto: by size.")]
@@ -124,6 +126,7 @@ OutTolerance = Annotated[
     list[Path] | None,
     typer.Option(
         "--out",
+        "-o",
         help="Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable. "
         f"The name says which table: x.csv has the measures, x.parameters.csv the contributions, {TABLES}.",
     ),
@@ -132,13 +135,15 @@ OutAllocation = Annotated[
     list[Path] | None,
     typer.Option(
         "--out",
+        "-o",
         help="Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable. "
         "The name says which table: x.csv has the tolerances, x.measures.csv the measures, x.offers.csv the cost over "
         f"accuracy, {TABLES}.",
     ),
 ]
 Data = Annotated[
-    list[Path] | None, typer.Option("--out", help="Write the result: .csv .xlsx .json .nc .zarr .parquet. Repeatable.")
+    list[Path] | None,
+    typer.Option("--out", "-o", help="Write the result: .csv .xlsx .json .nc .zarr .parquet. Repeatable."),
 ]
 Uncut = Annotated[
     bool, typer.Option("--uncut", help="Show peaks near dead centres in full; default: cut at the frame.")

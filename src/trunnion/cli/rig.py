@@ -31,7 +31,7 @@ def rig(
     rig_file: Annotated[Path, typer.Argument(help="Rig file: YAML, JSON or TOML.", show_default=False)],
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="Folder for data files, mapping.yaml and truth.yaml.", show_default=False),
+        typer.Option("--out", "-o", help="Folder for data files, mapping.yaml and truth.yaml.", show_default=False),
     ] = None,
     plan: Annotated[
         bool, typer.Option("--plan", help="Predict readings and efficiency; the default without --out.")

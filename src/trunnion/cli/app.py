@@ -35,6 +35,7 @@ from trunnion.cli.options import (
     FrictionLaw,
     Kinds,
     Method,
+    OnePosition,
     Report,
     Rounds,
     Seats,
@@ -53,7 +54,7 @@ from trunnion.cli.rig import rig
 from trunnion.cli.simulate import simulate
 from trunnion.cli.studio import studio
 from trunnion.cli.sweep import sweep
-from trunnion.cli.terminal import bar, console, say, show_figures, wrote
+from trunnion.cli.terminal import bar, console, say, show_figures, show_rows, wrote
 from trunnion.cli.tolerance import tolerance
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.files import folder
@@ -81,7 +82,11 @@ EXAMPLES = {
     "examples": ("", "durango-fourbar"),
     "schema": ("-o model.schema.json",),
     "studio": ("durango-fourbar.yaml", "."),
-    "analyse": ("durango-fourbar.yaml", "durango-fourbar.yaml --set AB=2.1m --friction off -o cycle.csv"),
+    "analyse": (
+        "durango-fourbar.yaml",
+        "durango-fourbar.yaml --set AB=2.1m --friction off -o cycle.csv",
+        "durango-fourbar.yaml --at 60deg",
+    ),
     "simulate": ("flywheel-press.yaml --time 3s -o start.png", "flywheel-press.yaml --steady --report steady.html"),
     "locking": ("drawing-press.yaml --near 1.2 -o margin.png",),
     "design": ("durango-fourbar.yaml --fluctuation 0.02",),
@@ -193,6 +198,7 @@ def check(
 def analyse(
     file: File,
     steps: Steps = 360,
+    at: OnePosition = None,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
@@ -217,12 +223,16 @@ def analyse(
     kept = Kept.read(variables, dtype)  # type: ignore[arg-type]  # it checks them
     if report and kept.variables is not None:
         raise MechanismError(Finding("a report is made of all variables", "--variables", "leave one of both out"))
+    if report and at:
+        raise MechanismError(Finding("a report is of the whole cycle", "--at", "leave one of both out"))
     mechanism = stated(file, set_, table, friction, seat)
     saved = {"units_row": units_row, "columns": columns, "units": units}
     with lines_of(file):
-        result = _analysed(mechanism, steps, _method(method, criterion, iterations), engine, kept, out or [], saved)
+        done = _method(method, criterion, iterations)
+        result = _analysed(mechanism, steps, done, engine, kept, out or [], saved, at)
     page = partial(_page, mechanism, result, uncut)
-    Shown(result, file, ["assembly"], report=report, page=page, written=list(out or [])).finish()
+    show = None if at is None else partial(_show_position, result, file, at)
+    Shown(result, file, ["assembly"], report=report, page=page, show=show, written=list(out or [])).finish()
 
 
 @verb
@@ -441,6 +451,19 @@ def _analysed(
 
     with bar("positions", steps, least=200_000) as progress:
         return analysed(mechanism, steps, method, progress, engine, *kept)  # type: ignore[arg-type]  # it checks it
+
+
+def _show_position(result: Result, file: Path, at: str) -> None:
+    """Every number of one position, with its unit."""
+    from trunnion.results.quantities import parts
+    from trunnion.results.tables import columns
+
+    rows = []
+    for name, unit, values in columns(result.dataset):
+        value = values(slice(None))[0]
+        text, shown = (str(value), "") if isinstance(value, str) else parts(float(value), unit)
+        rows.append([name, text, "" if shown == "1" else shown])
+    show_rows(f"{result.attrs['name'] or file} at {at}", ["", "value", "unit"], rows)
 
 
 def _run(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> xr.Dataset:

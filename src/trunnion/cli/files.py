@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 from typer.models import ArgumentInfo, OptionInfo, ParameterInfo
 
+from trunnion.errors import MechanismError
 from trunnion.files import Target, writing
 
 __all__ = ["guarded", "named_words", "outputs"]
@@ -23,14 +25,28 @@ MODEL = "file"
 
 def guarded(verb: Callable[..., None]) -> Callable[..., None]:
     """The verb, run so that nothing it writes is something it reads, and no two outputs are one file."""
-    names = outputs(verb)
+    names, flags = outputs(verb), _flags(verb)
 
     @functools.wraps(verb)
     def run(*arguments: Any, **options: Any) -> None:
-        with writing(list(_targets(names, options))):
-            verb(*arguments, **options)
+        try:
+            with writing(list(_targets(names, options))):
+                verb(*arguments, **options)
+        except MechanismError as error:  # what Python calls by the name of an argument is an option here
+            raise MechanismError(
+                [replace(one, where=flags.get(one.where, one.where)) for one in error.findings]
+            ) from None
 
     return run
+
+
+def _flags(verb: Callable[..., None]) -> dict[str, str]:
+    """The options of a verb by the names of their parameters."""
+    infos = (
+        (name, getattr(hint, "__metadata__", ())) for name, hint in get_type_hints(verb, include_extras=True).items()
+    )
+    options = {name: one for name, metadata in infos for one in metadata if isinstance(one, OptionInfo)}
+    return {name.strip("_"): next(iter(one.param_decls or ()), f"--{name}") for name, one in options.items()}
 
 
 def outputs(verb: Callable[..., None]) -> list[str]:

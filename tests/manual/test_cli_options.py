@@ -11,7 +11,9 @@ import trunnion
 from manual.conftest import Run
 from manual.test_cli import EXAMPLES
 from trunnion import MechanismError
+from trunnion.cli.files import _flags
 from trunnion.cli.options import PLOT_KINDS, over, points
+from trunnion.cli.tolerance import tolerance
 from trunnion.views.cycle.plots import PLOTS
 
 TOLERANCED = EXAMPLES / "toleranced-fourbar.yaml"
@@ -165,6 +167,10 @@ def test_one_position_instead_of_the_cycle(program: Run) -> None:
     done = program("analyse", FOUR_BAR, "--at", "60deg")
     assert done.code == 0
     assert f"{float(whole['drive_effort'].isel(position=60, driver=0)) / 1e3:.6g}"[:5] in done.out
+
+
+def test_options_by_the_names_of_arguments() -> None:
+    assert {"target": "--yield", "out": "--out", "at": "--at", "set": "--set"}.items() <= _flags(tolerance).items()
 
 
 @pytest.mark.parametrize(

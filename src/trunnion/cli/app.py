@@ -154,18 +154,12 @@ def check(
     friction: FrictionLaw = None,
     assemblies: Annotated[
         Path | None,
-        typer.Option(
-            "--assemblies",
-            help="Also draw the assembly modes of each group: a .png, .svg or .pdf file.",
-            show_default=False,
-        ),
+        typer.Option("--assemblies", help="Also draw the assembly modes of each group: a .png, .svg or .pdf file."),
     ] = None,
     list_: Annotated[
         bool, typer.Option("--list", help="List what can be set, swept and measured, with units and values.")
     ] = False,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Write that list: a .json file.", show_default=False)
-    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Write that list: a .json file.")] = None,
 ) -> None:
     """Check a model: findings, mobility, structure, assembly modes."""
     if list_ or out:
@@ -283,11 +277,7 @@ def plot(
     seat: Seats = None,
     at: Annotated[
         str | None,
-        typer.Option(
-            "--at",
-            help="Position to draw the mechanism in and to mark in curves: 60deg, 20mm, 0.1s.",
-            show_default=False,
-        ),
+        typer.Option("--at", help="Position to draw the mechanism in and to mark in curves: 60deg, 20mm, 0.1s."),
     ] = None,
     image: Annotated[str, typer.Option("--format", help="png, svg, pdf or jpg, for a folder of plots.")] = "png",
     uncut: Uncut = False,
@@ -377,7 +367,7 @@ def schema(
     of: Annotated[
         FileKind, typer.Option("--of", help="File: model, or data for the mapping of measured data.")
     ] = FileKind.MODEL,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Write it to a file.", show_default=False)] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Write it to a file.")] = None,
 ) -> None:
     """Print the JSON Schema of model or mapping file, for editors."""
     if of is FileKind.DATA:

@@ -42,11 +42,12 @@ def guarded(verb: Callable[..., None]) -> Callable[..., None]:
 
 def _flags(verb: Callable[..., None]) -> dict[str, str]:
     """The options of a verb by the names of their parameters."""
-    infos = (
-        (name, getattr(hint, "__metadata__", ())) for name, hint in get_type_hints(verb, include_extras=True).items()
-    )
-    options = {name: one for name, metadata in infos for one in metadata if isinstance(one, OptionInfo)}
-    return {name.strip("_"): next(iter(one.param_decls or ()), f"--{name}") for name, one in options.items()}
+    flags: dict[str, str] = {}
+    for name, hint in get_type_hints(verb, include_extras=True).items():
+        for info in (one for one in getattr(hint, "__metadata__", ()) if isinstance(one, OptionInfo)):
+            words = (info.default, *(info.param_decls or ()))  # of an annotation Typer calls the first the default
+            flags[name.strip("_")] = next((str(word) for word in words if str(word).startswith("--")), f"--{name}")
+    return flags
 
 
 def outputs(verb: Callable[..., None]) -> list[str]:

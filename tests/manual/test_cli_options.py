@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,9 @@ import trunnion
 from manual.conftest import Run
 from manual.test_cli import EXAMPLES
 from trunnion import MechanismError
+from trunnion.cli.files import _flags
 from trunnion.cli.options import PLOT_KINDS, over, points
+from trunnion.cli.tolerance import tolerance
 from trunnion.views.cycle.plots import PLOTS
 
 TOLERANCED = EXAMPLES / "toleranced-fourbar.yaml"
@@ -149,3 +152,33 @@ def test_a_plain_angle_is_told_once(program: Run, tmp_path: Path, stated: str) -
         told = [line for line in program(verb, "shaft.yaml", *options).err.splitlines() if "dimensions.phase" in line]
         assert len(told) == 1
         assert told[0].startswith("warning")
+
+
+def test_one_position_instead_of_the_cycle(program: Run) -> None:
+    """The numbers of `--at` are those of that row of the cycle, the summary of the cycle is the same."""
+    mechanism = trunnion.read(FOUR_BAR)
+    whole, there = trunnion.analyse(mechanism), trunnion.analyse(mechanism, at="60 deg")
+    for name in ("drive_effort", "reaction_force", "friction_power", "link_angle", "locking_margin"):
+        wanted = whole[name].isel(position=60)
+        assert there[name].isel(position=0).values == pytest.approx(wanted.values, rel=1e-9, abs=1e-9, nan_ok=True)
+    own = ("power_residual", "friction_iterations", "positions_solved")  # of the positions
+    of_cycle = [[one for one in json.loads(each.attrs["summary"]) if one["name"] not in own] for each in (whole, there)]
+    assert of_cycle[0] == of_cycle[1]
+    done = program("analyse", FOUR_BAR, "--at", "60deg")
+    assert done.code == 0
+    assert f"{float(whole['drive_effort'].isel(position=60, driver=0)) / 1e3:.6g}"[:5] in done.out
+
+
+def test_options_by_the_names_of_arguments() -> None:
+    assert {"target": "--yield", "out": "--out", "at": "--at", "set": "--set"}.items() <= _flags(tolerance).items()
+
+
+@pytest.mark.parametrize(
+    ("words", "option"),
+    [(("--at", "20mm"), "--at"), (("--steps", 0), "--steps"), (("--variables", "x"), "--variables")],
+)
+def test_what_is_wrong_with_an_option_is_said_of_the_option(
+    program: Run, words: tuple[object, ...], option: str
+) -> None:
+    done = program("analyse", FOUR_BAR, *words)
+    assert (done.code, done.err.startswith(f"error: {option}: ")) == (2, True), done.err

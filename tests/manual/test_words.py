@@ -8,9 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from typer import Context
 from typer.main import get_command
 
-from trunnion.cli.app import app
+from trunnion.cli.app import EXAMPLES, GROUPS, app
 from trunnion.cli.terminal import QUIET
 from trunnion.errors import Finding, Severity
 
@@ -110,3 +111,18 @@ def test_two_ends_are_told_apart_in_one_unit() -> None:
 
     assert between(-10605.9, -10605.5, "N m") == "between −10.6059 and −10.6055 kN m"
     assert between(0.0, 12.0, "N") == "between 0 and 12 N"
+
+
+def test_the_help_has_each_verb_once_under_a_question_with_examples_that_are_read() -> None:
+    commands = get_command(app).commands  # type: ignore[attr-defined]
+    assert sorted(name for names in GROUPS.values() for name in names) == sorted(commands)
+    for name, command in commands.items():
+        for example in EXAMPLES[name]:
+            command.make_context(name, example.split(), resilient_parsing=False)
+
+
+def test_the_help_calls_values_of_options_file_number_or_text() -> None:
+    for name, command in get_command(app).commands.items():  # type: ignore[attr-defined]
+        assert not re.search(
+            r"<(path|int|float|str|list\[\w+\])>", command.get_help(Context(command)).partition("Options:")[2]
+        ), name

@@ -79,10 +79,7 @@ def allocate(
         typer.Option("--criterion", help="What must meet the limits: worst-case, rss or yield. [default: worst-case]"),
     ] = None,
     target: Annotated[
-        float | None,
-        typer.Option(
-            "--yield", help="Required share within all limits; implies --criterion yield.", show_default=False
-        ),
+        float | None, typer.Option("--yield", help="Required share within all limits; implies --criterion yield.")
     ] = None,
     choice: Way = Choice.AUTO,
     exact: Exact = False,

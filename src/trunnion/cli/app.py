@@ -13,13 +13,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from trunnion.cli.allocate import allocate
 from trunnion.cli.assemble import assemble
 from trunnion.cli.compare import compare
 from trunnion.cli.data import data
 from trunnion.cli.edge import status_of
-from trunnion.cli.files import guarded
+from trunnion.cli.files import guarded, named_words
 from trunnion.cli.identify import identify
 from trunnion.cli.locking import locking
 from trunnion.cli.model import exit_status, lines_of, placed, stated
@@ -34,6 +35,7 @@ from trunnion.cli.options import (
     FrictionLaw,
     Kinds,
     Method,
+    OnePosition,
     Report,
     Rounds,
     Seats,
@@ -52,7 +54,7 @@ from trunnion.cli.rig import rig
 from trunnion.cli.simulate import simulate
 from trunnion.cli.studio import studio
 from trunnion.cli.sweep import sweep
-from trunnion.cli.terminal import bar, console, say, show_figures, wrote
+from trunnion.cli.terminal import bar, console, say, show_figures, show_rows, wrote
 from trunnion.cli.tolerance import tolerance
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.files import folder
@@ -66,8 +68,60 @@ if TYPE_CHECKING:
     from trunnion.results.result import Result
     from trunnion.solve.friction_method import FrictionMethod
 
+GROUPS = {
+    "Model": ("check", "examples", "schema", "studio"),
+    "Motion and forces": ("analyse", "simulate", "locking", "design"),
+    "As built": ("assemble", "play", "tolerance", "allocate"),
+    "Many mechanisms": ("sweep",),
+    "Measured data": ("rig", "data", "compare", "identify"),
+    "Pictures": ("plot", "report"),
+}
+# Each runs in a folder with the models that `trunnion examples NAME` copies; mapping.yaml is one of measured data.
+EXAMPLES = {
+    "check": ("durango-fourbar.yaml", "durango-fourbar.yaml --list"),
+    "examples": ("", "durango-fourbar"),
+    "schema": ("-o model.schema.json",),
+    "studio": ("durango-fourbar.yaml", "."),
+    "analyse": (
+        "durango-fourbar.yaml",
+        "durango-fourbar.yaml --set AB=2.1m --friction off -o cycle.csv",
+        "durango-fourbar.yaml --at 60deg",
+    ),
+    "simulate": ("flywheel-press.yaml --time 3s -o start.png", "flywheel-press.yaml --steady --report steady.html"),
+    "locking": ("drawing-press.yaml --near 1.2 -o margin.png",),
+    "design": ("durango-fourbar.yaml --fluctuation 0.02",),
+    "assemble": ("misaligned-hinges.yaml -o clearance.csv",),
+    "play": ("toleranced-slider-crank.yaml --measure piston.Q.x --at 60deg",),
+    "tolerance": ("toleranced-fourbar.yaml --samples 100000 --report yield.html",),
+    "allocate": ("toleranced-fourbar.yaml --yield 0.99 --write cheapest.yaml",),
+    "sweep": ("durango-fourbar.yaml --over AB=1.6m:2.4m:9 -o efficiency.png",),
+    "rig": ("pezzuti-cardan.yaml cardan-rig.yaml", "pezzuti-cardan.yaml cardan-rig.yaml -o lab"),
+    "data": ("lab/mapping.yaml -o turns.csv",),
+    "compare": ("pezzuti-cardan.yaml lab/mapping.yaml --report lab.html",),
+    "identify": ("pezzuti-cardan.yaml lab/mapping.yaml --parameter joint_defaults.friction.coefficient",),
+    "plot": ("durango-fourbar.yaml --kind torque -o torque.png", "durango-fourbar.yaml -o plots"),
+    "report": ("durango-fourbar.yaml -o durango.html",),
+}
+
+
+class Verbs(TyperGroup):
+    """The verbs under the questions that they answer."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the verbs, group by group."""
+        for title, names in GROUPS.items():
+            rows = [
+                (name.ljust(9), self.commands[name].get_short_help_str(68)) for name in names if name in self.commands
+            ]
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
+
+
 app = typer.Typer(
     name="trunnion",
+    cls=Verbs,
+    context_settings={"help_option_names": ["-h", "--help"]},
     help="Analysis of linkages as built, with friction, play, axis errors and tolerances.",
     no_args_is_help=True,
     add_completion=True,
@@ -85,7 +139,10 @@ class FileKind(StrEnum):
 
 def verb(function: Callable[..., None]) -> Callable[..., None]:
     """Register a verb; what its options write is said to every reader before it begins."""
-    app.command()(guarded(function))
+    name = function.__name__
+    named_words(function)
+    lines = "\n".join(f"  trunnion {name} {words}".rstrip() for words in EXAMPLES[name])
+    app.command(epilog=f"\b\nExamples:\n{lines}")(guarded(function))
     return function
 
 
@@ -97,18 +154,12 @@ def check(
     friction: FrictionLaw = None,
     assemblies: Annotated[
         Path | None,
-        typer.Option(
-            "--assemblies",
-            help="Also draw the assembly modes of each group: a .png, .svg or .pdf file.",
-            show_default=False,
-        ),
+        typer.Option("--assemblies", help="Also draw the assembly modes of each group: a .png, .svg or .pdf file."),
     ] = None,
     list_: Annotated[
         bool, typer.Option("--list", help="List what can be set, swept and measured, with units and values.")
     ] = False,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Write that list: a .json file.", show_default=False)
-    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Write that list: a .json file.")] = None,
 ) -> None:
     """Check a model: findings, mobility, structure, assembly modes."""
     if list_ or out:
@@ -141,6 +192,7 @@ def check(
 def analyse(
     file: File,
     steps: Steps = 360,
+    at: OnePosition = None,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
@@ -165,12 +217,16 @@ def analyse(
     kept = Kept.read(variables, dtype)  # type: ignore[arg-type]  # it checks them
     if report and kept.variables is not None:
         raise MechanismError(Finding("a report is made of all variables", "--variables", "leave one of both out"))
+    if report and at:
+        raise MechanismError(Finding("a report is of the whole cycle", "--at", "leave one of both out"))
     mechanism = stated(file, set_, table, friction, seat)
     saved = {"units_row": units_row, "columns": columns, "units": units}
     with lines_of(file):
-        result = _analysed(mechanism, steps, _method(method, criterion, iterations), engine, kept, out or [], saved)
+        done = _method(method, criterion, iterations)
+        result = _analysed(mechanism, steps, done, engine, kept, out or [], saved, at)
     page = partial(_page, mechanism, result, uncut)
-    Shown(result, file, ["assembly"], report=report, page=page, written=list(out or [])).finish()
+    show = None if at is None else partial(_show_position, result, file, at)
+    Shown(result, file, ["assembly"], report=report, page=page, show=show, written=list(out or [])).finish()
 
 
 @verb
@@ -212,7 +268,7 @@ verb(play)
 @verb
 def plot(
     file: File,
-    out: Annotated[Path, typer.Option("--out", help="Folder, or a .png .svg .pdf .jpg file of one plot.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder, or a .png .svg .pdf .jpg file of one plot.")],
     kind: Kinds = None,
     steps: Steps = 360,
     set_: Set = None,
@@ -221,11 +277,7 @@ def plot(
     seat: Seats = None,
     at: Annotated[
         str | None,
-        typer.Option(
-            "--at",
-            help="Position to draw the mechanism in and to mark in curves: 60deg, 20mm, 0.1s.",
-            show_default=False,
-        ),
+        typer.Option("--at", help="Position to draw the mechanism in and to mark in curves: 60deg, 20mm, 0.1s."),
     ] = None,
     image: Annotated[str, typer.Option("--format", help="png, svg, pdf or jpg, for a folder of plots.")] = "png",
     uncut: Uncut = False,
@@ -260,7 +312,7 @@ def plot(
 @verb
 def report(
     file: File,
-    out: Annotated[Path, typer.Option("--out", help="The HTML file to write.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The HTML file to write.")],
     steps: Steps = 360,
     set_: Set = None,
     table: TableFile = None,
@@ -315,7 +367,7 @@ def schema(
     of: Annotated[
         FileKind, typer.Option("--of", help="File: model, or data for the mapping of measured data.")
     ] = FileKind.MODEL,
-    out: Annotated[Path | None, typer.Option("--out", help="Write it to a file.", show_default=False)] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Write it to a file.")] = None,
 ) -> None:
     """Print the JSON Schema of model or mapping file, for editors."""
     if of is FileKind.DATA:
@@ -389,6 +441,19 @@ def _analysed(
 
     with bar("positions", steps, least=200_000) as progress:
         return analysed(mechanism, steps, method, progress, engine, *kept)  # type: ignore[arg-type]  # it checks it
+
+
+def _show_position(result: Result, file: Path, at: str) -> None:
+    """Every number of one position, with its unit."""
+    from trunnion.results.quantities import parts
+    from trunnion.results.tables import columns
+
+    rows = []
+    for name, unit, values in columns(result.dataset):
+        value = values(slice(None))[0]
+        text, shown = (str(value), "") if isinstance(value, str) else parts(float(value), unit)
+        rows.append([name, text, "" if shown == "1" else shown])
+    show_rows(f"{result.attrs['name'] or file} at {at}", ["", "value", "unit"], rows)
 
 
 def _run(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> xr.Dataset:

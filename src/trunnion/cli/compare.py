@@ -37,15 +37,10 @@ def compare(
     mapping: MappingFile,
     data: DataFiles = None,
     channel: Annotated[
-        list[str] | None,
-        typer.Option("--channel", help="A channel by its name in the mapping. Repeatable.", show_default=False),
+        list[str] | None, typer.Option("--channel", help="A channel by its name in the mapping. Repeatable.")
     ] = None,
-    condition: Annotated[
-        str | None, typer.Option("--condition", help="The condition to draw.", show_default=False)
-    ] = None,
-    kind: Annotated[
-        str | None, typer.Option("--kind", help="Figure of --out: efficiency or overlay.", show_default=False)
-    ] = None,
+    condition: Annotated[str | None, typer.Option("--condition", help="The condition to draw.")] = None,
+    kind: Annotated[str | None, typer.Option("--kind", help="Figure of --out: efficiency or overlay.")] = None,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,

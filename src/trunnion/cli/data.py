@@ -16,10 +16,9 @@ __all__ = ["data"]
 
 
 def data(
-    mapping: Annotated[Path, typer.Argument(help="Mapping file: YAML, JSON or TOML.", show_default=False)],
+    mapping: Annotated[Path, typer.Argument(help="Mapping file: YAML, JSON or TOML.")],
     files: Annotated[
-        list[Path] | None,
-        typer.Argument(help="Data files instead of those it names: .csv .parquet .tdms.", show_default=False),
+        list[Path] | None, typer.Argument(help="Data files instead of those it names: .csv .parquet .tdms.")
     ] = None,
     out: Data = None,
     units_row: UnitsRow = False,

@@ -43,42 +43,30 @@ Parameters = Annotated[
     typer.Option(
         "--parameter",
         help="A parameter, named as in --set; NAME=PATH,PATH,… for several with one common value. Repeatable.",
-        show_default=False,
     ),
 ]
 Channels = Annotated[
     list[str] | None,
     typer.Option(
-        "--channel",
-        help="A channel by its name in the mapping, or efficiency. Repeatable; default: all usable ones.",
-        show_default=False,
+        "--channel", help="A channel by its name in the mapping, or efficiency. Repeatable; default: all usable ones."
     ),
 ]
 Starting = Annotated[
-    list[str] | None,
-    typer.Option("--start", help="NAME=VALUE: start value; default: the value in the model."),
+    list[str] | None, typer.Option("--start", help="NAME=VALUE: start value; default: the value in the model.")
 ]
 HeldOut = Annotated[
     list[str] | None,
     typer.Option(
         "--hold-out",
         help="A condition, or a share of the turns such as 0.2, for validation instead of the fit. Repeatable.",
-        show_default=False,
     ),
 ]
 Sensors = Annotated[
-    str,
-    typer.Option("--sensors", help="Zero and gain errors are common to a channel, or to each condition."),
+    str, typer.Option("--sensors", help="Zero and gain errors are common to a channel, or to each condition.")
 ]
-Guard = Annotated[
-    int | None,
-    typer.Option("--guard", help="Positions left out on each side of a friction reversal.", show_default=False),
-]
+Guard = Annotated[int | None, typer.Option("--guard", help="Positions left out on each side of a friction reversal.")]
 Starts = Annotated[int, typer.Option("--starts", help="Number of start points.")]
-Kind = Annotated[
-    str | None,
-    typer.Option("--kind", help="Which figure: intervals, correlation or residuals.", show_default=False),
-]
+Kind = Annotated[str | None, typer.Option("--kind", help="Which figure: intervals, correlation or residuals.")]
 
 
 def identify(
@@ -190,30 +178,8 @@ def _write_model(
         named = "correct what explains the misfit, and identify again"
         unknown = "find the cause first: `trunnion compare` shows each channel and names errors of sensors and angle"
         return [Finding(what, "--write", named if explained else unknown)]
-    before = file.read_text("utf-8", errors="replace").splitlines()
     rewrite_mechanism(with_estimates(mechanism, result), file, write, force)
     written.append(write)
-    found = _outdated(before, write)
     if not lost:
-        return found
-    return [
-        *found,
-        Finding(f"{', '.join(lost)} unchanged: not identifiable from the data", "--write", "", Severity.NOTE),
-    ]
-
-
-def _outdated(before: list[str], write: Path) -> list[Finding]:
-    """A note of the comments behind values that are replaced: they speak of what was there."""
-    after = write.read_text("utf-8").splitlines()
-    if write.suffix.lower() not in (".yaml", ".yml") or len(after) != len(before):
         return []
-    rows = [(k, new.partition(" #")) for k, (old, new) in enumerate(zip(before, after, strict=True), 1) if old != new]
-    kept = [f"line {k} '{comment.strip()}'" for k, (_, mark, comment) in rows if mark]
-    if not kept:
-        return []
-    what = f"comments behind replaced values are kept: {', '.join(kept[:MOST_NAMED])}"
-    what += ", …" * (len(kept) > MOST_NAMED)
-    return [Finding(what, "--write", "check whether they still hold", Severity.NOTE, file=str(write))]
-
-
-MOST_NAMED = 4
+    return [Finding(f"{', '.join(lost)} unchanged: not identifiable from the data", "--write", "", Severity.NOTE)]

@@ -56,7 +56,7 @@ PLOT_KINDS = (
     "torque, speed, friction-power, reactions, polar, power, mechanism, motion, error, seat, beta, locking or measures"
 )
 
-File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)]
+File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.")]
 Steps = Annotated[int, typer.Option("--steps", help="Equally spaced positions over the turn or range.")]
 Set = Annotated[
     list[str] | None,
@@ -70,8 +70,7 @@ FrictionLaw = Annotated[
     str | None, typer.Option("--friction", help="off, or a friction law for all joints with friction.")
 ]
 Seats = Annotated[
-    str | None,
-    typer.Option("--seat", help="loaded or free: position of the pins in all joints with play."),
+    str | None, typer.Option("--seat", help="loaded or free: position of the pins in all joints with play.")
 ]
 Method = Annotated[
     str,
@@ -80,65 +79,35 @@ Method = Annotated[
 Criterion = Annotated[
     float | None,
     typer.Option(
-        "--criterion",
-        help="Friction iteration: largest change of a load, N, at convergence; default: by the residual.",
-        show_default=False,
+        "--criterion", help="Friction iteration: largest change of a load, N, at convergence; default: by the residual."
     ),
 ]
 Rounds = Annotated[int, typer.Option("--iterations", help="Limit of friction iterations.")]
-At = Annotated[
-    str | None,
-    typer.Option("--at", help="Position for measures that state none: 60deg, 20mm, 0.1s.", show_default=False),
-]
-OnePosition = Annotated[
-    str | None,
-    typer.Option("--at", help="One position instead of the cycle: 60deg, 20mm, 0.1s.", show_default=False),
-]
+At = Annotated[str | None, typer.Option("--at", help="Position for measures that state none: 60deg, 20mm, 0.1s.")]
+OnePosition = Annotated[str | None, typer.Option("--at", help="One position instead of the cycle: 60deg, 20mm, 0.1s.")]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of the random numbers; the same seed gives the same result.")]
-Jobs = Annotated[
-    int | None,
-    typer.Option("--jobs", help="Number of processes; default: one per core for long work.", show_default=False),
-]
-MappingFile = Annotated[Path, typer.Argument(help="Mapping of the data: YAML.", show_default=False)]
+Jobs = Annotated[int | None, typer.Option("--jobs", help="Number of processes; default: one per core for long work.")]
+MappingFile = Annotated[Path, typer.Argument(help="Mapping of the data: YAML.")]
 DataFiles = Annotated[
-    list[Path] | None,
-    typer.Argument(help="Data files instead of those in the mapping: CSV, Parquet, TDMS.", show_default=False),
+    list[Path] | None, typer.Argument(help="Data files instead of those in the mapping: CSV, Parquet, TDMS.")
 ]
-Write = Annotated[
-    Path | None,
-    typer.Option("--write", help="Write the model with the values found: .yaml or .json.", show_default=False),
-]
+Write = Annotated[Path | None, typer.Option("--write", help="Write the model with the values found: .yaml or .json.")]
 Force = Annotated[bool, typer.Option("--force", help="With --write: allow overwriting the model itself.")]
-Report = Annotated[
-    Path | None, typer.Option("--report", help="Also write the report, one HTML file.", show_default=False)
-]
-Out = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--out", help="Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable."
-    ),
-]
-Engine = Annotated[str, typer.Option("--engine", help="numpy, compiled, or auto: by size.")]
+Report = Annotated[Path | None, typer.Option("--report", help="Also write the report, one HTML file.")]
+WRITTEN = "Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable."
 TABLES = "x.positions.csv the curves, x.histogram.csv the samples, x.convergence.csv how they settle"
-OutTolerance = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--out",
-        help="Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable. "
-        f"The name says which table: x.csv has the measures, x.parameters.csv the contributions, {TABLES}.",
-    ),
-]
-OutAllocation = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--out",
-        help="Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable. "
-        "The name says which table: x.csv has the tolerances, x.measures.csv the measures, x.offers.csv the cost over "
-        f"accuracy, {TABLES}.",
-    ),
-]
+OF_TOLERANCE = f"The name says which table: x.csv has the measures, x.parameters.csv the contributions, {TABLES}."
+OF_ALLOCATION = (
+    "The name says which table: x.csv has the tolerances, x.measures.csv the measures, x.offers.csv the cost over "
+    f"accuracy, {TABLES}."
+)
+Out = Annotated[list[Path] | None, typer.Option("--out", "-o", help=WRITTEN)]
+OutTolerance = Annotated[list[Path] | None, typer.Option("--out", "-o", help=f"{WRITTEN} {OF_TOLERANCE}")]
+OutAllocation = Annotated[list[Path] | None, typer.Option("--out", "-o", help=f"{WRITTEN} {OF_ALLOCATION}")]
+Engine = Annotated[str, typer.Option("--engine", help="numpy, compiled, or auto: by size.")]
 Data = Annotated[
-    list[Path] | None, typer.Option("--out", help="Write the result: .csv .xlsx .json .nc .zarr .parquet. Repeatable.")
+    list[Path] | None,
+    typer.Option("--out", "-o", help="Write the result: .csv .xlsx .json .nc .zarr .parquet. Repeatable."),
 ]
 Uncut = Annotated[
     bool, typer.Option("--uncut", help="Show peaks near dead centres in full; default: cut at the frame.")
@@ -148,14 +117,11 @@ Columns = Annotated[
     typer.Option(
         "--columns",
         help="Columns of a table file: usual, motion (velocities, accelerations), locking, all, or names. Repeatable.",
-        show_default=False,
     ),
 ]
 Variables = Annotated[
     list[str] | None,
-    typer.Option(
-        "--variables", help="Keep these variables only: reaction_force, drive_effort … Repeatable.", show_default=False
-    ),
+    typer.Option("--variables", help="Keep these variables only: reaction_force, drive_effort … Repeatable."),
 ]
 Dtype = Annotated[str, typer.Option("--dtype", help="Numbers of the files: float64, or float32.")]
 UnitsRow = Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")]
@@ -171,15 +137,11 @@ class TableUnits(StrEnum):
 Units = Annotated[
     TableUnits, typer.Option("--units", help="Units of table files: si, or model for those of the model file.")
 ]
-Kinds = Annotated[
-    list[str] | None, typer.Option("--kind", help=f"{PLOT_KINDS}. Repeatable; all if not given.", show_default=False)
-]
+Kinds = Annotated[list[str] | None, typer.Option("--kind", help=f"{PLOT_KINDS}. Repeatable; all if not given.")]
 Measures = Annotated[
     list[str] | None,
     typer.Option(
-        "--measure",
-        help="A measure of the model, or rocker.C.x, angle:rocker, effort:A … (check --list). Repeatable.",
-        show_default=False,
+        "--measure", help="A measure of the model, or rocker.C.x, angle:rocker, effort:A … (check --list). Repeatable."
     ),
 ]
 

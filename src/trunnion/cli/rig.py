@@ -28,17 +28,15 @@ FEWEST = 20  # conditions from which a progress bar is worth it
 
 def rig(
     file: File,
-    rig_file: Annotated[Path, typer.Argument(help="Rig file: YAML, JSON or TOML.", show_default=False)],
+    rig_file: Annotated[Path, typer.Argument(help="Rig file: YAML, JSON or TOML.")],
     out: Annotated[
-        Path | None,
-        typer.Option("--out", help="Folder for data files, mapping.yaml and truth.yaml.", show_default=False),
+        Path | None, typer.Option("--out", "-o", help="Folder for data files, mapping.yaml and truth.yaml.")
     ] = None,
     plan: Annotated[
         bool, typer.Option("--plan", help="Predict readings and efficiency; the default without --out.")
     ] = False,
     format_: Annotated[
-        str | None,
-        typer.Option("--format", help="csv, parquet or tdms; default: as stated in the rig file.", show_default=False),
+        str | None, typer.Option("--format", help="csv, parquet or tdms; default: as stated in the rig file.")
     ] = None,
     seed: Seed = 1,
     set_: Set = None,

@@ -34,7 +34,6 @@ Kind = Annotated[
         "--kind",
         help="Figure to write: sheet, speed, effort, reactions, energy, phase; in play contacts, gaps, orbit, "
         "spectrum; of a steady cycle those of `trunnion plot`.",
-        show_default=False,
     ),
 ]
 
@@ -42,23 +41,18 @@ Kind = Annotated[
 def simulate(
     file: File,
     time: Annotated[
-        str | None,
-        typer.Option(
-            "--time", help="Duration, as 2s or 300ms; default: ten cycles of the stated motion.", show_default=False
-        ),
+        str | None, typer.Option("--time", help="Duration, as 2s or 300ms; default: ten cycles of the stated motion.")
     ] = None,
     steps: Annotated[int, typer.Option("--steps", help="Equal intervals of time in the result.")] = 1000,
     tolerance: Annotated[float, typer.Option("--tolerance", help="Relative tolerance of the integration.")] = 1e-9,
     steady: Annotated[
-        bool,
-        typer.Option("--steady", help="The cycle that the motion comes to repeat, as `analyse` gives a cycle."),
+        bool, typer.Option("--steady", help="The cycle that the motion comes to repeat, as `analyse` gives a cycle.")
     ] = False,
     evaluations: Annotated[
         int, typer.Option("--evaluations", help="Evaluations of the forces, after which the motion ends.")
     ] = EVALUATIONS,
     pass_change_points: Annotated[
-        bool,
-        typer.Option("--pass-change-points", help="Go on by momentum where two assemblies of the links meet."),
+        bool, typer.Option("--pass-change-points", help="Go on by momentum where two assemblies of the links meet.")
     ] = False,
     set_: Set = None,
     table: TableFile = None,

@@ -18,14 +18,9 @@ USUAL = 8765
 
 
 def studio(
-    file: Annotated[
-        Path | None, typer.Argument(help="Model to open, or the folder of models.", show_default=False)
-    ] = None,
+    file: Annotated[Path | None, typer.Argument(help="Model to open, or the folder of models.")] = None,
     port: Annotated[
-        int | None,
-        typer.Option(
-            "--port", help="Port on this machine; default: 8765, or any if that is taken.", show_default=False
-        ),
+        int | None, typer.Option("--port", help="Port on this machine; default: 8765, or any if that is taken.")
     ] = None,
     open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the browser.")] = True,
 ) -> None:

@@ -42,18 +42,13 @@ __all__ = ["sweep"]
 
 Over = Annotated[
     list[str],
-    typer.Option(
-        "--over",
-        help="NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,…: misalignment=0deg:30deg:16. Repeatable.",
-        show_default=False,
-    ),
+    typer.Option("--over", help="NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,…: misalignment=0deg:30deg:16. Repeatable."),
 ]
 Drawn = Annotated[
     list[str] | None,
     typer.Option(
         "--measure",
         help="Result to show, by its name in the CSV file: A.effort_max, or a measure of the model. Repeatable.",
-        show_default=False,
     ),
 ]
 Along = Annotated[

@@ -41,17 +41,13 @@ Methods = Annotated[
     typer.Option(
         "--method",
         help="linear, worst-case, monte-carlo, quasi-monte-carlo, sobol. Repeatable; the first three if not given.",
-        show_default=False,
     ),
 ]
 Samples = Annotated[
     list[str] | None,
     typer.Option("--sample", help="NAME=FILE.csv: measured deviations of a number, one column. Repeatable."),
 ]
-Cluster = Annotated[
-    str | None,
-    typer.Option("--cluster", help="Address of a Dask scheduler, or local.", show_default=False),
-]
+Cluster = Annotated[str | None, typer.Option("--cluster", help="Address of a Dask scheduler, or local.")]
 Kind = Annotated[
     str | None,
     typer.Option("--kind", help="A single figure: histogram, contributions, envelope, convergence or sobol."),
@@ -65,9 +61,7 @@ def tolerance(
     method: Methods = None,
     target: Annotated[
         float | None,
-        typer.Option(
-            "--yield", help="Required share within limits; then it alone decides the exit status.", show_default=False
-        ),
+        typer.Option("--yield", help="Required share within limits; then it alone decides the exit status."),
     ] = None,
     samples: Annotated[int, typer.Option("--samples", help="Number of random mechanisms.")] = 10_000,
     seed: Seed = 1,
@@ -76,10 +70,7 @@ def tolerance(
     engine: Engine = "auto",
     cluster: Cluster = None,
     checkpoint: Annotated[
-        Path | None,
-        typer.Option(
-            "--checkpoint", help="File that keeps the samples done; the same command continues.", show_default=False
-        ),
+        Path | None, typer.Option("--checkpoint", help="File that keeps the samples done; the same command continues.")
     ] = None,
     set_: Set = None,
     table: TableFile = None,

@@ -13,6 +13,7 @@ from trunnion.cycle.positions import ALL, Dtype, Kept, check_steps, positions
 from trunnion.cycle.scene import scene_of
 from trunnion.cycle.summary import member_units, result_of
 from trunnion.errors import Finding, MechanismError
+from trunnion.measures.positions import place_of, time_of
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.units import TableUnits
@@ -45,6 +46,7 @@ def analyse(
     units_row: bool = False,
     columns: Sequence[str] | None = None,
     units: TableUnits = "si",
+    at: float | str | None = None,
 ) -> xr.Dataset:
     """Motion, reactions with friction, drive effort and power of a mechanism over its cycle.
 
@@ -57,6 +59,7 @@ def analyse(
     variables: names of those that the Dataset has beside the status, all if not given; the summary and the findings
     are the same, but for the locking margin and what decides it, which are found only where it is named. dtype:
     float64, or float32 for a Dataset of half the size; what is computed is float64 in any case.
+    at: one position instead of all, such as "60 deg", or in SI, 1.05; the summary and the means are those of the cycle.
     out: files to write, as by `save`, with its arguments units_row, columns and units.
     Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
     Raises MechanismError if the structure does not determine the motion, `steps` is out of range, a variable is
@@ -65,7 +68,7 @@ def analyse(
     kept = Kept.read(variables, dtype)
     paths = [out] if isinstance(out, (str, os.PathLike)) else out
     saved = {"units_row": units_row, "columns": columns, "units": units}
-    return analysed(mechanism, steps, friction_method, progress, engine, kept, paths, saved).dataset
+    return analysed(mechanism, steps, friction_method, progress, engine, kept, paths, saved, at).dataset
 
 
 @strict_arguments
@@ -79,6 +82,7 @@ def analysed(
     kept: Kept = ALL,
     out: Sequence[str | os.PathLike[str]] = (),
     saved: Mapping[str, Any] | None = None,
+    at: float | str | None = None,
 ) -> Result:
     """What `analyse` does, before it becomes a Dataset."""
     check_steps(steps)
@@ -93,13 +97,22 @@ def analysed(
 
         for path in out:
             check_format(path)
-    found = positions(run, steps, method, progress, kept.margin, engine=engine, wanted=kept.variables)
+    time = None if at is None else _time(run, at)
+    found = positions(run, steps, method, progress, kept.margin, engine=engine, wanted=kept.variables, at=time)
     result = result_of(run, found, kept)
     for path in out:
         from trunnion.results.export import save
 
         save(result.dataset, path, **(saved or {}))
     return result
+
+
+def _time(run: Run, at: float | str) -> float:
+    """The time, s, of a position as a user writes it; MechanismError where the cycle has none there, or many."""
+    place, timed = place_of(run.system.mechanism, at)
+    if run.cycle.duration <= 0:
+        raise MechanismError(Finding("nothing moves: there is one position", "at", "remove at"))
+    return time_of(run, place, timed, "at")
 
 
 @np.errstate(all="ignore")

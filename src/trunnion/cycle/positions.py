@@ -115,18 +115,21 @@ def positions(
     averaged: bool = True,
     engine: str = "auto",
     wanted: Collection[str] | None = None,
+    at: float | None = None,
 ) -> Positions:
     """The numbers of every variable of `results` at equally spaced positions, their statuses and causes.
 
     margin: whether the locking margin is looked for; it is infinite if not. averaged: whether the means over the cycle
     are, which ask for many positions more; they are NaN if not. engine: see `cycle_kernel.compiles`. wanted: the
-    variables that will be read beside those that the books of the cycle are made of, all if not given.
+    variables that will be read beside those that the books of the cycle are made of, all if not given. at: a time,
+    s, for that position alone.
     """
     check_steps(steps)
     _refuse_seats(run)
     method = replace(method or FrictionMethod(), margin_up_to=MARGIN if margin else 0.0)
     steps = steps if run.cycle.duration > 0 else 1
-    found = stretch(run, run.cycle.times(steps), method, engine, wanted, progress)
+    time = run.cycle.times(steps) if at is None else np.array([at])
+    found = stretch(run, time, method, engine, wanted, progress)
     if not averaged:
         return found
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now

@@ -157,13 +157,13 @@ def _ends_of(run: Run, measure: Measure) -> tuple[float, ...]:
     if measure.in_time:
         return (0.0,)
     if measure.at is not None:
-        return (_time(run, measure, measure.at, f"{where}.at"),)
+        return (time_of(run, measure.at, measure.timed, f"{where}.at"),)
     return () if measure.over is None else _window_ends(run, measure, measure.over, f"{where}.over")
 
 
 def _window_ends(run: Run, measure: Measure, over: tuple[float, float], where: str) -> tuple[float, ...]:
     """Both ends of a window, s; none of a window as wide as the cycle."""
-    duration, (first, last) = run.cycle.duration, (_time(run, measure, place, where) for place in over)
+    duration, (first, last) = run.cycle.duration, (time_of(run, place, measure.timed, where) for place in over)
     if run.cycle.periodic:
         stated, whole = over[1] - over[0], duration if measure.timed else abs(gain_of(run))
         # [300, 60] and [-60, 60] deg are the same of a driver that turns on: from the first place to the second; one
@@ -184,10 +184,13 @@ def _window_ends(run: Run, measure: Measure, over: tuple[float, float], where: s
     return first, last
 
 
-def _time(run: Run, measure: Measure, place: float, where: str) -> float:
-    """The time, s, of a place: a time itself, or a coordinate of a driver that runs one way."""
+def time_of(run: Run, place: float, timed: bool, where: str) -> float:
+    """The time, s, of a place: a time itself, or a coordinate of a driver that runs one way.
+
+    Raises MechanismError for a place that is not in the cycle, or at no one time of it.
+    """
     duration, periodic, system, values = run.cycle.duration, run.cycle.periodic, run.system, run.values
-    if measure.timed:
+    if timed:
         if not periodic and not -1e-12 * duration <= place <= duration * (1 + 1e-12):
             what = f"{place:g} s is not in the cycle, which lasts {duration:g} s"
             raise MechanismError(Finding(what, where, "state a time within it"))

@@ -155,9 +155,9 @@ def _findings(sensors: tuple[Expected, ...], forecasts: list[Forecast]) -> Itera
     off = [one for one in measured if one.measured and abs(one.bias) > one.measured.uncertainty]
     if off:
         worst = max(off, key=lambda one: abs(one.bias))
-        what = f"in {len(off)} of {counted(len(measured), 'condition')} the bias of the efficiency exceeds its standard "
-        what += f"uncertainty, at most {worst.bias:+.2g} in condition {worst.case.number}: the sensors are too slow "
-        what += "for the cycle, or clipped"
+        what = f"in {len(off)} of {counted(len(measured), 'condition')} the bias of the efficiency exceeds its "
+        what += f"standard uncertainty, at most {worst.bias:+.2g} in condition {worst.case.number}: the sensors "
+        what += "are too slow for the cycle, or clipped"
         remedy = "use sensors with a larger bandwidth or range, more pulses, or a lower speed"
         figures = {"count": len(off), "of": len(measured), "condition": worst.case.number, "bias": worst.bias}
         yield Finding.warning("rig.biased", "sensors", what, remedy, **figures)

@@ -9,8 +9,6 @@ import pytest
 import xarray as xr
 
 from trunnion.cli.app import main
-from trunnion.cli.identify import _outdated
-from trunnion.errors import Severity
 from trunnion.model.mechanism import read_mechanism
 from trunnion.rig import identification
 from trunnion.rig.identification import identify
@@ -109,17 +107,6 @@ def test_tables_files_and_the_model(folder: Path, call) -> None:  # type: ignore
     assert "Content-Security-Policy" in page
     assert "<script" not in page
     assert "http" not in page.replace("http-equiv", "")
-
-
-def test_a_comment_behind_a_value_that_is_replaced_is_told(tmp_path: Path) -> None:
-    """It is kept, but may speak of the value that was there."""
-    path = tmp_path / "new.yaml"
-    path.write_text("a: 2  # catalogue\nb: 1  # stays\nc: 5\n")
-    (found,) = _outdated(["a: 1  # catalogue", "b: 1  # stays", "c: 4"], path)
-    assert "line 1 'catalogue'" in found.what
-    assert "stays" not in found.what
-    assert found.severity is Severity.NOTE
-    assert not _outdated(["a: 2  # catalogue", "b: 1  # stays", "c: 4"], path)
 
 
 @pytest.mark.slow

@@ -37,7 +37,7 @@ pages: $(VENV)/.dev
 
 # What `make test` leaves out: every example, long counts, further oracles, every page of the documentation.
 test-all: $(VENV)/.dev
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow --durations=20 --durations-min=10
 
 # Ratios to peers and hand-written kernels, measured in one run.
 bench: $(VENV)/.bench

@@ -64,14 +64,40 @@ def _keep_what_is_asked_for_again() -> None:
     maker.get_command = lambda app: kept(app, *(one.callback for one in app.registered_commands))
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Of a test marked `spread(n, *also)`, n of its cases, evenly chosen, and those named stay in `make test`."""
-    cases: defaultdict[tuple[Any, ...], list[pytest.Item]] = defaultdict(list)
-    for item in items:
-        if mark := item.get_closest_marker("spread"):
-            cases[item.nodeid.partition("[")[0], *mark.args].append(item)
-    for (_, count, *also), found in cases.items():
-        kept = {round((k + 0.5) * len(found) / count - 0.5) for k in range(count)}
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`pytest -m slow --every-case` runs the cases that `sample` leaves out."""
+    parser.addoption("--every-case", action="store_true", help="run also the like cases that `sample` leaves out")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Of a test marked `spread(n, *also)`, n of its cases, evenly chosen, and those named stay in `make test`; of the
+    slow cases of one marked `sample(n)`, n evenly chosen run."""
+    for (_, count, *also), found in _marked(items, "spread").items():
+        kept = _evenly(count, len(found))
         for k, item in enumerate(found):
             if k not in kept and item.nodeid.partition("[")[2].removesuffix("]") not in also:
                 item.add_marker(pytest.mark.slow)
+    if config.getoption("--every-case"):
+        return
+    slow = [item for item in items if item.get_closest_marker("slow")]
+    left: list[pytest.Item] = []
+    for (_, count), found in _marked(slow, "sample").items():
+        kept = _evenly(count, len(found))
+        left += [item for k, item in enumerate(found) if k not in kept]
+    out = set(map(id, left))
+    items[:] = [item for item in items if id(item) not in out]
+    config.hook.pytest_deselected(items=left)
+
+
+def _marked(items: list[pytest.Item], name: str) -> dict[tuple[Any, ...], list[pytest.Item]]:
+    """The cases of each test that has a mark, by the test and the mark's arguments."""
+    cases: defaultdict[tuple[Any, ...], list[pytest.Item]] = defaultdict(list)
+    for item in items:
+        if mark := item.get_closest_marker(name):
+            cases[item.nodeid.partition("[")[0], *mark.args].append(item)
+    return cases
+
+
+def _evenly(count: int, of: int) -> set[int]:
+    """Indices of so many, evenly chosen."""
+    return {round((k + 0.5) * of / count - 0.5) for k in range(count)}

@@ -32,7 +32,8 @@ def compare(console: Console, space: str, count: int) -> bool:
         seed += 1
     for what, number in outcomes.most_common():
         console.print(f"{space}: {number:6d} {what}")
-    console.print(f"{space}: largest difference {worst[0]:.1e} (seed {worst[1]}); over {limit:g}: {over}")
+    if count:
+        console.print(f"{space}: largest difference {worst[0]:.1e} (seed {worst[1]}); over {limit:g}: {over}")
     return not over
 
 

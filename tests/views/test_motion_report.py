@@ -220,6 +220,7 @@ def test_the_report_of_a_cycle_says_nothing_of_it() -> None:
     assert "Motion in time" not in words
 
 
+@pytest.mark.sample(9)
 @pytest.mark.spread(0, "ends early-sheet", "ends early-phase", "stays-energy")
 @pytest.mark.parametrize("kind", ["sheet", *(kind for kind in KINDS if kind not in OF_CONTACTS)])
 def test_every_figure_bears_every_motion(motion: tuple[str, xr.Dataset], kind: str) -> None:

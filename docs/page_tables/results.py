@@ -160,25 +160,56 @@ def formats_table() -> str:
 
 
 def codes_table() -> str:
-    """The codes of findings about results, with the sentence where it is a plain text."""
-    from trunnion.results.sentences.codes import SENTENCES
-
-    rows = {name: (str(one.severity), one.what if isinstance(one.what, str) else "") for name, one in SENTENCES.items()}
-    for module in ("comparison", "identification/findings"):
-        rows |= _codes_in(Path(trunnion.__file__).parent / f"rig/{module}.py")
+    """The codes of findings about results, with the sentence that the code writes; … where a figure is filled in."""
+    rows: dict[str, tuple[str, str]] = {}
+    for file in sorted(Path(trunnion.__file__).parent.rglob("*.py")):
+        rows |= _codes_in(file)
     return rows_of(("code", "is", "says"), [(code(name), *row) for name, row in sorted(rows.items())])
 
 
 def _codes_in(file: Path) -> dict[str, tuple[str, str]]:
-    """Severity and sentence, `…` for what is filled in, of the findings that a module makes, by their code."""
+    """Severity and sentence of the findings that a module makes, by their code."""
     rows = {}
-    for call in ast.walk(ast.parse(file.read_text("utf-8"))):
-        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "Finding":
+    functions = [node for node in ast.walk(ast.parse(file.read_text("utf-8"))) if isinstance(node, ast.FunctionDef)]
+    for function in functions:
+        weights = sorted({
+            node.attr.lower() for node in ast.walk(function)
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "Severity"
+        })  # fmt: skip
+        for call in ast.walk(function):
+            if not isinstance(call, ast.Call):
+                continue
+            maker = ast.unparse(call.func)
             named = {one.arg: one.value for one in call.keywords}
-            if isinstance(name := named.get("code"), ast.Constant):
-                weights = [one.attr.lower() for one in ast.walk(call) if isinstance(one, ast.Attribute)
-                           and isinstance(one.value, ast.Name) and one.value.id == "Severity"]  # fmt: skip
-                parts = call.args[0].values if isinstance(call.args[0], ast.JoinedStr) else [call.args[0]]
-                texts = [str(one.value) if isinstance(one, ast.Constant) else "…" for one in parts]
-                rows[str(name.value)] = (" or ".join(weights) or "error", "".join(texts) if len(texts) > 1 else "")
+            if maker == "Finding" and isinstance(name := named.get("code"), ast.Constant):
+                text, kind = call.args[0], " or ".join(weights) or "error"
+            elif maker == "Finding.weighed" and isinstance(name := call.args[1], ast.Constant):
+                text, kind = call.args[3], " or ".join(weights)
+            elif maker in ("Finding.note", "Finding.warning", "Finding.error"):
+                name, text, kind = call.args[0], call.args[2], maker.removeprefix("Finding.")
+            else:
+                continue
+            said = _text(text, function)
+            rows[str(name.value)] = (kind, said if said.strip("… :;,.") else "")
     return rows
+
+
+def _text(node: ast.expr, function: ast.FunctionDef) -> str:
+    """A string of the code, … for what is filled in; of a name the last that it is set to before."""
+    if isinstance(node, ast.Constant):
+        return str(node.value)
+    if isinstance(node, ast.JoinedStr):
+        return "".join(str(part.value) if isinstance(part, ast.Constant) else "…" for part in node.values)
+    if isinstance(node, ast.Name):
+        said = ""
+        settings = [one for one in ast.walk(function) if isinstance(one, (ast.Assign, ast.AugAssign))]
+        for setting in sorted(settings, key=lambda one: one.lineno):
+            target = setting.targets[0] if isinstance(setting, ast.Assign) else setting.target
+            if setting.lineno < node.lineno and isinstance(target, ast.Name) and target.id == node.id:
+                said = (
+                    _text(setting.value, function)
+                    if isinstance(setting, ast.Assign)
+                    else said + _text(setting.value, function)
+                )
+        return said
+    return "…"

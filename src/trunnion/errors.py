@@ -45,7 +45,8 @@ class Finding:
     where: path inside the model such as `links.crank.mass`; empty if it concerns the whole.
     remedy: what to do about it; line, file: where it stands in the model file, if it was read from one.
     code: what a program asks for, such as `friction.locked`; of something that was put in, `input.` and its section.
-    figures: the numbers of the sentence by name, with the names and places that it speaks of; see `results.sentences`.
+    figures: the numbers of the sentence by name, in SI if their name does not say otherwise, with the names and places
+    that it speaks of.
     """
 
     what: str
@@ -61,6 +62,27 @@ class Finding:
         if not self.code:
             section = self.where.lstrip("-").replace(" ", ".").partition(".")[0]
             object.__setattr__(self, "code", f"input.{section or 'file'}")
+
+    @classmethod
+    def weighed(cls, severity: Severity, code: str, where: str, what: str, remedy: str = "", /, **figures: Any) -> Self:
+        """A finding about a result, with its code and the figures of its sentence."""
+        plain = {name: value.item() if hasattr(value, "item") else value for name, value in figures.items()}
+        return cls(what, where, remedy, severity, code=code, figures=plain)
+
+    @classmethod
+    def error(cls, code: str, where: str, what: str, remedy: str = "", /, **figures: Any) -> Self:
+        """What forbids to use a result."""
+        return cls.weighed(Severity.ERROR, code, where, what, remedy, **figures)
+
+    @classmethod
+    def warning(cls, code: str, where: str, what: str, remedy: str = "", /, **figures: Any) -> Self:
+        """What makes a result doubtful."""
+        return cls.weighed(Severity.WARNING, code, where, what, remedy, **figures)
+
+    @classmethod
+    def note(cls, code: str, where: str, what: str, remedy: str = "", /, **figures: Any) -> Self:
+        """What one should know of a result."""
+        return cls.weighed(Severity.NOTE, code, where, what, remedy, **figures)
 
     def at(self, file: str, line: int | None) -> Finding:
         """The same finding with its place in a file."""

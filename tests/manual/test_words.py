@@ -11,9 +11,8 @@ import pytest
 from typer.main import get_command
 
 from trunnion.cli.app import app
+from trunnion.cli.terminal import QUIET
 from trunnion.errors import Finding, Severity
-from trunnion.results.sentences import QUIET, finding_for
-from trunnion.results.sentences.codes import SENTENCES
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "src" / "trunnion"
@@ -88,7 +87,6 @@ def test_what_nearly_every_run_has_is_a_note(code: str, capsys: pytest.CaptureFi
     """It is left to the report and to `check`; of the same code a warning is shown."""
     from trunnion.cli.terminal import say
 
-    assert SENTENCES[code].severity is Severity.NOTE
     note = Finding("x", code=code, severity=Severity.NOTE)
     say([note])
     assert not capsys.readouterr().err
@@ -106,9 +104,6 @@ def test_a_finding_has_its_quantities_in_a_unit_that_fits(value: float, unit: st
     from trunnion.results.quantities import readable
 
     assert readable(value, unit).startswith(text)
-    one = finding_for("errors.jump_moved", "drivers.A", at="3°", built="at 2°", meant="at 4°", rest=value, unit=unit)
-    assert text in one.what
-    assert one.figures["rest"] == value
 
 
 def test_two_ends_are_told_apart_in_one_unit() -> None:

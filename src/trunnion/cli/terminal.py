@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any
 from trunnion.errors import Finding, Severity
 from trunnion.results.attributes import Described, attribute
 from trunnion.results.quantities import parts
-from trunnion.results.sentences import QUIET
 
 if TYPE_CHECKING:
     from trunnion.results.figure import Figure
 
 __all__ = ["bar", "console", "say", "say_missed", "show_figures", "show_rows", "wrote"]
+
+# notes that nearly every result has: they are left to the report and to `check`
+QUIET = frozenset({"model.gravity", "samples.engine", "simulate.centred"})
 
 
 def console() -> Any:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,15 +21,14 @@ from trunnion.cycle.course import CycleCourse, Means, magnitude
 from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import scales_of
-from trunnion.errors import Finding, Status
+from trunnion.errors import Finding, Status, agreeing
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.joint_parts import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.tolerances import tolerated
 from trunnion.model.units import KINDS
-from trunnion.results.quantities import quantity, readable
-from trunnion.results.sentences import finding_for
+from trunnion.results.quantities import between, quantity, readable
 from trunnion.solve import loads
 from trunnion.solve.end_loads import NO_LOAD, EndLoads
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
@@ -47,6 +46,7 @@ RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be posi
 FAR = 1.0  # of the size: a hint farther off than this was meant for other lengths
 MEETS = 1e-6  # of its largest length: a spring that is no longer has its ends in one place
 CLASS_TWO = 2
+NEXT = 1e-3  # of the multiple at which one group locks: another that locks at less is told beside it
 NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effort that is less is no finding
 MUCH = 0.02  # of the drive work: what a spring keeps at the end of a range
 LEAST = 0.01  # of the drive work: what supplies less is not worth a word
@@ -138,7 +138,15 @@ def _far_hints(run: Run) -> Iterator[Finding]:
         distance = float(np.linalg.norm(np.subtract(place, stated)))
         if distance > FAR * size:
             words = ", ".join(quantity(part, "m") for part in place)
-            yield finding_for("assembly.far_hint", f"assembly.{name}", point=name, distance=distance, place=words)
+            yield Finding.warning(
+                "assembly.far_hint",
+                f"assembly.{name}",
+                f"the hint for {name} is {readable(distance, 'm')} from where {name} is at the start",
+                f"check the hint or the lengths; at the start it is at {words}",
+                point=name,
+                distance=distance,
+                place=words,
+            )
 
 
 def effort_units(system: System) -> list[str]:
@@ -156,13 +164,36 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     heavy = [name for name, link in bodies.items() if link.mass.source != 0]
     if heavy and mechanism.gravity is None:
         down, none = ("[0, -9.81]", "[0, 0]") if mechanism.space == "planar" else ("[0, 0, -9.81]", "[0, 0, 0]")
-        notes.append(finding_for("model.gravity", "gravity", links=heavy, phrases={"down": down, "none": none}))
+        notes.append(
+            Finding.note(
+                "model.gravity",
+                "gravity",
+                f"gravity is not stated and taken as zero, although {', '.join(heavy)} have mass",
+                f"state gravity: {down}, or gravity: {none}",
+                links=heavy,
+            )
+        )
     if not heavy and any(part.source != 0 for part in mechanism.gravity or ()):
-        notes.append(finding_for("model.no_mass", "gravity"))
+        notes.append(
+            Finding.note(
+                "model.no_mass",
+                "gravity",
+                "has no effect: no link has a mass",
+                "state mass: … and centre: … of the links, or no gravity",
+            )
+        )
     sliding = {link for joint in mechanism.joints.values() if PAIRS[joint.type].guided for link in joint.links}
     points = [name for name in heavy if bodies[name].inertia == ZERO_INERTIA and name not in sliding]
     if points:
-        notes.append(finding_for("model.point_mass", "links", links=points))
+        notes.append(
+            Finding.note(
+                "model.point_mass",
+                "links",
+                f"{', '.join(points)} have a mass but no inertia: each is a point mass at its centre",
+                "state inertia: …",
+                links=points,
+            )
+        )
     tight = [
         name
         for name, joint in mechanism.effective_joints.items()
@@ -171,12 +202,26 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
         and f"joints.{name}.pin.hole_radius" in values
     ]
     if tight:
-        notes.append(finding_for("model.seat_without_play", "joints", joints=tight))
+        notes.append(
+            Finding.note(
+                "model.seat_without_play",
+                "joints",
+                f"{', '.join(tight)} have a seat but no play at nominal size: these joints are ideal",
+                "analyse with --set fits=maximum for the largest play",
+                joints=tight,
+            )
+        )
     if playing:
         # no seats are taken where links are over-constrained
         held = {name for module in system.plan.modules if module.redundant for name in module.joints}
         seatable = [name for name in playing if name not in held]
-        notes.append(finding_for("model.play_centred", "joints", joints=playing, seatable=seatable))
+        of = f" of {', '.join(seatable)}" if len(seatable) < len(playing) else ", or analyse with --seat loaded"
+        remedy = f"for pins pressed to one side by their loads state seat: loaded{of}"
+        if not seatable:
+            remedy = "see `trunnion play` for the effect of the play, `trunnion assemble` for whether the links fit "
+            remedy += "together"
+        what = f"the pins of {', '.join(playing)} are at the middle of their play"
+        notes.append(Finding.note("model.play_centred", "joints", what, remedy, joints=playing, seatable=seatable))
     return notes
 
 
@@ -198,8 +243,15 @@ def shared_dimensions(mechanism: Mechanism) -> Iterator[Finding]:
             name = tolerance.path.removeprefix("dimensions.")
             shown = [path.removeprefix("links.").replace(".points.", ".") for path in used]
             more = f" and {len(shown) - MOST_PLACES} more" if len(shown) > MOST_PLACES else ""
-            phrases = {"shown": ", ".join(shown[:MOST_PLACES]) + more}
-            yield finding_for("tolerance.shared_dimension", tolerance.path, phrases=phrases, name=name, links=links)
+            yield Finding.note(
+                "tolerance.shared_dimension",
+                tolerance.path,
+                f"one tolerance sets points of {', '.join(links)} ({', '.join(shown[:MOST_PLACES])}{more}): these "
+                "links deviate together, by the same amount",
+                "if the links are made separately, give each a dimension of its own with its own tolerance",
+                name=name,
+                links=links,
+            )
 
 
 # ---- assembly, locking and singular positions -----------------------------------------------------------------
@@ -211,14 +263,27 @@ def _not_assembled(cycle: Cycle) -> Iterator[Finding]:
     for (number, *reasons), (places, sizes) in sorted(cycle.at.causes.of("open").items(), key=lambda item: item[0][0]):
         module, at = cycle.run.system.plan.modules[number], dial.intervals(places)
         everywhere, where = len(places) == len(dial.values) > 1, f"links {', '.join(module.links)}"
+        nowhere = f"cannot be assembled {'at any position' if everywhere else at}"
+        remedy = "change the lengths or the range of the driver"
         if reasons:
             gaps = {reason: np.nanmax(row) for reason, row in zip(reasons, sizes, strict=True) if np.any(row > 0)}
-            yield finding_for("assembly.gap", where, at=at, everywhere=everywhere, gaps=gaps)
-        else:
-            yield finding_for(
-                "assembly.open", where, at=at, everywhere=everywhere, redundant=bool(module.redundant),
-                errors=mechanism.has_errors, start=bool(np.any(places == 0)),
-            )  # fmt: skip
+            by = "; ".join(f"{name} by up to {readable(size, 'm')}" for name, size in gaps.items())
+            what = f"{nowhere}: {by or 'an earlier group has no position'}"
+            yield Finding.error("assembly.gap", where, what, remedy, at=at, everywhere=everywhere, gaps=gaps)
+            continue
+        start, redundant, errors = bool(np.any(places == 0)), bool(module.redundant), mechanism.has_errors
+        why = "these links do not close"
+        if everywhere and redundant and errors:
+            why = "these links are over-constrained; with their errors they need play to fit together, and as rigid "
+            why += "parts they cannot be analysed"
+            remedy = "see `trunnion assemble FILE` for the play that they need"
+        elif everywhere and redundant:
+            remedy = "the group is over-constrained and closes with special dimensions only: check them, "
+            remedy += "or use joints with more freedoms (cylindrical, spherical)"
+        elif not everywhere:
+            unreached = "these links cannot reach it from the start without being taken apart"
+            why = f"{why} there, where the motion starts" if start else unreached
+        yield Finding.error("assembly.open", where, f"{nowhere}: {why}", remedy, at=at, everywhere=everywhere)
 
 
 def _undecided_senses(cycle: Cycle) -> Iterator[Finding]:
@@ -226,7 +291,14 @@ def _undecided_senses(cycle: Cycle) -> Iterator[Finding]:
     for places, _ in cycle.at.causes.of("stuck").values():
         places = places[cycle.at.arrays["status"][places] == Status.ZERO_SLIP]
         if len(places):
-            yield finding_for("friction.sense", "joints", at=cycle.at.dial.intervals(places))
+            yield Finding.note(
+                "friction.sense",
+                "joints",
+                f"a joint with friction reverses {cycle.at.dial.intervals(places)} while its pin "
+                "moves within its play: friction may act either way there, and the seat changes with "
+                "it",
+                at=cycle.at.dial.intervals(places),
+            )
 
 
 def _singular(cycle: Cycle) -> Iterator[Finding]:
@@ -235,47 +307,75 @@ def _singular(cycle: Cycle) -> Iterator[Finding]:
     for number, (places, _) in cycle.at.causes.of("singular").items():
         module = cycle.run.system.plan.modules[number]
         kind = "dead centre (singular position)" if module.rank == CLASS_TWO else "singular position"
-        yield finding_for(
-            "position.singular", f"links {', '.join(module.links)}", at=cycle.at.dial.intervals(places),
-            condition=_most(condition[places]), phrases={"kind": kind},
-        )  # fmt: skip
+        yield Finding.error(
+            "position.singular",
+            f"links {', '.join(module.links)}",
+            f"{kind} {cycle.at.dial.intervals(places)}: condition number {_most(condition[places]):.3g}",
+            "speeds have no finite value there, nor have forces without friction; limit the range of the driver",
+            at=cycle.at.dial.intervals(places),
+            condition=_most(condition[places]),
+        )
 
 
 def _undefined(cycle: Cycle) -> Iterator[Finding]:
     """Loads and springs that have no value."""
     for path, (places, _) in cycle.at.causes.of("undefined").items():
-        code = "load.undefined" if path.startswith("loads.") else "spring.undefined"
-        yield finding_for(code, path, at=cycle.at.dial.intervals(places))
+        what = f"has no value {cycle.at.dial.intervals(places)}"
+        if path.startswith("loads."):
+            remedy = "extend its tables over the whole cycle, or make them periodic; check divisions and roots"
+            yield Finding.error("load.undefined", path, what, remedy)
+        else:
+            remedy = "its line has no direction where its ends coincide: move one end"
+            yield Finding.error("spring.undefined", path, what, remedy)
 
 
 def _locked(cycle: Cycle) -> Iterator[Finding]:
     """Modules that lock: how far they are from running, the joint that decides, and whether they lock backward too."""
     rubs = felt(cycle.run.system, cycle.run.values)
-    for number, (places, share) in cycle.at.causes.of("locked").items():
+    for number, (places, shares) in cycle.at.causes.of("locked").items():
         module = cycle.run.system.plan.modules[number]
-        reverse, decides, multiple = "", "", None
+        joints, share = [name for name in module.joints if name in rubs], float(np.min(shares))
+        what = f"locked by friction {cycle.at.dial.intervals(places)}: there is a solution only up to "
+        what += f"{share:.4g} times the friction of {', '.join(joints)}"
+        remedy = (
+            f"lower these coefficients below {share:.3g} times their values, shorten the arms or lengthen the guides"
+        )
+        figures: dict[str, Any] = {"share": share, "joints": joints}
         if cycle.locking is not None:
             states, responsible = cycle.locking.all_states(), cycle.locking.responsible
             if LockingState.JAMMED in states:
-                reverse = "some" if LockingState.LOCKED in states else "all"
+                there = "locks at some of these positions too" if LockingState.LOCKED in states else "locks there too"
+                what += f"; driven backward it {there} (jammed)"
             if responsible and responsible[0] in module.joints:
-                decides, multiple = responsible
-        yield finding_for(
-            "friction.locked", f"links {', '.join(module.links)}", at=cycle.at.dial.intervals(places),
-            share=np.min(share), joints=[name for name in module.joints if name in rubs], reverse=reverse,
-            decides=decides, multiple=multiple,
-            whole=float(np.nanmin(cycle.at.arrays["locking_margin"][places], initial=np.inf)),
-        )  # fmt: skip
+                figures |= {"decides": responsible[0], "multiple": responsible[1]}
+                alone = f"lower the coefficient of {responsible[0]} alone below {responsible[1]:.3g} times its value"
+                remedy = f"{alone}; or {remedy}"
+        margin = float(np.nanmin(cycle.at.arrays["locking_margin"][places], initial=np.inf))
+        if margin < (1 - NEXT) * share:
+            remedy = f"lower the coefficients of all joints below {margin:.3g} times their values (where "
+            remedy += f"{', '.join(joints)} no longer lock, other joints do), shorten the arms or lengthen the guides"
+        yield Finding.error("friction.locked", f"links {', '.join(module.links)}", what, remedy, **figures)
 
 
 def _badly_solved(cycle: Cycle) -> Iterator[Finding]:
     """Positions whose friction does not converge, and such as are close to singular."""
     status, condition, dial = cycle.at.arrays["status"], cycle.at.arrays["condition"], cycle.at.dial
     if len(late := np.flatnonzero(status == Status.NOT_CONVERGED)):
-        yield finding_for("friction.not_converged", "joints", at=dial.intervals(late))
+        yield Finding.error(
+            "friction.not_converged",
+            "joints",
+            f"the friction iteration did not converge {dial.intervals(late)}",
+            "use the Newton method, a larger criterion or more iterations",
+            at=dial.intervals(late),
+        )
     if len(close := np.flatnonzero(status == Status.NEAR_SINGULAR)):
-        yield finding_for(
-            "position.near_singular", "links", at=dial.intervals(close), condition=_most(condition[close])
+        yield Finding.warning(
+            "position.near_singular",
+            "links",
+            f"close to a dead centre {dial.intervals(close)}: condition number up to {_most(condition[close]):.3g}",
+            "forces there depend strongly on small changes of the dimensions",
+            at=dial.intervals(close),
+            condition=_most(condition[close]),
         )
 
 
@@ -293,7 +393,7 @@ def _resting(cycle: Cycle) -> Iterator[Finding]:
         if joint in holding:
             together.setdefault(places.tobytes(), ([], places))[0].append(joint)
     for joints, places in together.values():
-        widest: dict[str, dict[str, float | str]] = {}
+        widest: dict[str, dict[str, Any]] = {}
         matters = not cycle.mechanism.drivers
         for i, (driver, unit) in enumerate(zip(cycle.mechanism.drivers, effort_units(system), strict=True)):
             lower, upper = (scales.zeroed(at.arrays[f"drive_effort_{end}"][i], unit) for end in ("lower", "upper"))
@@ -304,10 +404,25 @@ def _resting(cycle: Cycle) -> Iterator[Finding]:
                 k = places[int(np.nanargmax(widths))]
                 widest[driver] = {"from": lower[k], "to": upper[k], "unit": unit, "at": f"at {at.dial.at(k)}"}
         if matters:
-            yield finding_for(
-                "friction.interval", f"joints.{', '.join(joints)}", joints=joints, at=at.dial.intervals(places),
-                efforts=widest, locks=bool(cycle.mechanism.drivers),
-            )  # fmt: skip
+            bounds = ", ".join(
+                f"{'torque' if row['unit'] == 'N m' else 'force'} of {driver} "
+                f"{between(row['from'], row['to'], row['unit'])} {row['at']}"
+                for driver, row in widest.items()
+            )
+            if not bounds and cycle.mechanism.drivers:
+                bounds = "with one sign it locks, so the drive effort has no bounds"
+            where = at.dial.intervals(places)
+            resting = f"{', '.join(joints)} {agreeing(len(joints), 'is', 'are')} "
+            resting += f"{'' if 'between' in where else 'momentarily '}at rest {where}"
+            yield Finding.note(
+                "friction.interval",
+                f"joints.{', '.join(joints)}",
+                f"{resting}; friction may act either way there{': ' * bool(bounds)}{bounds}",
+                "the bounds are in drive_effort_lower and drive_effort_upper",
+                joints=joints,
+                at=where,
+                efforts=widest,
+            )
 
 
 def _ranges(cycle: Cycle) -> Iterator[Finding]:
@@ -316,7 +431,14 @@ def _ranges(cycle: Cycle) -> Iterator[Finding]:
     if len(ranges) > 1:
         starts = [cycle.between(*ends) for *ends, start in ranges if start]
         places = [cycle.between(*ends) for *ends, _ in ranges]
-        yield finding_for("assembly.ranges", "links", ranges=places, starts=starts)
+        of = f"extremes are of the one that holds the start, {starts[0]}" if starts else "none of them holds the start"
+        remedy = (
+            "start the driver in another range to have the extremes of that" if starts else "start the driver in one"
+        )
+        what = (
+            f"it can be assembled in {len(places)} ranges that are not reached from each other: {', '.join(places)}; "
+        )
+        yield Finding.note("assembly.ranges", "links", what + of, remedy, ranges=places, starts=starts)
 
 
 def _no_common_period(cycle: Cycle) -> Iterator[Finding]:
@@ -326,7 +448,13 @@ def _no_common_period(cycle: Cycle) -> Iterator[Finding]:
     several = len(spans) > 1 or cycle.mechanism.gears or run.cycle.advances
     if several and not run.cycle.periodic and spans and all(span.periodic for span in spans):
         whom = "drivers" if len(spans) > 1 else f"driver and the {'gears' if cycle.mechanism.gears else 'threads'}"
-        yield finding_for("cycle.not_common", "drivers", duration=run.cycle.duration, phrases={"whom": whom})
+        yield Finding.warning(
+            "cycle.not_common",
+            "drivers",
+            f"the {whom} have no common period; the cycle is the longest period, {run.cycle.duration:g} s",
+            "means and efficiency are over that time; choose speeds with a common period, or ranges",
+            duration=run.cycle.duration,
+        )
 
 
 # ---- loads and springs ----------------------------------------------------------------------------------------
@@ -348,7 +476,13 @@ def _driving_resistances(cycle: Cycle) -> Iterator[Finding]:
         floor = max(RESOLVED * courses.sizes[row], scales_of(run).floor("N m" if path.endswith("torque") else "N"))
         places = [cycle.between(*ends) for ends in courses.below([row], floor)]
         if places:
-            yield finding_for("load.drives", path, at=listed(places))
+            yield Finding.warning(
+                "load.drives",
+                path,
+                f"this resistance is negative {listed(places)}: it drives the joint",
+                "use max(0 N, …), or a load with a sign",
+                at=listed(places),
+            )
 
 
 def _springs(cycle: Cycle) -> Iterator[Finding]:
@@ -364,16 +498,39 @@ def _springs(cycle: Cycle) -> Iterator[Finding]:
             before, after = elongation.sides(0)
             jumps = np.flatnonzero(np.abs(after - before) > np.pi)
             if len(jumps):
-                yield finding_for("spring.jump", where, at=cycle.place(float(courses.edges[1 + jumps[0]])))
+                yield Finding.warning(
+                    "spring.jump",
+                    where,
+                    f"its torque jumps at {cycle.place(float(courses.edges[1 + jumps[0]]))}, where its "
+                    "angle passes half a turn from the free angle",
+                    "whole turns are not counted in this joint",
+                    at=cycle.place(float(courses.edges[1 + jumps[0]])),
+                )
         if spring.only is not None:
             sign = 1.0 if spring.only == "pull" else -1.0
             most = elongation.extreme(lambda rows: rows[0], sign)
             if most is not None and sign * most.value < 0:
-                yield finding_for("spring.never_acts", where, only=spring.only, free=free, nearest=free + most.value)
+                end, nearest = "longest" if spring.only == "pull" else "shortest", free + most.value
+                yield Finding.warning(
+                    "spring.never_acts",
+                    where,
+                    f"never acts: its {end} length is {readable(nearest, 'm')}, its free length {readable(free, 'm')}, "
+                    f"and it can only {spring.only}",
+                    "move its ends, or change its free length or the motion, if it is to act",
+                    free=free,
+                    nearest=nearest,
+                )
         if spring.between is not None and spring.only != "pull" and (free or preload):
             least, most = (elongation.extreme(lambda rows: rows[0], sign) for sign in (-1.0, 1.0))
             if least is not None and most is not None and least.value + free <= MEETS * (most.value + free):
-                yield finding_for("spring.turned_round", where, at=cycle.place(least.time))
+                yield Finding.warning(
+                    "spring.turned_round",
+                    where,
+                    f"its ends pass each other at {cycle.place(least.time)}: its length falls to about 0, "
+                    "and its force reverses",
+                    "move one end along its line, with the free length, so that they stay apart",
+                    at=cycle.place(least.time),
+                )
 
 
 def _idle_loads(cycle: Cycle) -> Iterator[Finding]:
@@ -382,7 +539,15 @@ def _idle_loads(cycle: Cycle) -> Iterator[Finding]:
     course = cycle.course
     useful = cycle.at.arrays["useful_power"] if course is None else course.picked("useful_power").coefficients
     if marked and np.all(np.isfinite(useful)) and not np.any(useful):
-        yield finding_for("load.no_power", "loads", loads=marked, count=len(marked))
+        yield Finding.warning(
+            "load.no_power",
+            "loads",
+            f"{', '.join(marked)} {agreeing(len(marked), 'is', 'are')} useful, but "
+            f"{agreeing(len(marked), 'takes', 'take')} no power at any position",
+            "check its size and where it acts, or that its joint moves in the sense of only: …",
+            loads=marked,
+            count=len(marked),
+        )
 
 
 def beside_the_drive(mechanism: Mechanism) -> list[str]:
@@ -408,16 +573,39 @@ def _uncounted_work(cycle: Cycle) -> Iterator[Finding]:
     if above:
         work = work or dict([max(every.items(), key=lambda item: item[1])])
         supplies = ", ".join(f"{name} {readable(value, 'J')}" for name, value in work.items())
-        yield finding_for(
-            "efficiency.above_one", efficiency=means.efficiency, drive=drive, work=work, phrases={"supplies": supplies}
+        yield Finding.warning(
+            "efficiency.above_one",
+            "",
+            f"the efficiency of the cycle is {means.efficiency:.4g}, above 1: the drive supplies "
+            f"{readable(drive, 'J')}, beside it {supplies}",
+            "work beside the drive is not counted as input; leave out a load that stands for the drive itself",
+            efficiency=means.efficiency,
+            drive=drive,
+            work=work,
         )
         return
     for name in storing:
         if (stored := -every[f"spring {name}"]) > MUCH * drive > 0:
-            yield finding_for("spring.stores", f"springs.{name}", stored=stored, drive=drive)
+            yield Finding.note(
+                "spring.stores",
+                f"springs.{name}",
+                f"at the end of the range it has stored {readable(stored, 'J')} of the "
+                f"{readable(drive, 'J')} that the drive supplies; the efficiency counts them as lost",
+                "mark it useful: true if it stands for the work",
+                stored=stored,
+                drive=drive,
+            )
     for name in beside:
         if (supplied := work.get(f"load {name}")) is not None:
-            yield finding_for("load.not_counted", f"loads.{name}", work=supplied, drive=drive)
+            yield Finding.note(
+                "load.not_counted",
+                f"loads.{name}",
+                f"beside the drive, which supplies {readable(drive, 'J')}, this load supplies "
+                f"{readable(supplied, 'J')} over the cycle; the efficiency does not count it as input",
+                "leave out a load that stands for the drive itself, such as the force of a hand",
+                work=supplied,
+                drive=drive,
+            )
 
 
 def _work(cycle: Cycle, means: Means) -> dict[str, float]:
@@ -447,7 +635,14 @@ def _beside_gaps(cycle: Cycle) -> Iterator[Finding]:
     for i, name in enumerate(cycle.mechanism.drivers):
         largest = course.extreme("drive_effort", i, of=magnitude)
         if largest is not None and course.beside(largest, Status.CONTACT_LOST):
-            yield finding_for("effort.beside_gap", f"drivers.{name}", at=course.told(largest).removeprefix("at "))
+            yield Finding.note(
+                "effort.beside_gap",
+                f"drivers.{name}",
+                f"the largest effort, at {course.told(largest).removeprefix('at ')}, is where pins "
+                "begin or end to cross their play; while they cross it is not known",
+                "see `trunnion simulate` for the forces of pins that cross their play",
+                at=course.told(largest).removeprefix("at "),
+            )
 
 
 def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
@@ -471,7 +666,13 @@ def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
             places = [f"at {cycle.place(cross.time)}{ENDS[cross.end.place]}" for cross in crossings]
             lost.setdefault((part, listed(places)), []).append(joint)
         elif seat.given is None and loads.largest > 0 and all(end.seat.joint != joint for end, _ in loads.pressed):
-            yield finding_for("seat.unloaded", f"joints.{joint}", part=part)
+            yield Finding.note(
+                "seat.unloaded",
+                f"joints.{joint}",
+                f"the {part} carries no load: it is at the middle of its play",
+                "state the seat, or seat: free",
+                part=part,
+            )
         if halts:
             spans = _joined(halts, APART * run.cycle.duration)
             lifted.setdefault((part, listed([cycle.between(*span) for span in spans])), []).append(joint)
@@ -485,17 +686,55 @@ def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
         if part == "pin" and np.any(np.isfinite(numbers)):  # the load of a slider has no direction that can turn
             number = np.nanmax(numbers)
             turning = f"at {at.dial.at(int(np.nanargmax(numbers)) % numbers.shape[1])}"
-        yield finding_for(
-            "contact.lost", f"joints.{', '.join(names)}", part=part, least=least, peak=nearest.peak, at=text,
-            likely=contact_loss.EARLES_WU, number=number, turning=turning, count=len(names),
-        )  # fmt: skip
+        several, remedy = len(names) > 1, "expect impact there"
+        what = f"the {part} loses contact {text}: its load falls to {readable(least, 'N')} (peak "
+        what += f"{readable(nearest.peak, 'N')}) and reverses, and the pin would cross its play"
+        if several:
+            what = f"the {part}s lose contact {text}: the loads fall to {readable(least, 'N')} (peak "
+            what += f"{readable(nearest.peak, 'N')}) and reverse, and the pins would cross their play"
+        if number is not None:
+            remedy += (
+                f"; elsewhere {'their largest' if several else 'its'} contact-loss number is at most {number:.3g} "
+            )
+            remedy += f"rad/(N s), {turning} (impact is likely from {contact_loss.EARLES_WU:g}: Earles and Wu)"
+        yield Finding.warning(
+            "contact.lost",
+            f"joints.{', '.join(names)}",
+            what,
+            remedy,
+            part=part,
+            at=text,
+            least=least,
+            peak=nearest.peak,
+            number=number,
+        )
     for (part, text), names in lifted.items():
-        yield finding_for("contact.lifted", f"joints.{', '.join(names)}", part=part, at=text, count=len(names))
+        yield Finding.warning(
+            "contact.lifted",
+            f"joints.{', '.join(names)}",
+            f"the {part}{agreeing(len(names), '', 's')} {agreeing(len(names), 'lifts', 'lift')} "
+            f"off the wall {text}: the inertia force of {agreeing(len(names), 'its', 'their')} "
+            "motion within the play exceeds the load",
+            "forces there are those of a pin that stays in contact",
+            part=part,
+            at=text,
+            count=len(names),
+        )
     unsettled = (at.arrays["contact_lost"] > 0) & (seating.states(at.time) == UNSETTLED)
     for i in np.flatnonzero(np.any(unsettled, axis=1)):
         intervals = at.dial.intervals(np.flatnonzero(unsettled[i]))
         change = np.max(at.arrays["seat_change"][unsettled[i]])
-        yield finding_for("seat.unsettled", f"joints.{joints[i]}", rounds=SEAT_ROUNDS, at=intervals, change=change)
+        yield Finding.warning(
+            "seat.unsettled",
+            f"joints.{joints[i]}",
+            f"the seat did not converge in {SEAT_ROUNDS} iterations {intervals}: it still changes "
+            f"by {change:.2g} times the clearance, for the load turns as the pin moves, as where "
+            "a tool touches the work for only one of two positions of a pin",
+            "the pin floats there: treat it as loss of contact",
+            rounds=SEAT_ROUNDS,
+            at=intervals,
+            change=change,
+        )
 
 
 def _unloaded(cycle: Cycle, loads: EndLoads) -> Iterator[Finding]:
@@ -505,7 +744,15 @@ def _unloaded(cycle: Cycle, loads: EndLoads) -> Iterator[Finding]:
         ends = ranges.setdefault(cycle.between(low, high), {})
         ends[end.seat.joint] = "" if end.seat.joint in ends else ENDS[end.place]
     for text, ends in ranges.items():
-        yield finding_for("contact.unloaded", "joints", joints=[name + end for name, end in ends.items()], at=text)
+        yield Finding.note(
+            "contact.unloaded",
+            "joints",
+            f"no load presses the pins of {', '.join([name + end for name, end in ends.items()])} "
+            f"{text}: they float in their play, and positions there are not valid",
+            "expect impact where the load sets in",
+            joints=[name + end for name, end in ends.items()],
+            at=text,
+        )
 
 
 def _joined(spans: Sequence[tuple[float, float]], apart: float) -> list[tuple[float, float]]:
@@ -540,10 +787,20 @@ def _moved_jumps(cycle: Cycle) -> Iterator[Finding]:
             top, built, meant = max(tops, key=lambda top: top[0].value)
             rest = course.extreme("drive_effort_change", i, of=magnitude, panels=left)
             places = [course.told(Place(0.0, float(edges[k + 1]))) for k in (built, meant)]
-            yield finding_for(
-                "errors.jump_moved", f"drivers.{name}", at=course.told(top).removeprefix("at "), built=places[0],
-                meant=places[1], rest=rest.value if rest else 0.0, unit=unit,
-            )  # fmt: skip
+            yield Finding.note(
+                "errors.jump_moved",
+                f"drivers.{name}",
+                f"the change by the errors at {course.told(top).removeprefix('at ')} is that of a "
+                f"jump whose place they move: with them it is {places[0]}, without them {places[1]}; "
+                "elsewhere the effort changes by at most "
+                f"{readable(rest.value if rest else 0.0, unit)}",
+                "compare the extremes with and without errors, not single positions beside the jump",
+                at=course.told(top).removeprefix("at "),
+                built=places[0],
+                meant=places[1],
+                rest=rest.value if rest else 0.0,
+                unit=unit,
+            )
 
 
 def _moved(jumps: Array, without: Array, least: float, edges: Array) -> Iterator[tuple[int, int]]:

@@ -17,7 +17,6 @@ from trunnion.measures.measures import named
 from trunnion.measures.positions import ends_by_name
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.sentences import finding_for
 from trunnion.solve.assembly_modes import GroupModes, choices
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.run import Run, prepare
@@ -74,7 +73,17 @@ def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
     rank = run.determinacy.mobility if run.determinacy else _rank(walk)
     if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:
-        found.append(finding_for("mobility.special", "joints", formula=run.system.plan.mobility, rank=rank))
+        found.append(
+            Finding.warning(
+                "mobility.special",
+                "joints",
+                f"the mobility is {run.system.plan.mobility} by Grübler's formula and {rank} by the "
+                "rank of the constraints",
+                "the geometry is special: reactions or motion are not determined",
+                formula=run.system.plan.mobility,
+                rank=rank,
+            )
+        )
     found += [*shared_dimensions(mechanism), *_unplaced(run)]
     order = list(Severity)
     found.sort(key=lambda finding: order.index(finding.severity))

@@ -21,13 +21,12 @@ from trunnion.cycle.locking_course import (
 )  # fmt: skip
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import member_units
-from trunnion.errors import Finding, MechanismError, Status
+from trunnion.errors import Finding, MechanismError, Status, agreeing
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, codes, encoded, finding_rows
 from trunnion.results.dataset import Variable, described, with_variables
 from trunnion.results.figure import Figure
-from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work
 from trunnion.solve.run import Run, prepare
@@ -121,11 +120,32 @@ def _notes(run: Run) -> list[Finding]:
     """What the states leave out: seats of pins; loads that move them."""
     notes = []
     if run.seats:
-        notes.append(finding_for("locking.pins_centred", "joints", joints=[seat.joint for seat in run.seats]))
+        notes.append(
+            Finding.note(
+                "locking.pins_centred",
+                "joints",
+                f"locking takes the seats of {', '.join([seat.joint for seat in run.seats])} for the "
+                "margin and for where it locks forward; all else is of pins in the middle of their "
+                "play: the other states and their ranges, the motion backward, critical multiples of "
+                "single joints",
+                joints=[seat.joint for seat in run.seats],
+            )
+        )
     mechanism = run.system.mechanism
     beside = beside_the_drive(mechanism) if rubbing(run.system) else []
     if beside:
-        notes.append(finding_for("locking.load_beside_drive", "loads", loads=beside, count=len(beside)))
+        notes.append(
+            Finding.note(
+                "locking.load_beside_drive",
+                "loads",
+                f"{', '.join(beside)} {agreeing(len(beside), 'acts', 'act')} on a driven link beside "
+                f"the drive and {agreeing(len(beside), 'is', 'are')} not useful: backward "
+                f"{agreeing(len(beside), 'it acts', 'they act')} too, which moves the ranges",
+                "leave out a load that stands for the drive itself, such as the force of a hand",
+                loads=beside,
+                count=len(beside),
+            )
+        )
     return notes
 
 

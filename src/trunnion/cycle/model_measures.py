@@ -18,7 +18,6 @@ from trunnion.measures.measures import Measure, named
 from trunnion.measures.positions import ends_by_name, plan, within
 from trunnion.results.dataset import MemberUnits, Variable, described
 from trunnion.results.figure import MORE_THAN, Figure
-from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of
@@ -112,8 +111,10 @@ def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] 
             dial = run.system.dial(run.values, time)
             at = " and ".join(dial.at(int(k)) for k in gone)
             figures[i], notes[measure.name] = np.nan, f"not valid: a pin loses contact at its place, {at}"
-            phrases = {"why": SWITCHES if _beside_switch(run, time, gone) else ""}
-            findings.append(finding_for("measure.contact_lost", f"measures.{measure.name}", at=at, phrases=phrases))
+            switches = SWITCHES if _beside_switch(run, time, gone) else ""
+            what = f"the measure has no figure: a pin loses contact at its place, {at}{switches}"
+            remedy = "state another place or window of the measure, by at: or over:, or analyse with --seat free"
+            findings.append(Finding.note("measure.contact_lost", f"measures.{measure.name}", what, remedy, at=at))
         elif len(gone):
             notes[measure.name] = f"a pin loses contact at {len(gone)} of its {len(places)} positions"
     values[[one.of.reduced for one in measures]] = np.nan  # a number of the whole cycle

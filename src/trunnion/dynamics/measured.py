@@ -21,13 +21,15 @@ from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import MechanismError
 from trunnion.measures.evaluation import Curves, NumpyKernel, shape_of, step_of
 from trunnion.measures.measures import Measure
+from trunnion.results.quantities import readable
 from trunnion.solve.run import Run
 from trunnion.solve.system import Values
 
-__all__ = ["MotionKernel", "courses_in_time", "figures_in_time", "numbers_in_time", "unfound"]
+__all__ = ["LONGER", "MotionKernel", "courses_in_time", "figures_in_time", "not_steady", "numbers_in_time"]
 
 Array = NDArray[np.float64]
 
+LONGER = "state a longer duration of the measure in the model; `trunnion simulate` with these values shows the motion"
 TOLERANCE = 1e-10  # of the steps, relative: figures to 1e-7 and better, a coordinate being many turns
 FEW, KEPT = 256, 64  # samples of which figures are kept, and how many of them
 
@@ -41,10 +43,11 @@ class MotionKernel(NumpyKernel):
         return found | courses_in_time(self.run, self.measures, values, shape_of(values, time)), status
 
 
-def unfound(run: Run, measure: Measure) -> dict[str, Any]:
-    """What is to be said of a measure of a motion in time that has no value."""
+def not_steady(run: Run, measure: Measure) -> str:
+    """Why a measure of a motion in time has no value."""
     duration = CYCLES * run.cycle.duration if measure.duration is None else measure.duration
-    return {"measure": measure.name, "driver": measure.subject, "duration": duration}
+    lasting = readable(duration, "s")
+    return f"within {lasting} {measure.subject} does not come to run steadily, or its motion ends before"
 
 
 def courses_in_time(

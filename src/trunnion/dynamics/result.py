@@ -20,20 +20,20 @@ from trunnion.dynamics.rates import CLUTCH, WORKS
 from trunnion.dynamics.rates import CONTACT as IN_CONTACTS
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.shown import CONTACT, IMPACT, Touches, impact_arrays, impact_figures
-from trunnion.dynamics.solution import Event, Solution, Stretch
+from trunnion.dynamics.solution import Ended, Event, Solution, Stretch
 from trunnion.dynamics.spectrum import FEWEST, FREQUENCY, SPECTRUM, spectrum
 from trunnion.dynamics.started import steady_figures
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import SLOWEST
-from trunnion.errors import Finding, Status
+from trunnion.errors import Finding, Status, agreeing, counted
 from trunnion.joints.contact import restitution_of
 from trunnion.results import variables as results
 from trunnion.results.attributes import cited, encoded, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.figure import Figure
+from trunnion.results.quantities import readable
 from trunnion.results.result import Result
 from trunnion.results.scales import Scales
-from trunnion.results.sentences import finding_for
 from trunnion.solve.run import Run
 
 if TYPE_CHECKING:
@@ -314,17 +314,30 @@ WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
 def _unbalanced(found: Found) -> Iterator[Finding]:
     if found.share > WORST:
-        yield finding_for("simulate.energy", share=found.share)
+        yield Finding.warning(
+            "simulate.energy",
+            "",
+            f"works and energies differ by {found.share:.2g} of the energy turned over",
+            "ask for a smaller --tolerance",
+            share=found.share,
+        )
 
 
 def _undefined(books: Books) -> Iterator[Finding]:
     """Rows of a motion that goes on, without forces."""
     rows = np.flatnonzero(books.arrays["status"] == Status.LOAD_UNDEFINED)
     if len(rows):
-        yield finding_for("simulate.undefined", "loads", count=len(rows), time=float(books.time[rows[0]]))
+        yield Finding.error(
+            "simulate.undefined",
+            "loads",
+            f"a load or spring has no value in {counted(len(rows), 'row')} of the result, first "
+            f"at {readable(float(books.time[rows[0]]), 's')}: there are no forces there",
+            "extend its tables, check divisions and roots; the line of a spring has no direction "
+            "where its ends coincide",
+            count=len(rows),
+            time=float(books.time[rows[0]]),
+        )
 
-
-OF_DRIVER = ("simulate.range", "simulate.dead_centre", "simulate.change_point")  # ends that tell a place of a driver
 
 # ---- findings -------------------------------------------------------------------------------------------------
 
@@ -337,19 +350,103 @@ def motion_findings(
     yield from (one for one in motion.run.chosen.findings if one.code != "assembly.change_point")
     centred = [one.joint for one in motion.run.seats]
     if centred:
-        yield finding_for("simulate.centred", joints=centred)
+        yield Finding.note(
+            "simulate.centred",
+            "",
+            f"pins of {', '.join(centred)} are taken in the middle of their holes: a seat that "
+            "follows the load is left out",
+            joints=centred,
+        )
     yield from _of_contacts(motion, run, impacts)
-    yield from (finding_for(code, "joints", **figures) for code, figures in solution.notes.items())
+    for code, figures in solution.notes.items():
+        if code == "simulate.several_accelerations":
+            what = f"from {readable(figures['time'], 's')} on there are several accelerations: friction that grows "
+            what += "with the acceleration allows others than that which is followed (Painlevé's paradox)"
+            remedy = "lower the friction or the inertia behind the joints that could lock"
+            yield Finding.warning("simulate.several_accelerations", "joints", what, remedy, **figures)
+        else:
+            what = f"in {counted(figures['times'], 'impact')}, the first at {readable(figures['time'], 's')}, the "
+            what += "stated restitution would gain energy by friction, or the impacts have no end: the restitution is "
+            what += f"lowered there, to {figures['share']:.3g} of itself at the most"
+            yield Finding.note("simulate.restitution_lowered", "joints", what, **figures)
     if passed := [event.time for event in solution.events if event.kind == "change-point"]:
-        yield finding_for("simulate.passed", "assembly", times=len(passed), time=passed[0])
+        yield Finding.warning(
+            "simulate.passed",
+            "assembly",
+            f"change points are passed {counted(len(passed), 'time')}, first at "
+            f"{readable(passed[0], 's')}, with the velocities that the links have: reactions have "
+            "no bound there, so that no largest ones are told",
+            times=len(passed),
+            time=passed[0],
+        )
     name = next(iter(_shown(motion, run)), next(iter(system.mechanism.drivers)))
     effort = effort_units(system)[list(system.mechanism.drivers).index(name)]
     yield from _locks(motion, solution)
     yield from _rests(motion, solution, name, effort)
     if (ended := solution.ended) is not None:
         driver = ended.figures.get("driver", name)
-        of = {"driver": driver, "unit": "rad" if system.turns(driver) else "m"} if ended.code in OF_DRIVER else {}
-        yield finding_for(ended.code, f"drivers.{driver}", time=ended.time, **{**ended.figures, **of})
+        yield _end(ended, driver, "rad" if system.turns(driver) else "m")
+
+
+def _end(ended: Ended, driver: str, unit: str) -> Finding:
+    """Why a motion ended before its time. driver: the one concerned; unit: of its coordinate."""
+    where, at, figures = f"drivers.{driver}", readable(ended.time, "s"), {**ended.figures, "time": ended.time}
+    place = f"coordinate {figures['coordinate']:.6g}" if "coordinate" in figures else ""
+    state = f"{place}, rate {figures['rate']:.6g}" if "rate" in figures else place
+    match ended.code:
+        case "simulate.range":
+            what = f"{driver} reaches {readable(figures['coordinate'], unit)}, the end of its stated range, at {at}: "
+            what += "the motion ends there"
+            remedy = f"widen drivers.{driver}.range, or stop the motion before by a load or a brake"
+            return Finding.warning("simulate.range", where, what, remedy, **figures)
+        case "simulate.no_acceleration":
+            what = f"there is no acceleration at {at} ({state}), as the mechanism locks itself under its inertia: the "
+            what += f"effort that an acceleration takes (det ∂E/∂q̈) is {figures['growth']:.4g} of that without "
+            what += "friction, and must be above 0"
+            remedy = "lower the friction or the inertia behind the joints that lock; see `trunnion locking`"
+            return Finding.error("simulate.no_acceleration", where, what, remedy, **figures)
+        case "simulate.unsolved":
+            what = f"the accelerations are not found at {at} ({state})"
+            remedy = "check the forces there: one of them has no value, jumps, or grows without bound"
+            return Finding.error("simulate.unsolved", where, what, remedy, **figures)
+        case "simulate.dead_centre":
+            what = f"{driver} reaches its dead centre, {figures['coordinate']:.6g} {unit}, at {at}: the links cannot "
+            what += f"be assembled beyond it, and go on as {driver} reverses; the motion ends there"
+            remedy = "drive a joint that has no dead centre there, or limit the motion by a stop or a load"
+            return Finding.error("simulate.dead_centre", where, what, remedy, **figures)
+        case "simulate.not_assembled":
+            what = f"the links cannot be assembled beyond {at} ({place}): the motion ends there"
+            remedy = "limit the motion by a stop or a load, or drive a joint that has no dead centre there"
+            return Finding.error("simulate.not_assembled", where, what, remedy, **figures)
+        case "simulate.step":
+            what = f"the integration needs steps below rounding at {at} ({state})"
+            remedy = "check the forces there: one of them jumps or grows without bound"
+            return Finding.error("simulate.step", where, what, remedy, **figures)
+        case "simulate.events":
+            what = f"there are {figures['count']:.0f} events up to {at}: the motion is not followed farther"
+            remedy = "ask for a shorter time"
+            return Finding.error("simulate.events", where, what, remedy, **figures)
+        case "simulate.change_point":
+            what = f"at {at}, at {readable(figures['coordinate'], unit)} of {driver}, the links "
+            what += f"{', '.join(figures['links'])} come to a change point, where two of their assembly modes "
+            what += "coincide: neither reactions nor what follows are determined, and the motion ends there"
+            remedy = f"change a length, or stop the motion before it by drivers.{driver}.range, a load or a brake; or "
+            remedy += "pass it with the velocities that the links have: --pass-change-points"
+            return Finding.error("simulate.change_point", where, what, remedy, **figures)
+        case "simulate.evaluations":
+            what = f"{figures['count']:,} evaluations of the forces are used up at {at} of "
+            what += f"{readable(figures['of'], 's')}: the motion ends there"
+            if np.isfinite(constant := figures["constant"]):
+                why = f", by {' and '.join(figures['causes'])}" if figures["causes"] else ""
+                what += f". Its shortest time constant is {readable(constant, 's')}{why}, "
+                what += f"{figures['of'] / constant:.3g} of which fit into the stated time"
+            remedy = "check what makes it so fast, ask for a shorter --time or more --evaluations"
+            return Finding.error("simulate.evaluations", where, what, remedy, **figures)
+        case _:
+            what = f"there are no forces or impulses of the contacts that touch at {at} ({state}) under which nothing "
+            what += "sinks in (Painlevé's paradox): the motion is kept until then"
+            remedy = "lower the friction of the joints in play, or state a stiffness instead of law: rigid"
+            return Finding.error("simulate.no_contact_force", where, what, remedy, **figures)
 
 
 def _locks(motion: FreeMotion, solution: Solution) -> Iterator[Finding]:
@@ -357,12 +454,32 @@ def _locks(motion: FreeMotion, solution: Solution) -> Iterator[Finding]:
     locks = [one for one in solution.events if one.kind == "lock"]
     if not motion.resisted:
         for event in locks:
-            yield finding_for("simulate.locks", f"drivers.{event.of}", time=event.time, energy=event.figure)
+            yield Finding.warning(
+                "simulate.locks",
+                f"drivers.{event.of}",
+                f"the mechanism locks as it runs, at {readable(event.time, 's')}: it stops at once, "
+                f"and loses {readable(event.figure, 'J')}",
+                "see `trunnion locking` for where and by how much",
+                time=event.time,
+                energy=event.figure,
+            )
     elif locks:
         joints, energy = list(dict.fromkeys(one.of for one in locks)), float(np.nansum([one.figure for one in locks]))
         times = len({one.time for one in locks})
-        yield finding_for("simulate.joints_lock", f"joints.{joints[0]}", joints=joints, count=len(joints), times=times,
-                          time=locks[0].time, energy=energy)  # fmt: skip
+        yield Finding.warning(
+            "simulate.joints_lock",
+            f"joints.{joints[0]}",
+            f"{', '.join(joints)} {agreeing(len(joints), 'locks', 'lock')} as the mechanism runs, "
+            f"{counted(times, 'time')}, first at {readable(locks[0].time, 's')}: "
+            f"{agreeing(len(joints), 'it stops', 'they stop')} at once, {readable(energy, 'J')} "
+            "is lost, and what is still free moves on",
+            "see `trunnion locking` for where and by how much",
+            joints=joints,
+            count=len(joints),
+            times=times,
+            time=locks[0].time,
+            energy=energy,
+        )
 
 
 def _rests(motion: FreeMotion, solution: Solution, name: str, effort: str) -> Iterator[Finding]:
@@ -372,24 +489,43 @@ def _rests(motion: FreeMotion, solution: Solution, name: str, effort: str) -> It
         return
     last, stays = solution.stretches[-1], all(one.resting for one in solution.stretches)
     on = _on(motion, solution)
-    more: dict[str, Any] = {} if stays else {"time": rests[-1].time, **({} if on else {"times": len(rests)})}
+    figures: dict[str, Any] = {} if stays else {"time": rests[-1].time, **({} if on else {"times": len(rests)})}
+    since, times = readable(rests[-1].time, "s"), counted(len(rests), "time")
+    stronger = "use a stronger motor or a gear, lower the friction, or begin elsewhere"
+    larger = "use a larger flywheel, a stronger motor or a gear, or lower the load there"
     if motion.resisted:
         at = solution.layout.moment(np.array([last.begin]), solution.at(np.array([last.begin]))[0], now=last.now)
         shares = np.abs(np.asarray(motion.accelerate(at._replace(onsets=last.onsets, senses=last.senses)).shares)[:, 0])
         worst = int(np.argmax(shares))
-        code = "none_starts" if stays else "all_stall" if on else "all_rest"
-        joint = motion.resisted[worst]
-        more |= {"drivers": on} if code == "all_stall" else {}
-        yield finding_for(f"simulate.{code}", f"joints.{joint}", joint=joint, share=float(shares[worst]), **more)
+        joint, share = motion.resisted[worst], float(shares[worst])
+        where, figures = f"joints.{joint}", {**figures, "joint": joint, "share": share}
+        needs = f"needs {share:.2%} of what resists it at rest in {joint}, and no more in the other joints"
+        if stays:
+            what = f"nothing starts: what acts {needs}"
+            yield Finding.warning("simulate.none_starts", where, what, stronger, **figures)
+        elif on:
+            what = (
+                f"all free drivers rest from {since} on, with the motor of {', '.join(on)} on: what acts then {needs}"
+            )
+            yield Finding.error("simulate.all_stall", where, what, larger, **figures, drivers=on)
+        else:
+            what = f"all free drivers come to rest {times}, for the last time at {since}: what acts then {needs}"
+            yield Finding.note("simulate.all_rest", where, what, **figures)
         return
     given, needed = _holding(motion, solution, last)
-    figures: dict[str, Any] = {"driver": name, "given": given, "needed": needed, "unit": effort}
-    code = "stays_at_rest" if stays else "stalls" if on else "rests"
-    if code == "stalls":
-        place = float(solution.at(np.array([last.begin]))[0][0, 0])
-        turns = motion.system.turns(motion.names[0])
-        more |= {"coordinate": place % (2 * np.pi) if turns else place, "place": "rad" if turns else "m"}
-    yield finding_for(f"simulate.{code}", f"drivers.{name}", **figures, **more)
+    where, figures = f"drivers.{name}", {**figures, "driver": name, "given": given, "needed": needed, "unit": effort}
+    act, breaks = f"{readable(given, effort)} act on it", f"it breaks away from {readable(needed, effort)} on"
+    if stays:
+        what = f"{name} does not start: {act}, and {breaks}"
+        yield Finding.warning("simulate.stays_at_rest", where, what, stronger, **figures)
+    elif on:
+        place, turns = float(solution.at(np.array([last.begin]))[0][0, 0]), motion.system.turns(motion.names[0])
+        place, unit = (place % (2 * np.pi), "rad") if turns else (place, "m")
+        what = f"{name} stalls at {since}, at {readable(place, unit)}, with the motor on: {act} then, and {breaks}"
+        yield Finding.error("simulate.stalls", where, what, larger, **figures, coordinate=place, place=unit)
+    else:
+        what = f"{name} comes to rest {times}, for the last time at {since}: {act} then, and {breaks}"
+        yield Finding.note("simulate.rests", where, what, **figures)
 
 
 def _on(motion: FreeMotion, solution: Solution) -> list[str]:
@@ -412,18 +548,46 @@ def _of_contacts(motion: FreeMotion, run: Run, impacts: Sequence[Impact]) -> Ite
         slow = [impact for impact in own if impact.approach < SLOWEST]
         lost, whole = (sum(impact.loss for impact in some) for some in (slow, own))
         if len(slow) > FEW and lost > DIFFERS * whole:
-            yield finding_for("simulate.slow_onsets", f"joints.{one.joint}.contact", contact=one.label, count=len(slow),
-                              of=len(own), slowest=SLOWEST, share=lost / whole)  # fmt: skip
+            yield Finding.note(
+                "simulate.slow_onsets",
+                f"joints.{one.joint}.contact",
+                f"{one.label}: {len(slow):.0f} of {len(own):.0f} contacts begin slower than "
+                f"{readable(SLOWEST, 'm/s')} and are treated as beginning at that speed; "
+                f"{lost / whole:.2%} of what the contact law loses is lost in them",
+                "compare with another restitution: the law is one of impacts, and tells little of slow pressing",
+                contact=one.label,
+                count=len(slow),
+                of=len(own),
+                slowest=SLOWEST,
+                share=lost / whole,
+            )
         depth = max((impact.depth for impact in impacts if impact.label == one.label), default=0.0)
         if depth > one.clearance:
-            yield finding_for("simulate.soft", f"joints.{one.joint}.contact", contact=one.label, depth=depth,
-                              clearance=one.clearance)  # fmt: skip
+            yield Finding.warning(
+                "simulate.soft",
+                f"joints.{one.joint}.contact",
+                f"{one.label}: the surfaces sink {readable(depth, 'm')} into each other, more than "
+                f"the clearance of {readable(one.clearance, 'm')}",
+                "check the stiffness of the contact; a contact law holds for small penetrations",
+                contact=one.label,
+                depth=depth,
+                clearance=one.clearance,
+            )
     for one in {one.joint: one for one in motion.contacts.each}.values():
         law = run.system.mechanism.effective_joints[one.joint].contact
         returned = restitution_of(one.factor)
         if law is not None and not law.of.rigid and abs(returned - one.restitution) > DIFFERS:
-            yield finding_for("simulate.restitution", f"joints.{one.joint}.contact", joint=one.joint, law=law.law,
-                              stated=one.restitution, returned=returned)  # fmt: skip
+            yield Finding.note(
+                "simulate.restitution",
+                f"joints.{one.joint}.contact",
+                f"{one.joint}: with a stated restitution of {one.restitution:.3g} the contact law "
+                f"{law.law} returns {returned:.3g}",
+                "state law: restitution to get back what is stated",
+                joint=one.joint,
+                law=law.law,
+                stated=one.restitution,
+                returned=returned,
+            )
 
 
 def _holding(motion: FreeMotion, solution: Solution, stretch: Stretch) -> tuple[float, float]:

@@ -20,7 +20,6 @@ from trunnion.results.attributes import encoded, finding_rows, findings_of, summ
 from trunnion.results.figure import Figure
 from trunnion.results.result import Result
 from trunnion.results.scales import scales_in
-from trunnion.results.sentences import finding_for
 from trunnion.solve.run import prepare
 
 __all__ = ["steady"]
@@ -92,6 +91,20 @@ def _figures(found: SteadyCycle, each: Sequence[Repeated], missing: float) -> li
 
 def _findings(found: SteadyCycle, missing: float) -> Iterator[Finding]:
     if found.factor > 1.0 + INDIFFERENT:
-        yield finding_for("simulate.unstable", f"drivers.{found.motion.names[found.first]}", factor=found.factor)
+        yield Finding.warning(
+            "simulate.unstable",
+            f"drivers.{found.motion.names[found.first]}",
+            "the steady cycle is not stable: a difference from it grows by the factor "
+            f"{found.factor:.4g} with every cycle",
+            "run it without --steady to see how it leaves this cycle",
+            factor=found.factor,
+        )
     if not missing <= DIFFERS:
-        yield finding_for("simulate.cycle_differs", share=missing)
+        yield Finding.error(
+            "simulate.cycle_differs",
+            "",
+            f"the cycle takes efforts that differ from those of the motors by up to {missing:.2g} "
+            "of the largest: it is not the motion that was found",
+            "run it without --steady to see the motion from its start",
+            share=missing,
+        )

@@ -30,7 +30,7 @@ from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.sentences import finding_for
+from trunnion.results.quantities import readable
 
 __all__ = ["INDIFFERENT", "SteadyCycle", "UnsteadyError", "refuse_unsteady", "steady_cycle"]
 
@@ -152,12 +152,34 @@ def _why(motion: FreeMotion, solution: Solution, course: DriveCourse, first: int
     """Why there is no steady cycle, from the end of the longest run-up."""
     name, turns = motion.names[first], course.travel / TURN
     if not course.runs or solution.ended or solution.stretches[-1].resting:
-        none = finding_for("simulate.not_round", f"drivers.{name}", driver=name, turns=turns, time=solution.end)
+        none = Finding.error(
+            "simulate.not_round",
+            f"drivers.{name}",
+            f"there is no steady cycle: {name} makes {turns:.3g} turns in "
+            f"{readable(solution.end, 's')} and does not go round at the end",
+            "run it without --steady to see the start; give it more --time if it has not run up",
+            driver=name,
+            turns=turns,
+            time=solution.end,
+        )
         return [none, *motion_findings(motion, solution, motion.run)]
     takes = [course.at(course.travel - k * TURN, course.time) for k in range(3)]
     before, last = (TURN / (takes[k] - takes[k + 1]) for k in (1, 0))
     where, change = f"drivers.{name}", last - before
-    return [finding_for("simulate.not_repeating", where, driver=name, speed=last, change=change, time=solution.end)]
+    return [
+        Finding.error(
+            "simulate.not_repeating",
+            where,
+            f"there is no steady cycle: the speed of {name}, {readable(last, 'rad/s')} after "
+            f"{readable(solution.end, 's')}, changes by {readable(change, 'rad/s')} a turn, and "
+            "no speed is found that comes back",
+            "check that its losses grow with the speed or that its motor's effort falls; or give it more --time",
+            driver=name,
+            speed=last,
+            change=change,
+            time=solution.end,
+        )
+    ]
 
 
 @dataclass

@@ -27,7 +27,6 @@ from trunnion.groups.tree import OUTER
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import as_key
 from trunnion.results.quantities import quantity
-from trunnion.results.sentences import finding_for
 from trunnion.solve import change_points
 from trunnion.solve.forward import Forward, pose_of, start
 from trunnion.solve.system import Cycle, Dial, Positions, System, Values, driven_coordinates
@@ -415,9 +414,31 @@ def _told_twice(walk: Forward, module: Module, named: int, placed: int | None) -
     links, (key, name) = list(module.links), next(iter(_names(walk.system, module).items()))
     where = f"assembly.{key}"
     if placed is None or placed == named:
-        return [finding_for("assembly.told_twice", where, links=links, places=places)]
+        return [
+            Finding.note(
+                "assembly.told_twice",
+                where,
+                f"the assembly mode of the links {', '.join(links)} is stated by name and by the "
+                f"place of {', '.join(places)}",
+                "one is enough",
+                links=links,
+                places=places,
+            )
+        ]
     way = way_name(placed)
-    return [finding_for("assembly.contradiction", where, links=links, places=places, way=way, name=name)]
+    return [
+        Finding.warning(
+            "assembly.contradiction",
+            where,
+            f"the assembly mode of the links {', '.join(links)} is stated by name, {name}, and by "
+            f"the place of {', '.join(places)}, which means {way}; the name is used",
+            "remove one of the two",
+            links=links,
+            places=places,
+            way=way,
+            name=name,
+        )
+    ]
 
 
 def _undecided(walk: Forward, module: Module, count: int, tied: Sequence[int] = (), difference: str = "") -> Finding:
@@ -445,23 +466,52 @@ def _undecided(walk: Forward, module: Module, count: int, tied: Sequence[int] = 
     remedy = f"state roughly {place} at the start, e.g. assembly: {hint}, or one of the names listed by `check`"
     if given:
         remedy = "give a hint that is nearer to one of them, or one of the names listed by `check`"
-    phrases = {"why": why, "remedy": remedy, "used": way_name(tied[0]) if tied else "the first one"}
-    return finding_for("assembly.choice", "assembly", links=list(module.links), ways=count, phrases=phrases)
+    links, used = list(module.links), way_name(tied[0]) if tied else "the first one"
+    what = f"links {', '.join(links)} have {count} assembly modes and {why}; {used} is used"
+    return Finding.warning("assembly.choice", "assembly", what, remedy, links=links, ways=count)
 
 
 def _anew(module: Module, dial: Dial, positions: Positions) -> Finding:
-    return finding_for("assembly.anew", "links", links=list(module.links), at=dial.intervals(positions))
+    return Finding.warning(
+        "assembly.anew",
+        "links",
+        f"links {', '.join(module.links)} cannot stay assembled throughout the cycle "
+        f"and are assembled again {dial.intervals(positions)}",
+        "the assembly mode of the same sense nearest to the last one is used there; limit the range of the driver",
+        links=list(module.links),
+        at=dial.intervals(positions),
+    )
 
 
 def _never(system: System, module: Module) -> Finding:
     links = list(module.links)
     if not module.redundant:
-        return finding_for("assembly.never", "links", links=links)
+        return Finding.warning(
+            "assembly.never",
+            "links",
+            f"links {', '.join(links)} cannot be assembled at any position of the cycle",
+            "check the lengths, or give a better assembly hint",
+            links=links,
+        )
     if system.mechanism.has_errors:
-        return finding_for("assembly.never_rigid", "links", links=links)
+        return Finding.warning(
+            "assembly.never_rigid",
+            "links",
+            f"links {', '.join(links)} with their errors do not close as rigid parts at any position of the cycle",
+            "they need play to fit together: see `trunnion assemble FILE` for how much",
+            links=links,
+        )
     plan, drivers = system.plan, len(system.mechanism.drivers)
     spinning = f" ({len(plan.passive)} of them spins of a single link)" if plan.passive else ""
-    return finding_for(
-        "assembly.over_constrained", "links", links=links, formula=plan.mobility, drivers=drivers,
-        phrases={"spinning": spinning},
-    )  # fmt: skip
+    return Finding.warning(
+        "assembly.over_constrained",
+        "links",
+        f"links {', '.join(links)} cannot be assembled at any position of the cycle; the "
+        f"mobility is {plan.mobility} by Grübler's formula{spinning} and the number of "
+        f"drivers {drivers}",
+        "check the lengths, or give a better assembly hint; so many constraints are "
+        "consistent with special dimensions only: remove a driver or free a joint",
+        links=links,
+        formula=plan.mobility,
+        drivers=drivers,
+    )

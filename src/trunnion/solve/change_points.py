@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.errors import Finding
-from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import Forward, pose_of, posed
 from trunnion.solve.system import System, Values
 from trunnion.structure.decompose import Module
@@ -32,7 +31,17 @@ def finding(system: System, values: Values, module: Module, at: Sequence[Meeting
         dial = system.dial(values, np.array([first, last]))
         places.append(dial.between(0, 1).removeprefix("at "))
     links, joint = list(module.links), module.joints[1]
-    return finding_for("assembly.change_point", f"links {', '.join(links)}", places=places, links=links, joint=joint)
+    alone = ", ".join(place for place in places if not place.startswith("between"))
+    where = ", ".join([f"at {alone}"] * bool(alone) + [place for place in places if place.startswith("between")])
+    return Finding.error(
+        "assembly.change_point",
+        f"links {', '.join(links)}",
+        f"change point {where}: two assembly modes of the links {', '.join(links)} coincide there",
+        f"the motion beyond it is not determined; here {joint} stays on its side. Change a length, or limit the range "
+        "of the driver",
+        places=places,
+        links=links,
+    )
 
 
 def suspects(margin: Array) -> NDArray[np.bool_]:

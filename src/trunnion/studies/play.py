@@ -39,14 +39,14 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.results.figure import Figure
-from trunnion.results.sentences import finding_for
+from trunnion.results.quantities import readable
 from trunnion.solve import shifts
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.statistics.population import Population
 from trunnion.studies.tolerance import zones
 from trunnion.studies.tolerance.effects import FirstOrder
-from trunnion.studies.tolerance.first_order import ToleranceStudy
+from trunnion.studies.tolerance.first_order import ToleranceStudy, none_stated
 from trunnion.studies.tolerance.inputs import Inputs
 from trunnion.studies.tolerance.linear import Linear, Of, searched
 
@@ -217,7 +217,10 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
     remedy = "use `trunnion tolerance` for other measures"
     if others and names is not None:
         raise MechanismError(Finding(what, "measures", remedy))
-    notes = [finding_for("play.measures_left_out", "measures", measures=others)] if others else []
+    notes = []
+    if others:
+        short = f"left out: {', '.join(others)}, which have no one value at every position"
+        notes = [Finding.note("play.measures_left_out", "measures", short, remedy, measures=others)]
     found = [one for one in found if one.name not in others]
     if found:
         return found, notes
@@ -227,7 +230,7 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
         raise MechanismError(
             Finding("no measure is stated, and no joint to the ground is an output", "measures", remedy)
         )
-    return found, [finding_for("measure.none_stated", "measures", measures=[one.name for one in found]), *notes]
+    return found, [none_stated(found), *notes]
 
 
 def _covered(run: Run, measure: Measure) -> bool:
@@ -282,11 +285,24 @@ def _findings(played: Played) -> Iterator[Finding]:
     if run.determinacy is not None:
         yield from run.determinacy.findings()
         if any(part.redundant for part in run.determinacy.parts):
-            yield finding_for("play.redundant", "joints")
+            yield Finding.warning(
+                "play.redundant",
+                "joints",
+                "constraints are redundant: the worst case is an upper bound, because pins constrain one another",
+                "the deviation assumes that each pin can be anywhere within its play",
+            )
     yield from _left_out(run, played.inputs.loose)
     yield from _spinning(run, played.measures)
     if run.seats:
-        yield finding_for("play.seats_not_taken", "joints", joints=[one.joint for one in run.seats])
+        yield Finding.note(
+            "play.seats_not_taken",
+            "joints",
+            "play is relative to the middle of the holes: the worst case is over all positions "
+            "of the pins and does not use the seats of "
+            f"{', '.join(one.joint for one in run.seats)}",
+            "`trunnion analyse` has the deviation with these seats",
+            joints=[one.joint for one in run.seats],
+        )
     yield from _fits(run, played.inputs.loose)
     for i in range(len(played.measures)):
         yield from _limit(played, i)
@@ -297,16 +313,25 @@ def _findings(played: Played) -> Iterator[Finding]:
     for code in Status:
         where = np.flatnonzero(played.course.status == code)
         if code >= Status.NOT_CONVERGED and len(where):
-            yield finding_for("play.no_answer", at=dial.intervals(where), status=code.text)
+            yield Finding.error(
+                "play.no_answer",
+                "",
+                f"{code.text} {dial.intervals(where)}",
+                "the effect of play is undefined there",
+                at=dial.intervals(where),
+                status=code.text,
+            )
     for measure, effects, of in zip(played.measures, played.over_cycle, played.course.measures, strict=True):
         lost = np.any(np.isnan(effects.worst_case), axis=0) & np.isfinite(_nominal(of))
         where = np.flatnonzero(lost & (played.course.status < Status.SINGULAR))
         if len(where):
-            text = "a magnitude that is 0 has no derivative"
-            yield finding_for(
-                "play.no_answer", f"measures.{measure.name}", severity=Severity.WARNING, at=dial.intervals(where),
-                status=text,
-            )  # fmt: skip
+            yield Finding.warning(
+                "play.no_answer",
+                f"measures.{measure.name}",
+                f"a magnitude that is 0 has no derivative {dial.intervals(where)}",
+                "the effect of play is undefined there",
+                at=dial.intervals(where),
+            )
 
 
 def _left_out(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
@@ -320,12 +345,24 @@ def _left_out(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
     ]
     if stated:
         kinds = [f"{name} is {run.system.joints[name][0]}" for name in stated]
-        yield finding_for("play.left_out", "joints", joints=list(stated), kinds=kinds, modelled=list(models))
+        yield Finding.warning(
+            "play.left_out",
+            "joints",
+            f"the play of {', '.join(stated)} is left out ({', '.join(kinds)} joints)",
+            f"play is modelled in {', '.join(models)} joints",
+            joints=stated,
+        )
     toothed = sorted({
         joint for gear in mechanism.gears.values() if gear.teeth for joint in gear.joints if joint in loose
     })  # fmt: skip
     if toothed:
-        yield finding_for("play.gears", "gears", joints=toothed)
+        yield Finding.warning(
+            "play.gears",
+            "gears",
+            f"gears turn in {', '.join(toothed)}: the effect of this play on the tooth contact is left out",
+            "an offset e of a gear's centre across the line of centres turns the gear by e over its pitch radius",
+            joints=toothed,
+        )
 
 
 def _fits(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
@@ -340,7 +377,16 @@ def _fits(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
             largest[name] = float(np.ravel(primal(own))[0])
     if largest:
         most = max(largest, key=largest.__getitem__)
-        yield finding_for("play.mean_of_fits", "fits", joints=list(largest), largest=largest[most], most=most)
+        yield Finding.note(
+            "play.mean_of_fits",
+            "fits",
+            f"the play of {', '.join(largest)} is the mean of their fits; the largest is "
+            f"{readable(largest[most], 'm')}, of {most}",
+            "--set fits=maximum takes the largest play",
+            joints=list(largest),
+            largest=largest[most],
+            most=most,
+        )
 
 
 def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
@@ -349,7 +395,14 @@ def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
         for measure in measures:
             owner, _, point = measure.subject.partition(".")
             if owner == link and (measure.kind == "angle" or (measure.kind == "point" and point not in ends)):
-                yield finding_for("play.spin", f"measures.{measure.name}", link=link, points=list(ends))
+                yield Finding.warning(
+                    "play.spin",
+                    f"measures.{measure.name}",
+                    f"'{link}' can spin about the line {ends[0]}-{ends[1]}; this study sets that spin to zero",
+                    "measure one of these two points",
+                    link=link,
+                    points=list(ends),
+                )
 
 
 def _limit(played: Played, i: int) -> Iterator[Finding]:
@@ -362,8 +415,14 @@ def _limit(played: Played, i: int) -> Iterator[Finding]:
         return
     unit, where = measure.unit(played.run.system), f"measures.{measure.name}.limit"
     factor, shown = (180 / np.pi, "deg") if unit == "rad" else (1e3, "mm") if unit == "m" else (1.0, unit)
-    code = "limit.kept" if worst <= limit else "limit.exceeded"
-    yield finding_for(code, where, worst=factor * worst, limit=factor * limit, unit=shown, at=played.place(i))
+    figures = {"worst": factor * worst, "limit": factor * limit, "unit": shown, "at": played.place(i)}
+    reaches = f"the worst case to first order, {readable(factor * worst, shown)} at {played.place(i)}"
+    allowed = f"the limit of {readable(factor * limit, shown)}"
+    if worst <= limit:
+        yield Finding.note("limit.kept", where, f"{reaches}, is within {allowed}", **figures)
+    else:
+        remedy = "reduce the play of the joints with the largest share"
+        yield Finding.error("limit.exceeded", where, f"{reaches}, exceeds {allowed}", remedy, **figures)
 
 
 def _idle(played: Played, i: int) -> Iterator[Finding]:
@@ -377,10 +436,14 @@ def _idle(played: Played, i: int) -> Iterator[Finding]:
     moves = bool(np.ptp(solved) > floor and np.any(sized)) if len(solved) else False
     at = f" at {played.place(i)}" if len(played.time) == 1 else ""
     if joints and len(solved):
-        yield finding_for(
-            "play.no_effect", f"measures.{measure.name}", joints=joints, measure=measure.name,
-            drivers=list(run.system.mechanism.drivers), moves=moves, at=at,
-        )  # fmt: skip
+        drivers = ", ".join(run.system.mechanism.drivers)
+        yield Finding.note(
+            "play.no_effect",
+            f"measures.{measure.name}",
+            f"the play of {', '.join(joints)} has no effect on {measure.name}{at}",
+            f"drive the joint that the machine drives, now {drivers}" if moves else "",
+            joints=joints,
+        )
 
 
 def _beyond_first_order(played: Played, i: int, of: Of) -> Iterator[Finding]:
@@ -401,11 +464,21 @@ def _beyond_first_order(played: Played, i: int, of: Of) -> Iterator[Finding]:
     low, high = least.value, largest.value
     off = max(abs(low + first), abs(high - first)) / first
     if off > SLIGHT:
-        yield finding_for(
-            "play.beyond_first_order", f"measures.{measure.name}", low=low, high=high, first=first,
-            severity=Severity.WARNING if max(-low, high) > (1 + GRAVE) * first else Severity.NOTE,
-            unit=measure.unit(played.run.system), at=played.place(i),
-        )  # fmt: skip
+        yield Finding.weighed(
+            Severity.WARNING if max(-low, high) > (1 + GRAVE) * first else Severity.NOTE,
+            "play.beyond_first_order",
+            f"measures.{measure.name}",
+            f"to first order it changes by ±{readable(first, measure.unit(played.run.system))} at "
+            f"{played.place(i)}; the worst found on the mechanism itself is "
+            f"{readable(low, measure.unit(played.run.system))} and "
+            f"{readable(high, measure.unit(played.run.system))}",
+            "use these figures",
+            low=low,
+            high=high,
+            first=first,
+            unit=measure.unit(played.run.system),
+            at=played.place(i),
+        )
 
 
 # ---- the result -----------------------------------------------------------------------------------------------

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trunnion.errors import Finding, MechanismError, Status
+from trunnion.errors import Finding, MechanismError, Status, counted
 from trunnion.measures.measures import Measure, named
-from trunnion.results.sentences import finding_for
+from trunnion.results.quantities import readable
 from trunnion.rig.modelled import told_at
 from trunnion.rig.reading.rig_file import Rig, Value
 from trunnion.rig.virtual.sensors import SensorChannel, resolved
@@ -211,29 +211,59 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, SensorChannel], ri
             one = stopped[0]
             places = np.flatnonzero(one.true.status >= Status.NOT_CONVERGED)
             first = 360 * one.true.time[places[0]] / one.run.cycle.duration
-            yield finding_for(
-                "rig.no_answer", where, phrases={"cases": _named(stopped)}, status=status.text, condition=one.number,
-                count=len(places), positions=len(one.true.status), first_deg=first,
-            )  # fmt: skip
+            yield Finding.warning(
+                "rig.no_answer",
+                where,
+                f"{_named(stopped)} left out: {status.text}; in condition {one.number} at "
+                f"{len(places)} of {counted(len(one.true.status), 'position')}, first at {first:.4g}° "
+                "of the cycle",
+                "run `trunnion analyse` with these values to see where in the cycle, and why",
+                status=status.text,
+                condition=one.number,
+                count=len(places),
+                positions=len(one.true.status),
+                first_deg=first,
+            )
     sound = [case for case in cases if case.worst.solved]
     if mended := [case for case in sound if case.true.mended]:
         most = max(case.true.mended for case in mended)
-        yield finding_for("rig.load_at_rest", where, phrases={"cases": _named(mended)}, positions=most)
+        yield Finding.note(
+            "rig.load_at_rest",
+            where,
+            f"{_named(mended)}: a load has no unique value at up to {counted(most, 'position')}, "
+            "because its joint is at rest; sensors read 0 during a rest, and the mean of the "
+            "neighbours at a single position",
+            positions=most,
+        )
     yield from _lost_pulses(sound, rig)
     yield from _both_ways(sound, rig)
     driver = next(iter(cases[0].run.system.mechanism.drivers))
     placed = rig.encoder or any(one.measures == f"rate:{driver}" for one in channels.values())
     if sound and not placed and speed_differs(sound):
-        yield finding_for("rig.no_angle", "encoder", driver=driver)
+        yield Finding.error(
+            "rig.no_angle",
+            "encoder",
+            f"the conditions differ in speed, and no channel measures the angle of {driver}",
+            f"state an encoder, or a sensor of rate:{driver}",
+            driver=driver,
+        )
     for i, (name, channel) in enumerate(channels.items()):
         peaks = {case.number: float(np.max(np.abs(case.true.values[i]))) for case in sound}
         clipped = [case for case in sound if peaks[case.number] > channel.limit]
         if clipped:
             key = "range" if channel.limit == channel.range else "span"
-            yield finding_for(
-                "rig.clipped", f"sensors.{name}.{key}", phrases={"cases": _named(clipped)}, measures=channel.measures,
-                peak=max(peaks.values()), unit=channel.unit, limit=channel.limit,
-            )  # fmt: skip
+            yield Finding.warning(
+                "rig.clipped",
+                f"sensors.{name}.{key}",
+                f"{_named(clipped)}: {channel.measures} reaches "
+                f"{readable(max(peaks.values()), channel.unit)}, beyond the range of "
+                f"{readable(channel.limit, channel.unit)}: readings are clipped",
+                "use a sensor with a larger range",
+                measures=channel.measures,
+                peak=max(peaks.values()),
+                unit=channel.unit,
+                limit=channel.limit,
+            )
 
 
 def _both_ways(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
@@ -242,9 +272,19 @@ def _both_ways(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
     if len({case.drive(rig.rate.value)[1] > 0 for case in one_way}) < 2:
         return
     if rig.encoder is None:
-        yield finding_for("rig.both_ways", "encoder")
+        yield Finding.error(
+            "rig.both_ways",
+            "encoder",
+            "the conditions turn in both directions, and no channel measures the angle of the driver",
+            "state an encoder of kind: count, or one rig for each direction",
+        )
     elif rig.encoder.kind == "level":
-        yield finding_for("rig.both_ways_level", "encoder.kind")
+        yield Finding.error(
+            "rig.both_ways_level",
+            "encoder.kind",
+            "the conditions turn in both directions, which the level of an encoder does not distinguish",
+            "record kind: count",
+        )
 
 
 def speed_differs(cases: Sequence[Case]) -> bool:
@@ -277,6 +317,12 @@ def _lost_pulses(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
     lost = [case for case in cases if 4 * peaks[case.number] * rig.encoder.per_turn > rig.rate.value * (1 + 1e-9)]
     if lost:
         most = max(peaks.values()) * rig.encoder.per_turn
-        yield finding_for(
-            "rig.pulses_lost", "encoder.kind", phrases={"cases": _named(lost)}, pulses=most, rate=rig.rate.value
+        yield Finding.warning(
+            "rig.pulses_lost",
+            "encoder.kind",
+            f"{_named(lost)}: some encoder pulses are lost: up to {most:.4g} pulses per second, "
+            f"sampled at {rig.rate.value:.4g} Hz",
+            "use a sampling rate of four times the pulse rate, or record kind: count",
+            pulses=most,
+            rate=rig.rate.value,
         )

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding
-from trunnion.results.sentences import finding_for
+from trunnion.errors import Finding, counted
 from trunnion.rig.reading.efficiency import Efficiency, efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.measurement import Accuracy, Condition, Signal
 from trunnion.rig.virtual.cases import Case
@@ -144,15 +143,44 @@ def _said(observation: Observation, sensors: tuple[Expected, ...], forecasts: li
     found = []
     for one in sensors:
         if one.share < SMALL_RANGE:
-            found.append(finding_for("rig.range_wide", f"sensors.{one.sensor}.range", percent=100 * one.share))
+            found.append(
+                Finding.note(
+                    "rig.range_wide",
+                    f"sensors.{one.sensor}.range",
+                    f"the readings use {100 * one.share:.2g} % of the range: errors in % of full scale dominate",
+                    "use a sensor with a smaller range",
+                    percent=100 * one.share,
+                )
+            )
         if 0 < one.steps < FEW_STEPS:
-            found.append(finding_for("rig.steps_few", f"sensors.{one.sensor}.bits", steps=one.steps))
+            found.append(
+                Finding.note(
+                    "rig.steps_few",
+                    f"sensors.{one.sensor}.bits",
+                    f"the readings cover only {one.steps:.3g} steps of the converter",
+                    "use a converter with more bits, or a smaller span",
+                    steps=one.steps,
+                )
+            )
     measured = [one for one in forecasts if one.measured]
     off = [one for one in measured if one.measured and abs(one.bias) > one.measured.uncertainty]
     if off:
         worst = max(off, key=lambda one: abs(one.bias))
+        what = (
+            f"in {len(off)} of {counted(len(measured), 'condition')} the bias of the efficiency exceeds its standard "
+        )
+        what += f"uncertainty, at most {worst.bias:+.2g} in condition {worst.case.number}: the sensors are too slow "
+        what += "for the cycle, or clipped"
+        remedy = "use sensors with a larger bandwidth or range, more pulses, or a lower speed"
         figures = {"count": len(off), "of": len(measured), "condition": worst.case.number, "bias": worst.bias}
-        found.append(finding_for("rig.biased", "sensors", severity=None, phrases=None, **figures))
+        found.append(Finding.warning("rig.biased", "sensors", what, remedy, **figures))
     if not measured:
-        found.append(finding_for("rig.no_efficiency", "sensors"))
+        found.append(
+            Finding.note(
+                "rig.no_efficiency",
+                "sensors",
+                "the sensors do not measure input and output power: no efficiency is predicted",
+                "measure effort: and rate: of the driver, load: of a load on a joint and rate: of that joint",
+            )
+        )
     return found

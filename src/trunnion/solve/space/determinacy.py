@@ -20,11 +20,11 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
 from trunnion.algebra.space import ZERO, Screw, moment_at
 from trunnion.algebra.vector import dot, minus
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError, Severity, agreeing, counted
 from trunnion.groups.redundant import RANK, stacked
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import Pose
-from trunnion.results.sentences import finding_for
+from trunnion.results.quantities import readable
 from trunnion.solve.assembly import Chosen
 from trunnion.solve.backward import Given, backward
 from trunnion.solve.contacts import contacts_of
@@ -233,25 +233,63 @@ class Determinacy:
         """What there is to say of redundant constraints, undetermined freedoms and free spins."""
         spins, drivers = len(self.system.plan.passive), len(self.system.mechanism.drivers)
         counts: dict[str, Any] = {"formula": self.system.plan.mobility, "rank": self.mobility}
-        code = "redundant" if self.system.mechanism.over_constraint == "refuse" else "redundant_least"
+        mobility = f"the mobility is {counts['formula']} by Grübler's formula and {counts['rank']} by rank"
         findings: list[Finding] = []
         for part in self.parts:
             joints, links = list(part.joints), list(part.links)
             if part.surplus:
-                findings.append(finding_for("mobility.overdriven", "drivers", **counts, spins=spins, drivers=drivers))
+                beside = f", {spins} of them spins of a single link" if spins else ""
+                what = f"{mobility}{beside}, but there {agreeing(drivers, 'is', 'are')} {counted(drivers, 'driver')}"
+                figures = {**counts, "spins": spins, "drivers": drivers}
+                findings.append(Finding.error("mobility.overdriven", "drivers", what, "remove a driver", **figures))
             if part.undetermined:
-                counted = {**counts, "freedoms": part.undetermined}
-                findings.append(finding_for("mobility.undetermined", "drivers", **counted, links=links))
+                what = f"{mobility}: {counted(part.undetermined, 'freedom is', 'freedoms are')} not determined, of the "
+                what += f"links {', '.join(links)}"
+                figures = {**counts, "freedoms": part.undetermined, "links": links}
+                remedy = "add drivers or joints to these links"
+                findings.append(Finding.error("mobility.undetermined", "drivers", what, remedy, **figures))
             if part.redundant:
-                counted = {**counts, "constraints": part.redundant}
-                findings.append(finding_for(f"mobility.{code}", "joints", **counted, joints=joints))
+                figures = {**counts, "constraints": part.redundant, "joints": joints}
+                redundant = counted(part.redundant, "constraint is", "constraints are")
+                what = f"{mobility}: {redundant} redundant, in the joints {', '.join(joints)}; "
+                if self.system.mechanism.over_constraint == "refuse":
+                    what += "statics does not determine their reactions"
+                    remedy = "use a joint with more freedoms (cylindrical, spherical), or state over_constraint: "
+                    remedy += "minimum-norm for the smallest reactions"
+                    findings.append(Finding.error("mobility.redundant", "joints", what, remedy, **figures))
+                else:
+                    what += "the reactions given are the smallest that satisfy equilibrium"
+                    remedy = "misfit and preload add to them: they depend on errors and stiffness"
+                    findings.append(Finding.warning("mobility.redundant_least", "joints", what, remedy, **figures))
             if part.rubbing:
                 joints, constraints = list(part.rubbing), part.redundant
-                findings.append(finding_for("mobility.friction_open", "joints", joints=joints, constraints=constraints))
+                findings.append(
+                    Finding.error(
+                        "mobility.friction_open",
+                        "joints",
+                        "statics does not determine the forces on which the friction in the joints "
+                        f"{', '.join(joints)} depends",
+                        f"give the joints {counted(constraints, 'freedom')} more (cylindrical, spherical), "
+                        "state bearings on one line as one joint with pin.bearing (guide.length) from end to "
+                        "end, or friction: 0",
+                        joints=joints,
+                        constraints=constraints,
+                    )
+                )
         for module in self.system.plan.modules:
             for link, *points in module.spinning:
-                spin: dict[str, Any] = {"where": f"links.{link}", "link": link, "points": points}
-                findings.append(finding_for("mobility.spin", **spin, torque=self.dragged.get(link)))
+                where, drag = f"links.{link}", self.dragged.get(link)
+                what = f"the link '{link}' can spin about the line {points[0]}-{points[1]} (a passive freedom)"
+                remedy = "the analysis sets this spin to zero"
+                if drag is not None:
+                    remedy += f"; friction of its joints would drag it with up to {readable(drag, 'N m')}"
+                findings.append(
+                    Finding.note("mobility.spin", where, what, remedy, link=link, points=points, torque=drag)
+                )
                 if link in self.spins:
-                    findings.append(finding_for("mobility.spin_loaded", **spin, torque=self.spins[link]))
+                    what = f"the link '{link}' is free to spin about {points[0]}-{points[1]}, but a torque of up to "
+                    what += f"{readable(self.spins[link], 'N m')} acts about that line"
+                    remedy = "make the link symmetric about the line, or use a universal joint at one end"
+                    figures = {"link": link, "points": points, "torque": self.spins[link]}
+                    findings.append(Finding.warning("mobility.spin_loaded", where, what, remedy, **figures))
         return findings

@@ -39,7 +39,6 @@ from trunnion.groups.tree import Element
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.joints.pairs import PAIRS
 from trunnion.joints.spatial import MOTIONS
-from trunnion.results.sentences import finding_for
 from trunnion.solve import shifts
 from trunnion.solve.assembly import Chosen, choose, distance
 from trunnion.solve.forward import posed, start
@@ -392,7 +391,12 @@ def start_of(system: System, values: Values, ideal: Values, cycle: Cycle) -> tup
     if chosen.found[0]:
         return _ideal(system, ideal, chosen), list(chosen.findings)
     nearly = _followed(system, values, cycle)
-    misfit = finding_for("assembly.misfit", "links")
+    misfit = Finding.note(
+        "assembly.misfit",
+        "links",
+        "the stated axes and lengths do not close the loops, even without the errors",
+        "errors count from the position with the smallest opening; state the difference as misalignment or errors",
+    )
     if nearly is None:
         what = f"{misfit.what}: the loops are not nearly closed at any position"
         raise MechanismError(Finding(what, "links", "check the lengths"))

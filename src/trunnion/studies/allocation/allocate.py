@@ -20,7 +20,6 @@ from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.tolerances import Price
 from trunnion.results.quantities import drawn_in, signed
-from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import (
@@ -175,7 +174,15 @@ def _found(asked: AllocationRequest) -> Allocated:
     offers: list[tuple[float, Answer]] = []
     if asked.curve and answer.found:
         offers = _curve(answer, way, asked)
-    notes += [finding_for("allocation.unknown", f"measures.{name}") for name in rows.unknown]
+    notes += [
+        Finding.warning(
+            "allocation.unknown",
+            f"measures.{name}",
+            "the measure has no first-order result: its limits were ignored in the allocation",
+            "check with the samples whether they are met",
+        )
+        for name in rows.unknown
+    ]
     return Allocated(asked, now, rows, answer, way, prices, before, (*notes, *more), search.tight, tuple(offers))
 
 
@@ -225,7 +232,14 @@ def _prices(found: ToleranceStudy) -> tuple[dict[str, Price], list[Finding]]:
             instead = f"state pin.clearance and a cost of {plays[0]}.clearance instead"
             what = f"it changes the play of {', '.join(plays)}; {instead}"
         if what:
-            findings.append(finding_for("allocation.not_for_sale", f"costs.{one.path}", phrases={"why": what}))
+            findings.append(
+                Finding.warning(
+                    "allocation.not_for_sale",
+                    f"costs.{one.path}",
+                    f"this tolerance is not allocated: {what}",
+                    "remove the cost; the tolerance stays as stated",
+                )
+            )
         else:
             prices[one.path] = one
     if not prices:
@@ -299,7 +313,20 @@ class _Search:
                 kept = moving if kept is None else joined(moving, kept)
                 rows, now = ahead, after
         else:
-            return answer, now, whole, [finding_for("allocation.unsettled", "costs", rounds=ROUNDS)]
+            return (
+                answer,
+                now,
+                whole,
+                [
+                    Finding.warning(
+                        "allocation.unsettled",
+                        "costs",
+                        f"the effects depend on the tolerances themselves and did not converge in {ROUNDS} iterations",
+                        "use the verification",
+                        rounds=ROUNDS,
+                    )
+                ],
+            )
         return answer, now, whole, []
 
     def tightened(self, answer: Answer, now: ToleranceStudy, rows: Rows, found: list[Finding]) -> Found:
@@ -365,12 +392,9 @@ def _off(now: ToleranceStudy) -> list[Finding]:
             word, bound = ("at_least", nominal + lower) if lower > 0 else ("at_most", nominal + upper)
             unit = measure.figure_unit(now.run.system, now.run.values)
             factor, shown = drawn_in(bound, unit)
-            texts = (signed(value, factor, shown, "", 6) for value in (nominal, bound))
-            phrases = dict(zip(("told", "limit"), texts, strict=True))
-            where = f"measures.{measure.name}"
-            found.append(
-                finding_for(
-                    "allocation.nominal_outside", where, phrases=phrases, nominal=nominal, bound=bound, word=word
-                )
-            )
+            told, limit = (signed(value, factor, shown, "", 6) for value in (nominal, bound))
+            what = f"the nominal value is {told}, {word} is {limit}: tolerances cannot correct that"
+            where, remedy = f"measures.{measure.name}", "change the mechanism or the bound"
+            figures = {"nominal": nominal, "bound": bound}
+            found.append(Finding.error("allocation.nominal_outside", where, what, remedy, **figures))
     return found

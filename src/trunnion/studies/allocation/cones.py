@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from trunnion.errors import Finding
-from trunnion.results.sentences import finding_for
 from trunnion.statistics.costs import COST_MODELS
 from trunnion.studies.allocation.problem import PROVEN, AllocationProblem, Answer, none, shortfalls
 from trunnion.studies.allocation.task import Task, sides, task_of
@@ -66,14 +65,30 @@ def allocate_continuous(problem: AllocationProblem) -> Answer:
         return none(problem, trouble)
     point = minimise(task)
     if point is None:
-        return none(problem, [finding_for("allocation.not_found", "costs")])
+        return none(
+            problem,
+            [
+                Finding.error(
+                    "allocation.not_found",
+                    "costs",
+                    "the solver found no allocation, although the limits may be feasible",
+                    "check the orders of magnitude of costs and bounds",
+                )
+            ],
+        )
     tolerances = task.tolerances(point.u)
     pairs = zip(problem.contributions, tolerances.tolist(), strict=True)
     costs = np.array([contribution.cost.value(t) if contribution.cost else 0.0 for contribution, t in pairs])
     price = np.zeros(len(problem.effects.worst))
     np.add.at(price, task.sides.row[point.rows], point.multipliers / task.sides.room[point.rows])
     proven = point.gap <= PROVEN
-    doubt = finding_for("allocation.proven_roughly", "costs", gap=point.gap)
+    doubt = Finding.warning(
+        "allocation.proven_roughly",
+        "costs",
+        f"the optimality gap is {point.gap:.1e} of the cost of the tolerances",
+        "check the orders of magnitude of costs and bounds",
+        gap=point.gap,
+    )
     return Answer(
         problem, tolerances, costs, float(np.sum(costs)), point.bound, point.gap, proven,
         price=price, findings=() if proven else (doubt,), rounds=point.rounds,
@@ -83,7 +98,15 @@ def allocate_continuous(problem: AllocationProblem) -> Answer:
 def unbounded(task: Task) -> list[Finding]:
     """Tolerances that neither a limit nor a bound holds."""
     free = np.flatnonzero(~np.isfinite(task.most))
-    return [finding_for("allocation.unbounded", f"costs.{task.names[g]}") for g in free]
+    return [
+        Finding.error(
+            "allocation.unbounded",
+            f"costs.{task.names[g]}",
+            "no limit bounds this tolerance, and wider is cheaper",
+            "state `most`",
+        )
+        for g in free
+    ]
 
 
 def _unmet(problem: AllocationProblem, task: Task) -> list[Finding]:

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, milp
 
 from trunnion.errors import Finding
-from trunnion.results.sentences import finding_for
 from trunnion.studies.allocation.cones import Optimum, allocate_continuous, minimise, unbounded
 from trunnion.studies.allocation.problem import (
     ALLOWED,
@@ -267,7 +266,13 @@ class _Search:
             for i in members
         }
         proven = gap <= PROVEN
-        doubt = finding_for("allocation.proven_roughly", "processes", gap=gap)
+        doubt = Finding.warning(
+            "allocation.proven_roughly",
+            "processes",
+            f"the optimality gap is {gap:.1e} of the cost of the tolerances",
+            "check the orders of magnitude of costs and bounds",
+            gap=gap,
+        )
         nothing = np.full(len(problem.effects.worst), np.nan)
         return Answer(
             problem,

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, agreeing
 from trunnion.model.tolerances import ProcessChoice
 from trunnion.results.quantities import drawn_in, signed
-from trunnion.results.sentences import finding_for
 from trunnion.statistics.costs import Cost
 
 __all__ = [
@@ -320,18 +319,14 @@ def _shortfall(problem: AllocationProblem, least: Array, row: int, more: str) ->
     name = f"'{largest.name}'"
     narrow = f"narrow {name}, which has no cost and" if largest.fixed else f"allow {name} a smaller least: it"
     ratio = f", {over / limit:.3g} times the limit" if over * limit > 0 else ""
-    takes = f"{effects.say(row, over)}{effects.place(row)}"
-    normal = f" ({problem.margins()[row]:.3g} standard deviations of a normal distribution)"
-    phrases = {
-        "normal": normal if problem.criterion == "yield" else "",
-        "limit_told": effects.say(row, limit),
-        "takes_told": takes,
-        "ratio": ratio,
-        "more": more,
-        "narrow": narrow,
-    }
-    return finding_for(
-        "allocation.impossible", effects.label(row), phrases=phrases, limit=limit, takes=over, largest=largest.name
+    what = f"the limit {effects.say(row, limit)} is infeasible: with all tolerances at their least the deviation is "
+    what += f"{effects.say(row, over)}{effects.place(row)}"
+    if problem.criterion == "yield":
+        what += f" ({problem.margins()[row]:.3g} standard deviations of a normal distribution)"
+    remedy, figures = f"widen the limit, or first {narrow} has the largest share", {"limit": limit, "takes": over}
+    where = effects.label(row)
+    return Finding.error(
+        "allocation.impossible", where, f"{what}{ratio}{more}", remedy, **figures, largest=largest.name
     )
 
 

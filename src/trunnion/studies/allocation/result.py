@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, Severity
+from trunnion.errors import Finding, Severity, agreeing
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.tolerances import Price
 from trunnion.results.attributes import encoded, finding_rows, findings_of, summary_of
 from trunnion.results.dataset import MemberUnits, Variable, described, units_along, with_variables
 from trunnion.results.figure import Figure
+from trunnion.results.quantities import readable
 from trunnion.results.scales import scales_in
-from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import Answer, Criterion
@@ -311,17 +311,31 @@ def _findings(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
         return
     yield from _plays(found)
     for name, share in found.tight.items():
-        yield finding_for("allocation.narrowed", f"measures.{name}", percent=100 * (1 - share))
+        yield Finding.note(
+            "allocation.narrowed",
+            f"measures.{name}",
+            f"its limits were narrowed by {100 * (1 - share):.2g} % so that the mechanism meets "
+            "them exactly, not to first order",
+            percent=100 * (1 - share),
+        )
     if criterion != "yield" and found.study.effects.correlated:
-        yield finding_for("allocation.correlations_left_out", "correlations", criterion=criterion)
+        yield Finding.warning(
+            "allocation.correlations_left_out",
+            "correlations",
+            f"the criterion {criterion} ignores the correlations",
+            "use a yield, which includes them",
+            criterion=criterion,
+        )
     if criterion == "worst-case":
         yield from _searched(found, known)
     if criterion == "rss" and "yield" in known:
         yield from _promised(known)
     kept = [factor for factor, offer in found.offers if offer.found]
     if len(kept) < len(found.offers):
-        points, least = len(found.offers), min(kept, default=None)
-        yield finding_for("allocation.curve_short", points=points, lost=points - len(kept), least=least)
+        points, lost = len(found.offers), len(found.offers) - len(kept)
+        what = f"{lost} of the {points} points of the curve {agreeing(lost, 'is', 'are')} infeasible"
+        remedy = f"limits of at least {min(kept):.3g} times the stated ones are feasible" if kept else ""
+        yield Finding.note("allocation.curve_short", "", what, remedy, points=points, lost=lost)
 
 
 def _plays(found: Allocated) -> Iterator[Finding]:
@@ -331,8 +345,17 @@ def _plays(found: Allocated) -> Iterator[Finding]:
         sizes = [f"joints.{joint}.{part}.clearance" for part in ("pin", "guide")]
         for one in found.study.inputs.tolerances:
             if path == f"joints.{joint}.clearance" and one.path in sizes:
-                ends: dict[str, Any] = {"lower_um": 1e6 * one.lower, "upper_um": 1e6 * one.upper}
-                yield finding_for("allocation.play_tolerance", f"costs.{joint}.clearance", number=one.path, **ends)
+                lower, upper = 1e6 * one.lower, 1e6 * one.upper
+                yield Finding.note(
+                    "allocation.play_tolerance",
+                    f"costs.{joint}.clearance",
+                    f"the clearance is allocated; the tolerance {lower:+g}/{upper:+g} µm of {one.path} stays as "
+                    "stated, in addition to it, and the limits include it",
+                    "remove this tolerance if the cost covers the largest clearance",
+                    number=one.path,
+                    lower_um=lower,
+                    upper_um=upper,
+                )
 
 
 def _promised(known: xr.Dataset) -> Iterator[Finding]:
@@ -347,7 +370,15 @@ def _promised(known: xr.Dataset) -> Iterator[Finding]:
         if not high < DEFAULT_YIELD:
             continue
         severity = Severity.ERROR if 1 - high > TWICE * (1 - DEFAULT_YIELD) else Severity.WARNING
-        yield finding_for("yield.below_rss", f"measures.{name}", severity=severity, share=share, target=DEFAULT_YIELD)
+        yield Finding.weighed(
+            severity,
+            "yield.below_rss",
+            f"measures.{name}",
+            f"the yield of the samples is {share:.6g}; an RSS within the limits implies {DEFAULT_YIELD:g}",
+            "require that yield instead, which uses distributions, means and correlations as stated",
+            share=share,
+            target=DEFAULT_YIELD,
+        )
 
 
 def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
@@ -363,7 +394,17 @@ def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
         factor, unit = SHOWN.get(units[k], (1.0, units[k]))
         value, limit = (high, upper) if shares[1] >= shares[0] else (low, lower)
         severity = Severity.ERROR if beyond > ROUGH else Severity.WARNING if beyond > SLIGHT else Severity.NOTE
-        yield finding_for(
-            "allocation.worst_case_beyond", f"measures.{of.measure.name}", severity=severity, worst=factor * value,
-            unit=unit, percent=100 * beyond, limit=factor * limit, accepted=100 * ROUGH,
-        )  # fmt: skip
+        yield Finding.weighed(
+            severity,
+            "allocation.worst_case_beyond",
+            f"measures.{of.measure.name}",
+            f"the worst case of the mechanism, {readable(factor * value, unit)}, exceeds the "
+            f"limit {readable(factor * limit, unit)} by {100 * beyond:.2g} %; to first order it "
+            f"is met (up to {100 * ROUGH:g} % beyond is accepted)",
+            "use --exact (in Python exact=True), which narrows the tolerances",
+            worst=factor * value,
+            unit=unit,
+            percent=100 * beyond,
+            limit=factor * limit,
+            accepted=100 * ROUGH,
+        )

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import chdtr, ndtr, ndtri
 
-from trunnion.errors import Severity
-from trunnion.results.sentences import finding_for
+from trunnion.errors import Finding, Severity
 from trunnion.statistics.streams import SobolStream, factor
 from trunnion.studies.allocation.problem import AllocationProblem, Answer, SampledYield, Trial, common_options
 
@@ -91,7 +90,13 @@ def _judged(answer: Answer, target: float, sampled: SampledYield, sure: bool) ->
     if (sampled.low if sure else sampled.share) >= target - ROUNDING:
         return answer
     severity = Severity.ERROR if sure or sampled.high < target else Severity.NOTE
-    missed = finding_for("yield.missed", "yield", severity=severity, **sampled._asdict(), target=target)
+    interval = f" (95 % interval {sampled.low:.6g} to {sampled.high:.6g})" if sampled.low < sampled.high else ""
+    what = f"the yield found is {sampled.share:.6g}{interval}, the required one {target:g}"
+    remedy = "take more samples; --sure (in Python sure=True) asks the lower end of the interval to meet it"
+    if sampled.high < target:
+        remedy = "allow narrower tolerances, widen a limit or ask for a lower yield"
+    figures = {**sampled._asdict(), "target": target}
+    missed = Finding.weighed(severity, "yield.missed", "yield", what, remedy, **figures)
     return replace(answer, findings=(missed,) if severity is Severity.ERROR else (*answer.findings, missed))
 
 

@@ -15,7 +15,6 @@ from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described, driven
 from trunnion.results.figure import Figure
 from trunnion.results.scales import EVERYWHERE, Scales
-from trunnion.results.sentences import finding_for
 from trunnion.solve.system import System, Values
 
 if TYPE_CHECKING:
@@ -129,18 +128,19 @@ class Result:
         self._rigid()
         unsettled = np.flatnonzero(self.arrays["status"] == AssemblyStatus.UNSETTLED)
         if len(unsettled):
-            self._say("unsettled", "joints", status=AssemblyStatus.UNSETTLED.text, at=self._intervals(unsettled))
+            what = f"{AssemblyStatus.UNSETTLED.text} {self._intervals(unsettled)}"
+            remedy = "pins on a common axis block each other along it: give one an end float, or make it cylindrical"
+            self.findings.append(Finding.error("assembly.unsettled", "joints", what, remedy))
         if len(self.findings) > count or not self.of:
             return
         share = self.share[0]
         if share > 0:
-            phrases = {"told": _share(share)}
-            self._say("clearance_enough", "joints", phrases, share=share, at=self._share_place())
+            needed = f"{_share(share)} times their size is needed, {self._share_place()}"
+            what = f"the stated clearances are sufficient: {needed}"
+            self.findings.append(Finding.note("assembly.clearance_enough", "joints", what, share=share))
         else:
-            self._say("fits", "joints")
-
-    def _say(self, code: str, where: str, phrases: dict[str, str] | None = None, **figures: Any) -> None:
-        self.findings.append(finding_for(f"assembly.{code}", where, phrases=phrases, **figures))
+            what = "the loops close without any clearance"
+            self.findings.append(Finding.note("assembly.fits", "joints", what))
 
     def _intervals(self, places: NDArray[np.intp]) -> str:
         return self.system.dial(self.values, self.time).intervals(places)
@@ -148,7 +148,9 @@ class Result:
     def _apart(self) -> None:
         places = np.flatnonzero(self.arrays["status"] == AssemblyStatus.APART)
         if len(places):
-            self._say("apart", "links", status=AssemblyStatus.APART.text, at=self._intervals(places))
+            what = f"{AssemblyStatus.APART.text} {self._intervals(places)}"
+            remedy = "check the lengths, or limit the range of the driver"
+            self.findings.append(Finding.error("assembly.apart", "links", what, remedy))
 
     def _short(self) -> None:
         (share, at), short = self.share, np.flatnonzero(self.arrays["status"] == AssemblyStatus.SHORT)
@@ -161,8 +163,9 @@ class Result:
             takes = f"near {self.where(at)}: {times}"
         else:
             return
-        self._say("clearance_short", "joints", {"takes": takes, "remedy": self._remedy()}, share=share,
-                  clearance=self.clearance[0])  # fmt: skip
+        what, figures = f"the stated clearances are too small to close the loops {takes}", {"share": share}
+        figures["clearance"] = self.clearance[0]
+        self.findings.append(Finding.error("assembly.clearance_short", "joints", what, self._remedy(), **figures))
 
     def _rigid(self) -> None:
         places = np.flatnonzero(self.arrays["status"] == AssemblyStatus.RIGID)
@@ -175,8 +178,9 @@ class Result:
         if self.played:
             zero = " (a clearance of 0 gives no play)" if self.nil else ""
             none = f"the joints with play cannot close the loops, however large the play{zero}: they"
-        phrases = {"none": none, "by": by, "remedy": self._remedy()}
-        self._say("no_play", "joints", phrases, angle=angle, length=length, clearance=self.clearance[0])
+        what, figures = f"{none} stay open by up to {by}", {"angle": angle, "length": length}
+        figures["clearance"] = self.clearance[0]
+        self.findings.append(Finding.error("assembly.no_play", "joints", what, self._remedy(), **figures))
 
     def _remedy(self) -> str:
         need = self.clearance[0]

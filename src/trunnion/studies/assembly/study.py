@@ -21,7 +21,6 @@ from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.joint_parts import clearance
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.sentences import finding_for
 from trunnion.solve import shifts
 from trunnion.solve.assembly import choose
 from trunnion.solve.forward import forward
@@ -98,7 +97,9 @@ def _regular(system: System, values: Values, cycle: Cycle, time: Array) -> Resul
     result.arrays["status"] = np.where(there, AssemblyStatus.FITS, AssemblyStatus.APART).astype(np.int8)
     plane = "in the plane no joint constrains twice" if system.mechanism.space == "planar" else ""
     what = plane or "its joints constrain no more than its links have freedoms"
-    result.findings.append(finding_for("assembly.no_need", "joints", phrases={"why": what}))
+    result.findings.append(
+        Finding.note("assembly.no_need", "joints", f"{what}: errors only shift its links, so it needs no clearance")
+    )
     result.tell()
     return result
 

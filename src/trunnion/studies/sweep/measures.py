@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, agreeing
 from trunnion.measures.measures import Measure, named
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.sentences import finding_for
 from trunnion.solve.run import Run
 from trunnion.studies.sweep.figures import FIGURES
 
@@ -39,4 +38,9 @@ def measures_of(run: Run, names: Sequence[str]) -> list[Measure]:
 def left_out(mechanism: Mechanism, names: Sequence[str]) -> list[Finding]:
     """A note that names the measures of the model that a sweep does not have."""
     others = [name for name in mechanism.measures if name not in names]
-    return [finding_for("sweep.measures_left_out", "measures", measures=others)] if others else []
+    if not others:
+        return []
+    what = f"the model's {agreeing(len(others), 'measure', 'measures')} {', '.join(others)} "
+    what += f"{agreeing(len(others), 'is', 'are')} not in this sweep"
+    remedy = f"add {agreeing(len(others), 'it', 'them')} with --measure, in Python with measures=[…]"
+    return [Finding.note("sweep.measures_left_out", "measures", what, remedy, measures=others)]

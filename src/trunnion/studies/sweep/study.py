@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from trunnion.cycle.cycle_kernel import Engine
 from trunnion.cycle.scales import peak, scales_of
 from trunnion.cycle.summary import inputs, member_units, references
-from trunnion.dynamics.measured import unfound
-from trunnion.errors import Finding, Severity, Status, counted
+from trunnion.dynamics.measured import LONGER, not_steady
+from trunnion.errors import Finding, Severity, Status, agreeing, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.measures.measures import Measure
 from trunnion.model.arguments import strict_arguments
@@ -27,7 +27,6 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described
 from trunnion.results.scales import Scales
-from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work
 from trunnion.solve.run import Run
@@ -141,10 +140,19 @@ def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iter
             continue
         first = tuple(int(i) for i in where[0])
         count = int(missing[first])
-        yield finding_for(
-            "sweep.no_answer", " and ".join(one.name for one in swept), points=len(where), of=status.size,
-            at=say(swept, first), positions=count, status=code.text,
-        )  # fmt: skip
+        yield Finding.error(
+            "sweep.no_answer",
+            " and ".join(one.name for one in swept),
+            f"{len(where):,} of {counted(status.size, 'point')} "
+            f"{agreeing(len(where), 'has', 'have')} no result, the first at {say(swept, first)} "
+            f"({counted(count, 'position')} not solved): {code.text}",
+            "run `trunnion analyse` with these values to see where in the cycle, and why",
+            points=len(where),
+            of=status.size,
+            at=say(swept, first),
+            positions=count,
+            status=code.text,
+        )
 
 
 def _no_efficiency(points: Points, arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
@@ -160,9 +168,15 @@ def _no_efficiency(points: Points, arrays: Mapping[str, NDArray[Any]]) -> Iterat
     for why, so in reasons.items():
         where = np.argwhere(undefined & so)
         if len(where):
-            at, phrases = say(points.swept, tuple(int(i) for i in where[0])), {"why": why}
-            yield finding_for(
-                "sweep.no_efficiency", "efficiency", points=len(where), of=work.size, at=at, phrases=phrases
+            at = say(points.swept, tuple(int(i) for i in where[0]))
+            yield Finding.note(
+                "sweep.no_efficiency",
+                "efficiency",
+                f"the efficiency is undefined at {len(where):,} of {counted(work.size, 'point')}, the first at {at}: "
+                f"{why}",
+                "see the mean powers there; `trunnion analyse` with these values tells where loads act",
+                points=len(where),
+                of=work.size,
             )
 
 
@@ -171,11 +185,16 @@ def _not_steady(points: Points, watched: Iterable[Measure], arrays: Mapping[str,
     for measure in watched:
         where = np.argwhere(~np.isfinite(arrays[measure.name]))
         if measure.in_time and len(where):
-            first = tuple(int(i) for i in where[0])
-            yield finding_for(
-                "sweep.not_steady", f"measures.{measure.name}", points=len(where), of=arrays[measure.name].size,
-                at=say(points.swept, first), **unfound(points.run, measure),
-            )  # fmt: skip
+            first, size = tuple(int(i) for i in where[0]), arrays[measure.name].size
+            what = f"{measure.name} has no value at {len(where):,} of {counted(size, 'point')}, the first at "
+            yield Finding.warning(
+                "sweep.not_steady",
+                f"measures.{measure.name}",
+                f"{what}{say(points.swept, first)}: {not_steady(points.run, measure)}",
+                LONGER,
+                points=len(where),
+                of=size,
+            )
 
 
 def _scales(run: Run, arrays: Mapping[str, NDArray[Any]]) -> Scales:

@@ -17,7 +17,6 @@ from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure, chosen, outputs
 from trunnion.measures.positions import PositionPlan, place_of, plan
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.studies.tolerance.effects import Effects, effects_of
@@ -108,7 +107,7 @@ def study(
     found = chosen(mechanism, measures, run.values)
     if not found:
         found = outputs(run.system)
-        note = finding_for("measure.none_stated", "measures", measures=[one.name for one in found])
+        note = none_stated(found)
         if not found:
             what = "no measure is stated, and no joint to the ground is an output"
             raise MechanismError(Finding(what, "measures", note.remedy))
@@ -120,6 +119,14 @@ def study(
     if at is not None:
         found = [placed(mechanism, one, at) for one in found]
     return ToleranceStudy(run, inputs, tuple(found), steps, friction or FrictionMethod(), tuple(notes))
+
+
+def none_stated(measures: Sequence[Measure]) -> Finding:
+    """That outputs are taken as measures, as the model states none."""
+    names = [measure.name for measure in measures]
+    what = f"the model states no measure; {', '.join(names)} are used (joints to the ground without a driver)"
+    remedy = "state measures: in the model, or use --measure link.point.x"
+    return Finding.note("measure.none_stated", "measures", what, remedy, measures=names)
 
 
 def placed(mechanism: Mechanism, measure: Measure, at: float | str) -> Measure:

@@ -13,7 +13,6 @@ from trunnion.cycle.cycle_kernel import Engine
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies import batch
 from trunnion.studies.tolerance.indices import indices
@@ -110,7 +109,9 @@ def _engine(found: ToleranceStudy, engine: Engine, samples: int, cluster: str | 
         return engine, []
     many = samples * len(found.plan.times)
     engine = "numpy" if cluster else engine_for(engine, found.kernel, found.run.values, many)
-    return engine, [finding_for("samples.engine", "samples", engine=engine)] if engine != "numpy" else []
+    return engine, [
+        Finding.note("samples.engine", "samples", f"the samples are computed by the engine {engine}", engine=engine)
+    ] if engine != "numpy" else []
 
 
 def _check(methods: Sequence[str], samples: int, seed: int, target: float | None) -> None:

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding
 from trunnion.measures.measures import Measure
 from trunnion.results.quantities import decimals_of, scale_of, signed
-from trunnion.results.sentences import finding_for
 from trunnion.studies.tolerance.linear import by_position
 
 if TYPE_CHECKING:
@@ -62,11 +61,11 @@ def against(of: Of) -> bool:
     return of.measure.kind == "path_error" or (of.reference.against and of.measure.rule != "value")
 
 
-def scatters(of: Of, counted: Sampled | None, i: int) -> tuple[float, float] | None:
+def scatters(of: Of, sampled: Sampled | None, i: int) -> tuple[float, float] | None:
     """Standard deviations of the samples and of first order, where they differ so much that the latter means little."""
-    if counted is None or by_position(of.reference) or counted.done < ENOUGH:
+    if sampled is None or by_position(of.reference) or sampled.done < ENOUGH:
         return None
-    found, linear = float(counted.arrays["deviation"][i]), float(of.total.deviation)
+    found, linear = float(sampled.arrays["deviation"][i]), float(of.total.deviation)
     if not np.isfinite(found + linear) or not max(found, linear) > 0:
         return None
     return None if 1 / OTHERWISE < found / max(linear, 1e-300) < OTHERWISE else (found, linear)
@@ -75,54 +74,55 @@ def scatters(of: Of, counted: Sampled | None, i: int) -> tuple[float, float] | N
 # ---- what is missed -------------------------------------------------------------------------------------------
 
 
-def missed(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
+def missed(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
     """Each measure whose worst case, yield or capability is outside its limits: errors, with what helps.
 
     Where a yield is asked for, that alone decides.
     """
     if outcome.target is not None:
-        yield from _below(outcome, counted, outcome.target)
+        yield from _below(outcome, sampled, outcome.target)
         return
     for i, of in enumerate(outcome.study.linear.measures):
         if not limited(of.measure):
             continue
-        say = _Words(outcome, of, counted, i)
+        say = _Words(outcome, of, sampled, i)
         known, beyond = _worst(outcome, i, of)
         parts = [say.range(*known)] if beyond else []
-        short = _short(counted, i, sure=bool(np.all(np.isfinite(known))) and not beyond)
+        short = _short(sampled, i, sure=bool(np.all(np.isfinite(known))) and not beyond)
         if parts or short:
-            phrases = {
-                "told": "; ".join([*parts, *short]),
-                "limits": say.limits(),
-                "remedy": _remedy(outcome, of, say, scatters(of, counted, i) is not None),
-            }
-            figures = {"worst_lower": known[0], "worst_upper": known[1], **_sampled(counted, i)}
-            yield finding_for(MISSED, f"measures.{of.measure.name}", phrases=phrases, **figures)
+            what = f"limits not met: {'; '.join([*parts, *short])}; {say.limits()}"
+            remedy = _remedy(outcome, of, say, scatters(of, sampled, i) is not None)
+            figures = {"worst_lower": known[0], "worst_upper": known[1], **_sampled(sampled, i)}
+            yield Finding.error("limit.missed", f"measures.{of.measure.name}", what, remedy, **figures)
 
 
-def _below(outcome: Outcome, counted: Sampled | None, target: float) -> Iterator[Finding]:
+def _below(outcome: Outcome, sampled: Sampled | None, target: float) -> Iterator[Finding]:
     """Measures with a lower yield than is asked for, or else all of them together."""
-    if counted is None or not counted.done:
+    if sampled is None or not sampled.done:
         return
     fine = True
     for i, of in enumerate(outcome.study.linear.measures):
-        if limited(of.measure) and float(counted.arrays["yield_high"][i]) < target:
-            fine, say = False, _Words(outcome, of, counted, i)
-            short = _short(counted, i, sure=True)[0]
-            remedy = _remedy(outcome, of, say, scatters(of, counted, i) is not None)
-            phrases = {"told": short, "limits": say.limits(), "remedy": remedy}
-            figures = {"target_percent": 100 * target, **_sampled(counted, i)}
-            yield finding_for(f"{MISSED}_yield", f"measures.{of.measure.name}", phrases=phrases, **figures)
-    share, low, high = (float(counted.arrays[f"yield_all{end}"]) for end in ("", "_low", "_high"))
+        if limited(of.measure) and float(sampled.arrays["yield_high"][i]) < target:
+            fine, say = False, _Words(outcome, of, sampled, i)
+            short = _short(sampled, i, sure=True)[0]
+            remedy = _remedy(outcome, of, say, scatters(of, sampled, i) is not None)
+            what = f"limits not met: {short}, required {100 * target:.6g} %; {say.limits()}"
+            figures = {"target_percent": 100 * target, **_sampled(sampled, i)}
+            yield Finding.error("limit.missed_yield", f"measures.{of.measure.name}", what, remedy, **figures)
+    share, low, high = (float(sampled.arrays[f"yield_all{end}"]) for end in ("", "_low", "_high"))
     if fine and high < target:
         percents: dict[str, Any] = {"percent": 100 * share, "percent_low": 100 * low, "percent_high": 100 * high}
-        yield finding_for(f"{MISSED}_together", "measures", **percents, target_percent=100 * target)
+        what = f"limits not met: yield of all measures together {100 * share:.6g} % (95 % confidence interval "
+        what += f"{100 * low:.5g} to {100 * high:.5g} %), required {100 * target:.6g} %"
+        remedy = "narrow the tolerances of the measure with the lowest yield first"
+        percents["target_percent"] = 100 * target
+        yield Finding.error("limit.missed_together", "measures", what, remedy, **percents)
 
 
-def _sampled(counted: Sampled | None, i: int) -> dict[str, Any]:
+def _sampled(sampled: Sampled | None, i: int) -> dict[str, Any]:
     """What the samples say of a measure with limits, as figures of a finding."""
-    keys = ("yield", "yield_low", "yield_high", "cpk") if counted is not None and counted.done else ()
-    return {key: float(counted.arrays[key][i]) for key in keys if counted is not None}
+    keys = ("yield", "yield_low", "yield_high", "cpk") if sampled is not None and sampled.done else ()
+    return {key: float(sampled.arrays[key][i]) for key in keys if sampled is not None}
 
 
 def _worst(outcome: Outcome, i: int, of: Of) -> tuple[tuple[float, float], bool]:
@@ -137,11 +137,11 @@ def _worst(outcome: Outcome, i: int, of: Of) -> tuple[tuple[float, float], bool]
     return known, known[0] < lower - slight * size or known[1] > upper + slight * size
 
 
-def _short(counted: Sampled | None, i: int, sure: bool) -> list[str]:
+def _short(sampled: Sampled | None, i: int, sure: bool) -> list[str]:
     """What the samples say of the yield and of C_pk, if they are short; sure: the worst case keeps the limits."""
-    if counted is None or not counted.done:
+    if sampled is None or not sampled.done:
         return []
-    share, low, high, cpk = (float(counted.arrays[key][i]) for key in ("yield", "yield_low", "yield_high", "cpk"))
+    share, low, high, cpk = (float(sampled.arrays[key][i]) for key in ("yield", "yield_low", "yield_high", "cpk"))
     found = []
     if share < 1:
         own, least, most = (f"{100 * one:.{decimals_of(high - low)}f}" for one in (share, low, high))
@@ -154,15 +154,15 @@ def _short(counted: Sampled | None, i: int, sure: bool) -> list[str]:
 class _Words:
     """Deviations of a measure in the unit that the tables have them in."""
 
-    def __init__(self, outcome: Outcome, of: Of, counted: Sampled | None, i: int) -> None:
+    def __init__(self, outcome: Outcome, of: Of, sampled: Sampled | None, i: int) -> None:
         self.worst = "worst case" if outcome.worst is not None else "worst case, first order,"
         run = outcome.study.run
         unit = of.measure.figure_unit(run.system, run.values)
         one = of.measure
         known = [end for end in (one.lower, one.upper) if end is not None]
         known += [float(part) for part in of.total[:3]]
-        if counted is not None:
-            known.append(3 * float(counted.arrays["deviation"][i]))
+        if sampled is not None:
+            known.append(3 * float(sampled.arrays["deviation"][i]))
         nominal = of.reference.figure
         self.of = of
         self.factor, self.unit = scale_of(nominal if np.isfinite(nominal) else 0.0, known, unit)

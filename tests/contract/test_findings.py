@@ -35,11 +35,18 @@ def test_every_code_is_written_out() -> None:
 
 
 def test_no_sentence_ends_with_a_full_stop() -> None:
-    for file, place, call in made():
-        for text in call.args[place + 2 :]:
-            last = text.values[-1] if isinstance(text, ast.JoinedStr) else text
-            if isinstance(last, ast.Constant):
-                assert not str(last.value).endswith("."), f"{file}:{call.lineno}"
+    for path in sorted(Path(trunnion.__file__).parent.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            named = isinstance(node, ast.Assign | ast.AugAssign) and ast.unparse(node).startswith(("what ", "remedy "))
+            texts = [node.value] if named else node.args if isinstance(node, ast.Call) and _makes(node) else []
+            for text in texts:
+                last = text.values[-1] if isinstance(text, ast.JoinedStr) else text
+                if isinstance(last, ast.Constant):
+                    assert not str(last.value).endswith("."), f"{path.name}:{node.lineno}"
+
+
+def _makes(call: ast.Call) -> bool:
+    return ast.unparse(call.func) in MAKERS
 
 
 @pytest.mark.parametrize("severity", Severity)

@@ -171,19 +171,3 @@ def test_tolerances_of_what_no_model_may_have(
     assert [(code, where) for code, where, _ in told] == [(code, where) for code, where, _ in expected]
     for (_, _, own), (_, _, reached) in zip(told, expected, strict=True):
         assert own["least" if reached < 0 else "value"] == pytest.approx(reached, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("numbers", "told"), [({"stop": "1 deg"}, ["stop"]), ({"tilt": "1 deg"}, []), ({"r": "0.1 mm"}, [])]
-)
-def test_a_tolerance_of_the_range_of_a_driver_is_told(numbers: dict[str, str], told: list[str]) -> None:
-    """It does nothing, where the same deviation of the link that the driver turns does what the stop would."""
-    data = slider_crank().data()
-    data["dimensions"] |= {"stop": "60 deg", "tilt": "0 deg"}
-    data["links"]["crank"]["points"]["B"] = ["r*cos(tilt)", "r*sin(tilt)"]
-    data["drivers"]["A"] = {"range": ["0 deg", "stop"], "speed": "60 deg/s"}
-    data["measures"] = {"place": {"point": "piston.P", "axis": "x", "at": "stop"}}
-    found = tolerance(Mechanism(**{**data, "tolerances": numbers}), methods=["linear"], steps=12)
-    warned = [one for one in found.trunnion.findings if one.code == "tolerance.range_fixed"]
-    assert [one.figures["numbers"] for one in warned] == ([told] if told else [])
-    assert (float(found["worst_case_upper"][0]) == 0) == bool(told)

@@ -33,7 +33,7 @@ from trunnion.solve import loads
 from trunnion.solve.end_loads import NO_LOAD, EndLoads
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
 from trunnion.solve.seating import ROUNDS as SEAT_ROUNDS
-from trunnion.solve.seating import UNSETTLED, seating_of
+from trunnion.solve.seating import UNSETTLED, Seating, seating_of
 from trunnion.solve.system import System, felt, rubbing
 
 if TYPE_CHECKING:
@@ -138,15 +138,10 @@ def _far_hints(run: Run) -> Iterator[Finding]:
         distance = float(np.linalg.norm(np.subtract(place, stated)))
         if distance > FAR * size:
             words = ", ".join(quantity(part, "m") for part in place)
-            yield Finding.warning(
-                "assembly.far_hint",
-                f"assembly.{name}",
-                f"the hint for {name} is {readable(distance, 'm')} from where {name} is at the start",
-                f"check the hint or the lengths; at the start it is at {words}",
-                point=name,
-                distance=distance,
-                place=words,
-            )
+            what = f"the hint for {name} is {readable(distance, 'm')} from where {name} is at the start"
+            remedy = f"check the hint or the lengths; at the start it is at {words}"
+            figures = {"point": name, "distance": distance, "place": words}
+            yield Finding.warning("assembly.far_hint", f"assembly.{name}", what, remedy, **figures)
 
 
 def effort_units(system: System) -> list[str]:
@@ -164,36 +159,18 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     heavy = [name for name, link in bodies.items() if link.mass.source != 0]
     if heavy and mechanism.gravity is None:
         down, none = ("[0, -9.81]", "[0, 0]") if mechanism.space == "planar" else ("[0, 0, -9.81]", "[0, 0, 0]")
-        notes.append(
-            Finding.note(
-                "model.gravity",
-                "gravity",
-                f"gravity is not stated and taken as zero, although {', '.join(heavy)} have mass",
-                f"state gravity: {down}, or gravity: {none}",
-                links=heavy,
-            )
-        )
+        what = f"gravity is not stated and taken as zero, although {', '.join(heavy)} have mass"
+        remedy = f"state gravity: {down}, or gravity: {none}"
+        notes.append(Finding.note("model.gravity", "gravity", what, remedy, links=heavy))
     if not heavy and any(part.source != 0 for part in mechanism.gravity or ()):
-        notes.append(
-            Finding.note(
-                "model.no_mass",
-                "gravity",
-                "has no effect: no link has a mass",
-                "state mass: … and centre: … of the links, or no gravity",
-            )
-        )
+        what = "has no effect: no link has a mass"
+        remedy = "state mass: … and centre: … of the links, or no gravity"
+        notes.append(Finding.note("model.no_mass", "gravity", what, remedy))
     sliding = {link for joint in mechanism.joints.values() if PAIRS[joint.type].guided for link in joint.links}
     points = [name for name in heavy if bodies[name].inertia == ZERO_INERTIA and name not in sliding]
     if points:
-        notes.append(
-            Finding.note(
-                "model.point_mass",
-                "links",
-                f"{', '.join(points)} have a mass but no inertia: each is a point mass at its centre",
-                "state inertia: …",
-                links=points,
-            )
-        )
+        what = f"{', '.join(points)} have a mass but no inertia: each is a point mass at its centre"
+        notes.append(Finding.note("model.point_mass", "links", what, "state inertia: …", links=points))
     tight = [
         name
         for name, joint in mechanism.effective_joints.items()
@@ -202,15 +179,9 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
         and f"joints.{name}.pin.hole_radius" in values
     ]
     if tight:
-        notes.append(
-            Finding.note(
-                "model.seat_without_play",
-                "joints",
-                f"{', '.join(tight)} have a seat but no play at nominal size: these joints are ideal",
-                "analyse with --set fits=maximum for the largest play",
-                joints=tight,
-            )
-        )
+        what = f"{', '.join(tight)} have a seat but no play at nominal size: these joints are ideal"
+        remedy = "analyse with --set fits=maximum for the largest play"
+        notes.append(Finding.note("model.seat_without_play", "joints", what, remedy, joints=tight))
     if playing:
         # no seats are taken where links are over-constrained
         held = {name for module in system.plan.modules if module.redundant for name in module.joints}
@@ -243,15 +214,10 @@ def shared_dimensions(mechanism: Mechanism) -> Iterator[Finding]:
             name = tolerance.path.removeprefix("dimensions.")
             shown = [path.removeprefix("links.").replace(".points.", ".") for path in used]
             more = f" and {len(shown) - MOST_PLACES} more" if len(shown) > MOST_PLACES else ""
-            yield Finding.note(
-                "tolerance.shared_dimension",
-                tolerance.path,
-                f"one tolerance sets points of {', '.join(links)} ({', '.join(shown[:MOST_PLACES])}{more}): these "
-                "links deviate together, by the same amount",
-                "if the links are made separately, give each a dimension of its own with its own tolerance",
-                name=name,
-                links=links,
-            )
+            what = f"one tolerance sets points of {', '.join(links)} ({', '.join(shown[:MOST_PLACES])}{more}): these "
+            what += "links deviate together, by the same amount"
+            remedy = "if the links are made separately, give each a dimension of its own with its own tolerance"
+            yield Finding.note("tolerance.shared_dimension", tolerance.path, what, remedy, name=name, links=links)
 
 
 # ---- assembly, locking and singular positions -----------------------------------------------------------------
@@ -291,14 +257,9 @@ def _undecided_senses(cycle: Cycle) -> Iterator[Finding]:
     for places, _ in cycle.at.causes.of("stuck").values():
         places = places[cycle.at.arrays["status"][places] == Status.ZERO_SLIP]
         if len(places):
-            yield Finding.note(
-                "friction.sense",
-                "joints",
-                f"a joint with friction reverses {cycle.at.dial.intervals(places)} while its pin "
-                "moves within its play: friction may act either way there, and the seat changes with "
-                "it",
-                at=cycle.at.dial.intervals(places),
-            )
+            what = f"a joint with friction reverses {cycle.at.dial.intervals(places)} while its pin moves within its "
+            what += "play: friction may act either way there, and the seat changes with it"
+            yield Finding.note("friction.sense", "joints", what, at=cycle.at.dial.intervals(places))
 
 
 def _singular(cycle: Cycle) -> Iterator[Finding]:
@@ -307,14 +268,10 @@ def _singular(cycle: Cycle) -> Iterator[Finding]:
     for number, (places, _) in cycle.at.causes.of("singular").items():
         module = cycle.run.system.plan.modules[number]
         kind = "dead centre (singular position)" if module.rank == CLASS_TWO else "singular position"
-        yield Finding.error(
-            "position.singular",
-            f"links {', '.join(module.links)}",
-            f"{kind} {cycle.at.dial.intervals(places)}: condition number {_most(condition[places]):.3g}",
-            "speeds have no finite value there, nor have forces without friction; limit the range of the driver",
-            at=cycle.at.dial.intervals(places),
-            condition=_most(condition[places]),
-        )
+        what = f"{kind} {cycle.at.dial.intervals(places)}: condition number {_shown(condition[places])}"
+        remedy = "speeds have no finite value there, nor have forces without friction; limit the range of the driver"
+        figures = {"at": cycle.at.dial.intervals(places), "condition": _most(condition[places])}
+        yield Finding.error("position.singular", f"links {', '.join(module.links)}", what, remedy, **figures)
 
 
 def _undefined(cycle: Cycle) -> Iterator[Finding]:
@@ -361,27 +318,25 @@ def _badly_solved(cycle: Cycle) -> Iterator[Finding]:
     """Positions whose friction does not converge, and such as are close to singular."""
     status, condition, dial = cycle.at.arrays["status"], cycle.at.arrays["condition"], cycle.at.dial
     if len(late := np.flatnonzero(status == Status.NOT_CONVERGED)):
-        yield Finding.error(
-            "friction.not_converged",
-            "joints",
-            f"the friction iteration did not converge {dial.intervals(late)}",
-            "use the Newton method, a larger criterion or more iterations",
-            at=dial.intervals(late),
-        )
+        what = f"the friction iteration did not converge {dial.intervals(late)}"
+        remedy = "use the Newton method, a larger criterion or more iterations"
+        yield Finding.error("friction.not_converged", "joints", what, remedy, at=dial.intervals(late))
     if len(close := np.flatnonzero(status == Status.NEAR_SINGULAR)):
-        yield Finding.warning(
-            "position.near_singular",
-            "links",
-            f"close to a dead centre {dial.intervals(close)}: condition number up to {_most(condition[close]):.3g}",
-            "forces there depend strongly on small changes of the dimensions",
-            at=dial.intervals(close),
-            condition=_most(condition[close]),
-        )
+        what = f"close to a dead centre {dial.intervals(close)}: condition number up to {_shown(condition[close])}"
+        remedy = "forces there depend strongly on small changes of the dimensions"
+        figures = {"at": dial.intervals(close), "condition": _most(condition[close])}
+        yield Finding.warning("position.near_singular", "links", what, remedy, **figures)
 
 
 def _most(values: Array) -> float:
     """The largest; ∞ if any has no value."""
     return float(np.max(values)) if len(values) and np.all(np.isfinite(values)) else np.inf
+
+
+def _shown(values: Array) -> str:
+    """The largest in words."""
+    most = _most(values)
+    return f"{most:.3g}" if np.isfinite(most) else "∞"
 
 
 def _resting(cycle: Cycle) -> Iterator[Finding]:
@@ -414,15 +369,10 @@ def _resting(cycle: Cycle) -> Iterator[Finding]:
             where = at.dial.intervals(places)
             resting = f"{', '.join(joints)} {agreeing(len(joints), 'is', 'are')} "
             resting += f"{'' if 'between' in where else 'momentarily '}at rest {where}"
-            yield Finding.note(
-                "friction.interval",
-                f"joints.{', '.join(joints)}",
-                f"{resting}; friction may act either way there{': ' * bool(bounds)}{bounds}",
-                "the bounds are in drive_effort_lower and drive_effort_upper",
-                joints=joints,
-                at=where,
-                efforts=widest,
-            )
+            what = f"{resting}; friction may act either way there{': ' * bool(bounds)}{bounds}"
+            remedy = "the bounds are in drive_effort_lower and drive_effort_upper"
+            figures = {"joints": joints, "at": where, "efforts": widest}
+            yield Finding.note("friction.interval", f"joints.{', '.join(joints)}", what, remedy, **figures)
 
 
 def _ranges(cycle: Cycle) -> Iterator[Finding]:
@@ -448,13 +398,9 @@ def _no_common_period(cycle: Cycle) -> Iterator[Finding]:
     several = len(spans) > 1 or cycle.mechanism.gears or run.cycle.advances
     if several and not run.cycle.periodic and spans and all(span.periodic for span in spans):
         whom = "drivers" if len(spans) > 1 else f"driver and the {'gears' if cycle.mechanism.gears else 'threads'}"
-        yield Finding.warning(
-            "cycle.not_common",
-            "drivers",
-            f"the {whom} have no common period; the cycle is the longest period, {run.cycle.duration:g} s",
-            "means and efficiency are over that time; choose speeds with a common period, or ranges",
-            duration=run.cycle.duration,
-        )
+        what = f"the {whom} have no common period; the cycle is the longest period, {run.cycle.duration:g} s"
+        remedy = "means and efficiency are over that time; choose speeds with a common period, or ranges"
+        yield Finding.warning("cycle.not_common", "drivers", what, remedy, duration=run.cycle.duration)
 
 
 # ---- loads and springs ----------------------------------------------------------------------------------------
@@ -476,13 +422,9 @@ def _driving_resistances(cycle: Cycle) -> Iterator[Finding]:
         floor = max(RESOLVED * courses.sizes[row], scales_of(run).floor("N m" if path.endswith("torque") else "N"))
         places = [cycle.between(*ends) for ends in courses.below([row], floor)]
         if places:
-            yield Finding.warning(
-                "load.drives",
-                path,
-                f"this resistance is negative {listed(places)}: it drives the joint",
-                "use max(0 N, …), or a load with a sign",
-                at=listed(places),
-            )
+            what = f"this resistance is negative {listed(places)}: it drives the joint"
+            remedy = "use max(0 N, …), or a load with a sign"
+            yield Finding.warning("load.drives", path, what, remedy, at=listed(places))
 
 
 def _springs(cycle: Cycle) -> Iterator[Finding]:
@@ -498,39 +440,27 @@ def _springs(cycle: Cycle) -> Iterator[Finding]:
             before, after = elongation.sides(0)
             jumps = np.flatnonzero(np.abs(after - before) > np.pi)
             if len(jumps):
-                yield Finding.warning(
-                    "spring.jump",
-                    where,
-                    f"its torque jumps at {cycle.place(float(courses.edges[1 + jumps[0]]))}, where its "
-                    "angle passes half a turn from the free angle",
-                    "whole turns are not counted in this joint",
-                    at=cycle.place(float(courses.edges[1 + jumps[0]])),
-                )
+                what = f"its torque jumps at {cycle.place(float(courses.edges[1 + jumps[0]]))}, where its angle "
+                what += "passes half a turn from the free angle"
+                remedy = "whole turns are not counted in this joint"
+                figures = {"at": cycle.place(float(courses.edges[1 + jumps[0]]))}
+                yield Finding.warning("spring.jump", where, what, remedy, **figures)
         if spring.only is not None:
             sign = 1.0 if spring.only == "pull" else -1.0
             most = elongation.extreme(lambda rows: rows[0], sign)
             if most is not None and sign * most.value < 0:
                 end, nearest = "longest" if spring.only == "pull" else "shortest", free + most.value
-                yield Finding.warning(
-                    "spring.never_acts",
-                    where,
-                    f"never acts: its {end} length is {readable(nearest, 'm')}, its free length {readable(free, 'm')}, "
-                    f"and it can only {spring.only}",
-                    "move its ends, or change its free length or the motion, if it is to act",
-                    free=free,
-                    nearest=nearest,
-                )
+                what = f"never acts: its {end} length is {readable(nearest, 'm')}, its free length "
+                what += f"{readable(free, 'm')}, and it can only {spring.only}"
+                remedy = "move its ends, or change its free length or the motion, if it is to act"
+                yield Finding.warning("spring.never_acts", where, what, remedy, free=free, nearest=nearest)
         if spring.between is not None and spring.only != "pull" and (free or preload):
             least, most = (elongation.extreme(lambda rows: rows[0], sign) for sign in (-1.0, 1.0))
             if least is not None and most is not None and least.value + free <= MEETS * (most.value + free):
-                yield Finding.warning(
-                    "spring.turned_round",
-                    where,
-                    f"its ends pass each other at {cycle.place(least.time)}: its length falls to about 0, "
-                    "and its force reverses",
-                    "move one end along its line, with the free length, so that they stay apart",
-                    at=cycle.place(least.time),
-                )
+                what = f"its ends pass each other at {cycle.place(least.time)}: its length falls to about 0, and its "
+                what += "force reverses"
+                remedy = "move one end along its line, with the free length, so that they stay apart"
+                yield Finding.warning("spring.turned_round", where, what, remedy, at=cycle.place(least.time))
 
 
 def _idle_loads(cycle: Cycle) -> Iterator[Finding]:
@@ -539,15 +469,10 @@ def _idle_loads(cycle: Cycle) -> Iterator[Finding]:
     course = cycle.course
     useful = cycle.at.arrays["useful_power"] if course is None else course.picked("useful_power").coefficients
     if marked and np.all(np.isfinite(useful)) and not np.any(useful):
-        yield Finding.warning(
-            "load.no_power",
-            "loads",
-            f"{', '.join(marked)} {agreeing(len(marked), 'is', 'are')} useful, but "
-            f"{agreeing(len(marked), 'takes', 'take')} no power at any position",
-            "check its size and where it acts, or that its joint moves in the sense of only: …",
-            loads=marked,
-            count=len(marked),
-        )
+        what = f"{', '.join(marked)} {agreeing(len(marked), 'is', 'are')} useful, but "
+        what += f"{agreeing(len(marked), 'takes', 'take')} no power at any position"
+        remedy = "check its size and where it acts, or that its joint moves in the sense of only: …"
+        yield Finding.warning("load.no_power", "loads", what, remedy, loads=marked, count=len(marked))
 
 
 def beside_the_drive(mechanism: Mechanism) -> list[str]:
@@ -573,39 +498,24 @@ def _uncounted_work(cycle: Cycle) -> Iterator[Finding]:
     if above:
         work = work or dict([max(every.items(), key=lambda item: item[1])])
         supplies = ", ".join(f"{name} {readable(value, 'J')}" for name, value in work.items())
-        yield Finding.warning(
-            "efficiency.above_one",
-            "",
-            f"the efficiency of the cycle is {means.efficiency:.4g}, above 1: the drive supplies "
-            f"{readable(drive, 'J')}, beside it {supplies}",
-            "work beside the drive is not counted as input; leave out a load that stands for the drive itself",
-            efficiency=means.efficiency,
-            drive=drive,
-            work=work,
-        )
+        what = f"the efficiency of the cycle is {means.efficiency:.4g}, above 1: the drive supplies "
+        what += f"{readable(drive, 'J')}, beside it {supplies}"
+        remedy = "work beside the drive is not counted as input; leave out a load that stands for the drive itself"
+        figures = {"efficiency": means.efficiency, "drive": drive, "work": work}
+        yield Finding.warning("efficiency.above_one", "", what, remedy, **figures)
         return
     for name in storing:
         if (stored := -every[f"spring {name}"]) > MUCH * drive > 0:
-            yield Finding.note(
-                "spring.stores",
-                f"springs.{name}",
-                f"at the end of the range it has stored {readable(stored, 'J')} of the "
-                f"{readable(drive, 'J')} that the drive supplies; the efficiency counts them as lost",
-                "mark it useful: true if it stands for the work",
-                stored=stored,
-                drive=drive,
-            )
+            what = f"at the end of the range it has stored {readable(stored, 'J')} of the {readable(drive, 'J')} that "
+            what += "the drive supplies; the efficiency counts them as lost"
+            remedy = "mark it useful: true if it stands for the work"
+            yield Finding.note("spring.stores", f"springs.{name}", what, remedy, stored=stored, drive=drive)
     for name in beside:
         if (supplied := work.get(f"load {name}")) is not None:
-            yield Finding.note(
-                "load.not_counted",
-                f"loads.{name}",
-                f"beside the drive, which supplies {readable(drive, 'J')}, this load supplies "
-                f"{readable(supplied, 'J')} over the cycle; the efficiency does not count it as input",
-                "leave out a load that stands for the drive itself, such as the force of a hand",
-                work=supplied,
-                drive=drive,
-            )
+            what = f"beside the drive, which supplies {readable(drive, 'J')}, this load supplies "
+            what += f"{readable(supplied, 'J')} over the cycle; the efficiency does not count it as input"
+            remedy = "leave out a load that stands for the drive itself, such as the force of a hand"
+            yield Finding.note("load.not_counted", f"loads.{name}", what, remedy, work=supplied, drive=drive)
 
 
 def _work(cycle: Cycle, means: Means) -> dict[str, float]:
@@ -635,14 +545,11 @@ def _beside_gaps(cycle: Cycle) -> Iterator[Finding]:
     for i, name in enumerate(cycle.mechanism.drivers):
         largest = course.extreme("drive_effort", i, of=magnitude)
         if largest is not None and course.beside(largest, Status.CONTACT_LOST):
-            yield Finding.note(
-                "effort.beside_gap",
-                f"drivers.{name}",
-                f"the largest effort, at {course.told(largest).removeprefix('at ')}, is where pins "
-                "begin or end to cross their play; while they cross it is not known",
-                "see `trunnion simulate` for the forces of pins that cross their play",
-                at=course.told(largest).removeprefix("at "),
-            )
+            what = f"the largest effort, at {course.told(largest).removeprefix('at ')}, is where pins begin or end to "
+            what += "cross their play; while they cross it is not known"
+            remedy = "see `trunnion simulate` for the forces of pins that cross their play"
+            figures = {"at": course.told(largest).removeprefix("at ")}
+            yield Finding.note("effort.beside_gap", f"drivers.{name}", what, remedy, **figures)
 
 
 def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
@@ -666,13 +573,9 @@ def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
             places = [f"at {cycle.place(cross.time)}{ENDS[cross.end.place]}" for cross in crossings]
             lost.setdefault((part, listed(places)), []).append(joint)
         elif seat.given is None and loads.largest > 0 and all(end.seat.joint != joint for end, _ in loads.pressed):
-            yield Finding.note(
-                "seat.unloaded",
-                f"joints.{joint}",
-                f"the {part} carries no load: it is at the middle of its play",
-                "state the seat, or seat: free",
-                part=part,
-            )
+            what = f"the {part} carries no load: it is at the middle of its play"
+            remedy = "state the seat, or seat: free"
+            yield Finding.note("seat.unloaded", f"joints.{joint}", what, remedy, part=part)
         if halts:
             spans = _joined(halts, APART * run.cycle.duration)
             lifted.setdefault((part, listed([cycle.between(*span) for span in spans])), []).append(joint)
@@ -697,44 +600,31 @@ def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
                 f"; elsewhere {'their largest' if several else 'its'} contact-loss number is at most {number:.3g} "
             )
             remedy += f"rad/(N s), {turning} (impact is likely from {contact_loss.EARLES_WU:g}: Earles and Wu)"
-        yield Finding.warning(
-            "contact.lost",
-            f"joints.{', '.join(names)}",
-            what,
-            remedy,
-            part=part,
-            at=text,
-            least=least,
-            peak=nearest.peak,
-            number=number,
-        )
+        figures = {"part": part, "at": text, "least": least, "peak": nearest.peak, "number": number}
+        yield Finding.warning("contact.lost", f"joints.{', '.join(names)}", what, remedy, **figures)
     for (part, text), names in lifted.items():
-        yield Finding.warning(
-            "contact.lifted",
-            f"joints.{', '.join(names)}",
-            f"the {part}{agreeing(len(names), '', 's')} {agreeing(len(names), 'lifts', 'lift')} "
-            f"off the wall {text}: the inertia force of {agreeing(len(names), 'its', 'their')} "
-            "motion within the play exceeds the load",
-            "forces there are those of a pin that stays in contact",
-            part=part,
-            at=text,
-            count=len(names),
-        )
+        what = f"the {part}{agreeing(len(names), '', 's')} {agreeing(len(names), 'lifts', 'lift')} off the wall "
+        what += f"{text}: the inertia force of {agreeing(len(names), 'its', 'their')} motion within the play exceeds "
+        what += "the load"
+        remedy = "forces there are those of a pin that stays in contact"
+        figures = {"part": part, "at": text, "count": len(names)}
+        yield Finding.warning("contact.lifted", f"joints.{', '.join(names)}", what, remedy, **figures)
+    yield from _unsettled(cycle, seating)
+
+
+def _unsettled(cycle: Cycle, seating: Seating) -> Iterator[Finding]:
+    """Pins whose seat does not come to rest."""
+    at, joints = cycle.at, list(cycle.run.system.joints)
     unsettled = (at.arrays["contact_lost"] > 0) & (seating.states(at.time) == UNSETTLED)
     for i in np.flatnonzero(np.any(unsettled, axis=1)):
         intervals = at.dial.intervals(np.flatnonzero(unsettled[i]))
         change = np.max(at.arrays["seat_change"][unsettled[i]])
-        yield Finding.warning(
-            "seat.unsettled",
-            f"joints.{joints[i]}",
-            f"the seat did not converge in {SEAT_ROUNDS} iterations {intervals}: it still changes "
-            f"by {change:.2g} times the clearance, for the load turns as the pin moves, as where "
-            "a tool touches the work for only one of two positions of a pin",
-            "the pin floats there: treat it as loss of contact",
-            rounds=SEAT_ROUNDS,
-            at=intervals,
-            change=change,
-        )
+        what = f"the seat did not converge in {SEAT_ROUNDS} iterations {intervals}: it still changes by {change:.2g} "
+        what += "times the clearance, for the load turns as the pin moves, as where a tool touches the work for only "
+        what += "one of two positions of a pin"
+        remedy = "the pin floats there: treat it as loss of contact"
+        figures = {"rounds": SEAT_ROUNDS, "at": intervals, "change": change}
+        yield Finding.warning("seat.unsettled", f"joints.{joints[i]}", what, remedy, **figures)
 
 
 def _unloaded(cycle: Cycle, loads: EndLoads) -> Iterator[Finding]:
@@ -744,15 +634,11 @@ def _unloaded(cycle: Cycle, loads: EndLoads) -> Iterator[Finding]:
         ends = ranges.setdefault(cycle.between(low, high), {})
         ends[end.seat.joint] = "" if end.seat.joint in ends else ENDS[end.place]
     for text, ends in ranges.items():
-        yield Finding.note(
-            "contact.unloaded",
-            "joints",
-            f"no load presses the pins of {', '.join([name + end for name, end in ends.items()])} "
-            f"{text}: they float in their play, and positions there are not valid",
-            "expect impact where the load sets in",
-            joints=[name + end for name, end in ends.items()],
-            at=text,
-        )
+        what = f"no load presses the pins of {', '.join([name + end for name, end in ends.items()])} {text}: they "
+        what += "float in their play, and positions there are not valid"
+        remedy = "expect impact where the load sets in"
+        figures = {"joints": [name + end for name, end in ends.items()], "at": text}
+        yield Finding.note("contact.unloaded", "joints", what, remedy, **figures)
 
 
 def _joined(spans: Sequence[tuple[float, float]], apart: float) -> list[tuple[float, float]]:
@@ -787,20 +673,18 @@ def _moved_jumps(cycle: Cycle) -> Iterator[Finding]:
             top, built, meant = max(tops, key=lambda top: top[0].value)
             rest = course.extreme("drive_effort_change", i, of=magnitude, panels=left)
             places = [course.told(Place(0.0, float(edges[k + 1]))) for k in (built, meant)]
-            yield Finding.note(
-                "errors.jump_moved",
-                f"drivers.{name}",
-                f"the change by the errors at {course.told(top).removeprefix('at ')} is that of a "
-                f"jump whose place they move: with them it is {places[0]}, without them {places[1]}; "
-                "elsewhere the effort changes by at most "
-                f"{readable(rest.value if rest else 0.0, unit)}",
-                "compare the extremes with and without errors, not single positions beside the jump",
-                at=course.told(top).removeprefix("at "),
-                built=places[0],
-                meant=places[1],
-                rest=rest.value if rest else 0.0,
-                unit=unit,
-            )
+            what = f"the change by the errors at {course.told(top).removeprefix('at ')} is that of a jump whose place "
+            what += f"they move: with them it is {places[0]}, without them {places[1]}; elsewhere the effort changes "
+            what += f"by at most {readable(rest.value if rest else 0.0, unit)}"
+            remedy = "compare the extremes with and without errors, not single positions beside the jump"
+            figures = {
+                "at": course.told(top).removeprefix("at "),
+                "built": places[0],
+                "meant": places[1],
+                "rest": rest.value if rest else 0.0,
+                "unit": unit,
+            }
+            yield Finding.note("errors.jump_moved", f"drivers.{name}", what, remedy, **figures)
 
 
 def _moved(jumps: Array, without: Array, least: float, edges: Array) -> Iterator[tuple[int, int]]:

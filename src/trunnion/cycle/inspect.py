@@ -73,17 +73,11 @@ def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
     rank = run.determinacy.mobility if run.determinacy else _rank(walk)
     if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:
-        found.append(
-            Finding.warning(
-                "mobility.special",
-                "joints",
-                f"the mobility is {run.system.plan.mobility} by Grübler's formula and {rank} by the "
-                "rank of the constraints",
-                "the geometry is special: reactions or motion are not determined",
-                formula=run.system.plan.mobility,
-                rank=rank,
-            )
-        )
+        what = f"the mobility is {run.system.plan.mobility} by Grübler's formula and {rank} by the rank of the "
+        what += "constraints"
+        remedy = "the geometry is special: reactions or motion are not determined"
+        figures = {"formula": run.system.plan.mobility, "rank": rank}
+        found.append(Finding.warning("mobility.special", "joints", what, remedy, **figures))
     found += [*shared_dimensions(mechanism), *_unplaced(run)]
     order = list(Severity)
     found.sort(key=lambda finding: order.index(finding.severity))

@@ -120,32 +120,18 @@ def _notes(run: Run) -> list[Finding]:
     """What the states leave out: seats of pins; loads that move them."""
     notes = []
     if run.seats:
-        notes.append(
-            Finding.note(
-                "locking.pins_centred",
-                "joints",
-                f"locking takes the seats of {', '.join([seat.joint for seat in run.seats])} for the "
-                "margin and for where it locks forward; all else is of pins in the middle of their "
-                "play: the other states and their ranges, the motion backward, critical multiples of "
-                "single joints",
-                joints=[seat.joint for seat in run.seats],
-            )
-        )
+        what = f"locking takes the seats of {', '.join([seat.joint for seat in run.seats])} for the margin and for "
+        what += "where it locks forward; all else is of pins in the middle of their play: the other states and their "
+        what += "ranges, the motion backward, critical multiples of single joints"
+        notes.append(Finding.note("locking.pins_centred", "joints", what, joints=[seat.joint for seat in run.seats]))
     mechanism = run.system.mechanism
     beside = beside_the_drive(mechanism) if rubbing(run.system) else []
     if beside:
-        notes.append(
-            Finding.note(
-                "locking.load_beside_drive",
-                "loads",
-                f"{', '.join(beside)} {agreeing(len(beside), 'acts', 'act')} on a driven link beside "
-                f"the drive and {agreeing(len(beside), 'is', 'are')} not useful: backward "
-                f"{agreeing(len(beside), 'it acts', 'they act')} too, which moves the ranges",
-                "leave out a load that stands for the drive itself, such as the force of a hand",
-                loads=beside,
-                count=len(beside),
-            )
-        )
+        what = f"{', '.join(beside)} {agreeing(len(beside), 'acts', 'act')} on a driven link beside the drive and "
+        what += f"{agreeing(len(beside), 'is', 'are')} not useful: backward "
+        what += f"{agreeing(len(beside), 'it acts', 'they act')} too, which moves the ranges"
+        remedy = "leave out a load that stands for the drive itself, such as the force of a hand"
+        notes.append(Finding.note("locking.load_beside_drive", "loads", what, remedy, loads=beside, count=len(beside)))
     return notes
 
 

@@ -314,29 +314,21 @@ WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
 def _unbalanced(found: Found) -> Iterator[Finding]:
     if found.share > WORST:
-        yield Finding.warning(
-            "simulate.energy",
-            "",
-            f"works and energies differ by {found.share:.2g} of the energy turned over",
-            "ask for a smaller --tolerance",
-            share=found.share,
-        )
+        what = f"works and energies differ by {found.share:.2g} of the energy turned over"
+        remedy = "ask for a smaller --tolerance"
+        yield Finding.warning("simulate.energy", "", what, remedy, share=found.share)
 
 
 def _undefined(books: Books) -> Iterator[Finding]:
     """Rows of a motion that goes on, without forces."""
     rows = np.flatnonzero(books.arrays["status"] == Status.LOAD_UNDEFINED)
     if len(rows):
-        yield Finding.error(
-            "simulate.undefined",
-            "loads",
-            f"a load or spring has no value in {counted(len(rows), 'row')} of the result, first "
-            f"at {readable(float(books.time[rows[0]]), 's')}: there are no forces there",
-            "extend its tables, check divisions and roots; the line of a spring has no direction "
-            "where its ends coincide",
-            count=len(rows),
-            time=float(books.time[rows[0]]),
-        )
+        what = f"a load or spring has no value in {counted(len(rows), 'row')} of the result, first at "
+        what += f"{readable(float(books.time[rows[0]]), 's')}: there are no forces there"
+        remedy = "extend its tables, check divisions and roots; the line of a spring has no direction where its ends "
+        remedy += "coincide"
+        figures = {"count": len(rows), "time": float(books.time[rows[0]])}
+        yield Finding.error("simulate.undefined", "loads", what, remedy, **figures)
 
 
 # ---- findings -------------------------------------------------------------------------------------------------
@@ -350,13 +342,9 @@ def motion_findings(
     yield from (one for one in motion.run.chosen.findings if one.code != "assembly.change_point")
     centred = [one.joint for one in motion.run.seats]
     if centred:
-        yield Finding.note(
-            "simulate.centred",
-            "",
-            f"pins of {', '.join(centred)} are taken in the middle of their holes: a seat that "
-            "follows the load is left out",
-            joints=centred,
-        )
+        what = f"pins of {', '.join(centred)} are taken in the middle of their holes: a seat that follows the load is "
+        what += "left out"
+        yield Finding.note("simulate.centred", "", what, joints=centred)
     yield from _of_contacts(motion, run, impacts)
     for code, figures in solution.notes.items():
         if code == "simulate.several_accelerations":
@@ -370,15 +358,9 @@ def motion_findings(
             what += f"lowered there, to {figures['share']:.3g} of itself at the most"
             yield Finding.note("simulate.restitution_lowered", "joints", what, **figures)
     if passed := [event.time for event in solution.events if event.kind == "change-point"]:
-        yield Finding.warning(
-            "simulate.passed",
-            "assembly",
-            f"change points are passed {counted(len(passed), 'time')}, first at "
-            f"{readable(passed[0], 's')}, with the velocities that the links have: reactions have "
-            "no bound there, so that no largest ones are told",
-            times=len(passed),
-            time=passed[0],
-        )
+        what = f"change points are passed {counted(len(passed), 'time')}, first at {readable(passed[0], 's')}, with "
+        what += "the velocities that the links have: reactions have no bound there, so that no largest ones are told"
+        yield Finding.warning("simulate.passed", "assembly", what, times=len(passed), time=passed[0])
     name = next(iter(_shown(motion, run)), next(iter(system.mechanism.drivers)))
     effort = effort_units(system)[list(system.mechanism.drivers).index(name)]
     yield from _locks(motion, solution)
@@ -454,32 +436,21 @@ def _locks(motion: FreeMotion, solution: Solution) -> Iterator[Finding]:
     locks = [one for one in solution.events if one.kind == "lock"]
     if not motion.resisted:
         for event in locks:
-            yield Finding.warning(
-                "simulate.locks",
-                f"drivers.{event.of}",
-                f"the mechanism locks as it runs, at {readable(event.time, 's')}: it stops at once, "
-                f"and loses {readable(event.figure, 'J')}",
-                "see `trunnion locking` for where and by how much",
-                time=event.time,
-                energy=event.figure,
-            )
+            what = f"the mechanism locks as it runs, at {readable(event.time, 's')}: it stops at once, and loses "
+            what += f"{readable(event.figure, 'J')}"
+            remedy = "see `trunnion locking` for where and by how much"
+            figures = {"time": event.time, "energy": event.figure}
+            yield Finding.warning("simulate.locks", f"drivers.{event.of}", what, remedy, **figures)
     elif locks:
         joints, energy = list(dict.fromkeys(one.of for one in locks)), float(np.nansum([one.figure for one in locks]))
         times = len({one.time for one in locks})
-        yield Finding.warning(
-            "simulate.joints_lock",
-            f"joints.{joints[0]}",
-            f"{', '.join(joints)} {agreeing(len(joints), 'locks', 'lock')} as the mechanism runs, "
-            f"{counted(times, 'time')}, first at {readable(locks[0].time, 's')}: "
-            f"{agreeing(len(joints), 'it stops', 'they stop')} at once, {readable(energy, 'J')} "
-            "is lost, and what is still free moves on",
-            "see `trunnion locking` for where and by how much",
-            joints=joints,
-            count=len(joints),
-            times=times,
-            time=locks[0].time,
-            energy=energy,
-        )
+        what = f"{', '.join(joints)} {agreeing(len(joints), 'locks', 'lock')} as the mechanism runs, "
+        what += f"{counted(times, 'time')}, first at {readable(locks[0].time, 's')}: "
+        what += f"{agreeing(len(joints), 'it stops', 'they stop')} at once, {readable(energy, 'J')} is lost, and what "
+        what += "is still free moves on"
+        remedy = "see `trunnion locking` for where and by how much"
+        figures = {"count": len(joints), "times": times, "time": locks[0].time, "energy": energy}
+        yield Finding.warning("simulate.joints_lock", f"joints.{joints[0]}", what, remedy, joints=joints, **figures)
 
 
 def _rests(motion: FreeMotion, solution: Solution, name: str, effort: str) -> Iterator[Finding]:
@@ -548,46 +519,34 @@ def _of_contacts(motion: FreeMotion, run: Run, impacts: Sequence[Impact]) -> Ite
         slow = [impact for impact in own if impact.approach < SLOWEST]
         lost, whole = (sum(impact.loss for impact in some) for some in (slow, own))
         if len(slow) > FEW and lost > DIFFERS * whole:
-            yield Finding.note(
-                "simulate.slow_onsets",
-                f"joints.{one.joint}.contact",
-                f"{one.label}: {len(slow):.0f} of {len(own):.0f} contacts begin slower than "
-                f"{readable(SLOWEST, 'm/s')} and are treated as beginning at that speed; "
-                f"{lost / whole:.2%} of what the contact law loses is lost in them",
-                "compare with another restitution: the law is one of impacts, and tells little of slow pressing",
-                contact=one.label,
-                count=len(slow),
-                of=len(own),
-                slowest=SLOWEST,
-                share=lost / whole,
-            )
+            what = f"{one.label}: {len(slow):.0f} of {len(own):.0f} contacts begin slower than "
+            what += f"{readable(SLOWEST, 'm/s')} and are treated as beginning at that speed; {lost / whole:.2%} of "
+            what += "what the contact law loses is lost in them"
+            remedy = "compare with another restitution: the law is one of impacts, and tells little of slow pressing"
+            figures = {
+                "contact": one.label,
+                "count": len(slow),
+                "of": len(own),
+                "slowest": SLOWEST,
+                "share": lost / whole,
+            }
+            yield Finding.note("simulate.slow_onsets", f"joints.{one.joint}.contact", what, remedy, **figures)
         depth = max((impact.depth for impact in impacts if impact.label == one.label), default=0.0)
         if depth > one.clearance:
-            yield Finding.warning(
-                "simulate.soft",
-                f"joints.{one.joint}.contact",
-                f"{one.label}: the surfaces sink {readable(depth, 'm')} into each other, more than "
-                f"the clearance of {readable(one.clearance, 'm')}",
-                "check the stiffness of the contact; a contact law holds for small penetrations",
-                contact=one.label,
-                depth=depth,
-                clearance=one.clearance,
-            )
+            what = f"{one.label}: the surfaces sink {readable(depth, 'm')} into each other, more than the clearance "
+            what += f"of {readable(one.clearance, 'm')}"
+            remedy = "check the stiffness of the contact; a contact law holds for small penetrations"
+            figures = {"contact": one.label, "depth": depth, "clearance": one.clearance}
+            yield Finding.warning("simulate.soft", f"joints.{one.joint}.contact", what, remedy, **figures)
     for one in {one.joint: one for one in motion.contacts.each}.values():
         law = run.system.mechanism.effective_joints[one.joint].contact
         returned = restitution_of(one.factor)
         if law is not None and not law.of.rigid and abs(returned - one.restitution) > DIFFERS:
-            yield Finding.note(
-                "simulate.restitution",
-                f"joints.{one.joint}.contact",
-                f"{one.joint}: with a stated restitution of {one.restitution:.3g} the contact law "
-                f"{law.law} returns {returned:.3g}",
-                "state law: restitution to get back what is stated",
-                joint=one.joint,
-                law=law.law,
-                stated=one.restitution,
-                returned=returned,
-            )
+            what = f"{one.joint}: with a stated restitution of {one.restitution:.3g} the contact law {law.law} "
+            what += f"returns {returned:.3g}"
+            remedy = "state law: restitution to get back what is stated"
+            figures = {"joint": one.joint, "law": law.law, "stated": one.restitution, "returned": returned}
+            yield Finding.note("simulate.restitution", f"joints.{one.joint}.contact", what, remedy, **figures)
 
 
 def _holding(motion: FreeMotion, solution: Solution, stretch: Stretch) -> tuple[float, float]:

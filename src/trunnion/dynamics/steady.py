@@ -91,20 +91,14 @@ def _figures(found: SteadyCycle, each: Sequence[Repeated], missing: float) -> li
 
 def _findings(found: SteadyCycle, missing: float) -> Iterator[Finding]:
     if found.factor > 1.0 + INDIFFERENT:
-        yield Finding.warning(
-            "simulate.unstable",
-            f"drivers.{found.motion.names[found.first]}",
-            "the steady cycle is not stable: a difference from it grows by the factor "
-            f"{found.factor:.4g} with every cycle",
-            "run it without --steady to see how it leaves this cycle",
-            factor=found.factor,
-        )
+        what = f"the steady cycle is not stable: a difference from it grows by the factor {found.factor:.4g} with "
+        what += "every cycle"
+        remedy = "run it without --steady to see how it leaves this cycle"
+        where = f"drivers.{found.motion.names[found.first]}"
+        figures = {"factor": found.factor}
+        yield Finding.warning("simulate.unstable", where, what, remedy, **figures)
     if not missing <= DIFFERS:
-        yield Finding.error(
-            "simulate.cycle_differs",
-            "",
-            f"the cycle takes efforts that differ from those of the motors by up to {missing:.2g} "
-            "of the largest: it is not the motion that was found",
-            "run it without --steady to see the motion from its start",
-            share=missing,
-        )
+        what = f"the cycle takes efforts that differ from those of the motors by up to {missing:.2g} of the largest: "
+        what += "it is not the motion that was found"
+        remedy = "run it without --steady to see the motion from its start"
+        yield Finding.error("simulate.cycle_differs", "", what, remedy, share=missing)

@@ -152,34 +152,21 @@ def _why(motion: FreeMotion, solution: Solution, course: DriveCourse, first: int
     """Why there is no steady cycle, from the end of the longest run-up."""
     name, turns = motion.names[first], course.travel / TURN
     if not course.runs or solution.ended or solution.stretches[-1].resting:
-        none = Finding.error(
-            "simulate.not_round",
-            f"drivers.{name}",
-            f"there is no steady cycle: {name} makes {turns:.3g} turns in "
-            f"{readable(solution.end, 's')} and does not go round at the end",
-            "run it without --steady to see the start; give it more --time if it has not run up",
-            driver=name,
-            turns=turns,
-            time=solution.end,
-        )
+        what = f"there is no steady cycle: {name} makes {turns:.3g} turns in {readable(solution.end, 's')} and does "
+        what += "not go round at the end"
+        remedy = "run it without --steady to see the start; give it more --time if it has not run up"
+        figures = {"driver": name, "turns": turns, "time": solution.end}
+        none = Finding.error("simulate.not_round", f"drivers.{name}", what, remedy, **figures)
         return [none, *motion_findings(motion, solution, motion.run)]
     takes = [course.at(course.travel - k * TURN, course.time) for k in range(3)]
     before, last = (TURN / (takes[k] - takes[k + 1]) for k in (1, 0))
     where, change = f"drivers.{name}", last - before
-    return [
-        Finding.error(
-            "simulate.not_repeating",
-            where,
-            f"there is no steady cycle: the speed of {name}, {readable(last, 'rad/s')} after "
-            f"{readable(solution.end, 's')}, changes by {readable(change, 'rad/s')} a turn, and "
-            "no speed is found that comes back",
-            "check that its losses grow with the speed or that its motor's effort falls; or give it more --time",
-            driver=name,
-            speed=last,
-            change=change,
-            time=solution.end,
-        )
-    ]
+    what = f"there is no steady cycle: the speed of {name}, {readable(last, 'rad/s')} after "
+    what += f"{readable(solution.end, 's')}, changes by {readable(change, 'rad/s')} a turn, and no speed is found that "
+    what += "comes back"
+    remedy = "check that its losses grow with the speed or that its motor's effort falls; or give it more --time"
+    figures = {"driver": name, "speed": last, "change": change, "time": solution.end}
+    return [Finding.error("simulate.not_repeating", where, what, remedy, **figures)]
 
 
 @dataclass

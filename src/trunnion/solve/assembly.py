@@ -414,31 +414,14 @@ def _told_twice(walk: Forward, module: Module, named: int, placed: int | None) -
     links, (key, name) = list(module.links), next(iter(_names(walk.system, module).items()))
     where = f"assembly.{key}"
     if placed is None or placed == named:
-        return [
-            Finding.note(
-                "assembly.told_twice",
-                where,
-                f"the assembly mode of the links {', '.join(links)} is stated by name and by the "
-                f"place of {', '.join(places)}",
-                "one is enough",
-                links=links,
-                places=places,
-            )
-        ]
+        what = f"the assembly mode of the links {', '.join(links)} is stated by name and by the place of "
+        what += f"{', '.join(places)}"
+        return [Finding.note("assembly.told_twice", where, what, "one is enough", links=links, places=places)]
     way = way_name(placed)
-    return [
-        Finding.warning(
-            "assembly.contradiction",
-            where,
-            f"the assembly mode of the links {', '.join(links)} is stated by name, {name}, and by "
-            f"the place of {', '.join(places)}, which means {way}; the name is used",
-            "remove one of the two",
-            links=links,
-            places=places,
-            way=way,
-            name=name,
-        )
-    ]
+    what = f"the assembly mode of the links {', '.join(links)} is stated by name, {name}, and by the place of "
+    what += f"{', '.join(places)}, which means {way}; the name is used"
+    figures = {"links": links, "places": places, "way": way, "name": name}
+    return [Finding.warning("assembly.contradiction", where, what, "remove one of the two", **figures)]
 
 
 def _undecided(walk: Forward, module: Module, count: int, tied: Sequence[int] = (), difference: str = "") -> Finding:
@@ -472,46 +455,29 @@ def _undecided(walk: Forward, module: Module, count: int, tied: Sequence[int] = 
 
 
 def _anew(module: Module, dial: Dial, positions: Positions) -> Finding:
-    return Finding.warning(
-        "assembly.anew",
-        "links",
-        f"links {', '.join(module.links)} cannot stay assembled throughout the cycle "
-        f"and are assembled again {dial.intervals(positions)}",
-        "the assembly mode of the same sense nearest to the last one is used there; limit the range of the driver",
-        links=list(module.links),
-        at=dial.intervals(positions),
-    )
+    what = f"links {', '.join(module.links)} cannot stay assembled throughout the cycle and are assembled again "
+    what += f"{dial.intervals(positions)}"
+    remedy = "the assembly mode of the same sense nearest to the last one is used there; limit the range of the "
+    remedy += "driver"
+    figures = {"links": list(module.links), "at": dial.intervals(positions)}
+    return Finding.warning("assembly.anew", "links", what, remedy, **figures)
 
 
 def _never(system: System, module: Module) -> Finding:
     links = list(module.links)
     if not module.redundant:
-        return Finding.warning(
-            "assembly.never",
-            "links",
-            f"links {', '.join(links)} cannot be assembled at any position of the cycle",
-            "check the lengths, or give a better assembly hint",
-            links=links,
-        )
+        what = f"links {', '.join(links)} cannot be assembled at any position of the cycle"
+        remedy = "check the lengths, or give a better assembly hint"
+        return Finding.warning("assembly.never", "links", what, remedy, links=links)
     if system.mechanism.has_errors:
-        return Finding.warning(
-            "assembly.never_rigid",
-            "links",
-            f"links {', '.join(links)} with their errors do not close as rigid parts at any position of the cycle",
-            "they need play to fit together: see `trunnion assemble FILE` for how much",
-            links=links,
-        )
+        what = f"links {', '.join(links)} with their errors do not close as rigid parts at any position of the cycle"
+        remedy = "they need play to fit together: see `trunnion assemble FILE` for how much"
+        return Finding.warning("assembly.never_rigid", "links", what, remedy, links=links)
     plan, drivers = system.plan, len(system.mechanism.drivers)
     spinning = f" ({len(plan.passive)} of them spins of a single link)" if plan.passive else ""
-    return Finding.warning(
-        "assembly.over_constrained",
-        "links",
-        f"links {', '.join(links)} cannot be assembled at any position of the cycle; the "
-        f"mobility is {plan.mobility} by Grübler's formula{spinning} and the number of "
-        f"drivers {drivers}",
-        "check the lengths, or give a better assembly hint; so many constraints are "
-        "consistent with special dimensions only: remove a driver or free a joint",
-        links=links,
-        formula=plan.mobility,
-        drivers=drivers,
-    )
+    what = f"links {', '.join(links)} cannot be assembled at any position of the cycle; the mobility is "
+    what += f"{plan.mobility} by Grübler's formula{spinning} and the number of drivers {drivers}"
+    remedy = "check the lengths, or give a better assembly hint; so many constraints are consistent with special "
+    remedy += "dimensions only: remove a driver or free a joint"
+    figures = {"links": links, "formula": plan.mobility, "drivers": drivers}
+    return Finding.warning("assembly.over_constrained", "links", what, remedy, **figures)

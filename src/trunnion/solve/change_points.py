@@ -33,15 +33,10 @@ def finding(system: System, values: Values, module: Module, at: Sequence[Meeting
     links, joint = list(module.links), module.joints[1]
     alone = ", ".join(place for place in places if not place.startswith("between"))
     where = ", ".join([f"at {alone}"] * bool(alone) + [place for place in places if place.startswith("between")])
-    return Finding.error(
-        "assembly.change_point",
-        f"links {', '.join(links)}",
-        f"change point {where}: two assembly modes of the links {', '.join(links)} coincide there",
-        f"the motion beyond it is not determined; here {joint} stays on its side. Change a length, or limit the range "
-        "of the driver",
-        places=places,
-        links=links,
-    )
+    what = f"change point {where}: two assembly modes of the links {', '.join(links)} coincide there"
+    remedy = f"the motion beyond it is not determined; here {joint} stays on its side. Change a length, or limit the "
+    remedy += "range of the driver"
+    return Finding.error("assembly.change_point", f"links {', '.join(links)}", what, remedy, places=places, links=links)
 
 
 def suspects(margin: Array) -> NDArray[np.bool_]:

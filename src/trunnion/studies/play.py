@@ -285,24 +285,16 @@ def _findings(played: Played) -> Iterator[Finding]:
     if run.determinacy is not None:
         yield from run.determinacy.findings()
         if any(part.redundant for part in run.determinacy.parts):
-            yield Finding.warning(
-                "play.redundant",
-                "joints",
-                "constraints are redundant: the worst case is an upper bound, because pins constrain one another",
-                "the deviation assumes that each pin can be anywhere within its play",
-            )
+            what = "constraints are redundant: the worst case is an upper bound, because pins constrain one another"
+            remedy = "the deviation assumes that each pin can be anywhere within its play"
+            yield Finding.warning("play.redundant", "joints", what, remedy)
     yield from _left_out(run, played.inputs.loose)
     yield from _spinning(run, played.measures)
     if run.seats:
-        yield Finding.note(
-            "play.seats_not_taken",
-            "joints",
-            "play is relative to the middle of the holes: the worst case is over all positions "
-            "of the pins and does not use the seats of "
-            f"{', '.join(one.joint for one in run.seats)}",
-            "`trunnion analyse` has the deviation with these seats",
-            joints=[one.joint for one in run.seats],
-        )
+        what = "play is relative to the middle of the holes: the worst case is over all positions of the pins and "
+        what += f"does not use the seats of {', '.join(one.joint for one in run.seats)}"
+        remedy = "`trunnion analyse` has the deviation with these seats"
+        yield Finding.note("play.seats_not_taken", "joints", what, remedy, joints=[one.joint for one in run.seats])
     yield from _fits(run, played.inputs.loose)
     for i in range(len(played.measures)):
         yield from _limit(played, i)
@@ -313,25 +305,16 @@ def _findings(played: Played) -> Iterator[Finding]:
     for code in Status:
         where = np.flatnonzero(played.course.status == code)
         if code >= Status.NOT_CONVERGED and len(where):
-            yield Finding.error(
-                "play.no_answer",
-                "",
-                f"{code.text} {dial.intervals(where)}",
-                "the effect of play is undefined there",
-                at=dial.intervals(where),
-                status=code.text,
-            )
+            what = f"{code.text} {dial.intervals(where)}"
+            remedy = "the effect of play is undefined there"
+            yield Finding.error("play.no_answer", "", what, remedy, at=dial.intervals(where), status=code.text)
     for measure, effects, of in zip(played.measures, played.over_cycle, played.course.measures, strict=True):
         lost = np.any(np.isnan(effects.worst_case), axis=0) & np.isfinite(_nominal(of))
         where = np.flatnonzero(lost & (played.course.status < Status.SINGULAR))
         if len(where):
-            yield Finding.warning(
-                "play.no_answer",
-                f"measures.{measure.name}",
-                f"a magnitude that is 0 has no derivative {dial.intervals(where)}",
-                "the effect of play is undefined there",
-                at=dial.intervals(where),
-            )
+            what = f"a magnitude that is 0 has no derivative {dial.intervals(where)}"
+            remedy = "the effect of play is undefined there"
+            yield Finding.warning("play.no_answer", f"measures.{measure.name}", what, remedy, at=dial.intervals(where))
 
 
 def _left_out(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
@@ -345,24 +328,16 @@ def _left_out(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
     ]
     if stated:
         kinds = [f"{name} is {run.system.joints[name][0]}" for name in stated]
-        yield Finding.warning(
-            "play.left_out",
-            "joints",
-            f"the play of {', '.join(stated)} is left out ({', '.join(kinds)} joints)",
-            f"play is modelled in {', '.join(models)} joints",
-            joints=stated,
-        )
+        what = f"the play of {', '.join(stated)} is left out ({', '.join(kinds)} joints)"
+        remedy = f"play is modelled in {', '.join(models)} joints"
+        yield Finding.warning("play.left_out", "joints", what, remedy, joints=stated)
     toothed = sorted({
         joint for gear in mechanism.gears.values() if gear.teeth for joint in gear.joints if joint in loose
     })  # fmt: skip
     if toothed:
-        yield Finding.warning(
-            "play.gears",
-            "gears",
-            f"gears turn in {', '.join(toothed)}: the effect of this play on the tooth contact is left out",
-            "an offset e of a gear's centre across the line of centres turns the gear by e over its pitch radius",
-            joints=toothed,
-        )
+        what = f"gears turn in {', '.join(toothed)}: the effect of this play on the tooth contact is left out"
+        remedy = "an offset e of a gear's centre across the line of centres turns the gear by e over its pitch radius"
+        yield Finding.warning("play.gears", "gears", what, remedy, joints=toothed)
 
 
 def _fits(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
@@ -377,16 +352,11 @@ def _fits(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
             largest[name] = float(np.ravel(primal(own))[0])
     if largest:
         most = max(largest, key=largest.__getitem__)
-        yield Finding.note(
-            "play.mean_of_fits",
-            "fits",
-            f"the play of {', '.join(largest)} is the mean of their fits; the largest is "
-            f"{readable(largest[most], 'm')}, of {most}",
-            "--set fits=maximum takes the largest play",
-            joints=list(largest),
-            largest=largest[most],
-            most=most,
-        )
+        what = f"the play of {', '.join(largest)} is the mean of their fits; the largest is "
+        what += f"{readable(largest[most], 'm')}, of {most}"
+        remedy = "--set fits=maximum takes the largest play"
+        figures = {"joints": list(largest), "largest": largest[most], "most": most}
+        yield Finding.note("play.mean_of_fits", "fits", what, remedy, **figures)
 
 
 def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
@@ -395,14 +365,10 @@ def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
         for measure in measures:
             owner, _, point = measure.subject.partition(".")
             if owner == link and (measure.kind == "angle" or (measure.kind == "point" and point not in ends)):
-                yield Finding.warning(
-                    "play.spin",
-                    f"measures.{measure.name}",
-                    f"'{link}' can spin about the line {ends[0]}-{ends[1]}; this study sets that spin to zero",
-                    "measure one of these two points",
-                    link=link,
-                    points=list(ends),
-                )
+                what = f"'{link}' can spin about the line {ends[0]}-{ends[1]}; this study sets that spin to zero"
+                remedy = "measure one of these two points"
+                figures = {"link": link, "points": list(ends)}
+                yield Finding.warning("play.spin", f"measures.{measure.name}", what, remedy, **figures)
 
 
 def _limit(played: Played, i: int) -> Iterator[Finding]:

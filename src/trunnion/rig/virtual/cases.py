@@ -211,59 +211,46 @@ def findings_of(cases: Sequence[Case], channels: Mapping[str, SensorChannel], ri
             one = stopped[0]
             places = np.flatnonzero(one.true.status >= Status.NOT_CONVERGED)
             first = 360 * one.true.time[places[0]] / one.run.cycle.duration
-            yield Finding.warning(
-                "rig.no_answer",
-                where,
-                f"{_named(stopped)} left out: {status.text}; in condition {one.number} at "
-                f"{len(places)} of {counted(len(one.true.status), 'position')}, first at {first:.4g}° "
-                "of the cycle",
-                "run `trunnion analyse` with these values to see where in the cycle, and why",
-                status=status.text,
-                condition=one.number,
-                count=len(places),
-                positions=len(one.true.status),
-                first_deg=first,
-            )
+            what = f"{_named(stopped)} left out: {status.text}; in condition {one.number} at {len(places)} of "
+            what += f"{counted(len(one.true.status), 'position')}, first at {first:.4g}° of the cycle"
+            remedy = "run `trunnion analyse` with these values to see where in the cycle, and why"
+            figures = {
+                "status": status.text,
+                "condition": one.number,
+                "count": len(places),
+                "positions": len(one.true.status),
+                "first_deg": first,
+            }
+            yield Finding.warning("rig.no_answer", where, what, remedy, **figures)
     sound = [case for case in cases if case.worst.solved]
     if mended := [case for case in sound if case.true.mended]:
         most = max(case.true.mended for case in mended)
-        yield Finding.note(
-            "rig.load_at_rest",
-            where,
-            f"{_named(mended)}: a load has no unique value at up to {counted(most, 'position')}, "
-            "because its joint is at rest; sensors read 0 during a rest, and the mean of the "
-            "neighbours at a single position",
-            positions=most,
-        )
+        what = f"{_named(mended)}: a load has no unique value at up to {counted(most, 'position')}, because its joint "
+        what += "is at rest; sensors read 0 during a rest, and the mean of the neighbours at a single position"
+        yield Finding.note("rig.load_at_rest", where, what, positions=most)
     yield from _lost_pulses(sound, rig)
     yield from _both_ways(sound, rig)
     driver = next(iter(cases[0].run.system.mechanism.drivers))
     placed = rig.encoder or any(one.measures == f"rate:{driver}" for one in channels.values())
     if sound and not placed and speed_differs(sound):
-        yield Finding.error(
-            "rig.no_angle",
-            "encoder",
-            f"the conditions differ in speed, and no channel measures the angle of {driver}",
-            f"state an encoder, or a sensor of rate:{driver}",
-            driver=driver,
-        )
+        what = f"the conditions differ in speed, and no channel measures the angle of {driver}"
+        remedy = f"state an encoder, or a sensor of rate:{driver}"
+        yield Finding.error("rig.no_angle", "encoder", what, remedy, driver=driver)
     for i, (name, channel) in enumerate(channels.items()):
         peaks = {case.number: float(np.max(np.abs(case.true.values[i]))) for case in sound}
         clipped = [case for case in sound if peaks[case.number] > channel.limit]
         if clipped:
             key = "range" if channel.limit == channel.range else "span"
-            yield Finding.warning(
-                "rig.clipped",
-                f"sensors.{name}.{key}",
-                f"{_named(clipped)}: {channel.measures} reaches "
-                f"{readable(max(peaks.values()), channel.unit)}, beyond the range of "
-                f"{readable(channel.limit, channel.unit)}: readings are clipped",
-                "use a sensor with a larger range",
-                measures=channel.measures,
-                peak=max(peaks.values()),
-                unit=channel.unit,
-                limit=channel.limit,
-            )
+            what = f"{_named(clipped)}: {channel.measures} reaches {readable(max(peaks.values()), channel.unit)}, "
+            what += f"beyond the range of {readable(channel.limit, channel.unit)}: readings are clipped"
+            remedy = "use a sensor with a larger range"
+            figures = {
+                "measures": channel.measures,
+                "peak": max(peaks.values()),
+                "unit": channel.unit,
+                "limit": channel.limit,
+            }
+            yield Finding.warning("rig.clipped", f"sensors.{name}.{key}", what, remedy, **figures)
 
 
 def _both_ways(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
@@ -272,19 +259,12 @@ def _both_ways(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
     if len({case.drive(rig.rate.value)[1] > 0 for case in one_way}) < 2:
         return
     if rig.encoder is None:
-        yield Finding.error(
-            "rig.both_ways",
-            "encoder",
-            "the conditions turn in both directions, and no channel measures the angle of the driver",
-            "state an encoder of kind: count, or one rig for each direction",
-        )
+        what = "the conditions turn in both directions, and no channel measures the angle of the driver"
+        remedy = "state an encoder of kind: count, or one rig for each direction"
+        yield Finding.error("rig.both_ways", "encoder", what, remedy)
     elif rig.encoder.kind == "level":
-        yield Finding.error(
-            "rig.both_ways_level",
-            "encoder.kind",
-            "the conditions turn in both directions, which the level of an encoder does not distinguish",
-            "record kind: count",
-        )
+        what = "the conditions turn in both directions, which the level of an encoder does not distinguish"
+        yield Finding.error("rig.both_ways_level", "encoder.kind", what, "record kind: count")
 
 
 def speed_differs(cases: Sequence[Case]) -> bool:
@@ -317,12 +297,7 @@ def _lost_pulses(cases: Sequence[Case], rig: Rig) -> Iterator[Finding]:
     lost = [case for case in cases if 4 * peaks[case.number] * rig.encoder.per_turn > rig.rate.value * (1 + 1e-9)]
     if lost:
         most = max(peaks.values()) * rig.encoder.per_turn
-        yield Finding.warning(
-            "rig.pulses_lost",
-            "encoder.kind",
-            f"{_named(lost)}: some encoder pulses are lost: up to {most:.4g} pulses per second, "
-            f"sampled at {rig.rate.value:.4g} Hz",
-            "use a sampling rate of four times the pulse rate, or record kind: count",
-            pulses=most,
-            rate=rig.rate.value,
-        )
+        what = f"{_named(lost)}: some encoder pulses are lost: up to {most:.4g} pulses per second, sampled at "
+        what += f"{rig.rate.value:.4g} Hz"
+        remedy = "use a sampling rate of four times the pulse rate, or record kind: count"
+        yield Finding.warning("rig.pulses_lost", "encoder.kind", what, remedy, pulses=most, rate=rig.rate.value)

@@ -143,25 +143,14 @@ def _said(observation: Observation, sensors: tuple[Expected, ...], forecasts: li
     found = []
     for one in sensors:
         if one.share < SMALL_RANGE:
-            found.append(
-                Finding.note(
-                    "rig.range_wide",
-                    f"sensors.{one.sensor}.range",
-                    f"the readings use {100 * one.share:.2g} % of the range: errors in % of full scale dominate",
-                    "use a sensor with a smaller range",
-                    percent=100 * one.share,
-                )
-            )
+            what = f"the readings use {100 * one.share:.2g} % of the range: errors in % of full scale dominate"
+            remedy = "use a sensor with a smaller range"
+            figures = {"percent": 100 * one.share}
+            found.append(Finding.note("rig.range_wide", f"sensors.{one.sensor}.range", what, remedy, **figures))
         if 0 < one.steps < FEW_STEPS:
-            found.append(
-                Finding.note(
-                    "rig.steps_few",
-                    f"sensors.{one.sensor}.bits",
-                    f"the readings cover only {one.steps:.3g} steps of the converter",
-                    "use a converter with more bits, or a smaller span",
-                    steps=one.steps,
-                )
-            )
+            what = f"the readings cover only {one.steps:.3g} steps of the converter"
+            remedy = "use a converter with more bits, or a smaller span"
+            found.append(Finding.note("rig.steps_few", f"sensors.{one.sensor}.bits", what, remedy, steps=one.steps))
     measured = [one for one in forecasts if one.measured]
     off = [one for one in measured if one.measured and abs(one.bias) > one.measured.uncertainty]
     if off:
@@ -175,12 +164,7 @@ def _said(observation: Observation, sensors: tuple[Expected, ...], forecasts: li
         figures = {"count": len(off), "of": len(measured), "condition": worst.case.number, "bias": worst.bias}
         found.append(Finding.warning("rig.biased", "sensors", what, remedy, **figures))
     if not measured:
-        found.append(
-            Finding.note(
-                "rig.no_efficiency",
-                "sensors",
-                "the sensors do not measure input and output power: no efficiency is predicted",
-                "measure effort: and rate: of the driver, load: of a load on a joint and rate: of that joint",
-            )
-        )
+        what = "the sensors do not measure input and output power: no efficiency is predicted"
+        remedy = "measure effort: and rate: of the driver, load: of a load on a joint and rate: of that joint"
+        found.append(Finding.note("rig.no_efficiency", "sensors", what, remedy))
     return found

@@ -8,7 +8,7 @@ are not determined. What the joints carry in excess are the self-stresses, Jᵀ 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
 
@@ -263,19 +263,17 @@ class Determinacy:
                     findings.append(Finding.warning("mobility.redundant_least", "joints", what, remedy, **figures))
             if part.rubbing:
                 joints, constraints = list(part.rubbing), part.redundant
-                findings.append(
-                    Finding.error(
-                        "mobility.friction_open",
-                        "joints",
-                        "statics does not determine the forces on which the friction in the joints "
-                        f"{', '.join(joints)} depends",
-                        f"give the joints {counted(constraints, 'freedom')} more (cylindrical, spherical), "
-                        "state bearings on one line as one joint with pin.bearing (guide.length) from end to "
-                        "end, or friction: 0",
-                        joints=joints,
-                        constraints=constraints,
-                    )
-                )
+                what = "statics does not determine the forces on which the friction in the joints "
+                what += f"{', '.join(joints)} depends"
+                remedy = f"give the joints {counted(constraints, 'freedom')} more (cylindrical, spherical), state "
+                remedy += "bearings on one line as one joint with pin.bearing (guide.length) from end to end, or "
+                remedy += "friction: 0"
+                figures = {"joints": joints, "constraints": constraints}
+                findings.append(Finding.error("mobility.friction_open", "joints", what, remedy, **figures))
+        return [*findings, *self._spinning()]
+
+    def _spinning(self) -> Iterator[Finding]:
+        """Links that can spin about the line of their joints, and what would drag them."""
         for module in self.system.plan.modules:
             for link, *points in module.spinning:
                 where, drag = f"links.{link}", self.dragged.get(link)
@@ -283,13 +281,10 @@ class Determinacy:
                 remedy = "the analysis sets this spin to zero"
                 if drag is not None:
                     remedy += f"; friction of its joints would drag it with up to {readable(drag, 'N m')}"
-                findings.append(
-                    Finding.note("mobility.spin", where, what, remedy, link=link, points=points, torque=drag)
-                )
+                yield Finding.note("mobility.spin", where, what, remedy, link=link, points=points, torque=drag)
                 if link in self.spins:
                     what = f"the link '{link}' is free to spin about {points[0]}-{points[1]}, but a torque of up to "
                     what += f"{readable(self.spins[link], 'N m')} acts about that line"
                     remedy = "make the link symmetric about the line, or use a universal joint at one end"
                     figures = {"link": link, "points": points, "torque": self.spins[link]}
-                    findings.append(Finding.warning("mobility.spin_loaded", where, what, remedy, **figures))
-        return findings
+                    yield Finding.warning("mobility.spin_loaded", where, what, remedy, **figures)

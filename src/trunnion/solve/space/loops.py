@@ -391,12 +391,10 @@ def start_of(system: System, values: Values, ideal: Values, cycle: Cycle) -> tup
     if chosen.found[0]:
         return _ideal(system, ideal, chosen), list(chosen.findings)
     nearly = _followed(system, values, cycle)
-    misfit = Finding.note(
-        "assembly.misfit",
-        "links",
-        "the stated axes and lengths do not close the loops, even without the errors",
-        "errors count from the position with the smallest opening; state the difference as misalignment or errors",
-    )
+    what = "the stated axes and lengths do not close the loops, even without the errors"
+    remedy = "errors count from the position with the smallest opening; state the difference as misalignment or "
+    remedy += "errors"
+    misfit = Finding.note("assembly.misfit", "links", what, remedy)
     if nearly is None:
         what = f"{misfit.what}: the loops are not nearly closed at any position"
         raise MechanismError(Finding(what, "links", "check the lengths"))

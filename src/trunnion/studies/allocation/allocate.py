@@ -34,8 +34,8 @@ from trunnion.studies.allocation.rows import Rows, joined, part_of, rows_of
 from trunnion.studies.allocation.solve import Choice as Way
 from trunnion.studies.allocation.solve import solve, trade_off
 from trunnion.studies.tolerance.first_order import ToleranceStudy
+from trunnion.studies.tolerance.linear import limits
 from trunnion.studies.tolerance.study import DEFAULT_SAMPLES, Method, tolerance
-from trunnion.studies.tolerance.targets import limits
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -232,14 +232,9 @@ def _prices(found: ToleranceStudy) -> tuple[dict[str, Price], list[Finding]]:
             instead = f"state pin.clearance and a cost of {plays[0]}.clearance instead"
             what = f"it changes the play of {', '.join(plays)}; {instead}"
         if what:
-            findings.append(
-                Finding.warning(
-                    "allocation.not_for_sale",
-                    f"costs.{one.path}",
-                    f"this tolerance is not allocated: {what}",
-                    "remove the cost; the tolerance stays as stated",
-                )
-            )
+            what = f"this tolerance is not allocated: {what}"
+            remedy = "remove the cost; the tolerance stays as stated"
+            findings.append(Finding.warning("allocation.not_for_sale", f"costs.{one.path}", what, remedy))
         else:
             prices[one.path] = one
     if not prices:

@@ -82,13 +82,9 @@ def allocate_continuous(problem: AllocationProblem) -> Answer:
     price = np.zeros(len(problem.effects.worst))
     np.add.at(price, task.sides.row[point.rows], point.multipliers / task.sides.room[point.rows])
     proven = point.gap <= PROVEN
-    doubt = Finding.warning(
-        "allocation.proven_roughly",
-        "costs",
-        f"the optimality gap is {point.gap:.1e} of the cost of the tolerances",
-        "check the orders of magnitude of costs and bounds",
-        gap=point.gap,
-    )
+    what = f"the optimality gap is {point.gap:.1e} of the cost of the tolerances"
+    remedy = "check the orders of magnitude of costs and bounds"
+    doubt = Finding.warning("allocation.proven_roughly", "costs", what, remedy, gap=point.gap)
     return Answer(
         problem, tolerances, costs, float(np.sum(costs)), point.bound, point.gap, proven,
         price=price, findings=() if proven else (doubt,), rounds=point.rounds,

@@ -266,13 +266,9 @@ class _Search:
             for i in members
         }
         proven = gap <= PROVEN
-        doubt = Finding.warning(
-            "allocation.proven_roughly",
-            "processes",
-            f"the optimality gap is {gap:.1e} of the cost of the tolerances",
-            "check the orders of magnitude of costs and bounds",
-            gap=gap,
-        )
+        what = f"the optimality gap is {gap:.1e} of the cost of the tolerances"
+        remedy = "check the orders of magnitude of costs and bounds"
+        doubt = Finding.warning("allocation.proven_roughly", "processes", what, remedy, gap=gap)
         nothing = np.full(len(problem.effects.worst), np.nan)
         return Answer(
             problem,

@@ -23,7 +23,7 @@ from trunnion.studies.allocation.problem import Answer, Criterion
 from trunnion.studies.allocation.rows import Rows
 from trunnion.studies.allocation.solve import Choice as Way
 from trunnion.studies.tolerance.first_order import ToleranceStudy, study
-from trunnion.studies.tolerance.targets import MISSED, limits
+from trunnion.studies.tolerance.linear import limits
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -159,7 +159,7 @@ def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
     saving = MemberUnits("measure", [f"1/({unit})" for unit in units_along(known["nominal"], "measure")])
     variables = described(arrays, VARIABLES, {"parameter": parameters, "saving": saving})
     # the criterion says what is to be kept
-    kept = [one for one in findings_of(known) if not one.code.startswith(MISSED)]
+    kept = [one for one in findings_of(known) if not one.code.startswith("limit.missed")]
     own = list(_findings(found, known))
     attributes: dict[str, Any] = {
         "kind": "allocation",
@@ -311,21 +311,13 @@ def _findings(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
         return
     yield from _plays(found)
     for name, share in found.tight.items():
-        yield Finding.note(
-            "allocation.narrowed",
-            f"measures.{name}",
-            f"its limits were narrowed by {100 * (1 - share):.2g} % so that the mechanism meets "
-            "them exactly, not to first order",
-            percent=100 * (1 - share),
-        )
+        what = f"its limits were narrowed by {100 * (1 - share):.2g} % so that the mechanism meets them exactly, not "
+        what += "to first order"
+        yield Finding.note("allocation.narrowed", f"measures.{name}", what, percent=100 * (1 - share))
     if criterion != "yield" and found.study.effects.correlated:
-        yield Finding.warning(
-            "allocation.correlations_left_out",
-            "correlations",
-            f"the criterion {criterion} ignores the correlations",
-            "use a yield, which includes them",
-            criterion=criterion,
-        )
+        what = f"the criterion {criterion} ignores the correlations"
+        remedy = "use a yield, which includes them"
+        yield Finding.warning("allocation.correlations_left_out", "correlations", what, remedy, criterion=criterion)
     if criterion == "worst-case":
         yield from _searched(found, known)
     if criterion == "rss" and "yield" in known:
@@ -346,16 +338,11 @@ def _plays(found: Allocated) -> Iterator[Finding]:
         for one in found.study.inputs.tolerances:
             if path == f"joints.{joint}.clearance" and one.path in sizes:
                 lower, upper = 1e6 * one.lower, 1e6 * one.upper
-                yield Finding.note(
-                    "allocation.play_tolerance",
-                    f"costs.{joint}.clearance",
-                    f"the clearance is allocated; the tolerance {lower:+g}/{upper:+g} µm of {one.path} stays as "
-                    "stated, in addition to it, and the limits include it",
-                    "remove this tolerance if the cost covers the largest clearance",
-                    number=one.path,
-                    lower_um=lower,
-                    upper_um=upper,
-                )
+                what = f"the clearance is allocated; the tolerance {lower:+g}/{upper:+g} µm of {one.path} stays as "
+                what += "stated, in addition to it, and the limits include it"
+                remedy = "remove this tolerance if the cost covers the largest clearance"
+                figures = {"number": one.path, "lower_um": lower, "upper_um": upper}
+                yield Finding.note("allocation.play_tolerance", f"costs.{joint}.clearance", what, remedy, **figures)
 
 
 def _promised(known: xr.Dataset) -> Iterator[Finding]:

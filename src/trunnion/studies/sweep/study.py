@@ -140,19 +140,17 @@ def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iter
             continue
         first = tuple(int(i) for i in where[0])
         count = int(missing[first])
-        yield Finding.error(
-            "sweep.no_answer",
-            " and ".join(one.name for one in swept),
-            f"{len(where):,} of {counted(status.size, 'point')} "
-            f"{agreeing(len(where), 'has', 'have')} no result, the first at {say(swept, first)} "
-            f"({counted(count, 'position')} not solved): {code.text}",
-            "run `trunnion analyse` with these values to see where in the cycle, and why",
-            points=len(where),
-            of=status.size,
-            at=say(swept, first),
-            positions=count,
-            status=code.text,
-        )
+        what = f"{len(where):,} of {counted(status.size, 'point')} {agreeing(len(where), 'has', 'have')} no result, "
+        what += f"the first at {say(swept, first)} ({counted(count, 'position')} not solved): {code.text}"
+        remedy = "run `trunnion analyse` with these values to see where in the cycle, and why"
+        figures = {
+            "points": len(where),
+            "of": status.size,
+            "at": say(swept, first),
+            "positions": count,
+            "status": code.text,
+        }
+        yield Finding.error("sweep.no_answer", " and ".join(one.name for one in swept), what, remedy, **figures)
 
 
 def _no_efficiency(points: Points, arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
@@ -169,15 +167,10 @@ def _no_efficiency(points: Points, arrays: Mapping[str, NDArray[Any]]) -> Iterat
         where = np.argwhere(undefined & so)
         if len(where):
             at = say(points.swept, tuple(int(i) for i in where[0]))
-            yield Finding.note(
-                "sweep.no_efficiency",
-                "efficiency",
-                f"the efficiency is undefined at {len(where):,} of {counted(work.size, 'point')}, the first at {at}: "
-                f"{why}",
-                "see the mean powers there; `trunnion analyse` with these values tells where loads act",
-                points=len(where),
-                of=work.size,
-            )
+            what = f"the efficiency is undefined at {len(where):,} of {counted(work.size, 'point')}, the first at "
+            what += f"{at}: {why}"
+            remedy = "see the mean powers there; `trunnion analyse` with these values tells where loads act"
+            yield Finding.note("sweep.no_efficiency", "efficiency", what, remedy, points=len(where), of=work.size)
 
 
 def _not_steady(points: Points, watched: Iterable[Measure], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
@@ -187,14 +180,9 @@ def _not_steady(points: Points, watched: Iterable[Measure], arrays: Mapping[str,
         if measure.in_time and len(where):
             first, size = tuple(int(i) for i in where[0]), arrays[measure.name].size
             what = f"{measure.name} has no value at {len(where):,} of {counted(size, 'point')}, the first at "
-            yield Finding.warning(
-                "sweep.not_steady",
-                f"measures.{measure.name}",
-                f"{what}{say(points.swept, first)}: {not_steady(points.run, measure)}",
-                LONGER,
-                points=len(where),
-                of=size,
-            )
+            what = f"{what}{say(points.swept, first)}: {not_steady(points.run, measure)}"
+            figures = {"points": len(where), "of": size}
+            yield Finding.warning("sweep.not_steady", f"measures.{measure.name}", what, LONGER, **figures)
 
 
 def _scales(run: Run, arrays: Mapping[str, NDArray[Any]]) -> Scales:

@@ -28,7 +28,18 @@ from trunnion.studies.tolerance.effects import Effects, FirstOrder
 from trunnion.studies.tolerance.search import Corner, search
 from trunnion.studies.tolerance.zones import Spread
 
-__all__ = ["Linear", "Of", "Reference", "by_position", "linear", "references", "searched"]
+__all__ = [
+    "Linear",
+    "Of",
+    "Reference",
+    "against",
+    "by_position",
+    "limited",
+    "limits",
+    "linear",
+    "references",
+    "searched",
+]
 
 Array = NDArray[np.float64]
 AT_ONCE = 20_000  # numbers in an array of one walk with dual numbers
@@ -201,6 +212,36 @@ def by_position(known: Reference) -> bool:
     if known.measure.kind == "path_error":
         return rule in ("deviation", "value", "maximum", "largest")
     return rule == "deviation" or (known.against and rule in ("maximum", "minimum", "largest", "peak-to-peak"))
+
+
+def limited(measure: Measure) -> bool:
+    """Whether a measure has a limit or a bound."""
+    return any(end is not None for end in (measure.lower, measure.upper, measure.at_least, measure.at_most))
+
+
+def limits(of: Of) -> tuple[float, float]:
+    """Least and largest deviation from nominal that a measure may have; infinite where there is no limit."""
+    measure = of.measure
+    lower = -np.inf if measure.lower is None else measure.lower
+    upper = np.inf if measure.upper is None else measure.upper
+    least = -np.inf if measure.at_least is None else measure.at_least
+    most = np.inf if measure.at_most is None else measure.at_most
+    if measure.rule == "deviation":
+        return max(lower, -most), min(upper, most)
+    if not against(of):
+        return max(lower, least - of.reference.figure), min(upper, most - of.reference.figure)
+    if measure.rule == "maximum" and measure.kind != "path_error":
+        return -np.inf, min(upper, most)
+    if measure.rule == "minimum" and measure.kind != "path_error":
+        return max(lower, least), np.inf
+    if measure.rule == "mean" and measure.kind != "path_error":
+        return max(lower, least), min(upper, most)
+    return -min(upper, most), min(upper, most)  # what has a size and no sign
+
+
+def against(of: Of) -> bool:
+    """Whether the figure is made of deviations from the nominal mechanism and is 0 there."""
+    return of.measure.kind == "path_error" or (of.reference.against and of.measure.rule != "value")
 
 
 def _rated(known: Reference) -> bool:

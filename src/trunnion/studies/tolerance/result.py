@@ -21,7 +21,6 @@ from trunnion.studies.tolerance.findings import findings_of, summary
 from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.studies.tolerance.outcome import Outcome
 from trunnion.studies.tolerance.sampled import QUANTILES, sampled
-from trunnion.studies.tolerance.targets import MISSED
 from trunnion.studies.tolerance.zones import Spread
 
 if TYPE_CHECKING:
@@ -157,7 +156,7 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "steps": found.steps,
         **scales_of(found.run).summary(summary(outcome, counted, units, dial)),
         "findings": finding_rows(stated),
-        "missed": [f"{one.where}: {one.what}" for one in stated if one.code.startswith(MISSED)],
+        "missed": [f"{one.where}: {one.what}" for one in stated if one.code.startswith("limit.missed")],
     }
     return dataset_of("tolerance", variables, labels, attributes, {**quantiles, **driven(found.plan.times, *dial)})
 

@@ -62,15 +62,15 @@ _STUDIES = (
     Fault(
         "play-scatter-of-another-dimension",
         "studies/tolerance/effects.py",
-        "(most, square * len(end) / (len(end) + 2))",
-        "(most, square * len(end) / (len(end) + 1))",
+        "square * len(q) / (len(q) + 2) * length(q)",
+        "square * len(q) / (len(q) + 1) * length(q)",
         ("tests/reference/test_play.py", "-k", "one_rule"),
     ),
     Fault(
         "tolerance-mean-shift-sign",
-        "studies/tolerance/zones.py",
-        "half, slope * mean, np.abs(slope) * deviation)",
-        "half, -slope * mean, np.abs(slope) * deviation)",
+        "studies/tolerance/effects.py",
+        "upper, half, slope * mean, scatter)",
+        "upper, half, -slope * mean, scatter)",
         ("tests/reference/test_tolerance.py", "-k", "limits_to_one_side or moments"),
     ),
     Fault(

@@ -114,7 +114,7 @@ def comparisons_table() -> str:
 
 def assembling_table() -> str:
     """Every variable of whether a mechanism goes together."""
-    from trunnion.studies.assembly.study import FIGURES
+    from trunnion.studies.assembly import FIGURES
 
     return _described("dimensions", FIGURES)
 

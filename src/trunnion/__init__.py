@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from trunnion.results.export import save
     from trunnion.solve.friction_method import FrictionMethod
     from trunnion.studies.allocation.allocate import allocate
-    from trunnion.studies.assembly.study import assemble
+    from trunnion.studies.assembly import assemble
     from trunnion.studies.design import design
     from trunnion.studies.play import play
     from trunnion.studies.sweep.study import sweep
@@ -40,7 +40,7 @@ _PLACES = {
     "Status": ("trunnion.errors", "Status"),
     "allocate": ("trunnion.studies.allocation.allocate", "allocate"),
     "analyse": ("trunnion.cycle.analyse", "analyse"),
-    "assemble": ("trunnion.studies.assembly.study", "assemble"),
+    "assemble": ("trunnion.studies.assembly", "assemble"),
     "check": ("trunnion.cycle.inspect", "check"),
     "design": ("trunnion.studies.design", "design"),
     "locking": ("trunnion.cycle.locking", "locking"),

@@ -17,7 +17,7 @@ from mechanisms import Data
 from trunnion.results.attributes import summary_of
 from trunnion.solve.space.loops import Loops
 from trunnion.solve.system import build
-from trunnion.studies.assembly.study import AssemblyStatus, AssemblyStudy
+from trunnion.studies.assembly import AssemblyStatus, AssemblyStudy
 
 Array = NDArray[np.float64]
 LENGTHS = (0.100, 0.030, 0.090, 0.070)  # ground, crank, coupler, rocker

@@ -35,7 +35,7 @@ def assemble(
     units: Units = TableUnits.si,
 ) -> None:
     """Clearance needed to assemble a linkage with axis errors."""
-    from trunnion.studies.assembly.study import assemble as run
+    from trunnion.studies.assembly import assemble as run
 
     check_files(out or [], report)
     mechanism = stated(file, set_)

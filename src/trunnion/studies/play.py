@@ -44,7 +44,6 @@ from trunnion.solve import shifts
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.statistics.population import Population
-from trunnion.studies.tolerance import zones
 from trunnion.studies.tolerance.effects import FirstOrder
 from trunnion.studies.tolerance.first_order import ToleranceStudy, none_stated
 from trunnion.studies.tolerance.inputs import Inputs
@@ -262,13 +261,13 @@ def _by_joint(first: FirstOrder, blank: Array) -> JointEffects:
     found = JointEffects(np.zeros(shape), np.zeros(shape), loads)
     for j, joint in enumerate(inputs.loose):
         carriers = first.plays(j)
-        worst = np.array([zones.worst(*own) for own in carriers])
+        worst = np.array([pin.worst for pin in carriers])
         best = np.argmax(np.nan_to_num(worst) > (1 - EQUAL) * np.nan_to_num(np.max(worst, axis=0)), axis=0)
         found.worst_case[j] = np.take_along_axis(worst, best[None], axis=0)[0]
-        scatters = np.array([zones.scatter(*own) for own in carriers])
+        scatters = np.array([pin.deviation for pin in carriers])
         found.deviation[j] = np.take_along_axis(scatters, best[None], axis=0)[0]
         for k, keys in enumerate(inputs.ends(joint)):
-            at_end = np.array([own[0][k] for own in carriers])  # (carrier, component, …)
+            at_end = np.array([pin.loads[k] for pin in carriers])  # (carrier, component, …)
             for key, load in zip(keys, np.moveaxis(at_end, 1, 0), strict=True):
                 axis = "xyz".index(key.rpartition(".")[2])
                 found.loads[j, k, axis] = np.take_along_axis(load, best[None], axis=0)[0]

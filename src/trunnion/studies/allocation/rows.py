@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from trunnion.model.tolerances import Tolerance
 from trunnion.statistics.population import Marginal
 from trunnion.studies.allocation.problem import Criterion, RowEffects
+from trunnion.studies.tolerance.effects import Spread
 from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.studies.tolerance.linear import Of, against, by_position, limits
-from trunnion.studies.tolerance.zones import Spread
 
 __all__ = ["Rows", "joined", "part_of", "rows_of"]
 

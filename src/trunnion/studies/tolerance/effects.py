@@ -5,14 +5,15 @@ What turns over the whole circle, the direction of a run-out or of a seat, is mo
 follows from the derivatives there.
 
 What varies is then one of two kinds. A number moves a measure by S·d, d between the limits. A zone moves it by
-Q·(c − c₀): c lies in a disc or ball about the middle, on a circle, or in a ring, and c₀ is where it lies nominally,
-which of a direction is on the circle and of a play in the middle (`zones`). Of a clearance, Q is the load of the pin
-under the measure's unit load (virtual work).
+Q·(c − c₀), c₀ where it lies nominally. On a circle, over all directions, the first harmonic of the measure is H = Q r:
+the deviation lies within −H·u₀ ± |H| and has the mean −H·u₀ and the variance |H|²/2, u₀ being the nominal direction. In
+a ring the size varies too, by d: H + d G instead of H. In a hole, a disc or ball, the middle is nominal: worst case
+ϱ |Q|, variance E|c|² |Q|²/n of n components; Q is the load of the pin under the measure's unit load (virtual work).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -22,21 +23,68 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.model.tolerances import FULL_TURN, Tolerance
+from trunnion.model.tolerances import FULL_TURN
 from trunnion.solve.shifts import CARRIERS
-from trunnion.studies.tolerance import zones
 from trunnion.studies.tolerance.inputs import Inputs
-from trunnion.studies.tolerance.zones import Spread, Vector
 
-__all__ = ["Effects", "FirstOrder", "effects_of"]
+__all__ = ["Effects", "FirstOrder", "Pin", "Spread", "effects_of", "length"]
 
 Array = NDArray[np.float64]
+Vector = NDArray[np.float64]  # (component, …)
 SHARE = "share."  # of the radius at which a pin lies in its hole: before the path of its offset, at a corner
 NOBODY = -1
 NOISE = 1e-11
 OFFSETS = tuple(f"{carrier}." for carrier in CARRIERS)
 QUARTERS = (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi)
 NUMBER, SIZE, ANGLE = "number", "size", "angle"  # what of its owner a row moves; of a play it is the carrier
+
+
+class Spread(NamedTuple):
+    """What first order makes of every varying number, (parameter, …), or of all: deviation of a measure from nominal.
+
+    lower, upper: least and largest; half: of the classical sum of squares; shift: of the mean; deviation: standard.
+    """
+
+    lower: Array
+    upper: Array
+    half: Array
+    shift: Array
+    deviation: Array
+
+    @property
+    def worst(self) -> Array:
+        """The largest deviation to either side."""
+        return np.maximum(-self.lower, self.upper)
+
+
+def length(vector: Vector) -> Array:
+    """|Q|."""
+    return np.asarray(np.sqrt(np.sum(vector**2, axis=0)), float)
+
+
+def _along(vector: Vector, direction: float) -> Array:
+    """Q·u of a direction."""
+    component: Array = vector[0] * np.cos(direction) + vector[1] * np.sin(direction)
+    return component
+
+
+class Pin(NamedTuple):
+    """A pin anywhere in its hole: its load Q at every end, (component, …), and of each end the largest radius ϱ and
+    E ρ², ρ being the radius of a sample."""
+
+    loads: Sequence[Vector]
+    rooms: Sequence[tuple[float, float]]
+
+    @property
+    def worst(self) -> Array:
+        """Σ ϱ |Q| over the ends."""
+        return np.asarray(np.sum([most * length(q) for q, (most, _) in zip(*self, strict=True)], axis=0), float)
+
+    @property
+    def deviation(self) -> Array:
+        """Standard deviation, every place in each end as likely as any other: E|c|² = E ρ² n/(n + 2), n components."""
+        parts = [square * len(q) / (len(q) + 2) * length(q) ** 2 / len(q) for q, (_, square) in zip(*self, strict=True)]
+        return np.asarray(np.sqrt(np.sum(parts, axis=0)), float)
 
 
 class EffectRow(NamedTuple):
@@ -123,7 +171,7 @@ class Effects:
 
     def nominal(self, i: int) -> float:
         """Nominal value of a toleranced number."""
-        return float(np.ravel(primal(self.inputs.run.values[self.tolerance(i).path]))[0])
+        return float(np.ravel(primal(self.inputs.run.values[self.inputs.tolerances[i].path]))[0])
 
     def nominal_angle(self, path: str) -> float:
         """Nominal value of an angle."""
@@ -143,8 +191,7 @@ class Effects:
         ]
         for joint in self.inputs.loose:
             most, square = self.rooms[joint][0]
-            count = len(self.inputs.ends(joint)[0])
-            rows.append((most, 0.0, most, float(np.sqrt(square / (count + 2))), 0.0))
+            rows.append((most, 0.0, most, float(np.sqrt(square / (len(self.inputs.ends(joint)[0]) + 2))), 0.0))
         keys = ("nominal", "lower", "upper", "deviation", "shift")
         return dict(zip(keys, np.array(rows).reshape(-1, len(keys)).T, strict=True))
 
@@ -154,24 +201,15 @@ class Effects:
 
         A circle is told by four rows for its two axes: each counts half.
         """
-        found = np.zeros(len(self.rows))
+        weights, count = np.zeros(len(self.rows)), len(self.inputs.tolerances)
         for k, row in enumerate(self.rows):
-            if not row.seed:
-                continue
-            if row.part == ANGLE:
-                found[k] = np.sqrt(0.5)
-            elif row.part == SIZE:
-                found[k] = np.sqrt(0.5) * max(
-                    abs(self.tolerance(row.owner).lower), abs(self.tolerance(row.owner).upper)
-                )
-            elif row.part == NUMBER:
-                found[k] = self.tolerance(row.owner).half_width
-            else:
-                found[k] = self.rooms[self.joint(row.owner)][row.end][0]
-        return found
-
-    def tolerance(self, i: int) -> Tolerance:
-        return self.inputs.tolerances[i]
+            if row.seed and row.owner >= count:
+                weights[k] = self.rooms[self.joint(row.owner)][row.end][0]
+            elif row.seed:
+                one = self.inputs.tolerances[row.owner]
+                widest = {NUMBER: one.half_width, ANGLE: np.sqrt(0.5)}
+                weights[k] = widest.get(row.part, np.sqrt(0.5) * max(abs(one.lower), abs(one.upper)))
+        return weights
 
     def joint(self, i: int) -> str:
         """The joint of a play."""
@@ -180,17 +218,18 @@ class Effects:
     @cached_property
     def places(self) -> dict[tuple[int, str], list[int]]:
         """Rows by owner and part."""
-        found: dict[tuple[int, str], list[int]] = {}
+        places: dict[tuple[int, str], list[int]] = {}
         for k, row in enumerate(self.rows):
-            found.setdefault((row.owner, row.part), []).append(k)
-        return found
+            places.setdefault((row.owner, row.part), []).append(k)
+        return places
 
     def turns(self, i: int) -> bool:
         """Whether it is a direction over the whole turn."""
-        return i < len(self.inputs.tolerances) and self.tolerance(i).distribution == FULL_TURN
+        return i < len(self.inputs.tolerances) and self.inputs.tolerances[i].distribution == FULL_TURN
 
     def is_zone(self, i: int) -> bool:
-        return i >= len(self.inputs.tolerances) or bool(self.tolerance(i).direction) or self.turns(i)
+        """Whether it is a place in a disc, on a circle or in a ring, and no number between limits."""
+        return i >= len(self.inputs.tolerances) or bool(self.inputs.tolerances[i].direction) or self.turns(i)
 
     def sizes(self, angle: int) -> list[int]:
         """Toleranced numbers that point in a direction."""
@@ -234,15 +273,16 @@ class FirstOrder:
     @cached_property
     def sensitivity(self) -> Array:
         """∂y/∂p of every parameter, (parameter, …); of a zone |Q| summed over its ends; NaN of a direction."""
-        return np.array([self._sensitivity(i) for i in range(len(self.inputs.names))])
-
-    def _sensitivity(self, i: int) -> Array:
-        if i >= len(self.inputs.tolerances):
-            reach: Array = np.max([zones.reach(loads) for loads, _ in self.plays(i)], axis=0)
-            return reach
-        if self.effects.tolerance(i).direction:
-            return zones.size(self._harmonic(i, SIZE))
-        return np.full(self.slope.shape[1:], np.nan) if self.effects.turns(i) else self._slope(i)
+        rows = []
+        for i in range(len(self.inputs.names)):
+            if i >= len(self.inputs.tolerances):
+                rows.append(np.max([np.sum([length(q) for q in pin.loads], axis=0) for pin in self.plays(i)], axis=0))
+            elif self.inputs.tolerances[i].direction:
+                rows.append(length(self._harmonic(i, SIZE)))
+            else:
+                slope = self.slope[self.effects.places[i, NUMBER][0]] if not self.effects.turns(i) else np.nan
+                rows.append(np.full(self.slope.shape[1:], slope))
+        return np.array(rows)
 
     @cached_property
     def spread(self) -> Spread:
@@ -251,21 +291,36 @@ class FirstOrder:
         return Spread(*(np.array(part) for part in zip(*parts, strict=True)))
 
     def _spread(self, i: int) -> Spread:
-        if i >= len(self.inputs.tolerances):
-            return zones.play(self.plays(i))
-        one, mean, deviation = self.effects.tolerance(i), self.effects.deviations[1][i], self.effects.deviations[0][i]
-        if one.direction:
-            circle, ring = (self._harmonic(i, part) for part in (ANGLE, SIZE))
-            limits = one.lower, one.upper
-            return zones.run_out(circle, ring, limits, mean, deviation, self.effects.nominal_angle(one.direction))
-        if self.effects.turns(i):
-            wider = [self.effects.deviations[1][j] * self._harmonic(j, SIZE) for j in self.effects.sizes(i)]
-            return zones.direction(self._harmonic(i, ANGLE), wider, self.effects.nominal_angle(one.path))
-        alone = zones.number(self._steady(i), one, mean, deviation)
-        if i not in self.inputs.turned:
-            return alone
-        circle = self._harmonic(self.inputs.turned[i], ANGLE)
-        return zones.added(alone, circle, self._harmonic(i, SIZE), one, deviation)
+        if i >= len(
+            self.inputs.tolerances
+        ):  # the worst of all links that may carry a pin's seat, the scatter of the first
+            pins = self.plays(i)
+            most = np.max([pin.worst for pin in pins], axis=0)
+            return Spread(-most, most, most, np.zeros_like(most), pins[0].deviation)
+        one, mean, deviation = self.inputs.tolerances[i], self.effects.deviations[1][i], self.effects.deviations[0][i]
+        ring = self._harmonic(i, SIZE)
+        if self.effects.is_zone(i):
+            circle = self._harmonic(i, ANGLE)
+            most = np.maximum(*(length(circle + end * ring) for end in (one.lower, one.upper)))
+            middle = -_along(circle, self.effects.nominal_angle(self.inputs.angle(i)))
+            sizes = self.effects.sizes(i) if self.effects.turns(i) else ()  # a run-out has its own size
+            wider = [self.effects.deviations[1][j] * self._harmonic(j, SIZE) for j in sizes]
+            center = np.sum([circle + mean * ring, *wider], axis=0)
+            scatter = np.sqrt(0.5 * (length(center) ** 2 + (deviation * length(ring)) ** 2))
+            return Spread(middle - most, middle + most, most, middle, scatter)
+        slope = self._steady(i)
+        ends, half, scatter = (
+            (slope * one.lower, slope * one.upper),
+            np.abs(slope) * one.half_width,
+            np.abs(slope) * deviation,
+        )
+        lower, upper = np.minimum(*ends), np.maximum(*ends)
+        if i in self.inputs.turned:  # what it adds to the circle of a direction over the whole turn
+            circle = self._harmonic(self.inputs.turned[i], ANGLE)
+            more = np.maximum(*(length(circle + end * ring) for end in (one.lower, one.upper))) - length(circle)
+            lower, upper, half = lower - more, upper + more, half + np.abs(more)
+            scatter = np.sqrt(scatter**2 + 0.5 * (deviation * length(ring)) ** 2)
+        return Spread(lower, upper, half, slope * mean, scatter)
 
     @cached_property
     def total(self) -> Spread:
@@ -287,67 +342,54 @@ class FirstOrder:
     def covariances(self) -> Array:
         """Covariance of what every parameter does with the measure itself, (parameter, …): together its variance.
 
-        Of an independent one its own variance; of correlated ones S_i (C S)_i, which may be negative.
+        Of an independent one its own variance; of correlated ones S_i (C S)_i, which may be negative. Two sizes that
+        point the same way over a full turn go with each other, each harmonic half of the square.
         """
-        found = np.array(self.spread.deviation**2, float)
+        covariances = np.array(self.spread.deviation**2, float)
         if not self.effects.correlated:
-            return found
-        off = self.effects.covariance
-        for parts in self._linear_parts():
-            found[: len(off)] += parts * np.einsum("ij,j...->i...", off, parts)
-        return found
-
-    def _linear_parts(self) -> list[Array]:
-        """What the toleranced numbers do, (number, …): of the same in every direction, and of each harmonic.
-
-        Two sizes that point the same way over a full turn go with each other, each harmonic half of the square.
-        """
-        count = len(self.inputs.tolerances)
-        nothing = 0.0 * self.slope[0]
-        found = [np.array([nothing if self.effects.is_zone(i) else self._steady(i) for i in range(count)])]
+            return covariances
+        off, count, nothing = self.effects.covariance, len(self.inputs.tolerances), 0.0 * self.slope[0]
+        linear = [np.array([nothing if self.effects.is_zone(i) else self._steady(i) for i in range(count)])]
         for angle in sorted(set(self.inputs.turned.values())):
-            own = {i: self._harmonic(i, SIZE) for i in self.effects.sizes(angle)}
-            found += [
-                np.sqrt(0.5) * np.array([own[i][k] if i in own else nothing for i in range(count)]) for k in (0, 1)
-            ]
-        return found
+            own = {i: np.sqrt(0.5) * self._harmonic(i, SIZE) for i in self.effects.sizes(angle)}
+            linear += [np.array([own[i][k] if i in own else nothing for i in range(count)]) for k in (0, 1)]
+        for parts in linear:
+            covariances[:count] += parts * np.einsum("ij,j...->i...", off, parts)
+        return covariances
 
     def corner(self, sign: float, at: Mapping[str, float] | None = None) -> dict[str, float]:
         """Numbers that make a measure largest (sign 1) or least (−1), to first order; zones at their rim.
 
         at: the corner about which the derivatives are.
         """
-        found: dict[str, float] = {}
+        corner: dict[str, float] = {}
         widened: dict[int, list[Vector]] = {}  # by direction: what sizes in it add at their ends
-        for i, tolerance in enumerate(self.inputs.tolerances):
-            if self.effects.is_zone(i):
-                continue
-            steady = sign * float(self._steady(i, at))
-            far = zones.Far(tolerance.upper if steady >= 0 else tolerance.lower)
-            if (angle := self.inputs.turned.get(i)) is not None:
-                ring = self._harmonic(i, SIZE)
-                far = zones.farthest(self._circle(angle, at), ring, tolerance, steady)
-                widened.setdefault(angle, []).append(far.more)
-            found[tolerance.path] = self.effects.nominal(i) + far.deviation
-        for i, tolerance in enumerate(self.inputs.tolerances):
-            if not self.effects.is_zone(i):
-                continue
-            circle = np.sum([self._circle(i, at), *widened.get(i, [])], axis=0)
-            if tolerance.direction:
-                far = zones.farthest(circle, self._harmonic(i, SIZE), tolerance)
-                found[tolerance.path], circle = self.effects.nominal(i) + far.deviation, far.place
-            found[tolerance.direction or tolerance.path] = zones.angle(circle, sign)
-        for k, joint in enumerate(self.inputs.loose):
-            i = len(self.inputs.tolerances) + k
-            carriers = self.plays(i)
-            best = int(np.argmax([float(zones.worst(*one)) for one in carriers]))
-            for c, (carrier, (loads, _)) in enumerate(zip(self.inputs.carriers(joint), carriers, strict=True)):
-                for end, load in zip(self.inputs.ends(joint), loads, strict=True):
-                    length = float(zones.size(load)) if c == best else 0.0
-                    for key, part in zip(end, load, strict=True):
-                        share = sign * float(part) / length if length > 0 else 0.0
-                        found[f"{SHARE}{carrier}.{joint}.{key}"] = share
-        return found
+        numbers = range(len(self.inputs.tolerances))
+        for i in sorted(numbers, key=self.effects.is_zone):  # numbers first: they widen zones
+            one, zone, ring = self.inputs.tolerances[i], self.effects.is_zone(i), self._harmonic(i, SIZE)
+            steady = 0.0 if zone else sign * float(self._steady(i, at))
+            angle = i if zone else self.inputs.turned.get(i)
+            circle = np.zeros(2) if angle is None else self._circle(angle, at)
+            if zone:
+                circle = np.sum([circle, *widened.get(i, [])], axis=0)
+            ends = (one.upper, one.lower) if steady >= 0 else (one.lower, one.upper)
+            end = ends[int(np.argmax([steady * end + float(length(circle + end * ring)) for end in ends]))]
+            if not zone or one.direction:
+                corner[one.path] = self.effects.nominal(i) + end
+            if not zone and angle is not None:
+                widened.setdefault(angle, []).append(end * ring)
+            if zone:
+                x, y = sign * (circle + end * ring if one.direction else circle)
+                corner[one.direction or one.path] = float(np.arctan2(y, x))
+        for k, joint in enumerate(self.inputs.loose, len(numbers)):
+            pins = self.plays(k)
+            best = int(np.argmax([float(pin.worst) for pin in pins]))
+            for c, (carrier, pin) in enumerate(zip(self.inputs.carriers(joint), pins, strict=True)):
+                for end_keys, load in zip(self.inputs.ends(joint), pin.loads, strict=True):
+                    size = float(length(load)) if c == best else 0.0
+                    for key, part in zip(end_keys, load, strict=True):
+                        corner[f"{SHARE}{carrier}.{joint}.{key}"] = sign * float(part) / size if size > 0 else 0.0
+        return corner
 
     def gradient(self) -> Array:
         """Derivatives of a figure by the normal scores of the toleranced numbers, to first order; 0 of directions."""
@@ -355,10 +397,6 @@ class FirstOrder:
             0.0 if self.effects.is_zone(i) else self._steady(i) * self.effects.deviations[0][i]
             for i in range(len(self.inputs.tolerances))
         ])  # fmt: skip
-
-    def _slope(self, i: int) -> Array:
-        found: Array = self.slope[self.effects.places[i, NUMBER][0]]
-        return found
 
     def _harmonic(self, i: int, part: str) -> Vector:
         """First harmonic over the direction, (2, …): of the measure itself (ANGLE), or of its derivative (SIZE)."""
@@ -373,56 +411,49 @@ class FirstOrder:
     def _circle(self, angle: int, at: Mapping[str, float] | None) -> Vector:
         """Harmonic of a direction with all sizes that point there nominal; the derivatives are about a corner."""
         circle = self._harmonic(angle, ANGLE)
-        for j in [*self.effects.sizes(angle), *([angle] if self.effects.tolerance(angle).direction else [])]:
-            circle = circle - self._moved(j, at) * self._harmonic(j, SIZE)
+        for j in [*self.effects.sizes(angle), *([angle] if self.inputs.tolerances[angle].direction else [])]:
+            path, nominal = self.inputs.tolerances[j].path, self.effects.nominal(j)
+            circle = circle - ((at or {}).get(path, nominal) - nominal) * self._harmonic(j, SIZE)
         return circle
-
-    def _moved(self, i: int, at: Mapping[str, float] | None) -> float:
-        """How far a number is from nominal at a corner."""
-        path = self.effects.tolerance(i).path
-        return (at or {}).get(path, self.effects.nominal(i)) - self.effects.nominal(i)
 
     def _steady(self, i: int, at: Mapping[str, float] | None = None) -> Array:
         """∂y/∂p, of a size in a direction over the whole turn what of it is the same in all directions."""
-        found = self._slope(i)
-        if i in self.inputs.turned:
-            path = self.inputs.angle(self.inputs.turned[i])
-            found = found - zones.along(self._harmonic(i, SIZE), (at or {}).get(path, self.effects.nominal_angle(path)))
-        return found
+        slope: Array = self.slope[self.effects.places[i, NUMBER][0]]
+        if i not in self.inputs.turned:
+            return slope
+        path = self.inputs.angle(self.inputs.turned[i])
+        return slope - _along(self._harmonic(i, SIZE), (at or {}).get(path, self.effects.nominal_angle(path)))
 
-    def plays(self, i: int) -> list[tuple[list[Vector], list[tuple[float, float]]]]:
-        """For each link that may carry the seat: Q at every end, (component, …); largest radius and E|c|² of each."""
+    def plays(self, i: int) -> list[Pin]:
+        """A pin in its hole, for each link that may carry its seat."""
         joint = self.effects.joint(i)
-        ends = self.inputs.ends(joint)
-        radii = [
-            (most, square * len(end) / (len(end) + 2))
-            for (most, square), end in zip(self.effects.rooms[joint], ends, strict=True)
-        ]
-        found = []
+        ends, pins = self.inputs.ends(joint), []
         for carrier in self.inputs.carriers(joint):
             own = iter(self.effects.places[i, carrier])
-            found.append(([np.array([self.slope[next(own)] for _ in end]) for end in ends], radii))
-        return found
+            pins.append(
+                Pin([np.array([self.slope[next(own)] for _ in end]) for end in ends], self.effects.rooms[joint])
+            )
+        return pins
 
 
 def effects_of(inputs: Inputs) -> Effects:
     """The rows of the batch of all inputs."""
-    found: list[EffectRow] = [EffectRow(NOBODY, 0, {}, "")]  # the mechanism itself
+    rows: list[EffectRow] = [EffectRow(NOBODY, 0, {}, "")]  # the mechanism itself
     drawn = {one.direction for one in inputs.tolerances}  # these directions are those of run-outs
     for i, one in enumerate(inputs.tolerances):
         if one.direction:
-            found += [EffectRow(i, 0, {one.direction: angle}, one.path, SIZE) for angle in QUARTERS]
-            found += [EffectRow(i, 0, {one.direction: angle}, one.direction, ANGLE) for angle in QUARTERS]
+            rows += [EffectRow(i, 0, {one.direction: angle}, one.path, SIZE) for angle in QUARTERS]
+            rows += [EffectRow(i, 0, {one.direction: angle}, one.direction, ANGLE) for angle in QUARTERS]
         elif one.distribution == FULL_TURN:
             if one.path not in drawn:
-                found += [EffectRow(i, 0, {one.path: angle}, one.path, ANGLE) for angle in QUARTERS]
+                rows += [EffectRow(i, 0, {one.path: angle}, one.path, ANGLE) for angle in QUARTERS]
         else:
-            found.append(EffectRow(i, 0, {}, one.path))
+            rows.append(EffectRow(i, 0, {}, one.path))
             if i in inputs.turned:
                 turned = inputs.angle(inputs.turned[i])
-                found += [EffectRow(i, 0, {turned: angle}, one.path, SIZE) for angle in QUARTERS]
+                rows += [EffectRow(i, 0, {turned: angle}, one.path, SIZE) for angle in QUARTERS]
     for k, joint in enumerate(inputs.loose, len(inputs.tolerances)):
         for carrier in inputs.carriers(joint):
             for end, keys in enumerate(inputs.ends(joint)):
-                found += [EffectRow(k, end, {}, f"{carrier}.{joint}.{key}", carrier) for key in keys]
-    return Effects(inputs, tuple(found))
+                rows += [EffectRow(k, end, {}, f"{carrier}.{joint}.{key}", carrier) for key in keys]
+    return Effects(inputs, tuple(rows))

@@ -24,9 +24,8 @@ from trunnion.measures.lines import turn
 from trunnion.measures.many import Many, Read
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import PositionPlan, Window, moved, within
-from trunnion.studies.tolerance.effects import Effects, FirstOrder
+from trunnion.studies.tolerance.effects import Effects, FirstOrder, Spread
 from trunnion.studies.tolerance.search import Corner, search
-from trunnion.studies.tolerance.zones import Spread
 
 __all__ = [
     "Linear",

@@ -17,11 +17,11 @@ from trunnion.model.parameters import dimension_kinds
 from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.solve.system import System
+from trunnion.studies.tolerance.effects import Spread
 from trunnion.studies.tolerance.findings import findings_of, summary
 from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.studies.tolerance.outcome import Outcome
 from trunnion.studies.tolerance.sampled import QUANTILES, sampled
-from trunnion.studies.tolerance.zones import Spread
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,0 +1,477 @@
+"""Whether a mechanism whose joints constrain more than its links have freedoms can be put together as it is built.
+
+Its loops close only if the axes fit exactly. Where they do not, pins lie in their holes as the closure asks: of the
+offsets of their ends the smallest are looked for that close every loop, position by position (`solve.space.loops`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.nested import flat
+from trunnion.cycle.positions import check_steps
+from trunnion.cycle.summary import inputs, member_units
+from trunnion.errors import Coded, Finding, MechanismError
+from trunnion.joints.clearance import CLEARANCE_MODELS
+from trunnion.model.arguments import strict_arguments
+from trunnion.model.joint_parts import clearance
+from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import cited, finding_rows, origin
+from trunnion.results.dataset import Variable, dataset_of, described, driven
+from trunnion.results.figure import Figure
+from trunnion.results.scales import EVERYWHERE, Scales
+from trunnion.solve import shifts
+from trunnion.solve.assembly import choose
+from trunnion.solve.forward import forward
+from trunnion.solve.space.loops import CLOSED, Ask, End, LeastPlay, Loops, Start, ends_of, least_play, start_of
+from trunnion.solve.system import Cycle, System, Values, build
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["FIGURES", "AssemblyStatus", "AssemblyStudy", "assemble"]
+
+Array = NDArray[np.float64]
+Uniform = Literal["pins", "all"]
+ROUNDING = 1e-9  # rad, or of the size: an opening below it beside a larger one of the other kind is none
+CLOSE = 0.9  # of the largest need: maxima between the positions are looked for beside those above it
+MOST_TOPS = 4
+BETWEEN, NARROWED = 9, 5  # points in the interval around a maximum, and how often it is narrowed to a quarter
+ENOUGH = 1 + 1e-9  # of the stated clearances: all of it is enough
+SAME = 1e-6  # of a need: one that varies by less has no place
+LEAST_PART = 0.05  # a joint's part in the need that is worth a word
+SOURCE = (
+    "P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with quadratic objectives, "
+    "arXiv:2405.12762"
+)
+
+
+class AssemblyStatus(Coded):
+    """What a position came to."""
+
+    FITS = 0, "it can be assembled"
+    SHORT = 1, "the stated clearances do not suffice"
+    RIGID = 2, "no play is stated that could close the loops, however large"
+    UNSETTLED = 3, "the least clearance was not found"
+    APART = 4, "it cannot be assembled, with or without errors"
+
+
+LANES = ("position",)
+OFFSETS = ("joint", "end", "axis", "position")
+PARTS = ("joint", "end", "position")
+FIGURES: dict[str, Variable] = {
+    "smallest_clearance": Variable((), "m", "the largest needed clearance of the cycle, between the positions too"),
+    "largest_share": Variable((), "1", "the largest needed share of the cycle, between the positions too"),
+    "drive_coordinate": Variable(("driver", "position"), "coordinate", "coordinate of the driver"),
+    "needed_share": Variable(
+        LANES, "1", "share of the stated clearances that is needed to close the loops; above 1: too small"
+    ),
+    "needed_clearance": Variable(LANES, "m", "smallest radial clearance, the same in every pin, that closes the loops"),
+    "open_angle": Variable(LANES, "rad", "opening of the loops without play, angle"),
+    "open_length": Variable(LANES, "m", "opening of the loops without play, length"),
+    "stated_offset": Variable(OFFSETS, "m", "offset of the pin's end at the needed share, in the hole's frame"),
+    "uniform_offset": Variable(OFFSETS, "m", "offset of the pin's end at the needed clearance, in the hole's frame"),
+    "stated_part": Variable(PARTS, "1", "share of an end's play in the needed share; the sum is 1"),
+    "uniform_part": Variable(PARTS, "1", "share of an end's play in the needed clearance; the sum is 1"),
+    "closure_residual": Variable(LANES, "1", "largest exact opening of a loop at these offsets, rad or of the size"),
+    "certificate": Variable(LANES, "1", "relative gap between the needed share and its proven lower bound"),
+    "status": Variable(LANES, "1", "status code of the position; see the attribute flag_meanings", np.int8),
+}
+
+
+@strict_arguments
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
+def assemble(
+    mechanism: Mechanism,
+    steps: int = 360,
+    uniform: Uniform = "pins",
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """Whether the stated clearances take up the errors of a mechanism, and the smallest clearance that would.
+
+    Parameters
+    ----------
+    steps
+        Equally spaced positions of the cycle.
+    uniform
+        What has one and the same clearance where the smallest is looked for: all pins with a play (all pins, if no
+        play is stated), other plays as stated; or "all" kinds of play.
+    progress
+        Called with the number of positions done.
+
+    Returns
+    -------
+    Dataset
+        The variables of `FIGURES`; `smallest_clearance` (m) is the largest need of the whole cycle, between the
+        positions too. `status`: see `AssemblyStatus`.
+
+    Raises
+    ------
+    MechanismError
+        For a play without a length, or a structure that leaves a freedom undetermined.
+    """
+    check_steps(steps)
+    system, values = build(mechanism), mechanism.parameters()
+    cycle = system.cycle(values)
+    time = cycle.times(steps if cycle.duration > 0 else 1)
+    if any(module.redundant for module in system.plan.modules):
+        study = AssemblyStudy.of(system, values, mechanism.ideal_parameters(), cycle, uniform)
+        answer = study.answer(time)
+    else:
+        answer = _regular(system, values, cycle, time)
+    if progress:
+        progress(len(time))
+    return _dataset(answer)
+
+
+def _regular(system: System, values: Values, cycle: Cycle, time: Array) -> Answer:
+    """Every loop has as many equations as coordinates: it closes as it is, or not at all."""
+    chosen = choose(system, values, cycle)
+    walk = forward(system, values, chosen.assembly, time)
+    closes = np.ones(len(time), bool)
+    for pose in walk.poses:
+        for frame in pose.frames:
+            closes &= np.isfinite(sum(primal(number) for number in flat(frame)))
+    arrays = _blank(system, values, time)
+    for name in ("needed_share", "needed_clearance", "open_angle", "open_length", "certificate", "closure_residual"):
+        arrays[name] = np.where(closes, 0.0, np.nan)
+    arrays["status"] = np.where(closes, AssemblyStatus.FITS, AssemblyStatus.APART).astype(np.int8)
+    plane = "in the plane no joint constrains twice" if system.mechanism.space == "planar" else ""
+    why = plane or "its joints constrain no more than its links have freedoms"
+    what = f"{why}: errors only shift its links, so it needs no clearance"
+    return Answer(system, values, time, arrays, (*chosen.findings, Finding.note("assembly.no_need", "joints", what)))
+
+
+def _labels(system: System) -> dict[str, list[str]]:
+    """Names along the dimensions."""
+    ends = {"end": ["1", "2", "3", "4"], "axis": ["x", "y", "z"]}
+    return {"driver": list(system.mechanism.drivers), "joint": list(system.joints), **ends}
+
+
+def _blank(system: System, values: Values, time: Array) -> dict[str, NDArray[Any]]:
+    """The arrays of FIGURES without what is looked for."""
+    sizes = {"position": len(time), **{dim: len(names) for dim, names in _labels(system).items()}}
+    arrays = {
+        name: np.full([sizes[dim] for dim in one.dims], 0.0 if one.dims == PARTS else np.nan)
+        for name, one in FIGURES.items()
+    }
+    arrays["status"] = np.zeros(len(time), np.int8)
+    for i, driver in enumerate(system.mechanism.drivers):
+        arrays["drive_coordinate"][i] = primal(system.drive(values, driver, time)[0])
+    arrays["smallest_clearance"], arrays["largest_share"] = np.zeros(()), np.zeros(())
+    return arrays
+
+
+@dataclass(frozen=True)
+class AssemblyStudy:
+    """An over-constrained mechanism with its errors, the plays that it states, and those of the smallest clearance.
+
+    evened: for each end of `pins`, whether its play is the clearance that is looked for; the others stay.
+    """
+
+    system: System
+    values: Values
+    cycle: Cycle
+    start: Start
+    stated: tuple[End, ...]
+    pins: tuple[End, ...]
+    evened: tuple[bool, ...]
+    findings: tuple[Finding, ...]
+
+    @classmethod
+    def of(cls, system: System, values: Values, ideal: Values, cycle: Cycle, uniform: Uniform) -> AssemblyStudy:
+        """A mechanism with the numbers as built and those without errors."""
+        stated = tuple(ends_of(system, values, every_pin=False))
+        every = not any(end.pin for end in stated) and not (uniform == "all" and stated)
+        pins = tuple(ends_of(system, values, every_pin=every))
+        evened = tuple(end.pin or uniform == "all" for end in pins)
+        start, findings = start_of(system, values, ideal, cycle)
+        return cls(system, values, cycle, start, stated, pins, evened, tuple(findings))
+
+    def solve(self, time: Array, stated: bool) -> LeastPlay:
+        """The least share of the stated plays, or the smallest clearance, at times; ∞ where no play is there."""
+        ends = self.stated if stated else self.pins
+        radii = np.array([end.radius for end in ends])
+        evened = np.array(self.evened, float)
+        base, share = (np.zeros(len(ends)), radii) if stated else (radii * (1 - evened), evened)
+        ask = Ask(base, share, tuple(len(end.axes) for end in ends))
+        loops, none = Loops.of(self.system, self.values, ends, time), np.zeros((len(time), sum(ask.widths)))
+        with np.errstate(all="ignore"):
+            q, gap = loops.least_open(self.start(time), none)
+            fits = gap <= CLOSED
+            if not ends or np.all(fits | np.isnan(gap)):
+                least = np.where(np.isnan(gap), np.nan, np.where(fits, 0.0, np.inf))
+                return LeastPlay(least, least, q, none, np.zeros((len(time), len(ends))), gap, 0)
+            found = least_play(loops, q, none, ask)
+        # what is found where it closes as it is is rounding
+        found.least[fits], found.bound[fits], found.offsets[fits], found.weights[fits] = 0.0, 0.0, 0.0, 0.0
+        return found
+
+    def answer(self, time: Array) -> Answer:
+        """Needs, openings, offsets and statuses at times, and the largest needs of the cycle."""
+        arrays = _blank(self.system, self.values, time)
+        exists, opened = self._open(time, arrays)
+        if np.any(opened):
+            _check_lengths(self.system, self.values, self.pins)
+            shares, needs = self.solve(time, stated=True), self.solve(time, stated=False)
+            arrays["closure_residual"] = _worst(shares, needs, lambda one: one.opening)
+            arrays["certificate"] = _worst(
+                shares, needs, lambda one: (one.least - one.bound) / np.where(one.least > 0, one.least, 1.0)
+            )
+        else:  # the loops close without any play
+            zero, none = np.where(exists, 0.0, np.nan), np.zeros((len(time), 0))
+            shares, needs = (
+                LeastPlay(
+                    zero, zero, none, np.zeros((len(time), sum(len(end.axes) for end in ends))),
+                    np.zeros((len(time), len(ends))), none, 0,
+                ) for ends in (self.stated, self.pins)
+            )  # fmt: skip
+            arrays["certificate"] = arrays["closure_residual"] = zero
+        arrays["needed_share"], arrays["needed_clearance"] = shares.least, needs.least
+        self._place(shares, self.stated, arrays["stated_offset"], arrays["stated_part"])
+        self._place(needs, self.pins, arrays["uniform_offset"], arrays["uniform_part"])
+        status = np.where(
+            np.isinf(shares.least),
+            AssemblyStatus.RIGID,
+            np.where(shares.least > ENOUGH, AssemblyStatus.SHORT, AssemblyStatus.FITS),
+        )
+        status = np.where(np.isnan(shares.least) | np.isnan(needs.least), AssemblyStatus.UNSETTLED, status)
+        arrays["status"] = np.where(exists, status, AssemblyStatus.APART).astype(np.int8)
+        share = clearance = (0.0, 0.0)
+        if np.any(opened):
+            share, clearance = (self._largest(time, of.least, of is shares) for of in (shares, needs))
+        arrays["largest_share"], arrays["smallest_clearance"] = np.array(share[0]), np.array(clearance[0])
+        even = [end for end, evened in zip(self.pins, self.evened, strict=True) if evened]
+        return Answer(
+            self.system, self.values, time, arrays, self.findings, share, clearance,
+            ", ".join(dict.fromkeys(end.joint for end in even)), all(end.pin for end in even), bool(self.stated),
+        )  # fmt: skip
+
+    def _open(self, time: Array, arrays: Mapping[str, Array]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """How far the loops are open where they are so least without play, in angle and in length.
+
+        Returns where they exist, and where they are open.
+        """
+        loops, none = Loops.of(self.system, self.values, (), time), np.zeros((len(time), 0))
+        with np.errstate(all="ignore"):
+            q, gap = loops.least_open(self.start(time), none)
+            rows = loops.linear(q, none).gap[:, : 6 * len(loops.group.chords)].reshape(len(time), -1, 2, 3)
+        rows = np.where((gap <= CLOSED)[:, None, None, None], 0.0, rows)  # rounding
+        sizes = np.max(np.linalg.norm(rows, axis=-1), axis=1)
+        sizes[(sizes < ROUNDING) & (sizes < np.max(sizes, axis=1, keepdims=True))] = 0.0
+        arrays["open_angle"][:], arrays["open_length"][:] = sizes[:, 0], sizes[:, 1] * loops.size
+        return np.isfinite(gap), gap > CLOSED
+
+    def _place(self, found: LeastPlay, ends: Sequence[End], offsets: Array, parts: Array) -> None:
+        """Offsets and parts of the ends at their places in the result."""
+        joints, column = list(self.system.joints), 0
+        solved = np.isfinite(found.least)
+        for k, end in enumerate(ends):
+            joint = joints.index(end.joint)
+            parts[joint, end.number] = np.where(solved, found.weights[:, k], np.nan)
+            for axis in end.axes:
+                offsets[joint, end.number, "xyz".index(axis)] = np.where(solved, found.offsets[:, column], np.nan)
+                column += 1
+
+    def _largest(self, time: Array, needs: Array, stated: bool) -> tuple[float, float]:
+        """The largest need of the cycle and its time: between the positions too, beside the largest of them."""
+        heights = np.where(np.isnan(needs), -np.inf, needs)
+        top = int(np.argmax(heights))
+        if not np.all(np.isfinite(needs)) or len(time) < 3 or not heights[top] > 0:
+            return float(needs[top]) if np.all(~np.isnan(needs)) else float("nan"), float(time[top])
+        high = (heights >= np.roll(heights, 1)) & (heights >= np.roll(heights, -1)) & (heights >= CLOSE * heights[top])
+        tops = np.flatnonzero(high)
+        tops = tops[np.argsort(-heights[tops], kind="stable")][:MOST_TOPS]
+        best, most, reach = time[tops], heights[tops], float(time[1] - time[0])
+        for _ in range(NARROWED):
+            near = best[:, None] + reach * np.linspace(-1, 1, BETWEEN)
+            near = near if self.cycle.periodic else np.clip(near, 0.0, self.cycle.duration)
+            found = np.nan_to_num(self.solve(near.ravel(), stated).least.reshape(near.shape), nan=-np.inf)
+            place = np.argmax(found, axis=1)[:, None]
+            better = np.take_along_axis(found, place, 1)[:, 0]
+            best = np.where(better > most, np.take_along_axis(near, place, 1)[:, 0], best)
+            most, reach = np.maximum(most, better), reach / 4
+        top = int(np.argmax(most))
+        return float(most[top]), float(best[top])
+
+
+def _worst(one: LeastPlay, other: LeastPlay, of: Callable[[LeastPlay], Array]) -> Array:
+    """The larger of a number of two searches, of those that have an answer."""
+    with np.errstate(invalid="ignore"):
+        rows = [np.where(np.isfinite(found.least), of(found), -np.inf) for found in (one, other)]
+    most = np.maximum(*rows)
+    return np.where(np.isfinite(most), most, np.nan)
+
+
+def _check_lengths(system: System, values: Values, ends: Sequence[End]) -> None:
+    """MechanismError for every play that has no length over which a pin or guide could lean."""
+    findings = []
+    for name in dict.fromkeys(end.joint for end in ends):
+        model = CLEARANCE_MODELS["spatial"][system.joints[name][0]]
+        if model.size and not np.all(primal(shifts.length_of(model, values, name)) > 0):
+            part, keys = model.size
+            what = f"how far the {part} can lean in its play depends on its length, which is not stated"
+            findings.append(Finding(what, f"joints.{name}.{part}", f"state {' or '.join(keys)}: 20 mm"))
+    if findings:
+        raise MechanismError(findings)
+
+
+# ---- the answer in words --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was found at times, s: arrays by the names of FIGURES.
+
+    share, clearance: the largest needs of the cycle, each with its time; of: joints whose clearance is looked for;
+    pins: whether they are pins alone; played: whether any play is stated.
+    """
+
+    system: System
+    values: Values
+    time: Array
+    arrays: dict[str, NDArray[Any]]
+    notes: tuple[Finding, ...]
+    share: tuple[float, float] = (0.0, 0.0)
+    clearance: tuple[float, float] = (0.0, 0.0)
+    of: str = ""
+    pins: bool = True
+    played: bool = False
+
+    def at(self, status: AssemblyStatus) -> str:
+        """The positions that came to a status, in words; empty if none did."""
+        places = np.flatnonzero(self.arrays["status"] == status)
+        return self.system.dial(self.values, self.time).intervals(places) if len(places) else ""
+
+    def place(self, name: str) -> str:
+        """Where the largest need of a name is, among those of the positions: everywhere, if it is one number."""
+        (need, time), needs = self.share if name == "needed_share" else self.clearance, self.arrays[name]
+        if len(needs) > 1 and bool(np.all(np.isfinite(needs))) and need - float(np.min(needs)) <= SAME * need:
+            return EVERYWHERE
+        return self.where(time)
+
+    def where(self, time: float) -> str:
+        """A time in words: the drive coordinate, if there is one."""
+        dial = self.system.dial(self.values, np.array([time]))
+        return f"{dial.at(0)} of {dial.of}" if dial.of else dial.at(0)
+
+    def findings(self) -> Iterator[Finding]:
+        """Where the clearances suffice and where not, and what would."""
+        yield from self.notes
+        (share, time), need, settled = self.share, self.clearance[0], True
+        if apart := self.at(AssemblyStatus.APART):
+            remedy = "check the lengths, or limit the range of the driver"
+            yield Finding.error("assembly.apart", "links", f"{AssemblyStatus.APART.text} {apart}", remedy)
+            settled = False
+        place, times = _at(self.place("needed_share")), f"{_share(share)} times their size is needed"
+        short = self.at(AssemblyStatus.SHORT)
+        if short or (np.isfinite(share) and share > ENOUGH):  # or only between the positions
+            takes = f"{times} {place}" if place == EVERYWHERE else f"{place} {times}"
+            takes = f"{short}: {takes}" if short else f"near {self.where(time)}: {times}"
+            what = f"the stated clearances are too small to close the loops {takes}"
+            figures = {"share": share, "clearance": need}
+            yield Finding.error("assembly.clearance_short", "joints", what, self._remedy(), **figures)
+            settled = False
+        if rigid := self.at(AssemblyStatus.RIGID):
+            angle, length = (float(np.nanmax(self.arrays[name])) for name in ("open_angle", "open_length"))
+            sizes = [f"{1e3 * length:.4g} mm"] * (length > 0) + [f"{np.degrees(angle):.4g}°"] * (angle > 0)
+            stated = [clearance(name, self.values) for name in self.system.joints]
+            nil = any(one is not None and np.all(primal(one) == 0) for one in stated)
+            which = "a stated clearance of 0 gives no play: the loops" if nil else "no play is stated: the loops"
+            if self.played:
+                zero = " (a clearance of 0 gives no play)" if nil else ""
+                which = f"the joints with play cannot close the loops, however large the play{zero}: they"
+            what = f"{which} stay open by up to {' and '.join(sizes)} {rigid}"
+            figures = {"angle": angle, "length": length, "clearance": need}
+            yield Finding.error("assembly.no_play", "joints", what, self._remedy(), **figures)
+            settled = False
+        if unsettled := self.at(AssemblyStatus.UNSETTLED):
+            what = f"{AssemblyStatus.UNSETTLED.text} {unsettled}"
+            remedy = "pins on a common axis block each other along it: give one an end float, or make it cylindrical"
+            yield Finding.error("assembly.unsettled", "joints", what, remedy)
+            settled = False
+        if settled and self.of and share > 0:
+            what = f"the stated clearances are sufficient: {times}, {place}"
+            yield Finding.note("assembly.clearance_enough", "joints", what, share=share)
+        elif settled and self.of:
+            yield Finding.note("assembly.fits", "joints", "the loops close without any clearance")
+
+    def _remedy(self) -> str:
+        need = self.clearance[0]
+        if not np.isfinite(need):
+            return "state a clearance of pins, an end float of pins without axial freedom, or correct the axes"
+        size = f"{_enough(1e3 * need)} mm" if need >= 1e-4 else f"{_enough(1e6 * need)} um"
+        pins, place = "the pins " if self.pins else "", _at(self.place("needed_clearance"))
+        return f"the smallest radial clearance, the same in {pins}{self.of}, is {size}, needed {place}"
+
+    def summary(self) -> list[Figure]:
+        """The figures one looks at first."""
+        share, need = self.share[0], self.clearance[0]
+        if not self.of:
+            return [Figure("smallest_clearance", "smallest clearance that is needed", 0.0, "mm")]
+        angle, length = (float(np.nanmax(self.arrays[name], initial=0.0)) for name in ("open_angle", "open_length"))
+        figures = [
+            Figure("open_angle", "opening of the loops without play, angle", np.degrees(angle), "deg"),
+            Figure("open_length", "opening of the loops without play, length", 1e3 * length, "mm"),
+        ]
+        if angle > 0 or length > 0:
+            figures = [figure for figure, size in zip(figures, (angle, length), strict=True) if size > 0]
+        if self.played:
+            # what six digits show as 1 is shown with as many as distinguish it from 1
+            needed = _share(share) if f"{share:.6g}" == "1" or np.isinf(share) else share
+            figures.append(Figure("largest_share", "needed share of the stated clearances", needed))
+            if 0 < share < np.inf:
+                figures.append(Figure("largest_share.place", "  at", self.place("needed_share"), ""))
+        subject = f"smallest clearance, the same in {self.of}"
+        figures.append(Figure("smallest_clearance", subject, 1e3 * need, "mm"))
+        if 0 < need < np.inf:
+            largest = int(np.nanargmax(self.arrays["needed_clearance"]))
+            parts = self.arrays["uniform_part"][:, :, largest].sum(axis=1)
+            carried = sorted(zip(parts, self.system.joints, strict=True), reverse=True)
+            text = ", ".join(f"{name} {100 * part:.0f} %" for part, name in carried if part > LEAST_PART)
+            figures.append(Figure("smallest_clearance.place", "  at", self.place("needed_clearance"), ""))
+            figures.append(Figure("smallest_clearance.parts", "  share of each joint's clearance", text, ""))
+        return figures
+
+
+def _dataset(answer: Answer) -> xr.Dataset:
+    """The result with names, units and provenance."""
+    system, values = answer.system, answer.values
+    mechanism = system.mechanism
+    attributes = origin(
+        mechanism,
+        system.plan.formula,
+        assembling=answer.of,
+        inputs=inputs(mechanism),
+        **Scales(float(np.max(system.size(values))), 1.0, 0.0).summary(answer.summary()),
+        findings=finding_rows(answer.findings()),
+        periodic=int(system.cycle(values).periodic),
+    ) | cited([SOURCE, *mechanism.references], AssemblyStatus)
+    along = driven(answer.time, *system.dial(values, answer.time))
+    along["time"].attrs["long_name"] = "time"
+    variables = described({name: answer.arrays[name] for name in FIGURES}, FIGURES, member_units(system))
+    return dataset_of("assembly", variables, _labels(system), attributes, along)
+
+
+def _at(place: str) -> str:
+    return place if place == EVERYWHERE else f"at {place}"
+
+
+def _share(share: float) -> str:
+    """Four digits, or as many as it takes to tell it from 1; ∞."""
+    if np.isinf(share):
+        return "∞"
+    texts = (f"{share:.{digits}g}" for digits in range(4, 11))
+    return next((text for text in texts if float(text) != 1), "1")
+
+
+def _enough(size: float) -> str:
+    """Five digits, rounded up: the number that is written suffices."""
+    step = 10.0 ** (np.floor(np.log10(size)) - 4)
+    return f"{np.ceil(size / step * (1 - 1e-12)) * step:.5g}" if size > 0 else "0"

@@ -1,1 +1,0 @@
-"""Whether an over-constrained mechanism goes together as it is built."""

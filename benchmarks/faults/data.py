@@ -225,15 +225,15 @@ _RESULTS = (
     Fault(
         "power-in-not-written",
         "results/tables/cycle.py",
-        'found.append(("power_in", "W", lambda window: drive[:, window].sum(axis=0)))',
-        'found.append(("power_in", "W", lambda window: drive[:1, window].mean(axis=0) * 0.0))',
+        'Column("power_in", "W", result["drive_power"].values.sum(axis=0))',
+        'Column("power_in", "W", result["drive_power"].values[:1].mean(axis=0) * 0.0)',
         ("tests/invariants/test_written_results.py", "-k", "csv"),
     ),
     Fault(
         "set-values-of-the-next-condition",
-        "results/tables/comparison.py",
-        "(str(name), unit, np.repeat(rows[i], times))",
-        "(str(name), unit, np.tile(rows[i], times))",
+        "results/tables/studies.py",
+        "np.repeat(row, times)",
+        "np.tile(row, times)",
         ("tests/views/test_compare.py", "tests/rig/test_compare.py", "-k", "stands_beside"),
     ),
 )

@@ -14,7 +14,7 @@ import xarray as xr
 
 import trunnion
 from trunnion import MechanismError
-from trunnion.results.tables import KINDS, kind_of
+from trunnion.results.tables import KINDS
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 STEPS = 12
@@ -52,12 +52,6 @@ def test_a_result_says_what_it_is(result: Any) -> None:
     for table in read.tables().values():
         assert isinstance(table, pd.DataFrame)
         assert table.shape[1] > 0
-
-
-def test_a_result_of_a_version_that_names_no_kind_is_known(result: Any) -> None:
-    data, kind = result
-    attributes = {name: value for name, value in data.attrs.items() if name != "kind"}
-    assert kind_of(xr.Dataset(data.data_vars, data.coords, attributes)) == kind
 
 
 @pytest.mark.spread(5)

@@ -11,8 +11,7 @@ import pytest
 import xarray as xr
 
 import trunnion
-from trunnion.results.tables import columns
-from trunnion.results.tables.selection import selected
+from trunnion.results.tables import columns, selected
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 STEPS = 6
@@ -53,7 +52,7 @@ def test_a_group_holds_what_it_says(result: xr.Dataset) -> None:
 
 
 def test_columns_are_those_of_the_dataset(result: xr.Dataset) -> None:
-    known = {name: (unit, values(slice(None))) for name, unit, values in selected(result, ["all"])}
+    known = {name: (unit, values) for name, unit, values in selected(result, ["all"])}
     point = str(result["point"].values[-1])
     for axis in "xy":
         unit, values = known[f"{point}.acceleration_{axis}"]
@@ -65,7 +64,7 @@ def test_columns_are_those_of_the_dataset(result: xr.Dataset) -> None:
 def test_every_variable_of_the_positions_is_in_a_column() -> None:
     """By its numbers: but for those of the ground, which rests, and of freedoms that a joint has not."""
     data = result_of("durango-fourbar")
-    known = [values(slice(None)) for _, _, values in selected(data, ["all"])]
+    known = [values for _, _, values in selected(data, ["all"])]
     for name, one in data.data_vars.items():
         if "position" not in one.dims or name == "status":
             continue

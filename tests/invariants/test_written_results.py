@@ -105,13 +105,6 @@ def test_drive_unit_of_a_ram(tmp_path: Path) -> None:
     assert dict(zip(header, rows[0], strict=True))["X.effort"] == "N"
 
 
-def test_csv_in_chunks_is_one_table(result: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    trunnion.save(result, tmp_path / "whole.csv", units_row=True)
-    monkeypatch.setattr(export, "ROWS", 7)
-    trunnion.save(result, tmp_path / "parts.csv", units_row=True)
-    assert (tmp_path / "whole.csv").read_bytes() == (tmp_path / "parts.csv").read_bytes()
-
-
 def test_csv_with_positions_without_an_answer(gap: Any, tmp_path: Path) -> None:
     trunnion.save(gap, tmp_path / "r.csv")
     header, rows = table(tmp_path / "r.csv")

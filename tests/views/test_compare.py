@@ -21,7 +21,7 @@ import trunnion
 from rig_measurements import measured, rocker
 from trunnion import MechanismError
 from trunnion.cli.app import main
-from trunnion.results.tables.comparison import TABLES
+from trunnion.results.tables.studies import COMPARISON as TABLES
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.views.common.bundle import web_text
 from trunnion.views.compare import (

@@ -102,12 +102,12 @@ def test_a_guide_has_gaps_and_no_orbit() -> None:
 
 
 def test_columns_of_contacts_and_impacts() -> None:
-    times = {name: (unit, values(slice(None))) for name, unit, values in columns(rattled())}
+    times = {name: (unit, values) for name, unit, values in columns(rattled())}
     assert times["Q.contact_gap"][0] == "m"
     assert times["Q.contact_gap"][1][0] == pytest.approx(5e-4)
     assert times["Q.contact_offset.x"][1][0] == pytest.approx(0.0, abs=1e-15)
     assert {"work_contact", "contact_energy", "Q.reaction_x"} <= times.keys()
-    impacts = {name: (unit, values(slice(None))) for name, unit, values in columns(rattled(), "impacts")}
+    impacts = {name: (unit, values) for name, unit, values in columns(rattled(), "impacts")}
     assert list(impacts["contact"][1]) == ["Q", "Q"]
     assert impacts["approach"][0] == "m/s"
     assert impacts["approach"][1][0] == pytest.approx(4.38578315, rel=1e-8)
@@ -153,7 +153,7 @@ def test_the_spectrum_holds_the_square_of_the_force(last: int) -> None:
 
 
 def test_the_spectrum_as_table_and_figure() -> None:
-    table = {name: (unit, values(slice(None))) for name, unit, values in columns(rattled(), "spectrum")}
+    table = {name: (unit, values) for name, unit, values in columns(rattled(), "spectrum")}
     assert [unit for unit, _ in table.values()] == ["Hz", "N"]
     assert table["frequency"][1][1] == pytest.approx(1 / (701 * 1e-6))
     (axes,) = figure(rattled(), "spectrum").axes

@@ -18,11 +18,13 @@ if TYPE_CHECKING:
 __all__ = [
     "TIME",
     "UNITS_OF_EACH",
+    "Column",
     "MemberUnits",
     "Variable",
     "dataset_of",
     "described",
     "driven",
+    "flat",
     "unit_of",
     "units_along",
     "with_variables",
@@ -127,6 +129,21 @@ def units_along(array: xr.DataArray, dim: str) -> list[str]:
     """The unit of each member of a variable along a dimension."""
     before = array.dims.index(dim) * (0,)
     return [unit_of(array, (*before, member)) for member in range(array.sizes[dim])]
+
+
+class Column(NamedTuple):
+    """A flat column of a table: its name, its unit, its values."""
+
+    name: str
+    unit: str
+    values: NDArray[Any]
+
+
+def flat(result: xr.Dataset, variable: str, name: str, index: tuple[int, ...] = ()) -> list[Column]:
+    """An entry of a variable as a column; none of a variable that the result has not kept."""
+    if variable not in result:
+        return []
+    return [Column(name, unit_of(result[variable], index), result[variable].values[index])]
 
 
 def driven(time: NDArray[np.float64], values: ArrayLike, unit: str, of: str) -> dict[str, xr.Variable]:

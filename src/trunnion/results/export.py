@@ -12,7 +12,7 @@ they were given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max
 `drive`, `<measure>`, `<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`,
 …. Of tolerances the file's name says which table it holds: one row a measure, or of `x.parameters.csv` one a toleranced
 number, see `results.tables.tolerances`; so it does of a comparison with measurements and of what `identify` finds, see
-`results.tables.comparison` and `results.tables.identification`. What `assemble` finds has one row a position:
+`results.tables.studies`. What `assemble` finds has one row a position:
 `<driver>.coordinate`, `needed_share`, `needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`. Measured
 courses have one row a condition and position: `condition`, what was set, `phase`, `<channel>.mean`, `.scatter`,
 `.uncertainty`, `.turns`.
@@ -25,9 +25,8 @@ import importlib.util
 import json
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -39,10 +38,9 @@ from trunnion.model.arguments import strict_arguments
 from trunnion.model.names import guarded
 from trunnion.model.units import TableUnits
 from trunnion.results.attributes import KEPT
-from trunnion.results.model_units import in_model_units
-from trunnion.results.tables import KINDS, Column, kind_of, table_of
+from trunnion.results.dataset import Column
+from trunnion.results.tables import KINDS, in_model_units, kind_of, selected, table_of
 from trunnion.results.tables import columns as flat_columns
-from trunnion.results.tables.selection import selected
 from trunnion.results.workbook import write_workbook
 
 if TYPE_CHECKING:
@@ -52,59 +50,40 @@ __all__ = ["FORMATS", "check_format", "frame", "save"]
 
 Columns = Callable[[xr.Dataset, str], list[Column]]  # of a table by name; of the file's own if that is empty
 BY_ROW = ("tolerance", "allocation", "comparison", "identification", "measurement")  # no column has one unit there
-ROWS = 20_000  # written at a time, so that memory does not grow with the number of positions
 
 
 def frame(result: xr.Dataset, table: str = "", units: str = "si") -> pd.DataFrame:
     """The flat columns of a table, the first if none is named; units as for `save`."""
+    every = flat_columns(result, table)
+    return _frame(in_model_units(result, every) if units == "model" else every)
+
+
+def _frame(every: Sequence[Column]) -> pd.DataFrame:
     import pandas as pd
 
-    found = flat_columns(result, table)
-    found = in_model_units(result, found) if units == "model" else found
-    return pd.DataFrame({name: values(slice(None)) for name, _, values in found})
-
-
-def frames(found: Sequence[Column]) -> Iterator[pd.DataFrame]:
-    """The flat columns, some rows at a time."""
-    import pandas as pd
-
-    count = len(found[0][2](slice(None)))
-    for low in range(0, max(count, 1), ROWS):  # one window at least, so that the names are written
-        window = slice(low, low + ROWS)
-        yield pd.DataFrame({name: values(window) for name, _, values in found})
-
-
-def _guarded(frame: pd.DataFrame) -> pd.DataFrame:
-    """The frame with no text that a spreadsheet would take for a formula."""
-    frame = frame.rename(columns=guarded)
-    for place, kind in enumerate(frame.dtypes):
-        if kind.kind not in "fiub":
-            name = frame.columns[place]
-            frame[name] = [guarded(cell) if isinstance(cell, str) else cell for cell in frame[name]]
-    return frame
+    return pd.DataFrame({column.name: column.values for column in every})
 
 
 def _csv(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
-    found = columns(result, "")
+    """With no text that a spreadsheet would take for a formula."""
+    every = columns(result, "")
+    rows = _frame(every).rename(columns=guarded)
+    for place, kind in enumerate(rows.dtypes):
+        if kind.kind not in "fiub":
+            name = rows.columns[place]
+            rows[name] = [guarded(cell) if isinstance(cell, str) else cell for cell in rows[name]]
     with path.open("w", encoding="utf-8", newline="") as file:
-        for k, rows in enumerate(map(_guarded, frames(found))):
-            if not k:
-                rows.head(0).to_csv(file, index=False)
-                if units_row:
-                    csv.writer(file, lineterminator="\n").writerow([guarded(unit) for _, unit, _ in found])
-            rows.to_csv(file, index=False, header=False)
+        rows.head(0).to_csv(file, index=False)
+        if units_row:
+            csv.writer(file, lineterminator="\n").writerow([guarded(column.unit) for column in every])
+        rows.to_csv(file, index=False, header=False)
 
 
 def _parquet(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    with ExitStack() as stack:
-        writer = None
-        for part in frames(columns(result, "")):
-            rows = pa.Table.from_pandas(part, preserve_index=False)
-            writer = writer or stack.enter_context(pq.ParquetWriter(path, rows.schema))
-            writer.write_table(rows)
+    pq.write_table(pa.Table.from_pandas(_frame(columns(result, "")), preserve_index=False), path)
 
 
 def _netcdf(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:

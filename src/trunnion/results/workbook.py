@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.results.tables.column import Column
+from trunnion.results.dataset import Column
 
 __all__ = ["write_workbook"]
 
@@ -44,13 +44,13 @@ def write_workbook(path: Path, tables: Mapping[str, Sequence[Column]], title: st
             sheet.write_string(0, place, label, head)
             sheet.write_string(1, place, of, unit)
             sheet.set_column(place, place, max(10, min(len(label) + 2, 40)))
-            _fill(sheet, place, np.asarray(values(slice(None))))
+            _fill(sheet, place, np.asarray(values))
     book.close()
     path.write_bytes(made.getbuffer())
 
 
 def _check(path: Path, name: str, columns: Sequence[Column]) -> None:
-    rows = len(columns[0][2](slice(None))) if columns else 0
+    rows = len(columns[0].values) if columns else 0
     if rows + HEADS > MOST_ROWS or len(columns) > MOST_COLUMNS:
         what = f"{rows} rows of {len(columns)} columns do not fit a sheet"
         raise MechanismError(Finding(what, f"{path.name}: {name}", "write .csv or .parquet, or fewer steps or columns"))

@@ -1,72 +1,58 @@
-"""The flat columns of every kind of result, chosen from one table."""
+"""The flat columns of every kind of result, chosen from one table: which there are, and which of them a file gets."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.results.tables import comparison, cycle, identification, motion, studies, tolerances
-from trunnion.results.tables.column import Column, kept, whole
+from trunnion.model.names import nearest
+from trunnion.model.units import unit
+from trunnion.results.attributes import attribute
+from trunnion.results.dataset import Column
+from trunnion.results.tables import cycle, studies, tolerances
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["KINDS", "Column", "check_table", "columns", "kind_of", "table_of"]
+__all__ = ["GROUPS", "KINDS", "check_table", "columns", "in_model_units", "kind_of", "selected", "table_of"]
 
 TABULAR = (".csv", ".parquet", ".xlsx")  # files whose name says which table; the others hold the whole result
 
 OF_CONTACTS = ("impacts", "spectrum")  # tables of a motion in which a joint is in play
 
-Tables = Mapping[str, Callable[[Any], list[Column]]]
-
-
-def _whole(flat: Callable[[Any], Any]) -> Callable[[Any], list[Column]]:
-    return lambda result: whole(flat(result))
-
-
-def _swept(result: xr.Dataset) -> Iterator[tuple[str, str, Any]]:
-    return ((name, unit, values) for name, (unit, values) in studies.swept(result).items())
-
-
-_OF_TOLERANCES = {name: _whole(flat) for name, flat in tolerances.TABLES.items()}
 # the kinds of results: of each its tables by name, the one that a file holds first if its name says nothing else
-KINDS: dict[str, Tables] = {
+KINDS: dict[str, Mapping[str, Callable[[Any], list[Column]]]] = {
     "cycle": {"positions": cycle.positions},
     "motion": {
-        "times": motion.times,
-        "events": _whole(motion.events),
-        "impacts": _whole(motion.impacts),
-        "spectrum": _whole(motion.spectrum),
+        "times": cycle.times,
+        "events": cycle.events,
+        "impacts": cycle.impacts,
+        "spectrum": cycle.spectrum,
     },
-    "sweep": {"points": _whole(_swept)},
+    "sweep": {"points": studies.points},
     "play": {"positions": studies.played},
     "assembly": {"positions": studies.fitted},
-    "measurement": {"courses": _whole(studies.courses)},
-    "comparison": {name: _whole(flat) for name, flat in comparison.TABLES.items()},
-    "identification": {name: _whole(flat) for name, flat in identification.TABLES.items()},
-    "tolerance": _OF_TOLERANCES,
-    "allocation": {"parameters": _OF_TOLERANCES["parameters"], **_OF_TOLERANCES},
+    "measurement": {"courses": studies.courses},
+    "comparison": studies.COMPARISON,
+    "identification": studies.IDENTIFICATION,
+    "tolerance": tolerances.TABLES,
+    "allocation": {"parameters": tolerances.TABLES["parameters"], **tolerances.TABLES},
 }
-# by what a result is known that names no kind, of an older version: an attribute, a dimension or a variable
-_MARKS = {
-    "identified": "identification", "comparing": "comparison", "swept": "sweep", "bought": "allocation",
-    "parameter": "tolerance", "measure": "play", "assembling": "assembly", "setting": "measurement",
-}  # fmt: skip
 
 
 def kind_of(result: xr.Dataset) -> str:
     """The kind of a result, of KINDS."""
-    known = {str(name) for name in (*result.attrs, *result.dims, *result.variables)}
-    return str(result.attrs.get("kind", "")) or next((_MARKS[mark] for mark in _MARKS if mark in known), "cycle")
+    return str(result.attrs.get("kind", "cycle"))
 
 
 def columns(result: xr.Dataset, table: str = "") -> list[Column]:
-    """(name, unit, values of a window of rows) of every flat column of a table, the first if none is named."""
+    """Every flat column of a table, the first if none is named."""
     tables = KINDS[kind_of(result)]
-    return kept(tables[table or next(iter(tables))](result))
+    return tables[table or next(iter(tables))](result)
 
 
 def table_of(path: str | os.PathLike[str], result: xr.Dataset) -> str:
@@ -96,3 +82,60 @@ def check_table(path: str | os.PathLike[str], kind: str, in_play: bool = True) -
 
 def _inner(path: str | os.PathLike[str]) -> str:
     return Path(Path(path).stem).suffix.lstrip(".").lower()
+
+
+# ---- which columns a file gets --------------------------------------------------------------------------------
+
+
+def _everything(result: xr.Dataset) -> list[Column]:
+    return _once([*cycle.positions(result), *cycle.motion(result), *cycle.rest(result)])
+
+
+# of a cycle, beside the usual columns: coordinates, velocities and accelerations; margins, efficiency and effort
+# forward and backward; whatever there is at each position. Other kinds of results have but the usual ones
+OF_CYCLE: dict[str, Callable[[xr.Dataset], list[Column]]] = {
+    "motion": cycle.motion, "locking": cycle.locking, "all": _everything,
+}  # fmt: skip
+GROUPS = ("usual", *OF_CYCLE)
+
+
+def _group(name: str, result: xr.Dataset, table: str) -> list[Column]:
+    return OF_CYCLE[name](result) if name in OF_CYCLE and kind_of(result) == "cycle" else columns(result, table)
+
+
+def selected(result: xr.Dataset, wanted: Sequence[str] | None = None, table: str = "") -> list[Column]:
+    """The columns of a table of a result, in the order asked for and each once.
+
+    wanted: groups of GROUPS, names of columns, or patterns of them such as `crank.B.*`; the usual ones if not given.
+    The time is always there, if the table has it. Raises MechanismError for a name that no column has.
+    """
+    if wanted is None:
+        return columns(result, table)
+    every = _group("all", result, table)
+    chosen = [column for column in every[:1] if column.name == "time"]
+    for name in wanted:
+        own = [column for column in every if fnmatchcase(column.name, name)]
+        own = _group(name, result, table) if name in GROUPS else own
+        if not own:
+            remedy = nearest(name, [*GROUPS, *(column.name for column in every)])
+            raise MechanismError(Finding(f"there is no column '{name}'", "columns", remedy))
+        chosen += own
+    return _once(chosen)
+
+
+def _once(every: Iterable[Column]) -> list[Column]:
+    first: dict[str, Column] = {}
+    for column in every:
+        first.setdefault(column.name, column)
+    return list(first.values())
+
+
+def in_model_units(result: xr.Dataset, every: Iterable[Column]) -> list[Column]:
+    """Columns in the units of the model, named with their unit: `rod.C.x [mm]`; what has no unit stays as it is."""
+    units: Mapping[str, str] = dict(attribute(result, "model_units", "{}"))
+    converted = []
+    for name, si, values in every:
+        own = units.get(si, si)
+        shown = name if own in ("", "1") else f"{name} [{own}]"
+        converted.append(Column(shown, own, values if own == si else values * (1 / float(unit(own)[0]))))
+    return converted

@@ -1,4 +1,4 @@
-"""The flat columns of a result of `analyse` or `locking`: one row a position.
+"""The flat columns of a result of `analyse`, `locking` or `simulate`: one row a position, a time, or an event.
 
 One rule names all: `A.reaction_x` is of the member A, the stem of the variable here, and the labels along its other
 dimensions.
@@ -12,14 +12,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import attribute
-from trunnion.results.tables.column import Column, column, status_column, time_column
+from trunnion.results.dataset import Column, flat
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["locking", "motion", "of_members", "positions", "rest"]
+__all__ = [
+    "events",
+    "impacts",
+    "locking",
+    "motion",
+    "of_members",
+    "positions",
+    "rest",
+    "spectrum",
+    "status_column",
+    "time_column",
+    "times",
+]
 
 Stems = Mapping[str, str]  # by variable: what stands behind the name of the member
 Has = Callable[[int, str, tuple[int, ...]], bool]  # whether a member has a variable at an index along the others
@@ -95,6 +108,16 @@ REST = (
 )  # fmt: skip
 
 
+def time_column(result: xr.Dataset) -> list[Column]:
+    """The time of every position."""
+    return [Column("time", "s", result["time"].values)]
+
+
+def status_column(result: xr.Dataset) -> Column:
+    """The status of every position in words."""
+    return Column("status", "", np.array([status.name.lower() for status in Status])[result["status"].values])
+
+
 def of_members(result: xr.Dataset, dim: str, stems: Stems, has: Has = lambda *_: True) -> Iterator[Column]:
     """The columns of the members of a dimension, one member after another, of variables that the result has."""
     for i, member in enumerate(result[dim].values if dim in result.dims else ()):
@@ -106,50 +129,49 @@ def of_members(result: xr.Dataset, dim: str, stems: Stems, has: Has = lambda *_:
                 if has(i, variable, index):
                     labels = [str(result[other].values[k]) for other, k in zip(others, index, strict=True)]
                     name = f"{member}.{'_'.join(filter(None, (stem, *labels)))}"
-                    yield column(result, variable, name, (i, *index))
+                    yield from flat(result, variable, name, (i, *index))
 
 
 def positions(result: xr.Dataset) -> list[Column]:
     """Joints, drivers, springs, gears, links and points, power, status and measures."""
-    found: list[Column] = [time_column(result), *_flat(result, POSITIONS)]
+    columns = [*time_column(result), *_members(result, POSITIONS)]
     if "drive_power" in result:
-        drive = result["drive_power"].values
-        found.append(("power_in", "W", lambda window: drive[:, window].sum(axis=0)))
-    found += [column(result, "useful_power", "power_useful", ()), column(result, "seat_rounds", "seat_rounds", ())]
-    return [*found, status_column(result), *_measures(result)]
+        columns.append(Column("power_in", "W", result["drive_power"].values.sum(axis=0)))
+    columns += [*flat(result, "useful_power", "power_useful"), *flat(result, "seat_rounds", "seat_rounds")]
+    return [*columns, status_column(result), *_measures(result)]
 
 
 def motion(result: xr.Dataset) -> list[Column]:
     """Coordinates, velocities and accelerations of joints, links and points."""
-    return [time_column(result), *_flat(result, MOTION)]
+    return [*time_column(result), *_members(result, MOTION)]
 
 
 def rest(result: xr.Dataset) -> list[Column]:
     """What else there is at each position: powers, efficiency, margins, and how well it is solved."""
-    found: list[Column] = []
+    columns: list[Column] = []
     for variable, dim, name in REST:
-        found += of_members(result, dim, {variable: name}) if dim else [column(result, variable, name, ())]
-    found += _locking_state(result)
+        columns += of_members(result, dim, {variable: name}) if dim else flat(result, variable, name)
+    columns += _locking_state(result)
     if "link_error" in result:
         stem = "error" if "axis" in result["link_error"].dims else "angle_error"
-        found += of_members(result, "link", {"link_error": stem})
-    return found
+        columns += of_members(result, "link", {"link_error": stem})
+    return columns
 
 
 def locking(result: xr.Dataset) -> list[Column]:
     """What `locking` tells of each position; of a result of `analyse` the columns that it has."""
-    found = [time_column(result)]
+    columns = time_column(result)
     if "drive" in result.coords:
-        found.append(("drive", str(result["drive"].attrs["units"]), lambda window: result["drive"].values[window]))
-    found += [one for one in rest(result) if one[0] == "locking_margin" or one[0].endswith(".critical_multiple")]
-    found += of_members(result, "driver", {"drive_effort": "effort", "drive_effort_reverse": "effort_reverse"})
-    wanted = ("efficiency_instant", "efficiency_reverse_instant", "power_delivered_reverse")
-    more = ("power_acting_reverse", "power_given_reverse", "holding_multiple")
-    found += [column(result, name, name, ()) for name in (*wanted, *more)]
-    return [*found, *_locking_state(result), status_column(result)]
+        columns += flat(result, "drive", "drive")
+    columns += [one for one in rest(result) if one.name == "locking_margin" or one.name.endswith(".critical_multiple")]
+    columns += of_members(result, "driver", {"drive_effort": "effort", "drive_effort_reverse": "effort_reverse"})
+    for name in ("efficiency_instant", "efficiency_reverse_instant", "power_delivered_reverse", "power_acting_reverse",
+                 "power_given_reverse", "holding_multiple"):  # fmt: skip
+        columns += flat(result, name, name)
+    return [*columns, *_locking_state(result), status_column(result)]
 
 
-def _flat(result: xr.Dataset, stems: Mapping[str, Stems]) -> Iterator[Column]:
+def _members(result: xr.Dataset, stems: Mapping[str, Stems]) -> Iterator[Column]:
     """The columns of members, of joints those that their kinds have."""
     stated = attribute(result, "scene", "{}")
     spatial = stated.get("space") == "spatial"
@@ -183,14 +205,77 @@ def _locking_state(result: xr.Dataset) -> list[Column]:
     if "locking_state" not in result:
         return []
     words = np.array(str(result["locking_state"].attrs["flag_meanings"]).split())
-    return [("locking_state", "", lambda window: words[result["locking_state"].values[window]])]
+    return [Column("locking_state", "", words[result["locking_state"].values])]
 
 
 def _measures(result: xr.Dataset) -> list[Column]:
     """The model's measures, by their names, but for those that are numbers of the whole cycle alone."""
     names = result["measure"].values if "measure" in result.dims else ()
     return [
-        column(result, "measure_value", str(name), (i,))
+        column
         for i, name in enumerate(names)
         if np.isnan(result["measure_figure"].values[i]) or not np.all(np.isnan(result["measure_value"].values[i]))
-    ]  # fmt: skip
+        for column in flat(result, "measure_value", str(name), (i,))
+    ]
+
+
+# ---- a motion in time -----------------------------------------------------------------------------------------
+
+DRIVERS = {"drive_coordinate": "coordinate", "drive_rate": "rate", "rotor_speed": "rotor_speed"}
+CONTACT = ("contact_gap", "contact_normal_force", "contact_friction_force", "contact_slip", "contact_touching")
+IMPACT = (
+    ("begin", "s"), ("end", "s"), ("approach", "m/s"), ("separation", "m/s"), ("force", "N"), ("depth", "m"),
+    ("impulse", "N s"), ("wear", "J"),
+)  # fmt: skip
+ENERGY = (
+    *("work_drive", "work_loads", "work_springs", "work_friction", "kinetic_energy", "potential_energy"),
+    *("energy_residual", "resting"),
+)
+
+
+def times(result: xr.Dataset) -> list[Column]:
+    """What a cycle has at a position, with coordinates and rates of the drivers, works and energies."""
+
+    def has(i: int, variable: str, _: tuple[int, ...]) -> bool:
+        return variable != "rotor_speed" or bool(np.any(np.isfinite(result["rotor_speed"].values[i])))
+
+    columns = [*positions(result), *of_members(result, "driver", DRIVERS, has)]
+    columns += flat(result, "work_clutch", "work_clutch")
+    if "contact" in result.dims:
+        for k, contact in enumerate(result["contact"].values):
+            for name in CONTACT:
+                columns += flat(result, name, f"{contact}.{name}", (k,))
+            for axis, name in enumerate(result["axis"].values):
+                columns += flat(result, "contact_offset", f"{contact}.contact_offset.{name}", (k, axis))
+        columns += [*flat(result, "work_contact", "work_contact"), *flat(result, "contact_energy", "contact_energy")]
+    columns += of_members(result, "joint", {"sticking": "sticking"})
+    return [*columns, *(column for name in ENERGY for column in flat(result, name, name))]
+
+
+def impacts(result: xr.Dataset) -> list[Column]:
+    """Every contact of joints in play from onset to lift-off: times, speeds, force, penetration, wear."""
+    labels = attribute(result, "impacts") if "impact" in result.dims else []
+    columns = [Column("contact", "", np.array(labels, dtype=object))]
+    for name, unit in IMPACT:
+        columns.append(Column(name, unit, result[f"impact_{name}"].values if labels else np.empty(0)))
+    return columns
+
+
+def spectrum(result: xr.Dataset) -> list[Column]:
+    """Amplitude of every contact force by frequency."""
+    if "frequency" not in result.dims:
+        return [Column("frequency", "Hz", np.empty(0))]
+    columns = [Column("frequency", "Hz", result["frequency"].values)]
+    for contact, row in zip(result["contact"].values, result["contact_force_amplitude"].values, strict=True):
+        columns.append(Column(f"{contact}.contact_force_amplitude", "N", row))
+    return columns
+
+
+def events(result: xr.Dataset) -> list[Column]:
+    """Time, kind, driver and figure of every event."""
+    rows = attribute(result, "events")
+    kind, driver, unit = (np.array([row[k] for row in rows], dtype=object) for k in (0, 1, 3))
+    figure = np.array([np.nan if row[2] is None else row[2] for row in rows], float)
+    columns = {"event": kind, "driver": driver, "figure": figure, "unit": unit}
+    time = Column("time", "s", result["event_time"].values)
+    return [time, *(Column(name, "", values) for name, values in columns.items())]

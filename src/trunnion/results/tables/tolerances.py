@@ -12,33 +12,22 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion.results.attributes import attribute
-from trunnion.results.dataset import UNITS_OF_EACH, units_along
+from trunnion.results.dataset import UNITS_OF_EACH, Column, units_along
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["TABLES"]
 
-Values = NDArray[Any]
-Flat = list[tuple[str, str, Values]]
 BY_MEASURE = ("sensitivity", "contribution_worst_case", "contribution_rss", "contribution_variance",
               "corner_lower", "corner_upper", "first_order", "first_order_low", "first_order_high", "total_order",
               "total_order_low", "total_order_high")  # fmt: skip
 SHARES = (
-    "yield",
-    "used",
-    "contribution_rss",
-    "contribution_variance",
-    "first_order",
-    "total_order",
-    "convergence_yield",
-    "cp",
-    "skewness",
-    "kurtosis",
-)
+    "yield", "used", "contribution_rss", "contribution_variance", "first_order", "total_order", "convergence_yield",
+    "cp", "skewness", "kurtosis",
+)  # fmt: skip
 
 
 def _units(result: xr.Dataset) -> list[str]:
@@ -72,50 +61,49 @@ def _names(result: xr.Dataset, dim: str) -> list[str]:
     return [str(name) for name in result[dim].values]
 
 
-def _is_share(key: str) -> bool:
-    return key.startswith(SHARES)
-
-
-def _measures(result: xr.Dataset) -> Flat:
+def _measures(result: xr.Dataset) -> list[Column]:
     """One row a measure: its figures; quantiles as `quantile_0.05`; limits and bounds as they are stated."""
-    found: Flat = [("measure", "", np.array(_names(result, "measure"))), ("unit", "", np.array(_units(result)))]
+    found: list[Column] = [
+        Column("measure", "", np.array(_names(result, "measure"))),
+        Column("unit", "", np.array(_units(result))),
+    ]
     for key, ends in (("limits", ("limit_lower", "limit_upper")), ("bounds", ("at_least", "at_most"))):
         stated = attribute(result, key)
         for k, name in enumerate(ends):
             column = [np.nan if pair is None or pair[k] is None else float(pair[k]) for pair in stated]
-            found += [(name, _common(_units(result)), np.array(column))] if column else []
+            found += [Column(name, _common(_units(result)), np.array(column))] if column else []
     limited = np.any([np.isfinite(column) for _, _, column in found[2:]], axis=0) if len(found) > 2 else True
     for variable, one in result.data_vars.items():
         key = str(variable)
         if one.dims == ("measure",):
             own = np.where(limited, one.values, np.nan) if key.startswith("yield") else np.asarray(one.values)
-            found.append((key, "1" if _is_share(key) else _stated(one), own))
+            found.append(Column(key, "1" if key.startswith(SHARES) else _stated(one), own))
         elif one.dims == ("measure", "quantile"):
             levels = result["quantile"].values
             stem = key.replace("quantile_value", "quantile")
-            found += [(f"{stem}_{level:g}", _stated(one), one.values[:, k]) for k, level in enumerate(levels)]
+            found += [Column(f"{stem}_{level:g}", _stated(one), one.values[:, k]) for k, level in enumerate(levels)]
     return found
 
 
-def _parameters(result: xr.Dataset) -> Flat:
+def _parameters(result: xr.Dataset) -> list[Column]:
     """One row a toleranced number; what is of a measure is `<measure>.sensitivity`, …."""
-    found: Flat = [("parameter", "", np.array(_names(result, "parameter")))]
-    found.append(("unit", "", np.array(_parameter_units(result))))
+    found: list[Column] = [Column("parameter", "", np.array(_names(result, "parameter")))]
+    found.append(Column("unit", "", np.array(_parameter_units(result))))
     for variable, one in result.data_vars.items():
         if one.dims == ("parameter",):
-            found.append((str(variable).removeprefix("parameter_"), _stated(one), np.asarray(one.values)))
+            found.append(Column(str(variable).removeprefix("parameter_"), _stated(one), np.asarray(one.values)))
     own = _common(_parameter_units(result))
     for i, (measure, unit) in enumerate(zip(_names(result, "measure"), _units(result), strict=True)):
         told = {"sensitivity": _by(unit, own), "contribution_worst_case": unit, "corner_lower": own,
                 "corner_upper": own}  # fmt: skip
-        for key in (key for key in BY_MEASURE if key in result):
-            found.append((f"{measure}.{key}", told.get(key, "1"), result[key].values[i]))
+        keys = [key for key in BY_MEASURE if key in result]
+        found += [Column(f"{measure}.{key}", told.get(key, "1"), result[key].values[i]) for key in keys]
     return found
 
 
-def _positions(result: xr.Dataset) -> Flat:
+def _positions(result: xr.Dataset) -> list[Column]:
     """One row a position: of each measure its curve, what the tolerances do to it, and its sensitivities."""
-    found: Flat = [(key, str(result[key].attrs.get("units", "")), result[key].values)
+    found: list[Column] = [Column(key, str(result[key].attrs.get("units", "")), result[key].values)
                    for key in ("time", "drive") if key in result.coords]  # fmt: skip
     numbers = list(zip(_names(result, "parameter"), _parameter_units(result), strict=True))
     for i, (measure, unit) in enumerate(zip(_names(result, "measure"), _course_units(result), strict=True)):
@@ -123,52 +111,57 @@ def _positions(result: xr.Dataset) -> Flat:
             name = str(key).replace("curve", "").strip("_")
             name = f"{measure}.{name}" if name else measure
             if one.dims == ("measure", "position"):
-                found.append((name, unit, one.values[i]))
+                found.append(Column(name, unit, one.values[i]))
             elif one.dims == ("measure", "quantile", "position"):
                 levels = result["quantile"].values
-                found += [(f"{name}_{level:g}", unit, one.values[i, k]) for k, level in enumerate(levels)]
+                found += [Column(f"{name}_{level:g}", unit, one.values[i, k]) for k, level in enumerate(levels)]
             elif one.dims == ("measure", "parameter", "position"):
                 end = str(key).removeprefix("curve_")
                 parts = zip(numbers, one.values[i], strict=True)
-                found += [(f"{measure}.{path}.{end}", _by(unit, other), row) for (path, other), row in parts]
+                found += [Column(f"{measure}.{path}.{end}", _by(unit, other), row) for (path, other), row in parts]
     return found
 
 
-def _histogram(result: xr.Dataset) -> Flat:
+def _histogram(result: xr.Dataset) -> list[Column]:
     """One row a bin of a measure: its edges and its count."""
     if "histogram" not in result:
-        return [(name, "", np.empty(0)) for name in ("measure", "from", "to", "count")]
+        return [Column(name, "", np.empty(0)) for name in ("measure", "from", "to", "count")]
     counts, edges = result["histogram"].values, result["edge"].values
     names = np.repeat(_names(result, "measure"), counts.shape[1])
     low, high = (edges[:, part].ravel() for part in (slice(0, -1), slice(1, None)))
     unit = _stated(result["edge"])
-    return [("measure", "", names), ("from", unit, low), ("to", unit, high), ("count", "1", counts.ravel())]
+    return [
+        Column("measure", "", names),
+        Column("from", unit, low),
+        Column("to", unit, high),
+        Column("count", "1", counts.ravel()),
+    ]
 
 
-def _convergence(result: xr.Dataset) -> Flat:
+def _convergence(result: xr.Dataset) -> list[Column]:
     """One row a number of samples: mean, deviation and yield of each measure so far."""
-    found: Flat = []
+    found: list[Column] = []
     if "convergence_samples" in result:
-        found.append(("samples", "1", result["convergence_samples"].values))
+        found.append(Column("samples", "1", result["convergence_samples"].values))
     for i, (measure, unit) in enumerate(zip(_names(result, "measure"), _units(result), strict=True)):
         for key in (key for key in ("mean", "deviation", "yield") if f"convergence_{key}" in result):
             row = result[f"convergence_{key}"].values[i]
-            found.append((f"{measure}.{key}", "1" if key == "yield" else unit, row))
-    return found or [("samples", "1", np.empty(0))]
+            found.append(Column(f"{measure}.{key}", "1" if key == "yield" else unit, row))
+    return found or [Column("samples", "1", np.empty(0))]
 
 
-def _offers(result: xr.Dataset) -> Flat:
+def _offers(result: xr.Dataset) -> list[Column]:
     """One row a point of cost over accuracy: what limits are multiplied by, the cost, and each tolerance."""
     if "trade_off_cost" not in result:
-        return [(name, "1", np.empty(0)) for name in ("factor", "cost")]
-    found: Flat = [(key, "1", result[f"trade_off_{key}"].values) for key in ("factor", "cost")]
+        return [Column(name, "1", np.empty(0)) for name in ("factor", "cost")]
+    found: list[Column] = [Column(key, "1", result[f"trade_off_{key}"].values) for key in ("factor", "cost")]
     for j, (path, unit) in enumerate(zip(_names(result, "parameter"), _parameter_units(result), strict=True)):
         if result["bought"].values[j]:
-            found.append((path, unit, result["trade_off_tolerance"].values[:, j]))
+            found.append(Column(path, unit, result["trade_off_tolerance"].values[:, j]))
     return found
 
 
-TABLES: dict[str, Callable[[Any], Flat]] = {
+TABLES: dict[str, Callable[[Any], list[Column]]] = {
     "measures": _measures,
     "parameters": _parameters,
     "positions": _positions,

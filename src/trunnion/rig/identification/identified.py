@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.dataset import Variable
-from trunnion.results.tables.identification import CURVES
+from trunnion.results.tables.studies import CURVES
 from trunnion.rig.identification.fit import FAR, Fit, Solution, rms
 from trunnion.rig.identification.identifiability import InseparableUnknowns
 from trunnion.rig.identification.misfit import MisfitCause

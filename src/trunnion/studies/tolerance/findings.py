@@ -30,8 +30,8 @@ from trunnion.studies.tolerance.linear import by_position, limited, limits
 from trunnion.studies.tolerance.sampled import CAUSES
 
 if TYPE_CHECKING:
+    from trunnion.studies.tolerance.first_order import Outcome
     from trunnion.studies.tolerance.linear import Of
-    from trunnion.studies.tolerance.outcome import Outcome
     from trunnion.studies.tolerance.sampled import Sampled
 
 __all__ = ["findings_of", "summary"]

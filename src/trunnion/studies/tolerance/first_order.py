@@ -20,13 +20,14 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.studies.tolerance.effects import Effects, effects_of
+from trunnion.studies.tolerance.indices import Indices
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
 from trunnion.studies.tolerance.kernel import many_of
 from trunnion.studies.tolerance.linear import Linear, Reference, linear, references, searched
-from trunnion.studies.tolerance.sampling import Sampling, towards
+from trunnion.studies.tolerance.sampling import Samples, Sampling, towards
 from trunnion.studies.tolerance.search import Corner
 
-__all__ = ["FEW", "ToleranceStudy", "placed", "study"]
+__all__ = ["FEW", "Outcome", "ToleranceStudy", "placed", "study"]
 
 
 FEW = 10_000_000  # configurations up to which further processes cost more than they save
@@ -90,6 +91,18 @@ class ToleranceStudy:
             model, self.measures, self.steps, method, samples, seed, engine, self.friction, len(self.plan.times),
             rotation,
         )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What the methods that were asked for found; None of those that were not. target: the yield asked for."""
+
+    study: ToleranceStudy
+    methods: tuple[str, ...]
+    worst: Sequence[tuple[Corner, Corner]] | None = None
+    samples: Samples | None = None
+    indices: Indices | None = None
+    target: float | None = None
 
 
 def study(

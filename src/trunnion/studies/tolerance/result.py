@@ -19,8 +19,7 @@ from trunnion.results.dataset import MemberUnits, Variable, dataset_of, describe
 from trunnion.solve.system import System
 from trunnion.studies.tolerance.effects import Spread
 from trunnion.studies.tolerance.findings import findings_of, summary
-from trunnion.studies.tolerance.first_order import ToleranceStudy
-from trunnion.studies.tolerance.outcome import Outcome
+from trunnion.studies.tolerance.first_order import Outcome, ToleranceStudy
 from trunnion.studies.tolerance.sampled import QUANTILES, sampled
 
 if TYPE_CHECKING:
@@ -33,7 +32,20 @@ __all__ = ["VARIABLES", "course_text", "dataset", "text_of"]
 Array = NDArray[np.float64]
 # units: "measure": that of each figure; "curve": of each course; "parameter": of each parameter; "ratio" and "curve
 # ratio": the former over the latter; "drive": deg, mm or s, as `drive_unit` says
+CURVES = {
+    "worst_case_lower": "lower", "worst_case_upper": "upper", "rss": "half", "shift": "shift", "deviation": "deviation"
+}  # fmt: skip
 M, P, MP, MPOS = ("measure",), ("parameter",), ("measure", "parameter"), ("measure", "position")
+
+
+def _interval(name: str, dims: tuple[str, ...], unit: str, what: str) -> dict[str, Variable]:
+    """The ends of a 95 % interval."""
+    ends = {"low": "lower", "high": "upper"}
+    return {
+        f"{name}_{end}": Variable(dims, unit, f"{what}, {word} end of the 95 % interval") for end, word in ends.items()
+    }
+
+
 VARIABLES: dict[str, Variable] = {
     "nominal": Variable(M, "measure", "figure of the nominal mechanism"),
     "place": Variable(M, "drive", "drive coordinate of the measure; for an extreme, the nominal one"),
@@ -71,26 +83,21 @@ VARIABLES: dict[str, Variable] = {
     "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings"),
     "samples": Variable((), "1", "number of samples"),
     "mean": Variable(M, "measure", "mean of the figure"),
-    "mean_low": Variable(M, "measure", "mean, lower end of the 95 % interval"),
-    "mean_high": Variable(M, "measure", "mean, upper end of the 95 % interval"),
+    **_interval("mean", M, "measure", "mean"),
     "deviation": Variable(M, "measure", "standard deviation of the figure"),
-    "deviation_low": Variable(M, "measure", "standard deviation, lower end of the 95 % interval"),
-    "deviation_high": Variable(M, "measure", "standard deviation, upper end of the 95 % interval"),
+    **_interval("deviation", M, "measure", "standard deviation"),
     "skewness": Variable(M, "1", "skewness of the figure"),
     "kurtosis": Variable(M, "1", "kurtosis of the figure, 3 of a normal distribution"),
     "least": Variable(M, "measure", "least figure"),
     "most": Variable(M, "measure", "largest figure"),
     "quantile_value": Variable(("measure", "quantile"), "measure", "figure that this share does not exceed"),
-    "quantile_low": Variable(("measure", "quantile"), "measure", "quantile, lower end of the 95 % interval"),
-    "quantile_high": Variable(("measure", "quantile"), "measure", "quantile, upper end of the 95 % interval"),
+    **_interval("quantile", ("measure", "quantile"), "measure", "quantile"),
     "yield": Variable(
         M, "1", "share of the samples within the limits of the measure, or with an answer if it has none"
     ),
-    "yield_low": Variable(M, "1", "yield, lower end of the 95 % interval"),
-    "yield_high": Variable(M, "1", "yield, upper end of the 95 % interval"),
+    **_interval("yield", M, "1", "yield"),
     "yield_all": Variable((), "1", "share of the samples within all limits"),
-    "yield_all_low": Variable((), "1", "yield of all, lower end of the 95 % interval"),
-    "yield_all_high": Variable((), "1", "yield of all, upper end of the 95 % interval"),
+    **_interval("yield_all", (), "1", "yield of all"),
     "cp": Variable(M, "1", "capability index C_p of the figure"),
     "cpk": Variable(M, "1", "capability index C_pk of the figure"),
     "failed": Variable(("cause",), "1", "samples not solved, by the gravest status of their positions"),
@@ -106,11 +113,9 @@ VARIABLES: dict[str, Variable] = {
     "convergence_deviation": Variable(("measure", "size"), "measure", "standard deviation of the first samples"),
     "convergence_yield": Variable(("measure", "size"), "1", "yield of the first samples"),
     "first_order": Variable(MP, "1", "Sobol' index of first order: share of the variance by the parameter alone"),
-    "first_order_low": Variable(MP, "1", "first order, lower end of the 95 % interval"),
-    "first_order_high": Variable(MP, "1", "first order, upper end of the 95 % interval"),
+    **_interval("first_order", MP, "1", "first order"),
     "total_order": Variable(MP, "1", "Sobol' index of total order: share with all its interactions"),
-    "total_order_low": Variable(MP, "1", "total order, lower end of the 95 % interval"),
-    "total_order_high": Variable(MP, "1", "total order, upper end of the 95 % interval"),
+    **_interval("total_order", MP, "1", "total order"),
 }
 
 
@@ -178,11 +183,8 @@ def _units(
     own: Sequence[str], courses: Sequence[str], parameters: Sequence[str], drive: str
 ) -> dict[str, str | MemberUnits]:
     """The units that `Variable` names by a word."""
-    figure, curve, parameter = (
-        MemberUnits("measure", own),
-        MemberUnits("measure", courses),
-        MemberUnits("parameter", parameters),
-    )
+    figure, curve = MemberUnits("measure", own), MemberUnits("measure", courses)
+    parameter = MemberUnits("parameter", parameters)
     return {
         "measure": figure,
         "curve": curve,
@@ -220,11 +222,8 @@ def _linear(found: ToleranceStudy) -> dict[str, Any]:
         "shift_linear": total.shift, "deviation_linear": total.deviation,
         "curve": _spread_out(found, [of.curve for of in rows], ()),
         "curve_sensitivity": _spread_out(found, [of.course.sensitivity for of in rows], (len(inputs.names),)),
-        "curve_worst_case_lower": _spread_out(found, [of.course.total.lower for of in rows], ()),
-        "curve_worst_case_upper": _spread_out(found, [of.course.total.upper for of in rows], ()),
-        "curve_rss": _spread_out(found, [of.course.total.half for of in rows], ()),
-        "curve_shift": _spread_out(found, [of.course.total.shift for of in rows], ()),
-        "curve_deviation": _spread_out(found, [of.course.total.deviation for of in rows], ()),
+        **{f"curve_{name}": _spread_out(found, [getattr(of.course.total, part) for of in rows], ())
+           for name, part in CURVES.items()},
         "status": first.status,
     }  # fmt: skip
 

@@ -21,9 +21,8 @@ from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
 if TYPE_CHECKING:
     import xarray as xr
 
-from trunnion.studies.tolerance.first_order import FEW, ToleranceStudy, study
+from trunnion.studies.tolerance.first_order import FEW, Outcome, ToleranceStudy, study
 from trunnion.studies.tolerance.kernel import engine_for
-from trunnion.studies.tolerance.outcome import Outcome
 from trunnion.studies.tolerance.result import dataset
 
 __all__ = ["DEFAULT_METHODS", "Method", "tolerance"]

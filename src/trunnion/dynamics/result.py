@@ -372,7 +372,8 @@ def motion_findings(
 
 def _end(ended: Ended, driver: str, unit: str) -> Finding:
     """Why a motion ended before its time. driver: the one concerned; unit: of its coordinate."""
-    where, at, figures = f"drivers.{driver}", readable(ended.time, "s"), {**ended.figures, "time": ended.time}
+    where, at = f"drivers.{driver}", readable(ended.time, "s")
+    figures = {**ended.figures, "driver": driver, "unit": unit, "time": ended.time}
     place = f"coordinate {figures['coordinate']:.6g}" if "coordinate" in figures else ""
     state = f"{place}, rate {figures['rate']:.6g}" if "rate" in figures else place
     match ended.code:

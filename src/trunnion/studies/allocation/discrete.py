@@ -14,8 +14,8 @@ Q. Huangfu and J. A. J. Hall, Parallelizing the dual revised simplex method, Mat
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from itertools import accumulate
+from dataclasses import replace
+from itertools import accumulate, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,63 +56,42 @@ def allocate_discrete(problem: AllocationProblem) -> Answer:
     return none(problem, trouble) if trouble else search.run()
 
 
-@dataclass
-class _Best:
-    """The best allocation so far: its total cost, the options taken, the half widths left, the gap of these."""
-
-    cost: float = np.inf
-    taken: Flags = field(default_factory=lambda: np.zeros(0, bool))
-    point: Optimum | None = None
-
-
 class _Search:
-    """Outer approximation: unknowns are [0/1 of all options, u of the groups with a cost model, their costs]."""
+    """Outer approximation: unknowns are [0/1 of all options, u of the groups with a cost model, their costs].
+
+    table, prices: half width and cost of every contribution by option, 0 of options of others; parts: the options of
+    each group; best: the least cost so far, the options taken, the half widths left.
+    """
 
     def __init__(self, problem: AllocationProblem, groups: list[list[Contribution]]) -> None:
         self.problem = problem
         place = {one.name: i for i, one in enumerate(problem.contributions)}
         self.limits: Sides = sides(problem)
         self.task: Task = task_of(problem, self.limits)
-        options = [common_options(members) for members in groups]
-        self.names = [list(each) for each in options]
-        self.widths = [len(names) for names in self.names]
-        self.starts = [0, *accumulate(self.widths)]
+        self.options = [common_options(members) for members in groups]
         self.members = [[place[one.name] for one in members] for members in groups]
-        self.table = np.zeros((len(place), self.starts[-1]))  # half widths by option
-        self.prices = np.zeros((len(place), self.starts[-1]))
-        for start, own, members in zip(self.starts, options, self.members, strict=False):
-            for k, each in enumerate(own.values(), start):
+        ends = [0, *accumulate(map(len, self.options))]
+        self.parts = [slice(*pair) for pair in pairwise(ends)]
+        self.count = ends[-1]  # of 0/1 numbers
+        self.table, self.prices = np.zeros((2, len(place), self.count))
+        for part, members, own in zip(self.parts, self.members, self.options, strict=True):
+            for k, each in enumerate(own.values(), part.start):
                 self.table[members, k] = [option.tolerance for option in each]
                 self.prices[members, k] = [option.cost for option in each]
         self.scale = float(np.sum(np.abs(self.prices))) or 1.0
+        self.free = slice(self.count, self.count + len(self.task.unit))  # the unknowns u
+        self.columns = self.free.stop + len(self.task.costs)
         self.rows: list[Array] = []  # rows · unknowns ≤ right
         self.right: list[float] = []
-        self.listed: set[int] = set()
-
-    # Sizes of the linear problem
-
-    @property
-    def chosen(self) -> int:
-        """How many 0/1 numbers there are."""
-        return self.starts[-1]
-
-    @property
-    def columns(self) -> int:
-        """How many unknowns there are."""
-        return self.chosen + len(self.task.unit) + len(self.task.costs)
+        self.listed: set[int] = set()  # sides whose row is there in full
+        self.best: tuple[float, Flags, Optimum | None] = np.inf, np.zeros(self.count, bool), None
 
     def unmet(self) -> list[Finding]:
         """Why no choice keeps the limits: told only where the narrowest half widths are the best to be had."""
-        if any(not names for names in self.names):
-            which = next(k for k, names in enumerate(self.names) if not names)
-            one = self.problem.contributions[self.members[which][0]]
-            return [
-                Finding(
-                    "no option of the group lies within the bounds of all its members",
-                    f"costs.{one.name}",
-                    "widen the bounds",
-                )
-            ]
+        for own, members in zip(self.options, self.members, strict=True):
+            if not own:
+                what = "no option of the group lies within the bounds of all its members"
+                return [Finding(what, f"costs.{self.problem.contributions[members[0]].name}", "widen the bounds")]
         if not self.limits.rising and np.all(self.limits.room > 0):
             return []
         return shortfalls(self.problem, self.narrowest())
@@ -120,46 +99,47 @@ class _Search:
     def narrowest(self) -> Array:
         """The least half widths of all, m or rad."""
         t = self.task.tolerances(self.task.low)
-        for start, width, members in zip(self.starts, self.widths, self.members, strict=False):
-            t[members] = np.min(self.table[members, start : start + width], axis=1)
+        for part, members in zip(self.parts, self.members, strict=True):
+            t[members] = np.min(self.table[members, part], axis=1)
         return t
 
     def run(self) -> Answer:
         """Rounds of linear problem and completion until they meet."""
-        best, bound = _Best(), -np.inf
-        for g, cost in self.task.costs:
-            del cost
+        bound, rounds = -np.inf, 0
+        for place in range(len(self.task.costs)):
             for share in STARTS:
-                self._price_tangents(share * self.task.high, only=g)
-        rounds = 0
+                self._price_tangent(place, share * self.task.high)
         while rounds < ROUNDS:
             rounds += 1
-            found = self._linear()
-            if found is None:
-                bound = best.cost
+            solution = self._linear()
+            if solution is None:
+                bound = self.best[0]
                 break
-            unknowns, bound = found
-            if bound >= best.cost - PROVEN * self.scale:
+            unknowns, bound = solution
+            if bound >= self.best[0] - PROVEN * self.scale:
                 break
-            taken = unknowns[: self.chosen] > 0.5
-            u = np.clip(unknowns[self.chosen :][: len(self.task.unit)], self.task.low, self.task.high)
+            taken = unknowns[: self.count] > 0.5
+            u = np.clip(unknowns[self.free], self.task.low, self.task.high)
             self._break(taken, u)
-            self._complete(taken, u, best)
-        return self._answer(best, bound, rounds)
+            self._complete(taken, u)
+        return self._answer(bound, rounds)
 
     def _linear(self) -> tuple[Array, float] | None:
         """The linear problem's unknowns and cost; None if no choice is left."""
-        task, count = self.task, len(self.task.unit)
-        aim = np.concatenate([self.prices.sum(axis=0), np.zeros(count), np.ones(len(task.costs))]) / self.scale
-        once = np.zeros((len(self.widths), self.columns))
-        for row, (start, width) in enumerate(zip(self.starts, self.widths, strict=False)):
-            once[row, start : start + width] = 1.0
+        task, inner = self.task, self.columns - self.count
+        aim = np.concatenate([self.prices.sum(axis=0), np.zeros(len(task.unit)), np.ones(len(task.costs))]) / self.scale
+        once = np.zeros((len(self.parts), self.columns))
+        for row, part in zip(once, self.parts, strict=True):
+            row[part] = 1.0
         rules = [LinearConstraint(once, 1.0, 1.0)]
         if self.rows:
             rules.append(LinearConstraint(np.array(self.rows), -np.inf, np.array(self.right)))
-        low = np.concatenate([np.zeros(self.chosen), task.low, np.full(len(task.costs), -np.inf)])
-        high = np.concatenate([np.ones(self.chosen), task.high, np.full(len(task.costs), np.inf)])
-        kinds = np.concatenate([np.ones(self.chosen), np.zeros(count + len(task.costs))])
+        costs = np.full(len(task.costs), np.inf)
+        low, high = (
+            np.concatenate(ends)
+            for ends in ([np.zeros(self.count), task.low, -costs], [np.ones(self.count), task.high, costs])
+        )
+        kinds = np.concatenate([np.ones(self.count), np.zeros(inner)])
         found = milp(aim, integrality=kinds, bounds=Bounds(low, high), constraints=rules, options={"mip_rel_gap": 0.0})
         if found.x is None:
             return None
@@ -178,108 +158,86 @@ class _Search:
             self._limit(int(k), t, u)
 
     def _limit(self, k: int, t: Array, u: Array) -> None:
-        """A row of the linear problem for one side, unless it is there in full already."""
+        """A row of the linear problem for a side: its square where that is linear in 0/1 numbers, else its tangent."""
         limits, task = self.limits, self.task
-        row = np.zeros(self.columns)
-        inner = slice(self.chosen, self.chosen + len(task.unit))
-        span = task.spans * task.unit
-        if not limits.spread[k].any():
-            if k in self.listed:
-                return
-            self.listed.add(k)
-            row[: self.chosen], row[inner] = limits.linear[k] @ self.table, limits.linear[k] @ span
-            self._add(row, 1.0 - limits.linear[k] @ task.base)
+        flat = not limits.spread[k].any()
+        squared = not flat and limits.factor is None and not limits.linear[k].any()
+        if k in self.listed and (flat or (squared and not len(task.unit))):
             return
-        if limits.factor is None and not limits.linear[k].any():
+        if flat or squared:
+            self.listed.add(k)
+        row, span = np.zeros(self.columns), task.spans * task.unit
+        if squared:
             squares = limits.spread[k] ** 2
-            if k in self.listed and not len(task.unit):
-                return
-            self.listed.add(k)
-            row[: self.chosen] = squares @ self.table**2
-            row[inner] = 2 * (squares @ span**2) * u  # u² ≥ 2 û u − û²
-            self._add(row, 1.0 - squares @ task.base**2 + float((squares @ span**2) @ u**2))
-            return
-        gradient = limits.gradient(t, np.array([k]))[0]
-        row[: self.chosen], row[inner] = gradient @ self.table, gradient @ span
-        self._add(row, 1.0 - float(limits.value(t, np.array([k]))[0]) + gradient @ (t - task.base))
+            row[: self.count], free = squares @ self.table**2, squares @ span**2
+            row[self.free] = 2 * free * u  # u² ≥ 2 û u − û²
+            right = 1.0 - squares @ task.base**2 + free @ u**2
+        else:
+            gradient = limits.gradient(t, np.array([k]))[0]
+            row[: self.count], row[self.free] = gradient @ self.table, gradient @ span
+            right = 1.0 - limits.value(t, np.array([k]))[0] + gradient @ (t - task.base)
+        self._add(row, right)
 
     def _add(self, row: Array, right: float) -> None:
         self.rows.append(row)
         self.right.append(float(right))
 
-    def _price_tangents(self, u: Array, only: int | None = None) -> None:
-        """Tangents of the costs at half widths: cost ≥ value + slope (u − û)."""
-        for place, (g, cost) in enumerate(self.task.costs):
-            t = float(self.task.unit[g] * u[g])
-            if (only is not None and g != only) or not t > 0:
-                continue
-            row = np.zeros(self.columns)
-            slope = cost.slope(t) * self.task.unit[g]
-            row[self.chosen + g], row[self.chosen + len(self.task.unit) + place] = slope, -1.0
-            size = max(abs(slope), 1.0)
-            self._add(row / size, (slope * u[g] - cost.value(t)) / size)
+    def _price_tangent(self, place: int, u: Array) -> None:
+        """The tangent of a cost at a half width: cost ≥ value + slope (u − û)."""
+        g, cost = self.task.costs[place]
+        t = float(self.task.unit[g] * u[g])
+        if not t > 0:
+            return
+        row, slope = np.zeros(self.columns), cost.slope(t) * self.task.unit[g]
+        row[self.count + g], row[self.free.stop + place] = slope, -1.0
+        size = max(abs(slope), 1.0)
+        self._add(row / size, (slope * u[g] - cost.value(t)) / size)
 
-    def _complete(self, taken: Flags, u: Array, best: _Best) -> None:
+    def _complete(self, taken: Flags, u: Array) -> None:
         """With these options: the best half widths of the others; the options are settled and not asked for again."""
         price, point = float(np.sum(self.prices @ taken)), None
-        self._forbid(taken)
+        forbidden = np.zeros(self.columns)
+        forbidden[: self.count] = taken
+        self._add(forbidden, len(self.parts) - 1.0)
         if len(self.task.unit):
-            self._price_tangents(u)
             part = replace(self.task, base=self.task.base + self.table @ taken)
-            least = part.tolerances(part.low)
-            if self.limits.rising and np.any(self.limits.value(least) > 1 + ALLOWED):
+            for place in range(len(self.task.costs)):
+                self._price_tangent(place, u)
+            if self.limits.rising and np.any(self.limits.value(part.tolerances(part.low)) > 1 + ALLOWED):
                 self._break(taken, part.low)
                 return
             point = minimise(part)
             if point is None:
                 return
             price += part.cost(point.u)
-            self._price_tangents(point.u)
+            for place in range(len(self.task.costs)):
+                self._price_tangent(place, point.u)
             for k in point.rows:
                 self._limit(int(k), part.tolerances(point.u), point.u)
         elif np.any(self.limits.value(self._tolerances(taken, u)) > 1 + ALLOWED):
             return
-        if price < best.cost:
-            best.cost, best.taken, best.point = price, taken, point
+        if price < self.best[0]:
+            self.best = price, taken, point
 
-    def _forbid(self, taken: Flags) -> None:
-        row = np.zeros(self.columns)
-        row[: self.chosen] = taken
-        self._add(row, len(self.widths) - 1.0)
-
-    def _answer(self, best: _Best, bound: float, rounds: int) -> Answer:
-        problem = self.problem
-        if not np.isfinite(best.cost):
-            doubt = Finding(
-                "no choice of processes meets the limits", "processes", "widen a limit or add a finer process"
-            )
+    def _answer(self, bound: float, rounds: int) -> Answer:
+        problem, (cost, taken, point) = self.problem, self.best
+        if not np.isfinite(cost):
+            remedy = "widen a limit or add a finer process"
+            doubt = Finding("no choice of processes meets the limits", "processes", remedy)
             return none(problem, shortfalls(problem, self.narrowest()) or [doubt])
-        u = best.point.u if best.point else np.zeros(0)
-        gap = max(best.cost - bound, 0.0) / self.scale + (best.point.gap if best.point else 0.0)
-        costs = self.prices @ best.taken
-        t = self._tolerances(best.taken, u)
-        costs += [one.cost.value(float(t[i])) if one.cost else 0.0 for i, one in enumerate(problem.contributions)]
-        flat = [name for names in self.names for name in names]
+        gap = max(cost - bound, 0.0) / self.scale + (point.gap if point else 0.0)
+        t = self._tolerances(taken, point.u if point else np.zeros(0))
+        own = [one.cost.value(float(t[i])) if one.cost else 0.0 for i, one in enumerate(problem.contributions)]
         choices = {
-            problem.contributions[i].name: flat[int(np.flatnonzero(best.taken[start : start + width])[0]) + start]
-            for start, width, members in zip(self.starts, self.widths, self.members, strict=False)
+            problem.contributions[i].name: list(options)[int(np.flatnonzero(taken[part])[0])]
+            for part, members, options in zip(self.parts, self.members, self.options, strict=True)
             for i in members
         }
-        proven = gap <= PROVEN
         what = f"the optimality gap is {gap:.1e} of the cost of the tolerances"
         remedy = "check the orders of magnitude of costs and bounds"
         doubt = Finding.warning("allocation.proven_roughly", "processes", what, remedy, gap=gap)
-        nothing = np.full(len(problem.effects.worst), np.nan)
         return Answer(
-            problem,
-            t,
-            costs,
-            best.cost,
-            min(bound, best.cost),
-            gap,
-            proven,
-            choices=choices,
-            price=nothing,
-            findings=() if proven else (doubt,),
+            problem, t, self.prices @ taken + own, cost, min(bound, cost), gap, gap <= PROVEN, choices=choices,
+            price=np.full(len(problem.effects.worst), np.nan), findings=() if gap <= PROVEN else (doubt,),
             rounds=rounds,
-        )
+        )  # fmt: skip

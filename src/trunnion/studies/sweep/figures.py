@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Place
 from trunnion.cycle.course import CycleCourse, Means, magnitude
-from trunnion.errors import Status
+from trunnion.errors import Finding, MechanismError, Status, agreeing
 from trunnion.joints.pairs import PAIRS
+from trunnion.measures.measures import Measure, named
+from trunnion.model.mechanism import Mechanism
 from trunnion.results.dataset import Variable
+from trunnion.solve.run import Run
 from trunnion.solve.system import System
 
-__all__ = ["FIGURES", "Reduced", "reduced"]
+__all__ = ["FIGURES", "Reduced", "left_out", "measures_of", "reduced"]
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -96,3 +99,39 @@ def reduced(arrays: Arrays, course: CycleCourse | None, ideal: Means | None, sys
 def _value(found: Place | None) -> float:
     """An extreme; NaN where there is none."""
     return float("nan") if found is None else found.value
+
+
+# ---- measures of the model -------------------------------------------------------------------------------------
+
+
+def measures_of(run: Run, names: Sequence[str]) -> list[Measure]:
+    """Measures by their names, each with one figure a cycle; MechanismError with all that cannot be swept, and why."""
+    found = named(run.system.mechanism, names, run.values)
+    findings = []
+    for measure in found:
+        where = f"measures.{measure.name}"
+        if measure.name in FIGURES:
+            what = f"the measure '{measure.name}' has the name of a figure of the sweep"
+            findings.append(Finding(what, where, "call it otherwise in the model"))
+        elif measure.of.against or measure.of_attitude(run.system):
+            what = f"the measure '{measure.name}' is a deviation from the nominal mechanism, and each point is its own"
+            findings.append(
+                Finding(what, where, "sweep another; see `trunnion tolerance` for the effect of tolerances on it")
+            )
+        elif measure.rule == "deviation":
+            what = f"the measure '{measure.name}' has a number at every position and none of the cycle"
+            findings.append(Finding(what, where, "state a position, at: 60 deg, or a statistic, as: maximum"))
+    if findings:
+        raise MechanismError(findings)
+    return found
+
+
+def left_out(mechanism: Mechanism, names: Sequence[str]) -> list[Finding]:
+    """A note that names the measures of the model that a sweep does not have."""
+    others = [name for name in mechanism.measures if name not in names]
+    if not others:
+        return []
+    what = f"the model's {agreeing(len(others), 'measure', 'measures')} {', '.join(others)} "
+    what += f"{agreeing(len(others), 'is', 'are')} not in this sweep"
+    remedy = f"add {agreeing(len(others), 'it', 'them')} with --measure, in Python with measures=[…]"
+    return [Finding.note("sweep.measures_left_out", "measures", what, remedy, measures=others)]

@@ -37,9 +37,8 @@ from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import Cycle, System, law_of, rubbing
-from trunnion.studies.sweep.figures import Reduced, reduced
+from trunnion.studies.sweep.figures import Reduced, measures_of, reduced
 from trunnion.studies.sweep.grid import Swept, named
-from trunnion.studies.sweep.measures import measures_of
 
 __all__ = ["Points"]
 

@@ -30,9 +30,8 @@ from trunnion.results.scales import Scales
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work
 from trunnion.solve.run import Run
-from trunnion.studies.sweep.figures import FIGURES
+from trunnion.studies.sweep.figures import FIGURES, left_out, measures_of
 from trunnion.studies.sweep.grid import MOST_POINTS, Over, Swept, grid, say
-from trunnion.studies.sweep.measures import left_out, measures_of
 from trunnion.studies.sweep.points import Points
 
 if TYPE_CHECKING:

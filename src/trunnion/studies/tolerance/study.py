@@ -54,21 +54,42 @@ def tolerance(
 ) -> xr.Dataset:
     """What the tolerances and plays of a mechanism do to measures: limits, scatter, yield, and what each contributes.
 
-    measures: names of the model's, or as on the command line (`measures.named`); all of the model if not given, or,
-    where it states none, rotation and slide of every joint to the ground that is not driven. methods: see `Method`.
-    samples: of the sampling method, and of the variance-based indices; seed: of its random numbers. steps: positions of
-    a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
-    friction_method: how friction and reactions are settled; Newton's method if not given.
-    jobs: processes, one a core if not given and worth it; cluster, checkpoint: see `batch.run`; progress: called with
-    the samples done.
-    engine: numpy, compiled, or auto: compiled where it pays and can do the mechanism.
-    target: the yield that is asked for; limits are missed below it, and if none is given where a worst case, a yield
-    below 1 or a C_pk below 1 breaks them: errors among the findings.
-    Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.
-    Method: exact first derivatives by dual numbers; the worst corner of the tolerances found on the mechanism itself;
-    Monte Carlo or scrambled Sobol points through the whole analysis; Sobol' indices. Samples that have no answer are
-    counted, and are outside every limit.
-    Raises MechanismError if nothing varies, for an unknown measure or method, or as `analyse` does.
+    Exact first derivatives by dual numbers; the worst corner of the tolerances found on the mechanism itself; Monte
+    Carlo or scrambled Sobol points through the whole analysis; Sobol' indices. Samples that have no answer are counted,
+    and are outside every limit.
+
+    Parameters
+    ----------
+    measures
+        Names of the model's, or as on the command line (`measures.named`); all of the model if not given, or, where it
+        states none, rotation and slide of every joint to the ground that is not driven.
+    methods
+        See `Method`.
+    samples, seed
+        Of the sampling method, and of the variance-based indices; of its random numbers.
+    steps, at
+        Positions of a whole cycle; the place (driver coordinate or time) of measures that state none and no figure.
+    friction_method
+        How friction and reactions are settled; Newton's method if not given.
+    jobs, cluster, checkpoint
+        Processes, one a core if not given and worth it; see `batch.run`.
+    engine
+        numpy, compiled, or auto: compiled where it pays and can do the mechanism.
+    progress
+        Called with the samples done.
+    target
+        The yield that is asked for: limits are missed below it. If none is given, they are where a worst case, a yield
+        below 1 or a C_pk below 1 breaks them: errors among the findings.
+
+    Returns
+    -------
+    Dataset
+        Over (measure, parameter, position, …), of `result.VARIABLES`; SI, each measure in its own unit.
+
+    Raises
+    ------
+    MechanismError
+        Nothing varies, a measure or method is unknown, or as `analyse` does.
     """
     methods, notes, stated = tuple(dict.fromkeys(methods)), list[Finding](), engine
     _check(methods, samples, seed, target)

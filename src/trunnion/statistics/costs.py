@@ -7,9 +7,9 @@ where k t ≥ unit. So an allocation is solved in t, where it is convex with eit
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -32,21 +32,16 @@ class CostParameter:
     meaning: str = ""
 
 
-class CostFunction(Protocol):
-    """A cost, or its derivative, from the half width t (m or rad)."""
-
-    def __call__(self, t: float, *, A: float, B: float, k: float, unit: float) -> float: ...
-
-
 @dataclass(frozen=True)
 class CostModel:
     """A cost of a tolerance, with its derivative with respect to the half width.
 
-    cone: the cone of a conic program that its epigraph is: of z ≥ x^−k, or of z ≥ exp(−k x), with x = t/unit.
+    value, slope: of (t, *, A, B, k, unit), t the half width, m or rad; cone: the cone of a conic program that its
+    epigraph is: of z ≥ x^−k, or of z ≥ exp(−k x), with x = t/unit.
     """
 
-    value: CostFunction
-    slope: CostFunction
+    value: Callable[..., float]
+    slope: Callable[..., float]
     parameters: Mapping[str, CostParameter]
     formula: str
     source: str

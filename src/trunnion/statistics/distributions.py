@@ -73,22 +73,6 @@ def _normal_quantile(u: Floats, lower: float, upper: float, options: Options) ->
     return np.asarray(mean + sigma * special.ndtri(u), dtype=np.float64)
 
 
-# ---- uniform, direction ---------------------------------------------------------------------------------------
-
-
-def _uniform_quantile(u: Floats, lower: float, upper: float, options: Options) -> Floats:
-    return lower + (upper - lower) * np.asarray(u)
-
-
-def _uniform_variance(lower: float, upper: float, options: Options) -> float:
-    return (upper - lower) ** 2 / 12
-
-
-def _direction_quantile(u: Floats, lower: float, upper: float, options: Options) -> Floats:
-    """An angle that is any with the same chance, −π to π; the limits do not matter."""
-    return _uniform_quantile(u, -math.pi, math.pi, options)
-
-
 # ---- triangular -----------------------------------------------------------------------------------------------
 
 
@@ -102,16 +86,6 @@ def _triangular_quantile(u: Floats, lower: float, upper: float, options: Options
     left = lower + np.sqrt(u * (width * (mode - lower)))
     right = upper - np.sqrt((1 - u) * (width * (upper - mode)))
     return np.clip(np.where(u * width < mode - lower, left, right), lower, upper)
-
-
-def _triangular_mean(lower: float, upper: float, options: Options) -> float:
-    return (lower + upper + _mode(lower, upper, options)) / 3
-
-
-def _triangular_variance(lower: float, upper: float, options: Options) -> float:
-    """(w² − (mode − lower)(upper − mode))/18, w = upper − lower."""
-    mode = _mode(lower, upper, options)
-    return ((upper - lower) ** 2 - (mode - lower) * (upper - mode)) / 18
 
 
 # ---- truncated normal -----------------------------------------------------------------------------------------
@@ -191,17 +165,6 @@ def _beta_quantile(u: Floats, lower: float, upper: float, options: Options) -> F
     return np.asarray(np.where(u <= 0.5, below, above), dtype=np.float64)
 
 
-def _beta_mean(lower: float, upper: float, options: Options) -> float:
-    alpha, beta = _shapes(options)
-    return (lower * beta + upper * alpha) / (alpha + beta)
-
-
-def _beta_variance(lower: float, upper: float, options: Options) -> float:
-    """w² α β/((α + β)² (α + β + 1))."""
-    alpha, beta = _shapes(options)
-    return (upper - lower) ** 2 * alpha * beta / ((alpha + beta) ** 2 * (alpha + beta + 1))
-
-
 # ---- sample ---------------------------------------------------------------------------------------------------
 
 
@@ -216,72 +179,55 @@ def _sample_quantile(u: Floats, lower: float, upper: float, options: Options) ->
     return values[np.clip(place, 0, values.size - 1)]
 
 
-def _sample_mean(lower: float, upper: float, options: Options) -> float:
-    return float(_values(options).mean())
+def _triangular_variance(lower: float, upper: float, options: Options) -> float:
+    """(w² − (mode − lower)(upper − mode))/18, w = upper − lower."""
+    mode = _mode(lower, upper, options)
+    return ((upper - lower) ** 2 - (mode - lower) * (upper - mode)) / 18
 
 
-def _sample_variance(lower: float, upper: float, options: Options) -> float:
-    """Of the values as a population: they are all there is to be drawn, so the divisor is n."""
-    return float(_values(options).var())
+def _beta_moments(lower: float, upper: float, options: Options) -> tuple[float, float]:
+    """Mean, and variance w² α β/((α + β)² (α + β + 1))."""
+    alpha, beta = _shapes(options)
+    both = alpha + beta
+    return (lower * beta + upper * alpha) / both, (upper - lower) ** 2 * alpha * beta / (both**2 * (both + 1))
 
 
-DISTRIBUTIONS: dict[str, Distribution] = {
-    entry.name: entry
-    for entry in (
-        Distribution(
-            "normal",
-            "normal, spread by the capability of the process",
-            _normal_quantile,
-            mean=lambda lower, upper, options: normal_parameters(lower, upper, options)[0],
-            variance=lambda lower, upper, options: normal_parameters(lower, upper, options)[1] ** 2,
-            parameters={"cp": 1.0, "cpk": None, "shift": None},
-            bounded=False,
-        ),
-        Distribution(
-            "uniform",
-            "uniform between the limits",
-            _uniform_quantile,
-            mean=lambda lower, upper, options: (lower + upper) / 2,
-            variance=_uniform_variance,
-        ),
-        Distribution(
-            "triangular",
-            "triangular between the limits",
-            _triangular_quantile,
-            _triangular_mean,
-            _triangular_variance,
-            parameters={"mode": None},
-        ),
-        Distribution(
-            "truncated",
-            "normal, cut off at the limits",
-            _truncated_quantile,
-            mean=lambda lower, upper, options: _truncated_moments(lower, upper, options)[0],
-            variance=lambda lower, upper, options: _truncated_moments(lower, upper, options)[1],
-            parameters={"cp": 1.0, "cpk": None, "shift": None},
-        ),
-        Distribution(
-            "beta",
-            "beta between the limits",
-            _beta_quantile,
-            _beta_mean,
-            _beta_variance,
-            parameters={"alpha": 2.0, "beta": 2.0},
-        ),
-        Distribution(
-            "sample",
-            "drawn from measured values",
-            _sample_quantile,
-            _sample_mean,
-            _sample_variance,
-            parameters={"values": None},
-        ),
-        Distribution(
-            "direction",
-            "any angle with the same chance",
-            _direction_quantile,
-            mean=lambda lower, upper, options: 0.0,
-            variance=lambda lower, upper, options: math.pi**2 / 3,
-        ),
-    )
-}
+CAPABILITY: Mapping[str, float | None] = {"cp": 1.0, "cpk": None, "shift": None}
+DISTRIBUTIONS: dict[str, Distribution] = {entry.name: entry for entry in (
+    Distribution(
+        "normal", "normal, spread by the capability of the process", _normal_quantile,
+        lambda lower, upper, options: normal_parameters(lower, upper, options)[0],
+        lambda lower, upper, options: normal_parameters(lower, upper, options)[1] ** 2, CAPABILITY, bounded=False,
+    ),
+    Distribution(
+        "uniform", "uniform between the limits",
+        lambda u, lower, upper, options: lower + (upper - lower) * np.asarray(u),
+        lambda lower, upper, options: (lower + upper) / 2, lambda lower, upper, options: (upper - lower) ** 2 / 12,
+    ),
+    Distribution(
+        "triangular", "triangular between the limits", _triangular_quantile,
+        lambda lower, upper, options: (lower + upper + _mode(lower, upper, options)) / 3, _triangular_variance,
+        {"mode": None},
+    ),
+    Distribution(
+        "truncated", "normal, cut off at the limits", _truncated_quantile,
+        lambda lower, upper, options: _truncated_moments(lower, upper, options)[0],
+        lambda lower, upper, options: _truncated_moments(lower, upper, options)[1], CAPABILITY,
+    ),
+    Distribution(
+        "beta", "beta between the limits", _beta_quantile,
+        lambda lower, upper, options: _beta_moments(lower, upper, options)[0],
+        lambda lower, upper, options: _beta_moments(lower, upper, options)[1], {"alpha": 2.0, "beta": 2.0},
+    ),
+    # of measured values as a population: they are all there is to be drawn, so the divisor of the variance is n
+    Distribution(
+        "sample", "drawn from measured values", _sample_quantile,
+        lambda lower, upper, options: float(_values(options).mean()),
+        lambda lower, upper, options: float(_values(options).var()), {"values": None},
+    ),
+    Distribution(  # the limits do not matter
+        "direction", "any angle with the same chance",
+        lambda u, lower, upper, options: -math.pi + (math.pi - -math.pi) * np.asarray(u),
+        lambda lower, upper, options: 0.0, lambda lower, upper, options: math.pi**2 / 3,
+    ),
+)}  # fmt: skip

@@ -277,13 +277,14 @@ def _singular(cycle: Cycle) -> Iterator[Finding]:
 def _undefined(cycle: Cycle) -> Iterator[Finding]:
     """Loads and springs that have no value."""
     for path, (places, _) in cycle.at.causes.of("undefined").items():
-        what = f"has no value {cycle.at.dial.intervals(places)}"
+        at = cycle.at.dial.intervals(places)
+        what = f"has no value {at}"
         if path.startswith("loads."):
             remedy = "extend its tables over the whole cycle, or make them periodic; check divisions and roots"
-            yield Finding.error("load.undefined", path, what, remedy)
+            yield Finding.error("load.undefined", path, what, remedy, at=at)
         else:
             remedy = "its line has no direction where its ends coincide: move one end"
-            yield Finding.error("spring.undefined", path, what, remedy)
+            yield Finding.error("spring.undefined", path, what, remedy, at=at)
 
 
 def _locked(cycle: Cycle) -> Iterator[Finding]:
@@ -297,7 +298,7 @@ def _locked(cycle: Cycle) -> Iterator[Finding]:
         remedy = (
             f"lower these coefficients below {share:.3g} times their values, shorten the arms or lengthen the guides"
         )
-        figures: dict[str, Any] = {"share": share, "joints": joints}
+        figures: dict[str, Any] = {"at": cycle.at.dial.intervals(places), "share": share, "joints": joints}
         if cycle.locking is not None:
             states, responsible = cycle.locking.all_states(), cycle.locking.responsible
             if LockingState.JAMMED in states:

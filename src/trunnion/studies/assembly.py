@@ -367,7 +367,7 @@ class Answer:
         (share, time), need, settled = self.share, self.clearance[0], True
         if apart := self.at(AssemblyStatus.APART):
             remedy = "check the lengths, or limit the range of the driver"
-            yield Finding.error("assembly.apart", "links", f"{AssemblyStatus.APART.text} {apart}", remedy)
+            yield Finding.error("assembly.apart", "links", f"{AssemblyStatus.APART.text} {apart}", remedy, at=apart)
             settled = False
         place, times = _at(self.place("needed_share")), f"{_share(share)} times their size is needed"
         short = self.at(AssemblyStatus.SHORT)
@@ -394,7 +394,7 @@ class Answer:
         if unsettled := self.at(AssemblyStatus.UNSETTLED):
             what = f"{AssemblyStatus.UNSETTLED.text} {unsettled}"
             remedy = "pins on a common axis block each other along it: give one an end float, or make it cylindrical"
-            yield Finding.error("assembly.unsettled", "joints", what, remedy)
+            yield Finding.error("assembly.unsettled", "joints", what, remedy, at=unsettled)
             settled = False
         if settled and self.of and share > 0:
             what = f"the stated clearances are sufficient: {times}, {place}"

@@ -401,14 +401,11 @@ def _idle(played: Played, i: int) -> Iterator[Finding]:
     moves = bool(np.ptp(solved) > floor and np.any(sized)) if len(solved) else False
     at = f" at {played.place(i)}" if len(played.time) == 1 else ""
     if joints and len(solved):
+        what = f"the play of {', '.join(joints)} has no effect on {measure.name}{at}"
         drivers = ", ".join(run.system.mechanism.drivers)
-        yield Finding.note(
-            "play.no_effect",
-            f"measures.{measure.name}",
-            f"the play of {', '.join(joints)} has no effect on {measure.name}{at}",
-            f"drive the joint that the machine drives, now {drivers}" if moves else "",
-            joints=joints,
-        )
+        remedy = f"drive the joint that the machine drives, now {drivers}" if moves else ""
+        figures = {"joints": joints, "measure": measure.name}
+        yield Finding.note("play.no_effect", f"measures.{measure.name}", what, remedy, **figures)
 
 
 def _beyond_first_order(played: Played, i: int, of: Of) -> Iterator[Finding]:

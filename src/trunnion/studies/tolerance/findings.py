@@ -307,12 +307,13 @@ def _nominal(outcome: Outcome) -> Iterator[Finding]:
     dial = study.run.system.dial(study.run.values, study.plan.times)
     for code in Status:
         places = np.flatnonzero(study.linear.status == code)
+        at = dial.intervals(places) if len(places) else ""
         if code >= Status.NOT_CONVERGED and len(places):
-            what = f"nominal mechanism: {code.text} {dial.intervals(places)}"
-            yield Finding.error("tolerance.nominal_no_answer", "", what, "there is no result there")
+            what = f"nominal mechanism: {code.text} {at}"
+            yield Finding.error("tolerance.nominal_no_answer", "", what, "there is no result there", at=at)
         elif code == Status.NEAR_SINGULAR and len(places):
-            what = f"close to a dead centre {dial.intervals(places)}: the first-order result is not reliable there"
-            yield Finding.warning("tolerance.near_singular", "", what, "use the samples there")
+            what = f"close to a dead centre {at}: the first-order result is not reliable there"
+            yield Finding.warning("tolerance.near_singular", "", what, "use the samples there", at=at)
     for of in study.linear.measures:
         if np.isnan(of.reference.figure):
             where, what = f"measures.{of.measure.name}", f"{of.measure.name}: undefined for the nominal mechanism"

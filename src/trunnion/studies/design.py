@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses, Place
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.panels import GAUSS_WEIGHTS, ON_GAUSS
-from trunnion.cycle.course import magnitude
+from trunnion.algebra.panels import CANCELLED, GAUSS_WEIGHTS, INTEGRAL, ON_GAUSS
+from trunnion.cycle.course import Mean, course_of, magnitude
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import PAIRS
@@ -25,10 +25,10 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.figure import Figure
 from trunnion.results.scales import EVERYWHERE, Scales
 from trunnion.solve.forward import Forward, forward
+from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import pose_status
 from trunnion.solve.switches import Mechanisms, knots_of
-from trunnion.studies.motor import Motor, motor
 
 __all__ = [
     "Counterweight",
@@ -41,6 +41,7 @@ __all__ = [
     "grashof",
     "instant_centre",
     "limits",
+    "motor",
     "pressure_angles",
     "report_figures",
     "shaking",
@@ -70,6 +71,16 @@ class Extremes(NamedTuple):
     at_least: float
     largest: float
     at_largest: float
+
+
+class Motor(NamedTuple):
+    """Of one driver over a cycle: RMS of its effort, N m or N; largest magnitude and mean of its power, W; largest
+    change of its energy about the mean, J. NaN where positions have no answer."""
+
+    rms_effort: float = 0.0
+    peak_power: float = 0.0
+    mean_power: float = 0.0
+    energy_swing: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -233,25 +244,17 @@ def grashof(mechanism: Mechanism, run: Run | None = None) -> str:
         p, q = local[link, one], local[link, two]
         return float(np.hypot(p.x - q.x, p.y - q.y))
 
-    sides = {
-        "ground": span(ground, a, d),
-        "input": span(crank, a, b),
-        "coupler": span(coupler, b, c),
-        "output": span(rocker, c, d),
+    sides = {  # by the type of a four-bar of which that side is the shortest
+        "double crank": span(ground, a, d),
+        "crank-rocker": span(crank, a, b),
+        "double rocker": span(coupler, b, c),
+        "rocker-crank": span(rocker, c, d),
     }
     lengths = sorted(sides.values())
     margin = lengths[1] + lengths[2] - lengths[0] - lengths[3]
     if abs(margin) <= 1e-12 * lengths[3]:
         return "change point"
-    if margin < 0:
-        return "triple rocker"
-    shortest = min(sides, key=sides.__getitem__)
-    return {
-        "ground": "double crank",
-        "input": "crank-rocker",
-        "coupler": "double rocker",
-        "output": "rocker-crank",
-    }[shortest]
+    return "triple rocker" if margin < 0 else min(sides, key=sides.__getitem__)
 
 
 class _Motion(NamedTuple):
@@ -349,6 +352,21 @@ def _numbers(walk: Forward, time: Array) -> dict[tuple[str, str], Number]:
         numbers["pressure angle", name] = angle
     (numbers["shaking force", "x"], numbers["shaking force", "y"]), numbers["shaking moment", ""] = shaking(walk)
     return numbers
+
+
+def motor(run: Run, driver: str) -> Motor:
+    """Figures of a driver."""
+    i = list(run.system.mechanism.drivers).index(driver)
+    course = course_of(run, FrictionMethod(), names=("drive_effort", "drive_power"))
+    power, peak = course.picked("drive_power", i), course.extreme("drive_power", i, of=magnitude)
+    with np.errstate(all="ignore"):
+        square = course.picked("drive_effort", i).mean(np.square)[0]
+        value, size = float(power.mean()[0]), float(power.mean(np.abs)[0])
+    mean = Mean(value, float(power.error()[0]), size, CANCELLED * size).net
+    # the energy is level where the power is the mean, or at an edge
+    cut = power.parted(power.passages(0, mean))
+    energy = np.cumsum(np.append(0.0, cut.half * (cut.coefficients[:, 0] @ INTEGRAL - 2.0 * mean)))
+    return Motor(float(np.sqrt(square)), 0.0 if peak is None else peak.value, mean, float(np.ptp(energy)))
 
 
 def dead_centres(run: Run) -> dict[str, tuple[float, ...]]:

@@ -1,21 +1,8 @@
 """A result as a file: CSV, JSON, NetCDF, Zarr, Parquet or a workbook, by extension.
 
-CSV (and Parquet) have one row a position and flat columns: `time`, `<joint>.rotation`, `<joint>.slide`,
-`<joint>.reaction_x|y`, `<joint>.friction_torque`, `<driver>.effort`, `<link>.<point>.x|y`, `power_in`,
-`power_useful`, `status` and so on, in SI; the other formats hold the whole Dataset. In space also z, and
-`<joint>.reaction_moment_x|y|z`, `<joint>.friction_force`, `<link>.x|y|z`, `<link>.rotation_w|x|y|z`,
-`<link>.angular_velocity_x|y|z`. Of a mechanism with errors also `<joint>.rotation_error`, `<joint>.slide_error`,
-`<link>.<point>.error_x|y`, `<joint>.reaction_change_x|y`, `<driver>.effort_change`; of pins in their seats
-`<joint>.seat_1_x` …, `<joint>.end_force_1_x` …, `<joint>.contact_1_x` …, `<joint>.seat_beta`, `<joint>.seat_xi`,
-`<joint>.seat_xi_pin`, `<joint>.contact_lost`. A sweep has one row a point of its grid: the swept numbers by the names
-they were given, then `efficiency`, `<driver>.effort_max`, `<joint>.reaction_max`, …, `status`. The play of joints has
-`drive`, `<measure>`, `<measure>.worst_case`, `<measure>.rss`, `<measure>.deviation`, `<measure>.<joint>.worst_case`,
-…. Of tolerances the file's name says which table it holds: one row a measure, or of `x.parameters.csv` one a toleranced
-number, see `results.tables.tolerances`; so it does of a comparison with measurements and of what `identify` finds, see
-`results.tables.studies`. What `assemble` finds has one row a position:
-`<driver>.coordinate`, `needed_share`, `needed_clearance`, …, `<joint>.uniform_1_x` of end 1, …, `status`. Measured
-courses have one row a condition and position: `condition`, what was set, `phase`, `<channel>.mean`, `.scatter`,
-`.uncertainty`, `.turns`.
+CSV, Parquet and workbooks have flat columns in SI, one row a position (of a motion a time, of a sweep a point, of
+tolerances a measure, …); the file's name says which of several tables it holds, see `results.tables`. The other formats
+hold the whole Dataset.
 """
 
 from __future__ import annotations
@@ -27,9 +14,12 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
 import xarray as xr
 
 from trunnion.errors import Finding, MechanismError
@@ -41,7 +31,6 @@ from trunnion.results.attributes import KEPT
 from trunnion.results.dataset import Column
 from trunnion.results.tables import KINDS, in_model_units, kind_of, selected, table_of
 from trunnion.results.tables import columns as flat_columns
-from trunnion.results.workbook import write_workbook
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,6 +39,11 @@ __all__ = ["FORMATS", "check_format", "frame", "save"]
 
 Columns = Callable[[xr.Dataset, str], list[Column]]  # of a table by name; of the file's own if that is empty
 BY_ROW = ("tolerance", "allocation", "comparison", "identification", "measurement")  # no column has one unit there
+
+MOST_ROWS, MOST_COLUMNS = 1_048_576, 16_384  # of a sheet, by the format
+HEADS = 2  # rows of names and units
+NAME = 31  # letters of a sheet's name, at most
+PLAIN = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}  # a name stays a name
 
 
 def frame(result: xr.Dataset, table: str = "", units: str = "si") -> pd.DataFrame:
@@ -128,8 +122,40 @@ def _plain(value: Any) -> Any:
 
 
 def _xlsx(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
+    """A sheet for each table, with names and units above the numbers; the same result gives the same file.
+
+    Raises MechanismError for a table that does not fit a sheet.
+    """
+    from xlsxwriter import Workbook
+
     tables = {name: columns(result, name) for name in KINDS[kind_of(result)]}
-    write_workbook(path, tables, str(result.attrs.get("name", "")))
+    for name, table in tables.items():
+        rows = len(table[0].values) if table else 0
+        if rows + HEADS > MOST_ROWS or len(table) > MOST_COLUMNS:
+            what = f"{rows} rows of {len(table)} columns do not fit a sheet"
+            remedy = "write .csv or .parquet, or fewer steps or columns"
+            raise MechanismError(Finding(what, f"{path.name}: {name}", remedy))
+    made = BytesIO()  # written by Python: where the disk is full, the package raises what is no OSError
+    book = Workbook(made, {**PLAIN, "in_memory": True})
+    title = str(result.attrs.get("name", ""))
+    book.set_properties({"title": title, "comments": "written by Trunnion", "created": datetime(2000, 1, 1)})
+    head = book.add_format({"bold": True, "bottom": 1})
+    below = book.add_format({"italic": True, "font_color": "#5a636e"})
+    for name, table in tables.items():
+        sheet = book.add_worksheet(name[:NAME])
+        sheet.freeze_panes(HEADS, 1)
+        for place, (label, unit, values) in enumerate(table):
+            sheet.write_string(0, place, label, head)
+            sheet.write_string(1, place, unit, below)
+            sheet.set_column(place, place, max(10, min(len(label) + 2, 40)))
+            numbers = np.asarray(values).dtype.kind in "fiub"
+            for row, value in enumerate(np.asarray(values).tolist(), HEADS):
+                if not numbers:
+                    sheet.write_string(row, place, str(value))
+                elif np.isfinite(value):  # numbers that are none are empty cells
+                    sheet.write_number(row, place, value)
+    book.close()
+    path.write_bytes(made.getbuffer())
 
 
 Writer = Callable[["xr.Dataset", Path, bool, Columns], None]

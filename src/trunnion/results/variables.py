@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,23 +150,6 @@ IDEAL = {
 }
 
 
-class CycleMeans(Protocol):
-    """What CYCLE names, over drivers or joints where it has these dimensions."""
-
-    @property
-    def efficiency(self) -> float: ...
-    @property
-    def efficiency_error(self) -> float: ...
-    @property
-    def drive_effort_rms(self) -> NDArray[np.float64]: ...
-    @property
-    def drive_power_mean(self) -> float: ...
-    @property
-    def useful_power_mean(self) -> float: ...
-    @property
-    def friction_power_mean(self) -> NDArray[np.float64]: ...
-
-
 Labels = Mapping[str, Sequence[str]]
 
 
@@ -220,18 +203,20 @@ def dataset(
     arrays: dict[str, NDArray[np.float64]],
     labels: Labels,
     along: Mapping[str, xr.Variable],
-    means: CycleMeans,
+    means: object,
     attributes: Mapping[str, Any],
     units: Mapping[str, MemberUnits],
-    ideal: CycleMeans | None = None,
+    ideal: object = None,
     kept: Collection[str] | None = None,
     dtype: str = "float64",
     more: Mapping[str, xr.Variable] | None = None,
 ) -> xr.Dataset:
-    """The result of a cycle. along: the coordinates of its positions, see `results.dataset.driven`; units: those of
-    drivers and springs; kept: variables of every position that it has, all if not given; dtype: of their floats. Where
-    that is another than theirs, arrays are taken out of their dict one by one, so that both need not be in memory.
-    more: what it has beside.
+    """The result of a cycle.
+
+    along: the coordinates of its positions, see `results.dataset.driven`; means, ideal: what has the names of CYCLE as
+    attributes, of the mechanism and of that without errors; units: those of drivers and springs; kept: variables of
+    every position that it has, all if not given; dtype: of their floats. Where that is another than theirs, arrays are
+    taken out of their dict one by one, so that both need not be in memory. more: what it has beside.
     """
     known = _along_positions(_space(labels))
     names = [name for name in arrays if kept is None or name in kept]

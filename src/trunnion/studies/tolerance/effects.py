@@ -134,7 +134,7 @@ class Effects:
 
     def _rims(self, values: Mapping[str, Number], at: Mapping[str, float]) -> dict[str, Number]:
         """Offsets of pins of which `at` says where in their holes they lie, as shares of the radius."""
-        found: dict[str, Number] = {}
+        offsets: dict[str, Number] = {}
         for joint in self.inputs.loose if any(path.startswith(SHARE) for path in at) else ():
             play = self.inputs.play(joint, values)
             assert play is not None
@@ -142,8 +142,8 @@ class Effects:
                 for end, radius in zip(play.model.ends, play.radii, strict=True):
                     room = namespace(radius).maximum(radius, 0.0)
                     for key in end:
-                        found[f"{path}.{key}"] = room * at.get(f"{SHARE}{path}.{key}", 0.0)
-        return found
+                        offsets[f"{path}.{key}"] = room * at.get(f"{SHARE}{path}.{key}", 0.0)
+        return offsets
 
     def slopes(self, number: Number, shape: tuple[int, ...]) -> tuple[Array, Array]:
         """Primal and derivative of a result, (row, …)."""
@@ -186,8 +186,8 @@ class Effects:
         """Of every parameter: nominal value, limits of its deviation, standard deviation and mean; of a clearance the
         radius, 0 and the play, and the standard deviation of an offset along one axis."""
         rows = [
-            (self.nominal(i), one.lower, one.upper, self.deviations[0][i], self.deviations[1][i])
-            for i, one in enumerate(self.inputs.tolerances)
+            (self.nominal(i), tolerance.lower, tolerance.upper, self.deviations[0][i], self.deviations[1][i])
+            for i, tolerance in enumerate(self.inputs.tolerances)
         ]
         for joint in self.inputs.loose:
             most, square = self.rooms[joint][0]
@@ -206,9 +206,9 @@ class Effects:
             if row.seed and row.owner >= count:
                 weights[k] = self.rooms[self.joint(row.owner)][row.end][0]
             elif row.seed:
-                one = self.inputs.tolerances[row.owner]
-                widest = {NUMBER: one.half_width, ANGLE: np.sqrt(0.5)}
-                weights[k] = widest.get(row.part, np.sqrt(0.5) * max(abs(one.lower), abs(one.upper)))
+                tolerance = self.inputs.tolerances[row.owner]
+                widest = {NUMBER: tolerance.half_width, ANGLE: np.sqrt(0.5)}
+                weights[k] = widest.get(row.part, np.sqrt(0.5) * max(abs(tolerance.lower), abs(tolerance.upper)))
         return weights
 
     def joint(self, i: int) -> str:
@@ -241,21 +241,24 @@ class Effects:
         tolerances = self.inputs.tolerances
         seeds = np.eye(len(tolerances))[:, :, None] if tolerances else np.zeros((0, 1, 1))
         values = self.inputs.run.system.mechanism.parameters(
-            deviations={one.path: Dual(0.0, seeds[i]) for i, one in enumerate(tolerances)}
+            deviations={tolerance.path: Dual(0.0, seeds[i]) for i, tolerance in enumerate(tolerances)}
         )
         deviations, means = self.deviations
-        found: dict[str, list[tuple[float, float]]] = {}
+        rooms: dict[str, list[tuple[float, float]]] = {}
         for joint in self.inputs.loose:
             play = self.inputs.play(joint, values)
             assert play is not None
-            found[joint] = []
+            rooms[joint] = []
             for radius in play.radii:
                 start = float(np.ravel(primal(radius))[0])
                 slope = np.ravel(derivative(radius)) * np.ones(len(tolerances))
-                gain = [max(s * one.lower, s * one.upper) for s, one in zip(slope, tolerances, strict=True)]
+                gain = [
+                    max(s * tolerance.lower, s * tolerance.upper)
+                    for s, tolerance in zip(slope, tolerances, strict=True)
+                ]
                 mean, variance = start + float(slope @ means), float(np.sum((slope * deviations) ** 2))
-                found[joint].append((max(start + sum(gain), 0.0), max(mean, 0.0) ** 2 + variance))
-        return found
+                rooms[joint].append((max(start + sum(gain), 0.0), max(mean, 0.0) ** 2 + variance))
+        return rooms
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,11 +300,11 @@ class FirstOrder:
             pins = self.plays(i)
             most = np.max([pin.worst for pin in pins], axis=0)
             return Spread(-most, most, most, np.zeros_like(most), pins[0].deviation)
-        one, mean, deviation = self.inputs.tolerances[i], self.effects.deviations[1][i], self.effects.deviations[0][i]
+        tolerance, (deviation, mean) = self.inputs.tolerances[i], (part[i] for part in self.effects.deviations)
         ring = self._harmonic(i, SIZE)
         if self.effects.is_zone(i):
             circle = self._harmonic(i, ANGLE)
-            most = np.maximum(*(length(circle + end * ring) for end in (one.lower, one.upper)))
+            most = np.maximum(*(length(circle + end * ring) for end in (tolerance.lower, tolerance.upper)))
             middle = -_along(circle, self.effects.nominal_angle(self.inputs.angle(i)))
             sizes = self.effects.sizes(i) if self.effects.turns(i) else ()  # a run-out has its own size
             wider = [self.effects.deviations[1][j] * self._harmonic(j, SIZE) for j in sizes]
@@ -310,14 +313,16 @@ class FirstOrder:
             return Spread(middle - most, middle + most, most, middle, scatter)
         slope = self._steady(i)
         ends, half, scatter = (
-            (slope * one.lower, slope * one.upper),
-            np.abs(slope) * one.half_width,
+            (slope * tolerance.lower, slope * tolerance.upper),
+            np.abs(slope) * tolerance.half_width,
             np.abs(slope) * deviation,
         )
         lower, upper = np.minimum(*ends), np.maximum(*ends)
         if i in self.inputs.turned:  # what it adds to the circle of a direction over the whole turn
             circle = self._harmonic(self.inputs.turned[i], ANGLE)
-            more = np.maximum(*(length(circle + end * ring) for end in (one.lower, one.upper))) - length(circle)
+            more = np.maximum(*(length(circle + end * ring) for end in (tolerance.lower, tolerance.upper))) - length(
+                circle
+            )
             lower, upper, half = lower - more, upper + more, half + np.abs(more)
             scatter = np.sqrt(scatter**2 + 0.5 * (deviation * length(ring)) ** 2)
         return Spread(lower, upper, half, slope * mean, scatter)
@@ -351,8 +356,8 @@ class FirstOrder:
         off, count, nothing = self.effects.covariance, len(self.inputs.tolerances), 0.0 * self.slope[0]
         linear = [np.array([nothing if self.effects.is_zone(i) else self._steady(i) for i in range(count)])]
         for angle in sorted(set(self.inputs.turned.values())):
-            own = {i: np.sqrt(0.5) * self._harmonic(i, SIZE) for i in self.effects.sizes(angle)}
-            linear += [np.array([own[i][k] if i in own else nothing for i in range(count)]) for k in (0, 1)]
+            rings = {i: np.sqrt(0.5) * self._harmonic(i, SIZE) for i in self.effects.sizes(angle)}
+            linear += [np.array([rings[i][k] if i in rings else nothing for i in range(count)]) for k in (0, 1)]
         for parts in linear:
             covariances[:count] += parts * np.einsum("ij,j...->i...", off, parts)
         return covariances
@@ -366,21 +371,21 @@ class FirstOrder:
         widened: dict[int, list[Vector]] = {}  # by direction: what sizes in it add at their ends
         numbers = range(len(self.inputs.tolerances))
         for i in sorted(numbers, key=self.effects.is_zone):  # numbers first: they widen zones
-            one, zone, ring = self.inputs.tolerances[i], self.effects.is_zone(i), self._harmonic(i, SIZE)
+            tolerance, zone, ring = self.inputs.tolerances[i], self.effects.is_zone(i), self._harmonic(i, SIZE)
             steady = 0.0 if zone else sign * float(self._steady(i, at))
             angle = i if zone else self.inputs.turned.get(i)
             circle = np.zeros(2) if angle is None else self._circle(angle, at)
             if zone:
                 circle = np.sum([circle, *widened.get(i, [])], axis=0)
-            ends = (one.upper, one.lower) if steady >= 0 else (one.lower, one.upper)
+            ends = (tolerance.upper, tolerance.lower) if steady >= 0 else (tolerance.lower, tolerance.upper)
             end = ends[int(np.argmax([steady * end + float(length(circle + end * ring)) for end in ends]))]
-            if not zone or one.direction:
-                corner[one.path] = self.effects.nominal(i) + end
+            if not zone or tolerance.direction:
+                corner[tolerance.path] = self.effects.nominal(i) + end
             if not zone and angle is not None:
                 widened.setdefault(angle, []).append(end * ring)
             if zone:
-                x, y = sign * (circle + end * ring if one.direction else circle)
-                corner[one.direction or one.path] = float(np.arctan2(y, x))
+                x, y = sign * (circle + end * ring if tolerance.direction else circle)
+                corner[tolerance.direction or tolerance.path] = float(np.arctan2(y, x))
         for k, joint in enumerate(self.inputs.loose, len(numbers)):
             pins = self.plays(k)
             best = int(np.argmax([float(pin.worst) for pin in pins]))
@@ -429,9 +434,9 @@ class FirstOrder:
         joint = self.effects.joint(i)
         ends, pins = self.inputs.ends(joint), []
         for carrier in self.inputs.carriers(joint):
-            own = iter(self.effects.places[i, carrier])
+            rows = iter(self.effects.places[i, carrier])
             pins.append(
-                Pin([np.array([self.slope[next(own)] for _ in end]) for end in ends], self.effects.rooms[joint])
+                Pin([np.array([self.slope[next(rows)] for _ in end]) for end in ends], self.effects.rooms[joint])
             )
         return pins
 
@@ -439,19 +444,19 @@ class FirstOrder:
 def effects_of(inputs: Inputs) -> Effects:
     """The rows of the batch of all inputs."""
     rows: list[EffectRow] = [EffectRow(NOBODY, 0, {}, "")]  # the mechanism itself
-    drawn = {one.direction for one in inputs.tolerances}  # these directions are those of run-outs
-    for i, one in enumerate(inputs.tolerances):
-        if one.direction:
-            rows += [EffectRow(i, 0, {one.direction: angle}, one.path, SIZE) for angle in QUARTERS]
-            rows += [EffectRow(i, 0, {one.direction: angle}, one.direction, ANGLE) for angle in QUARTERS]
-        elif one.distribution == FULL_TURN:
-            if one.path not in drawn:
-                rows += [EffectRow(i, 0, {one.path: angle}, one.path, ANGLE) for angle in QUARTERS]
+    drawn = {tolerance.direction for tolerance in inputs.tolerances}  # these directions are those of run-outs
+    for i, tolerance in enumerate(inputs.tolerances):
+        if tolerance.direction:
+            rows += [EffectRow(i, 0, {tolerance.direction: angle}, tolerance.path, SIZE) for angle in QUARTERS]
+            rows += [EffectRow(i, 0, {tolerance.direction: angle}, tolerance.direction, ANGLE) for angle in QUARTERS]
+        elif tolerance.distribution == FULL_TURN:
+            if tolerance.path not in drawn:
+                rows += [EffectRow(i, 0, {tolerance.path: angle}, tolerance.path, ANGLE) for angle in QUARTERS]
         else:
-            rows.append(EffectRow(i, 0, {}, one.path))
+            rows.append(EffectRow(i, 0, {}, tolerance.path))
             if i in inputs.turned:
                 turned = inputs.angle(inputs.turned[i])
-                rows += [EffectRow(i, 0, {turned: angle}, one.path, SIZE) for angle in QUARTERS]
+                rows += [EffectRow(i, 0, {turned: angle}, tolerance.path, SIZE) for angle in QUARTERS]
     for k, joint in enumerate(inputs.loose, len(inputs.tolerances)):
         for carrier in inputs.carriers(joint):
             for end, keys in enumerate(inputs.ends(joint)):

@@ -64,12 +64,12 @@ def summary(outcome: Outcome, sampled: Sampled | None, units: Sequence[str], dia
         yield Figure(f"{name}.rss", f"{name}, RSS{alone}", rss, unit, place=at)
         yield Figure(f"{name}.deviation_linear", f"{name}, standard deviation, linear", deviation, unit, place=at)
         if sampled is not None:
-            shown = [("mean", "mean of samples", unit), ("deviation", "standard deviation of samples", unit)]
+            figures = [("mean", "mean of samples", unit), ("deviation", "standard deviation of samples", unit)]
             if limited(of.measure):
                 low = "yield, least by the 95 % interval"
-                shown += [("yield", "yield", "1"), ("yield_low", low, "1"), ("cpk", "C_pk", "1")]
-            for key, text, own in shown:
-                yield Figure(f"{name}.{key}", f"{name}, {text}", sampled.arrays[key][i], own)
+                figures += [("yield", "yield", "1"), ("yield_low", low, "1"), ("cpk", "C_pk", "1")]
+            for key, text, figure_unit in figures:
+                yield Figure(f"{name}.{key}", f"{name}, {text}", sampled.arrays[key][i], figure_unit)
         yield from _contributions(outcome, of)
     if sampled is not None:
         if len(units) > 1:
@@ -95,7 +95,7 @@ def findings_of(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
     study = outcome.study
     run = study.run
     yield from _missed(outcome, sampled)
-    yield from (one for one in model_notes(run.system.mechanism, run.system) if one.severity is not Severity.NOTE)
+    yield from (note for note in model_notes(run.system.mechanism, run.system) if note.severity is not Severity.NOTE)
     yield from run.chosen.findings
     if run.determinacy is not None:
         yield from run.determinacy.findings()
@@ -141,16 +141,16 @@ def _missed(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
     for i, of in enumerate(outcome.study.linear.measures):
         if not limited(of.measure):
             continue
-        (low, high), beyond = _worst(outcome, i, of)
+        (low, high), outside = _worst(outcome, i, of)
         figures: dict[str, Any] = {"worst_lower": low, "worst_upper": high}
-        parts = [_range(outcome, of, sampled, i, low, high)] if beyond and target is None else []
+        parts = [_range(outcome, of, sampled, i, low, high)] if outside and target is None else []
         if drawn is not None:
             figures |= {key: float(drawn[key][i]) for key in ("yield", "yield_low", "yield_high", "cpk")}
             share, least, most = (figures[key] for key in ("yield", "yield_low", "yield_high"))
             if share < 1 if target is None else most < target:
-                own, *ends = (f"{100 * one:.{decimals_of(most - least)}f}" for one in (share, least, most))
-                parts.append(f"yield {own} % (95 % interval {ends[0]} to {ends[1]} %)")
-            sure = np.isfinite(low) and np.isfinite(high) and not beyond
+                middle, *ends = (f"{100 * one:.{decimals_of(most - least)}f}" for one in (share, least, most))
+                parts.append(f"yield {middle} % (95 % interval {ends[0]} to {ends[1]} %)")
+            sure = np.isfinite(low) and np.isfinite(high) and not outside
             if figures["cpk"] < 1 and not sure and target is None:
                 parts.append(f"Cpk {figures['cpk']:.3g}")
         if not parts:

@@ -117,21 +117,21 @@ def study(
     run = prepare(mechanism)
     inputs = inputs_of(run)
     notes: list[Finding] = []
-    found = chosen(mechanism, measures, run.values)
-    if not found:
-        found = outputs(run.system)
-        note = none_stated(found)
-        if not found:
+    selected = chosen(mechanism, measures, run.values)
+    if not selected:
+        selected = outputs(run.system)
+        note = none_stated(selected)
+        if not selected:
             what = "no measure is stated, and no joint to the ground is an output"
             raise MechanismError(Finding(what, "measures", note.remedy))
         notes.append(note)
-    if run.determinacy is not None and not all(one.of_motion for one in found):
+    if run.determinacy is not None and not all(measure.of_motion for measure in selected):
         run.determinacy.refuse()
     if run.cycle.duration <= 0:  # there is one position
-        found = [replace(one, statistic="value") if one.rule == "deviation" else one for one in found]
+        selected = [replace(one, statistic="value") if one.rule == "deviation" else one for one in selected]
     if at is not None:
-        found = [placed(mechanism, one, at) for one in found]
-    return ToleranceStudy(run, inputs, tuple(found), steps, friction or FrictionMethod(), tuple(notes))
+        selected = [placed(mechanism, measure, at) for measure in selected]
+    return ToleranceStudy(run, inputs, tuple(selected), steps, friction or FrictionMethod(), tuple(notes))
 
 
 def none_stated(measures: Sequence[Measure]) -> Finding:

@@ -53,7 +53,7 @@ def indices(sampler: Sampler, samples: int, seed: int) -> Indices:
     parts = inputs.parts
     base = min(max(1 << (max(1, samples // (len(parts) + 2)).bit_length() - 1), LEAST), MOST)
     u = SobolStream(seed, 0, 2 * inputs.dims).points(0, base)
-    one, two = u[: inputs.dims], u[inputs.dims :]
+    first, two = u[: inputs.dims], u[inputs.dims :]
 
     def analysed(points: Array) -> Array:
         size = sampler.job.block_size
@@ -61,10 +61,10 @@ def indices(sampler: Sampler, samples: int, seed: int) -> Indices:
             parts = [sampler.figures(points[:, low : low + size]) for low in range(0, points.shape[1], size)]
         return np.concatenate([part["figure"] for part in parts], axis=1)
 
-    y_one, y_two = analysed(one), analysed(two)
+    y_one, y_two = analysed(first), analysed(two)
     mixed = np.empty((len(parts), *y_one.shape))
     for i, rows in enumerate(parts):
-        points = one.copy()
+        points = first.copy()
         points[rows] = two[rows]
         mixed[i] = analysed(points)
     lost = int(sum(np.count_nonzero(np.any(np.isnan(y), axis=0)) for y in (y_one, y_two, *mixed)))
@@ -80,8 +80,8 @@ def _indices(y_one: Array, y_two: Array, mixed: Array, seed: int, lost: int) -> 
 
     def both(points: Any) -> Array:
         parts = {"f_A": y_one[..., points], "f_B": y_two[..., points], "f_AB": mixed[..., points]}
-        found = sobol_indices(func=parts, n=base)
-        return np.array([np.reshape(found.first_order, shape), np.reshape(found.total_order, shape)])
+        orders = sobol_indices(func=parts, n=base)
+        return np.array([np.reshape(orders.first_order, shape), np.reshape(orders.total_order, shape)])
 
     rng = np.random.Generator(np.random.Philox(seed))
     with np.errstate(all="ignore"), warnings.catch_warnings():

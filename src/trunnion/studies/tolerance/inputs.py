@@ -48,7 +48,10 @@ class Inputs:
     @property
     def names(self) -> list[str]:
         """Paths of the toleranced numbers, and `joints.NAME.clearance` for every pin that may lie anywhere."""
-        return [*(one.path for one in self.tolerances), *(f"joints.{name}.clearance" for name in self.loose)]
+        return [
+            *(tolerance.path for tolerance in self.tolerances),
+            *(f"joints.{name}.clearance" for name in self.loose),
+        ]
 
     @cached_property
     def nominal(self) -> dict[str, Number]:
@@ -62,22 +65,22 @@ class Inputs:
     def dims(self) -> int:
         """How many uniform numbers a sample takes."""
         play = sum(len(end) for name in self.loose for end in self.ends(name))
-        return len(self.tolerances) + sum(bool(one.direction) for one in self.tolerances) + play
+        return len(self.tolerances) + sum(bool(tolerance.direction) for tolerance in self.tolerances) + play
 
     @property
     def parts(self) -> list[list[int]]:
         """Which of the uniform numbers each of `names` is drawn from."""
-        found: list[list[int]] = [[i] for i in range(len(self.tolerances))]
+        parts: list[list[int]] = [[i] for i in range(len(self.tolerances))]
         place = len(self.tolerances)
-        for own, tolerance in zip(found, self.tolerances, strict=True):
+        for rows, tolerance in zip(parts, self.tolerances, strict=True):
             if tolerance.direction:
-                own.append(place)
+                rows.append(place)
                 place += 1
         for name in self.loose:
             count = sum(len(end) for end in self.ends(name))
-            found.append(list(range(place, place + count)))
+            parts.append(list(range(place, place + count)))
             place += count
-        return found
+        return parts
 
     def ends(self, joint: str) -> Sequence[Sequence[str]]:
         """Names of the components of the pin's offset at each end of a joint's hole."""
@@ -96,24 +99,28 @@ class Inputs:
     @cached_property
     def turned(self) -> dict[int, int]:
         """Of each toleranced number that changes the size of what points anywhere, which of them is the direction."""
-        angles = [i for i, one in enumerate(self.tolerances) if one.direction or one.distribution == FULL_TURN]
+        angles = [
+            i
+            for i, tolerance in enumerate(self.tolerances)
+            if tolerance.direction or tolerance.distribution == FULL_TURN
+        ]
         if not angles:
             return {}
         count = len(self.tolerances)
         seeds = np.eye(2 * count)[:, :, None]
-        deviations = {one.path: Dual(0.0, seeds[i]) for i, one in enumerate(self.tolerances)}
+        deviations = {tolerance.path: Dual(0.0, seeds[i]) for i, tolerance in enumerate(self.tolerances)}
         for i in angles:  # the angle of a run-out is no toleranced number
-            path, own = self.angle(i), Dual(0.0, seeds[count + i])
-            deviations[path] = deviations[path] + own if path in deviations else own
+            path, seed = self.angle(i), Dual(0.0, seeds[count + i])
+            deviations[path] = deviations[path] + seed if path in deviations else seed
         values = self.run.system.mechanism.parameters(deviations=deviations)
-        found: dict[int, int] = {}
+        directions: dict[int, int] = {}
         for sizes, angle in self._directed(values):
             turning = [i for i in angles if np.any(_by(values[angle], count + i, 2 * count))]
             numbers = [
                 i for i in range(count) if i not in angles and any(np.any(_by(size, i, 2 * count)) for size in sizes)
             ]
-            found.update({i: turning[0] for i in numbers if turning})
-        return found
+            directions.update({i: turning[0] for i in numbers if turning})
+        return directions
 
     def _directed(self, values: Mapping[str, Number]) -> Iterator[tuple[tuple[Number, ...], str]]:
         """Sizes, and the path of the direction they point in: of misaligned axes and of seats that are given."""
@@ -141,10 +148,10 @@ class Inputs:
         """
         count = len(self.tolerances)
         rest = iter(u[count:])
-        own = u[:count] if rotation is None else correlated(u[:count], rotation)
+        scores = u[:count] if rotation is None else correlated(u[:count], rotation)
         deviations: dict[str, Number] = {}
         turned: dict[str, Number] = {}
-        for tolerance, row in zip(self.tolerances, self.population.draw(own), strict=True):
+        for tolerance, row in zip(self.tolerances, self.population.draw(scores), strict=True):
             deviations[tolerance.path] = row[:, None]
             if tolerance.direction:
                 turned[tolerance.direction] = (2 * np.pi * next(rest) - np.pi)[:, None]
@@ -175,8 +182,8 @@ class Inputs:
 
 def _by(number: Number, i: int, count: int) -> Array:
     """Derivative of a number by the i-th of so many seeds."""
-    found: Array = np.broadcast_to(np.asarray(derivative(number), float), (count, 1))[i]
-    return found
+    part: Array = np.broadcast_to(np.asarray(derivative(number), float), (count, 1))[i]
+    return part
 
 
 def within(u: Sequence[Array]) -> list[Array]:
@@ -196,10 +203,10 @@ def inputs_of(run: Run) -> Inputs:
     """The random numbers of a mechanism. Raises MechanismError if nothing varies, or a play has no length."""
     mechanism = run.system.mechanism
     tolerances = tuple(mechanism.tolerated())
-    given = {seat.joint for seat in run.seats if seat.given is not None}
+    seated = {seat.joint for seat in run.seats if seat.given is not None}
     plays = {name: play for name in run.system.joints if (play := _play(run, name)) is not None}
-    loose = tuple(name for name in plays if name not in given)
-    held = tuple(name for name in plays if name in given)
+    loose = tuple(name for name in plays if name not in seated)
+    fixed_pins = tuple(name for name in plays if name in seated)
     if not tolerances and not loose:
         remedy = "write `60 mm ± 0.05 mm`, an entry in `tolerances`, or a clearance of a joint"
         raise MechanismError(Finding("nothing has a tolerance or a clearance", "tolerances", remedy))
@@ -208,18 +215,21 @@ def inputs_of(run: Run) -> Inputs:
         findings += shifts.unstated_length(name, play)
     if findings:
         raise MechanismError(findings)
-    marginals = [Marginal(one.distribution, one.lower, one.upper, one.options) for one in tolerances]
-    return Inputs(run, tolerances, loose, held, Population(marginals, mechanism.correlation()))
+    marginals = [
+        Marginal(tolerance.distribution, tolerance.lower, tolerance.upper, tolerance.options)
+        for tolerance in tolerances
+    ]
+    return Inputs(run, tolerances, loose, fixed_pins, Population(marginals, mechanism.correlation()))
 
 
 def _uneven(mechanism: Mechanism, tolerances: Sequence[Tolerance]) -> Iterator[Finding]:
     """Speeds and ranges that vary while there are other drivers, which would no longer be at the same positions."""
-    for one in tolerances:
-        section, _, rest = one.path.partition(".")
+    for tolerance in tolerances:
+        section, _, rest = tolerance.path.partition(".")
         key = rest.partition(".")[2].partition(".")[0]
         if section == "drivers" and len(mechanism.drivers) > 1 and key != "start":
             what = "it cannot vary alone: the drivers would have different cycle times"
-            yield Finding(what, f"tolerances.{one.path}", "leave it out, or vary the start of the driver")
+            yield Finding(what, f"tolerances.{tolerance.path}", "leave it out, or vary the start of the driver")
 
 
 def _play(run: Run, joint: str) -> Play | None:

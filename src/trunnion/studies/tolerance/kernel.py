@@ -57,8 +57,8 @@ class CompiledCourses:
             return lambda back: measure.curve(back.walk if measure.of_motion else back)[k]
 
         figures = {name: figure(*part) for name, part in self._parts.items()}
-        told = repr(list(self._parts.items()))
-        return WalkKernel(self.numpy.run, figures, self.numpy.forces, self.numpy.method, described=told)
+        description = repr(list(self._parts.items()))
+        return WalkKernel(self.numpy.run, figures, self.numpy.forces, self.numpy.method, described=description)
 
     def check(self, values: Mapping[str, Number]) -> None:
         """MechanismError for a mechanism that only NumPy takes."""
@@ -69,10 +69,10 @@ class CompiledCourses:
         if any(isinstance(number, Dual) for number in (time, *values.values())):
             return self.numpy.courses(values, time)
         curves, status = self._compiled.curves(values, np.asarray(time, float))
-        found: Curves = {measure.name: () for measure in self.numpy.measures}
+        courses: Curves = {measure.name: () for measure in self.numpy.measures}
         for name, (measure, _) in self._parts.items():
-            found[measure.name] += (where_known(measure, status, curves[name]),)
-        return found, status
+            courses[measure.name] += (where_known(measure, status, curves[name]),)
+        return courses, status
 
 
 def engine_for(engine: Engine, numpy: NumpyKernel, values: Mapping[str, Number], configurations: int) -> Engine:
@@ -108,8 +108,8 @@ def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: Fric
 def many_of(run: Run, measures: Sequence[Measure], inputs: Inputs, friction: FrictionMethod, engine: str) -> Many:
     """The measures of the nominal mechanism, pins in the middle of their holes where no seat is given."""
 
-    def kernels(some: Sequence[Measure]) -> Kernel:
-        return kernel_of(engine, run, some, friction)
+    def kernels(part: Sequence[Measure]) -> Kernel:
+        return kernel_of(engine, run, part, friction)
 
     many = Many(run, measures, inputs.nominal, kernels)
     many.tune(inputs.values(uniforms(0, 0, inputs.dims, PILOTS)))

@@ -103,7 +103,7 @@ def references(kernel: NumpyKernel, plan: PositionPlan, many: Many) -> dict[str,
     """Every measure of the nominal mechanism, at the positions of the plan too."""
     system, values = kernel.run.system, many.values
     curves, _ = kernel.courses(values, plan.times)
-    found = {}
+    references_of = {}
     for measure in kernel.measures:
         window, turning = plan.windows[measure.name], measure.turning(system)
         parts = [
@@ -115,25 +115,27 @@ def references(kernel: NumpyKernel, plan: PositionPlan, many: Many) -> dict[str,
         attitude = measure.of_attitude(system)
         against = measure.against_nominal(system)
         figure, time = many.figures[measure.name], many.times[measure.name]
-        found[measure.name] = Reference(measure, window, tuple(parts), figure, time, turning, attitude, against)
-    return found
+        references_of[measure.name] = Reference(measure, window, tuple(parts), figure, time, turning, attitude, against)
+    return references_of
 
 
 def linear(
-    kernel: NumpyKernel, plan: PositionPlan, effects: Effects, known: Mapping[str, Reference], many: Many
+    kernel: NumpyKernel, plan: PositionPlan, effects: Effects, nominal: Mapping[str, Reference], many: Many
 ) -> Linear:
     """First order of every measure about the nominal mechanism."""
     values = effects.values()
     courses, status = _courses(kernel, plan, effects, values)
-    lines = {name: one.window.time for name, one in known.items() if one.measure.rule == "line"}
-    wanted = [measure for measure in kernel.measures if _rated(known[measure.name]) or measure.name in lines]
-    some = many if len(wanted) == len(kernel.measures) else many.only(wanted)
-    reads, found = some.read(values, lines), []
+    lines = {name: reference.window.time for name, reference in nominal.items() if reference.measure.rule == "line"}
+    rated = [measure for measure in kernel.measures if _rated(nominal[measure.name]) or measure.name in lines]
+    reading = many if len(rated) == len(kernel.measures) else many.only(rated)
+    reads, orders = reading.read(values, lines), []
     for measure in kernel.measures:
-        one, read = known[measure.name], reads.get(measure.name)
-        there = _placed(replace(kernel, measures=[measure]), effects, values, one, many) if by_position(one) else None
-        found.append(_of(one, effects, courses[measure.name], read, there))
-    return Linear(effects, plan, found, status[0])
+        reference, read = nominal[measure.name], reads.get(measure.name)
+        place = None
+        if by_position(reference):
+            place = _placed(replace(kernel, measures=[measure]), effects, values, reference, many)
+        orders.append(_of(reference, effects, courses[measure.name], read, place))
+    return Linear(effects, plan, orders, status[0])
 
 
 Course = list[Dual]  # parts, (row, position) each
@@ -146,41 +148,43 @@ def _courses(
     rows, times = len(effects.rows), moved(kernel.run, values, plan.times)
     count = len(plan.times)
     step = max(1, AT_ONCE // rows)
-    found: dict[str, Course] = {}
+    courses_of: dict[str, Course] = {}
     status = np.empty((rows, count), np.int8)
     for low in range(0, count, step):
         window = slice(low, min(low + step, count))
         courses, status[:, window] = kernel.courses(values, times[..., window])
         for name, course in courses.items():
-            if name not in found:
-                found[name] = [Dual(np.empty((rows, count)), np.empty((rows, count))) for _ in course]
-            for whole, part in zip(found[name], course, strict=True):
-                whole.real[:, window], whole.dual[:, window] = effects.slopes(part, (window.stop - low,))
-    return found, status
+            if name not in courses_of:
+                courses_of[name] = [Dual(np.empty((rows, count)), np.empty((rows, count))) for _ in course]
+            for row, part in zip(courses_of[name], course, strict=True):
+                row.real[:, window], row.dual[:, window] = effects.slopes(part, (window.stop - low,))
+    return courses_of, status
 
 
-def _of(known: Reference, effects: Effects, course: Course, read: Read | None, there: tuple[float, Array] | None) -> Of:
-    """First order of one measure. read: of its figure, or of the line that it is of; there: where a figure is that is
-    taken at the worst position, and its derivatives."""
-    measure, window, time = known.measure, known.window, known.time
+def _of(
+    reference: Reference, effects: Effects, course: Course, read: Read | None, placed: tuple[float, Array] | None
+) -> Of:
+    """First order of one measure. read: of its figure, or of the line that it is of; placed: where a figure is that
+    is taken at the worst position, and its derivatives."""
+    measure, window, time = reference.measure, reference.window, reference.time
     parts = [Dual(part.real[:, window.index], part.dual[:, window.index]) for part in course]
-    real, slope = _scalar(known, effects, parts, read.shown if read else 0.0)
-    whole = FirstOrder(effects, effects.without_noise(slope))
+    real, slope = _scalar(reference, effects, parts, read.shown if read else 0.0)
+    over_course = FirstOrder(effects, effects.without_noise(slope))
     lead, place = None, -1
-    if there is not None:
-        time, steep = there
+    if placed is not None:
+        time, steep = placed
         place = int(np.argmin(np.abs(window.time - time))) if np.isfinite(time) else -1
-    elif read is None or not _rated(known):
+    elif read is None or not _rated(reference):
         steep = np.full(len(real), np.nan)
-        lead = FirstOrder(effects, whole.slope[:, _top(whole.total.upper)])
+        lead = FirstOrder(effects, over_course.slope[:, _top(over_course.total.upper)])
     else:
         value, steep = effects.slopes(read.figure, ())
         place = 0 if measure.rule == "value" and not measure.in_time else -1
         time = float(window.time[0]) if place == 0 else time
         steep = np.where(np.isfinite(value), steep, np.nan)  # of what does not exist
-    one = FirstOrder(effects, effects.without_noise(steep))
-    total = _ends(measure, whole.total, one.total) if by_position(known) else one.total
-    return Of(known, one, whole, total, real[0], place, time, lead or one)
+    figure = FirstOrder(effects, effects.without_noise(steep))
+    total = _ends(measure, over_course.total, figure.total) if by_position(reference) else figure.total
+    return Of(reference, figure, over_course, total, real[0], place, time, lead or figure)
 
 
 def _ends(measure: Measure, course: Spread, total: Spread) -> Spread:
@@ -201,16 +205,16 @@ def _ends(measure: Measure, course: Spread, total: Spread) -> Spread:
     return total._replace(lower=lower, upper=upper)
 
 
-def by_position(known: Reference) -> bool:
+def by_position(reference: Reference) -> bool:
     """Whether the figure is 0 of the nominal mechanism, without a derivative, but has that of the course somewhere.
 
     Of a distance neither the mean, the least nor any spread has; of other deviations the root of the mean square has
     not; and nothing is largest or least of a course that is 0 throughout.
     """
-    rule = known.measure.rule
-    if known.measure.kind == "path_error":
+    rule = reference.measure.rule
+    if reference.measure.kind == "path_error":
         return rule in ("deviation", "value", "maximum", "largest")
-    return rule == "deviation" or (known.against and rule in ("maximum", "minimum", "largest", "peak-to-peak"))
+    return rule == "deviation" or (reference.against and rule in ("maximum", "minimum", "largest", "peak-to-peak"))
 
 
 def limited(measure: Measure) -> bool:
@@ -243,51 +247,51 @@ def against(of: Of) -> bool:
     return of.measure.kind == "path_error" or (of.reference.against and of.measure.rule != "value")
 
 
-def _rated(known: Reference) -> bool:
+def _rated(reference: Reference) -> bool:
     """Whether the figure has derivatives at the nominal mechanism, which those of most deviations from it have not."""
-    rule, kind = known.measure.rule, known.measure.kind
-    return not by_position(known) and kind != "path_error" and (rule in ("mean", "value") or not known.against)
+    rule, kind = reference.measure.rule, reference.measure.kind
+    return not by_position(reference) and kind != "path_error" and (rule in ("mean", "value") or not reference.against)
 
 
-def _scalar(known: Reference, effects: Effects, parts: Sequence[Dual], line: Number = 0.0) -> tuple[Array, Array]:
+def _scalar(reference: Reference, effects: Effects, parts: Sequence[Dual], line: Number = 0.0) -> tuple[Array, Array]:
     """One number a position, (row, position), with its derivative, that stands for the course.
 
     line: the distances from the line of a path.
     """
     count = np.shape(parts[0].real)[1]
-    if known.measure.kind == "path_error":
+    if reference.measure.kind == "path_error":
         slopes = np.array([part.dual for part in parts])  # (axis, row, position)
         scaled = slopes * effects.weights[:, None]
         scatter = np.einsum("arp,brp->pab", scaled, scaled)
         along = np.linalg.eigh(np.nan_to_num(scatter))[1][:, :, -1]  # (position, axis)
         return np.zeros_like(parts[0].real), np.einsum("arp,pa->rp", slopes, along)
-    if known.measure.rule == "line":
+    if reference.measure.rule == "line":
         return effects.slopes(line, (count,))
-    if known.attitude:
-        return effects.slopes(turn(parts, [primal(part)[0] for part in parts], known.measure.axis), (count,))
+    if reference.attitude:
+        return effects.slopes(turn(parts, [primal(part)[0] for part in parts], reference.measure.axis), (count,))
     if len(parts) > 1:
         useful, driven = parts
         return effects.slopes(useful / selected(primal(driven) > 0, driven, np.nan), (count,))
     real = parts[0].real.copy()
-    if known.turning and len(known.parts[0]) == count:
-        real += known.parts[0] - real[0]
-    if known.measure.of.against:
+    if reference.turning and len(reference.parts[0]) == count:
+        real += reference.parts[0] - real[0]
+    if reference.measure.of.against:
         real -= real[:1]
     return real, parts[0].dual
 
 
 def _placed(
-    kernel: NumpyKernel, effects: Effects, values: Mapping[str, Number], known: Reference, many: Many
+    kernel: NumpyKernel, effects: Effects, values: Mapping[str, Number], reference: Reference, many: Many
 ) -> tuple[float, Array]:
     """Time, s, at which the worst case of a course is largest, and the derivatives of the figure there, (row,).
 
     NaN s of a peak-to-peak value, which is of two places.
     """
-    run, measure, time = kernel.run, known.measure, many.spots(known.measure)
+    run, measure, time = kernel.run, reference.measure, many.spots(reference.measure)
     for _ in range(ROUNDS):
         curves, status = kernel.courses(values, moved(run, values, within(run, time)))
         parts = [Dual(*effects.slopes(part, (len(time),))) for part in curves[measure.name]]
-        course = FirstOrder(effects, effects.without_noise(_scalar(known, effects, parts)[1]))
+        course = FirstOrder(effects, effects.without_noise(_scalar(reference, effects, parts)[1]))
         if measure.rule == "peak-to-peak":
             return float("nan"), _widest(course)
         sound = np.broadcast_to(status, (len(effects.rows), len(time)))[0] < Status.NEAR_SINGULAR
@@ -304,17 +308,17 @@ def _placed(
 def _widest(course: FirstOrder) -> Array:
     """Derivatives of the difference of a course between the two of its places where that is worst."""
     slope = course.slope
-    best, found = -1.0, slope[:, 0] * 0.0
+    best, widest = -1.0, slope[:, 0] * 0.0
     for i in np.unique(np.linspace(0, slope.shape[1] - 1, min(slope.shape[1], MOST_PAIRS)).astype(int)):
         change = slope - slope[:, [i]]
         upper = np.nan_to_num(FirstOrder(course.effects, change).total.upper)
         top = int(np.argmax(upper))
         if upper[top] > best:
-            best, found = float(upper[top]), change[:, top]
-    return found
+            best, widest = float(upper[top]), change[:, top]
+    return widest
 
 
-def searched(many: Many, found: Linear, of: Of) -> tuple[Corner, Corner]:
+def searched(many: Many, first: Linear, of: Of) -> tuple[Corner, Corner]:
     """The least and the largest deviation of the figure on the mechanism itself, with the numbers there.
 
     Of a figure over all positions: the least and the largest deviation of the course from nominal anywhere.
@@ -327,8 +331,8 @@ def searched(many: Many, found: Linear, of: Of) -> tuple[Corner, Corner]:
             return effects.slopes(read.most if sign > 0 else read.least, ())
 
         start = of.lead.corner(sign)
-        alone.tune(found.effects.values(start))
-        return search(found.effects, objective, start, sign, bool(np.isfinite(of.reference.figure)))
+        alone.tune(first.effects.values(start))
+        return search(first.effects, objective, start, sign, bool(np.isfinite(of.reference.figure)))
 
     return ends(-1.0), ends(1.0)
 

@@ -119,25 +119,25 @@ VARIABLES: dict[str, Variable] = {
 }
 
 
-def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
+def dataset(outcome: Outcome, notes: Sequence[Finding]) -> xr.Dataset:
     """The numbers of all methods with all that is said of them."""
-    found = outcome.study
-    system, mechanism = found.run.system, found.run.system.mechanism
-    counted = sampled(outcome.samples, found) if outcome.samples else None
+    study = outcome.study
+    system, mechanism = study.run.system, study.run.system.mechanism
+    counted = sampled(outcome.samples, study) if outcome.samples else None
     job = outcome.samples.job if outcome.samples else None
-    stated = [*findings_of(outcome, counted), *told]
-    arrays = {**_linear(found), **_worst(outcome), **(counted.arrays if counted else {}), **_shares(outcome)}
-    units = [measure.figure_unit(system, found.run.values) for measure in found.measures]
-    curve_units = [measure.unit(system) for measure in found.measures]
+    findings = [*findings_of(outcome, counted), *notes]
+    arrays = {**_linear(study), **_worst(outcome), **(counted.arrays if counted else {}), **_shares(outcome)}
+    units = [measure.figure_unit(system, study.run.values) for measure in study.measures]
+    curve_units = [measure.unit(system) for measure in study.measures]
     dimensions = {f"dimensions.{name}": kind for name, kind in dimension_kinds(mechanism).items()}
     kinds = {**mechanism.parameter_kinds(), **dimensions}
-    parameter_units = [kinds[name].unit if name in kinds else "m" for name in found.inputs.names]
-    dial = system.dial(found.run.values, found.plan.times)
+    parameter_units = [kinds[name].unit if name in kinds else "m" for name in study.inputs.names]
+    dial = system.dial(study.run.values, study.plan.times)
     variables = described(arrays, VARIABLES, _units(units, curve_units, parameter_units, dial.unit))
-    used = {dim for one in variables.values() for dim in one.dims}
+    used = {dim for each in variables.values() for dim in each.dims}
     labels = {
-        "measure": [measure.name for measure in found.measures],
-        "parameter": found.inputs.names,
+        "measure": [measure.name for measure in study.measures],
+        "parameter": study.inputs.names,
         "cause": [*(code.text for code in Status), "the figure does not exist"],
     }
     labels = {dim: names for dim, names in labels.items() if dim in used}
@@ -149,41 +149,44 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "sampling": job.method if job else "",
         "engine": job.engine if job else "numpy",
         "seed": job.seed if job else -1,
-        **_of_measures(found),
+        **_of_measures(study),
         "distributions": [
-            *(one.distribution for one in found.inputs.tolerances),
-            *("play" for _ in found.inputs.loose),
+            *(each.distribution for each in study.inputs.tolerances),
+            *("play" for _ in study.inputs.loose),
         ],
-        "correlated": int(found.effects.correlated),
+        "correlated": int(study.effects.correlated),
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
-        "periodic": int(found.run.cycle.periodic),
-        "steps": found.steps,
-        **scales_of(found.run).summary(summary(outcome, counted, units, dial)),
-        "findings": finding_rows(stated),
-        "missed": [f"{one.where}: {one.what}" for one in stated if one.code.startswith("limit.missed")],
+        "periodic": int(study.run.cycle.periodic),
+        "steps": study.steps,
+        **scales_of(study.run).summary(summary(outcome, counted, units, dial)),
+        "findings": finding_rows(findings),
+        "missed": [f"{each.where}: {each.what}" for each in findings if each.code.startswith("limit.missed")],
     }
-    return dataset_of("tolerance", variables, labels, attributes, {**quantiles, **driven(found.plan.times, *dial)})
+    return dataset_of("tolerance", variables, labels, attributes, {**quantiles, **driven(study.plan.times, *dial)})
 
 
-def _of_measures(found: ToleranceStudy) -> dict[str, list[Any]]:
+def _of_measures(study: ToleranceStudy) -> dict[str, list[Any]]:
     """Attributes that are a list each, an entry for each measure."""
-    system, measures = found.run.system, found.measures
-    limits = [None if (one.lower, one.upper) == (None, None) else [one.lower, one.upper] for one in measures]
+    system, measures = study.run.system, study.measures
+    limits = [
+        None if (measure.lower, measure.upper) == (None, None) else [measure.lower, measure.upper]
+        for measure in measures
+    ]
     return {
-        "measure_texts": [text_of(one, system) for one in measures],
-        "measure_rules": [one.rule for one in measures],
-        "curve_texts": [course_text(one, system) for one in measures],
+        "measure_texts": [text_of(measure, system) for measure in measures],
+        "measure_rules": [measure.rule for measure in measures],
+        "curve_texts": [course_text(measure, system) for measure in measures],
         "limits": limits,
-        "bounds": [[one.at_least, one.at_most] for one in measures],
+        "bounds": [[measure.at_least, measure.at_most] for measure in measures],
     }
 
 
 def _units(
-    own: Sequence[str], courses: Sequence[str], parameters: Sequence[str], drive: str
+    figures: Sequence[str], courses: Sequence[str], parameters: Sequence[str], drive: str
 ) -> dict[str, str | MemberUnits]:
     """The units that `Variable` names by a word."""
-    figure, curve = MemberUnits("measure", own), MemberUnits("measure", courses)
+    figure, curve = MemberUnits("measure", figures), MemberUnits("measure", courses)
     parameter = MemberUnits("parameter", parameters)
     return {
         "measure": figure,
@@ -195,14 +198,14 @@ def _units(
     }
 
 
-def _over(one: MemberUnits, other: MemberUnits) -> str:
+def _over(unit: MemberUnits, other: MemberUnits) -> str:
     """The unit of a ratio: "N m/m", "(N m or rad)/(m)" where several units meet."""
-    several = len({*one.each}) > 1 or len({*other.each}) > 1
-    return f"({one.text})/({other.text})" if several else f"{one.text}/{other.text}"
+    several = len({*unit.each}) > 1 or len({*other.each}) > 1
+    return f"({unit.text})/({other.text})" if several else f"{unit.text}/{other.text}"
 
 
-def _linear(found: ToleranceStudy) -> dict[str, Any]:
-    first, inputs = found.linear, found.inputs
+def _linear(study: ToleranceStudy) -> dict[str, Any]:
+    first, inputs = study.linear, study.inputs
     rows = first.measures
     total = Spread(*np.array([of.total for of in rows], float).reshape(-1, 5).T)
     halves = np.array([of.figure.spread.half for of in rows])
@@ -212,44 +215,44 @@ def _linear(found: ToleranceStudy) -> dict[str, Any]:
         variance = scatter / np.sum(scatter, axis=1, keepdims=True)
     return {
         "nominal": np.array([of.reference.figure for of in rows]),
-        "place": np.array([_place(found, of) for of in rows], float),
-        **{f"parameter_{key}": array for key, array in found.effects.numbers().items()},
+        "place": np.array([_place(study, of) for of in rows], float),
+        **{f"parameter_{key}": array for key, array in study.effects.numbers().items()},
         "sensitivity": np.array([of.figure.sensitivity for of in rows]),
         "contribution_worst_case": np.array([of.figure.spread.worst for of in rows]),
         "contribution_rss": shares,
         "contribution_variance": variance,
         "worst_case_lower": total.lower, "worst_case_upper": total.upper, "rss": total.half,
         "shift_linear": total.shift, "deviation_linear": total.deviation,
-        "curve": _spread_out(found, [of.curve for of in rows], ()),
-        "curve_sensitivity": _spread_out(found, [of.course.sensitivity for of in rows], (len(inputs.names),)),
-        **{f"curve_{name}": _spread_out(found, [getattr(of.course.total, part) for of in rows], ())
+        "curve": _spread_out(study, [of.curve for of in rows], ()),
+        "curve_sensitivity": _spread_out(study, [of.course.sensitivity for of in rows], (len(inputs.names),)),
+        **{f"curve_{name}": _spread_out(study, [getattr(of.course.total, part) for of in rows], ())
            for name, part in CURVES.items()},
         "status": first.status,
     }  # fmt: skip
 
 
-def _place(found: ToleranceStudy, of: Of) -> float:
+def _place(study: ToleranceStudy, of: Of) -> float:
     """The drive coordinate at which a figure is taken; NaN if it is of no single position."""
-    run, time = found.run, of.time
+    run, time = study.run, of.time
     if not np.isfinite(time) or run.cycle.duration <= 0:
         return float("nan")
     time = time % run.cycle.duration if run.cycle.periodic else time
     return float(run.system.dial(run.values, np.array([time])).values[0])
 
 
-def _spread_out(found: ToleranceStudy, arrays: Sequence[Array], shape: tuple[int, ...]) -> Array:
+def _spread_out(study: ToleranceStudy, arrays: Sequence[Array], shape: tuple[int, ...]) -> Array:
     """Numbers over the windows of measures as one array over all positions, NaN outside."""
-    whole = np.full((len(arrays), *shape, len(found.plan.times)), np.nan)
-    for row, array, of in zip(whole, arrays, found.linear.measures, strict=True):
+    spread = np.full((len(arrays), *shape, len(study.plan.times)), np.nan)
+    for row, array, of in zip(spread, arrays, study.linear.measures, strict=True):
         row[..., of.reference.window.index] = array
-    return whole
+    return spread
 
 
 def _worst(outcome: Outcome) -> dict[str, Any]:
     if outcome.worst is None:
         return {}
-    found, inputs = outcome.study, outcome.study.inputs
-    radii = found.effects.numbers()["nominal"]
+    study, inputs = outcome.study, outcome.study.inputs
+    radii = study.effects.numbers()["nominal"]
     values = {}
     for k, key in enumerate(("lower", "upper")):
         corners = [pair[k] for pair in outcome.worst]
@@ -261,27 +264,27 @@ def _worst(outcome: Outcome) -> dict[str, Any]:
 
 
 def _shares(outcome: Outcome) -> dict[str, Any]:
-    one = outcome.indices
-    if one is None:
+    indices = outcome.indices
+    if indices is None:
         return {}
     return {
-        "first_order": one.first, "first_order_low": one.first_low, "first_order_high": one.first_high,
-        "total_order": one.total, "total_order_low": one.total_low, "total_order_high": one.total_high,
+        "first_order": indices.first, "first_order_low": indices.first_low, "first_order_high": indices.first_high,
+        "total_order": indices.total, "total_order_low": indices.total_low, "total_order_high": indices.total_high,
     }  # fmt: skip
 
 
 def text_of(measure: Measure, system: System) -> str:
     """What a measure is: "coordinate of point ram.Q, y at 270° of O"."""
     kind = measure.of.long_name.replace(" a ", " ")
-    whole = measure.subject in ("mechanism", "cycle", "instant")
-    subject = f" ({measure.subject})" if whole else f" {measure.subject}"
+    alone = measure.subject in ("mechanism", "cycle", "instant")
+    subject = f" ({measure.subject})" if alone else f" {measure.subject}"
     axis = f", {measure.axis}" if measure.axis else ""
     rule = {
         "deviation": ", largest deviation from nominal", "value": "", "line": "", "ratio": "", "work": "",
         "dead centre": "", "dead centre, least": " (least)",
     }.get(measure.rule, f", {measure.rule.replace('-', ' ')}")  # fmt: skip
-    own = measure.of.rule == measure.rule and measure.rule != "deviation"
-    return f"{kind}{subject}{axis}{'' if own else rule}{_where(measure, system)}"
+    usual = measure.of.rule == measure.rule and measure.rule != "deviation"
+    return f"{kind}{subject}{axis}{'' if usual else rule}{_where(measure, system)}"
 
 
 def course_text(measure: Measure, system: System) -> str:

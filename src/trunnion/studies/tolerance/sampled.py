@@ -53,8 +53,8 @@ def sampled(samples: Samples, study: ToleranceStudy) -> Sampled:
     yields = np.mean(everything, axis=1)
     if job.replicates > 1:
         ends = {
-            "mean": intervals.by_replicates(np.array([one.mean for one in each]), axis=0),
-            "deviation": intervals.by_replicates(np.array([_of_even_points(one) for one in each]), axis=0),
+            "mean": intervals.by_replicates(np.array([moment.mean for moment in each]), axis=0),
+            "deviation": intervals.by_replicates(np.array([_of_even_points(moment) for moment in each]), axis=0),
         }
         right = np.sum(everything.reshape(count + 1, *replicates), axis=2)
         # turned to where a measure changes most, a replicate's count is all but one of two numbers: on the safe side
@@ -92,9 +92,9 @@ def sampled(samples: Samples, study: ToleranceStudy) -> Sampled:
     return Sampled(arrays, done, int(np.sum(everything[-1])))
 
 
-def _of_even_points(one: Moments) -> Array:
+def _of_even_points(moments: Moments) -> Array:
     """Standard deviation of the points of a replicate, by n: their mean is all but true and uses none up."""
-    return one.deviation * np.sqrt(np.maximum(one.number - 1, 0) / np.maximum(one.number, 1))
+    return moments.deviation * np.sqrt(np.maximum(moments.number - 1, 0) / np.maximum(moments.number, 1))
 
 
 def _failed(samples: Samples) -> NDArray[np.int64]:
@@ -107,9 +107,9 @@ def _quantiles(ordered: Array, shares: Array) -> Array:
     """Quantiles of figures in order, of which the k-th stands for the share (k − ½)/n; linear between two of them."""
     if not ordered.size:
         return np.full(shares.shape, np.nan)
-    found = np.quantile(ordered, np.clip(np.nan_to_num(shares), 0.0, 1.0), method="hazen")
-    found = np.where(np.isnan(found), _of_rank(ordered, shares), found)
-    return np.where(np.isnan(shares), np.nan, found)
+    values = np.quantile(ordered, np.clip(np.nan_to_num(shares), 0.0, 1.0), method="hazen")
+    values = np.where(np.isnan(values), _of_rank(ordered, shares), values)
+    return np.where(np.isnan(shares), np.nan, values)
 
 
 def _of_rank(ordered: Array, shares: Array) -> Array:
@@ -181,14 +181,14 @@ def limits_of(measure: Measure, nominal: float) -> tuple[float, float]:
 
 def _bands(samples: Samples, study: ToleranceStudy) -> Array:
     """Quantiles of the deviation of the course at every position, of the samples whose curves are kept."""
-    found = np.full((len(samples.curves), len(QUANTILES), samples.job.positions), np.nan)
+    bands = np.full((len(samples.curves), len(QUANTILES), samples.job.positions), np.nan)
     for i, (curves, of) in enumerate(zip(samples.curves, study.linear.measures, strict=True)):
         nominal = 0.0 if of.reference.against else np.nan_to_num(of.curve)
         ordered = np.sort(curves - nominal, axis=0)  # NaN last
         index = study.plan.windows[of.measure.name].index
         for position, column in zip(index, ordered.T, strict=True):
-            found[i, :, position] = _quantiles(column[~np.isnan(column)], np.array(QUANTILES))
-    return found
+            bands[i, :, position] = _quantiles(column[~np.isnan(column)], np.array(QUANTILES))
+    return bands
 
 
 def _convergence(samples: Samples) -> dict[str, Any]:

@@ -155,8 +155,8 @@ def towards(gradients: Array) -> Array:
     transformation of J. Imai, K. S. Tan, J. Comput. Finance 10 (2006) 129-155, doi:10.21314/JCF.2006.162).
     """
     scale = np.sqrt(np.sum(gradients**2, axis=1, keepdims=True))
-    known = np.nan_to_num(gradients / np.where(scale > 0, scale, 1.0))
-    rotation: Array = np.linalg.svd(known, full_matrices=True)[2].T
+    scaled = np.nan_to_num(gradients / np.where(scale > 0, scale, 1.0))
+    rotation: Array = np.linalg.svd(scaled, full_matrices=True)[2].T
     return rotation
 
 
@@ -201,12 +201,12 @@ class Sampler:
             part["passed"][i] = within_limits(measure, part["figure"][i], read.least, read.most)
             part["status"] = np.maximum(part["status"], read.status)
             shape = (count, len(self.times[measure.name]))
-            shown = np.asarray(read.shown) if curves else np.empty((count, 1))
-            part[f"curve{i}"] = np.broadcast_to(shown, shape)[:curves]
+            course = np.asarray(read.shown) if curves else np.empty((count, 1))
+            part[f"curve{i}"] = np.broadcast_to(course, shape)[:curves]
         return part
 
     def __call__(self, block: int) -> Part:
         """What is known of the samples of a block."""
         with np.errstate(all="ignore"):
-            kept = CURVES // self.job.positions
-            return self.figures(self.drawn(block), max(kept - block * self.job.block_size, 0))
+            most = CURVES // self.job.positions
+            return self.figures(self.drawn(block), max(most - block * self.job.block_size, 0))

@@ -45,7 +45,7 @@ def search(effects: Effects, objective: Objective, start: Mapping[str, float], s
 
     known: whether the nominal mechanism has the figure. NaN if none is found.
     """
-    among = known and all(one.lower <= 0.0 <= one.upper for one in effects.inputs.tolerances)
+    among = known and all(tolerance.lower <= 0.0 <= tolerance.upper for tolerance in effects.inputs.tolerances)
     at, best, assembles = dict(start), Corner(0.0 if among else np.nan, {}, 0), True  # the nominal mechanism
     for rounds in range(1, MOST_ROUNDS + 1):
         real, slope = objective(effects.values(at), effects)
@@ -67,31 +67,31 @@ def search(effects: Effects, objective: Objective, start: Mapping[str, float], s
         if not np.any(np.isfinite(real)):
             break
         top = int(np.nanargmax(sign * real))
-        found = _better(best, Corner(float(real[top]), {**best.at, **flips[top]}, rounds), sign)
-        if found is best:
+        trial = _better(best, Corner(float(real[top]), {**best.at, **flips[top]}, rounds), sign)
+        if trial is best:
             break
-        best = found
+        best = trial
     return best._replace(assembles=assembles)
 
 
 def _flips(effects: Effects, at: Mapping[str, float]) -> list[dict[str, float]]:
     """Each toleranced number alone at its other limit, or at its nominal value if its limits let it."""
-    found = []
-    for i, one in enumerate(effects.inputs.tolerances):
-        if one.direction or one.distribution == "direction":
+    flips = []
+    for i, tolerance in enumerate(effects.inputs.tolerances):
+        if tolerance.direction or tolerance.distribution == "direction":
             continue
         nominal = effects.nominal(i)
-        within = {nominal} if one.lower <= 0.0 <= one.upper else set()
-        places = {*within, nominal + one.lower, nominal + one.upper} - {at.get(one.path, nominal)}
-        found += [{one.path: place} for place in sorted(places)]
-    return found
+        within = {nominal} if tolerance.lower <= 0.0 <= tolerance.upper else set()
+        places = {*within, nominal + tolerance.lower, nominal + tolerance.upper} - {at.get(tolerance.path, nominal)}
+        flips += [{tolerance.path: place} for place in sorted(places)]
+    return flips
 
 
-def _better(best: Corner, found: Corner, sign: float) -> Corner:
-    gain = sign * (found.value - best.value)
+def _better(best: Corner, trial: Corner, sign: float) -> Corner:
+    gain = sign * (trial.value - best.value)
     least = 1e-12 * abs(best.value) if np.isfinite(best.value) else 0.0
-    return found if np.isfinite(found.value) and (not np.isfinite(best.value) or gain > least) else best
+    return trial if np.isfinite(trial.value) and (not np.isfinite(best.value) or gain > least) else best
 
 
-def _same(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
-    return all(abs(value - other[path]) <= 1e-9 * max(1.0, abs(value)) for path, value in one.items())
+def _same(corner: Mapping[str, float], other: Mapping[str, float]) -> bool:
+    return all(abs(value - other[path]) <= 1e-9 * max(1.0, abs(value)) for path, value in corner.items())

@@ -91,14 +91,14 @@ def tolerance(
     MechanismError
         Nothing varies, a measure or method is unknown, or as `analyse` does.
     """
-    methods, notes, stated = tuple(dict.fromkeys(methods)), list[Finding](), engine
+    methods, notes, asked_engine = tuple(dict.fromkeys(methods)), list[Finding](), engine
     _check(methods, samples, seed, target)
-    found = study(mechanism, measures, steps, at, friction_method)
-    worst = found.worst() if "worst-case" in methods else None
+    prepared = study(mechanism, measures, steps, at, friction_method)
+    worst = prepared.worst() if "worst-case" in methods else None
     drawn, shares = None, None
-    if (method := next((one for one in methods if one in SAMPLINGS), None)) is not None:
-        engine, chosen = _engine(found, engine, samples, cluster)
-        job = found.sampling(method, samples, seed, engine)
+    if (method := next((sampling for sampling in methods if sampling in SAMPLINGS), None)) is not None:
+        engine, chosen = _engine(prepared, engine, samples, cluster)
+        job = prepared.sampling(method, samples, seed, engine)
         if jobs is None:
             jobs = 1 if job.work < FEW and cluster is None else None
 
@@ -111,24 +111,27 @@ def tolerance(
                 job, jobs=jobs, threads=engine == "compiled", cluster=cluster, checkpoint=checkpoint, progress=tell
             )
         except KeyboardInterrupt:
-            kept = (f"samples are in {checkpoint}: the same command goes on from them",) if checkpoint else ()
-            raise KeyboardInterrupt(*kept) from None
+            hint = (f"samples are in {checkpoint}: the same command goes on from them",) if checkpoint else ()
+            raise KeyboardInterrupt(*hint) from None
         drawn = job.joined(parts)
         del parts  # as large as the samples
         notes += [*chosen, *trouble]
     if "sobol" in methods:
-        own = found.sampling("quasi-monte-carlo", samples, seed, _engine(found, stated, samples, cluster=None)[0])
-        own = replace(own, rotation=None)  # each number is to have its own coordinates of the points
-        shares = indices(own.prepare(), samples, seed)
-    return dataset(Outcome(found, tuple(methods), worst, drawn, shares, target), [*found.told, *notes])
+        alone = _engine(prepared, asked_engine, samples, cluster=None)[0]
+        # each number is to have its own coordinates of the points
+        plain = replace(prepared.sampling("quasi-monte-carlo", samples, seed, alone), rotation=None)
+        shares = indices(plain.prepare(), samples, seed)
+    return dataset(Outcome(prepared, tuple(methods), worst, drawn, shares, target), [*prepared.told, *notes])
 
 
-def _engine(found: ToleranceStudy, engine: Engine, samples: int, cluster: str | None) -> tuple[Engine, list[Finding]]:
+def _engine(
+    prepared: ToleranceStudy, engine: Engine, samples: int, cluster: str | None
+) -> tuple[Engine, list[Finding]]:
     """The engine to use, and a note if it is not NumPy, as it is on a cluster, whose workers may have no other."""
     if engine != "auto":
         return engine, []
-    many = samples * len(found.plan.times)
-    engine = "numpy" if cluster else engine_for(engine, found.kernel, found.run.values, many)
+    many = samples * len(prepared.plan.times)
+    engine = "numpy" if cluster else engine_for(engine, prepared.kernel, prepared.run.values, many)
     return engine, [
         Finding.note("samples.engine", "samples", f"the samples are computed by the engine {engine}", engine=engine)
     ] if engine != "numpy" else []

@@ -47,8 +47,8 @@ class Described(Protocol):
 
 def origin(mechanism: Mechanism, formula: str, **more: Any) -> dict[str, Any]:
     """Whose result it is, the units it is written in, and by which version; more: what comes between."""
-    told = {"name": mechanism.name, "formula": formula, **more, "model_units": stated_units(mechanism)}
-    return {**told, "model_hash": mechanism.digest, "trunnion_version": __version__}
+    identity = {"name": mechanism.name, "formula": formula, **more, "model_units": stated_units(mechanism)}
+    return {**identity, "model_hash": mechanism.digest, "trunnion_version": __version__}
 
 
 def cited(references: Iterable[str], statuses: type[IntEnum] = Status) -> dict[str, Any]:
@@ -67,15 +67,18 @@ def codes(what: str, of: type[IntEnum]) -> dict[str, str]:
 def finding_rows(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """Findings for JSON."""
     keys = ("severity", "where", "what", "remedy", "code")
-    return [{key: str(getattr(one, key)) for key in keys} | {"figures": _written(one.figures)} for one in findings]
+    return [
+        {key: str(getattr(finding, key)) for key in keys} | {"figures": _written(finding.figures)}
+        for finding in findings
+    ]
 
 
 def _written(value: Any) -> Any:
     """A figure as JSON can hold it: no number of NumPy, and none that is not finite."""
     if isinstance(value, Mapping):
-        return {key: _written(one) for key, one in value.items()}
+        return {key: _written(part) for key, part in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_written(one) for one in value]
+        return [_written(part) for part in value]
     value = value.item() if hasattr(value, "item") else value
     return None if isinstance(value, float) and not isfinite(value) else value
 
@@ -113,7 +116,7 @@ def findings_of(result: Described) -> list[Finding]:
 
 def figure_rows(figures: Iterable[Figure]) -> list[dict[str, Any]]:
     """The figures of a summary for JSON."""
-    return [one.row() for one in figures]
+    return [figure.row() for figure in figures]
 
 
 def summary_of(result: Described) -> list[Figure]:
@@ -136,14 +139,14 @@ def _stated_units(mechanism: Mechanism) -> dict[str, str]:
     counts: Counter[tuple[str, str]] = Counter()
     for entry in mechanism.parameter_set.entries.values():
         text = str(entry.quantity.source)
-        found = STATED.fullmatch(text)
-        if entry.alias or not found:
+        match = STATED.fullmatch(text)
+        if entry.alias or not match:
             continue
         try:
-            counts[si_unit(unit(found[1])[1]), found[1]] += 1
+            counts[si_unit(unit(match[1])[1]), match[1]] += 1
         except UnitError:  # of a formula: "2 e", "40 N * x"
             continue
     stated: dict[str, str] = {}
-    for (si, own), _ in counts.most_common():
-        stated.setdefault(si, own)
-    return {si: own for si, own in (ANGLES | stated).items() if si != own}
+    for (si, unit_text), _ in counts.most_common():
+        stated.setdefault(si, unit_text)
+    return {si: unit_text for si, unit_text in (ANGLES | stated).items() if si != unit_text}

@@ -98,20 +98,20 @@ def described(
     """
     import xarray as xr
 
-    found: dict[str, xr.Variable] = {}
+    variables: dict[str, xr.Variable] = {}
     for name, array in arrays.items():
-        one = known[name]
-        unit = (units or {}).get(one.units, one.units)
-        attributes = {"units": unit, "long_name": one.long_name}
+        variable = known[name]
+        unit = (units or {}).get(variable.units, variable.units)
+        attributes = {"units": unit, "long_name": variable.long_name}
         if isinstance(unit, MemberUnits):
             attributes["units"] = unit.text
             if len(set(unit.each)) > 1:
-                attributes[UNITS_OF_EACH] = coordinate = f"{one.units}_unit"
-                meaning = {"long_name": f"unit of the {one.units.replace('_', ' ')}"}
-                found[coordinate] = xr.Variable((unit.dim,), np.asarray(unit.each, dtype=str), meaning)
+                attributes[UNITS_OF_EACH] = coordinate = f"{variable.units}_unit"
+                meaning = {"long_name": f"unit of the {variable.units.replace('_', ' ')}"}
+                variables[coordinate] = xr.Variable((unit.dim,), np.asarray(unit.each, dtype=str), meaning)
         # without fastpath xarray loads dask, where it is installed, to see whether the array is one of its own
-        found[name] = xr.Variable(one.dims, np.asarray(array), attributes, fastpath=True)
-    return found
+        variables[name] = xr.Variable(variable.dims, np.asarray(array), attributes, fastpath=True)
+    return variables
 
 
 def unit_of(array: xr.DataArray, index: Sequence[int] = ()) -> str:
@@ -184,21 +184,22 @@ def dataset_of(
     names: dict[str, Any] = {}
     indexes: dict[str, xr.indexes.PandasIndex] = {}
     for dim, members in labels.items():
-        indexes[dim], own = _index(dim, tuple(members))
-        names |= own
+        indexes[dim], coordinate = _index(dim, tuple(members))
+        names |= coordinate
     drive = (along or {}).get("drive")
     if drive is not None and drive.dims == ("position",):
         # xarray draws over the coordinate that bears the dimension's name. It has no index: two results are combined
         # position by position, not by angles that may differ in their last digit
         names["position"] = drive
     # those without an index go in at once: to add them afterwards takes as long as all else
-    plain = {name: one for name, one in (along or {}).items() if isinstance(one, xr.Variable) and name not in one.dims}
+    others = (along or {}).items()
+    plain = {name: one for name, one in others if isinstance(one, xr.Variable) and name not in one.dims}
     units = {name: variables[name] for name in _unit_coordinates(variables)}
     coordinates = xr.Coordinates(names | plain | units, indexes)
-    rest = {name: one for name, one in variables.items() if name not in units}
-    found = xr.Dataset(rest, coordinates, {"kind": kind, **encoded(attributes)})
-    indexed = {name: one for name, one in (along or {}).items() if name not in plain}
-    return found.assign_coords(indexed) if indexed else found
+    rest = {name: variable for name, variable in variables.items() if name not in units}
+    result = xr.Dataset(rest, coordinates, {"kind": kind, **encoded(attributes)})
+    indexed = {name: variable for name, variable in others if name not in plain}
+    return result.assign_coords(indexed) if indexed else result
 
 
 def with_variables(result: xr.Dataset, variables: Mapping[str, xr.Variable]) -> xr.Dataset:
@@ -207,4 +208,5 @@ def with_variables(result: xr.Dataset, variables: Mapping[str, xr.Variable]) -> 
 
 
 def _unit_coordinates(variables: Mapping[str, xr.Variable]) -> list[str]:
-    return list(dict.fromkeys(one.attrs[UNITS_OF_EACH] for one in variables.values() if UNITS_OF_EACH in one.attrs))
+    stated = (variable.attrs.get(UNITS_OF_EACH) for variable in variables.values())
+    return list(dict.fromkeys(name for name in stated if name is not None))

@@ -213,9 +213,9 @@ def save(
 
     def chosen(result: xr.Dataset, table: str) -> list[Column]:
         """The columns of a table; what was asked for holds for the one that the file is named for."""
-        own = table_of(path, result)
-        found = selected(result, columns if table in ("", own) else None, table or own)
-        return in_model_units(result, found) if units == "model" else found
+        named_table = table_of(path, result)
+        every = selected(result, columns if table in ("", named_table) else None, table or named_table)
+        return in_model_units(result, every) if units == "model" else every
 
     with whole(path) as temporary:
         writer(result, temporary, units_row, chosen)

@@ -55,9 +55,9 @@ class Figure:
 
     def row(self) -> dict[str, Any]:
         """The figure for JSON."""
-        own = dict(vars(self))
-        row = {"label": self.label, "value": own.pop("value"), "unit": own.pop("unit")}
-        return row | {key: text for key, text in own.items() if text}
+        parts = dict(vars(self))
+        row = {"label": self.label, "value": parts.pop("value"), "unit": parts.pop("unit")}
+        return row | {key: text for key, text in parts.items() if text}
 
     @classmethod
     def read(cls, row: Mapping[str, Any]) -> Figure:

@@ -99,8 +99,8 @@ def scale_of(nominal: float, parts_of: Iterable[float], unit: str) -> tuple[floa
 
     It is the unit of the largest deviation, or of the nominal value where that is larger, but not by 1000 times.
     """
-    known = [abs(one) for one in parts_of if math.isfinite(one) and one != 0]
-    spread = max(known, default=abs(nominal))
+    sizes = [abs(size) for size in parts_of if math.isfinite(size) and size != 0]
+    spread = max(sizes, default=abs(nominal))
     return scaled(max(spread, min(abs(nominal), 1e3 * spread)), unit)
 
 

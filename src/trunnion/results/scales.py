@@ -74,10 +74,10 @@ class Scales(NamedTuple):
     def of_figures(self, figures: Iterable[Figure]) -> list[Figure]:
         """Figures, 0 where they are rounding, but for those that tell of the solution."""
         return [
-            replace(one, value=0.0)
-            if isinstance(one.value, float) and not one.numerical and abs(one.value) <= self.floor(one.unit)
-            else one
-            for one in figures
+            replace(figure, value=0.0)
+            if isinstance(figure.value, float) and not figure.numerical and abs(figure.value) <= self.floor(figure.unit)
+            else figure
+            for figure in figures
         ]
 
 
@@ -123,12 +123,12 @@ def scales_in(result: Described) -> Scales:
 def without_noise(result: xr.Dataset) -> xr.Dataset:
     """A result as views show it: 0 where its numbers are rounding, but for those that tell of the solution."""
     scales, cleared = scales_in(result), {}
-    for name, one in result.data_vars.items():
-        if one.dtype.kind != "f" or name in OF_SOLUTION or "units" not in one.attrs:
+    for name, variable in result.data_vars.items():
+        if variable.dtype.kind != "f" or name in OF_SOLUTION or "units" not in variable.attrs:
             continue
-        floors = scales.floor(unit_of(one))
-        each = result.coords.get(one.attrs.get(UNITS_OF_EACH))
+        floors = scales.floor(unit_of(variable))
+        each = result.coords.get(variable.attrs.get(UNITS_OF_EACH))
         if each is not None and each.ndim:
             floors = each.copy(data=[scales.floor(str(unit)) for unit in each.values])
-        cleared[name] = one.where(~(abs(one) <= floors), 0.0)
+        cleared[name] = variable.where(~(abs(variable) <= floors), 0.0)
     return result.assign(cleared)

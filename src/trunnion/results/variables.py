@@ -155,13 +155,13 @@ Labels = Mapping[str, Sequence[str]]
 
 def variables(space: str) -> dict[str, Variable]:
     """The vocabulary of the results of planar or of spatial mechanisms."""
-    both = {name: one for name, one in VARIABLES.items() if one.space in ("", space)}
+    both = {name: variable for name, variable in VARIABLES.items() if variable.space in ("", space)}
     return {**both, **IN_SPACE} if space == "spatial" else both
 
 
 @functools.cache
 def _along_positions(space: str) -> dict[str, Variable]:
-    return {name: one.over("position") for name, one in variables(space).items()}
+    return {name: variable.over("position") for name, variable in variables(space).items()}
 
 
 def _space(labels: Labels) -> str:
@@ -218,12 +218,12 @@ def dataset(
     every position that it has, all if not given; dtype: of their floats. Where that is another than theirs, arrays are
     taken out of their dict one by one, so that both need not be in memory. more: what it has beside.
     """
-    known = _along_positions(_space(labels))
+    vocabulary = _along_positions(_space(labels))
     names = [name for name in arrays if kept is None or name in kept]
     other = {name for name in names if arrays[name].dtype == np.float64 and dtype != "float64"}
-    own = {name: arrays.pop(name).astype(dtype) if name in other else arrays[name] for name in names}
-    found = described(own, known, units)
-    found |= described({name: getattr(means, name) for name in CYCLE}, CYCLE, units)
+    numbers = {name: arrays.pop(name).astype(dtype) if name in other else arrays[name] for name in names}
+    described_arrays = described(numbers, vocabulary, units)
+    described_arrays |= described({name: getattr(means, name) for name in CYCLE}, CYCLE, units)
     if ideal is not None:
-        found |= described({name: getattr(ideal, name.removesuffix("_ideal")) for name in IDEAL}, IDEAL)
-    return dataset_of("cycle", {**found, **(more or {})}, labels, attributes, along)
+        described_arrays |= described({name: getattr(ideal, name.removesuffix("_ideal")) for name in IDEAL}, IDEAL)
+    return dataset_of("cycle", {**described_arrays, **(more or {})}, labels, attributes, along)

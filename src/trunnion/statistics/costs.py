@@ -107,7 +107,7 @@ class Cost:
     def numbers(self) -> dict[str, float]:
         """The parameters by name, those that are not stated with their defaults."""
         stated = COST_MODELS[self.model].parameters
-        return {name: self.parameters.get(name, one.default or 0.0) for name, one in stated.items()}
+        return {name: self.parameters.get(name, parameter.default or 0.0) for name, parameter in stated.items()}
 
     def value(self, t: float) -> float:
         """Cost of a half width t, m or rad."""
@@ -120,14 +120,16 @@ class Cost:
     def findings(self, where: str = "") -> list[Finding]:
         """What is missing or out of range."""
         if self.model not in COST_MODELS:
-            known = ", ".join(COST_MODELS)
-            return [Finding(f"'{self.model}' is no cost model", where, f"write one of {known}")]
-        found = []
-        for name, one in COST_MODELS[self.model].parameters.items():
-            value = self.parameters.get(name, one.default)
+            names = ", ".join(COST_MODELS)
+            return [Finding(f"'{self.model}' is no cost model", where, f"write one of {names}")]
+        findings_here = []
+        for name, parameter in COST_MODELS[self.model].parameters.items():
+            value = self.parameters.get(name, parameter.default)
             if value is None:
-                found.append(Finding(f"'{name}' is missing ({one.meaning})", where, "add it"))
-            elif not value > one.minimum and (one.above or value != one.minimum):
-                limit = f"{'above' if one.above else 'at least'} {one.minimum:g}"
-                found.append(Finding(f"'{name}' is {value:g}, it has to be {limit}", where, "else wider costs more"))
-        return found
+                findings_here.append(Finding(f"'{name}' is missing ({parameter.meaning})", where, "add it"))
+            elif not value > parameter.minimum and (parameter.above or value != parameter.minimum):
+                limit = f"{'above' if parameter.above else 'at least'} {parameter.minimum:g}"
+                findings_here.append(
+                    Finding(f"'{name}' is {value:g}, it has to be {limit}", where, "else wider costs more")
+                )
+        return findings_here

@@ -146,6 +146,6 @@ def capability(lower: float, upper: float, mean: float, sigma: float) -> tuple[f
     18 (1986) 41-52, doi:10.1080/00224065.1986.11978984.
     """
     with np.errstate(all="ignore"):
-        found = np.array([(upper - lower) / 2, min(upper - mean, mean - lower)]) / (3 * np.float64(sigma))
-    cp, cpk = np.where(np.isfinite(found), found, np.nan).tolist()
+        indices = np.array([(upper - lower) / 2, min(upper - mean, mean - lower)]) / (3 * np.float64(sigma))
+    cp, cpk = np.where(np.isfinite(indices), indices, np.nan).tolist()
     return cp, cpk

@@ -158,8 +158,8 @@ def _blank(system: System, values: Values, time: Array) -> dict[str, NDArray[Any
     """The arrays of FIGURES without what is looked for."""
     sizes = {"position": len(time), **{dim: len(names) for dim, names in _labels(system).items()}}
     arrays = {
-        name: np.full([sizes[dim] for dim in one.dims], 0.0 if one.dims == PARTS else np.nan)
-        for name, one in FIGURES.items()
+        name: np.full([sizes[dim] for dim in variable.dims], 0.0 if variable.dims == PARTS else np.nan)
+        for name, variable in FIGURES.items()
     }
     arrays["status"] = np.zeros(len(time), np.int8)
     for i, driver in enumerate(system.mechanism.drivers):
@@ -268,15 +268,15 @@ class AssemblyStudy:
         arrays["open_angle"][:], arrays["open_length"][:] = sizes[:, 0], sizes[:, 1] * loops.size
         return np.isfinite(gap), gap > CLOSED
 
-    def _place(self, found: LeastPlay, ends: Sequence[End], offsets: Array, parts: Array) -> None:
+    def _place(self, search: LeastPlay, ends: Sequence[End], offsets: Array, parts: Array) -> None:
         """Offsets and parts of the ends at their places in the result."""
         joints, column = list(self.system.joints), 0
-        solved = np.isfinite(found.least)
+        solved = np.isfinite(search.least)
         for k, end in enumerate(ends):
             joint = joints.index(end.joint)
-            parts[joint, end.number] = np.where(solved, found.weights[:, k], np.nan)
+            parts[joint, end.number] = np.where(solved, search.weights[:, k], np.nan)
             for axis in end.axes:
-                offsets[joint, end.number, "xyz".index(axis)] = np.where(solved, found.offsets[:, column], np.nan)
+                offsets[joint, end.number, "xyz".index(axis)] = np.where(solved, search.offsets[:, column], np.nan)
                 column += 1
 
     def _largest(self, time: Array, needs: Array, stated: bool) -> tuple[float, float]:
@@ -292,19 +292,19 @@ class AssemblyStudy:
         for _ in range(NARROWED):
             near = best[:, None] + reach * np.linspace(-1, 1, BETWEEN)
             near = near if self.cycle.periodic else np.clip(near, 0.0, self.cycle.duration)
-            found = np.nan_to_num(self.solve(near.ravel(), stated).least.reshape(near.shape), nan=-np.inf)
-            place = np.argmax(found, axis=1)[:, None]
-            better = np.take_along_axis(found, place, 1)[:, 0]
+            heights_near = np.nan_to_num(self.solve(near.ravel(), stated).least.reshape(near.shape), nan=-np.inf)
+            place = np.argmax(heights_near, axis=1)[:, None]
+            better = np.take_along_axis(heights_near, place, 1)[:, 0]
             best = np.where(better > most, np.take_along_axis(near, place, 1)[:, 0], best)
             most, reach = np.maximum(most, better), reach / 4
         top = int(np.argmax(most))
         return float(most[top]), float(best[top])
 
 
-def _worst(one: LeastPlay, other: LeastPlay, of: Callable[[LeastPlay], Array]) -> Array:
+def _worst(shares: LeastPlay, other: LeastPlay, of: Callable[[LeastPlay], Array]) -> Array:
     """The larger of a number of two searches, of those that have an answer."""
     with np.errstate(invalid="ignore"):
-        rows = [np.where(np.isfinite(found.least), of(found), -np.inf) for found in (one, other)]
+        rows = [np.where(np.isfinite(search.least), of(search), -np.inf) for search in (shares, other)]
     most = np.maximum(*rows)
     return np.where(np.isfinite(most), most, np.nan)
 
@@ -381,8 +381,8 @@ class Answer:
         if rigid := self.at(AssemblyStatus.RIGID):
             angle, length = (float(np.nanmax(self.arrays[name])) for name in ("open_angle", "open_length"))
             sizes = [f"{1e3 * length:.4g} mm"] * (length > 0) + [f"{np.degrees(angle):.4g}°"] * (angle > 0)
-            stated = [clearance(name, self.values) for name in self.system.joints]
-            nil = any(one is not None and np.all(primal(one) == 0) for one in stated)
+            clearances = [clearance(name, self.values) for name in self.system.joints]
+            nil = any(size is not None and np.all(primal(size) == 0) for size in clearances)
             which = "a stated clearance of 0 gives no play: the loops" if nil else "no play is stated: the loops"
             if self.played:
                 zero = " (a clearance of 0 gives no play)" if nil else ""

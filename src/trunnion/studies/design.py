@@ -204,10 +204,10 @@ def shaking(walk: Forward) -> tuple[tuple[Number, Number], Number]:
 
 def instant_centre(walk: Forward, first: str, second: str) -> tuple[Array, Array]:
     """Point (x, y), m, where two links have the same velocity; at infinity (±inf or NaN) where they turn alike."""
-    one, two = walk.motions[first], walk.motions[second]
-    w = np.asarray(two.twist.w - one.twist.w, float)
+    base, two = walk.motions[first], walk.motions[second]
+    w = np.asarray(two.twist.w - base.twist.w, float)
     with np.errstate(all="ignore"):
-        return -(two.twist.y - one.twist.y) / w, (two.twist.x - one.twist.x) / w
+        return -(two.twist.y - base.twist.y) / w, (two.twist.x - base.twist.x) / w
 
 
 def curvature(walk: Forward, link: str, point: str) -> Array:
@@ -372,19 +372,19 @@ def motor(run: Run, driver: str) -> Motor:
 def dead_centres(run: Run) -> dict[str, tuple[float, ...]]:
     """Drive coordinates (rad, m) at which each link on the ground turns back; times (s) without a driver."""
     motion, courses = _motion(run), _motion(run).courses
-    beside, duration = BESIDE * courses.span * np.array([-1.0, 1.0]), run.cycle.duration
-    found: dict[str, tuple[float, ...]] = {}
+    sides, duration = BESIDE * courses.span * np.array([-1.0, 1.0]), run.cycle.duration
+    centres: dict[str, tuple[float, ...]] = {}
     for joint, row in motion.named("speed").items():
         passages = courses.passages(row)
         if run.cycle.periodic:  # its end is its start
             passages = np.sort(np.append(np.where(passages > duration * (1 - BESIDE), 0.0, passages), 0.0))
             passages = passages[np.diff(passages, prepend=-duration) > BESIDE * duration]
-        around = passages[:, None] + beside
+        around = passages[:, None] + sides
         around = around % duration if run.cycle.periodic else np.clip(around, 0.0, courses.span)
         before, after = courses.picked(np.array([row])).at(around.ravel()).reshape(-1, 2).T
         places = [round(_coordinate(run, time), 12) + 0.0 for time in passages[before * after < 0].tolist()]
-        found[joint] = tuple(sorted(set(places)))
-    return found
+        centres[joint] = tuple(sorted(set(places)))
+    return centres
 
 
 def _coordinate(run: Run, moment: float) -> float:
@@ -398,16 +398,16 @@ def limits(run: Run) -> tuple[tuple[float, float], ...]:
     motion, courses = _motion(run), _motion(run).courses
     turns = courses.passages(motion.rows("rate")[0])  # where the drive turns back
     edges = np.flatnonzero(np.diff(np.concatenate([[0], motion.assembled.astype(int), [0]])))
-    found: list[tuple[float, float]] = []
+    intervals: list[tuple[float, float]] = []
     for first, after in zip(edges[::2], edges[1::2], strict=True):
         low, high = courses.edges[first], courses.edges[after]
         inside = turns[(turns > low) & (turns < high)]
         ends = [_coordinate(run, float(time)) for time in [low, high]]
         places = [*ends, *(_coordinate(run, float(time)) for time in inside)]
         reached = (min(places), max(places)) if len(inside) else (ends[0], ends[1])
-        if not any(np.allclose(reached, other, rtol=1e-9, atol=0) for other in found):  # there and back again
-            found.append(reached)
-    return tuple(found)
+        if not any(np.allclose(reached, other, rtol=1e-9, atol=0) for other in intervals):  # there and back again
+            intervals.append(reached)
+    return tuple(intervals)
 
 
 def counterweights(run: Run) -> tuple[tuple[Counterweight, ...], float]:
@@ -439,37 +439,37 @@ def counterweights(run: Run) -> tuple[tuple[Counterweight, ...], float]:
 def report_figures(mechanism: Mechanism, fluctuation: float = 0.05) -> list[Figure]:
     """The figures that one looks at first."""
     run = _planar(mechanism)
-    found, scales = design(mechanism), scales_of(run)
+    answer, scales = design(mechanism), scales_of(run)
     driver = next(iter(mechanism.drivers), "")
     turns = not driver or run.system.turns(driver)
     unit, scale = ("°", 180 / np.pi) if turns else ("mm", 1e3)
-    figures = [Figure("grashof", "four-bar type (Grashof)", found.grashof)] if found.grashof else []
-    if driver and not found.transmission_angle and mechanism.fixed_link not in run.system.joints[driver][1]:
+    figures = [Figure("grashof", "four-bar type (Grashof)", answer.grashof)] if answer.grashof else []
+    if driver and not answer.transmission_angle and mechanism.fixed_link not in run.system.joints[driver][1]:
         why = f"{driver} drives two moving links; both are of a driver on {mechanism.fixed_link}"
         figures.append(Figure("transmission_angle", "four-bar type and transmission angle", None, "°", note=why))
-    for name, angle in found.transmission_angle.items():
+    for name, angle in answer.transmission_angle.items():
         subject = f"transmission angle of {name}"
         figures.append(Figure(f"{name}.transmission_angle", subject, angle * 180 / np.pi, "°", "minimum"))
-    figures += [_pressure(name, extremes, scale, unit, scales) for name, extremes in found.pressure_angle.items()]
-    for name, places in found.dead_centres.items():
+    figures += [_pressure(name, extremes, scale, unit, scales) for name, extremes in answer.pressure_angle.items()]
+    for name, places in answer.dead_centres.items():
         if places:
             text = ", ".join(f"{place * scale:.6g}" for place in places)
             figures.append(Figure(f"{name}.dead_centres", f"dead centres of {name}", text, f"{unit} of {driver}"))
-    text = ", ".join(f"{low * scale:.6g} … {high * scale:.6g}" for low, high in found.limits) or "no position"
+    text = ", ".join(f"{low * scale:.6g} … {high * scale:.6g}" for low, high in answer.limits) or "no position"
     within = "" if run.cycle.periodic else "within the stated motion"
-    start = f"it starts at {_coordinate(run, 0.0) * scale:.6g}{unit}" * (len(found.limits) > 1 and bool(driver))
+    start = f"it starts at {_coordinate(run, 0.0) * scale:.6g}{unit}" * (len(answer.limits) > 1 and bool(driver))
     figures += [
         Figure("limits", "range of assembly", text, f"{unit} of {driver}" if driver else "", within, note=start),
-        Figure("shaking_force", "shaking force", found.shaking_force, "N", "maximum"),
-        Figure("shaking_moment", "shaking moment about the ground's origin", found.shaking_moment, "N m", "maximum"),
-        Figure("effort_rms", "drive effort", found.rms_effort, "N m" if turns else "N", "RMS"),
-        Figure("peak_power", "drive power", found.peak_power, "W", "maximum"),
-        Figure("mean_power", "drive power", found.mean_power, "W", "mean"),
-        Figure("energy_swing", "energy swing about the mean", found.energy_swing, "J"),
+        Figure("shaking_force", "shaking force", answer.shaking_force, "N", "maximum"),
+        Figure("shaking_moment", "shaking moment about the ground's origin", answer.shaking_moment, "N m", "maximum"),
+        Figure("effort_rms", "drive effort", answer.rms_effort, "N m" if turns else "N", "RMS"),
+        Figure("peak_power", "drive power", answer.peak_power, "W", "maximum"),
+        Figure("mean_power", "drive power", answer.mean_power, "W", "mean"),
+        Figure("energy_swing", "energy swing about the mean", answer.energy_swing, "J"),
     ]
-    if turns and driver and run.cycle.periodic and found.mean_speed:
+    if turns and driver and run.cycle.periodic and answer.mean_speed:
         subject = f"flywheel for a fluctuation of {fluctuation:g}"
-        figures.append(Figure("flywheel", subject, found.flywheel(fluctuation), "kg m^2"))
+        figures.append(Figure("flywheel", subject, answer.flywheel(fluctuation), "kg m^2"))
     if any(PAIRS[kind].turns and mechanism.fixed_link in links for kind, links in run.system.joints.values()):
         figures += _balanced(run, scales)
     return scales.of_figures(figures)

@@ -114,12 +114,12 @@ def selected(result: xr.Dataset, wanted: Sequence[str] | None = None, table: str
     every = _group("all", result, table)
     chosen = [column for column in every[:1] if column.name == "time"]
     for name in wanted:
-        own = [column for column in every if fnmatchcase(column.name, name)]
-        own = _group(name, result, table) if name in GROUPS else own
-        if not own:
+        matching = [column for column in every if fnmatchcase(column.name, name)]
+        matching = _group(name, result, table) if name in GROUPS else matching
+        if not matching:
             remedy = nearest(name, [*GROUPS, *(column.name for column in every)])
             raise MechanismError(Finding(f"there is no column '{name}'", "columns", remedy))
-        chosen += own
+        chosen += matching
     return _once(chosen)
 
 
@@ -135,7 +135,9 @@ def in_model_units(result: xr.Dataset, every: Iterable[Column]) -> list[Column]:
     units: Mapping[str, str] = dict(attribute(result, "model_units", "{}"))
     converted = []
     for name, si, values in every:
-        own = units.get(si, si)
-        shown = name if own in ("", "1") else f"{name} [{own}]"
-        converted.append(Column(shown, own, values if own == si else values * (1 / float(unit(own)[0]))))
+        model_unit = units.get(si, si)
+        shown = name if model_unit in ("", "1") else f"{name} [{model_unit}]"
+        converted.append(
+            Column(shown, model_unit, values if model_unit == si else values * (1 / float(unit(model_unit)[0])))
+        )
     return converted

@@ -163,7 +163,11 @@ def locking(result: xr.Dataset) -> list[Column]:
     columns = time_column(result)
     if "drive" in result.coords:
         columns += flat(result, "drive", "drive")
-    columns += [one for one in rest(result) if one.name == "locking_margin" or one.name.endswith(".critical_multiple")]
+    columns += [
+        column
+        for column in rest(result)
+        if column.name == "locking_margin" or column.name.endswith(".critical_multiple")
+    ]
     columns += of_members(result, "driver", {"drive_effort": "effort", "drive_effort_reverse": "effort_reverse"})
     for name in ("efficiency_instant", "efficiency_reverse_instant", "power_delivered_reverse", "power_acting_reverse",
                  "power_given_reverse", "holding_multiple"):  # fmt: skip
@@ -173,17 +177,17 @@ def locking(result: xr.Dataset) -> list[Column]:
 
 def _members(result: xr.Dataset, stems: Mapping[str, Stems]) -> Iterator[Column]:
     """The columns of members, of joints those that their kinds have."""
-    stated = attribute(result, "scene", "{}")
-    spatial = stated.get("space") == "spatial"
-    kinds = [stated["joints"][str(joint)]["type"] for joint in result["joint"].values]
+    scene = attribute(result, "scene", "{}")
+    spatial = scene.get("space") == "spatial"
+    kinds = [scene["joints"][str(joint)]["type"] for joint in result["joint"].values]
 
     def moves(i: int, variable: str, index: tuple[int, ...]) -> bool:
         if variable in SEATS:  # of joints and ends that have one
             return bool(np.any(np.isfinite(result["seat_offset"].values[(i, *index[:1])])))
         return _has(kinds[i], variable, spatial)
 
-    for dim, own in stems.items():
-        yield from of_members(result, dim, own, moves) if dim == "joint" else of_members(result, dim, own)
+    for dim, stems_of in stems.items():
+        yield from of_members(result, dim, stems_of, moves) if dim == "joint" else of_members(result, dim, stems_of)
 
 
 def _has(kind: str, variable: str, spatial: bool) -> bool:

@@ -49,8 +49,8 @@ def fitted(result: xr.Dataset) -> list[Column]:
     columns = time_column(result)
     for i, driver in enumerate(result["driver"].values):
         columns += flat(result, "drive_coordinate", f"{driver}.coordinate", (i,))
-    for name, one in result.data_vars.items():
-        if one.dims == ("position",) and name != "status":
+    for name, variable in result.data_vars.items():
+        if variable.dims == ("position",) and name != "status":
             columns += flat(result, str(name), str(name))
     joints, ends, axes = (result[dim].values for dim in ("joint", "end", "axis"))
     for kind in ("stated", "uniform"):
@@ -103,8 +103,8 @@ def courses(result: xr.Dataset) -> list[Column]:
     units = units_along(result["mean"], "channel")
     for i, (channel, unit) in enumerate(zip(result["channel"].values, units, strict=True)):
         for figure in ("mean", "scatter", "uncertainty", "turns"):
-            own = "1" if figure == "turns" else unit
-            columns.append(Column(f"{channel}.{figure}", own, result[figure].values[:, i].ravel()))
+            own_unit = "1" if figure == "turns" else unit
+            columns.append(Column(f"{channel}.{figure}", own_unit, result[figure].values[:, i].ravel()))
     return columns
 
 
@@ -125,8 +125,8 @@ def _compared(result: xr.Dataset) -> list[Column]:
     columns.append(Column("status", "", _words(result, "flag", result["status"].values)))
     for i, (channel, unit) in enumerate(zip(result["channel"].values, attribute(result, "channel_units"), strict=True)):
         for name in COURSES:
-            own = "1" if name == "compared" else unit
-            columns.append(Column(f"{channel}.{name}", own, result[name].values[i].ravel()))
+            own_unit = "1" if name == "compared" else unit
+            columns.append(Column(f"{channel}.{name}", own_unit, result[name].values[i].ravel()))
     return [column._replace(values=column.values[measured]) for column in columns]
 
 
@@ -136,13 +136,16 @@ def _verdicts(result: xr.Dataset) -> list[Column]:
     columns = _conditions(result, channels)
     columns.append(Column("channel", "", np.tile(result["channel"].values.astype(object), conditions)))
     columns.append(Column("unit", "", np.tile(units, conditions)))
-    for name, one in result.data_vars.items():
-        stated = str(one.attrs["units"])
-        if one.dims == ("channel", "condition"):
-            unit, values = str(result.attrs["drive_unit"]) if stated == "drive" else stated, one.values.T.ravel()
+    for name, variable in result.data_vars.items():
+        unit_named = str(variable.attrs["units"])
+        if variable.dims == ("channel", "condition"):
+            unit, values = (
+                str(result.attrs["drive_unit"]) if unit_named == "drive" else unit_named,
+                variable.values.T.ravel(),
+            )
             columns.append(Column(str(name), unit, _words(result, "verdict", values) if name == "verdict" else values))
-        elif one.dims == ("condition",):
-            columns.append(Column(str(name), stated, np.repeat(one.values, channels)))
+        elif variable.dims == ("condition",):
+            columns.append(Column(str(name), unit_named, np.repeat(variable.values, channels)))
     return columns
 
 
@@ -154,7 +157,7 @@ def _parameters(result: xr.Dataset) -> list[Column]:
     names = _texts(result["parameter"].values)
     columns = [
         Column("parameter", "", names),
-        Column("paths", "", _texts([" ".join(one) for one in attribute(result, "parameter_paths")])),
+        Column("paths", "", _texts([" ".join(paths) for paths in attribute(result, "parameter_paths")])),
         Column("unit", "", _texts(attribute(result, "parameter_units"))),
         *(Column(key, "", result[key].values) for key in FIGURES),
         *(Column(key, "1", result[key].values) for key in ("degrees_of_freedom", "limit", "told")),

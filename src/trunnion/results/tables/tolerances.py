@@ -48,9 +48,9 @@ def _common(units: list[str]) -> str:
     return units[0] if len(set(units)) == 1 else ""
 
 
-def _stated(one: Any) -> str:
+def _stated(variable: Any) -> str:
     """The unit of all of a variable; empty if there are several."""
-    return "" if UNITS_OF_EACH in one.attrs else str(one.attrs.get("units", ""))
+    return "" if UNITS_OF_EACH in variable.attrs else str(variable.attrs.get("units", ""))
 
 
 def _by(unit: str, other: str) -> str:
@@ -63,63 +63,65 @@ def _names(result: xr.Dataset, dim: str) -> list[str]:
 
 def _measures(result: xr.Dataset) -> list[Column]:
     """One row a measure: its figures; quantiles as `quantile_0.05`; limits and bounds as they are stated."""
-    found: list[Column] = [
+    columns: list[Column] = [
         Column("measure", "", np.array(_names(result, "measure"))),
         Column("unit", "", np.array(_units(result))),
     ]
     for key, ends in (("limits", ("limit_lower", "limit_upper")), ("bounds", ("at_least", "at_most"))):
-        stated = attribute(result, key)
+        pairs = attribute(result, key)
         for k, name in enumerate(ends):
-            column = [np.nan if pair is None or pair[k] is None else float(pair[k]) for pair in stated]
-            found += [Column(name, _common(_units(result)), np.array(column))] if column else []
-    limited = np.any([np.isfinite(column) for _, _, column in found[2:]], axis=0) if len(found) > 2 else True
-    for variable, one in result.data_vars.items():
+            column = [np.nan if pair is None or pair[k] is None else float(pair[k]) for pair in pairs]
+            columns += [Column(name, _common(_units(result)), np.array(column))] if column else []
+    limited = np.any([np.isfinite(column) for _, _, column in columns[2:]], axis=0) if len(columns) > 2 else True
+    for variable, array in result.data_vars.items():
         key = str(variable)
-        if one.dims == ("measure",):
-            own = np.where(limited, one.values, np.nan) if key.startswith("yield") else np.asarray(one.values)
-            found.append(Column(key, "1" if key.startswith(SHARES) else _stated(one), own))
-        elif one.dims == ("measure", "quantile"):
+        if array.dims == ("measure",):
+            values = np.where(limited, array.values, np.nan) if key.startswith("yield") else np.asarray(array.values)
+            columns.append(Column(key, "1" if key.startswith(SHARES) else _stated(array), values))
+        elif array.dims == ("measure", "quantile"):
             levels = result["quantile"].values
             stem = key.replace("quantile_value", "quantile")
-            found += [Column(f"{stem}_{level:g}", _stated(one), one.values[:, k]) for k, level in enumerate(levels)]
-    return found
+            columns += [
+                Column(f"{stem}_{level:g}", _stated(array), array.values[:, k]) for k, level in enumerate(levels)
+            ]
+    return columns
 
 
 def _parameters(result: xr.Dataset) -> list[Column]:
     """One row a toleranced number; what is of a measure is `<measure>.sensitivity`, …."""
-    found: list[Column] = [Column("parameter", "", np.array(_names(result, "parameter")))]
-    found.append(Column("unit", "", np.array(_parameter_units(result))))
-    for variable, one in result.data_vars.items():
-        if one.dims == ("parameter",):
-            found.append(Column(str(variable).removeprefix("parameter_"), _stated(one), np.asarray(one.values)))
-    own = _common(_parameter_units(result))
+    columns: list[Column] = [Column("parameter", "", np.array(_names(result, "parameter")))]
+    columns.append(Column("unit", "", np.array(_parameter_units(result))))
+    for variable, array in result.data_vars.items():
+        if array.dims == ("parameter",):
+            columns.append(Column(str(variable).removeprefix("parameter_"), _stated(array), np.asarray(array.values)))
+    unit_of_all = _common(_parameter_units(result))
     for i, (measure, unit) in enumerate(zip(_names(result, "measure"), _units(result), strict=True)):
-        told = {"sensitivity": _by(unit, own), "contribution_worst_case": unit, "corner_lower": own,
-                "corner_upper": own}  # fmt: skip
+        units = {"sensitivity": _by(unit, unit_of_all), "contribution_worst_case": unit, "corner_lower": unit_of_all,
+                "corner_upper": unit_of_all}  # fmt: skip
         keys = [key for key in BY_MEASURE if key in result]
-        found += [Column(f"{measure}.{key}", told.get(key, "1"), result[key].values[i]) for key in keys]
-    return found
+        columns += [Column(f"{measure}.{key}", units.get(key, "1"), result[key].values[i]) for key in keys]
+    return columns
 
 
 def _positions(result: xr.Dataset) -> list[Column]:
     """One row a position: of each measure its curve, what the tolerances do to it, and its sensitivities."""
-    found: list[Column] = [Column(key, str(result[key].attrs.get("units", "")), result[key].values)
+    columns: list[Column] = [Column(key, str(result[key].attrs.get("units", "")), result[key].values)
                    for key in ("time", "drive") if key in result.coords]  # fmt: skip
     numbers = list(zip(_names(result, "parameter"), _parameter_units(result), strict=True))
     for i, (measure, unit) in enumerate(zip(_names(result, "measure"), _course_units(result), strict=True)):
-        for key, one in result.data_vars.items():
+        for key, array in result.data_vars.items():
             name = str(key).replace("curve", "").strip("_")
             name = f"{measure}.{name}" if name else measure
-            if one.dims == ("measure", "position"):
-                found.append(Column(name, unit, one.values[i]))
-            elif one.dims == ("measure", "quantile", "position"):
+            if array.dims == ("measure", "position"):
+                columns.append(Column(name, unit, array.values[i]))
+            elif array.dims == ("measure", "quantile", "position"):
                 levels = result["quantile"].values
-                found += [Column(f"{name}_{level:g}", unit, one.values[i, k]) for k, level in enumerate(levels)]
-            elif one.dims == ("measure", "parameter", "position"):
+                columns += [Column(f"{name}_{level:g}", unit, array.values[i, k]) for k, level in enumerate(levels)]
+            elif array.dims == ("measure", "parameter", "position"):
                 end = str(key).removeprefix("curve_")
-                parts = zip(numbers, one.values[i], strict=True)
-                found += [Column(f"{measure}.{path}.{end}", _by(unit, other), row) for (path, other), row in parts]
-    return found
+                parts = zip(numbers, array.values[i], strict=True)
+                columns += [Column(f"{measure}.{path}.{end}", _by(unit, other), row) for (path, other), row in parts]
+    return columns
 
 
 def _histogram(result: xr.Dataset) -> list[Column]:
@@ -140,25 +142,25 @@ def _histogram(result: xr.Dataset) -> list[Column]:
 
 def _convergence(result: xr.Dataset) -> list[Column]:
     """One row a number of samples: mean, deviation and yield of each measure so far."""
-    found: list[Column] = []
+    columns: list[Column] = []
     if "convergence_samples" in result:
-        found.append(Column("samples", "1", result["convergence_samples"].values))
+        columns.append(Column("samples", "1", result["convergence_samples"].values))
     for i, (measure, unit) in enumerate(zip(_names(result, "measure"), _units(result), strict=True)):
         for key in (key for key in ("mean", "deviation", "yield") if f"convergence_{key}" in result):
             row = result[f"convergence_{key}"].values[i]
-            found.append(Column(f"{measure}.{key}", "1" if key == "yield" else unit, row))
-    return found or [Column("samples", "1", np.empty(0))]
+            columns.append(Column(f"{measure}.{key}", "1" if key == "yield" else unit, row))
+    return columns or [Column("samples", "1", np.empty(0))]
 
 
 def _offers(result: xr.Dataset) -> list[Column]:
     """One row a point of cost over accuracy: what limits are multiplied by, the cost, and each tolerance."""
     if "trade_off_cost" not in result:
         return [Column(name, "1", np.empty(0)) for name in ("factor", "cost")]
-    found: list[Column] = [Column(key, "1", result[f"trade_off_{key}"].values) for key in ("factor", "cost")]
+    columns: list[Column] = [Column(key, "1", result[f"trade_off_{key}"].values) for key in ("factor", "cost")]
     for j, (path, unit) in enumerate(zip(_names(result, "parameter"), _parameter_units(result), strict=True)):
         if result["bought"].values[j]:
-            found.append(Column(path, unit, result["trade_off_tolerance"].values[:, j]))
-    return found
+            columns.append(Column(path, unit, result["trade_off_tolerance"].values[:, j]))
+    return columns
 
 
 TABLES: dict[str, Callable[[Any], list[Column]]] = {

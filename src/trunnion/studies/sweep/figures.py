@@ -65,25 +65,27 @@ def reduced(arrays: Arrays, course: CycleCourse | None, ideal: Means | None, sys
     """
     status = arrays["status"]
     missing = int(np.count_nonzero(status >= Status.NOT_CONVERGED))
-    told: Reduced = {"status": int(np.max(status)), "without_answer": missing}
-    told["not_valid"] = int(np.count_nonzero(status == Status.CONTACT_LOST))
+    figures: Reduced = {"status": int(np.max(status)), "without_answer": missing}
+    figures["not_valid"] = int(np.count_nonzero(status == Status.CONTACT_LOST))
     if "locking_margin" in arrays:
         valid = status != Status.CONTACT_LOST
-        told["locking_margin"] = float(np.min(arrays["locking_margin"][valid], initial=np.inf))
+        figures["locking_margin"] = float(np.min(arrays["locking_margin"][valid], initial=np.inf))
     if ideal:
-        told["efficiency_ideal"] = ideal.efficiency
+        figures["efficiency_ideal"] = ideal.efficiency
     if missing or course is None or not np.any(course.sound):  # contact is lost everywhere
-        return told
+        return figures
     means = course.means
     joints, drivers = range(len(system.joints)), range(len(system.mechanism.drivers))
     if ideal:
         slides = [PAIRS[kind].guided for kind, _ in system.joints.values()]
         names = [f"joint_{'slide' if slide else 'rotation'}_error" for slide in slides]
-        told["transmission_error_max"] = [_value(course.extreme(name, i, of=magnitude)) for i, name in enumerate(names)]
+        figures["transmission_error_max"] = [
+            _value(course.extreme(name, i, of=magnitude)) for i, name in enumerate(names)
+        ]
     else:  # beside points with errors
-        told |= {"efficiency_ideal": means.efficiency, "transmission_error_max": 0.0}
+        figures |= {"efficiency_ideal": means.efficiency, "transmission_error_max": 0.0}
     ends = [[_value(course.extreme("drive_effort", i, sign=sign)) for i in drivers] for sign in (-1.0, 1.0)]
-    return told | {
+    return figures | {
         "efficiency": means.efficiency,
         "efficiency_error": means.efficiency_error,
         "drive_effort_min": ends[0],
@@ -96,9 +98,9 @@ def reduced(arrays: Arrays, course: CycleCourse | None, ideal: Means | None, sys
     }
 
 
-def _value(found: Place | None) -> float:
+def _value(place: Place | None) -> float:
     """An extreme; NaN where there is none."""
-    return float("nan") if found is None else found.value
+    return float("nan") if place is None else place.value
 
 
 # ---- measures of the model -------------------------------------------------------------------------------------
@@ -106,9 +108,9 @@ def _value(found: Place | None) -> float:
 
 def measures_of(run: Run, names: Sequence[str]) -> list[Measure]:
     """Measures by their names, each with one figure a cycle; MechanismError with all that cannot be swept, and why."""
-    found = named(run.system.mechanism, names, run.values)
+    measures = named(run.system.mechanism, names, run.values)
     findings = []
-    for measure in found:
+    for measure in measures:
         where = f"measures.{measure.name}"
         if measure.name in FIGURES:
             what = f"the measure '{measure.name}' has the name of a figure of the sweep"
@@ -123,7 +125,7 @@ def measures_of(run: Run, names: Sequence[str]) -> list[Measure]:
             findings.append(Finding(what, where, "state a position, at: 60 deg, or a statistic, as: maximum"))
     if findings:
         raise MechanismError(findings)
-    return found
+    return measures
 
 
 def left_out(mechanism: Mechanism, names: Sequence[str]) -> list[Finding]:

@@ -44,13 +44,13 @@ class Swept:
     def stated(self, index: int) -> float | str:
         """The value at an index as a model states it: with a unit, in SI, if it was given in one."""
         value = float(self.values[index])
-        known = self.written and self.unit not in ("1", "SI") and np.isfinite(value)
-        return f"{value!r} {self.unit}" if known else value
+        has_unit = self.written and self.unit not in ("1", "SI") and np.isfinite(value)
+        return f"{value!r} {self.unit}" if has_unit else value
 
     def say(self, index: int) -> str:
         """The value at an index as an equation, in the unit it was given in."""
-        shown = (self.written or self.unit).removeprefix("1")
-        return f"{self.name} = {self.values[index] / self.factor + 0.0:.6g} {shown}".rstrip()
+        unit = (self.written or self.unit).removeprefix("1")
+        return f"{self.name} = {self.values[index] / self.factor + 0.0:.6g} {unit}".rstrip()
 
 
 def grid(mechanism: Mechanism, over: Over) -> tuple[Swept, ...]:
@@ -113,18 +113,18 @@ def _swept(mechanism: Mechanism, name: str, path: str, given: Any) -> Swept:
         measured = measured or _unit_of(with_it, path)
         read.append(_read(with_it, path, value))
     measured = measured or _unit_of(mechanism, path)  # plain numbers are in the unit of what they replace
-    written = next((one.unit for one in read if one.unit), "")
-    bare = next((value for one, value in zip(read, ends, strict=True) if one.plain and one.si), None)
+    written = next((end.unit for end in read if end.unit), "")
+    bare = next((value for end, value in zip(read, ends, strict=True) if end.plain and end.si), None)
     if written and bare is not None:
         raise MechanismError(
             Finding(f"{bare} has no unit, and others have", name, f"write it with one, as {bare} {written}")
         )
     factor = unit(written)[0] if written else Fraction(1)
-    values = [one.si for one in read]
+    values = [end.si for end in read]
     if isinstance(given, tuple):
         count = int(given[2])
-        exact = all(one.unit == written or not one.number for one in read)
-        low, high = (one.number if exact else Fraction(one.si) / factor for one in read)
+        exact = all(end.unit == written or not end.number for end in read)
+        low, high = (end.number if exact else Fraction(end.si) / factor for end in read)
         # exact until rounded once, so that a point is the same float as when its value is written in a file
         between = (float((low * (count - 1 - k) + high * k) / (count - 1) * factor) for k in range(1, count - 1))
         values = [values[0], *between, values[1]]
@@ -147,20 +147,21 @@ def _read(changed: Mechanism, path: str, value: float | str) -> _Value:
 
 def _unit_of(mechanism: Mechanism, path: str) -> str:
     """SI unit of a number; of a dimension, as its value tells."""
-    known: dict[str, Dimension | None] = {}
-    for one, entry in mechanism.parameter_set.entries.items():  # dimensions first, in order of evaluation
-        if one.startswith("dimensions."):
-            known[one.removeprefix("dimensions.")] = entry.quantity.check(known)
+    dimensions: dict[str, Dimension | None] = {}
+    for other, entry in mechanism.parameter_set.entries.items():  # dimensions first, in order of evaluation
+        if other.startswith("dimensions."):
+            dimensions[other.removeprefix("dimensions.")] = entry.quantity.check(dimensions)
     name = path.removeprefix("dimensions.")
-    return si_unit(known[name]) if name in known and name != path else mechanism.parameter_set.entries[path].kind.unit
+    stated = name in dimensions and name != path
+    return si_unit(dimensions[name]) if stated else mechanism.parameter_set.entries[path].kind.unit
 
 
 def at(swept: Sequence[Swept], index: tuple[int, ...]) -> dict[str, float | str]:
-    return {one.path: float(one.values[i]) for one, i in zip(swept, index, strict=True)}
+    return {number.path: float(number.values[i]) for number, i in zip(swept, index, strict=True)}
 
 
 def say(swept: Sequence[Swept], index: Sequence[int]) -> str:
-    return ", ".join(one.say(int(i)) for one, i in zip(swept, index, strict=True))
+    return ", ".join(number.say(int(i)) for number, i in zip(swept, index, strict=True))
 
 
 @contextmanager

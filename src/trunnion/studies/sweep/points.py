@@ -81,7 +81,7 @@ class Points:
 
     @property
     def shape(self) -> Index:
-        return tuple(len(one.values) for one in self.swept)
+        return tuple(len(number.values) for number in self.swept)
 
     def solved(self) -> Iterator[tuple[Index, Reduced]]:
         """Figures of every point, in any order."""
@@ -91,11 +91,11 @@ class Points:
             size, later = max(1, most // self.steps), []
             for low in range(0, len(left), size):
                 part = left[low : low + size]
-                for index, found in zip(part, self._together(part), strict=True):
-                    if found is None:
+                for index, figures in zip(part, self._together(part), strict=True):
+                    if figures is None:
                         later.append(index)
                     else:
-                        yield index, found
+                        yield index, figures
             left = later
         for index in left:
             yield index, self._alone(index)
@@ -106,7 +106,7 @@ class Points:
         """The mechanism of a point by itself; MechanismError says at which."""
         with named(self.swept, index):
             changed = self.mechanism.with_values(
-                {one.path: one.stated(i) for one, i in zip(self.swept, index, strict=True)}
+                {number.path: number.stated(i) for number, i in zip(self.swept, index, strict=True)}
             )
             run = prepare(changed)
             if run.determinacy is not None:
@@ -120,22 +120,24 @@ class Points:
     def _alone(self, index: Index, run: Run | None = None) -> Reduced:
         run = run or (self._prepared(index) if any(index) else self.run)
         with named(self.swept, index):
-            found = positions(run, self.steps, self.method, margin=self.margin)
-        return self._reduced(found.arrays, found.course, found.ideal)
+            cycle = positions(run, self.steps, self.method, margin=self.margin)
+        return self._reduced(cycle.arrays, cycle.course, cycle.ideal)
 
     def measured(self, index: Index, names: Sequence[str]) -> dict[str, float]:
         """Figures of measures at a point."""
         with named(self.swept, index):
             run = self._prepared(index) if any(index) else self.run
-            found = measures_of(run, names)
-            timed = courses_in_time(run, found, run.values, (1,))
-            of_cycle = [one for one in found if not one.in_time]
+            measures = measures_of(run, names)
+            timed = courses_in_time(run, measures, run.values, (1,))
+            of_cycle = [measure for measure in measures if not measure.in_time]
             figures = figures_of(run, of_cycle, self.method) if of_cycle else {}
             return figures | {name: float(np.ravel(parts[0])[0]) for name, parts in timed.items()}
 
     def _reduced(self, arrays: Mapping[str, Array], course: CycleCourse | None, ideal: Means | None) -> Reduced:
-        wanted = arrays if self.margin else {key: one for key, one in arrays.items() if key != "locking_margin"}
-        return reduced(wanted, course, ideal, self.run.system)
+        kept_arrays = (
+            arrays if self.margin else {key: array for key, array in arrays.items() if key != "locking_margin"}
+        )
+        return reduced(kept_arrays, course, ideal, self.run.system)
 
     # ---- in one pass ------------------------------------------------------------------------------------------
 
@@ -159,7 +161,7 @@ class Points:
     @cached_property
     def _followed(self) -> bool:
         """Whether any group is followed along the cycle of the first point."""
-        return any(hasattr(one, "pose") for one in self.run.chosen.assembly)
+        return any(hasattr(assembly, "pose") for assembly in self.run.chosen.assembly)
 
     def _probes(self) -> list[Index]:
         """Points along every name from the first, and the corners."""
@@ -193,12 +195,12 @@ class Points:
         """Every number of the mechanism, (point, 1) where it varies."""
         mechanism, columns = self.run.system.mechanism, np.array(points, int).T
         entries = mechanism.parameter_set.entries
-        stated: dict[str, Number] = {}
-        for one, places in zip(self.swept, columns, strict=True):
-            error = entries[one.path].error
-            numbers = one.values[places][:, np.newaxis]
-            stated[one.path] = numbers + (0.0 if ideal or not error else self.run.values[error])
-        return mechanism.ideal_parameters(stated) if ideal else mechanism.parameters(stated)
+        numbers_of: dict[str, Number] = {}
+        for number, places in zip(self.swept, columns, strict=True):
+            error = entries[number.path].error
+            numbers = number.values[places][:, np.newaxis]
+            numbers_of[number.path] = numbers + (0.0 if ideal or not error else self.run.values[error])
+        return mechanism.ideal_parameters(numbers_of) if ideal else mechanism.parameters(numbers_of)
 
     def _together(self, points: Sequence[Index]) -> list[Reduced | None]:
         """Figures of some points; None where a point has to be looked at alone."""
@@ -218,15 +220,15 @@ class Points:
             ours &= ~_may_change(run.system, arrays[CONDITIONS], run.cycle.periodic)
             if self._followed:
                 ours &= np.all(arrays["status"] != Status.NOT_ASSEMBLED, axis=1)
-            whole = ours & _answered(arrays)
-            courses = self._courses(values, meant, cycles, whole)
+            answered = ours & _answered(arrays)
+            courses = self._courses(values, meant, cycles, answered)
             likes = self._courses(ideal_values, None, cycles, ours & errs & _answered(ideal)) if errs.any() else {}
-        found: list[Reduced | None] = []
+        figures: list[Reduced | None] = []
         for i in range(len(points)):
-            own = {name: array[..., i, :] for name, array in arrays.items()}
+            rows = {name: array[..., i, :] for name, array in arrays.items()}
             meant_means = likes[i].means if i in likes else None
-            found.append(self._reduced(own, courses.get(i), meant_means) if ours[i] else None)
-        return found
+            figures.append(self._reduced(rows, courses.get(i), meant_means) if ours[i] else None)
+        return figures
 
     def _some(self, values: Mapping[str, Number], cycles: Sequence[Cycle], rows: NDArray[np.intp]) -> Mechanisms:
         """Some mechanisms of a batch."""
@@ -259,8 +261,8 @@ class Points:
         for k, index in enumerate(points):
             numbers.nominal.update((path, _nth(value, k)) for path, value in changed.items())
             with named(self.swept, index), np.errstate(all="ignore"):
-                found = check_values(mechanism, numbers, changed)
-                wrong = [one for one in found if one.severity is Severity.ERROR]
+                findings = check_values(mechanism, numbers, changed)
+                wrong = [finding for finding in findings if finding.severity is Severity.ERROR]
                 if wrong:
                     raise MechanismError(wrong)
 
@@ -269,11 +271,11 @@ class Points:
         drive = {path: value for path, value in values.items() if path.startswith("drivers.")}
         if not any(np.ndim(value) for value in drive.values()):
             return [self.run.cycle] * len(points)
-        found = []
+        cycles = []
         for k, index in enumerate(points):
             with named(self.swept, index):
-                found.append(self.run.system.cycle({path: _nth(value, k) for path, value in drive.items()}))
-        return found
+                cycles.append(self.run.system.cycle({path: _nth(value, k) for path, value in drive.items()}))
+        return cycles
 
 
 def _answered(arrays: Mapping[str, Array]) -> NDArray[np.bool_]:
@@ -281,14 +283,14 @@ def _answered(arrays: Mapping[str, Array]) -> NDArray[np.bool_]:
     return np.asarray(np.all(arrays["status"] < Status.NOT_CONVERGED, axis=1))
 
 
-def _agree(found: Reduced, other: Reduced) -> bool:
+def _agree(together: Reduced, other: Reduced) -> bool:
     """Whether two cycles come to the same statuses, efforts and reactions; powers follow from these."""
-    if found.keys() != other.keys() or any(found[name] != other[name] for name in ("status", "without_answer")):
+    if together.keys() != other.keys() or any(together[name] != other[name] for name in ("status", "without_answer")):
         return False
     return all(
-        np.allclose(found[name], other[name], rtol=0.0, atol=SAME * np.max(np.abs(other[name])))
+        np.allclose(together[name], other[name], rtol=0.0, atol=SAME * np.max(np.abs(other[name])))
         for name in ("drive_effort_rms", "drive_effort_max", "reaction_max")
-        if name in found
+        if name in together
     )
 
 
@@ -310,11 +312,11 @@ def _findings(run: Run) -> Iterator[Finding]:
 
 def _differ(values: Mapping[str, Number], others: Mapping[str, Number], count: int) -> NDArray[np.bool_]:
     """Which mechanisms of a batch are others than their ideal ones."""
-    found = np.zeros(count, bool)
+    differing = np.zeros(count, bool)
     for path, value in others.items():
         if value is not values[path]:
-            found |= np.broadcast_to(np.not_equal(value, values[path]), (count, 1))[:, 0]
-    return found
+            differing |= np.broadcast_to(np.not_equal(value, values[path]), (count, 1))[:, 0]
+    return differing
 
 
 def _as_chosen(run: Run, values: Mapping[str, Number], count: int) -> NDArray[np.bool_]:
@@ -337,10 +339,10 @@ def _as_chosen(run: Run, values: Mapping[str, Number], count: int) -> NDArray[np
 
 def _may_change(system: System, conditions: Array, periodic: bool) -> NDArray[np.bool_]:
     """Which mechanisms of a batch may pass a change point: see `change_points.suspects`."""
-    found = np.zeros(conditions.shape[1], bool)
+    suspected = np.zeros(conditions.shape[1], bool)
     for module, group, condition in zip(system.plan.modules, system.groups, conditions, strict=True):
         if module.rank > 1 and group.BRANCHES:
             margin = 1 / condition
             around = np.concatenate([margin[:, -1:], margin, margin[:, :1]], axis=1) if periodic else margin
-            found |= np.any(change_points.suspects(around), axis=-1)
-    return found
+            suspected |= np.any(change_points.suspects(around), axis=-1)
+    return suspected

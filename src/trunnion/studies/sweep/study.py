@@ -71,14 +71,15 @@ def sweep(
     """
     points = Points(mechanism, grid(mechanism, over), steps, friction_method or FrictionMethod(), margin, engine)
     labels = {"driver": list(mechanism.drivers), "joint": list(mechanism.effective_joints)}
-    sizes = {dim: len(names) for dim, names in labels.items()} | {one.name: len(one.values) for one in points.swept}
+    sizes = {dim: len(names) for dim, names in labels.items()}
+    sizes |= {number.name: len(number.values) for number in points.swept}
     arrays = {
-        name: one.over(*(swept.name for swept in points.swept)).blank(sizes)
-        for name, one in FIGURES.items()
-        if margin or one.part != "margin"
+        name: variable.over(*(swept.name for swept in points.swept)).blank(sizes)
+        for name, variable in FIGURES.items()
+        if margin or variable.part != "margin"
     }
     measures = measures or ()
-    watched = {one.name: one for one in measures_of(points.run, measures)} if measures else {}
+    watched = {measure.name: measure for measure in measures_of(points.run, measures)} if measures else {}
     arrays |= {name: np.full(points.shape, np.nan) for name in watched}
     for done, (index, row) in enumerate(points.solved(), 1):
         if watched:
@@ -88,17 +89,17 @@ def sweep(
             arrays[name][place] = value
         if progress:
             progress(done)
-    found = [*_answers(points.swept, arrays), *_shared(points), *left_out(mechanism, measures)]
-    found = _with_bare(mechanism, points.swept, found)
-    found += [*_no_efficiency(points, arrays), *_not_steady(points, watched.values(), arrays)]
+    findings = [*_answers(points.swept, arrays), *_shared(points), *left_out(mechanism, measures)]
+    findings = _with_bare(mechanism, points.swept, findings)
+    findings += [*_no_efficiency(points, arrays), *_not_steady(points, watched.values(), arrays)]
     if not points.erring:
-        of_errors = {name for name, one in FIGURES.items() if one.part == "errors"}
+        of_errors = {name for name, variable in FIGURES.items() if variable.part == "errors"}
         arrays = {name: array for name, array in arrays.items() if name not in of_errors}
     figures = FIGURES | {
-        name: Variable((), one.figure_unit(points.run.system, points.run.values), f"measure {name}")
-        for name, one in watched.items()
+        name: Variable((), measure.figure_unit(points.run.system, points.run.values), f"measure {name}")
+        for name, measure in watched.items()
     }
-    return _dataset(points, labels, arrays, found, figures)
+    return _dataset(points, labels, arrays, findings, figures)
 
 
 def _with_bare(mechanism: Mechanism, swept: Iterable[Swept], found: list[Finding]) -> list[Finding]:
@@ -121,13 +122,13 @@ def _with_bare(mechanism: Mechanism, swept: Iterable[Swept], found: list[Finding
 def _shared(points: Points) -> Iterator[Finding]:
     """What the points have to say that were looked at by themselves, each once; notes only if all have them."""
     total, looked = int(np.prod(points.shape)), len(points.looked)
-    whole = counted(total, "point") if looked == total else f"{counted(looked, 'point')} looked at"
-    for found in points.said.values():
-        one, count = next(iter(found.values())), len(found)
+    all_points = counted(total, "point") if looked == total else f"{counted(looked, 'point')} looked at"
+    for by_point in points.said.values():
+        finding, count = next(iter(by_point.values())), len(by_point)
         if count == looked:
-            yield one
-        elif one.severity is not Severity.NOTE:
-            yield replace(one, what=f"{one.what} (at {count:,} of {whole})")
+            yield finding
+        elif finding.severity is not Severity.NOTE:
+            yield replace(finding, what=f"{finding.what} (at {count:,} of {all_points})")
 
 
 def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
@@ -149,7 +150,7 @@ def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iter
             "positions": count,
             "status": code.text,
         }
-        yield Finding.error("sweep.no_answer", " and ".join(one.name for one in swept), what, remedy, **figures)
+        yield Finding.error("sweep.no_answer", " and ".join(number.name for number in swept), what, remedy, **figures)
 
 
 def _no_efficiency(points: Points, arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
@@ -201,14 +202,15 @@ def _dataset(
     figures: Mapping[str, Variable],
 ) -> xr.Dataset:
     mechanism, run, swept = points.mechanism, points.run, points.swept
-    names = [one.name for one in swept]
+    names = [number.name for number in swept]
     errors = ["m" if PAIRS[kind].guided else "rad" for kind, _ in run.system.joints.values()]
     units = {**member_units(run.system), "transmission_error": MemberUnits("joint", errors)}
-    variables = described(arrays, {name: one.over(*names) for name, one in figures.items()}, units)
+    variables = described(arrays, {name: variable.over(*names) for name, variable in figures.items()}, units)
     along: dict[str, xr.Variable] = {}
-    for one in swept:
-        along |= described({one.name: one.values}, {one.name: Variable((one.name,), one.unit, one.path)})
-        along[one.name].attrs |= {"written_unit": one.written, "written_factor": one.factor}
+    for number in swept:
+        described_by = {number.name: Variable((number.name,), number.unit, number.path)}
+        along |= described({number.name: number.values}, described_by)
+        along[number.name].attrs |= {"written_unit": number.written, "written_factor": number.factor}
     attributes = {
         **origin(mechanism, run.system.plan.formula, swept=names, steps=points.steps),
         "method": points.method.name,

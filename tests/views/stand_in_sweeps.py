@@ -58,7 +58,7 @@ def swept(names, law=None, status=None, ideal=False, name="Cardan joint", margin
             values = codes if key == "status" else np.where(codes >= 4, 3, 0)
         given |= described({key: values}, {key: one.over(*names)}, UNITS)
     attributes = {
-        "name": name, "swept": json.dumps(list(names), ensure_ascii=False),
+        "kind": "sweep", "name": name, "swept": json.dumps(list(names), ensure_ascii=False),
         "scale_of_length": 1.0, "scale_of_rate": 1.0, "scale_of_force": 1.0, "findings": "[]", "steps": 36,
     }  # fmt: skip
     empty = xr.Dataset({}, {**{dim: (dim, np.array(one)) for dim, one in labels.items()}, **coordinates}, attributes)

@@ -111,7 +111,8 @@ def toleranced(
         "time": ("position", period * np.arange(positions) / positions, {"units": "s", "long_name": "time"}),
         "drive": ("position", np.degrees(theta), {"units": "°", "long_name": "coordinate of A"}),
     }
-    return xr.Dataset(variables, coordinates, _attributes(labels, names, methods, samples, limits, found))
+    attributes = {"kind": "tolerance", **_attributes(labels, names, methods, samples, limits, found)}
+    return xr.Dataset(variables, coordinates, attributes)
 
 
 def _drawn(rng, slope, sigma, samples):

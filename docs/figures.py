@@ -132,7 +132,7 @@ class _Drawing:
         from trunnion import analyse, assemble, read, report
         from trunnion.views.assembly import figure as fit
         from trunnion.views.assembly.mode_drawings import ways
-        from trunnion.views.cycle.plots import PLOTS, save
+        from trunnion.views.cycle.plots import figure, save
 
         if (EXAMPLES / f"{self.base}.yaml").is_file():
             mechanism = self.gallery.model(self.base)
@@ -166,7 +166,7 @@ class _Drawing:
             if name == "report.html":
                 contents[name] = report(real(), ideal()).encode()
                 continue
-            draw = special.get(kind) or (lambda kind=kind: PLOTS[kind](real(), ideal() if kind in COMPARED else None))
+            draw = special.get(kind) or (lambda kind=kind: figure(real(), kind, ideal() if kind in COMPARED else None))
             contents[name] = bytes(save(draw(), path).read_bytes())
         return contents
 

@@ -564,7 +564,7 @@ def test_example_of_the_lamp() -> None:
 
 
 def test_drawings_show_springs_and_following_loads(tmp_path: Path) -> None:
-    from trunnion.views.cycle.plots import PLOTS
+    from trunnion.views.cycle.plots import figure
     from trunnion.views.cycle.scene import scene
 
     data = spring_four_bar(stiffness=900.0, free_length=0.3)
@@ -577,4 +577,4 @@ def test_drawings_show_springs_and_following_loads(tmp_path: Path) -> None:
     push = shown["loads"][0]
     assert (push["frame"], push["varies"], abs(push["force"][0])) == ("link", True, pytest.approx(30))
     for kind in ("mechanism", "power"):
-        PLOTS[kind](result, None).savefig(tmp_path / f"{kind}.png")
+        figure(result, kind).savefig(tmp_path / f"{kind}.png")

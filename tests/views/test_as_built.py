@@ -10,14 +10,21 @@ from matplotlib.patches import Circle
 
 import trunnion
 from trunnion.errors import MechanismError, Status
-from trunnion.views.cycle.deviations import angle_scale, broken, continued, losses, outputs, seated, worst_points
-from trunnion.views.cycle.deviations_plot import error, with_worst_case
-from trunnion.views.cycle.plots import PLOTS, READY, drawable, save
-from trunnion.views.cycle.seat_plot import FACTORS, PIN
+from trunnion.views.cycle import plots
+from trunnion.views.cycle.deviations import (
+    angle_scale,
+    broken,
+    continued,
+    losses,
+    outputs,
+    seated,
+    with_worst_case,
+    worst_points,
+)
+from trunnion.views.cycle.plots import READY, drawable, save
+from trunnion.views.cycle.seats import PIN
 from trunnion.views.sweep import figure as sweep_figure
 from trunnion.views.sweep import tables
-
-INCH = 0.0254
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +54,7 @@ def test_every_figure_is_drawn(which, request, tmp_path):
     assert ("beta" in kinds) == (which != "balls")
     assert {"error", "seat"} <= set(kinds)
     for name in READY.keys() & set(kinds):
-        assert save(PLOTS[name](result, None), tmp_path / f"{name}.svg").stat().st_size > 10_000
+        assert save(plots.figure(result, name), tmp_path / f"{name}.svg").stat().st_size > 10_000
 
 
 @pytest.mark.parametrize(
@@ -55,18 +62,18 @@ def test_every_figure_is_drawn(which, request, tmp_path):
 )
 def test_without_errors_the_reason_is_told(plain, name, why):
     with pytest.raises(MechanismError, match=f"{why}.*no figure '{name}'.*seat=loaded"):
-        PLOTS[name](plain, None)
+        plots.figure(plain, name)
     assert name not in drawable(plain)
 
 
 @pytest.mark.slow
 def test_balls_have_no_angles(balls):
     with pytest.raises(MechanismError, match="the seats of balls are directions"):
-        PLOTS["beta"](balls, None)
+        plots.figure(balls, "beta")
 
 
 def test_errors_are_those_of_the_result(slider):
-    figure = PLOTS["error"](slider, None)
+    figure = plots.figure(slider, "error")
     place, slide = figure.axes
     size = np.linalg.norm(slider.point_error.sel(point="piston.Q").values, axis=0)
     assert _label(place, "piston.Q").get_ydata()[:-1] == pytest.approx(1e6 * size)
@@ -83,7 +90,7 @@ def test_the_transmission_error_of_a_four_bar_is_in_minutes_of_arc_with_its_wors
     """One pin with 0.02 mm: at 60° of crank angle the output errs by at most 0.017902°."""
     result = with_worst_case(four_bar(), four_bar_model())
     wrong = result.joint_rotation_error.sel(joint="D").values
-    axes = error(result).axes[1]
+    axes = plots.figure(result, "error").axes[1]
     assert "rotation [arcmin]" in axes.get_ylabel()
     assert _label(axes, "D").get_ydata()[:-1] == pytest.approx(60 * np.degrees(wrong))
     (band,) = [one for one in axes.collections if one.get_label() == "worst case of the play, first order"]
@@ -132,42 +139,29 @@ def test_positions_without_an_answer_are_gaps(slider, tmp_path):
     for name in ("point_error", "joint_slide_error", "seat_offset", "seat_xi", "seat_beta", "end_force"):
         blank[name] = blank[name].where(~np.asarray(hole))
     blank["status"] = ("position", np.where(hole, int(Status.LOCKED), 0).astype(np.int8))
-    drawn = _label(PLOTS["error"](blank, None).axes[0], "piston.Q").get_ydata()
+    drawn = _label(plots.figure(blank, "error").axes[0], "piston.Q").get_ydata()
     assert np.isnan(drawn[20:30]).all()
     assert np.isfinite(drawn[[19, 30]]).all()
-    save(PLOTS["seat"](blank, None), tmp_path / "seat.png")
-    curve = _label(PLOTS["beta"](blank, None).axes[0], "Q")
+    save(plots.figure(blank, "seat"), tmp_path / "seat.png")
+    curve = _label(plots.figure(blank, "beta").axes[0], "Q")
     inside = (curve.get_xdata() > 100) & (curve.get_xdata() < 145)
     assert np.isnan(curve.get_ydata()[inside]).all()
     everywhere = blank.assign(seat_offset=blank["seat_offset"] * np.nan)
     assert "seat" not in drawable(everywhere)
     with pytest.raises(MechanismError, match="no position is solved"):
-        PLOTS["seat"](everywhere, None)
+        plots.figure(everywhere, "seat")
 
 
 # ---- seats ----------------------------------------------------------------------------------------------------
 
 
 def _drawn(figure):
-    """Diagrams by title, with their magnification."""
+    """Diagrams by title."""
     return {axes.get_title(loc="left"): axes for axes in figure.axes if axes.get_title(loc="left")}
 
 
-@pytest.mark.slow
-def test_the_magnification_that_is_written_is_that_on_paper(slider, cardan):
-    for result in (slider, cardan):
-        figure = PLOTS["seat"](result, None)
-        figure.draw_without_rendering()
-        for axes in _drawn(figure).values():
-            stated = float(axes.get_title(loc="right").split("×")[1].replace("\u202f", ""))
-            low, high = axes.get_ylim()  # µm
-            paper = axes.get_window_extent().height / figure.dpi * INCH
-            assert paper / ((high - low) * 1e-6) == pytest.approx(stated, rel=2e-3)
-            assert stated / 10 ** np.floor(np.log10(stated)) in [pytest.approx(one) for one in FACTORS]
-
-
 def test_ends_stand_side_by_side_and_their_pins_touch_the_wall(cardan):
-    diagrams = _drawn(PLOTS["seat"](cardan, None))
+    diagrams = _drawn(plots.figure(cardan, "seat"))
     assert list(diagrams) == [
         f"{joint}, end {end}" for joint in ("input", "pin-1", "pin-2", "output") for end in (1, 2)
     ]
@@ -180,20 +174,20 @@ def test_ends_stand_side_by_side_and_their_pins_touch_the_wall(cardan):
 
 
 def test_the_locus_has_the_offsets_and_no_jump(slider):
-    axes = _drawn(PLOTS["seat"](slider, None))["Q"]
-    (locus,) = [one for one in axes.collections if isinstance(one, LineCollection)]
+    axes = _drawn(plots.figure(slider, "seat"))["Q"]
+    loci = [one for one in axes.collections if isinstance(one, LineCollection)]
     offset = 1e6 * slider.seat_offset.sel(joint="Q", end="1").transpose("position", "axis").values
-    drawn = np.concatenate(locus.get_segments())
+    pieces = [piece for locus in loci for piece in locus.get_segments()]
+    drawn = np.concatenate(pieces)
     assert all(np.min(np.linalg.norm(offset - place, axis=1)) < 1e-9 for place in drawn)
-    assert max(np.linalg.norm(np.diff(piece, axis=0)) for piece in locus.get_segments()) < 20
+    assert max(np.linalg.norm(np.diff(piece, axis=0)) for piece in pieces) < 20
 
 
 def test_a_guide_lies_between_its_limits_in_its_own_scale(slider):
-    axes = _drawn(PLOTS["seat"](slider, None))["S"]
+    axes = _drawn(plots.figure(slider, "seat"))["S"]
     assert axes.get_xlabel().startswith("along the guide [mm]\nguide of frame in piston")
     assert axes.get_ylabel() == "across [µm]"
-    assert axes.get_title(loc="right").startswith("across × ")
-    bars = [line for line in axes.lines if line.get_marker() == "o"]
+    bars = [line for line in axes.lines if line.get_marker() == "o" and len(line.get_xdata()) == 2]
     assert len(bars) == 4
     for bar in bars:
         assert np.abs(bar.get_ydata()) == pytest.approx([30, 30])
@@ -201,7 +195,7 @@ def test_a_guide_lies_between_its_limits_in_its_own_scale(slider):
 
 
 def test_a_ball_is_seen_twice(balls):
-    diagrams = _drawn(PLOTS["seat"](balls, None))
+    diagrams = _drawn(plots.figure(balls, "seat"))
     assert list(diagrams) == ["B: xy", "B: xz", "C: xy", "C: xz"]
     assert diagrams["C: xz"].get_ylabel() == "z [µm]"
 
@@ -210,7 +204,7 @@ def test_a_seat_that_is_given_is_drawn_where_it_is():
     result = four_bar()
     (one,) = seated(result)
     assert (one.joint, one.kind, one.clearance, one.links) == ("B", "pin", pytest.approx(2e-5), ("crank", "coupler"))
-    axes = PLOTS["beta"](result, None).axes
+    axes = plots.figure(result, "beta").axes
     assert len(axes) == 1  # no β in the plane
     assert axes[0].lines[1].get_ydata() == pytest.approx(30.0)
 
@@ -220,7 +214,7 @@ def test_a_seat_that_is_given_is_drawn_where_it_is():
 
 def test_no_line_crosses_a_jump_and_losses_are_marked(slider, cardan):
     for result, jump in ((slider, 60.0), (cardan, 60.0)):
-        figure = PLOTS["beta"](result, None)
+        figure = plots.figure(result, "beta")
         for axes in figure.axes:
             if "[°]" not in axes.get_ylabel():
                 continue
@@ -228,7 +222,7 @@ def test_no_line_crosses_a_jump_and_losses_are_marked(slider, cardan):
                 for line in (one for one in axes.lines if one.get_label() == joint):
                     step = np.abs(np.diff(line.get_ydata()))
                     assert np.nanmax(step, initial=0.0) < jump
-    marks = _label(PLOTS["beta"](slider, None).axes[1], "contact lost").get_xdata()
+    marks = _label(plots.figure(slider, "beta").axes[1], "contact lost").get_xdata()
     assert sorted(marks) == pytest.approx(sorted(5.0 * np.repeat(losses(slider)["S"], 1)))
 
 

@@ -12,10 +12,10 @@ from matplotlib.colors import to_rgb
 import trunnion
 from trunnion.cycle.locking import LockingState
 from trunnion.results.attributes import summary_of
-from trunnion.views.common.joined import joined
+from trunnion.views.charts import Line, joined
 from trunnion.views.common.markup import with_code
 from trunnion.views.cycle import plots
-from trunnion.views.cycle.locking_plot import STATES
+from trunnion.views.cycle.courses import STATES
 from trunnion.views.cycle.report import report
 from trunnion.views.page import headline
 
@@ -143,8 +143,10 @@ def test_joints_with_the_same_reaction_are_one_curve(cycle):
 
 def test_curves_are_joined_by_values_and_gaps():
     gap = np.array([1.0, np.nan, 3.0])
-    found = joined({"a": gap, "b": gap + 1e-9, "c": np.array([1.0, 2.0, 3.0]), "d": 2 * gap})
-    assert [(label, first) for label, first, _ in found] == [("a = b", 0), ("c", 2), ("d", 3)]
+    courses = {"a": gap, "b": gap + 1e-9, "c": np.array([1.0, 2.0, 3.0]), "d": 2 * gap}
+    found = joined([Line(np.arange(3.0), values, name) for name, values in courses.items()])
+    assert [line.name for line in found] == ["a = b", "c", "d"]
+    assert found[0].y is gap
 
 
 def test_numerical_figures_are_in_their_own_table(cycle):

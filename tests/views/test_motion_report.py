@@ -23,7 +23,7 @@ from timed import slider_crank, three_posts, wheel
 from trunnion import analyse, simulate
 from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
-from trunnion.views.cycle.plots import PLOTS
+from trunnion.views.cycle import plots
 from trunnion.views.cycle.report import report as cycle_report
 from trunnion.views.cycle.scene import scene
 from trunnion.views.motion.contacts import OF_CONTACTS
@@ -205,13 +205,13 @@ def test_the_speed_over_a_cycle_is_drawn_where_it_varies() -> None:
     law = {"law": "cycloidal", "range": [0.3, 1.2], "duration": 2.0, "returns": False}
     result = analyse(Mechanism(**{**data, "drivers": {"A": law}}), 20)
     wanted = 0.45 * (1 - np.cos(np.pi * result["time"].values))
-    (line,) = (one for one in PLOTS["speed"](result, None).axes[0].lines if len(one.get_ydata()) == 20)
+    (line,) = (one for one in plots.figure(result, "speed").axes[0].lines if len(one.get_ydata()) == 20)
     assert line.get_ydata() == pytest.approx(wanted, abs=1e-12)
     assert scene(result)["drivers"][0]["speed"] == pytest.approx(wanted, abs=1e-6)
     even = analyse(Mechanism(**data), 12)
     assert scene(even)["drivers"][0]["speed"] == []
     with pytest.raises(MechanismError, match="the speed of no driver varies"):
-        PLOTS["speed"](even, None)
+        plots.figure(even, "speed")
 
 
 def test_the_report_of_a_cycle_says_nothing_of_it() -> None:

@@ -27,9 +27,9 @@ def test_every_figure_of_every_result(name, case, tmp_path):
     kind, result = case
     if (name, kind) == ("mechanism", "nowhere"):
         with pytest.raises(MechanismError, match="nothing to draw"):
-            PLOTS[name](result, None)
+            plots.figure(result, name)
         return
-    figure = PLOTS[name](result, None)
+    figure = plots.figure(result, name)
     assert save(figure, tmp_path / "figure.png").stat().st_size > 5_000
     figure.set_layout_engine("none")  # it is arranged by now
     root = ElementTree.parse(save(figure, tmp_path / "figure.svg")).getroot()
@@ -40,7 +40,7 @@ def test_every_figure_of_every_result(name, case, tmp_path):
 
 @pytest.mark.parametrize("name", PLAIN)
 def test_overlaid_comparison_changes_no_limits_of_the_drive(name, plain, ideal):
-    alone, both = PLOTS[name](plain, None), PLOTS[name](plain, ideal)
+    alone, both = plots.figure(plain, name), plots.figure(plain, name, ideal)
     assert isinstance(both, Figure)
     assert alone.axes[0].get_xlim() == pytest.approx(both.axes[0].get_xlim(), rel=0.05, abs=0.1)
 
@@ -54,7 +54,7 @@ def _curve(figure, label, panel=0):
 
 
 def test_torque_is_that_of_the_result_in_kilonewton_metres_and_closes_the_turn(plain, ideal):
-    figure = PLOTS["torque"](plain, ideal)
+    figure = plots.figure(plain, "torque", ideal)
     drawn = _curve(figure, "with friction")
     assert drawn[:-1, 1] == pytest.approx(plain.drive_effort.values[0] / 1000)
     assert (drawn[-1] == (pytest.approx(360.0), pytest.approx(drawn[0, 1]))).all()
@@ -63,12 +63,12 @@ def test_torque_is_that_of_the_result_in_kilonewton_metres_and_closes_the_turn(p
 
 
 def test_a_sliding_drive_has_a_force_over_millimetres():
-    figure = PLOTS["torque"](slider(), None)
+    figure = plots.figure(slider(), "torque")
     assert {"force S [N]", "drive slide S [mm]"} <= set(_texts(figure))
 
 
 def test_a_gap_breaks_the_curve_and_names_its_cause():
-    figure = PLOTS["torque"](four_bar(gap=(132, 229, Status.NOT_ASSEMBLED)), None)
+    figure = plots.figure(four_bar(gap=(132, 229, Status.NOT_ASSEMBLED)), "torque")
     drawn = _curve(figure, "torque")
     assert np.isnan(drawn[132:229, 1]).all()
     assert np.isfinite(drawn[131, 1])
@@ -76,14 +76,14 @@ def test_a_gap_breaks_the_curve_and_names_its_cause():
 
 
 def test_friction_power_adds_up(plain):
-    figure = PLOTS["friction-power"](plain, None)
+    figure = plots.figure(plain, "friction-power")
     lines = {line.get_label().split(",")[0]: line.get_ydata() for line in figure.axes[0].lines}
     assert sum(lines[joint] for joint in "ABCD") == pytest.approx(lines["all joints"])
 
 
 def test_names_are_shown_as_they_are():
     result = four_bar(24, rename={"A": "_α", "B": "$B$", "C": "C$", "D": "D_{1}"})
-    labels = [text.get_text() for text in PLOTS["reactions"](result, None).axes[0].get_legend().get_texts()]
+    labels = [text.get_text() for text in plots.figure(result, "reactions").axes[0].get_legend().get_texts()]
     assert [label.strip("\u2009") for label in labels] == ["_α", r"\$B\$", r"C\$", "D_{1}"]
 
 
@@ -113,7 +113,7 @@ def test_a_font_that_has_the_sign_is_used(fonts, tmp_path):
     without = plain(sign)
     fonts("STIXGeneral")  # comes with matplotlib; stands for a font of another script
     assert (without, plain(sign)) == (r"\U0001d400", sign)
-    assert save(PLOTS["polar"](four_bar(12, rename={"A": sign}), None), tmp_path / "polar.png").exists()
+    assert save(plots.figure(four_bar(12, rename={"A": sign}), "polar"), tmp_path / "polar.png").exists()
 
 
 @pytest.mark.slow
@@ -123,7 +123,7 @@ def test_a_hundred_thousand_positions(tmp_path):
     ramp = np.arange(100_000) * 2 * np.pi / 100_000
     long["joint_rotation"] = long["joint_rotation"].copy(data=np.tile(ramp, (4, 1)))
     for name in PLAIN:
-        path = save(PLOTS[name](long, long), tmp_path / f"{name}.svg")
+        path = save(plots.figure(long, name, long), tmp_path / f"{name}.svg")
         assert path.stat().st_size < 3_000_000, name
 
 
@@ -143,28 +143,28 @@ def test_a_position_without_an_answer_says_so():
 
 
 def test_the_same_figure_gives_the_same_file(plain, tmp_path):
-    first, second = (save(PLOTS["power"](plain, None), tmp_path / name).read_bytes() for name in ("a.svg", "b.svg"))
+    first, second = (save(plots.figure(plain, "power"), tmp_path / name).read_bytes() for name in ("a.svg", "b.svg"))
     assert first == second
 
 
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("suffix", SIGNATURES)
 def test_formats(suffix, plain, tmp_path):
-    path = save(PLOTS["polar"](plain, None), tmp_path / f"polar{suffix}")
+    path = save(plots.figure(plain, "polar"), tmp_path / f"polar{suffix}")
     assert path.read_bytes().startswith(SIGNATURES[suffix])
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
 
 def test_an_unknown_format_is_refused_before_anything_is_written(plain, tmp_path):
     with pytest.raises(MechanismError, match=r"\.png, \.svg, \.pdf or \.jpg"):
-        save(PLOTS["torque"](plain, None), tmp_path / "torque.bmp")
+        save(plots.figure(plain, "torque"), tmp_path / "torque.bmp")
     assert not list(tmp_path.iterdir())
 
 
 def test_a_failed_write_leaves_the_old_file_and_no_draft(plain, tmp_path, monkeypatch):
     target = tmp_path / "torque.png"
     target.write_text("old")
-    figure = PLOTS["torque"](plain, None)
+    figure = plots.figure(plain, "torque")
     monkeypatch.setattr(figure, "savefig", lambda *_, **__: (_ for _ in ()).throw(OSError("disk full")))
     with pytest.raises(MechanismError, match="disk full"):
         save(figure, target)
@@ -175,7 +175,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_draft(plain, tmp_path, monkey
 def test_no_pyplot_state_is_touched(plain):
     import sys
 
-    PLOTS["torque"](plain, None)
+    plots.figure(plain, "torque")
     assert "matplotlib.pyplot" not in vars(plots)
     assert not getattr(sys.modules.get("matplotlib.pyplot"), "get_fignums", list)()
 

@@ -14,13 +14,14 @@ from test_report import Page
 
 from trunnion.errors import MechanismError, Status
 from trunnion.results.tables import columns
+from trunnion.views.cycle import plots
+from trunnion.views.cycle.courses import turned_from_start
 from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
 from trunnion.views.cycle.report import report
 from trunnion.views.cycle.scene import scene
 from trunnion.views.space.bodies import space
 from trunnion.views.space.camera import best, looking
 from trunnion.views.space.paint import facets
-from trunnion.views.space.plots import turned_from_start
 from trunnion.views.space.scene import screw_axis
 from trunnion.views.space.scenery import scenery
 from trunnion.views.space.solids import SYMBOLS, solids
@@ -41,9 +42,9 @@ def test_every_figure_of_every_spatial_result(name, spatial, tmp_path):
     kind, result = spatial
     if name == "mechanism" and kind in BLANK:
         with pytest.raises(MechanismError, match="nothing to draw"):
-            PLOTS[name](result, None)
+            plots.figure(result, name)
         return
-    figure = PLOTS[name](result, result)
+    figure = plots.figure(result, name, result)
     # in one format each: every figure comes up in both, and so does every result
     suffix = ("png", "svg")[([*PLOTS].index(name) + [*SPATIAL].index(kind)) % 2]
     assert 5_000 < save(figure, tmp_path / f"figure.{suffix}").stat().st_size < 3_000_000
@@ -55,7 +56,7 @@ def _texts(figure):
 
 def test_magnitudes_have_three_components():
     result = rssr(36)
-    figure = PLOTS["reactions"](result, None)
+    figure = plots.figure(result, "reactions")
     for axes, variable in zip(figure.axes, ("reaction_force", "reaction_moment"), strict=True):
         line = next(one for one in axes.lines if one.get_label() == "O")
         expected = np.linalg.norm(result[variable].sel(joint="O").values, axis=0)
@@ -65,7 +66,7 @@ def test_magnitudes_have_three_components():
 
 def test_polar_diagrams_show_three_planes():
     result = rssr(36)
-    figure = PLOTS["polar"](result, None)
+    figure = plots.figure(result, "polar")
     assert len(figure.axes) == 12
     labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes[:3]]
     assert labels == [("Fx [N]", "Fy [N]"), ("Fx [N]", "Fz [N]"), ("Fy [N]", "Fz [N]")]
@@ -74,7 +75,7 @@ def test_polar_diagrams_show_three_planes():
 
 
 def test_motion_tells_rotations_slides_and_links():
-    figure = PLOTS["motion"](every_kind(24), None)
+    figure = plots.figure(every_kind(24), "motion")
     assert {"joint rotation [°]", "joint slide [mm]", "turn of the link [°]", "angular velocity [rad/s]"} <= set(
         _texts(figure)
     )

@@ -232,7 +232,7 @@ def plot(
 ) -> None:
     """Plot a cycle: torque, friction power, reactions, mechanism."""
     from trunnion.views.common.peaks import whole_peaks
-    from trunnion.views.cycle.deviations_plot import with_worst_case
+    from trunnion.views.cycle.deviations import with_worst_case
     from trunnion.views.cycle.plots import PLOTS, check_kinds, drawable, save
     from trunnion.views.cycle.plots import figure as figure_of
 
@@ -406,7 +406,7 @@ def _ideal(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> x
 def _page(mechanism: Mechanism, analysed: Result, uncut: bool) -> str:
     """The report of a cycle as HTML."""
     from trunnion.views.common.peaks import whole_peaks
-    from trunnion.views.cycle.deviations_plot import with_worst_case
+    from trunnion.views.cycle.deviations import with_worst_case
     from trunnion.views.cycle.report import report as page
 
     result = analysed.dataset

@@ -70,9 +70,9 @@ def locking(
             _show_ranges(title, [row["cells"] for row in every["rows"]])
 
     def draw(path: Path) -> Any:
-        from trunnion.views.cycle.locking_plot import locking as figure
+        from trunnion.views.cycle.plots import figure
 
-        return figure(found)
+        return figure(found, "locking")
 
     Shown(
         found, file, ["assembly"], out or [], None, units_row,

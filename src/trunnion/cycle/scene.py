@@ -57,7 +57,17 @@ def scene_of(run: Run) -> dict[str, Any]:
         },
         "gears": {name: pitch_circles(system, values, name) for name in teeth},
         "plays": plays,
+        **({"measures": measured} if (measured := _measured(run)) else {}),
         **({"passive": [{"link": link, "joints": [a, b]} for link, a, b in spinning]} if spatial else {}),
+    }
+
+
+def _measured(run: Run) -> dict[str, str]:
+    """What each measure of the model is of, in words: "slide of S", "effort of A"."""
+    stated = run.system.mechanism.measures.items()
+    return {
+        name: f"{one.kind.replace('_', ' ')} of {one.subject}{f'.{one.axis}' if one.axis else ''}"
+        for name, one in stated
     }
 
 

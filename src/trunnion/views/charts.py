@@ -8,22 +8,27 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Status
-from trunnion.results.quantities import quantity
+from trunnion.results.quantities import prefixed, quantity
 from trunnion.views.common.cycle import Abscissa, intervals
+from trunnion.views.common.peaks import ease, peak, usual_peak
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Axis", "Band", "Bars", "Cells", "Chart", "ColourScale", "Legend", "Line", "Look", "Mark", "Note", "Panel",
-           "Rule", "Stairs", "Stripe", "outside", "silent"]  # fmt: skip
+__all__ = ["FREE", "Arrow", "Axis", "Band", "Bars", "Cells", "Chart", "ColourScale", "Legend", "Line", "Look", "Mark",
+           "Note", "Panel", "Plot", "Ring", "Rule", "Stairs", "Stripe", "joined", "nth", "outside", "over_drive",
+           "silent"]  # fmt: skip
 
 Array = NDArray[np.float64]
+SAME = 1e-6  # of the largest value of all curves: a difference that no figure shows
+RIPPLE = 0.1  # of the largest value: curves that vary by less are shown without 0
+COLOURS, DASHES = 6, ("solid", "long", "short", "dash-dot")  # colours of the palette, then the next dash
 
 
 @dataclass(frozen=True)
@@ -36,7 +41,7 @@ class Look:
 
     colour: int | float | str = 0
     width: float = 1.6
-    dash: Literal["solid", "long", "dashed", "short", "dotted", "none"] = "solid"
+    dash: Literal["solid", "long", "dashed", "short", "dotted", "dash-dot", "none"] = "solid"
     mark: str = ""
     size: float = 4.5
     hollow: bool = False
@@ -50,9 +55,18 @@ class Look:
         return replace(self, **changes)  # type: ignore[arg-type]  # names of fields
 
 
+FREE = Look("ink", 0.9, "dashed")  # without friction, among many curves
+
+
+def nth(index: int) -> Look:
+    """Colour and dash of the n-th of several curves; colours repeat with another dash."""
+    return Look(index, dash=DASHES[index // COLOURS % len(DASHES)])  # type: ignore[arg-type]  # one of the dashes
+
+
 class Line(NamedTuple):
     """A curve or, without a dash, points; low, high: lengths of the bars of their uncertainty; steps: constant up to
-    the next point; close: over a whole turn led on to its first value."""
+    the next point; close: over a whole turn led on to its first value, of what may gain whole turns to that and as
+    many of `turn` as it has gained; shares: places of its points on the scale of colours, from 0 to 1."""
 
     x: Array
     y: Array
@@ -62,6 +76,8 @@ class Line(NamedTuple):
     high: Array | None = None
     steps: bool = False
     close: bool = False
+    turn: float = 0.0
+    shares: Array | None = None
 
 
 class Band(NamedTuple):
@@ -116,8 +132,29 @@ class Stripe(NamedTuple):
     name: str | None = None
 
 
+class Arrow(NamedTuple):
+    """An arrow between two places in the units of the axes."""
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+    look: Look = Look("ink", 1.5)
+
+
+class Ring(NamedTuple):
+    """A circle, or a square about its middle, in a frame of equal scales; filled as pale as `alpha` says."""
+
+    middle: tuple[float, float]
+    radius: float
+    look: Look = Look("ink", 1.2)
+    square: bool = False
+    filled: float = 0.0
+
+
 class Note(NamedTuple):
-    """A text at a place in shares of the frame or, data, in the units of the axes; shift: from there, in points."""
+    """A text at a place in shares of the frame or, data, in the units of the axes; shift: from there, in points.
+
+    beside: it is put where it hides nothing, as near to its place as there is room.
+    """
 
     text: str
     x: float
@@ -129,6 +166,7 @@ class Note(NamedTuple):
     size: float = 8.0
     shift: tuple[float, float] = (0.0, 0.0)
     boxed: bool = False
+    beside: bool = False
 
 
 class Cells(NamedTuple):
@@ -145,7 +183,7 @@ def outside(peak: float, unit: str) -> Note:
     return Note(text, 0.99, 0.97, "right", "top", boxed=True)
 
 
-Mark = Line | Band | Stairs | Bars | Rule | Stripe | Note | Cells
+Mark = Line | Band | Stairs | Bars | Rule | Stripe | Arrow | Ring | Note | Cells
 
 
 @dataclass(frozen=True)
@@ -153,8 +191,9 @@ class Axis:
     """An axis of a chart.
 
     limits: its ends, None where the marks decide; margin: around the marks, as a share; places: where it is marked,
-    with names, which may be turned by so many degrees; integer: marked at whole numbers only; count: of its marks;
-    form: how a number is written; powers: very large and small numbers by a common power of ten.
+    with names, which may be turned by so many degrees; integer: marked at whole numbers only; angles: at parts of a
+    turn; count: of its marks; form: how a number is written; powers: very large and small numbers by a common power of
+    ten.
     """
 
     title: str = ""
@@ -162,6 +201,7 @@ class Axis:
     places: Sequence[tuple[float, str]] | None = None
     log: bool = False
     integer: bool = False
+    angles: bool = False
     count: int = 0
     form: Callable[[float], str] | None = None
     turned: float = 0.0
@@ -198,8 +238,8 @@ class ColourScale(NamedTuple):
 
 @dataclass(frozen=True)
 class Chart:
-    """Marks between two axes. over: the drive along x, instead of an axis; zero: with a line at y = 0; legend: None for
-    none; title: above at the left, aside: above at the right."""
+    """Marks between two axes. over: the drive along x, instead of an axis; zero: with a line at y = 0; equal: both of
+    one scale, in a square; legend: None for none; title: above at the left, aside: above at the right."""
 
     x: Axis | Abscissa
     y: Axis
@@ -210,6 +250,7 @@ class Chart:
     aside: str = ""
     colours: ColourScale | None = None
     bare: bool = False  # without a line and marks at the left
+    equal: bool = False
 
 
 @dataclass(frozen=True)
@@ -220,6 +261,78 @@ class Panel:
     charts: Sequence[Chart]
     height: float = 3.5
     parts: Sequence[float] = field(default=())
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure: panels in rows of so many columns under a title; width in inches, 0 as the columns ask for; note: of
+    what is not drawn, beneath."""
+
+    title: str
+    panels: Sequence[Panel]
+    columns: int = 1
+    width: float = 0.0
+    note: str = ""
+
+
+def joined(lines: Sequence[Line]) -> list[Line]:
+    """The lines, those with a name that are the same as one with the names of all: "A = B". Gaps are a part of them."""
+    known = [np.max(np.abs(line.y[np.isfinite(line.y)]), initial=0.0) for line in lines]
+    near, groups = SAME * float(max(known, default=0.0)), list[Line]()
+    for line in lines:
+        alike = (
+            k for k, other in enumerate(groups) if line.name and other.name and line.y.shape == other.y.shape
+            and np.allclose(line.y, other.y, rtol=0.0, atol=near, equal_nan=True)
+        )  # fmt: skip
+        k = next(alike, None)
+        if k is None:
+            groups.append(line)
+        else:
+            groups[k] = groups[k]._replace(name=f"{groups[k].name} = {line.name}")
+    return groups
+
+
+def over_drive(
+    result: xr.Dataset, over: Abscissa, title: str, unit: str, lines: Sequence[Line], *, bands: Sequence[Band] = (),
+    marks: Sequence[Mark] = (), rate: str = "", scale: tuple[float, str] | None = None, **chart: Any,
+) -> Chart:  # fmt: skip
+    """Curves of one unit over the drive, in the unit in which they read best.
+
+    Where positions next to a dead centre tower over all others, the axis ends at what is usual; where all curves stay
+    near one value far from 0, it shows how they vary.
+
+    Parameters
+    ----------
+    result : whose positions without an answer are shaded
+    over : what it is drawn over
+    title : of the axis, without the unit
+    lines, bands : in SI
+    marks : beside, in the unit of the chart
+    rate : what follows the unit, as "/s"
+    scale : factor and unit, instead of those that fit
+    chart : more of the chart
+    """
+    rows = [*(line.y for line in lines), *(edge for band in bands for edge in (band.low, band.high))]
+    usual, most = usual_peak(ease(result), *rows), peak(*rows)
+    factor, label = scale or prefixed(usual, unit)
+    values = np.concatenate([row.ravel() for row in rows]) * factor if rows else np.empty(0)
+    values = values[np.isfinite(values)]
+    low, high = float(values.min(initial=0.0)), float(values.max(initial=0.0))
+    varies = float(np.ptp(values)) if values.size else 0.0
+    y, zero, cut = Axis(f"{title} [{label}{rate}]" if label else title), True, list[Mark]()
+    if usual < most:
+        y = replace(y, limits=(1.05 * max(low, -usual * factor), 1.05 * min(high, usual * factor)))
+        cut.append(outside(most, unit + rate))
+    elif 1e-9 * most * factor < varies < RIPPLE * most * factor:
+        y, zero = replace(y, margin=0.1, count=5), False
+    drawn = [line._replace(y=line.y * factor, turn=line.turn * factor, low=_times(line.low, factor),
+                           high=_times(line.high, factor)) for line in joined(lines)]  # fmt: skip
+    areas = [band._replace(low=band.low * factor, high=band.high * factor) for band in bands]
+    return Chart(over, y, [*silent(result, over), *areas, *drawn, *marks, *cut], zero, **chart)
+
+
+def _times(values: Array | None, factor: float) -> Array | None:
+    return None if values is None else values * factor
 
 
 def silent(result: xr.Dataset, over: Abscissa, written: bool = True) -> list[Mark]:

@@ -10,13 +10,15 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize, to_hex
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize, to_hex, to_rgba
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Circle, Rectangle
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator, ScalarFormatter
 
 from trunnion.views.charts import (
+    Arrow,
     Axis,
     Band,
     Bars,
@@ -27,12 +29,15 @@ from trunnion.views.charts import (
     Look,
     Note,
     Panel,
+    Plot,
+    Ring,
     Rule,
     Stairs,
     Stripe,
 )
 from trunnion.views.common.cycle import Abscissa, Array, thin
 from trunnion.views.common.figures import INK, MUTED, PALETTE, RULE, SHADE, WIDTH, along, dress, legend, new
+from trunnion.views.common.labels import Labels
 from trunnion.views.common.lettering import Sheet, plain
 
 if TYPE_CHECKING:
@@ -41,14 +46,16 @@ if TYPE_CHECKING:
     from matplotlib.colorbar import Colorbar
     from matplotlib.figure import Figure, FigureBase
 
-__all__ = ["Board", "chart", "colour", "figure", "grid", "line_style", "small"]
+__all__ = ["Board", "chart", "colour", "figure", "grid", "line_style", "plot", "small"]
 
 COLOURS = {"ink": INK, "muted": MUTED, "rule": RULE, "shade": SHADE, "limit": "#a1260d", "pale": "#b9c3cd"}
 DASHES: dict[str, Any] = {"solid": "-", "long": (0, (5, 2)), "dashed": (0, (3, 2)), "short": (0, (2, 1.5)),
-                          "dotted": (0, (1, 1.5)), "none": "none"}  # fmt: skip
+                          "dotted": (0, (1, 1.5)), "dash-dot": (0, (6, 2, 1.5, 2)),
+                          "none": "none"}  # fmt: skip
 # without the end that fades on white
 RISING: Colormap = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)), "viridis to green")
 PAGE = {1: WIDTH, 2: 12.6, 3: 14.4}  # width of a figure by its columns, inches
+DRAWN = "chart"  # label of the axes of a chart, beside those of scales of colours
 BOX: dict[str, Any] = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
 
 
@@ -74,7 +81,27 @@ def figure(title: str, result: xr.Dataset, panels: Sequence[Panel], columns: int
         if panel.title and len(panels) > 1:
             place.suptitle(_lines(panel.title), x=0.012, ha="left", fontsize=9.5, color=INK)
         _panel(place, panel, min(1.0, sheet.get_figwidth() / columns / WIDTH))
+    _put_names(sheet, [spec for panel in panels for spec in panel.charts])
     return sheet
+
+
+def plot(drawn: Plot, result: xr.Dataset) -> Figure:
+    """A figure of a result as it is described."""
+    sheet = figure(drawn.title, result, drawn.panels, drawn.columns, drawn.width)
+    if drawn.note:
+        sheet.text(0.012, 0.005, plain(drawn.note), fontsize=7.5, color=MUTED)
+    return sheet
+
+
+def _put_names(sheet: Figure, charts: Sequence[Chart]) -> None:
+    """The texts that are to hide nothing, when all else is there."""
+    axes_of = [axes for axes in sheet.axes if axes.get_label() == DRAWN]
+    notes = [(axes, mark) for axes, spec in zip(axes_of, charts, strict=True) for mark in spec.marks
+             if isinstance(mark, Note) and mark.beside]  # fmt: skip
+    labels = Labels(sheet)
+    for axes, note in notes:
+        labels.add(axes, note.text, np.array([note.x, note.y]), note.size, weight="normal")
+    labels.place()
 
 
 def small(panel: Panel, width: float = 4.4) -> Figure:
@@ -193,6 +220,7 @@ class Board(NamedTuple):
 
 def chart(axes: Axes, spec: Chart, wide: float = 1.0) -> None:
     """One chart on axes; wide: of the width of all figures, which its legend has room in."""
+    axes.set_label(DRAWN)
     if isinstance(spec.x, Abscissa):
         along(axes, spec.x, _lines(spec.y.title), zero=spec.zero)
     else:
@@ -200,6 +228,8 @@ def chart(axes: Axes, spec: Chart, wide: float = 1.0) -> None:
         _axis(axes, "x", spec.x)
         if spec.zero:
             axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
+    if spec.equal:
+        axes.set_aspect("equal", adjustable="box" if spec.y.limits[0] is not None else "datalim")
     _axis(axes, "y", spec.y)
     for mark in sorted(spec.marks, key=lambda mark: isinstance(mark, Rule)):
         if isinstance(mark, Rule):  # in view or not: the limits must stand
@@ -249,6 +279,8 @@ def _axis(axes: Axes, name: str, axis: Axis) -> None:
         subs = (1.0, 2.0, 5.0) if axis.count > 1 else (1.0,)
         side.set_major_locator(LogLocator(subs=subs, numticks=6))
         side.set_minor_formatter(NullFormatter())
+    elif axis.angles:
+        side.set_major_locator(MaxNLocator(nbins=8, steps=[1, 1.5, 3, 4.5, 9, 10]))
     elif axis.count or axis.integer:
         side.set_major_locator(MaxNLocator(integer=axis.integer, nbins=axis.count or 6))
     if axis.powers:
@@ -309,11 +341,13 @@ def _name(name: str | None) -> str | None:
     return None if name is None else plain(name)
 
 
-def _closed(spec: Chart, x: Array, close: bool, *rows: Array) -> list[Array]:
-    """x and rows, over a whole turn led on to their first values."""
+def _closed(spec: Chart, x: Array, close: bool, *rows: Array, turn: float = 0.0) -> list[Array]:
+    """x and rows, over a whole turn led on to their first values and the turns that they have gained."""
     if not (close and isinstance(spec.x, Abscissa) and spec.x.closed):
         return [x, *rows]
-    return [np.append(x, x[0] + spec.x.period), *(np.append(row, row[0]) for row in rows)]
+    turns = [turn * round((row[-1] - row[0]) / turn) if turn and np.isfinite(row[-1] - row[0]) else 0.0 for row in rows]
+    ends = [np.append(row, row[0] + gained) for row, gained in zip(rows, turns, strict=True)]
+    return [np.append(x, x[0] + spec.x.period), *ends]
 
 
 @singledispatch
@@ -323,10 +357,18 @@ def _mark(mark: object, axes: Axes, spec: Chart) -> None:
 
 @_mark.register(Line)
 def _line(mark: Line, axes: Axes, spec: Chart) -> None:
-    style, (x, y) = line_style(mark.look), _closed(spec, mark.x, mark.close, np.asarray(mark.y, float))
+    style = line_style(mark.look)
+    x, y = _closed(spec, mark.x, mark.close, np.asarray(mark.y, float), turn=mark.turn)
     if mark.low is not None and mark.high is not None:
         axes.errorbar(x, y, [mark.low, mark.high], label=_name(mark.name), capsize=3, elinewidth=1.1,
                       fmt="none" if not mark.look.mark else "", **style)  # fmt: skip
+        return
+    if mark.shares is not None:
+        pieces = np.stack([np.stack([x[:-1], y[:-1]], 1), np.stack([x[1:], y[1:]], 1)], 1)
+        paints = RISING((mark.shares[:-1] + mark.shares[1:]) / 2)
+        axes.add_collection(
+            LineCollection(list(pieces), colors=paints, linewidths=mark.look.width, zorder=mark.look.order)
+        )
         return
     if isinstance(spec.x, Abscissa) and mark.look.dash != "none":  # a dense course, without losing a peak
         picked = thin(y)
@@ -384,8 +426,26 @@ def _stripe(mark: Stripe, axes: Axes, spec: Chart) -> None:
                   ha="center", va="center", fontsize=8, color=MUTED, zorder=3, clip_on=True)  # fmt: skip
 
 
+@_mark.register(Arrow)
+def _arrow(mark: Arrow, axes: Axes, spec: Chart) -> None:
+    style = {"arrowstyle": "-|>", "color": colour(mark.look.colour), "linewidth": mark.look.width, "shrinkA": 0,
+             "shrinkB": 0, "mutation_scale": 9}  # fmt: skip
+    axes.annotate("", xy=mark.end, xytext=mark.start, arrowprops=style, zorder=mark.look.order)
+
+
+@_mark.register(Ring)
+def _ring(mark: Ring, axes: Axes, spec: Chart) -> None:
+    paint, (x, y), r = colour(mark.look.colour), mark.middle, mark.radius
+    edge = to_rgba(paint, mark.look.alpha or 1)
+    style: dict[str, Any] = {"facecolor": to_rgba(paint, mark.filled), "edgecolor": edge, "zorder": mark.look.order,
+                             "linewidth": mark.look.width, "linestyle": DASHES[mark.look.dash]}  # fmt: skip
+    axes.add_patch(Rectangle((x - r, y - r), 2 * r, 2 * r, **style) if mark.square else Circle((x, y), r, **style))
+
+
 @_mark.register(Note)
 def _note(mark: Note, axes: Axes, spec: Chart) -> None:
+    if mark.beside:  # when all else is there
+        return
     axes.annotate(
         _lines(mark.text), (mark.x, mark.y), xycoords="data" if mark.data else "axes fraction", xytext=mark.shift,
         textcoords="offset points", ha=mark.across, va=mark.up, fontsize=mark.size, color=colour(mark.colour),

@@ -45,6 +45,11 @@ class Abscissa:
         """Label with unit, for an axis."""
         return f"{self.label} [{self.unit}]" if self.unit else self.label
 
+    @property
+    def span(self) -> float:
+        """How long the run is, in `unit`."""
+        return abs(self.period) if self.closed else float(np.ptp(self.values)) if self.values.size else 0.0
+
     def say(self, index: int) -> str:
         """The place of a position in words: "132°", "12.5 mm"."""
         value = float(self.values[index])

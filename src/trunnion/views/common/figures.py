@@ -66,7 +66,7 @@ def dress(axes: Axes, x: str = "", y: str = "") -> None:
 def along(axes: Axes, over: Abscissa, y: str, *, zero: bool = True) -> None:
     """Axes over the drive: whole degrees at round angles, limits at the ends of the run; zero: with a line there."""
     dress(axes, plain(over.title), y)
-    span = _span(over)
+    span = over.span
     if over.unit == "°" and span >= 90:
         axes.xaxis.set_major_locator(MultipleLocator(_round_angle(span)))
     elif over.unit == "":
@@ -80,10 +80,6 @@ def along(axes: Axes, over: Abscissa, y: str, *, zero: bool = True) -> None:
         axes.set_xlim(low, low + span)
     if zero:
         axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
-
-
-def _span(over: Abscissa) -> float:
-    return abs(over.period) if over.closed else float(np.ptp(over.values)) if over.values.size else 0.0
 
 
 def _round_angle(span: float) -> float:

@@ -42,6 +42,7 @@ class _Name(NamedTuple):
     place: Array
     size: float
     symbol: float
+    weight: str
 
     def reach(self) -> float:
         """Half width of its symbol, pixels."""
@@ -56,11 +57,13 @@ class Labels:
     figure: Figure
     wanted: list[_Name] = field(default_factory=list)
 
-    def add(self, axes: Axes, text: str, place: Array, size: float = 10.0, symbol: float = 0.0) -> None:
+    def add(
+        self, axes: Axes, text: str, place: Array, size: float = 10.0, symbol: float = 0.0, weight: str = "bold"
+    ) -> None:
         """A name of a place in the coordinates of the axes. size: of its letters, points; symbol: half width of what is
         drawn there, in the same coordinates."""
         if np.all(np.isfinite(place)):
-            self.wanted.append(_Name(axes, plain(text), np.asarray(place, float), size, symbol))
+            self.wanted.append(_Name(axes, plain(text), np.asarray(place, float), size, symbol, weight))
 
     def place(self) -> None:
         """Write all names; the figure is painted once for it."""
@@ -87,7 +90,7 @@ class Labels:
         """The name at its place, to be moved; it takes no part in the layout, which it would change."""
         note = name.axes.annotate(
             name.text, (name.place[0], name.place[1]), xytext=(0, 0), textcoords="offset points", ha="center",
-            va="center", fontsize=name.size, fontweight="bold", color=INK, zorder=8, annotation_clip=False,
+            va="center", fontsize=name.size, fontweight=name.weight, color=INK, zorder=8, annotation_clip=False,
             bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
         )  # fmt: skip
         note.set_in_layout(False)

@@ -9,14 +9,18 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
+from trunnion.studies.play import play as play_of
 from trunnion.views.common.cycle import Array, column, layout, names
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from trunnion.model.mechanism import Mechanism
+
 __all__ = [
     "JUMP", "NOWHERE", "Output", "Seats", "angle_scale", "broken", "has", "jumps", "losses", "need", "outputs",
-    "point_errors", "seated", "worst_points",
+    "point_errors", "seated",
+    "with_worst_case", "worst_points",
 ]  # fmt: skip
 
 JUMP = np.pi / 3  # a seat that turns by more from one position to the next is taken to have jumped
@@ -121,6 +125,36 @@ def losses(result: xr.Dataset) -> dict[str, NDArray[np.intp]]:
     return found
 
 
+def with_worst_case(result: xr.Dataset, mechanism: Mechanism) -> xr.Dataset:
+    """The result with the band in which the play of all joints holds the error of each output, if there is any play.
+
+    `transmission_centre` and `transmission_reach` (joint, position), rad or m, NaN of joints that are no outputs: the
+    error with every pin in the middle of its hole, and the most that all plays can add to it, to first order.
+    """
+    found = outputs(result) if has(result, "errors") else []
+    if not found:
+        return result
+    measures = [f"{'slide' if one.unit == 'm' else 'rotation'}:{one.joint}" for one in found]
+    try:
+        free = play_of(mechanism, measures, result.sizes["position"])
+    except MechanismError:  # no joint has a play
+        return result
+    joints = names(result, "joint")
+    centre, reach = (np.full((len(joints), result.sizes["position"]), np.nan) for _ in range(2))
+    for one, measure in zip(found, measures, strict=True):
+        told = column(result, f"joint_{measure.split(':')[0]}", joint=one.joint)
+        middle, most = (column(free, name, measure=measure) for name in ("value", "worst_case_total"))
+        if told is None or middle is None or most is None:
+            continue
+        apart = middle - told
+        turns = 2 * np.pi * np.round(apart / (2 * np.pi)) if one.unit == "rad" else 0.0
+        centre[joints.index(one.joint)], reach[joints.index(one.joint)] = one.error + apart - turns, most
+    if not np.nanmax(reach, initial=0.0) > 0:
+        return result
+    dims = ("joint", "position")
+    return result.assign(transmission_centre=(dims, centre), transmission_reach=(dims, reach))
+
+
 # ---- seats ----------------------------------------------------------------------------------------------------
 
 
@@ -140,6 +174,11 @@ class Seats(NamedTuple):
     offsets: Array
     forces: Array
     links: tuple[str, str]
+
+    @property
+    def peak(self) -> float:
+        """The largest load at an end, N."""
+        return float(np.linalg.norm(np.nan_to_num(self.forces), axis=1).max(initial=0.0))
 
     @property
     def planar_guide(self) -> bool:

@@ -16,9 +16,9 @@ from trunnion.results.dataset import units_along
 from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import abscissa, column, course, intervals, layout, names, numbers, series
 from trunnion.views.common.peaks import ease
+from trunnion.views.cycle.courses import varying
 from trunnion.views.cycle.deviations import losses
 from trunnion.views.cycle.deviations_scene import built
-from trunnion.views.cycle.speed import varying
 from trunnion.views.space.bodies import is_spatial
 from trunnion.views.space.scene import space_scene
 

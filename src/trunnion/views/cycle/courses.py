@@ -1,0 +1,528 @@
+"""What a cycle has over its drive as charts: efforts, powers, reactions, motion, measures, errors.
+
+Each kind is a function of the result and, if wanted, of the same run without friction, and gives a `Plot`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from trunnion.cycle.locking import HELD_AND_DRIVEN, LockingState
+from trunnion.errors import Finding, MechanismError
+from trunnion.joints.pairs import GUIDED, PAIRS
+from trunnion.results.attributes import attribute, summary_of
+from trunnion.results.dataset import units_along
+from trunnion.results.quantities import number, prefixed, quantity, scaled
+from trunnion.solve.friction_method import MARGIN
+from trunnion.views.charts import (
+    FREE,
+    Axis,
+    Band,
+    Chart,
+    Legend,
+    Line,
+    Look,
+    Mark,
+    Note,
+    Panel,
+    Plot,
+    Rule,
+    Stripe,
+    joined,
+    nth,
+    outside,
+    over_drive,
+    silent,
+)
+from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, layout, mean_friction, names
+from trunnion.views.common.peaks import ease, peak, usual_peak
+from trunnion.views.cycle.deviations import angle_scale, losses, need, outputs, point_errors, worst_points
+from trunnion.views.space.bodies import is_spatial
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "drawn_measures", "error", "friction_power", "has_friction", "locking", "measures", "motion", "polar", "power",
+    "reactions", "speed", "torque", "turned_from_start", "varying",
+]  # fmt: skip
+
+SEEN = 0.002  # of the largest effort: narrower ranges would not be seen
+STEADY = 1e-6  # of the largest speed: variations that are none
+MOST_POINTS = 5000  # of the track of a vector
+PLANES = (("x", "y"), ("x", "z"), ("y", "z"))
+TURN = 2 * np.pi
+RATES = ("", "/s", "/s²")
+LEVELS = ("maximum", "minimum", "mean", "value", "largest")  # aspects of a figure that is a value of the course
+HEIGHT = 2.3  # of one of several charts below one another, inches
+
+
+def _stack(title: str, charts: Sequence[Chart], parts: Sequence[float] = ()) -> Plot:
+    """Charts below one another; parts: shares of the height."""
+    return Plot(title, [Panel("", charts, 0.6 + HEIGHT * len(charts) if len(charts) > 1 else 3.75, parts)])
+
+
+# ---- effort and power ---------------------------------------------------------------------------------------------
+
+
+def torque(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
+    """Drive effort over the drive, one panel a driver; without friction dashed, its interval at zero slip as bars."""
+    over, charts, nouns = abscissa(result), list[Chart](), dict[str, None]()
+    for driver, unit in zip(names(result, "driver"), units_along(result["drive_effort"], "driver"), strict=True):
+        noun = "force" if unit == "N" else "torque"
+        nouns[noun] = None
+        effort, low, high = (column(result, f"drive_effort{end}", driver=driver) for end in ("", "_lower", "_upper"))
+        free = None if ideal is None else column(ideal, "drive_effort", driver=driver)
+        if effort is None:
+            continue
+        name = noun if free is None else "with friction"
+        lines = [Line(over.values, effort, name, Look(0, 2.0), close=True)]
+        if free is not None:
+            lines.append(Line(over.values, free, "without friction", FREE, close=True))
+        if low is not None and high is not None:
+            wide = high - low > SEEN * usual_peak(ease(result), low, high)
+            if wide.any():
+                middle, half = np.where(wide, (low + high) / 2, np.nan), (high - low) / 2
+                look = Look(0, 2.0, "none", alpha=0.35)
+                lines.append(Line(over.values, middle, "range, friction at rest", look, half, half))
+        charts.append(over_drive(result, over, f"{noun} {driver}", unit, lines))
+    return _stack(f"Drive {'effort' if len(nouns) != 1 else ''.join(nouns)}", charts or [Chart(over, Axis(), [])])
+
+
+def varying(result: xr.Dataset) -> dict[str, tuple[Array, str]]:
+    """Speed and unit of every driver whose speed varies."""
+    speeds, joints = {}, layout(result)["joints"]
+    for driver in names(result, "driver"):
+        slides = joints.get(driver, {}).get("type") in GUIDED
+        values = column(result, f"joint_{'slide' if slides else 'rotation'}_velocity", joint=driver)
+        finite = _finite(values)
+        if values is not None and finite.size and np.ptp(finite) > STEADY * np.abs(finite).max():
+            speeds[driver] = values, "m/s" if slides else "rad/s"
+    return speeds
+
+
+def speed(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
+    """Speed of the drivers over the cycle, where it varies: of a stated motion law, or of a steady cycle."""
+    over, speeds = abscissa(result), varying(result)
+    if not speeds:
+        what, remedy = "the speed of no driver varies", "use `trunnion simulate --steady`, or a motion law"
+        raise MechanismError(Finding(what, "speed", remedy))
+    lines = {name: Line(over.values, values, name, Look(0, 2.0), close=True) for name, (values, _) in speeds.items()}
+    return _stack("Speed", [over_drive(result, over, f"speed {name}", speeds[name][1], [line])
+                            for name, line in lines.items()])  # fmt: skip
+
+
+def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
+    """Power lost to friction in each joint and in all, with the mean of each over the run."""
+    over, joints = abscissa(result), names(result, "joint")
+    losses_of = {joint: column(result, "friction_power", joint=joint) for joint in joints}
+    rubbing = {joint: values for joint, values in losses_of.items() if values is not None and peak(values) > 0}
+    total = np.sum(list(rubbing.values()), axis=0) if rubbing else np.zeros(over.values.size)
+    factor, unit = prefixed(usual_peak(ease(result), total), "W")
+    means = {joint: mean_friction(result, joint) for joint in rubbing}
+
+    def named(text: str, mean: float) -> str:
+        return f"{text}, mean {number(mean * factor)} {unit}" if np.isfinite(mean) else f"{text}, not solved"
+
+    lines = joined([Line(over.values, values, joint, nth(joints.index(joint)).but(width=1.4), close=True)
+                    for joint, values in rubbing.items()])  # fmt: skip
+    lines = [line._replace(name=named(str(line.name), means[str(line.name).split(" = ")[0]])) for line in lines]
+    every = named("all joints", sum(means.values()))
+    area = Band(over.values, np.zeros(total.size), total, None, Look("shade", alpha=0.6, order=1.0), close=True)
+    lines = [Line(over.values, total, every, Look("ink", 1.8), close=True), *lines]
+    shown = over_drive(result, over, "friction power", "W", lines, bands=[area], scale=(factor, unit), legend=Legend(3))
+    return _stack("Friction power by joint", [shown])
+
+
+def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
+    """Where the power goes: drive, useful, friction, and the remainder that masses and other loads take or give."""
+    over = abscissa(result)
+    drive, lost = (np.asarray(result[name].sum(dim, skipna=False).values, dtype=float)
+                   for name, dim in (("drive_power", "driver"), ("friction_power", "joint")))  # fmt: skip
+    useful = column(result, "useful_power")
+    useful = np.zeros_like(lost) if useful is None else useful
+    rest = drive - useful - lost
+    parts = [("drive", drive, Look(0)), ("useful", useful, Look(2)), ("friction", lost, Look(1))]
+    if peak(rest) > 1e-9 * peak(drive, useful, lost):
+        label = "masses, springs and other loads" if "spring" in result.dims else "masses and other loads"
+        parts.append((label, rest, Look("muted", 1.2, "short")))
+    lines = [Line(over.values, values, name, look, close=True) for name, values, look in parts]
+    return _stack("Power over the run", [over_drive(result, over, "power", "W", lines)])
+
+
+# ---- reactions ----------------------------------------------------------------------------------------------------
+
+
+def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
+    """Magnitude of the reaction in each joint, in space also of its moment; without friction thin, dotted."""
+    over, joints = abscissa(result), names(result, "joint")
+    parts = [("force of the reaction", "reaction_force", "N"), ("moment of the reaction", "reaction_moment", "N m")]
+    if not is_spatial(result):
+        parts = [("magnitude of the reaction", "reaction_force", "N")]
+
+    def sizes(of: xr.Dataset, variable: str) -> list[Array]:
+        each = (column(of, variable, joint=joint) for joint in joints)
+        return [np.linalg.norm(values, axis=0) for values in each if values is not None]
+
+    charts = []
+    for title, variable, unit in parts:
+        lines = [Line(over.values, size, joint, nth(k), close=True)
+                 for k, (joint, size) in enumerate(zip(joints, sizes(result, variable), strict=True))]  # fmt: skip
+        free = [] if ideal is None else sizes(ideal, variable)
+        dashed = [Line(over.values, size, None if k else "without friction", FREE, close=True)
+                  for k, size in enumerate(free)]  # fmt: skip
+        charts.append(over_drive(result, over, title, unit, [*lines, *dashed]))
+    return _stack("Joint reactions", charts)
+
+
+def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
+    """Polar reaction diagrams: the tip of each joint's force vector over the run, in the global frame.
+
+    In space a row for each joint: the vector seen along z, y and x.
+    """
+    over, joints = abscissa(result), names(result, "joint")
+    planes = PLANES if is_spatial(result) else PLANES[:1]
+    charts = [
+        _hodograph(result, ideal, over, joint, plane, index)
+        for index, joint in enumerate(joints) for plane in planes
+    ]  # fmt: skip
+    columns = min(len(charts), 2 if len(charts) in (2, 4) else 3) or 1
+    panels = [Panel("", [chart], 6.8 / columns) for chart in charts]
+    note = "" if ideal is None else "dashed: without friction"
+    return Plot("Polar diagrams of the joint reactions", panels, columns, 7.4, note)
+
+
+def _hodograph(
+    result: xr.Dataset, ideal: xr.Dataset | None, over: Abscissa, joint: str, plane: tuple[str, str], index: int
+) -> Chart:
+    """The track of a joint's force in a plane, a dot every 30° of the drive, told every 90°."""
+
+    def force_of(of: xr.Dataset) -> Array:
+        picked = of["reaction_force"].sel(joint=joint, axis=list(plane)).transpose("axis", "position")
+        return np.asarray(picked.values, dtype=float)
+
+    def track(vector: Array, look: Look) -> Line:
+        points = vector[:, :: -(-vector.shape[1] // MOST_POINTS)]
+        points = np.hstack([points, vector[:, :1]]) if over.closed else points
+        points = np.hstack([np.zeros((2, 1)), points]) if points.shape[1] == 1 else points  # one position has no track
+        return Line(*(points * factor), None, look)
+
+    forces = [force_of(of) for of in (result, ideal) if of is not None]
+    sizes = [np.hypot(*vector) for vector in forces]
+    usual, most = usual_peak(ease(result), *sizes), peak(*sizes)
+    factor, unit = prefixed(usual, "N")
+    marks: list[Mark] = [Rule(0.0, None, Look("muted", 0.8, order=1.5), upright) for upright in (True, False)]
+    marks += [track(vector, FREE) for vector in forces[1:]]
+    marks.append(track(forces[0], Look(index)))
+    angles = np.arange(0.0, 360.0, 30.0) if over.closed else over.values[:1]
+    at = [int(np.argmin(np.abs((over.values - angle + 180) % 360 - 180))) if over.closed else 0 for angle in angles]
+    dots = np.where(np.abs(forces[0][:, at]).max(axis=0) <= usual, forces[0][:, at] * factor, np.nan)
+    marks.append(Line(*dots, None, Look(index, dash="none", mark="o", size=3.2, order=4.0)))
+    for k in range(0, len(at), 3):
+        if np.isfinite(dots[:, k]).all():
+            marks.append(Note(over.say(at[k]), *dots[:, k].tolist(), data=True, size=7.5, colour="ink", beside=True))
+    limits: tuple[float | None, float | None] = (None, None)
+    if usual < most:
+        limits = (-usual * factor, usual * factor)
+        marks.append(outside(most, "N"))
+    x, y = (Axis(f"F{axis} [{unit}]", limits, margin=0.13, count=5) for axis in plane)
+    return Chart(x, y, marks, title=joint if plane == PLANES[0] else "", legend=None, equal=True)
+
+
+# ---- motion -------------------------------------------------------------------------------------------------------
+
+
+class Motions(NamedTuple):
+    """A quantity of links or joints with its first and second rate: its name, unit, and of each member the three."""
+
+    noun: str
+    unit: str
+    members: dict[str, list[Array | None]]
+    rates: tuple[str, str] = ("velocity", "acceleration")
+
+
+def motion(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
+    """Angles of the turning links, slides of the sliding joints, and their rates; in space also those of the joints."""
+    over, kinds = abscissa(result), _motions(result)
+    panels = [Panel("", [_rate(result, over, kind, order) for order in range(3)], 5.8) for kind in kinds]
+    return Plot("Motion", panels, len(panels), 7.4 if len(panels) == 1 else 2.8 + 3.6 * len(panels))
+
+
+def _rate(result: xr.Dataset, over: Abscissa, kind: Motions, order: int) -> Chart:
+    """The quantity itself or one of its rates."""
+    turn = TURN if kind.unit == "rad" and not order else 0.0
+    lines = [
+        Line(over.values, values[order], name, nth(k), close=True, turn=turn)
+        for k, (name, values) in enumerate(kind.members.items()) if values[order] is not None
+    ]  # fmt: skip
+    title, scale = (kind.noun, *kind.rates)[order], None
+    if kind.unit == "m":  # as the drive
+        scale = scaled(usual_peak(ease(result), *(line.y for line in lines)), "m")
+    elif order:
+        scale = 1.0, kind.unit
+    legend = Legend(6, least=1) if order == 0 else None
+    return over_drive(result, over, title, kind.unit, lines, rate=RATES[order], scale=scale, legend=legend)
+
+
+def _motions(result: xr.Dataset) -> list[Motions]:
+    """What moves: links that turn and joints that slide; in space also joints that turn."""
+    stated, spatial = layout(result), is_spatial(result)
+    kinds = {name: stated["joints"].get(name, {}).get("type") for name in names(result, "joint")}
+    links = [link for link in names(result, "link") if link != stated["ground"]]
+
+    def rated(variable: str, dim: str, members: list[str]) -> dict[str, list[Array | None]]:
+        return {name: [column(result, variable + rate, **{dim: name}) for rate in ("", "_velocity", "_acceleration")]
+                for name in members}  # fmt: skip
+
+    if not spatial:
+        turning = [link for link in links if _moves(column(result, "link_angle", link=link))]
+        sliding = [name for name, kind in kinds.items() if kind in GUIDED]
+        angles = [Motions("angle", "rad", rated("link_angle", "link", turning))] if turning or not sliding else []
+        return [*angles, *([Motions("slide", "m", rated("joint_slide", "joint", sliding))] if sliding else [])]
+    found = []
+    for noun, unit, moves in (("rotation", "rad", "turns"), ("slide", "m", "slides")):
+        variable = f"joint_{noun}"
+        joints = [name for name, kind in kinds.items()
+                  if getattr(PAIRS[kind], moves) and _moves(column(result, variable, joint=name))]  # fmt: skip
+        if joints:
+            found.append(Motions(f"joint {noun}", unit, rated(variable, "joint", joints)))
+    turns = {
+        link: [turned_from_start(column(result, "link_rotation", link=link)),
+               *(_size(column(result, f"link_angular_{rate}", link=link)) for rate in ("velocity", "acceleration"))]
+        for link in links
+    }  # fmt: skip
+    return [*found, Motions("turn of the link", "rad", turns, ("angular velocity", "angular acceleration"))]
+
+
+def _finite(values: Array | None) -> Array:
+    return np.empty(0) if values is None else values[np.isfinite(values)]
+
+
+def _moves(values: Array | None) -> bool:
+    finite = _finite(values)
+    return finite.size == 1 or bool(np.ptp(finite) > 1e-9 * max(1.0, np.abs(finite).max()) if finite.size else False)
+
+
+def _size(vector: Array | None) -> Array | None:
+    return None if vector is None else np.asarray(np.linalg.norm(vector, axis=0))
+
+
+def turned_from_start(rotation: Array | None) -> Array | None:
+    """Angle (rad) by which a link is turned from the first orientation (w, x, y, z; position) that is known.
+
+    It goes on beyond a turn: of q and −q, which are one orientation, and of an axis and its opposite the one that is
+    nearer to the position before is taken.
+    """
+    if rotation is None:
+        return None
+    angle = np.full(rotation.shape[1], np.nan)
+    solved = np.flatnonzero(np.isfinite(rotation).all(axis=0))
+    if not solved.size:
+        return angle
+    w0, *v0 = rotation[:, solved[0]]
+    w, v = rotation[0, solved], rotation[1:, solved]
+    cosine = w0 * w + np.array(v0) @ v
+    sine = w0 * v - np.array(v0)[:, None] * w - np.cross(v0, v, axisb=0).T
+    same = np.sign(np.sum(rotation[:, solved[1:]] * rotation[:, solved[:-1]], axis=0))
+    cosine, sine = (part * np.cumprod([1.0, *np.where(same < 0, -1.0, 1.0)]) for part in (cosine, sine))
+    size = np.linalg.norm(sine, axis=0)
+    way = np.sum(sine[:, 1:] * sine[:, :-1], axis=0)
+    size = size * np.cumprod([1.0, *np.where(way < 0, -1.0, 1.0)])
+    angle[solved] = np.unwrap(2 * np.arctan2(size, cosine), period=4 * np.pi)
+    return angle
+
+
+# ---- measures -----------------------------------------------------------------------------------------------------
+
+
+def drawn_measures(result: xr.Dataset) -> list[int]:
+    """Numbers of the measures of a result that have one number at every position."""
+    if "measure_value" not in result:
+        return []
+    return [i for i, row in enumerate(result["measure_value"].values) if np.any(np.isfinite(row))]
+
+
+def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
+    """The model's measures over the drive: a panel for each course, with the figures of all measures of it."""
+    rows, over = drawn_measures(result), abscissa(result)
+    if not rows:
+        what = "there is no measure with one number at every position"
+        raise MechanismError(Finding(what, "measures", "state measures: in the model"))
+    units, figure_units = (units_along(result[f"measure_{part}"], "measure") for part in ("value", "figure"))
+    stated, aspects = layout(result).get("measures", {}), {row.name: row.aspect for row in summary_of(result)}
+    names_of = [str(name) for name in result["measure"].values]
+    values, figures, charts = result["measure_value"].values, result["measure_figure"].values, list[Chart]()
+    for i in rows:
+        same = [k for k in rows if units[k] == units[i] and np.array_equal(values[k], values[i], equal_nan=True)]
+        if i != same[0]:
+            continue
+        title = names_of[i] if len(same) == 1 else stated.get(names_of[i], "course of the measures")
+        scope = usual_peak(ease(result), values[i])
+        factor, shown = (scaled if units[i] == "m" else prefixed)(scope, units[i])
+        marks = list[Mark]()
+        for k in same:
+            if np.isfinite(figures[k]):
+                aspect = aspects.get(names_of[k], "")
+                level = aspect in LEVELS and figure_units[k] == units[i]
+                text = f"{names_of[k]}: {aspect} {quantity(float(figures[k]), figure_units[k])}"
+                look = nth(1 + len(marks)).but(width=1.2, dash="dashed")
+                # a figure that is no value of the course is told in the legend alone
+                marks.append(Rule(figures[k] * factor if level else np.nan, text, look, upright=False))
+        line = Line(over.values, values[i], title, Look(0, 2.0), close=True)
+        charts.append(over_drive(result, over, title, units[i], [line], marks=marks, scale=(factor, shown),
+                                 legend=Legend(3)))  # fmt: skip
+    return _stack("Measures", charts)
+
+
+# ---- errors -------------------------------------------------------------------------------------------------------
+
+
+def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
+    """Errors against the mechanism without any: of the worst points, and of the joints of the ground, over the drive.
+
+    The band of the worst case of the play is drawn if the result has it; see `with_worst_case`.
+    """
+    need(result, "errors", "error")
+    over, lost = abscissa(result), contact_losses(result)
+    worst = worst_points(result)
+    lines = [Line(over.values, size, key, nth(k), close=True) for k, (key, size) in enumerate(worst.items())]
+    # the scale is that of all points: those that are not drawn err less
+    scale = prefixed(usual_peak(ease(result), *point_errors(result).values()), "m")
+    look = {"legend": Legend(4, least=1), "marks": lost}
+    charts = [over_drive(result, over, "position error", "m", lines, scale=scale, **look)]
+    for unit, noun in (("rad", "rotation"), ("m", "slide")):
+        found = [each for each in outputs(result) if each.unit == unit]
+        if not found:
+            continue
+        lines, bands = [], list[Band]()
+        for k, each in enumerate(found):
+            centre, reach = (column(result, f"transmission_{part}", joint=each.joint) for part in ("centre", "reach"))
+            if centre is not None and reach is not None and np.isfinite(centre + reach).any():
+                text = f"worst case of the play, first order{f', {each.joint}' if len(found) > 1 else ''}"
+                area = Look(k, alpha=0.15, order=1.2)
+                bands.append(Band(over.values, centre - reach, centre + reach, text, area, close=True))
+            lines.append(Line(over.values, each.error, each.joint, nth(k), close=True))
+        edges = [edge for band in bands for edge in (band.low, band.high)]
+        usual = usual_peak(ease(result), *(line.y for line in lines), *edges)
+        scale = angle_scale(usual) if unit == "rad" else prefixed(usual, "m")
+        charts.append(
+            over_drive(result, over, f"transmission error,\n{noun}", unit, lines, bands=bands, scale=scale, **look)
+        )
+    return _stack("Errors of the mechanism as built", charts)
+
+
+def contact_losses(result: xr.Dataset) -> list[Mark]:
+    """A dotted line wherever a joint loses contact, in the legend with the joints."""
+    lost, over = losses(result), abscissa(result)
+    places = np.unique(np.concatenate(list(lost.values()))) if lost else np.empty(0, int)
+    label = f"contact lost: {', '.join(lost)}"
+    return [Rule(float(over.values[place]), None if k else label, Look("limit", 0.9, "dotted", order=1.4))
+            for k, place in enumerate(places)]  # fmt: skip
+
+
+# ---- locking ------------------------------------------------------------------------------------------------------
+
+# what is shaded: values of `locking_state` and the colour; over the stripes that say why there is no answer
+STATES = (
+    (LockingState.RUNS, "#eef0f3"),
+    (LockingState.BACKDRIVABLE, "#cfe9dd"),
+    (LockingState.SELF_LOCKING, "#fbe3c4"),
+    (LockingState.SELF_LOCKING_FORWARD, "#f4bf7f"),
+    (LockingState.DRIVEN_ON, "#c9dff3"),
+    (LockingState.LOCKED_BACKWARD, "#e0cdea"),
+    (LockingState.LOCKED, "#f3c4bf"),
+    (LockingState.JAMMED, "#dea8a3"),
+    (LockingState.UNSOLVED, "#c6ccd3"),
+)
+LEAST_TOP = 2.0  # of the axis of the margin, so that 1 does not lie on its frame
+
+
+def has_friction(result: xr.Dataset) -> bool:
+    """Whether the locking margin is known anywhere, and some joint takes power."""
+    margin, lost = column(result, "locking_margin"), column(result, "friction_power")
+    if margin is None or lost is None:
+        return False
+    rubs = bool(np.any(np.nan_to_num(lost) != 0)) or bool(np.any(margin < 1))
+    return rubs and not bool(np.all(np.isnan(margin)))
+
+
+def locking(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
+    """The locking margin over the drive above the efficiency; locked ranges are shaded.
+
+    Of a result of `locking` also the critical multiple of each joint, and the efficiency backward.
+    """
+    margin = column(result, "locking_margin")
+    if margin is None or not has_friction(result):
+        raise MechanismError(Finding("no joint has friction, so nothing can lock", "locking", "state friction"))
+    over = abscissa(result)
+    alone = {joint: column(result, "critical_multiple", joint=joint) for joint in names(result, "joint")}
+    multiples = {joint: values for joint, values in alone.items() if values is not None and np.isfinite(values).any()}
+    every = np.concatenate([margin, *multiples.values()])
+    largest = float(np.max(every[np.isfinite(every)], initial=0.0))
+    reached = bool(np.any(np.isinf(every))) or largest >= MARGIN
+    top = MARGIN if reached else max(1.1 * largest, LEAST_TOP)
+    never = f": more than {MARGIN:g}" if not np.isfinite(margin).any() else ""
+    lines = [Line(over.values, _drawable(margin), f"locking margin, all friction{never}", Look("ink", 2.0), close=True)]
+    lines += joined([Line(over.values, _drawable(multiples[joint]), f"{joint} alone", nth(k).but(width=1.3), close=True)
+                     for k, joint in enumerate(alone) if joint in multiples])  # fmt: skip
+    marks: list[Mark] = [*_states(result, over, named=True), *silent(result, over), *lines]
+    marks.append(Rule(1.0, "locks at 1", Look("ink", 1.0, "dashed", order=1.6), upright=False))
+    if not largest:  # nothing to draw
+        marks.append(Note(f"more than {MARGIN:g} at every position", 0.5, 0.5, size=10, colour="ink"))
+    searched = f", searched to {MARGIN:g}" if reached and largest else ""
+    upper = Chart(over, Axis(f"times the friction{searched}", (0.0, top)), marks, legend=Legend(least=1))
+    lower = _efficiency(result, over)
+    centred = "; ranges: pins centred" * ("seat_offset" in result and "locking_state" in result)
+    return _stack(f"Locking by friction{centred}", [upper, lower], (3, 2) if largest else (1, 2))
+
+
+def _drawable(values: Array) -> Array:
+    """A multiple that is not finite is drawn nowhere."""
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _efficiency(result: xr.Dataset, over: Abscissa) -> Chart:
+    """Forward and, of a result of `locking`, backward; beyond ±1 a driver hardly works beside springs and masses."""
+    courses = [
+        ("forward", "efficiency_instant", Look(0)),
+        ("backward, by the useful loads", "efficiency_reverse_instant", Look(2, dash="long")),
+    ]
+    lines = []
+    for name, variable, look in courses:
+        values = column(result, variable)
+        values = None if values is None else np.where(np.abs(values) <= 1 + 1e-9, 100 * values, np.nan)
+        if values is not None and (np.isfinite(values).any() or not lines):
+            lines.append(Line(over.values, values, name, look, close=True))
+    low = min((float(np.nanmin(line.y)) for line in lines if np.isfinite(line.y).any()), default=0.0)
+    limits = min(0.0, max(1.05 * low, -105.0)), 103.0
+    return Chart(over, Axis("efficiency [%]", limits),
+                 [*_states(result, over, named=False), *silent(result, over), *joined(lines)], zero=True)  # fmt: skip
+
+
+def _states(result: xr.Dataset, over: Abscissa, named: bool) -> list[Mark]:
+    """The ranges of a result of `locking`, in their colours, and where the drive effort changes sign; named: for the
+    legend."""
+    if "locking_state" not in result:
+        return []
+    time, values = result["time"].values, over.values
+    if len(time) > 1:  # a motion that comes again has ranges beyond its last position
+        time, values = (np.append(row, 2 * row[-1] - row[-2]) for row in (time, values))
+    rows = [row for row in attribute(result, "locking_ranges", '{"rows": []}')["rows"] if row["state"]]
+    marks, both, seen = list[Mark](), {state.name.lower() for state in HELD_AND_DRIVEN}, set[str]()
+    for state, colour in STATES:
+        for row in (row for row in rows if row["state"] == state.name.lower()):
+            low, high = np.interp(row["times"], time, values)
+            name = state.short if named and state.short not in seen else None
+            seen.add(state.short)
+            marks.append(Stripe(float(low), float(high), "", Look(colour, order=0.55), name))
+    label = "drive effort changes sign" if named else None
+    for before, after in pairwise(rows):
+        if {before["state"], after["state"]} == both:
+            place = float(np.interp(after["times"][0], time, values))
+            marks.append(Rule(place, label, Look("ink", 1.0, "dotted", order=1.5)))
+            label = None
+    return marks

@@ -100,6 +100,6 @@ def _check_without_play(out: list[Path], of: str, kind: str | None) -> None:
     for path in out:
         check_table(path, of, in_play=False)
     if kind and out:
-        from trunnion.views.motion.contacts import check_kind
+        from trunnion.views.motion.figure import check_contacts
 
-        check_kind(kind, in_play=False)
+        check_contacts(kind, in_play=False)

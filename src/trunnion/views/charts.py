@@ -210,11 +210,13 @@ class Axis:
 
 
 class Legend(NamedTuple):
-    """A legend above the chart: entries in a row, characters that a row has room for, fewest entries."""
+    """A legend above the chart: entries in a row, characters that a row has room for, fewest entries; lift: height of
+    what stands below it, points."""
 
     most: int = 6
     room: int = 90
     least: int = 2
+    lift: float = 0.0
 
 
 LEGEND = Legend()

@@ -244,7 +244,7 @@ def chart(axes: Axes, spec: Chart, wide: float = 1.0) -> None:
         bar.set_label(plain(scale.title), fontsize=9, color=INK)
         bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
     if spec.legend is not None:
-        legend(axes, spec.legend.most, int(wide * spec.legend.room), spec.legend.least)
+        legend(axes, spec.legend.most, int(wide * spec.legend.room), spec.legend.least, spec.legend.lift)
 
 
 def _titles(axes: Axes, spec: Chart) -> None:

@@ -209,7 +209,7 @@ def _hodograph(
         points = vector[:, :: -(-vector.shape[1] // MOST_POINTS)]
         points = np.hstack([points, vector[:, :1]]) if over.closed else points
         points = np.hstack([np.zeros((2, 1)), points]) if points.shape[1] == 1 else points  # one position has no track
-        return Line(*(points * factor), None, look)
+        return Line(points[0] * factor, points[1] * factor, None, look)
 
     forces = [force_of(of) for of in (result, ideal) if of is not None]
     sizes = [np.hypot(*vector) for vector in forces]
@@ -221,10 +221,20 @@ def _hodograph(
     angles = np.arange(0.0, 360.0, 30.0) if over.closed else over.values[:1]
     at = [int(np.argmin(np.abs((over.values - angle + 180) % 360 - 180))) if over.closed else 0 for angle in angles]
     dots = np.where(np.abs(forces[0][:, at]).max(axis=0) <= usual, forces[0][:, at] * factor, np.nan)
-    marks.append(Line(*dots, None, Look(index, dash="none", mark="o", size=3.2, order=4.0)))
+    marks.append(Line(dots[0], dots[1], None, Look(index, dash="none", mark="o", size=3.2, order=4.0)))
     for k in range(0, len(at), 3):
         if np.isfinite(dots[:, k]).all():
-            marks.append(Note(over.say(at[k]), *dots[:, k].tolist(), data=True, size=7.5, colour="ink", beside=True))
+            marks.append(
+                Note(
+                    over.say(at[k]),
+                    float(dots[0, k]),
+                    float(dots[1, k]),
+                    data=True,
+                    size=7.5,
+                    colour="ink",
+                    beside=True,
+                )
+            )
     limits: tuple[float | None, float | None] = (None, None)
     if usual < most:
         limits = (-usual * factor, usual * factor)
@@ -256,8 +266,8 @@ def _rate(result: xr.Dataset, over: Abscissa, kind: Motions, order: int) -> Char
     """The quantity itself or one of its rates."""
     turn = TURN if kind.unit == "rad" and not order else 0.0
     lines = [
-        Line(over.values, values[order], name, nth(k), close=True, turn=turn)
-        for k, (name, values) in enumerate(kind.members.items()) if values[order] is not None
+        Line(over.values, course, name, nth(k), close=True, turn=turn)
+        for k, (name, values) in enumerate(kind.members.items()) if (course := values[order]) is not None
     ]  # fmt: skip
     title, scale = (kind.noun, *kind.rates)[order], None
     if kind.unit == "m":  # as the drive
@@ -392,8 +402,8 @@ def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     lines = [Line(over.values, size, key, nth(k), close=True) for k, (key, size) in enumerate(worst.items())]
     # the scale is that of all points: those that are not drawn err less
     scale = prefixed(usual_peak(ease(result), *point_errors(result).values()), "m")
-    look = {"legend": Legend(4, least=1), "marks": lost}
-    charts = [over_drive(result, over, "position error", "m", lines, scale=scale, **look)]
+    legend = Legend(4, least=1)
+    charts = [over_drive(result, over, "position error", "m", lines, scale=scale, marks=lost, legend=legend)]
     for unit, noun in (("rad", "rotation"), ("m", "slide")):
         found = [each for each in outputs(result) if each.unit == unit]
         if not found:
@@ -410,7 +420,17 @@ def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
         usual = usual_peak(ease(result), *(line.y for line in lines), *edges)
         scale = angle_scale(usual) if unit == "rad" else prefixed(usual, "m")
         charts.append(
-            over_drive(result, over, f"transmission error,\n{noun}", unit, lines, bands=bands, scale=scale, **look)
+            over_drive(
+                result,
+                over,
+                f"transmission error,\n{noun}",
+                unit,
+                lines,
+                bands=bands,
+                scale=scale,
+                marks=lost,
+                legend=legend,
+            )
         )
     return _stack("Errors of the mechanism as built", charts)
 
@@ -491,7 +511,7 @@ def _efficiency(result: xr.Dataset, over: Abscissa) -> Chart:
         ("forward", "efficiency_instant", Look(0)),
         ("backward, by the useful loads", "efficiency_reverse_instant", Look(2, dash="long")),
     ]
-    lines = []
+    lines = list[Line]()
     for name, variable, look in courses:
         values = column(result, variable)
         values = None if values is None else np.where(np.abs(values) <= 1 + 1e-9, 100 * values, np.nan)

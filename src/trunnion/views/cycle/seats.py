@@ -82,7 +82,7 @@ def _hole(seats: Seats, end: int, plane: tuple[int, int], over: Abscissa) -> Cha
         Ring(middle, rho, Look("muted", 0.8, "dashed", order=2.0), square),
     ]
     marks: list[Mark] = [*wall, *_locus(offset, share, over, rho)]
-    for index in _marked(over, np.isfinite(offset).all(axis=0)):
+    for index in _marked(over, np.asarray(np.isfinite(offset).all(axis=0))):
         paint, place = Look(float(share[index])), offset[:, index]
         at = (float(place[0]), float(place[1]))
         marks.append(Ring(at, PIN * rho, paint.but(width=1.1, alpha=0.85, order=1.5), square, 0.07))
@@ -115,9 +115,9 @@ def _locus(offset: Array, share: Array, over: Abscissa, jump: float) -> list[Mar
     marks = list[Mark]()
     for part, hue in zip(np.split(offset, cuts, axis=1), np.split(share, cuts), strict=True):
         if part.shape[1] > 1:
-            marks.append(Line(*part, None, Look(0, 2.6, order=3.0), shares=hue))
+            marks.append(Line(part[0], part[1], None, Look(0, 2.6, order=3.0), shares=hue))
         elif np.isfinite(part).all():
-            marks.append(Line(*part, None, Look(float(hue[0]), dash="none", mark="o", size=3.7, order=3.0)))
+            marks.append(Line(part[0], part[1], None, Look(float(hue[0]), dash="none", mark="o", size=3.7, order=3.0)))
     return marks
 
 
@@ -129,7 +129,7 @@ def _guide(seats: Seats, over: Abscissa) -> Chart:
     x, ends, share = np.array([-half, half]), seats.offsets[:, 1] * factor, _share(over)
     marks: list[Mark] = [Line(x, np.full(2, side * rho), None, Look("ink", 1.4, order=1.0)) for side in (1, -1)]
     marks.append(Line(x, np.zeros(2), None, Look("muted", 0.8, "dash-dot", order=0.8)))
-    for index in _marked(over, np.isfinite(ends).all(axis=0)):
+    for index in _marked(over, np.asarray(np.isfinite(ends).all(axis=0))):
         paint = Look(float(share[index]), 2.2, mark="o", size=4.0, order=3.0)
         marks.append(Line(x, ends[:, index], None, paint))
         for end, load in enumerate(seats.forces[:, 1, index]):

@@ -8,7 +8,7 @@ import numpy as np
 
 from trunnion.results.quantities import prefixed, quantity
 from trunnion.views.cycle.report import page
-from trunnion.views.motion import contacts
+from trunnion.views.motion.figure import pictures
 from trunnion.views.motion.scene import motion_scene
 from trunnion.views.motion.shown import Shown, energies, shown
 from trunnion.views.page import source
@@ -38,7 +38,7 @@ def report(result: xr.Dataset) -> str:
         "events": [{"seconds": f"{one.time:.9g}", "time": quantity(one.time, "s"), "cells": one[1:]} for one in events],
         "more": len(motion.events) - len(events),
         "account": _account(motion.rows),
-        "pictures": [{"alt": title, "source": source(drawn)} for title, drawn in contacts.pictures(result)],
+        "pictures": [{"alt": title, "source": source(drawn)} for title, drawn in pictures(result)],
     }
     return page(motion.rows, motion_scene(motion), over, _residual(motion))
 

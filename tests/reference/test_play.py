@@ -388,3 +388,12 @@ def test_redundant_constraints_make_it_a_bound() -> None:
 def test_play_at_the_teeth_is_told_of() -> None:
     result = trunnion.play(with_play(mechanisms.model(mechanisms.geared_five_bar())), ["effort:A"], steps=12)
     assert any(row["code"] == "play.gears" for row in json.loads(result.attrs["findings"]))
+
+
+def test_the_limit_that_is_drawn_is_the_one_that_is_judged() -> None:
+    """Of an extreme too."""
+    data = four_bar("C").data() | {"measures": {"swing": {"rotation": "D", "as": "maximum", "limit": "0.01 deg"}}}
+    result = trunnion.play(trunnion.Mechanism(**data), steps=36)
+    (finding,) = [row for row in json.loads(result.attrs["findings"]) if row["where"] == "measures.swing.limit"]
+    assert finding["figures"]["limit"] == pytest.approx(0.01)
+    assert np.degrees(json.loads(result.attrs["limits"])) == pytest.approx([0.01])

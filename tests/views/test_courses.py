@@ -11,6 +11,7 @@ from stand_in import four_bar
 import trunnion
 from trunnion.views.charts import Line, over_drive
 from trunnion.views.common.cycle import abscissa
+from trunnion.views.common.drawing import cylinder, picture
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.courses import turned_from_start
 
@@ -90,3 +91,23 @@ def test_slides_are_told_in_millimetres_as_their_drive():
     result = trunnion.analyse(trunnion.read(EXAMPLES / "slider-crank.yaml").with_values({"r": "1.2 m", "l": "5 m"}), 12)
     labels = [axes.get_ylabel() for axes in plots.figure(result, "motion").axes]
     assert "slide [mm]" in labels
+
+
+def test_a_cylinder_is_a_barrel_with_a_rod_in_it():
+    """0.95 m shut, a stroke of 0.75 m: the barrel stays off the rod's eye, and the rod off the foot."""
+    result = trunnion.analyse(trunnion.read(EXAMPLES / "inverted-slider-crank.yaml"), 24)
+    shown = picture(result)
+    parts = cylinder(shown, "S")
+    assert (parts.barrel, parts.rod) == ("barrel.A", "rod.B")
+    rod, barrel = parts.long
+    apart = np.hypot(*(shown.tracks[parts.rod] - shown.tracks[parts.barrel]))
+    assert [apart.min(), apart.max()] == pytest.approx([0.95, 1.70], rel=1e-6)
+    assert barrel < apart.min()
+    assert rod < apart.min()
+    assert rod + barrel > apart.max()
+    drawn = plots.figure(result, "mechanism", at="375 mm")
+    ends = [line.get_xydata() for line in drawn.axes[0].lines if line.get_linewidth() == 17.0]
+    foot = shown.tracks["barrel.A"][:, 0]
+    assert [end[0] for end in ends] == [pytest.approx(foot)]
+    press = picture(trunnion.analyse(trunnion.read(EXAMPLES / "slider-crank.yaml"), 12))
+    assert cylinder(press, "S") is None  # on the ground

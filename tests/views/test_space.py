@@ -24,7 +24,7 @@ from trunnion.views.space.camera import best, looking
 from trunnion.views.space.paint import facets
 from trunnion.views.space.scene import screw_axis
 from trunnion.views.space.scenery import scenery
-from trunnion.views.space.solids import SYMBOLS, solids
+from trunnion.views.space.solids import SYMBOLS, Solid, solids
 
 BLANK = ("nowhere", "locked")  # no position can be drawn
 
@@ -177,6 +177,57 @@ def test_solids_stay_in_the_box_that_the_figure_shows():
                 assert x.max() < right + room
                 assert y.min() > below - room
                 assert y.max() < above + room
+
+
+def test_a_cardan_joint_is_a_fork_a_cross_and_a_fork():
+    """Each shaft has two prongs to either end of its pin; the cross has two arms square to each other."""
+    shown = space(cardan())
+    bodies = {
+        link: [
+            one
+            for one in solids(shown)
+            if one.paint == link
+            and one.kind == "rod"
+            and one.radius > 0.012 * shown.size
+            and one.radius < 0.014 * shown.size
+        ]
+        for link in shown.moving
+    }
+    (cross,) = [
+        link for link in shown.moving if len(bodies[link]) == 2 and all(len(one.points) == 2 for one in bodies[link])
+    ]
+    first, second = (one.points[1] - one.points[0] for one in bodies[cross])
+    assert abs(first @ second) < 1e-9 * np.linalg.norm(first) * np.linalg.norm(second) + 1e-12
+    for link in shown.moving:
+        if link == cross:
+            continue
+        prongs = [one.points for one in bodies[link]]
+        assert len(prongs) == 2
+        assert prongs[0][0] == pytest.approx(prongs[1][0])
+        joint = next(
+            name for name, one in shown.joints.items() if link in one["links"] and shown.ground not in one["links"]
+        )
+        centre = shown.element(joint, shown.joints[joint]["links"].index(link))[0]
+        assert (prongs[0][-1] + prongs[1][-1]) / 2 == pytest.approx(centre, abs=1e-12)
+
+
+def test_wide_ends_of_a_rod_are_cut_into_pieces_that_sort():
+    """They cover the end: the areas of the pieces are that of the polygon."""
+    solid = Solid("rod", "plate", np.array([[0.0, 0, 0], [0, 0, 0.01]]), 0.5)
+    ends = [one for one in facets(solid, 1.0) if np.ptp(one[:, 2]) == 0 and one[0, 2] > 0]
+    assert len(ends) > 16
+    area = sum(np.linalg.norm(sum(np.cross(a, b) for a, b in pairwise([*one, one[0]]))) / 2 for one in ends)
+    assert area == pytest.approx(16 / 2 * 0.25 * np.sin(2 * np.pi / 16))
+
+
+def test_a_swash_plate_is_a_disc_as_wide_as_its_shoe_travels():
+    shown = space(every_kind())
+    (name,) = [name for name, joint in shown.joints.items() if joint["type"] == "planar"]
+    discs = [one for one in solids(shown) if one.kind == "rod" and one.radius > 0.05 * shown.size]
+    (disc,) = discs
+    side = shown.joints[name]["links"].index(disc.link)
+    apart = shown.at(name, 1 - side) - shown.poses[disc.link].place(shown.element(name, side)[0])
+    assert disc.radius > np.nanmax(np.linalg.norm(apart, axis=0))
 
 
 # ---- scene ----------------------------------------------------------------------------------------------------

@@ -433,3 +433,16 @@ def test_a_measure_that_is_undefined_has_a_row_that_says_so():
     data["dimensions"] = {**data["dimensions"], "l2": "200 mm"}
     (table,) = tables(trunnion.tolerance(trunnion.Mechanism(**data), ["least"], methods=("linear",), steps=12))
     assert table.rows == [["nominal", "undefined"]]
+
+
+def test_the_interval_of_few_samples_stays_within_what_can_be():
+    """Of σ not below 0, of a yield not beyond 0 and 100 %."""
+    result = toleranced(24)
+    wide = result.assign(convergence_deviation=result["convergence_deviation"] * 1e-3)
+    for case in (result, wide):
+        _, sigma, passed = figure(case, "convergence").axes
+        for axes, least, most in ((sigma, 0.0, np.inf), (passed, 0.0, 100.0)):
+            for band in axes.collections:
+                for path in band.get_paths():
+                    assert path.vertices[:, 1].min() >= least
+                    assert path.vertices[:, 1].max() <= most

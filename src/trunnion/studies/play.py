@@ -352,12 +352,17 @@ def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
                 yield finding_for("play.spin", f"measures.{measure.name}", link=link, points=list(ends))
 
 
+def _judged_limit(measure: Measure) -> float | None:
+    """The deviation that is allowed to either side where the measure is judged: at its place, or at every position."""
+    sides = [abs(side) for side in (measure.limit, measure.upper, measure.lower) if side is not None]
+    placed = measure.at is not None or measure.rule in EXTREMES
+    return min(sides) if placed and sides else measure.limit
+
+
 def _limit(played: Played, i: int) -> Iterator[Finding]:
     """Whether the worst case of a measure keeps its limit."""
     measure = played.measures[i]
-    sides = [abs(side) for side in (measure.limit, measure.upper, measure.lower) if side is not None]
-    placed = measure.at is not None or measure.rule in EXTREMES
-    limit, worst = min(sides) if placed and sides else measure.limit, float(np.sum(played.at_places[i].worst_case))
+    limit, worst = _judged_limit(measure), float(np.sum(played.at_places[i].worst_case))
     if limit is None or not np.isfinite(worst):
         return
     unit, where = measure.unit(played.run.system), f"measures.{measure.name}.limit"
@@ -442,7 +447,7 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
     attributes = {
         **origin(mechanism, system.plan.formula),
         **cited(references(mechanism)),
-        "limits": [measure.limit for measure in played.measures],
+        "limits": [_judged_limit(measure) for measure in played.measures],
         "inputs": inputs(mechanism),
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),

@@ -106,7 +106,9 @@ def _panel(every: xr.Dataset, i: int) -> Panel:
         # of an extreme the curve has the pins where they are, the figure also this place, which they may move
         at = np.array([_place(result, over)])
         place = " at ".join(attribute(every, "places")[i]).strip()
-        marks.append(Line(at, np.array([extreme * factor]), place, Look("ink", dash="none", mark="o", size=6)))
+        marks.append(
+            Line(at, np.array([extreme * factor]), place, Look("ink", dash="none", mark="o", size=6, unclipped=True))
+        )
     marks += silent(every, over)
     top = None
     if shown < most:

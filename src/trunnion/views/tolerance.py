@@ -422,6 +422,11 @@ def convergence(read: MeasureReading) -> Panel:
     for key, title, factor in rows:
         values = read.row(f"convergence_{key}") * factor
         low, high = (factor * end for end in _running_interval(read, key, values / factor, size))
+        least, most = {"mean": (-np.inf, np.inf), "deviation": (0.0, np.inf), "yield": (0.0, 100.0)}[key]
+        low, high = (
+            np.clip(low, least, most),
+            np.clip(high, least, most),
+        )  # of few samples normal intervals reach beyond
         bounded = np.isfinite(low)
         marks: list[Mark] = [Line(size, values, "of the first samples", Look(WITHIN, mark="o", size=3.2))]
         if bounded.sum() > 1:

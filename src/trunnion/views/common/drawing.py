@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.patches import Circle, Polygon, Rectangle
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 GHOSTS = 8
+PISTON, ASIDE = 0.95, 0.01  # length of a cylinder's rod, of the least distance of its eyes; of the size: off the guide
 PALE = "#b4bac1"  # of links that are not spoken of
 
 
@@ -118,7 +119,9 @@ def draw(axes: Axes, shown: Picture, index: int, labels: Labels) -> None:
 def sketch(axes: Axes, shown: Picture, index: int) -> None:
     """Links, springs, gears and joints at position `index` over the coupler curves, without a letter."""
     _curves(axes, shown)
-    for link in sorted(shown.moving, key=lambda link: link in shown.only):  # what is spoken of lies above
+    cylinders = {link for name, joint in shown.stated["joints"].items()
+                 if PAIRS[joint["type"]].guided and cylinder(shown, name) for link in joint["links"]}  # fmt: skip
+    for link in sorted({*shown.moving} - cylinders, key=lambda link: (link in shown.only, shown.moving.index(link))):
         _body(axes, shown, link, index, shown.colour(link))
     for name, spring in shown.stated["springs"].items():
         _spring(axes, shown, spring.get("between") or (), index, shown.pulls.get(name))
@@ -282,11 +285,58 @@ def _slider(axes: Axes, shown: Picture, name: str, index: int, place: Array, gro
         middle = place + ((low + high) / 2 - here) * np.array([np.cos(angle), np.sin(angle)])
         below = np.array([np.sin(angle), -np.cos(angle)]) * r
         _hatched(axes, middle + below, angle, (high - low) / 2 + 2.4 * r, r)
+    elif (parts := cylinder(shown, name)) is not None:
+        _cylinder(axes, shown, name, index, parts)
+        return
     else:
         _slot(axes, shown, name, index, 2.4 * r)
     turned = Affine2D().rotate(angle).translate(*place) + axes.transData
     axes.add_patch(Rectangle((-1.7 * r, -r), 3.4 * r, 2 * r, transform=turned, facecolor="white", edgecolor=INK,
                              linewidth=1.3, zorder=5))  # fmt: skip
+
+
+class Cylinder(NamedTuple):
+    """A driven slide between two links that are pinned at their other ends: a barrel and the piston rod in it.
+
+    barrel, rod: their eyes, as keys of points; long: length of the rod and of the barrel, m.
+    """
+
+    barrel: str
+    rod: str
+    long: tuple[float, float]
+
+
+def cylinder(shown: Picture, name: str) -> Cylinder | None:
+    """The cylinder that a slide is; None where no driver moves it, where its links have more than two joints, where the
+    eyes do not lie on the guide, or where the stroke is longer than a barrel could be.
+    """
+    stated, eyes = shown.stated, list[str]()
+    for link in stated["joints"][name]["links"]:
+        keys = [key for key in shown.joints(link) if key != f"{link}.{name}"]
+        if link == shown.ground or len(keys) != 1 or keys[0].split(".", 1)[1] not in stated["joints"]:
+            return None
+        eyes += keys
+    if name not in stated.get("drivers", ()):
+        return None
+    apart = shown.tracks[eyes[1]] - shown.tracks[eyes[0]]
+    turns = np.array([shown.axis(name, position) for position in range(apart.shape[1])])
+    beside = np.nanmax(np.abs(apart[1] * np.cos(turns) - apart[0] * np.sin(turns)), initial=0.0)
+    low, high = (float(end(np.hypot(*apart))) for end in (np.nanmin, np.nanmax))
+    rod = PISTON * low
+    barrel = high - rod + (1 - PISTON) * low
+    return Cylinder(*eyes, (rod, barrel)) if barrel < low and beside < ASIDE * shown.size else None
+
+
+def _cylinder(axes: Axes, shown: Picture, name: str, index: int, parts: Cylinder) -> None:
+    """The rod, and over it the barrel that it comes out of."""
+    start, end = shown.tracks[parts.barrel][:, index], shown.tracks[parts.rod][:, index]
+    along = (end - start) / np.hypot(*(end - start))
+    barrel, rod = shown.stated["joints"][name]["links"]
+    for ends, width, link in (((end - parts.long[0] * along, end), 7.0, rod),
+                              ((start, start + parts.long[1] * along), 17.0, barrel)):  # fmt: skip
+        for edge, paint in ((0.0, shown.colour(link)), (2.4, tint(shown.colour(link)))):
+            axes.plot(*np.array(ends).T, color=paint, linewidth=(width - edge) * shown.weight,
+                      zorder=4.2 if link == rod else 4.3, solid_capstyle="round")  # fmt: skip
 
 
 def _slot(axes: Axes, shown: Picture, name: str, index: int, beyond: float) -> None:

@@ -66,7 +66,20 @@ def _rod(points: Array, radius: float, grown: float, step: float) -> list[Array]
     sides = [
         np.array([low[i], low[i + 1], high[i + 1], high[i]]) for low, high in pairwise(rings) for i in range(SIDES)
     ]
-    return [*sides, rings[0][:0:-1], rings[-1][:-1]]
+    return [*sides, *_cap(rings[0][:0:-1], step), *_cap(rings[-1][:-1], step)]
+
+
+def _cap(rim: Array, step: float) -> list[Array]:
+    """The end of a rod; a wide one, as of a disc, in rings of pieces that sort."""
+    middle = rim.mean(axis=0)
+    count = int(np.linalg.norm(rim[0] - middle) // step)
+    if count < 2:
+        return [rim]
+    shares = np.linspace(1.0, 1.0 / count, count)
+    rings = [middle + share * (np.vstack([rim, rim[:1]]) - middle) for share in shares]
+    pieces = [np.array([out[i], out[i + 1], inner[i + 1], inner[i]]) for out, inner in pairwise(rings)
+              for i in range(len(rim))]  # fmt: skip
+    return [*pieces, rings[-1][:-1]]
 
 
 def _cut(points: Array, step: float) -> Array:

@@ -24,6 +24,7 @@ __all__ = ["Solid", "solids"]
 BAR, FINE, SHAFT, SLEEVE, HALF, BALL, BLOCK = 0.0125, 0.005, 0.0095, 0.022, 0.03, 0.024, 0.024
 COLLAR, FOOT = 0.0165, 0.05
 TURNS, STEPS = 5, 10  # of a thread, and its corners a turn
+NEAR, SQUARE = 0.2, 0.25  # of the axes of a fork or a cross: apart, share of the size, and cosine between them
 ARC = np.radians(9)  # of a rod that is part of an arc
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -75,8 +76,8 @@ def _body(shown: Space, link: str) -> list[Solid]:
     """Rods along the shortest tree through the joints of a link, finer ones to its free points."""
     sides = {name: joint["links"].index(link) for name, joint in shown.joints.items() if link in joint["links"]}
     seats = {name: shown.seat(name, side) for name, side in sides.items()}
-    found = []
-    for one, two in _tree(seats):
+    found = _of_cardan(shown, link, sides)
+    for one, two in [] if found else _tree(seats):
         route = np.array(_route(shown, (one, sides[one]), (two, sides[two])))
         route[0] += _clear(shown, one, sides[one], route[1] - route[0])
         route[-1] += _clear(shown, two, sides[two], route[-2] - route[-1])
@@ -88,6 +89,32 @@ def _body(shown: Space, link: str) -> list[Solid]:
             found.append(_rod(link, base, place, FINE * shown.size, link))
             found.append(Solid("ball", link, place[None], 0.011 * shown.size, link))
     return found
+
+
+def _of_cardan(shown: Space, link: str, sides: dict[str, int]) -> list[Solid]:
+    """A link of a Cardan joint, both of whose axes cross squarely in one place: the cross between two moving links, or
+    the fork of a shaft in the ground. Nothing of other links.
+    """
+    if len(sides) != 2 or not all(shown.shifts[name] for name in sides):
+        return []
+    size, (first, second) = shown.size, (shown.element(name, side) for name, side in sides.items())
+    if np.linalg.norm(first[0] - second[0]) > NEAR * size or abs(float(first[1] @ second[1])) > SQUARE:
+        return []
+    shafts = [name for name in sides if shown.ground in shown.joints[name]["links"]]
+    pins = [name for name in sides if name not in shafts]
+    if not shafts:
+        arms = {name: (abs(shown.shifts[name]) + HALF * size) * shown.element(name, sides[name])[1] for name in pins}
+        middles = {name: shown.element(name, sides[name])[0] for name in pins}
+        return [_rod(link, middles[name] - arm, middles[name] + arm, BAR * size, link) for name, arm in arms.items()]
+    if len(pins) != 1:
+        return []
+    (shaft,), (pin,) = shafts, pins
+    start, centre = shown.seat(shaft, sides[shaft]), shown.element(shaft, sides[shaft])[0]
+    middle, axis, _ = shown.element(pin, sides[pin])
+    ends = [shown.seat(pin, sides[pin]), 2 * middle - shown.seat(pin, sides[pin])]
+    prongs = [Solid("rod", link, np.array(_arc(start, end, centre, middle)), BAR * size, link) for end in ends]
+    eye = _rod(link, ends[1] - HALF * size * axis, ends[1] + HALF * size * axis, SLEEVE * size)
+    return [*prongs, eye]
 
 
 def _clear(shown: Space, name: str, side: int, way: Array) -> Array:
@@ -251,7 +278,7 @@ def _cross(shown: Space, name: str) -> list[Solid]:
 
 
 def _flat(shown: Space, name: str) -> list[Solid]:
-    """A slab of the inner link on the plate of the outer one, as wide as it travels."""
+    """A slab of the inner link on a disc of the outer one, as wide as it travels."""
     size, links = shown.size, shown.joints[name]["links"]
     outer = _outer(shown, name)
     point, z, x = shown.element(name, outer)
@@ -259,9 +286,8 @@ def _flat(shown: Space, name: str) -> list[Solid]:
     frame = shown.poses[links[outer]]
     apart = shown.at(name, 1 - outer) - frame.place(point)
     across = [np.einsum("in,in->n", apart, frame.direction(one)) for one in (x, y)]
-    half = max(float(np.nanmax(np.abs(across))) + 1.6 * BLOCK * size, 3 * BLOCK * size)
-    plate = np.array([half * x, half * y, 0.004 * size * z])
-    found = [_box(links[outer], point - 0.014 * size * z, plate, links[outer])]
+    radius = max(float(np.nanmax(np.hypot(*across))) + 1.6 * BLOCK * size, 3 * BLOCK * size)
+    found = [_rod(links[outer], point - 0.018 * size * z, point - 0.01 * size * z, radius, links[outer])]
     _, w, v = shown.element(name, 1 - outer)
     slab = np.array([1.3 * BLOCK * size * v, 1.3 * BLOCK * size * np.cross(w, v), 0.01 * size * w])
     return [*found, _box(links[1 - outer], shown.seat(name, 1 - outer), slab)]

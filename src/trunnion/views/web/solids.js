@@ -45,9 +45,23 @@ function rod(corners, radius, more, step) {
     x = plus(ring[0], after, -dot(ring[0], after)); // on the next piece the same line of the surface
   });
   const sides = Array.from({ length: SIDES }, (_, side) => side);
-  const faces = [sides.map((side) => SIDES - 1 - side), sides.map((side) => last * SIDES + side)];
+  const faces = [...cap(points, sides.map((side) => SIDES - 1 - side), step), ...cap(points, sides.map((side) => last * SIDES + side), step)];
   for (let order = 0; order < last; order += 1) faces.push(...around(order * SIDES, (order + 1) * SIDES));
   return { points, faces };
+}
+
+/** The end of a rod from its rim; a wide one, as of a disc, in rings of faces that sort, whose corners join the points. */
+function cap(points, rim, step) {
+  const middle = scaled(rim.reduce((sum, corner) => plus(sum, points[corner]), [0, 0, 0]), 1 / rim.length);
+  const count = Math.floor(Math.hypot(...plus(points[rim[0]], middle, -1)) / step);
+  const rings = [rim];
+  for (let ring = 1; ring < count; ring += 1) {
+    rings.push(rim.map((corner) => points.push(plus(middle, plus(points[corner], middle, -1), 1 - ring / count)) - 1));
+  }
+  const faces = rings.slice(1).flatMap((inner, order) =>
+    inner.map((corner, side) => [rings[order][side], rings[order][(side + 1) % SIDES], inner[(side + 1) % SIDES], corner]),
+  );
+  return [...faces, rings[rings.length - 1]];
 }
 
 /** The line through the corners with more points on it, none farther from the next than a step. */

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,27 +16,108 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.solve.assembly_modes import AssemblyMode, GroupModes, choices, put_together
 from trunnion.solve.forward import forward
 from trunnion.solve.run import Run, prepare
-from trunnion.views.assembly.mode_drawings_space import space_ways
-from trunnion.views.assembly.mode_panels import panels
 from trunnion.views.assembly.modes import some
 from trunnion.views.common.cycle import Array, layout
-from trunnion.views.common.drawing import Picture, framed, name_points, sketch
-from trunnion.views.common.figures import MUTED, new
+from trunnion.views.common.drawing import Picture, framed, name_points
+from trunnion.views.common.drawing import sketch as sketch_plane
+from trunnion.views.common.figures import INK, MUTED, RULE, new
 from trunnion.views.common.labels import Labels
 from trunnion.views.common.lettering import plain
+from trunnion.views.space.bodies import space
+from trunnion.views.space.camera import best, looking
+from trunnion.views.space.figure import name_joints
+from trunnion.views.space.figure import sketch as sketch_space
+from trunnion.views.space.scenery import Scenery, scenery
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
 __all__ = ["ways"]
 
-COLUMNS = 4  # at most, of drawings
-WIDTH = 2.4  # of a drawing, in
 MOST_DRAWN = 24  # ways of one group
 SYMBOLS = 1.25  # size of joints and bearings, as if the mechanism were so much larger
-STEPS = 90  # positions of a turn, of the paths
+STEPS, STEPS_SPACE = 90, 48  # positions of a turn, of the paths
 MOST_STEPS = 1440
+
+
+class Cell(NamedTuple):
+    """One drawing: the way that it is of, the box around what it shows, m, and what draws it into axes."""
+
+    way: AssemblyMode
+    box: tuple[float, float, float, float] | None
+    draw: Callable[[Axes, float, Labels], None]
+
+
+def ways(mechanism: Mechanism, found: Sequence[GroupModes] | None = None) -> Figure:
+    """A drawing for every way of every group that has several, with the paths of the points; the taken one is marked.
+
+    Each is what the mechanism becomes if that way is named in the file and all else is left, so later groups follow
+    their own hints. A row is a group, or more rows if it has many ways. found: the choices, if known.
+    Raises MechanismError if there is nothing to choose or to draw.
+    """
+    found = choices(prepare(mechanism)) if found is None else found
+    if not found:
+        what = "no group has more than one assembly mode: there is nothing to draw"
+        raise MechanismError(Finding(what, remedy="draw the mechanism with `trunnion plot --kind mechanism`"))
+    if mechanism.space == "spatial":
+        result = analyse(mechanism.with_friction("off"), 1)
+        return _sheet(result, found, _in_space(mechanism, found), columns=3, width=2.9)
+    result = analyse(mechanism, 1)
+    drawn = [[_drawn(mechanism, layout(result), choice, way) for way in some(choice, MOST_DRAWN)] for choice in found]
+    cells = [[Cell(one.way, one.shown.box, one.draw) for one in row] for row in drawn]
+    return _sheet(result, found, cells, columns=4, width=2.4)
+
+
+def _sheet(
+    result: xr.Dataset, found: Sequence[GroupModes], rows: list[list[Cell]], columns: int, width: float
+) -> Figure:
+    """The drawings in rows of at most so many columns, each so wide, inches, all in one scale."""
+    boxes = np.array([cell.box for row in rows for cell in row if cell.box] or [(0.0, 0.0, 1.0, 1.0)])
+    low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+    size = float(np.hypot(*(high - low))) or 1.0
+    (left, below), (right, above) = (low - 0.08 * size).tolist(), (high + 0.08 * size).tolist()
+    box = (left, below - 0.03 * size, right, above)  # a bearing reaches below its joint
+    columns = min(columns, max(map(len, rows)))
+    tall = width * min(max((box[3] - box[1]) / (box[2] - box[0]), 0.45), 1.6) + 0.28
+    heights = [0.3 + math.ceil(len(row) / columns) * tall for row in rows]
+    figure = new("Assembly modes", result, 0.6 + sum(heights), max(columns, 2) * width + 0.2)
+    parts = figure.subfigures(len(found), 1, squeeze=False, height_ratios=heights)[:, 0]
+    labels, shown = Labels(figure), float(np.hypot(box[2] - box[0], box[3] - box[1]))
+    for part, choice, row in zip(parts, found, rows, strict=True):
+        for axes, cell in zip(_panels(part, choice, [cell.way for cell in row], columns, box), row, strict=True):
+            cell.draw(axes, shown, labels)
+    labels.place()
+    return figure
+
+
+def _panels(
+    part: SubFigure, choice: GroupModes, modes: Sequence[AssemblyMode], columns: int, box: Sequence[float]
+) -> list[Axes]:
+    """Axes for each of the modes that are drawn, under their names; the frame of the one that is used is bold.
+
+    box: left, below, right, above of all of them, m.
+    """
+    where = f", at {choice.where}" if choice.where else ""
+    more = f", {len(modes)} of {len(choice.ways)} assembly modes" if len(modes) < len(choice.ways) else ""
+    head = f"{choice.label}    {', '.join(choice.links)}{where}{more}"
+    part.suptitle(plain(head), x=0.012, ha="left", fontsize=9, color=INK)
+    grid = part.subplots(math.ceil(len(modes) / columns), columns, squeeze=False).ravel().tolist()
+    for axes in grid[len(modes) :]:
+        axes.set_visible(False)
+    for axes, mode in zip(grid, modes, strict=False):
+        axes.set_aspect("equal")
+        axes.set(xlim=(box[0], box[2]), ylim=(box[1], box[3]), xticks=[], yticks=[])
+        for spine in axes.spines.values():
+            spine.set(color=INK if mode.taken else RULE, linewidth=1.8 if mode.taken else 1.0)
+        title = f"{choice.link}: {mode.name}" + "  used" * mode.taken
+        weight = "bold" if mode.taken else "normal"
+        axes.set_title(plain(title), fontsize=8.5, fontweight=weight, color=INK, loc="left", pad=4)
+    return list(grid[: len(modes)])
+
+
+# ---- in the plane -------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -48,36 +129,17 @@ class ModeDrawing:
     index: int
     missing: tuple[str, ...]
 
+    def draw(self, axes: Axes, size: float, labels: Labels) -> None:
+        """The mechanism with the names of the joints of the group; size: of the box around all drawings, m."""
+        shown = replace(self.shown, size=SYMBOLS * size)
+        sketch_plane(axes, shown, self.index)
+        name_points(axes, shown, self.index, labels, list(self.way.joints))
+        if self.missing:
+            _remark(axes, f"not assembled here: {', '.join(self.missing)}")
 
-def ways(mechanism: Mechanism, found: Sequence[GroupModes] | None = None) -> Figure:
-    """A drawing for every way of every group that has several, with the paths of the points; the taken one is marked.
 
-    Each is what the mechanism becomes if that way is named in the file and all else is left, so later groups follow
-    their own hints. A row is a group, or more rows if it has more than four ways. found: the choices, if known.
-    Raises MechanismError if there is nothing to choose or to draw.
-    """
-    found = choices(prepare(mechanism)) if found is None else found
-    if not found:
-        what = "no group has more than one assembly mode: there is nothing to draw"
-        raise MechanismError(Finding(what, remedy="draw the mechanism with `trunnion plot --kind mechanism`"))
-    if mechanism.space == "spatial":
-        return space_ways(mechanism, found)
-    result = analyse(mechanism, 1)
-    rows = [[_drawn(mechanism, layout(result), choice, way) for way in some(choice, MOST_DRAWN)] for choice in found]
-    box = _box([one.shown for row in rows for one in row])
-    columns = min(COLUMNS, max(map(len, rows)))
-    lines = [math.ceil(len(row) / columns) for row in rows]
-    high = WIDTH * min(max((box[3] - box[1]) / (box[2] - box[0]), 0.45), 1.6) + 0.28
-    width = max(columns * WIDTH, 2 * WIDTH) + 0.2
-    figure = new("Assembly modes", result, 0.6 + sum(0.3 + line * high for line in lines), width)
-    parts = figure.subfigures(len(found), 1, squeeze=False, height_ratios=[0.3 + line * high for line in lines])[:, 0]
-    labels = Labels(figure)
-    size = float(np.hypot(box[2] - box[0], box[3] - box[1]))
-    for part, choice, row in zip(parts, found, rows, strict=True):
-        for axes, one in zip(panels(part, choice, [one.way for one in row], columns, box), row, strict=True):
-            _one(axes, one, size, labels)
-    labels.place()
-    return figure
+def _remark(axes: Axes, text: str) -> None:
+    axes.text(0.03, 0.03, plain(text), transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8)
 
 
 def _drawn(mechanism: Mechanism, stated: dict[str, Any], choice: GroupModes, way: AssemblyMode) -> ModeDrawing:
@@ -113,20 +175,34 @@ def _run(mechanism: Mechanism, choice: GroupModes, way: AssemblyMode) -> Run:
         return prepare(Mechanism(**{**stated, "assembly": kept}))
 
 
-def _box(pictures: Sequence[Picture]) -> tuple[float, float, float, float]:
-    """Around all that the pictures show, so that they have one scale, with a margin."""
-    boxes = np.array([picture.box for picture in pictures])
-    low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
-    size = float(np.hypot(*(high - low))) or 1.0
-    (left, below), (right, above) = (low - 0.08 * size).tolist(), (high + 0.08 * size).tolist()
-    return left, below - 0.03 * size, right, above  # a bearing reaches below its joint
+# ---- in space -----------------------------------------------------------------------------------------------------
 
 
-def _one(axes: Axes, one: ModeDrawing, size: float, labels: Labels) -> None:
-    """One drawing."""
-    shown = replace(one.shown, size=SYMBOLS * size)
-    sketch(axes, shown, one.index)
-    name_points(axes, shown, one.index, labels, list(one.way.joints))
-    if one.missing:
-        text = f"not assembled here: {', '.join(one.missing)}"
-        axes.text(0.03, 0.03, plain(text), transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8)
+def _in_space(mechanism: Mechanism, found: Sequence[GroupModes]) -> list[list[Cell]]:
+    """The drawings of all ways from one side; of those that cannot be assembled a remark."""
+    rows = []
+    camera = None
+    for choice in found:
+        rows.append(list[Cell]())
+        for way in some(choice, MOST_DRAWN // 2):
+            try:
+                result = analyse(put_together(mechanism, choice, way).with_friction("off"), STEPS_SPACE)
+                shown = space(result)
+            except MechanismError:
+                rows[-1].append(Cell(way, None, lambda axes, *_: _remark(axes, "cannot be assembled in this mode")))
+                continue
+            camera = camera or looking(*best(shown))
+            look = scenery(shown, camera)
+            known = np.flatnonzero(shown.drawable)
+            times = np.asarray(result["time"].values, dtype=float)
+            index = int(known[np.argmin(np.abs(times[known] - choice.time))])
+            rows[-1].append(Cell(way, look.box, _drawing(choice, way, look, index)))
+    return rows
+
+
+def _drawing(choice: GroupModes, way: AssemblyMode, look: Scenery, index: int) -> Callable[[Axes, float, Labels], None]:
+    def draw(axes: Axes, size: float, labels: Labels) -> None:
+        sketch_space(axes, look, index, choice.links)
+        name_joints(axes, look, index, labels, tuple(way.joints), 7.5)
+
+    return draw

@@ -324,7 +324,7 @@ def cylinder(shown: Picture, name: str) -> Cylinder | None:
     low, high = (float(end(np.hypot(*apart))) for end in (np.nanmin, np.nanmax))
     rod = PISTON * low
     barrel = high - rod + (1 - PISTON) * low
-    return Cylinder(*eyes, (rod, barrel)) if barrel < low and beside < ASIDE * shown.size else None
+    return Cylinder(eyes[0], eyes[1], (rod, barrel)) if barrel < low and beside < ASIDE * shown.size else None
 
 
 def _cylinder(axes: Axes, shown: Picture, name: str, index: int, parts: Cylinder) -> None:

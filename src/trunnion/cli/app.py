@@ -450,7 +450,7 @@ def _show_position(result: Result, file: Path, at: str) -> None:
 
     rows = []
     for name, unit, values in columns(result.dataset):
-        value = values(slice(None))[0]
+        value = values[0]
         text, shown = (str(value), "") if isinstance(value, str) else parts(float(value), unit)
         rows.append([name, text, "" if shown == "1" else shown])
     show_rows(f"{result.attrs['name'] or file} at {at}", ["", "value", "unit"], rows)

@@ -377,13 +377,6 @@ def _judged_limit(measure: Measure) -> float | None:
     return min(sides) if placed and sides else measure.limit
 
 
-def _judged_limit(measure: Measure) -> float | None:
-    """The deviation that is allowed to either side where the measure is judged: at its place, or at every position."""
-    sides = [abs(side) for side in (measure.limit, measure.upper, measure.lower) if side is not None]
-    placed = measure.at is not None or measure.rule in EXTREMES
-    return min(sides) if placed and sides else measure.limit
-
-
 def _limit(played: Played, i: int) -> Iterator[Finding]:
     """Whether the worst case of a measure keeps its limit."""
     measure = played.measures[i]

@@ -249,7 +249,8 @@ def _not_assembled(cycle: Cycle) -> Iterator[Finding]:
         elif not everywhere:
             unreached = "these links cannot reach it from the start without being taken apart"
             why = f"{why} there, where the motion starts" if start else unreached
-        yield Finding.error("assembly.open", where, f"{nowhere}: {why}", remedy, at=at, everywhere=everywhere)
+        figures = {"at": at, "everywhere": everywhere, "start": start}
+        yield Finding.error("assembly.open", where, f"{nowhere}: {why}", remedy, **figures)
 
 
 def _undecided_senses(cycle: Cycle) -> Iterator[Finding]:
@@ -601,7 +602,14 @@ def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
                 f"; elsewhere {'their largest' if several else 'its'} contact-loss number is at most {number:.3g} "
             )
             remedy += f"rad/(N s), {turning} (impact is likely from {contact_loss.EARLES_WU:g}: Earles and Wu)"
-        figures = {"part": part, "at": text, "least": least, "peak": nearest.peak, "number": number}
+        figures = {
+            "part": part,
+            "count": len(names),
+            "at": text,
+            "least": least,
+            "peak": nearest.peak,
+            "number": number,
+        }
         yield Finding.warning("contact.lost", f"joints.{', '.join(names)}", what, remedy, **figures)
     for (part, text), names in lifted.items():
         what = f"the {part}{agreeing(len(names), '', 's')} {agreeing(len(names), 'lifts', 'lift')} off the wall "

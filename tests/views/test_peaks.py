@@ -169,7 +169,8 @@ def test_every_verb_that_draws_can_show_all(verb, tmp_path):
         "play": ["--set", "P.pin.clearance=0.1mm", "--measure", "rotation:O", "--out", picture],
     }[verb]  # fmt: skip
     for switch in ([], ["--uncut"]):
-        CliRunner().invoke(app, [verb, str(file), "--steps", "400", *map(str, more), *switch])
+        done = CliRunner().invoke(app, [verb, str(file), "--steps", "400", *map(str, more), *switch])
+        assert page.exists() or picture.exists(), done.output + repr(done.exception)
         text = (page if page.exists() else picture).read_text(encoding="utf-8")
         if page.exists():
             assert ('"ease":[1.0]' in text.replace(" ", "")) == bool(switch)

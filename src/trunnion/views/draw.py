@@ -385,7 +385,8 @@ def _line(mark: Line, axes: Axes, spec: Chart) -> None:
 @_mark.register(Band)
 def _band(mark: Band, axes: Axes, spec: Chart) -> None:
     x, low, high = _closed(spec, mark.x, mark.close, mark.low, mark.high)
-    axes.fill_between(x, low, high, label=_name(mark.name), **_area(mark.look))
+    picked = np.union1d(thin(low), thin(high))
+    axes.fill_between(x[picked], low[picked], high[picked], label=_name(mark.name), **_area(mark.look))
 
 
 @_mark.register(Stairs)

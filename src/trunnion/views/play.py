@@ -106,9 +106,8 @@ def _panel(every: xr.Dataset, i: int) -> Panel:
         # of an extreme the curve has the pins where they are, the figure also this place, which they may move
         at = np.array([_place(result, over)])
         place = " at ".join(attribute(every, "places")[i]).strip()
-        marks.append(
-            Line(at, np.array([extreme * factor]), place, Look("ink", dash="none", mark="o", size=6, unclipped=True))
-        )
+        look = Look("ink", dash="none", mark="o", size=6, unclipped=shown >= most)  # on the frame, but not beyond it
+        marks.append(Line(at, np.array([extreme * factor]), place, look))
     marks += silent(every, over)
     top = None
     if shown < most:

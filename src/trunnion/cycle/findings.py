@@ -300,16 +300,18 @@ def _locked(cycle: Cycle) -> Iterator[Finding]:
             f"lower these coefficients below {share:.3g} times their values, shorten the arms or lengthen the guides"
         )
         figures: dict[str, Any] = {"at": cycle.at.dial.intervals(places), "share": share, "joints": joints}
+        figures |= {"reverse": "", "decides": None, "multiple": None}
         if cycle.locking is not None:
             states, responsible = cycle.locking.all_states(), cycle.locking.responsible
             if LockingState.JAMMED in states:
                 there = "locks at some of these positions too" if LockingState.LOCKED in states else "locks there too"
                 what += f"; driven backward it {there} (jammed)"
+                figures["reverse"] = there
             if responsible and responsible[0] in module.joints:
                 figures |= {"decides": responsible[0], "multiple": responsible[1]}
                 alone = f"lower the coefficient of {responsible[0]} alone below {responsible[1]:.3g} times its value"
                 remedy = f"{alone}; or {remedy}"
-        margin = float(np.nanmin(cycle.at.arrays["locking_margin"][places], initial=np.inf))
+        figures["whole"] = margin = float(np.nanmin(cycle.at.arrays["locking_margin"][places], initial=np.inf))
         if margin < (1 - NEXT) * share:
             remedy = f"lower the coefficients of all joints below {margin:.3g} times their values (where "
             remedy += f"{', '.join(joints)} no longer lock, other joints do), shorten the arms or lengthen the guides"

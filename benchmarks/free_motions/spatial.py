@@ -146,6 +146,7 @@ class NewtonEuler:
         table = np.array(rows)
         jacobian = table[:, 1:] - table[:, :1]
         scale = np.linalg.norm(jacobian, axis=1)
+        scale[scale == 0] = 1.0  # a row that holds nothing at this pose
         return jacobian / scale[:, None], -table[:, 0] / scale
 
     def pose(self, row: Array) -> dict[str, tuple[Array, ...]]:
@@ -202,6 +203,7 @@ class NewtonEuler:
         unbound = roots @ (roots.T @ self.applied(pose))
         weighted = jacobian @ roots
         scale = np.linalg.norm(weighted, axis=1)
+        scale[scale == 0] = 1.0
         change = np.linalg.lstsq(weighted / scale[:, None], (right - jacobian @ unbound) / scale, rcond=DEPENDENT)[0]
         rates = (unbound + roots @ change).reshape(-1, 6)
         state, out = row.reshape(-1, 13), np.zeros((len(self.links), 13))

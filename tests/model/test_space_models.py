@@ -167,7 +167,6 @@ def test_moments_of_inertia_that_were_rounded(tmp_path: Path, moments: str, seve
 @pytest.mark.parametrize(
     ("change", "where", "what"),
     [
-        ("over_constraint: refuse", "over_constraint", "is for spatial models"),
         ("joint_defaults: {guide: {length: 1, width: 1}}", "joint_defaults.guide.width", "no torsion"),
     ],
 )

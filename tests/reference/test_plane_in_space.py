@@ -107,3 +107,76 @@ def test_a_joint_is_at_rest_by_one_rule() -> None:
             rate = np.broadcast_to(walk.rates(joint)[0 if turns else 1], (STEPS,))
             still = np.broadcast_to(walk.still(joint, turns), (STEPS,))
             np.testing.assert_array_equal(still, np.abs(rate) <= walk.noise(joint, turns))
+
+
+def coupled_wheels(third: tuple[float, float], stiffness: dict[str, float] | None = None) -> Data:
+    """Three equal cranks on one coupling rod: mobility 0 by the count, 1 by rank."""
+    feet = {"A": (0.0, 0.0), "B": (1.2, 0.0), "C": third}
+    pins = dict(zip(feet, "DEF", strict=True))
+    links: Data = {"ground": {"points": {name: list(place) for name, place in feet.items()}}}
+    joints: Data = {}
+    for name, pin in pins.items():
+        links[f"wheel-{name}"] = {"points": {name: [0, 0], pin: [0.3, 0]}, "mass": 20.0, "inertia": 0.5}
+        joints[name] = {"type": "revolute", "links": ["ground", f"wheel-{name}"]}
+        joints[pin] = {"type": "revolute", "links": [f"wheel-{name}", "rod"]}
+    rod = {pin: list(feet[name]) for name, pin in pins.items()}
+    links["rod"] = {"points": rod, "mass": 30.0, "inertia": 8.0, "centre": [1.0, 0.1]}
+    for name, radial in (stiffness or {}).items():
+        joints[name]["stiffness"] = {"radial": radial}
+    return {
+        "over_constraint": "minimum-norm",
+        "gravity": [0, -9.81],
+        "links": links,
+        "joints": joints,
+        "joint_defaults": {"pin": {"radius": 0.02}, "friction": 0.05},
+        "drivers": {"A": {"speed": 10.0, "range": [0.4, 2.6]}},
+        "loads": {"pull": {"joint": "C", "resisting_torque": 100.0, "useful": True}},
+    }
+
+
+@pytest.mark.parametrize("third", [(2.5, 0.0), (1.7, 0.9)])
+def test_three_wheels_on_a_rod(third: tuple[float, float]) -> None:
+    """In the plane as in space, where everything that holds it across the plane carries nothing."""
+    data = coupled_wheels(third)
+    flat = trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), STEPS)
+    space = trunnion.analyse(trunnion.Mechanism(trunnion=1, **raised(data)), STEPS)
+    np.testing.assert_allclose(flat.drive_effort.values, space.drive_effort.values, rtol=1e-9)
+    forces = flat.reaction_force.values
+    atol = 1e-9 * np.max(np.abs(forces))
+    np.testing.assert_allclose(space.reaction_force.values[:, :2], forces, rtol=0, atol=atol)
+    assert float(np.max(np.abs(flat.power_residual))) < 1e-10
+    assert {"mobility.redundant_least", "mobility.friction_open"} <= {one.code for one in flat.trunnion.findings}
+    rest = {key: value for key, value in data.items() if key != "over_constraint"}
+    with pytest.raises(trunnion.MechanismError, match="over_constraint: minimum-norm"):
+        trunnion.analyse(trunnion.Mechanism(trunnion=1, **rest), STEPS)
+
+
+def test_three_wheels_share_their_load_by_stiffness() -> None:
+    """Without friction: forces of the one self-stress shift the energy nowhere, Σ F · S / k = 0."""
+    stiffness = dict(zip("ABCDEF", (2e7, 5e6, 8e6, 3e7, 1e6, 4e6), strict=True))
+    data = {**coupled_wheels((1.7, 0.9), stiffness), "joint_defaults": {}}
+    result = trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), STEPS)
+    place = {name: result.point_position.sel(point=name).values for name in result.point.values}
+    for step in range(STEPS):
+        pins = np.array([place[f"rod.{name}"][:, step] for name in "DEF"])
+        crank = place["wheel-A.D"][:, step] - place["wheel-A.A"][:, step]
+        unit = crank / np.linalg.norm(crank)  # a massless crank passes on what is along it; the driven one anything
+        # forces of the cranks on the rod that balance: a along unit at E and F, any at D
+        matrix = np.array(
+            [
+                [1.0, 0.0, unit[0], unit[0]],
+                [0.0, 1.0, unit[1], unit[1]],
+                [
+                    -pins[0][1],
+                    pins[0][0],
+                    pins[1][0] * unit[1] - pins[1][1] * unit[0],
+                    pins[2][0] * unit[1] - pins[2][1] * unit[0],
+                ],
+            ]
+        )
+        null = np.linalg.svd(matrix)[2][-1]
+        own = np.array([null[:2], null[2] * unit, null[3] * unit])
+        forces = np.array([result.reaction_force.sel(joint=name).values[:, step] for name in "ABCDEF"])
+        stresses = np.vstack([own, own])
+        energy = [forces[i] @ stresses[i] / stiffness[name] for i, name in enumerate("ABCDEF")]
+        assert abs(sum(energy)) < 1e-9 * max(abs(part) for part in energy)

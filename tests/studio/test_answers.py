@@ -114,11 +114,11 @@ def test_every_example_opens(example):
     assert found["solved"] or set(why) <= {"mobility.redundant", "input.drivers", "input.tables"}, found["findings"]
 
 
-def test_friction_of_forces_that_statics_leaves_open_is_an_error():
+def test_friction_of_forces_that_statics_leaves_open_is_a_warning():
     found = ask(ask="model", text=EXAMPLES["bennett"].replace("bearing: 40 mm}", "bearing: 40 mm}\n  friction: 0.1"))
     assert "error" not in found
-    assert not found["solved"]
-    assert "mobility.friction_open" in {one["code"] for one in found["findings"] if one["severity"] == "error"}
+    assert found["solved"]
+    assert "mobility.friction_open" in {one["code"] for one in found["findings"] if one["severity"] == "warning"}
 
 
 def test_a_margin_is_of_positions_that_there_are():

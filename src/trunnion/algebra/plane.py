@@ -18,7 +18,7 @@ from trunnion.algebra.namespace import Number, namespace
 
 __all__ = [
     "NO_MOMENT", "NULL", "ORIGIN", "STILL", "ZERO", "ZERO_LOAD", "Frame", "Twist", "Vector2", "Wrench", "about",
-    "acceleration_at", "added", "bracket", "compose", "distance", "line_of", "minus", "moment_at", "moving",
+    "acceleration_at", "added", "bracket", "compose", "distance", "line_of", "minus", "moment_at", "moving", "on_axis",
     "place_of", "point_of", "power", "relative", "rotated", "rotated_moment", "slid", "spin", "times", "turned",
     "turned_vector", "velocity_at",
 ]  # fmt: skip
@@ -180,6 +180,11 @@ def acceleration_at(twist: Twist, second: Twist, place: Vector2) -> Vector2:
 def moment_at(wrench: Wrench, place: Vector2) -> Number:
     """Moment of a wrench about a place: M − p × F."""
     return less(wrench.m, less(literal.times(place[0], wrench.y), literal.times(place[1], wrench.x)))
+
+
+def on_axis(wrench: Wrench, joint: Frame, _: Number = 0.0) -> tuple[Vector2, tuple[()], tuple[Number]]:
+    """Force across the axis of a joint, which stands on the plane, none along it, and moment about its point."""
+    return (wrench.x, wrench.y), (), (moment_at(wrench, place_of(joint)),)
 
 
 def about(force: Vector2, moment: Number, place: Vector2) -> Wrench:

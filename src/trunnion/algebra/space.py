@@ -18,8 +18,8 @@ from trunnion.algebra.vector import IDENTITY, Vector3, cross, dot, plus, scaled,
 
 __all__ = [
     "NO_MOMENT", "NULL", "ORIGIN", "STILL", "ZERO", "ZERO_LOAD", "Frame", "Screw", "about", "added", "bracket",
-    "compose", "distance", "element", "line_of", "minus", "moment_at", "moving", "place_of", "point_of", "power",
-    "quaternion", "relative", "rotated", "rotated_moment", "slid", "spin", "times", "turned", "vector_minus",
+    "compose", "distance", "element", "line_of", "minus", "moment_at", "moving", "on_axis", "place_of", "point_of",
+    "power", "quaternion", "relative", "rotated", "rotated_moment", "slid", "spin", "times", "turned", "vector_minus",
     "velocity_at",
 ]  # fmt: skip
 
@@ -201,6 +201,13 @@ def moment_at(a: Screw, place: Vector3) -> Vector3:
 
 
 velocity_at = moment_at  # the same of a twist
+
+
+def on_axis(wrench: Screw, joint: Frame, middle: Number = 0.0) -> tuple[Vector3, tuple[Number], Vector3]:
+    """Force across and along the axis of a joint, and moment about the point at `middle` along it from the joint's."""
+    along = dot(wrench.u, joint.z)
+    moment = moment_at(wrench, plus(joint.place, scaled(middle, joint.z)))
+    return vector_minus(wrench.u, scaled(along, joint.z)), (along,), moment
 
 
 def spin(twist: Screw) -> Number:

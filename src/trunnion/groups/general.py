@@ -18,6 +18,7 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.plane import Frame, Twist, Wrench, about, moment_at, place_of, velocity_at
 from trunnion.groups.gear import NUMBERS, GearPair, actions, turn_from
+from trunnion.groups.redundant import Support
 from trunnion.groups.tree import OUTER, Coordinates, Element, Pose, Tree
 from trunnion.joints.planar import MOTIONS
 from trunnion.joints.spatial import PairMotion
@@ -163,15 +164,18 @@ class General(Tree):
             for force in actions(gear, pose.elements, ratio, torque)
         ]
 
-    def reactions(self, pose: Pose, loads: Sequence[Wrench]) -> list[Wrench]:
-        """See `General`."""
-        multipliers = self.multipliers(pose, loads)
-        wrenches = self.link_by_link(pose, loads, multipliers)
+    def link_by_link(self, pose: Pose, loads: Sequence[Wrench], multipliers: Sequence[Number]) -> list[Wrench]:
+        """Of the joints, then the torque that each gear pair puts into its second joint."""
         torques = multipliers[len(multipliers) - len(self.gears) :]
-        found = [self._at_joint(pose, k, wrench) for k, wrench in enumerate(wrenches)]
-        return found + [Wrench(0.0, 0.0, torque) for torque in torques]
+        return super().link_by_link(pose, loads, multipliers) + [Wrench(0.0, 0.0, torque) for torque in torques]
 
-    def _at_joint(self, pose: Pose, k: int, wrench: Wrench) -> Wrench:
+    def reactions(self, pose: Pose, loads: Sequence[Wrench], supports: Sequence[Support] = ()) -> list[Wrench]:
+        """See `General`."""
+        wrenches = super().reactions(pose, loads, supports)
+        count = len(self.joints)
+        return [self.at_joint(pose, k, wrench) for k, wrench in enumerate(wrenches[:count])] + wrenches[count:]
+
+    def at_joint(self, pose: Pose, k: int, wrench: Wrench) -> Wrench:
         """About the joint's point on its second link, where a pin that is not driven carries no moment."""
         if self.joints[k].sides == (OUTER, OUTER):
             return wrench

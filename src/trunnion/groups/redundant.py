@@ -2,15 +2,17 @@
 
 A planar four-bar drawn in space, Bennett's and Sarrus' linkages close although their equations outnumber their
 coordinates. Newton's method then takes the step of least squares, and a position counts where the gap closes. Statics
-does not tell what the redundant constraints add to the reactions; those returned are the smallest: the least sum of
-squares of forces, and of moments at the joints over the size. Real numbers only: a small change of a dimension
-takes such a linkage apart, so there is no derivative, and dual parts come out as NaN.
+does not tell what the redundant constraints add to the reactions. Those returned have the least elastic energy of the
+joints, Σ F²/k + M²/κ (theorem of Castigliano and Menabrea): without stated stiffnesses every joint is as stiff as the
+others across and along its axis, k, and against tilting κ = k h² of the two ends of its bearing at ±h. Real numbers
+only: a small change of a dimension takes such a linkage apart, so there is no derivative, and dual parts are NaN.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
-from typing import cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 
-__all__ = ["RANK", "condition", "least", "least_squares", "pseudo_inverse"]
+__all__ = ["RANK", "Support", "condition", "least", "least_squares", "pseudo_inverse", "stacked", "weighed"]
 
 Array = NDArray[np.float64]
 RANK = 1e-7  # of the largest singular value: below it a direction counts as lost; rounding leaves some 1e-15
@@ -68,14 +70,50 @@ def least_squares(matrix: Sequence[Sequence[Number]], side: Sequence[Number]) ->
     return [Dual(value, np.nan) for value in values] if dual else values
 
 
+class Support(NamedTuple):
+    """How a joint holds its second link: stiffness across and along its axis, N/m or relative, and against tilting.
+
+    middle: of its bearing along the axis from the joint's point, m. arm: half the length of its bearing, m, which gives
+    the stiffness against tilting where `tilting`, N m/rad, is None; None where nothing says how long it is.
+    """
+
+    radial: Number = 1.0
+    axial: Number = 1.0
+    tilting: Number | None = None
+    arm: Number | None = None
+    middle: Number = 0.0
+
+
+def weighed(
+    algebra: Any, wrenches: Sequence[Any], elements: Sequence[Any], supports: Sequence[Support], size: Number
+) -> Array:
+    """(lane, entry): forces and moments of all joints over the roots of the stiffnesses, whose squares are energies.
+
+    A joint without a length has the shortest that is stated, and that of the size where none is.
+    """
+    arms = [support.arm for support in supports if support.arm is not None]
+    shortest: Number = functools.reduce(np.minimum, arms) if arms else size
+    rows: list[Number] = []
+    for k, (_, second, *_) in enumerate(elements):
+        support = supports[k] if k < len(supports) else Support()
+        arm = shortest if support.arm is None else support.arm
+        tilting = support.radial * arm * arm if support.tilting is None else support.tilting
+        across, along, moments = algebra.on_axis(wrenches[k], second, support.middle)
+        rows += [part / np.sqrt(support.radial) for part in across]
+        rows += [part / np.sqrt(support.axial) for part in along]
+        rows += [part / np.sqrt(tilting) for part in moments]
+    flat = np.broadcast_arrays(*(np.asarray(primal(row), float) for row in rows), np.zeros(1))[:-1]
+    return np.stack(flat, axis=-1)
+
+
 def least(
     jacobian: Sequence[Sequence[Number]],
     reactions: Callable[[Sequence[Number], bool], Array],
     multipliers: Sequence[Number],
 ) -> list[Number]:
-    """The multipliers of the smallest reactions: λ + N y, with N the null space of Jᵀ and y by least squares.
+    """The multipliers of the least energy: λ + N y, with N the null space of Jᵀ and y by least squares.
 
-    reactions(multipliers, loaded): (lane, entry), of all joints, with the loads of the links or without.
+    reactions(multipliers, loaded): (lane, entry), weighed, of all joints, with the loads of the links or without.
     """
     start = reactions(multipliers, True)
     count = len(multipliers)

@@ -2,9 +2,7 @@
 
 Every joint keeps its coordinates q. The second element of a chord must be where its coordinates, seen from the first,
 put it [P 8]: six equations, a twist, for each loop. A link whose spin is free (both its joints are spherical) adds one
-row: it does not spin about the line of its joints. Where the loops ask for more than the coordinates can give
-(`redundant`), the equations are solved by least squares and the reactions are those of least size, see
-`groups.redundant`.
+row: it does not spin about the line of its joints.
 """
 
 from __future__ import annotations
@@ -15,15 +13,13 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion.algebra import space
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.space import NULL, ZERO, Screw, about, moment_at, vector_minus
+from trunnion.algebra.space import NULL, Screw, about, moment_at, vector_minus
 from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled
-from trunnion.groups import redundant
-from trunnion.groups.tree import CLOSED, Coordinates, Element, Pose, Tree
+from trunnion.groups.tree import Coordinates, Element, Pose, Tree
 from trunnion.joints.spatial import MOTIONS, PairMotion
 
 __all__ = ["SpatialGroup"]
@@ -33,12 +29,10 @@ __all__ = ["SpatialGroup"]
 class SpatialGroup(Tree):
     """The module with the given joints; its reactions are about the origin.
 
-    spinning: links whose spin is free, each with its two joints; redundant: whether the loops may ask for more than
-    the coordinates can give.
+    spinning: links whose spin is free, each with its two joints.
     """
 
     spinning: tuple[tuple[int, int, int], ...] = ()
-    redundant: bool = False
     algebra: ClassVar[Any] = space
     motions: ClassVar[Mapping[str, PairMotion]] = MOTIONS
 
@@ -133,35 +127,6 @@ class SpatialGroup(Tree):
         """Torque about its line that each link with a free spin would need to keep from spinning, N m."""
         return self.multipliers(pose, loads)[6 * len(self.chords) :]
 
-    # ---- loops that ask for too much --------------------------------------------------------------------------
-
-    def solved(self, jacobian: list[list[Number]], gaps: list[Number]) -> Sequence[Number]:
-        """J⁻¹ gap, by least squares where that is asked for."""
-        return redundant.least_squares(jacobian, gaps) if self.redundant else super().solved(jacobian, gaps)
-
-    def settled(self, elements: Sequence[Any], q: Coordinates, size: Number, moved_by: Number) -> Number:
-        """Least squares end where the loops are open least, not always where they close."""
-        placed = self.place(elements, q)[1]
-        return super().settled(elements, q, size, moved_by) & (self.opening(placed, q, size) <= CLOSED * size)
-
-    def _inverted(
-        self, jacobian: list[list[Number]], gap: Number, size: Number
-    ) -> tuple[list[list[Number]], Number, Number]:
-        if self.redundant and jacobian and self.free:
-            return redundant.pseudo_inverse(jacobian), redundant.condition(jacobian), 1.0
-        return super()._inverted(jacobian, gap, size)
-
-    def reactions(self, pose: Pose, loads: Sequence[Screw]) -> list[Screw]:
-        """See `Tree.reactions`; where statics leaves them open, the smallest."""
-        multipliers = self.multipliers(pose, loads)
-        if self.redundant and multipliers:
-
-            def weighed(under: Sequence[Number], loaded: bool) -> NDArray[np.float64]:
-                return _weighed(pose, self.link_by_link(pose, loads if loaded else [ZERO] * len(loads), under))
-
-            multipliers = redundant.least(pose.jacobian, weighed, multipliers)
-        return self.link_by_link(pose, loads, multipliers)
-
     def signature(self, pose: Pose, spread: float) -> list[Number]:
         """Axes and places of the links; of a spinning one its two joints."""
         spun = {link for link, _, _ in self.spinning}
@@ -172,13 +137,3 @@ class SpatialGroup(Tree):
         for _, a, b in self.spinning:
             numbers += [n / spread for k in (a, b) for n in pose.elements[k].second.place]
         return numbers
-
-
-def _weighed(pose: Pose, wrenches: Sequence[Screw]) -> NDArray[np.float64]:
-    """(lane, entry): forces and moments at the joints over the size, of all joints."""
-    rows: list[Number] = []
-    for wrench, pair in zip(wrenches, pose.elements, strict=True):
-        moment = moment_at(wrench, pair.second.place)
-        rows += [*wrench.u, *(part / pose.size for part in moment)]
-    flat = np.broadcast_arrays(*(np.asarray(primal(row), float) for row in rows), np.zeros(1))[:-1]
-    return np.stack(flat, axis=-1)

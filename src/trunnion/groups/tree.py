@@ -17,16 +17,19 @@ from __future__ import annotations
 import functools
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import depth, primal
 from trunnion.algebra.namespace import Number, apart, looped, namespace
 from trunnion.algebra.nested import each, flat, replaced
+from trunnion.groups import redundant
+from trunnion.groups.redundant import Support
 from trunnion.joints.pairs import PAIRS, Pair
 from trunnion.joints.spatial import PairMotion
 
@@ -95,12 +98,16 @@ class Pose(NamedTuple):
 class Tree(ABC):
     """The module with the given joints; `driven` lists those whose first coordinate is prescribed.
 
+    redundant: whether the loops may ask for more than the coordinates can give; its equations are then solved by least
+    squares, and its reactions are those of least elastic energy, see `groups.redundant`.
+
     algebra, motions: of the frames and screws, and of the pairs. BRANCHES: the assemblies of a closed form.
     """
 
     links: int
     joints: tuple[GroupJoint, ...]
     driven: tuple[int, ...] = ()
+    redundant: bool = field(default=False, kw_only=True)
     BRANCHES: ClassVar[tuple[int, ...]] = ()
     algebra: ClassVar[Any]
     motions: ClassVar[Mapping[str, PairMotion]]
@@ -321,6 +328,8 @@ class Tree(ABC):
         """J⁻¹, its condition, and the sign of det J."""
         if not jacobian or not self.free:
             return [], 1.0, np.where(gap <= CLOSED * size, 1.0, np.nan)  # no coordinate could close what is open
+        if self.redundant:
+            return redundant.pseudo_inverse(jacobian), redundant.condition(jacobian), 1.0
         inverse = linalg.inverse(jacobian)
         # a closed form stays on its branch by itself
         orientation = 1.0 if self.BRANCHES else np.sign(primal(linalg.determinant(jacobian)))
@@ -342,8 +351,10 @@ class Tree(ABC):
         return [[np.where(closed, value, np.nan) for value in joint] for joint in q]
 
     def settled(self, elements: Sequence[Any], q: Coordinates, size: Number, moved_by: Number) -> Number:
-        """Where Newton's method has arrived."""
-        return moved_by <= NEARLY
+        """Where Newton's method has arrived: least squares end where the loops are open least, not always closed."""
+        if not self.redundant:
+            return moved_by <= NEARLY
+        return (moved_by <= NEARLY) & (self.opening(self.place(elements, q)[1], q, size) <= CLOSED * size)
 
     def _iterate(
         self, elements: Sequence[Any], q: Coordinates, size: Number, drive: Sequence[Number], rounds: int
@@ -415,7 +426,7 @@ class Tree(ABC):
 
     def solved(self, jacobian: list[list[Number]], gaps: list[Number]) -> Sequence[Number]:
         """J⁻¹ gap."""
-        return linalg.solve(jacobian, gaps)[0]
+        return redundant.least_squares(jacobian, gaps) if self.redundant else linalg.solve(jacobian, gaps)[0]
 
     def _unmoved(self) -> Coordinates:
         return [[0.0] * len(self.motion(k).steps) for k in range(len(self.joints))]
@@ -554,13 +565,27 @@ class Tree(ABC):
 
     # ---- reactions --------------------------------------------------------------------------------------------
 
-    def reactions(self, pose: Pose, loads: Sequence[Any]) -> list[Any]:
+    def reactions(self, pose: Pose, loads: Sequence[Any], supports: Sequence[Support] = ()) -> list[Any]:
         """Wrench on the second link of each joint by the first.
 
         loads: everything else that acts on each link, inertia included. The component along a driven freedom is the
-        drive effort. Cut wrenches from Jᵀ λ = −(outboard power on each screw), the others link by link.
+        drive effort. Cut wrenches from Jᵀ λ = −(outboard power on each screw), the others link by link. supports: of
+        the joints, which share what statics leaves open.
         """
-        return self.link_by_link(pose, loads, self.multipliers(pose, loads))
+        multipliers = self.multipliers(pose, loads)
+        if self.redundant and multipliers:
+
+            def energy(under: Sequence[Number], loaded: bool) -> NDArray[np.float64]:
+                acting = loads if loaded else [self.algebra.ZERO_LOAD] * len(loads)
+                wrenches = self.link_by_link(pose, acting, under)
+                return redundant.weighed(self.algebra, wrenches, pose.elements, supports, pose.size)
+
+            multipliers = redundant.least(pose.jacobian, energy, multipliers)
+        return self.link_by_link(pose, loads, multipliers)
+
+    def at_joint(self, pose: Pose, k: int, wrench: Any) -> Any:
+        """A joint's wrench about what its reaction is about: the origin."""
+        return wrench
 
     def link_by_link(self, pose: Pose, loads: Sequence[Any], multipliers: Sequence[Number]) -> list[Any]:
         """The wrenches of all joints from those of the loops."""

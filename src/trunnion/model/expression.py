@@ -207,7 +207,7 @@ def _tokens(text: str) -> tuple[str, dict[str, Literal | str]]:
 
 def _hint(text: str, place: int = 0) -> str:
     """The remedy that the commonest slips need. place: from which on nothing is understood."""
-    if text[place] == "." and re.search(r"[0-9]\s*[^\W\d_]+$", text[:place]):  # 10 N.m
+    if text[place : place + 1] == "." and re.search(r"[0-9]\s*[^\W\d_]+$", text[:place]):  # 10 N.m
         return f"write {text[:place]} {text[place + 1 :]}"
     if re.search(r"[0-9],[0-9]", text):
         return "write a decimal point, not a comma"

@@ -99,6 +99,7 @@ class Fields(Part):
                 guide=row.guide,
                 friction=row.friction,
                 losses=row.losses,
+                stiffness=row.stiffness,
                 misalignment=row.misalignment,
                 seat_on=row.seat_on,
                 seat=row.seat,

@@ -36,8 +36,10 @@ from trunnion.model.quantity import (
     Dimensionless,
     ForceOrMoment,
     Length,
+    LineStiffness,
     Pressure,
     Quantity,
+    TorsionalStiffness,
 )
 from trunnion.model.rules import NotNegative, NotZero, OnlyWith, Positive, Refers, Selects, Within
 from trunnion.model.units import KINDS, UnitError
@@ -47,6 +49,7 @@ __all__ = [
     "JOINT_TYPES",
     "PLAY_PAIRS",
     "TURNING_PAIRS",
+    "BearingStiffness",
     "Contact",
     "Fit",
     "Friction",
@@ -290,6 +293,18 @@ class Losses(Part):
     viscous: Annotated[Damping | None, NotNegative] = None
 
 
+class BearingStiffness(Part):
+    """How stiff a joint is where statics leaves its reaction open, see `over_constraint`.
+
+    radial: across its axis; axial: along it, `radial` if not stated; tilting: against moments, radial (L/2)² of the
+    bearing or guide of length L if not stated.
+    """
+
+    radial: Annotated[LineStiffness, Positive]
+    axial: Annotated[LineStiffness | None, Positive] = None
+    tilting: Annotated[TorsionalStiffness | None, Positive] = None
+
+
 class JointDefaults(Part):
     """What every joint has unless it says otherwise: pins where it turns, guides where it slides."""
 
@@ -315,6 +330,7 @@ class Joint(Part):
     contact: Contact | None = None
     friction: Friction | None = None
     losses: Losses | None = None
+    stiffness: BearingStiffness | None = None
     misalignment: Misalignment | None = None
     seat: SeatChoice | None = None
     seat_on: Name | None = None
@@ -335,6 +351,7 @@ class LoopJoint(Part):
     guide: Guide | None = None
     friction: Friction | None = None
     losses: Losses | None = None
+    stiffness: BearingStiffness | None = None
     misalignment: Misalignment | None = None
     seat: SeatChoice | None = None
     seat_on: Name | None = None

@@ -210,7 +210,7 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
     rows = [row.joint for row in mechanism.loop]
     location: Location = ("loop", rows.index(name)) if name in rows else ("joints", name)
     yield from _walk(joint.pitch, f"joints.{name}.pitch", (*location, "pitch"), markers(Joint)["pitch"])
-    for key in ("pin", "guide", "friction", "losses", "seat"):
+    for key in ("pin", "guide", "friction", "losses", "stiffness", "seat"):
         part, default = getattr(joint, key), getattr(mechanism.joint_defaults, key, None)
         own = f"joints.{name}.{key}"
         shared = {one.path: one.quantity for one in _walk(default, own, ())}

@@ -34,6 +34,7 @@ __all__ = [
     "ForceOrMoment",
     "Inertia",
     "Length",
+    "LineStiffness",
     "Mass",
     "MassOrInertia",
     "Moment",
@@ -42,6 +43,7 @@ __all__ = [
     "Rate",
     "Stiffness",
     "Time",
+    "TorsionalStiffness",
     "deviation_spans",
     "evaluation_order",
     "nominal_dimensions",
@@ -289,6 +291,8 @@ MassOrInertia = Annotated[Quantity, _Read(KINDS["mass"] | KINDS["moment of inert
 ForceOrMoment = Annotated[Quantity, _Read(KINDS["force"] | KINDS["moment"])]
 Pressure = Annotated[Quantity, _Read(KINDS["pressure"])]
 Stiffness = Annotated[Quantity, _Read(KINDS["stiffness"] | KINDS["torsional stiffness"])]
+LineStiffness = Annotated[Quantity, _Read(KINDS["stiffness"])]
+TorsionalStiffness = Annotated[Quantity, _Read(KINDS["torsional stiffness"])]
 Damping = Annotated[Quantity, _Read(KINDS["damping"] | KINDS["torsional damping"])]
 AngleOrLength = Annotated[Quantity, _Read(KINDS["angle"] | KINDS["length"])]
 

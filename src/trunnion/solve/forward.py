@@ -314,7 +314,10 @@ class Forward:
     def reactions(self, number: int, loads: Sequence[Any], group: Any = None) -> list[Reaction]:
         """Reactions of a module to loads on its links, flat. group: in place of the module itself."""
         group = self.system.groups[number] if group is None else group
-        return [tuple(flat(wrench)) for wrench in group.reactions(self.poses[number], loads)]
+        given: list[Any] = [self.poses[number], loads]
+        if self.system.plan.modules[number].redundant:
+            given.append([self.system.support(self.values, place.joint) for place in self.system.places[number]])
+        return [tuple(flat(wrench)) for wrench in group.reactions(*given)]
 
     def wrench(self, place: Place, reaction: Reaction) -> Any:
         """The reaction on a joint's second link as the file names it; a module may see it from the other."""

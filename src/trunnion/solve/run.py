@@ -166,8 +166,10 @@ class Run:
 
     @functools.cached_property
     def determinacy(self) -> Determinacy | None:
-        """What of motion and reactions the joints leave open; None in the plane, where the structure decides it."""
-        return look(self.system, self.values, self.chosen, self.cycle) if self.system.spatial else None
+        """What of motion and reactions the joints leave open; None in the plane where the structure decides it."""
+        if not self.system.spatial and not any(module.redundant for module in self.system.plan.modules):
+            return None
+        return look(self.system, self.values, self.chosen, self.cycle)
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so

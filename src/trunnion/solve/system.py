@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra import plane, space
 from trunnion.algebra.dual import primal
+from trunnion.algebra.literal import is_zero
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.vector import dot
 from trunnion.errors import Finding, MechanismError
@@ -21,6 +22,7 @@ from trunnion.groups import GROUPS
 from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.gear import GearPair
 from trunnion.groups.general import General
+from trunnion.groups.redundant import Support
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import OUTER, GroupJoint
 from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
@@ -196,11 +198,11 @@ class System:
         driven = tuple(names.index(name) for name in module.driven)
         if not self.spatial:
             gears = tuple(self._gear(name, names) for name in module.gears)
-            return General(len(module.links), joints, driven, gears=gears)
+            return General(len(module.links), joints, driven, gears, redundant=module.redundant)
         if module.kind == "CCC" and not self._parallel(module):
             return CylindricalDyad(2, joints)
         spins = tuple((number[link], names.index(a), names.index(b)) for link, a, b in module.spinning)
-        return SpatialGroup(len(module.links), joints, driven, spins, module.redundant)
+        return SpatialGroup(len(module.links), joints, driven, spins, redundant=module.redundant)
 
     def _parallel(self, module: Module) -> bool:
         """Whether the two axes of a link of a cylindrical dyad are parallel: it has no closed form then."""
@@ -313,6 +315,19 @@ class System:
     def lead(self, values: Values, joint: str) -> Number:
         """Slide for one radian of a helical pair, m; 0 of others."""
         return values[f"joints.{joint}.pitch"] / (2 * np.pi) if PAIRS[self.joints[joint][0]].threaded else 0.0
+
+    def support(self, values: Values, joint: str) -> Support:
+        """How a joint holds its second link, where statics leaves its reaction open."""
+        path, moments = f"joints.{joint}", self.spatial or not self.turns(joint)
+        radial = values.get(f"{path}.stiffness.radial", 1.0)
+        length = values.get(f"{path}.pin.bearing", values.get(f"{path}.guide.length")) if moments else None
+        return Support(
+            radial,
+            values.get(f"{path}.stiffness.axial", radial),
+            values.get(f"{path}.stiffness.tilting"),
+            None if length is None or is_zero(length) else 0.5 * length,
+            values.get(f"{path}.pin.offset", 0.0),
+        )
 
     def vector(self, values: Values, path: str) -> tuple[Number, ...]:
         """The components with a path."""

@@ -165,11 +165,12 @@ def decompose(mechanism: Mechanism) -> Plan:
     bodies = list(table.numbers)[1:]
     determines, left_over = table.matched()
     moved = mobility - len(spinning)
-    if moved > drivers or (planar and moved < drivers):
+    # in space axes that are parallel or meet are common, and the rank at a pose tells; in the plane the count does
+    by_rank = not planar or mechanism.over_constraint == "minimum-norm"
+    if moved > drivers or (moved < drivers and not by_rank):
         raise MechanismError([_undriven(moved, drivers, len(spinning))])
-    if not planar and (moved < drivers or FREEDOMS["spatial"] * len(bodies) > len(determines)):
-        module = replace(table.module(bodies, {mechanism.fixed_link}, []), kind="general", redundant=True)
-        return Plan((module,), mobility, tuple(spinning))
+    if by_rank and (moved < drivers or FREEDOMS[mechanism.space] * len(bodies) > len(determines)):
+        return _as_one(table, mobility, spinning)
     after: list[set[int]] = [set() for _ in bodies]
     for constraint, body in determines.items():
         for link in set(table.links_of[constraint]) - {body}:
@@ -182,6 +183,8 @@ def decompose(mechanism: Mechanism) -> Plan:
         for other in after[k]:
             before[part_of[other]] |= {part} - {part_of[other]}
     if planar and (fault := Generic(mechanism, bodies, determines, table.links_of).fault(left_over, parts, before)):
+        if by_rank:
+            return _as_one(table, mobility, spinning)
         raise MechanismError([fault])
     known = {mechanism.fixed_link}
     modules: list[Module] = []
@@ -192,13 +195,21 @@ def decompose(mechanism: Mechanism) -> Plan:
     return Plan(tuple(modules), mobility, tuple(spinning))
 
 
+def _as_one(table: LinkTable, mobility: int, spinning: Mapping[str, tuple[str, str]]) -> Plan:
+    """All links as one module whose joints may constrain more than the links have freedoms."""
+    bodies = list(table.numbers)[1:]
+    module = table.module(bodies, {table.mechanism.fixed_link}, list(table.mechanism.gears))
+    return Plan((replace(module, kind="general", redundant=True),), mobility, tuple(spinning))
+
+
 def _undriven(mobility: int, drivers: int, spins: int) -> Finding:
     """The finding of drivers that are not as many as the freedoms that have an effect."""
     has = "is no driver" if drivers == 0 else "is one driver" if drivers == 1 else f"are {drivers} drivers"
     remedy = (
         "drive a joint for each freedom left, or add a link or joint that removes it"
         if mobility > drivers
-        else "remove a driver, or a joint or link that constrains twice"
+        else "remove a driver, or a joint or link that constrains twice; if it moves all the same, as a parallelogram "
+        "with a third crank does, state over_constraint: minimum-norm"
     )
     beside = f" beside {spins} that spin a link alone" if spins else ""
     what = f"the mobility is {mobility} by Grübler's formula{beside}, but there {has}"

@@ -190,7 +190,8 @@ class Generic:
             links = [body for body, free in zip(links, columns, strict=True) if free] or links
         named = _listed([f"{name} (driven)" if name in self.mechanism.drivers else name for name in joints])
         loosely = f"while the links {_listed(links)} stay undetermined"
-        remedy = "move a joint or a driver from the part that is constrained twice to the undetermined one"
+        remedy = "move a joint or a driver from the part that is constrained twice to the undetermined one, or, if its "
+        remedy += "geometry lets it move all the same, state over_constraint: minimum-norm"
         return Finding(f"one part is constrained twice, by the joints {named}, {loosely}", "joints", remedy)
 
 

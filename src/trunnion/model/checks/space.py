@@ -32,8 +32,6 @@ def coordinates(mechanism: Numbers) -> str:
 def space(mechanism: Numbers) -> Iterator[Finding]:
     """What is stated that only the other space has."""
     if mechanism.space == "planar":
-        if "over_constraint" in mechanism.model_fields_set:
-            yield Finding("is for spatial models", "over_constraint", "remove it, or state space: spatial")
         guides = {f"joints.{name}": joint.guide for name, joint in mechanism.stated_joints.items()}
         for where, guide in {**guides, "joint_defaults": mechanism.joint_defaults.guide}.items():
             if guide is not None and guide.width is not None:

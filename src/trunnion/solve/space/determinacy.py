@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
-from trunnion.algebra.space import ZERO, Screw, moment_at
+from trunnion.algebra.space import moment_at
 from trunnion.algebra.vector import dot, minus
 from trunnion.errors import Finding, MechanismError, Severity, agreeing, counted
 from trunnion.groups.redundant import RANK, stacked
-from trunnion.groups.spatial import SpatialGroup
-from trunnion.groups.tree import Pose
+from trunnion.groups.tree import Pose, Tree
 from trunnion.results.quantities import readable
 from trunnion.solve.assembly import Chosen
 from trunnion.solve.backward import Given, backward
@@ -46,7 +45,8 @@ Array = NDArray[Any]
 class ModuleDeterminacy(NamedTuple):
     """Of one module: redundant constraints and undetermined freedoms at every position looked at; joints that carry the
     former, links that have the latter. surplus: drivers more than there are freedoms, for which it does not close;
-    rubbing: joints whose friction follows what the redundant constraints leave open.
+    rubbing: joints whose friction follows what the redundant constraints leave open; change: by how much at most their
+    normal loads change, as a part of the largest, where one of the joints is twice or half as stiff.
     """
 
     redundant: int
@@ -55,6 +55,7 @@ class ModuleDeterminacy(NamedTuple):
     links: tuple[str, ...]
     surplus: int = 0
     rubbing: tuple[str, ...] = ()
+    change: float = 0.0
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
@@ -71,7 +72,7 @@ def look(system: System, values: Values, chosen: Chosen, cycle: Cycle) -> Determ
 
 def _of_module(walk: Forward, number: int, rubbing: Sequence[str], lanes: int) -> ModuleDeterminacy | None:
     """Of one module, nothing if it closes no loop or could not be assembled."""
-    module, group = walk.system.plan.modules[number], cast(SpatialGroup, walk.system.groups[number])
+    module, group = walk.system.plan.modules[number], cast(Tree, walk.system.groups[number])
     pose: Pose | None = walk.poses[number] if group.chords else None
     if pose is not None and not np.any(np.isfinite(np.asarray(pose.gap))):
         pose = _by_least_squares(walk, number, group)
@@ -92,13 +93,40 @@ def _of_module(walk: Forward, number: int, rubbing: Sequence[str], lanes: int) -
     stresses = [_stress(group, pose, null) for null in np.moveaxis(left, -1, 0)[rank:]]
     motions = [_motion(group, pose, null) for null in np.moveaxis(right, -2, 0)[rank:]]
     normals = [_normals(walk, module.joints, rubbing, pose.size, stress) for stress in stresses]
+    strained, pressed = (_present(module.joints, parts, stresses, regular) for parts in (stresses, normals))
     return ModuleDeterminacy(
         rows - rank,
         columns - rank,
-        _present(module.joints, stresses, stresses, regular),
+        strained,
         _present(module.links, motions, motions, regular),
-        rubbing=_present(module.joints, normals, stresses, regular),
+        rubbing=pressed,
+        change=_change(walk, number, strained) if pressed and module.redundant else 0.0,
     )
+
+
+def _change(walk: Forward, number: int, joints: Sequence[str]) -> float:
+    """Largest change of a normal load where one of the joints is twice or half as stiff, of the largest normal load."""
+
+    def pressing(values: Values) -> Array:
+        """(contact, position): normal loads, N."""
+        back = backward(replace(walk, values=values), FrictionMethod(), Given())
+        module = walk.system.plan.modules[number]
+        loads = [
+            contact.load.normal(contact.load.felt(back.module_reactions[module.joints[contact.joint]]))
+            for contact, rub in back.rubbed[len(walk.system.plan.modules) - 1 - number]
+            if rub is not None
+        ]
+        return np.array([np.broadcast_to(primal(load), np.shape(walk.time)) for load in loads])
+
+    nominal, most = pressing(walk.values), 0.0
+    for joint in joints:
+        stiffness = f"joints.{joint}.stiffness"
+        for factor in (0.5, 2.0):
+            stiffer = {f"{stiffness}.radial": factor} | {
+                path: factor * value for path, value in walk.values.items() if path.startswith(f"{stiffness}.")
+            }
+            most = max(most, _largest(pressing({**walk.values, **stiffer}) - nominal))
+    return most / max(_largest(nominal), 1e-300)
 
 
 def _spins(walk: Forward) -> tuple[dict[str, float], dict[str, float]]:
@@ -132,7 +160,7 @@ def _largest(values: Any) -> float:
     return float(np.nanmax(np.abs(primal(values)), initial=0.0))
 
 
-def _too_many(walk: Forward, number: int, group: SpatialGroup) -> ModuleDeterminacy | None:
+def _too_many(walk: Forward, number: int, group: Tree) -> ModuleDeterminacy | None:
     """Whether a module does not close because it has more drivers than freedoms: it is solved without any."""
     pose = _by_least_squares(walk, number, replace(group, driven=()))
     if pose is None:
@@ -143,11 +171,11 @@ def _too_many(walk: Forward, number: int, group: SpatialGroup) -> ModuleDetermin
     return ModuleDeterminacy(0, 0, (), (), surplus) if freedoms and surplus > 0 else None
 
 
-def _by_least_squares(walk: Forward, number: int, group: SpatialGroup) -> Pose | None:
+def _by_least_squares(walk: Forward, number: int, group: Tree) -> Pose | None:
     """A module that Newton's method does not close because J is singular, at the start, solved all the same."""
     system = walk.system
     module, places = system.plan.modules[number], system.places[number]
-    free = SpatialGroup(group.links, group.joints, group.driven, group.spinning, redundant=True)
+    free = replace(group, redundant=True)
     drive = driven_coordinates(system, module, places, walk.values, walk.time)[0] if group.driven else []
     elements, drive = at(walk.pairs(places), 0), [lane_of(q, 0) for q in drive]
     rng, reaches = np.random.default_rng(SEED), guess_reaches(free, extent(free, elements))
@@ -162,13 +190,14 @@ def _by_least_squares(walk: Forward, number: int, group: SpatialGroup) -> Pose |
         return free.position(elements, [lane_of(pose.q[i], best) for i in free.kept], drive)
 
 
-def _stress(group: SpatialGroup, pose: Pose, null: Array) -> Array:
-    """(joint, 6, lane): the wrenches of a self-stress. null: (lane, row)."""
-    return _table(group.link_by_link(pose, [ZERO] * group.links, list(null.T)), len(null))
+def _stress(group: Tree, pose: Pose, null: Array) -> Array:
+    """(joint, 6 or 3, lane): the wrenches of a self-stress. null: (lane, row)."""
+    wrenches = group.link_by_link(pose, [group.algebra.ZERO_LOAD] * group.links, list(null.T))
+    return _table([group.at_joint(pose, k, wrenches[k]) for k in range(len(group.joints))], len(null))
 
 
-def _motion(group: SpatialGroup, pose: Pose, null: Array) -> Array:
-    """(link, 6, lane): the twists of a motion that nothing determines, J q̇ = 0. null: (lane, column)."""
+def _motion(group: Tree, pose: Pose, null: Array) -> Array:
+    """(link, 6 or 3, lane): the twists of a motion that nothing determines, J q̇ = 0. null: (lane, column)."""
     rates: list[list[Number]] = [[0.0] * len(screws) for screws in pose.screws]
     for (k, i), rate in zip(group.free, null.T, strict=True):
         rates[k][i] = rate
@@ -187,7 +216,7 @@ def _normals(walk: Forward, names: Sequence[str], rubbing: Sequence[str], size: 
     return normals
 
 
-def _table(screws: Sequence[Screw], lanes: int) -> Array:
+def _table(screws: Sequence[Any], lanes: int) -> Array:
     """(screw, 6, lane)."""
     return np.array([[np.broadcast_to(entry, lanes) for entry in flat(screw)] for screw in screws])
 
@@ -258,19 +287,32 @@ class Determinacy:
                     remedy += "minimum-norm for the smallest reactions"
                     findings.append(Finding.error("mobility.redundant", "joints", what, remedy, **figures))
                 else:
-                    what += "the reactions given are the smallest that satisfy equilibrium"
-                    remedy = "misfit and preload add to them: they depend on errors and stiffness"
-                    findings.append(Finding.warning("mobility.redundant_least", "joints", what, remedy, **figures))
-            if part.rubbing:
-                joints, constraints = list(part.rubbing), part.redundant
-                what = "statics does not determine the forces on which the friction in the joints "
-                what += f"{', '.join(joints)} depends"
-                remedy = f"give the joints {counted(constraints, 'freedom')} more (cylindrical, spherical), state "
-                remedy += "bearings on one line as one joint with pin.bearing (guide.length) from end to end, or "
-                remedy += "friction: 0"
-                figures = {"joints": joints, "constraints": constraints}
-                findings.append(Finding.error("mobility.friction_open", "joints", what, remedy, **figures))
+                    findings += self._shared(part, what, figures)
         return [*findings, *self._spinning()]
+
+    def _shared(self, part: ModuleDeterminacy, what: str, figures: Mapping[str, Any]) -> Iterator[Finding]:
+        """How redundant joints share their load."""
+        joints = self.system.mechanism.effective_joints
+        lacking = [name for name in part.joints if joints[name].stiffness is None]
+        if 0 < len(lacking) < len(part.joints):
+            lack = f"the stiffness of {', '.join(lacking)} is not stated, that of the joints beside is"
+            remedy = "state it for each of the joints that share the load, or for none"
+            yield Finding.error("mobility.stiffness_lacks", f"joints.{lacking[0]}", lack, remedy, joints=lacking)
+            return
+        stiff = "equally stiff joints" if lacking else "the stated stiffness of the joints"
+        what += f"the reactions given are those of {stiff} without preload, the least elastic energy"
+        remedy = "misfit and preload add to them"
+        yield Finding.warning("mobility.redundant_least", "joints", what, remedy, **figures)
+        if part.rubbing and lacking:
+            what = f"the friction in the joints {', '.join(part.rubbing)} depends on how the joints share the load: "
+            what += (
+                f"normal loads change by up to {100 * part.change:.2g} % of the largest if one joint is twice or half "
+            )
+            what += "as stiff"
+            remedy = f"state the stiffness of the joints, or give them {counted(part.redundant, 'freedom')} more "
+            remedy += "(cylindrical, spherical)"
+            figures = {"joints": list(part.rubbing), "constraints": part.redundant, "change": part.change}
+            yield Finding.warning("mobility.friction_open", "joints", what, remedy, **figures)
 
     def _spinning(self) -> Iterator[Finding]:
         """Links that can spin about the line of their joints, and what would drag them."""

@@ -17,9 +17,10 @@ from trunnion.errors import Finding, Severity
 from trunnion.model.units import KINDS
 from trunnion.rig.comparison import CAUSES, VARIABLES, causes
 from trunnion.rig.judge import Verdict, expanded, independent, judge, uncertainty_of
-from trunnion.rig.modelled import prepared
+from trunnion.rig.modelled import in_condition
 from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
+from trunnion.solve.run import prepare
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 POWERS = ("torque", "speed", "brake", "out")
@@ -213,7 +214,7 @@ def test_an_angle_that_runs_backwards_is_refused():
 
 
 @pytest.mark.parametrize(
-    "verb", [trunnion.rig.compare, lambda model, data: trunnion.rig.identify(model, data, ["A.friction"])]
+    "verb", [trunnion.rig.compare, lambda model, data: trunnion.rig.identify(model, data, ["C.friction"])]
 )
 def test_all_files_that_run_backwards_are_told(verb):
     data = measured(settings=({"A.speed": 4.0}, {"A.speed": 5.0}, {"A.friction": 0.1}), channels=("speed", "out"))
@@ -245,7 +246,7 @@ def test_a_length_that_is_set_with_its_unit_is_no_plain_number():
     mechanism, length = trunnion.read(EXAMPLES / "slider-crank.yaml"), KINDS["length"].dimensions[0]
     path = next(path for path, one in mechanism.parameter_set.entries.items() if one.kind is KINDS["length"])
     for dimensions in ({path: length}, {}):
-        run = prepared(mechanism, Condition("a", {path: 0.06}, np.zeros(1), {}, dimensions=dimensions))
+        run = prepare(in_condition(mechanism, Condition("a", {path: 0.06}, np.zeros(1), {}, dimensions=dimensions)))
         told = [one for one in model_notes(run.system.mechanism, run.system) if "a plain number" in one.what]
         assert bool(told) != bool(dimensions)
         assert run.system.mechanism.parameters()[path] == 0.06
@@ -528,10 +529,10 @@ def test_units_of_what_is_set_are_those_of_the_model(verb):
         if fitting:
             compare(other, mechanism)
             continue
-        with pytest.raises(MechanismError, match=rf"a {kind} is set where the model has an angular speed") as caught:
+        with pytest.raises(MechanismError, match=rf"20.0 .+ is a {kind} where an angular speed") as caught:
             verb(mechanism, other)
         (finding,) = caught.value.findings
-        assert finding.where == "set.A.speed"
+        assert finding.where == "drivers.A.speed"
         assert "such as 1500 rpm" in finding.remedy
         assert finding.file == "run-1.csv"
 

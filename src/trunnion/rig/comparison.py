@@ -29,7 +29,7 @@ from trunnion.results.attributes import cited, codes, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import readable
 from trunnion.rig.judge import Judgement, Verdict, difference, expanded, going_on, judge, probability, uncertainty_of
-from trunnion.rig.modelled import Modelled, apart, check_settings, modelled
+from trunnion.rig.modelled import Modelled, apart, each, in_condition, modelled
 from trunnion.rig.reading.efficiency import efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Condition, Measurement, Signal
@@ -227,13 +227,8 @@ def compare(
     if not (np.isfinite(coverage) and 0 < coverage <= 8):
         raise MechanismError(Finding(f"{coverage:g} is no coverage factor", "coverage", "give such as 2, up to 8"))
     measures = _measures(measurement, channels)
-    check_settings(mechanism, measurement)
     method = friction_method or FrictionMethod()
-    rows = []
-    for done, condition in enumerate(measurement.conditions, 1):
-        rows.append(_condition(mechanism, condition, measures, coverage, method))
-        if progress:
-            progress(done)
+    rows = each(measurement.conditions, lambda one: _condition(mechanism, one, measures, coverage, method), progress)
     return _dataset(mechanism, measurement, measures, rows, coverage, method)
 
 
@@ -290,12 +285,12 @@ def _frictionless(
     mechanism: Mechanism, condition: Condition, channels: Mapping[str, str], method: FrictionMethod
 ) -> Mapping[str, Array]:
     """Courses of the model without its friction; none where it has no friction, or has no answer without it."""
-    stated = mechanism.with_values(dict(condition.values))
+    stated = in_condition(mechanism, condition)
     try:
         free = stated.with_friction("off")
         if free.data() == stated.data():
             return {}
-        return modelled(free, replace(condition, values={}), channels, method).courses
+        return modelled(free, replace(condition, values={}, dimensions={}), channels, method).courses
     except MechanismError:
         return {}
 
@@ -449,18 +444,13 @@ def _attributes(
 
 
 def _units_set(mechanism: Mechanism, rows: Sequence[ConditionComparison]) -> list[tuple[str, str, float]]:
-    """SI unit of each number that is set, and the unit with its factor that it is read in.
-
-    That of the names of the conditions, such as `input.speed 250 rpm`, else the one that the model states it in.
-    """
+    """SI unit of each number that is set, and the unit with its factor that the model states it in."""
     entries = {row["path"]: row for row in inputs(mechanism)}
-    stated = dict(part.partition(" ")[::2] for row in rows for part in row.condition.name.split(", "))
     units = []
     for name in dict.fromkeys(name for row in rows for name in row.condition.values):
         entry = entries.get(mechanism.path_of(name), {"unit": "", "text": ""})
-        literals = (LITERAL.fullmatch(one.strip().removeprefix("-")) for one in (stated.get(name, ""), entry["text"]))
-        unit = next((one["unit"] or one["per"] or "" for one in literals if one and (one["unit"] or one["per"])), "")
-        unit = unit or {"rad": "deg"}.get(entry["unit"], entry["unit"])
+        literal = LITERAL.fullmatch(entry["text"].strip().removeprefix("-"))
+        unit = (literal and (literal["unit"] or literal["per"])) or {"rad": "deg"}.get(entry["unit"], entry["unit"])
         units.append((entry["unit"], unit, float(unit_of(unit)[0]) if unit and unit != "1" else 1.0))
     return units
 

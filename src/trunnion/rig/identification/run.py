@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Literal
 
@@ -34,7 +35,7 @@ from trunnion.rig.identification.result import dataset
 from trunnion.rig.identification.signals import Model, SeatedModel
 from trunnion.rig.identification.uncertainty import excess, spread_of
 from trunnion.rig.identification.unknowns import Parameters, described, unknowns
-from trunnion.rig.modelled import apart, check_settings, measure_of, refuse_backwards, refuse_unit
+from trunnion.rig.modelled import apart, each, in_condition, measure_of, refuse_backwards, refuse_unit
 from trunnion.rig.reading.efficiency import efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.solve.friction_method import FrictionMethod
@@ -104,8 +105,8 @@ def identify(
         For names, channels or conditions that are not there, or where the model has no answer.
     """
     _check(sensors, guard, starts)
-    check_settings(mechanism, measurement)
     conditions = measurement.conditions
+    each(conditions, partial(in_condition, mechanism))
     paths = described(mechanism, parameters)
     mechanism = _stated(mechanism, measurement, paths, start or {})
     settings = _settings(mechanism, measurement, paths)
@@ -123,8 +124,8 @@ def identify(
     if channels is None:
         model, blocks, unused = _acted_on(model, blocks)
     at = np.array([one.start for one in model.unknowns])
-    speeds = [(one, model.driven(k, at)[2]) for k, one in enumerate(conditions)]
-    refuse_backwards(next(iter(mechanism.drivers), ""), speeds)
+    speeds = iter([model.driven(k, at)[2] for k in range(len(conditions))])
+    each(conditions, lambda one: refuse_backwards(mechanism, one, next(speeds)))
     fit = Fit(
         Evaluations(model, progress), blocks, sensor_errors(model, conditions, blocks, sensors == "condition"), guard
     )

@@ -14,8 +14,8 @@ from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import as_key
 from trunnion.model.units import si_unit
-from trunnion.rig.reading.checks import backward_finding
 from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Condition, Signal
 from trunnion.solve.friction_method import FrictionMethod
@@ -142,7 +142,7 @@ def in_condition(mechanism: Mechanism, condition: Condition) -> Mechanism:
     stated: dict[str, float | str] = dict(condition.values)
     for name, dimension in condition.dimensions.items():
         unit = si_unit(dimension)
-        if unit != "1" and np.isfinite(condition.values[name]):
+        if unit != "1" and np.isfinite(condition.values.get(name, np.nan)):
             stated[name] = f"{condition.values[name]} {unit}"
     with _told_of(condition):
         return mechanism.with_values(stated)
@@ -213,8 +213,14 @@ def _same_cycle(run: Run, condition: Condition, unit: str, begin: float, span: f
 def refuse_backwards(mechanism: Mechanism, condition: Condition, speed: float) -> None:
     """MechanismError where a condition turns the other way than the model, which turns at `speed`, rad/s."""
     if condition.speed * speed < 0:
-        finding = backward_finding(next(iter(mechanism.drivers), ""), condition.speed, speed)
-        raise MechanismError(replace(finding, file=str(next(iter(condition.files), ""))))
+        driver, rpm = next(iter(mechanism.drivers), ""), np.pi / 30
+        what = f"the angle runs backwards: {condition.speed / rpm:.4g} rpm measured, "
+        what += f"{speed / rpm:.4g} rpm stated of {driver}"
+        remedy = f"if it does turn so, set {as_key(f'{driver}.speed')} below zero; else add sign: -1 to angle:, or "
+        figures, file = {"measured": condition.speed, "stated": speed}, str(next(iter(condition.files), ""))
+        raise MechanismError(
+            Finding(what, "angle", f"{remedy}remove it", file=file, code="data.angle.backwards", figures=figures)
+        )
 
 
 def apart(measured: float, stated: float, share: float = FAR) -> bool:

@@ -375,10 +375,10 @@ class _Recording:
         self.running = slice(low, high)
         reach = float(np.median(end - begin)) / self.mapping.positions
         reach += PERIODS / self.mapping.filter.cut_off.value if self.mapping.filter is not None else 0.0
-        span = checks.FaultSpan(low, high, begin, end, checks.WIDTH + int(reach / self.line.step))
+        beside = checks.WIDTH + int(reach / self.line.step)
         for name, channel in self.mapping.channels.items():
             where, readings, moves = f"channels.{name}", self.readings[name], not channel.measures.startswith("rate:")
-            for finding in checks.faults(where, readings, self.line.seconds, span, moves):
+            for finding in checks.faults(where, readings, self.line.seconds, (begin, end), beside, moves):
                 self.say(finding)
 
     def levels(self, name: str) -> Array:
@@ -397,17 +397,12 @@ class _Recording:
         together = {name: np.concatenate([part.courses[name] for part in parts]) for name in channels}
         if not self.mapping.timed:
             turning = self._speed(parts)
-            against = checks.backwards(channels, [part.setting.values for part in parts], turning)
-            self.say(against)
-            if against is None:
-                zeros = {name: accuracy.zero for name, accuracy in accuracies.items()}
-                wrong = list(checks.signs(channels, together, zeros, turning))
-                units = {name: sensor.shown for name, sensor in self.sensors.items()}
-                speed = checks.speeds(channels, together, units, turning)
-                for finding in wrong:
-                    self.say(finding)
-                if speed is not None and speed.where not in {finding.where for finding in wrong}:
-                    self.say(speed)
+            zeros = {name: accuracy.zero for name, accuracy in accuracies.items()}
+            wrong = list(checks.signs(channels, together, zeros, turning))
+            units = {name: sensor.shown for name, sensor in self.sensors.items()}
+            speed = checks.speeds(channels, together, units, turning)
+            for finding in [*wrong, *([speed] if speed and speed.where not in {one.where for one in wrong} else [])]:
+                self.say(finding)
         return [self._condition(part, accuracies) for part in parts]
 
     def _courses(self, name: str, steps: Mapping[tuple[object, ...], float]) -> Accuracy:

@@ -157,9 +157,9 @@ def test_a_gap_in_a_turn_is_not_the_drives(tmp_path: Path) -> None:
     assert "2 turns left out" in one.what
     turns = found.conditions[0].courses["M"].turns.shape[0]
     assert turns == TURNS - 2
-    assert found.done[0].startswith(f"{turns} whole turns of {TURNS} recorded")
+    assert found.done[0].startswith(f"{turns} whole turns;")
     found = mapping(tmp_path, [{"file": "a.csv"}, {"file": written(tmp_path / "b.csv").name}])
-    assert found.done[0].startswith(f"{turns} to {TURNS} whole turns in each of 2 conditions, 2 more left out")
+    assert found.done[0].startswith(f"{turns} to {TURNS} whole turns in each of 2 conditions;")
 
 
 def test_time_stamps_of_many_files_are_told_once(tmp_path: Path) -> None:

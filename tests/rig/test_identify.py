@@ -384,7 +384,7 @@ def test_estimates_are_written_with_the_digits_they_have(cardan: trunnion.Mechan
         ({"hold_out": 1.5}, "cannot be held out"),
         ({"hold_out": [""]}, "there is no condition ''"),
         ({"hold_out": ["run"]}, "in the names of 5 conditions"),
-        ({"guard": 100}, "each is next to a friction reversal"),
+        ({"guard": 100}, "no position can be used: .* friction reverses"),
         ({"hold_out": [f"run-{k}" for k in range(1, 6)]}, "all conditions are held out"),
         ({"start": {"mass": 1.0}}, "is not one of the parameters"),
         ({"start": {FRICTION: -1.0}}, "which is negative"),
@@ -398,14 +398,9 @@ def test_what_is_wrong_is_said(
         identify(four_bar, torque.measured(1), **options)
 
 
-@pytest.mark.parametrize(
-    ("reading", "message"), [(np.nan, "no channel has a value"), (3.0, "reads 3 at all positions of all turns in 5")]
-)
-def test_data_that_say_nothing_are_refused(
-    four_bar: trunnion.Mechanism, torque: True_, reading: float, message: str
-) -> None:
-    with pytest.raises(MechanismError, match=message):
-        identify(four_bar, changed(torque.measured(1), lambda turns: np.full_like(turns, reading)), [FRICTION])
+def test_data_that_say_nothing_are_refused(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    with pytest.raises(MechanismError, match="no channel has a value"):
+        identify(four_bar, changed(torque.measured(1), lambda turns: np.full_like(turns, np.nan)), [FRICTION])
 
 
 def changed(data: Measurement, change: Callable[[Any], Any]) -> Measurement:

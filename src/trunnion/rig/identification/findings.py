@@ -10,9 +10,9 @@ from trunnion.errors import Finding, Severity, agreeing, counted
 from trunnion.rig.comparison import other_speed
 from trunnion.rig.identification.fit import FAR, shared_zero
 from trunnion.rig.identification.identifiability import Combination, InseparableUnknowns
-from trunnion.rig.identification.identified import Identified
 from trunnion.rig.identification.misfit import MisfitCause
 from trunnion.rig.identification.number_text import amount, few_digits, joined
+from trunnion.rig.identification.result import Identified
 
 __all__ = ["findings_of"]
 

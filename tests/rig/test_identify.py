@@ -19,8 +19,6 @@ from trunnion.errors import MechanismError
 from trunnion.measures.measures import named
 from trunnion.model.mechanism import read_mechanism
 from trunnion.rig.identification import identify, with_estimates
-from trunnion.rig.identification.findings import _formula
-from trunnion.rig.identification.identifiability import Combination
 from trunnion.rig.identification.run import held_out
 from trunnion.rig.identification.signals import Model
 from trunnion.rig.identification.unknowns import described, limits, unknowns
@@ -454,11 +452,6 @@ def test_a_value_names_all_conditions_that_have_it(four_bar: trunnion.Mechanism,
     assert held_out(four_bar, data, "25 deg") == ({names[0], names[2]}, 0.0)
     assert held_out(four_bar, data, "5 deg") == ({names[1]}, 0.0)
     assert held_out(four_bar, data, "20") == ({names[2]}, 0.0)
-
-
-def test_a_combination_has_the_units_of_its_factors() -> None:
-    for factor, unit, text in ((17.0, "m", "+ 17 1/m b"), (-0.5, "N m", "− 0.5 1/(N m) b"), (-2.0, "1", "− 2 b")):
-        assert _formula(Combination("sum", (1.0, factor), 0.2, 0.1), ["a", "b"], ["1", unit]) == f"a {text}"
 
 
 def test_a_channel_without_a_course_is_refused(four_bar: trunnion.Mechanism, torque: True_) -> None:

@@ -305,7 +305,7 @@ def test_one_turn_is_no_uncertainty():
     assert np.isfinite(result.rms.values).all()
     assert np.isnan(result.within.values).all()
     assert result.efficiency_within.values.tolist() == [-1]
-    assert said(result, "channels.torque", "one turn only", "warning")
+    assert said(result, "channels.torque", "no position with values from two turns, of 1 turn", "warning")
     assert said(result, "efficiency", "not known in run 1: there is only one turn", "more turns")
 
 
@@ -335,7 +335,7 @@ def test_turns_that_faults_left_are_told_from_those_measured():
     turns = condition.courses["torque"].turns.copy()
     turns[1:] = np.nan
     result = compare(replace(whole, conditions=(replace(condition, courses={"torque": course("torque", turns)}),)))
-    assert said(result, "only one turn at a position, although up to 3 turns were measured", "see the gaps")
+    assert said(result, "no position with values from two turns, of 3 turns", "see the gaps")
 
 
 def test_errors_that_go_on_from_turn_to_turn_are_said():

@@ -16,13 +16,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import convolve1d, median_filter, minimum_filter1d, uniform_filter1d
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.units import UnitError
 from trunnion.rig.reading.channels import unit_differs
-from trunnion.rig.reading.log import at_times, counted, note, warning
+from trunnion.rig.reading.log import at_times, counted, warning
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.tables import Column, DataTable
 from trunnion.rig.reading.timebase import GAP, Timeline
-from trunnion.rig.reading.units import alike, dimensions
 
 __all__ = ["Coordinate", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved", "unwrapped"]
 
@@ -93,18 +91,7 @@ def coordinate(source: AngleSource, table: DataTable, line: Timeline, speed: Arr
 
 
 def _of_column(source: AngleSource, column: Column, line: Timeline, say: Say) -> Array:
-    unit = source.unit or column.unit
-    if not unit:
-        what = f"the column '{source.column}' has no unit; rad is assumed"
-        say(note("angle.no_unit", "angle", what, "state angle.unit"))
-    try:
-        factor, kind = dimensions(unit or "rad")
-    except UnitError as error:
-        what, remedy = f"the column '{source.column}': {error.what}", "state angle.unit in the mapping, such as deg"
-        raise MechanismError(Finding(what, "angle", f"{remedy}; in the file, {error.remedy}")) from None
-    if not alike(kind, dimensions("rad")[1]):
-        what = f"the column '{source.column}' has the unit '{unit}', which is no angle"
-        raise MechanismError(Finding(what, "angle", "name another column"))
+    factor = column.factor("angle", str(source.column), source.unit, "rad", say)
     if source.unit and (finding := unit_differs("angle", str(source.column), source.unit, column)):
         say(finding)
     values = line.rows(column.values) * factor

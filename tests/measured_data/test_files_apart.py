@@ -13,7 +13,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
 from trunnion.rig.reading.units import dimensions
-from trunnion.views.rig.measured import tables
+from trunnion.views.measured import tables
 
 RATE, SPEED, TURNS = 1000.0, 120.0, 12  # Hz, rpm
 FOOT_POUND = 1.3558179483314003

@@ -460,7 +460,7 @@ class _Recording:
         phase = np.arange(mapping.positions) / mapping.positions
         return Condition(
             setting.name or self.path.stem, values, phase, courses, (str(self.path),), speed, start, span,
-            lag=self.lag, cut=self.cut, dimensions=kinds, followed=tuple(setting.means), duration=duration,
+            lag=self.lag, cut=self.cut, dimensions=kinds, duration=duration,
         )  # fmt: skip
 
 

@@ -142,7 +142,7 @@ def test_up_to_how_many_positions_samples_are_averaged(tmp_path: Path) -> None:
     columns = recorded()
     rows = {count: read(columns, tmp_path, {"positions": count}) for count in (130, 120)}
     told = {count: next(one for one in found.done if one.startswith("values at")) for count, found in rows.items()}
-    assert "of 125 positions they are means" in told[130]
+    assert "with up to 125 positions they are means" in told[130]
     assert "mean of the samples" in told[120]
     scatter = {count: np.median(found.conditions[0].courses["brake"].scatter) for count, found in rows.items()}
     assert scatter[120] < 0.7 * scatter[130]

@@ -84,7 +84,8 @@ def _candidates(fit: Fit, start: Array, test: LackOfFit) -> Iterator[MisfitCause
         ahead += cause.size
         if not model.run.cycle.periodic or abs(cause.size) < SETTLED:
             break
-    yield replace(cause, size=ahead)
+    if cause:
+        yield replace(cause, size=ahead)
 
 
 def _with(fit: Fit, start: Array, error: SensorError, unit: float, test: LackOfFit) -> tuple[MisfitCause | None, Array]:

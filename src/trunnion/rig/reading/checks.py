@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
+from scipy.special import bdtrc
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.rig.reading.log import counted, note, places, runs, warning
@@ -32,7 +33,7 @@ STUCK = 30  # equal readings in a row at least
 WIDTH = 7  # samples of the median that spikes are told from: up to three in a row are found
 FAR = 12.0  # robust standard deviations from it
 SEEN = 0.1  # of the span from the 1st to the 99th percentile, that a spike exceeds
-NEAR = 0.01  # of a turn, in which what recurs is in the same place
+NEAR, CHANCE = 0.01, 0.025  # of a turn, in which what recurs is in the same place; chance that faults lie so close
 FEW = 4  # turns from which what comes back in them can be told from faults
 STEADY = 0.03  # of the mean speed, between the slowest and the fastest turn
 CERTAIN = 6.0  # standard errors from which a slope is one
@@ -112,8 +113,11 @@ def faults(
         yield warning("readings.stuck", where, what, "check sensor and logger")
     near = slice(max(running.start - beside, 0), running.stop + beside)
     part, (far, off) = readings[near], _spikes(readings[near], wide)
-    far[np.flatnonzero(far)[_recurring(seconds[near][far], begin, end)]] = False
-    if 0 < runs(far)[0].size < 0.5 * begin.size:
+    if runs(far)[0].size < 0.5 * begin.size:
+        far[np.flatnonzero(far)[_recurring(seconds[near][far], begin, end)]] = False
+    else:
+        far[:] = False
+    if far.any():
         what = (
             f"spikes: {counted(int(far.sum()), 'reading')} of {known.size:,} up to {off[far].max() / wide:.2g} times "
         )
@@ -123,11 +127,18 @@ def faults(
 
 
 def _recurring(time: Array, begin: Array, end: Array) -> Mask:
-    """What others are in the same place of the turn as, far more than chance would have it: the signal's own."""
+    """What others are in the same place of the turn as, more than chance has it (binomial): the signal's own."""
     turn = np.clip(np.searchsorted(begin, time, side="right") - 1, 0, begin.size - 1)
-    phase = (time - begin[turn]) / (end - begin)[turn]
-    away = np.abs((phase[:, None] - phase + 0.5) % 1 - 0.5)
-    return np.asarray(np.count_nonzero(away < NEAR, axis=1) - 1 >= 1 + 6 * NEAR * time.size)
+    phase, own = ((time - begin[turn]) / (end - begin)[turn]) % 1.0, np.zeros(time.size, dtype=np.bool_)
+    while np.count_nonzero(~own) > 1:  # what is found does not count any more
+        rest = phase[~own]
+        around = np.sort(np.concatenate([rest - 1, rest, rest + 1]))
+        others = np.searchsorted(around, rest + NEAR, side="right") - np.searchsorted(around, rest - NEAR) - 1
+        again = np.asarray(bdtrc(others - 1, rest.size - 1, 2 * NEAR) < CHANCE)
+        if not again.any():
+            break
+        own[np.flatnonzero(~own)[again]] = True
+    return own
 
 
 def _stuck(part: Array) -> Mask:

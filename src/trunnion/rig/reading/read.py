@@ -346,7 +346,7 @@ class _Recording:
         if most >= positions:
             say("values at a position: mean of the samples within half a position to either side")
             return
-        say(f"values at a position: interpolated by a cubic between four samples; of {most} positions they are means")
+        say(f"values at a position: interpolated by a cubic; with up to {most} positions they are means of samples")
 
     def _find_faults(self) -> None:
         """Leave out stuck readings and spikes from before the first turn to after the last."""

@@ -10,7 +10,7 @@ import importlib.util
 import math
 import os
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,14 +20,14 @@ from ruamel.yaml import YAML
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import guard
 from trunnion.rig.reading.rig_file import FORMATS, Rig
+from trunnion.rig.virtual.observation import Case, Record, Recorded, case_names, speed_differs
 from trunnion.version import __version__
 
 if TYPE_CHECKING:
-    from trunnion.rig.virtual.observe import Case, Observation, Record
     from trunnion.rig.virtual.sensors import SensorChannel
 
 __all__ = [
-    "MAPPING", "TRUTH", "case_names", "check_folder", "check_form", "mapping_of", "speed_differs", "truth_of", "write",
+    "MAPPING", "TRUTH", "check_folder", "check_form", "mapping_of", "truth_of", "write",
 ]  # fmt: skip
 
 MAPPING, TRUTH = "mapping.yaml", "truth.yaml"
@@ -35,19 +35,6 @@ PACKAGES = {"parquet": "pyarrow", "tdms": "nptdms"}
 POSITIONS = (360, 180, 120, 90, 72, 60, 36, 24, 12)  # of a cycle: fewer than samples
 FEWER = 0.99
 AT_REST = 0.9  # share of the idle stretch that the zero is taken from: a filter carries the run into the rest
-
-
-def case_names(count: int) -> list[str]:
-    """Names of conditions, and of their files."""
-    width = max(2, len(str(count)))
-    return [f"run-{number:0{width}d}" for number in range(1, count + 1)]
-
-
-def speed_differs(cases: Sequence[Case]) -> bool:
-    """Whether the first driver runs one way and not as fast in all conditions."""
-    durations = [case.run.cycle.duration for case in cases]
-    one_way = cases[0].run.system.span(cases[0].run.values, cases[0].driver).one_way
-    return one_way and max(durations) - min(durations) > 1e-9 * max(durations)
 
 
 def check_form(form: str) -> None:
@@ -88,7 +75,7 @@ def _of_a_rig(path: Path) -> bool:
 
 
 def write(
-    observation: Observation, folder: str | os.PathLike[str], form: str, progress: Callable[[int], None] | None = None
+    observation: Recorded, folder: str | os.PathLike[str], form: str, progress: Callable[[int], None] | None = None
 ) -> list[str]:
     """Write all files into a folder, which is made if it is not there, once all of them are complete; their names."""
     check_form(form)
@@ -125,7 +112,7 @@ def _write_yaml(path: Path, data: dict[str, Any]) -> None:
         yaml.dump(data, stream)
 
 
-def units_of(observation: Observation) -> dict[str, str]:
+def units_of(observation: Recorded) -> dict[str, str]:
     """Unit of every column that has one."""
     found = {observation.rig.time.column: observation.rig.time.unit}
     return found | {channel.column: channel.reading for channel in observation.channels.values()}
@@ -134,7 +121,7 @@ def units_of(observation: Observation) -> dict[str, str]:
 # ---- tables ---------------------------------------------------------------------------------------------------
 
 
-def _csv(record: Record, units: Mapping[str, str], path: Path, observation: Observation) -> None:
+def _csv(record: Record, units: Mapping[str, str], path: Path, observation: Recorded) -> None:
     """Text, a column's unit in brackets behind its name, in quotes where it needs them; an empty cell: no reading."""
     head = [f"{name} [{units[name]}]" if name in units else name for name in record.columns]
     with path.open("w", encoding="utf-8", newline="") as stream:
@@ -144,7 +131,7 @@ def _csv(record: Record, units: Mapping[str, str], path: Path, observation: Obse
         stream.write("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
 
 
-def _parquet(record: Record, units: Mapping[str, str], path: Path, observation: Observation) -> None:
+def _parquet(record: Record, units: Mapping[str, str], path: Path, observation: Recorded) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -156,7 +143,7 @@ def _parquet(record: Record, units: Mapping[str, str], path: Path, observation: 
     pq.write_table(pa.table(columns, schema=pa.schema(fields)), path)
 
 
-def _tdms(record: Record, units: Mapping[str, str], path: Path, observation: Observation) -> None:
+def _tdms(record: Record, units: Mapping[str, str], path: Path, observation: Recorded) -> None:
     from nptdms import ChannelObject, RootObject, TdmsWriter
 
     about = {"name": record.name, "description": observation.rig.name}
@@ -168,7 +155,7 @@ def _tdms(record: Record, units: Mapping[str, str], path: Path, observation: Obs
         stream.write_segment([RootObject(properties=about), *objects])
 
 
-WRITERS: Mapping[str, Callable[[Record, Mapping[str, str], Path, Observation], None]] = {
+WRITERS: Mapping[str, Callable[[Record, Mapping[str, str], Path, Recorded], None]] = {
     "csv": _csv,
     "parquet": _parquet,
     "tdms": _tdms,
@@ -178,7 +165,7 @@ WRITERS: Mapping[str, Callable[[Record, Mapping[str, str], Path, Observation], N
 # ---- the mapping ----------------------------------------------------------------------------------------------
 
 
-def mapping_of(observation: Observation, form: str) -> dict[str, Any]:
+def mapping_of(observation: Recorded, form: str) -> dict[str, Any]:
     """The mapping that reads the files of an observation; what a laboratory knows, and no more than that."""
     rig = observation.rig
     found: dict[str, Any] = {"trunnion-data": 1, "name": rig.name or observation.mechanism.name}
@@ -197,7 +184,7 @@ def mapping_of(observation: Observation, form: str) -> dict[str, Any]:
     return found
 
 
-def _file(observation: Observation, case: Case, form: str, timed: bool) -> dict[str, Any]:
+def _file(observation: Recorded, case: Case, form: str, timed: bool) -> dict[str, Any]:
     """A file with what was set, its zero of an encoder, and where the time alone tells the position, when it ran."""
     found: dict[str, Any] = {"file": f"{case.name}.{form}"}
     if case.settings:
@@ -210,7 +197,7 @@ def _file(observation: Observation, case: Case, form: str, timed: bool) -> dict[
     return found
 
 
-def _angle(observation: Observation) -> dict[str, Any]:
+def _angle(observation: Recorded) -> dict[str, Any]:
     """Where the coordinate of the driver comes from, and what a cycle is."""
     run = observation.cases[0].run
     driver = next(iter(observation.mechanism.drivers))
@@ -228,7 +215,7 @@ def _angle(observation: Observation) -> dict[str, Any]:
     return found
 
 
-def _source(observation: Observation, driver: str) -> dict[str, Any]:
+def _source(observation: Recorded, driver: str) -> dict[str, Any]:
     """The encoder if there is one, else a constant speed, else a measured one."""
     case = observation.cases[0]
     encoder = observation.rig.encoder
@@ -251,7 +238,7 @@ def _source(observation: Observation, driver: str) -> dict[str, Any]:
     return {"from": "time", "speed": f"{speed:.15g} rad/s", "zero": f"{math.degrees(start):.12g} deg"}
 
 
-def _counted_from(observation: Observation, case: Case | None = None) -> float:
+def _counted_from(observation: Recorded, case: Case | None = None) -> float:
     """Coordinate, rad, where an encoder reads zero: at its index, else where its count is 0, its level rises."""
     encoder, case = observation.rig.encoder, case or observation.cases[0]
     assert encoder is not None  # asked of encoders only
@@ -267,7 +254,7 @@ def _counted_from(observation: Observation, case: Case | None = None) -> float:
     return zero + edge * pitch
 
 
-def _channel(observation: Observation, name: str) -> dict[str, Any]:
+def _channel(observation: Recorded, name: str) -> dict[str, Any]:
     channel = observation.channels[name]
     stated = channel.stated
     found: dict[str, Any] = {"column": channel.column, "measures": channel.measures, "unit": channel.reading}
@@ -296,7 +283,7 @@ def _stated_zero(channel: SensorChannel, zero: float) -> float:
 # ---- the truth ------------------------------------------------------------------------------------------------
 
 
-def truth_of(observation: Observation) -> dict[str, Any]:
+def truth_of(observation: Recorded) -> dict[str, Any]:
     """What was drawn and what is true, in SI: for a check of what is found from the files, not for finding it."""
     mechanism = observation.mechanism
     found: dict[str, Any] = {
@@ -343,7 +330,7 @@ def _short(value: float) -> float:
     return float(f"{value:.12g}")
 
 
-def _mean(observation: Observation, case: Case, i: int) -> float:
+def _mean(observation: Recorded, case: Case, i: int) -> float:
     """Mean of a true course over the recorded cycles."""
     whole = round(observation.rig.schedule.turns * case.run.cycle.duration * observation.rate)
     return float(np.mean(case.true.at_samples(i)[case.first : case.first + whole]))

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, counted
 from trunnion.rig.reading.efficiency import Efficiency, efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.measurement import Accuracy, Condition, Signal
-from trunnion.rig.virtual.observe import Case, Observation
+from trunnion.rig.virtual.observation import Case
+from trunnion.rig.virtual.observe import Observation
 
 __all__ = ["Expected", "Forecast", "RigPlan", "plan"]
 

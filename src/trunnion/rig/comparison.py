@@ -477,10 +477,6 @@ def hashed_files(conditions: Iterable[Condition]) -> list[dict[str, Any]]:
 # ---- findings -------------------------------------------------------------------------------------------------
 
 
-def _found(code: str, where: str, what: str, remedy: str, severity: Severity, **figures: Any) -> Finding:
-    return Finding(what, where, remedy, severity, code=f"compare.{code}", figures=figures)
-
-
 def _findings(mechanism: Mechanism, channels: Iterable[str], rows: Sequence[ConditionComparison]) -> list[Finding]:
     """Errors first."""
     names = list(channels)
@@ -501,13 +497,13 @@ def _findings(mechanism: Mechanism, channels: Iterable[str], rows: Sequence[Cond
         what = f"positions left out of the statistics: {', '.join(f'{name} {n:,}' for name, n in counts.items())}"
         what += "; a joint is momentarily at rest there, or a dead centre is close"
         remedy = "the model gives an interval there, not a single value"
-        findings.append(_found("left_out", "", what, remedy, Severity.NOTE, counts=counts))
+        findings.append(Finding.note("compare.left_out", "", what, remedy, counts=counts))
     if bare:
         what = (
             f"no accuracy of zero and gain is stated for {', '.join(bare)}: U includes only the scatter between turns"
         )
         remedy = "state accuracy: {gain: …, zero: …} in the mapping"
-        findings.append(_found("no_accuracy", "channels", what, remedy, Severity.NOTE, channels=list(bare)))
+        findings.append(Finding.note("compare.no_accuracy", "channels", what, remedy, channels=list(bare)))
     return sorted(findings, key=lambda finding: list(Severity).index(finding.severity))
 
 
@@ -536,23 +532,23 @@ def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Find
         what = f"does not agree within U {in_which[Verdict.NOT]}{offset}: {down}{100 * within:.0f} % of the positions "
         what += f"agree, RMS of the residual {up}{rms_text}"
         remedy = "see what would explain it; `trunnion identify` fits friction and other numbers of the model"
-        yield _found("not_within", where, what, remedy, Severity.ERROR, within_percent=100 * within, rms=rms)
+        yield Finding.error("compare.not_within", where, what, remedy, within_percent=100 * within, rms=rms)
     if unknown := by_verdict.get(Verdict.UNKNOWN):
         turns = max(len(one.signal.turns) for _, one in unknown)
         what = f"has no position with values from two turns, of {counted(turns, 'turn')}: its uncertainty cannot be "
         what += f"estimated without scatter, {in_which[Verdict.UNKNOWN]}"
         remedy = "measure more turns, or see the gaps reported by `trunnion data`"
-        yield _found("turns_few", where, what, remedy, Severity.WARNING, turns=turns)
+        yield Finding.warning("compare.turns_few", where, what, remedy, turns=turns)
     if Verdict.NOTHING in by_verdict:
         what = f"not compared, for lack of measured values or of a solution of the model, {in_which[Verdict.NOTHING]}"
-        yield _found("nothing", where, what, "", Severity.WARNING)
+        yield Finding.warning("compare.nothing", where, what, "")
     correlations = [(value, turns) for value, turns in (going_on(one.signal) for _, one in cases) if turns]
     count = sum(turns for _, turns in correlations)
     mean = sum(value * turns for value, turns in correlations) / max(count, 1)
     if mean * math.sqrt(count) > SIGNIFICANT:
         what = f"the errors of successive turns are correlated, {mean:+.2f}: U assumes independent turns"
         remedy = "measure many more turns, or turns further apart; state the drift of the zero in accuracy:"
-        yield _found("turns_alike", where, what, remedy, Severity.WARNING, correlation=mean)
+        yield Finding.warning("compare.turns_alike", where, what, remedy, correlation=mean)
 
 
 def _of_efficiency(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
@@ -565,15 +561,15 @@ def _of_efficiency(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
         what += f"model {most.model:.4f}"
         remedy = "check the channels; `trunnion identify` fits the friction of the model to them"
         figures = {"measured": most.measured, "expanded": most.expanded, "model": most.model}
-        yield _found("efficiency", "efficiency", what, remedy, Severity.ERROR, **figures)
+        yield Finding.error("compare.efficiency", "efficiency", what, remedy, **figures)
     for missing in dict.fromkeys(row.unmeasured for row in rows if row.unmeasured):
         where = _in_which([row.condition for row in rows if row.unmeasured == missing], len(rows))
         what = f"not compared {where}: the power of {', '.join(missing)} is not measured"
         remedy = "measure effort: of every driver and load: of every useful load, each with its rate:"
-        yield _found("efficiency_unmeasured", "efficiency", what, remedy, Severity.WARNING, missing=list(missing))
+        yield Finding.warning("compare.efficiency_unmeasured", "efficiency", what, remedy, missing=list(missing))
     for what, remedy in dict.fromkeys(one.reason for _, one in cases if one.reason[0]):
         where = _in_which([condition for condition, one in cases if one.reason == (what, remedy)], len(cases))
-        yield _found("efficiency_unknown", "efficiency", f"not known {where}: {what}", remedy, Severity.WARNING)
+        yield Finding.warning("compare.efficiency_unknown", "efficiency", f"not known {where}: {what}", remedy)
 
 
 def other_speed(driver: str, rows: Sequence[tuple[Condition, float]]) -> Iterator[Finding]:
@@ -591,7 +587,7 @@ def other_speed(driver: str, rows: Sequence[tuple[Condition, float]]) -> Iterato
     remedy = f"state set: {{{as_key(f'{driver}.speed')}: {mean}}} in the mapping: the model then runs at this speed"
     severity = Severity.ERROR if any(apart(one.speed, model) for one, model in off) else Severity.WARNING
     figures = {"measured": first.speed, "model": speed, "driver": driver}
-    yield _found("speed", f"drivers.{driver}", what, remedy, severity, **figures)
+    yield Finding.weighed(severity, "compare.speed", f"drivers.{driver}", what, remedy, **figures)
 
 
 def _no_answer(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
@@ -607,7 +603,7 @@ def _no_answer(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
         what += f"{count:,} of {counted(positions, 'position')}: {code.text}"
         remedy = f"run analyse{values} to see where in the cycle, and why"
         figures = {"count": count, "positions": positions, "status": code.text}
-        yield _found("no_answer", "", what, remedy, Severity.ERROR, **figures)
+        yield Finding.error("compare.no_answer", "", what, remedy, **figures)
 
 
 def _of_model(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:

@@ -13,7 +13,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
 from trunnion.rig.reading.units import dimensions
-from trunnion.views.rig.measured import tables
+from trunnion.views.measured import tables
 
 RATE, SPEED, TURNS = 1000.0, 120.0, 12  # Hz, rpm
 FOOT_POUND = 1.3558179483314003
@@ -157,9 +157,9 @@ def test_a_gap_in_a_turn_is_not_the_drives(tmp_path: Path) -> None:
     assert "2 turns left out" in one.what
     turns = found.conditions[0].courses["M"].turns.shape[0]
     assert turns == TURNS - 2
-    assert found.done[0].startswith(f"{turns} whole turns of {TURNS} recorded")
+    assert found.done[0].startswith(f"{turns} whole turns;")
     found = mapping(tmp_path, [{"file": "a.csv"}, {"file": written(tmp_path / "b.csv").name}])
-    assert found.done[0].startswith(f"{turns} to {TURNS} whole turns in each of 2 conditions, 2 more left out")
+    assert found.done[0].startswith(f"{turns} to {TURNS} whole turns in each of 2 conditions;")
 
 
 def test_time_stamps_of_many_files_are_told_once(tmp_path: Path) -> None:

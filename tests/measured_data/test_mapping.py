@@ -11,7 +11,7 @@ import pytest
 
 from manual.conftest import Run, program
 from measured_data.recording import Columns, mapping, off, read, recorded, text_of
-from trunnion.errors import MechanismError, Severity
+from trunnion.errors import MechanismError
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.mapping import read_mapping
 from trunnion.rig.reading.read import read_measured
@@ -94,7 +94,6 @@ CHANGES: list[tuple[dict[str, Any], str, str]] = [
     ({"angle/wrap": 9, "angle/kind": "level"}, "angle", "only a running count wraps"),
     ({"time": {"column": "t", "rate": "1 kHz"}}, "time", "either a column or a rate"),
     ({"time": {"rate": "0 Hz"}}, "time.rate", "not a frequency above zero"),
-    ({"time": {"rate": "1 kHz"}, "filter": {"cut_off": "500 Hz"}}, "filter.cut_off", "samples come at 1000 Hz"),
     ({"set": {"a": {"mean": "speed"}}}, "set.a.mean", "no channel 'speed'"),
     ({"set": {"a": {"mean": "brake", "column": "x"}}}, "set.a", "one of mean and column"),
     ({"set": {"a": "2 * AB"}}, "set.a", "refers to AB"),
@@ -147,28 +146,20 @@ def test_files_beside_the_mapping(tmp_path: Path, columns: Columns) -> None:
 
 
 def test_files_of_the_command_line_keep_what_was_set(tmp_path: Path, columns: Columns) -> None:
-    """By the file, else by its name; a note names those that do not."""
+    """By the file, else by its name."""
     (tmp_path / "elsewhere").mkdir()
     for name in ("run.csv", "new.csv", "elsewhere/run.csv", "elsewhere/two.csv"):
         (tmp_path / name).write_text(text_of(columns), "utf-8")
     path, files = tmp_path / "m.json", [{"file": "run.csv", "set": {"beta": "15 deg"}}, {"file": "two.csv"}]
     path.write_text(json.dumps(mapping({"files": files, "set": {"gamma": "1 deg"}})), encoding="utf-8")
 
-    def read_(*names: str) -> tuple[list[dict[str, float]], list[str]]:
-        found = read_measured(path, [tmp_path / name for name in names])
-        assert {one.severity for one in found.findings} <= {Severity.NOTE}
-        return [dict(one.values) for one in found.conditions], [one.what for one in found.findings]
+    def read_(*names: str) -> list[dict[str, float]]:
+        return [dict(one.values) for one in read_measured(path, [tmp_path / name for name in names]).conditions]
 
     beta, gamma = {"beta": pytest.approx(np.radians(15))}, {"gamma": pytest.approx(np.radians(1))}
-    assert read_("run.csv") == ([{**gamma, **beta}], [])
-    assert read_("elsewhere/run.csv") == ([{**gamma, **beta}], [])
-    assert read_("elsewhere/two.csv") == ([gamma], [])  # nothing is stated of it
-    values, (note,) = read_("run.csv", "new.csv")
-    assert values == [{**gamma, **beta}, gamma]
-    assert "new.csv read without what the mapping states" in note
-    values, (note,) = read_("elsewhere/run.csv", "new.csv", "./elsewhere/../elsewhere/run.csv")
-    assert values == [gamma] * 3  # which of two of a name is meant cannot be known
-    assert "elsewhere/run.csv" in note
+    for name in ("run.csv", "elsewhere/run.csv"):
+        assert read_(name) == [{**gamma, **beta}]
+    assert read_("elsewhere/two.csv", "new.csv") == [gamma] * 2  # nothing is stated of them
 
 
 UNITS: list[dict[str, Any]] = [
@@ -219,7 +210,7 @@ def test_units_of_the_file(tmp_path: Path, columns: Columns) -> None:
     "stated", [{"range": "20 N m"}, {"accuracy": {"zero": "0.02 N m"}}, {"resolution": "0.01 N m"}]
 )
 @pytest.mark.parametrize("unit", [None, "N"])
-def test_a_column_of_forces_taken_for_torques_is_told_as_such(
+def test_an_amount_in_another_unit_than_its_column_is_refused(
     tmp_path: Path, columns: Columns, stated: dict[str, Any], unit: str | None
 ) -> None:
     """Whether in the file or in the mapping the unit stands; of two files it is told once."""
@@ -233,8 +224,7 @@ def test_a_column_of_forces_taken_for_torques_is_told_as_such(
     (one,) = failure.value.findings
     (key, value), *_ = stated.items()
     told, value = (f"{key}.zero", value["zero"]) if isinstance(value, dict) else (key, value)
-    assert f"the column 'T2' is in N, {told} in {value.partition(' ')[2]}; load:brake is in N m or N" in one.what
-    assert one.remedy.startswith("name another column")
+    assert f"{told}: '{value}' is neither of the readings (N) nor of what they measure (N)" in one.what
     assert ("a.csv, b.csv" in one.what) == (unit is None)
 
 

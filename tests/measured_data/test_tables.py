@@ -243,9 +243,9 @@ def test_a_comma_in_another_column_is_no_sign_of_decimals(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("column", "cell", "where", "remedy"),
     [
-        ("T2", "{:.3f} Nm", "channels.brake.column", "remove the unit from the cells; state channels.brake.unit"),
+        ("T2", "{:.3f} Nm", "channels.brake.column", "a unit belongs in the heading"),
         ("T2", "overflow", "channels.brake.column", "name a column of numbers"),
-        ("encoder", "{:.0f} Imp", "angle.column", "remove the unit from the cells"),
+        ("encoder", "{:.0f} Imp", "angle.column", "a unit belongs in the heading"),
     ],
 )
 def test_a_column_of_text_is_an_error(tmp_path: Path, column: str, cell: str, where: str, remedy: str) -> None:

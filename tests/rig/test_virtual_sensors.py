@@ -160,9 +160,7 @@ def test_streams_are_apart_and_the_same_again() -> None:
     ("duration", "rate", "count", "lead"), [(0.12, 2000, 500, 24.5), (0.07, 1000, 800, 3.0), (0.3, 7, 90, 0.5)]
 )
 def test_phases_are_those_of_the_samples(duration: float, rate: float, count: int, lead: float) -> None:
-    found = phases(duration, rate, count, lead)
-    assert found is not None
-    time, place = found
+    time, place = phases(duration, rate, count, lead)
     wanted = np.mod((np.arange(count) - lead) / rate, duration)
     apart = np.abs(time[place] - wanted)
     assert np.minimum(apart, duration - apart).max() < 1e-12
@@ -171,4 +169,4 @@ def test_phases_are_those_of_the_samples(duration: float, rate: float, count: in
 
 
 def test_phases_that_never_come_again() -> None:
-    assert phases(2 * np.pi / 10, 1000.0, 5000) is None
+    assert len(phases(2 * np.pi / 10, 1000.0, 5000)[0]) == 5000

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from trunnion.views.rig.conditions import shortened
+from trunnion.views.measured import shortened
 
 
 def test_what_all_set_goes_into_the_head() -> None:

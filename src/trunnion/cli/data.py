@@ -27,7 +27,7 @@ def data(
     from trunnion.results.export import save
     from trunnion.rig.reading.measurement import dataset
     from trunnion.rig.reading.read import read_measured
-    from trunnion.views.rig.measured import tables
+    from trunnion.views.measured import tables
 
     check_files(out or [], drawn=False)
     measurement = read_measured(mapping, files)

@@ -29,7 +29,7 @@ from trunnion.results.attributes import cited, codes, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import readable
 from trunnion.rig.judge import Judgement, Verdict, difference, expanded, going_on, judge, probability, uncertainty_of
-from trunnion.rig.modelled import Modelled, apart, check_settings, modelled
+from trunnion.rig.modelled import Modelled, apart, each, in_condition, modelled
 from trunnion.rig.reading.efficiency import efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Condition, Measurement, Signal
@@ -227,13 +227,8 @@ def compare(
     if not (np.isfinite(coverage) and 0 < coverage <= 8):
         raise MechanismError(Finding(f"{coverage:g} is no coverage factor", "coverage", "give such as 2, up to 8"))
     measures = _measures(measurement, channels)
-    check_settings(mechanism, measurement)
     method = friction_method or FrictionMethod()
-    rows = []
-    for done, condition in enumerate(measurement.conditions, 1):
-        rows.append(_condition(mechanism, condition, measures, coverage, method))
-        if progress:
-            progress(done)
+    rows = each(measurement.conditions, lambda one: _condition(mechanism, one, measures, coverage, method), progress)
     return _dataset(mechanism, measurement, measures, rows, coverage, method)
 
 
@@ -290,12 +285,12 @@ def _frictionless(
     mechanism: Mechanism, condition: Condition, channels: Mapping[str, str], method: FrictionMethod
 ) -> Mapping[str, Array]:
     """Courses of the model without its friction; none where it has no friction, or has no answer without it."""
-    stated = mechanism.with_values(dict(condition.values))
+    stated = in_condition(mechanism, condition)
     try:
         free = stated.with_friction("off")
         if free.data() == stated.data():
             return {}
-        return modelled(free, replace(condition, values={}), channels, method).courses
+        return modelled(free, replace(condition, values={}, dimensions={}), channels, method).courses
     except MechanismError:
         return {}
 
@@ -449,18 +444,13 @@ def _attributes(
 
 
 def _units_set(mechanism: Mechanism, rows: Sequence[ConditionComparison]) -> list[tuple[str, str, float]]:
-    """SI unit of each number that is set, and the unit with its factor that it is read in.
-
-    That of the names of the conditions, such as `input.speed 250 rpm`, else the one that the model states it in.
-    """
+    """SI unit of each number that is set, and the unit with its factor that the model states it in."""
     entries = {row["path"]: row for row in inputs(mechanism)}
-    stated = dict(part.partition(" ")[::2] for row in rows for part in row.condition.name.split(", "))
     units = []
     for name in dict.fromkeys(name for row in rows for name in row.condition.values):
         entry = entries.get(mechanism.path_of(name), {"unit": "", "text": ""})
-        literals = (LITERAL.fullmatch(one.strip().removeprefix("-")) for one in (stated.get(name, ""), entry["text"]))
-        unit = next((one["unit"] or one["per"] or "" for one in literals if one and (one["unit"] or one["per"])), "")
-        unit = unit or {"rad": "deg"}.get(entry["unit"], entry["unit"])
+        literal = LITERAL.fullmatch(entry["text"].strip().removeprefix("-"))
+        unit = (literal and (literal["unit"] or literal["per"])) or {"rad": "deg"}.get(entry["unit"], entry["unit"])
         units.append((entry["unit"], unit, float(unit_of(unit)[0]) if unit and unit != "1" else 1.0))
     return units
 
@@ -489,31 +479,31 @@ def hashed_files(conditions: Iterable[Condition]) -> list[dict[str, Any]]:
 
 def _findings(mechanism: Mechanism, channels: Iterable[str], rows: Sequence[ConditionComparison]) -> list[Finding]:
     """Errors first."""
-    signals = {name: [row.channels[name].signal for row in rows if name in row.channels] for name in channels}
+    names = list(channels)
     findings = [
         *_no_answer(rows),
         *other_speed(next(iter(mechanism.drivers), ""), [(row.condition, row.model.speed) for row in rows]),
-        *(finding for name in signals for finding in _of_channel(name, rows)),
+        *(finding for name in names for finding in _of_channel(name, rows)),
         *_of_efficiency(rows),
         *_of_model(rows),
     ]
-    counts = dict.fromkeys(signals, 0)
-    for row in rows:
-        for name, one in row.channels.items():
-            counts[name] += int(np.count_nonzero(np.isfinite(one.model) & ~one.comparable))
-    left_out = {name: n for name, n in counts.items() if n}
-    if left_out:
-        what = f"positions left out of the statistics: {', '.join(f'{name} {n:,}' for name, n in left_out.items())}"
+    left_out, bare = dict.fromkeys(names, 0), dict.fromkeys(names)
+    for name, one in ((name, one) for row in rows for name, one in row.channels.items()):
+        left_out[name] += int(np.count_nonzero(np.isfinite(one.model) & ~one.comparable))
+        if one.signal.accuracy.zero or one.signal.accuracy.gain:
+            bare.pop(name, None)
+    if any(left_out.values()):
+        counts = {name: count for name, count in left_out.items() if count}
+        what = f"positions left out of the statistics: {', '.join(f'{name} {n:,}' for name, n in counts.items())}"
         what += "; a joint is momentarily at rest there, or a dead centre is close"
         remedy = "the model gives an interval there, not a single value"
-        findings.append(Finding(what, "", remedy, Severity.NOTE, code="compare.left_out", figures={"counts": left_out}))
-    bare = [name for name, own in signals.items() if not any(one.accuracy.zero or one.accuracy.gain for one in own)]
+        findings.append(Finding.note("compare.left_out", "", what, remedy, counts=counts))
     if bare:
         what = (
             f"no accuracy of zero and gain is stated for {', '.join(bare)}: U includes only the scatter between turns"
         )
-        remedy, figures = "state accuracy: {gain: …, zero: …} in the mapping", {"channels": bare}
-        findings.append(Finding(what, "channels", remedy, Severity.NOTE, code="compare.no_accuracy", figures=figures))
+        remedy = "state accuracy: {gain: …, zero: …} in the mapping"
+        findings.append(Finding.note("compare.no_accuracy", "channels", what, remedy, channels=list(bare)))
     return sorted(findings, key=lambda finding: list(Severity).index(finding.severity))
 
 
@@ -528,76 +518,58 @@ def _in_which(conditions: Sequence[Condition], count: int) -> str:
 def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
     """Where a channel is not within U, cannot be judged, or has turns that resemble each other."""
     cases = [(row.condition, row.channels[name]) for row in rows if name in row.channels]
-    where = f"channels.{name}"
-
-    def having(*verdicts: Verdict) -> tuple[list[ChannelComparison], str]:
-        those = [(condition, one) for condition, one in cases if one.judgement.verdict in verdicts]
-        return [one for _, one in those], _in_which([one for one, _ in those], len(cases)) if those else ""
-
-    off, cases_off = having(Verdict.NOT, Verdict.OFFSET)
-    if off:
+    where, by_verdict = f"channels.{name}", dict[Verdict, list[tuple[Condition, ChannelComparison]]]()
+    for condition, one in cases:
+        key = Verdict.NOT if one.judgement.verdict is Verdict.OFFSET else one.judgement.verdict
+        by_verdict.setdefault(key, []).append((condition, one))
+    in_which = {key: _in_which([one for one, _ in those], len(cases)) for key, those in by_verdict.items()}
+    if off := [one for _, one in by_verdict.get(Verdict.NOT, ())]:
         rms, within = max(one.judgement.rms for one in off), min(one.judgement.within for one in off)
         unit, size = off[0].signal.shown
         rms_text = f"{rms / size:.3g} {unit}" if unit not in ("rad", "1") else readable(rms, unit, 3)
-        only_offset = all(one.judgement.verdict is Verdict.OFFSET for one in off)
+        offset = " apart from a constant offset" * all(one.judgement.verdict is Verdict.OFFSET for one in off)
         down, up = ("down to ", "up to ") if len(off) > 1 else ("", "")
-        yield Finding(
-            f"does not agree within U {cases_off}{' apart from a constant offset' * only_offset}: {down}"
-            f"{100 * within:.0f} % of the positions agree, RMS of the residual {up}{rms_text}",
-            where, "see what would explain it; `trunnion identify` fits friction and other numbers of the model",
-            code="compare.not_within", figures={"within_percent": 100 * within, "rms": rms},
-        )  # fmt: skip
-    unknown, cases_unknown = having(Verdict.UNKNOWN)
-    if unknown:
-        turns = max(len(one.signal.turns) for one in unknown)
-        what, remedy = "measured in one turn only", "measure more turns"
-        if turns > 1:
-            what = f"has values from only one turn at a position, although up to {turns} turns were measured"
-            remedy = "see the gaps reported by `trunnion data`"
-        yield Finding(
-            f"{what}: its uncertainty cannot be estimated without scatter, {cases_unknown}", where, remedy,
-            Severity.WARNING, code="compare.turns_few", figures={"turns": turns},
-        )  # fmt: skip
-    _, cases_nothing = having(Verdict.NOTHING)
-    if cases_nothing:
-        what = f"not compared, for lack of measured values or of a solution of the model, {cases_nothing}"
-        yield Finding(what, where, "", Severity.WARNING, code="compare.nothing")
+        what = f"does not agree within U {in_which[Verdict.NOT]}{offset}: {down}{100 * within:.0f} % of the positions "
+        what += f"agree, RMS of the residual {up}{rms_text}"
+        remedy = "see what would explain it; `trunnion identify` fits friction and other numbers of the model"
+        yield Finding.error("compare.not_within", where, what, remedy, within_percent=100 * within, rms=rms)
+    if unknown := by_verdict.get(Verdict.UNKNOWN):
+        turns = max(len(one.signal.turns) for _, one in unknown)
+        what = f"has no position with values from two turns, of {counted(turns, 'turn')}: its uncertainty cannot be "
+        what += f"estimated without scatter, {in_which[Verdict.UNKNOWN]}"
+        remedy = "measure more turns, or see the gaps reported by `trunnion data`"
+        yield Finding.warning("compare.turns_few", where, what, remedy, turns=turns)
+    if Verdict.NOTHING in by_verdict:
+        what = f"not compared, for lack of measured values or of a solution of the model, {in_which[Verdict.NOTHING]}"
+        yield Finding.warning("compare.nothing", where, what, "")
     correlations = [(value, turns) for value, turns in (going_on(one.signal) for _, one in cases) if turns]
     count = sum(turns for _, turns in correlations)
     mean = sum(value * turns for value, turns in correlations) / max(count, 1)
     if mean * math.sqrt(count) > SIGNIFICANT:
-        yield Finding(
-            f"the errors of successive turns are correlated, {mean:+.2f}: U assumes independent turns and is too "
-            "small, also for the efficiency", where,
-            "measure many more turns, or turns further apart; state the drift of the zero in accuracy:",
-            Severity.WARNING, code="compare.turns_alike", figures={"correlation": mean},
-        )  # fmt: skip
+        what = f"the errors of successive turns are correlated, {mean:+.2f}: U assumes independent turns"
+        remedy = "measure many more turns, or turns further apart; state the drift of the zero in accuracy:"
+        yield Finding.warning("compare.turns_alike", where, what, remedy, correlation=mean)
 
 
 def _of_efficiency(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
     cases = [(row.condition, row.efficiency) for row in rows if row.efficiency is not None]
-    off = [(condition, one) for condition, one in cases if one.within == 0]
-    if off:
+    if off := [(condition, one) for condition, one in cases if one.within == 0]:
         worst, most = max(off, key=lambda case: abs(case[1].measured - case[1].model))
         where = _in_which([condition for condition, _ in off], len(cases))
         where += f"; the most in {worst.name}" if len(off) > 1 else ""
-        yield Finding(
-            f"does not agree within U {where}: measured {most.measured:.4f} ± {most.expanded:.2g}, model "
-            f"{most.model:.4f}", "efficiency",
-            "check the channels; `trunnion identify` fits the friction of the model to them", code="compare.efficiency",
-            figures={"measured": most.measured, "expanded": most.expanded, "model": most.model},
-        )  # fmt: skip
+        what = f"does not agree within U {where}: measured {most.measured:.4f} ± {most.expanded:.2g}, "
+        what += f"model {most.model:.4f}"
+        remedy = "check the channels; `trunnion identify` fits the friction of the model to them"
+        figures = {"measured": most.measured, "expanded": most.expanded, "model": most.model}
+        yield Finding.error("compare.efficiency", "efficiency", what, remedy, **figures)
     for missing in dict.fromkeys(row.unmeasured for row in rows if row.unmeasured):
         where = _in_which([row.condition for row in rows if row.unmeasured == missing], len(rows))
-        yield Finding(
-            f"not compared {where}: the power of {', '.join(missing)} is not measured", "efficiency",
-            "measure effort: of every driver and load: of every useful load, each with its rate:", Severity.WARNING,
-            code="compare.efficiency_unmeasured", figures={"missing": list(missing)},
-        )  # fmt: skip
+        what = f"not compared {where}: the power of {', '.join(missing)} is not measured"
+        remedy = "measure effort: of every driver and load: of every useful load, each with its rate:"
+        yield Finding.warning("compare.efficiency_unmeasured", "efficiency", what, remedy, missing=list(missing))
     for what, remedy in dict.fromkeys(one.reason for _, one in cases if one.reason[0]):
         where = _in_which([condition for condition, one in cases if one.reason == (what, remedy)], len(cases))
-        what = f"not known {where}: {what}"
-        yield Finding(what, "efficiency", remedy, Severity.WARNING, code="compare.efficiency_unknown")
+        yield Finding.warning("compare.efficiency_unknown", "efficiency", f"not known {where}: {what}", remedy)
 
 
 def other_speed(driver: str, rows: Sequence[tuple[Condition, float]]) -> Iterator[Finding]:
@@ -607,34 +579,31 @@ def other_speed(driver: str, rows: Sequence[tuple[Condition, float]]) -> Iterato
         return
     sensor = {signal.measures: signal for one, _ in rows for signal in one.courses.values()}.get(f"rate:{driver}")
     unit, size = sensor.shown if sensor is not None and sensor.read_in[0] else ("rpm", np.pi / 30)
-    speeds = [f"{one.name}: {one.speed / size:.4g} {unit} measured, {speed / size:.4g} {unit} in the model"
-              for one, speed in off]  # fmt: skip
-    where = _in_which([one for one, _ in off], len(rows)).partition(" (")[0]
-    first = "; ".join(speeds[:MOST_NAMED]) + "; …" * (len(speeds) > MOST_NAMED)
+    first, speed = off[0]
+    where = _in_which([one for one, _ in off], len(rows))
+    what = f"the measured speed of the driver differs from that of the model {where}: "
+    what += f"{first.speed / size:.4g} {unit} measured, {speed / size:.4g} {unit} in the model in {first.name}"
     mean = f"{{mean: {sensor.channel if sensor is not None else 'angle'}}}"
-    severe = any(apart(one.speed, speed) for one, speed in off)
-    yield Finding(
-        f"the measured speed of the driver differs from that of the model {where}: {first}", f"drivers.{driver}",
-        f"state set: {{{as_key(f'{driver}.speed')}: {mean}}} in the mapping: the model then runs at the measured speed",
-        Severity.ERROR if severe else Severity.WARNING, code="compare.speed",
-        figures={"measured": off[0][0].speed, "model": off[0][1], "driver": driver},
-    )  # fmt: skip
+    remedy = f"state set: {{{as_key(f'{driver}.speed')}: {mean}}} in the mapping: the model then runs at this speed"
+    severity = Severity.ERROR if any(apart(one.speed, model) for one, model in off) else Severity.WARNING
+    figures = {"measured": first.speed, "model": speed, "driver": driver}
+    yield Finding.weighed(severity, "compare.speed", f"drivers.{driver}", what, remedy, **figures)
 
 
 def _no_answer(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
     """An error for every status that leaves positions of the model without numbers."""
     for code in Status:
         cases = [row for row in rows if not code.solved and np.any(row.model.status == code)]
-        if cases:
-            first = cases[0]
-            count, positions = int(np.count_nonzero(first.model.status == code)), len(first.condition.phase)
-            values = "".join(f" --set {name}={value:.6g}" for name, value in first.condition.values.items())
-            yield Finding(
-                f"the model has no solution {_in_which([row.condition for row in cases], len(rows))}, the first at "
-                f"{count:,} of {counted(positions, 'position')}: {code.text}",
-                "", f"run analyse{values} to see where in the cycle, and why", code="compare.no_answer",
-                figures={"count": count, "positions": positions, "status": code.text},
-            )  # fmt: skip
+        if not cases:
+            continue
+        first = cases[0]
+        count, positions = int(np.count_nonzero(first.model.status == code)), len(first.condition.phase)
+        values = "".join(f" --set {name}={value:.6g}" for name, value in first.condition.values.items())
+        what = f"the model has no solution {_in_which([row.condition for row in cases], len(rows))}, the first at "
+        what += f"{count:,} of {counted(positions, 'position')}: {code.text}"
+        remedy = f"run analyse{values} to see where in the cycle, and why"
+        figures = {"count": count, "positions": positions, "status": code.text}
+        yield Finding.error("compare.no_answer", "", what, remedy, **figures)
 
 
 def _of_model(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:

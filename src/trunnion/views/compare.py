@@ -23,8 +23,8 @@ from trunnion.rig.comparison import CAUSES
 from trunnion.rig.judge import Verdict
 from trunnion.views.charts import Axis, Band, Chart, ColourScale, Legend, Line, Look, Mark, Panel, Stripe, silent
 from trunnion.views.common.cycle import Abscissa, Array, names
+from trunnion.views.measured import shortened
 from trunnion.views.page import Section, Summary, counts, page
-from trunnion.views.rig.conditions import shortened
 from trunnion.views.scales import Scale, cause
 from trunnion.views.table import NONE, Table
 

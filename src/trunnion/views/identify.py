@@ -17,8 +17,8 @@ from trunnion.rig.identification.uncertainty import quantile
 from trunnion.views.charts import Axis, Band, Cells, Chart, Legend, Line, Look, Mark, Note, Panel
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.compare import about_data, data_section
+from trunnion.views.measured import shortened
 from trunnion.views.page import Section, Summary, counts, page
-from trunnion.views.rig.conditions import shortened
 from trunnion.views.table import NONE, Table
 
 if TYPE_CHECKING:
@@ -36,7 +36,6 @@ FEW = 5  # conditions whose names stand side by side
 FEW_ESTIMATES = 2  # whose correlation needs no picture
 MOST_WRITTEN = 12  # parameters whose correlations have room for their numbers
 COVERED = 2.0  # standard uncertainties of the band
-ALIKE = 1e-6  # of the range of the drive: by which it may differ between conditions that share an axis
 BEFORE, AFTER = 4, 0
 
 

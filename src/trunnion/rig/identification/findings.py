@@ -9,10 +9,10 @@ import numpy as np
 from trunnion.errors import Finding, Severity, agreeing, counted
 from trunnion.rig.comparison import other_speed
 from trunnion.rig.identification.fit import FAR, shared_zero
-from trunnion.rig.identification.identifiability import Combination, InseparableUnknowns
-from trunnion.rig.identification.identified import Identified
+from trunnion.rig.identification.identifiability import InseparableUnknowns
 from trunnion.rig.identification.misfit import MisfitCause
 from trunnion.rig.identification.number_text import amount, few_digits, joined
+from trunnion.rig.identification.result import Identified
 
 __all__ = ["findings_of"]
 
@@ -140,23 +140,21 @@ def _story(identified: Identified, cause: MisfitCause) -> str:
 
 
 def _sensors(identified: Identified) -> Iterator[Finding]:
-    """Channels whose zero and gain are taken as exact, which of forces they hardly are, and errors far from what is
-    stated of them, or beyond it; not beside what explains a misfit."""
+    """Channels whose zero and gain are taken as exact; errors far from what is stated of them, or beyond it, but not
+    beside what explains a misfit."""
     fit, spread = identified.fit, identified.spread
     stated: dict[str, bool] = {}
     for block in (fit.blocks[k] for k in fit.fitted()):
         accuracy = block.signal.accuracy
         has_any = bool(block.effects or shared_zero(accuracy) or accuracy.gain)
         stated[block.channel] = stated.get(block.channel, False) or has_any
-    for of_motion in (False, True):
-        bare = [name for name, has in stated.items() if not has and fit.model.measures[name].of_motion == of_motion]
-        if bare:
-            narrow = "" if of_motion else ", and the intervals are too narrow"
-            yield Finding(
-                f"no accuracy is stated for {joined(bare)}: zero and gain count as exact{narrow}", "sensors",
-                "state accuracy: {zero: …, gain: …} in the mapping", Severity.NOTE if of_motion else Severity.WARNING,
-                code="sensor.no_accuracy",
-            )  # fmt: skip
+    bare = [name for name, has in stated.items() if not has and not fit.model.measures[name].of_motion]
+    if bare:
+        what = (
+            f"no accuracy is stated for {joined(bare)}: zero and gain count as exact, and the intervals are too narrow"
+        )
+        remedy = "state accuracy: {zero: …, gain: …} in the mapping"
+        yield Finding(what, "sensors", remedy, Severity.WARNING, code="sensor.no_accuracy")
     for s, sensor in enumerate(fit.sensors) if not (identified.causes or spread.test.gross) else ():
         beyond = s in spread.beyond
         times = abs(spread.beyond.get(s, float(identified.x[fit.count + s])))
@@ -219,20 +217,12 @@ def _determined(identified: Identified, group: InseparableUnknowns, names: Seque
     units = [unknowns[i].unit if i < len(unknowns) else "1" for i in group.members]
     subject, unit = f"their {one.form}", units[0] or "1"
     if one.form == "sum":
-        subject = {1.0: "their sum", -1.0: "their difference"}.get(one.factors[1]) or _formula(one, names, units)
+        weighed = f"{names[0]} {'−' if one.factors[1] < 0 else '+'} {abs(one.factors[1]):.3g} {names[1]} (SI)"
+        subject = {1.0: "their sum", -1.0: "their difference"}.get(one.factors[1], weighed)
     else:
         dimensional = [unit for unit in units if unit not in ("", "1")]
         unit = dimensional[0] if one.form == "product" and len(dimensional) == 1 else "1"
     return f"{subject} is determined, {amount(one.value, one.uncertainty, unit)}, neither alone"
-
-
-def _formula(one: Combination, names: Sequence[str], units: Sequence[str]) -> str:
-    """A sum with its factor and its unit, such as `a − 2 1/m b`."""
-    lead, unit = ("1" if one_unit in ("", "1") else one_unit for one_unit in units)
-    under = f"({unit})" if set(unit) & set(" /*") else unit
-    per = "" if unit == lead else f" {lead}" if unit == "1" else f" {lead}/{under}"
-    size = "" if abs(one.factors[1]) == 1 and not per else f"{abs(one.factors[1]):.3g}{per} "
-    return f"{names[0]} {'−' if one.factors[1] < 0 else '+'} {size}{names[1]}"
 
 
 # ---- limits, data ---------------------------------------------------------------------------------------------

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.rig.identification.fit import Evaluations, Fit, SensorError, Solution, refined, rms
+from trunnion.rig.identification.fit import Evaluations, Fit, SensorError, refined, rms
 from trunnion.rig.identification.uncertainty import LackOfFit, lack_of_fit, quantile, spread_of
 
 __all__ = ["MisfitCause", "explanations"]
@@ -60,46 +61,45 @@ def explanations(fit: Fit, start: Array, test: LackOfFit) -> list[MisfitCause]:
 def _candidates(fit: Fit, start: Array, test: LackOfFit) -> Iterator[MisfitCause]:
     """Fits with a zero or a gain of each channel, beyond what is stated of it, and with an offset of the angle."""
     model = fit.model
-    for kind in ("zero", "gain"):
-        for channel in dict.fromkeys(fit.blocks[k].channel for k in fit.fitted()):
-            if kind == "gain" and model.measures[channel].turning(model.run.system):
-                continue
-            turns = np.concatenate([block.turns.ravel() for block in fit.blocks if block.channel == channel])
-            unit = 0.01 * (1.0 if kind == "gain" else rms(turns) or 1.0)
-            sizes = tuple(unit * (block.channel == channel) for block in fit.blocks)
-            more, best = _with(fit, start, SensorError(f"{kind} of {channel}", channel, kind, sizes, stated=False))
-            if np.isfinite(best.cost):
-                yield _cause(more, best, unit, float(best.x[-1]) * unit, test)
+    for kind, channel in product(("zero", "gain"), dict.fromkeys(fit.blocks[k].channel for k in fit.fitted())):
+        if kind == "gain" and model.measures[channel].turning(model.run.system):
+            continue
+        turns = np.concatenate([block.turns.ravel() for block in fit.blocks if block.channel == channel])
+        unit = 0.01 * (1.0 if kind == "gain" else rms(turns) or 1.0)
+        sizes = tuple(unit * (block.channel == channel) for block in fit.blocks)
+        error = SensorError(f"{kind} of {channel}", channel, kind, sizes, stated=False)
+        if cause := _with(fit, start, error, unit, test)[0]:
+            yield cause
     ahead = 0.0
     sizes = tuple(-DEGREE / model.turns[block.condition] * (block.turns.shape[1] > 2) for block in fit.blocks)
     if not np.isfinite(sizes).all() or not any(sizes):
         return
+    error = SensorError("offset of the drive angle", "", "angle", sizes, stated=False)
     for _ in range(ROUNDS):  # the positions follow the angle until it is settled
         phases = tuple((phase + ahead / turn) % 1.0 for phase, turn in zip(model.phases, model.turns, strict=True))
         moved = replace(fit, courses_at=Evaluations(replace(model, phases=phases))) if ahead else fit
-        more, best = _with(moved, start, SensorError("offset of the drive angle", "", "angle", sizes, stated=False))
-        step = float(best.x[-1]) * DEGREE
-        if not np.isfinite(best.cost) or abs(step) > np.pi:
+        cause, start = _with(moved, start, error, DEGREE, test)
+        if cause is None or abs(cause.size) > np.pi:
             return
-        ahead, start = ahead + step, best.x[:-1]
-        if not model.run.cycle.periodic or abs(step) < SETTLED:
+        ahead += cause.size
+        if not model.run.cycle.periodic or abs(cause.size) < SETTLED:
             break
-    yield _cause(more, best, DEGREE, ahead, test)
+    if cause:
+        yield replace(cause, size=ahead)
 
 
-def _with(fit: Fit, start: Array, error: SensorError) -> tuple[Fit, Solution]:
-    """The problem with one error more, and its fit from a start; of infinite cost where it has none."""
-    more, begin = replace(fit, sensors=[*fit.sensors, error], inflation=1.0), np.append(start, 0.0)
+def _with(fit: Fit, start: Array, error: SensorError, unit: float, test: LackOfFit) -> tuple[MisfitCause | None, Array]:
+    """What a fit with one error more comes to, None where the model has no answer; and its place without the error.
+
+    unit: standard uncertainty of the error.
+    """
     try:
-        return refined(more, begin)
+        more, best = refined(replace(fit, sensors=[*fit.sensors, error], inflation=1.0), np.append(start, 0.0))
     except ValueError:  # no answer of the model there
-        return more, Solution(begin, float("inf"))
-
-
-def _cause(fit: Fit, best: Solution, unit: float, size: float, test: LackOfFit) -> MisfitCause:
-    """The error that was fitted last. unit: its standard uncertainty."""
-    left, spread, error = lack_of_fit(fit, best.x), spread_of(fit, best.x), fit.sensors[-1]
+        return None, start
+    left, spread, count = lack_of_fit(more, best.x), spread_of(more, best.x), fit.count
     half = quantile(spread.freedom) * spread.deviation
     explains = min((test.reduced - left.reduced) / (test.reduced - 1), 1.0)
-    estimates, halves = best.x[: fit.count], half[: fit.count]
-    return MisfitCause(error.kind, error.channel, size, float(half[-1]) * unit, explains, estimates, halves, left)
+    size, wide = float(best.x[-1]) * unit, float(half[-1]) * unit
+    cause = MisfitCause(error.kind, error.channel, size, wide, explains, best.x[:count], half[:count], left)
+    return cause, best.x[:-1]

@@ -1,39 +1,256 @@
-"""An identification as a Dataset, and its estimates as numbers of the model."""
+"""What an identification comes to: intervals, limits, residuals before and after; as a Dataset, and in the model."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.summary import inputs, references
+from trunnion.errors import Finding
 from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.units import UnitError, normalise, unit
 from trunnion.results.attributes import attribute, finding_rows, origin
-from trunnion.results.dataset import dataset_of, described
+from trunnion.results.dataset import Variable, dataset_of, described
+from trunnion.results.tables.studies import CURVES
 from trunnion.rig.comparison import data_findings, hashed_files
-from trunnion.rig.identification.findings import findings_of
-from trunnion.rig.identification.identified import VARIABLES, Identified
+from trunnion.rig.identification.fit import FAR, Fit, Solution, rms
+from trunnion.rig.identification.identifiability import InseparableUnknowns
+from trunnion.rig.identification.misfit import MisfitCause
 from trunnion.rig.identification.number_text import decimals
-from trunnion.rig.identification.uncertainty import CONFIDENCE
+from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, quantile
+from trunnion.rig.reading.measurement import Measurement
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["dataset", "with_estimates"]
+__all__ = ["VARIABLES", "Identified", "dataset", "with_estimates"]
 
-Array = NDArray[Any]
+Array = NDArray[np.float64]
 USUAL = {"rad": "deg", "m": "mm"}  # units of numbers that the model states without one
 SOURCES = (
     "G. A. F. Seber, C. J. Wild, Nonlinear Regression, Wiley, 1989, doi:10.1002/0471725315",
     "JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in measurement",
 )
+AT_LIMIT = 0.05  # of the standard uncertainty: nearer than this to a limit is on it
 
 
-def dataset(identified: Identified) -> xr.Dataset:
+PARAMETER, SENSOR, BLOCK = ("parameter",), ("sensor",), ("channel", "condition")
+COURSE = (*BLOCK, "position")
+VARIABLES = {
+    "start": Variable(PARAMETER, "of the parameter", "start of the search"),
+    "estimate": Variable(PARAMETER, "of the parameter", "estimate; NaN if not identifiable"),
+    "standard_uncertainty": Variable(PARAMETER, "of the parameter", "standard uncertainty of the estimate"),
+    "lower": Variable(PARAMETER, "of the parameter", "lower end of the 95 % interval"),
+    "upper": Variable(PARAMETER, "of the parameter", "upper end of the 95 % interval"),
+    "degrees_of_freedom": Variable(PARAMETER, "1", "effective degrees of freedom of the standard uncertainty"),
+    "limit": Variable(PARAMETER, "1", "−1 on the lower limit, 1 on the upper: the interval is one-sided"),
+    "told": Variable(PARAMETER, "1", "1 if identifiable, 0 if not"),
+    "correlation": Variable(("parameter", "parameter_2"), "1", "correlation of the estimates"),
+    "share": Variable(("parameter", "source"), "1", "share of a source in the variance of an estimate"),
+    "singular_value": Variable(
+        PARAMETER, "1", "singular value of the derivatives with columns scaled to 1, the largest first"
+    ),
+    "sensor_error": Variable(SENSOR, "1", "estimated error of a sensor, in its standard uncertainties"),
+    "sensor_size": Variable(
+        SENSOR, "of the sensor", "its standard uncertainty as stated, of the angle rad; NaN if it differs"
+    ),
+    "sensor_uncertainty": Variable(SENSOR, "1", "standard uncertainty of that, in those stated"),
+    "rms_before": Variable(BLOCK, "of the channel", "root mean square of the residual at the start"),
+    "rms_after": Variable(BLOCK, "of the channel", "root mean square of the residual with the estimates"),
+    "rms_expected": Variable(BLOCK, "of the channel", "its expected value from the scatter between turns"),
+    "used": Variable(BLOCK, "1", "positions used", np.int32),
+    "left_out": Variable(BLOCK, "1", "positions with data that are not used", np.int32),
+    "turns": Variable(BLOCK, "1", "turns used", np.int32),
+    "held_out_turns": Variable(BLOCK, "1", "held-out turns", np.int32),
+    "held_out_before": Variable(
+        BLOCK,
+        "of the channel",
+        "root mean square of the residual of the held-out data, at the start values",
+    ),
+    "held_out_after": Variable(BLOCK, "of the channel", "the same with the estimates"),
+    "held_out_expected": Variable(
+        BLOCK,
+        "of the channel",
+        "its expected value from the scatter and the uncertainty of the prediction",
+    ),
+    "reduced_chi_squared": Variable((), "1", "χ² of the residuals relative to the scatter between turns"),
+    "chi_squared_freedom": Variable((), "1", "degrees of freedom of that χ²"),
+    "chi_squared_chance": Variable((), "1", "chance of a larger one if the model is right"),
+    "turn_correlation": Variable((), "1", "correlation of the contributions of successive turns"),
+    "hold_out_ratio": Variable((), "1", "residuals of the held-out data over their expected value"),
+    "phase": Variable(("condition", "position"), "1", "share of the cycle"),
+    "measured": Variable(COURSE, "of the channel", "mean over the turns"),
+    "residual_before": Variable(COURSE, "of the channel", "measured minus model, at the start"),
+    "residual_after": Variable(
+        COURSE,
+        "of the channel",
+        "measured value minus predicted reading of the sensor",
+    ),
+    "residual_uncertainty": Variable(COURSE, "of the channel", "standard uncertainty of the mean over the turns"),
+}
+
+
+@dataclass(frozen=True)
+class Identified:
+    """An identification, with the figures of it, (unknown,) unless said.
+
+    starts: places that the search began at; other: another that fits as well; groups: what the data do not tell apart;
+    causes: what would explain a misfit, best first; unused: channels that no unknown acts on.
+    """
+
+    mechanism: Mechanism
+    measurement: Measurement
+    fit: Fit
+    solution: Solution
+    starts: int
+    other: Array | None
+    spread: Covariances
+    groups: Sequence[InseparableUnknowns]
+    causes: Sequence[MisfitCause]
+    unused: Sequence[str]
+
+    @property
+    def x(self) -> Array:
+        """Estimates of the unknowns, then of the sensors' errors."""
+        return self.solution.x
+
+    @cached_property
+    def times_stated(self) -> float:
+        """Size of the first cause of a misfit in standard uncertainties that are stated of it; 0 where none is."""
+        if not self.causes:
+            return 0.0
+        first, sensors = self.causes[0], [one for one in self.fit.sensors if one.stated]
+        alike = [max(map(abs, one.sizes)) for one in sensors if (one.kind, one.channel) == (first.kind, first.channel)]
+        stated = max([one.angle for one in sensors] if first.kind == "angle" else alike, default=0.0)
+        return abs(first.size) / stated if stated else 0.0
+
+    @property
+    def refuted(self) -> bool:
+        """Whether the estimates stand for something else: a gross misfit, or an error beyond what is stated of it."""
+        return self.spread.test.gross or bool(self.spread.beyond) or self.times_stated > FAR
+
+    @cached_property
+    def lost(self) -> NDArray[np.bool_]:
+        """Unknowns that the data do not tell, (unknown and sensor,)."""
+        members = [one for group in self.groups for one in group.members]
+        return np.isin(np.arange(len(self.x)), members)
+
+    @property
+    def values(self) -> Array:
+        """Estimates, of what the data do not tell the start."""
+        return np.asarray(np.where(self.lost, self.fit.start, self.x)[: self.fit.count])
+
+    @cached_property
+    def deviation(self) -> Array:
+        """Standard uncertainty, (unknown and sensor,); NaN of what the data do not tell."""
+        return np.asarray(np.where(self.lost, np.nan, self.spread.deviation))
+
+    @cached_property
+    def _step(self) -> Array:
+        """Where the next step would go without limits, (unknown and sensor,)."""
+        return np.asarray(-self.spread.inverse @ (self.fit.jacobian(self.x).T @ self.fit.residuals(self.x)))
+
+    @cached_property
+    def limit(self) -> NDArray[np.int8]:
+        """−1 of an unknown on its lower limit, 1 on its upper, 0 of others."""
+        (low, high), x = self.fit.bounds, self.x
+        near = AT_LIMIT * np.nan_to_num(self.deviation) + 1e-9 * np.abs(x)
+        limit = np.where(
+            (high - x <= near) & (self._step >= 0), 1, np.where((x - low <= near) & (self._step <= 0), -1, 0)
+        )
+        return np.asarray(np.where(self.lost, 0, limit)[: self.fit.count], np.int8)
+
+    @cached_property
+    def estimate(self) -> Array:
+        """Estimates; on a limit the limit itself, NaN of what the data do not tell."""
+        n = self.fit.count
+        low, high = (end[:n] for end in self.fit.bounds)
+        at = np.where(self.limit < 0, low, np.where(self.limit > 0, high, self.x[:n]))
+        return np.asarray(np.where(self.lost[:n], np.nan, at))
+
+    @cached_property
+    def interval(self) -> tuple[Array, Array]:
+        """95 %, within the limits; one-sided of an unknown on one, from where a step without limits ends if inside."""
+        n = self.fit.count
+        low, high = (end[:n] for end in self.fit.bounds)
+        u, freedom, free = self.deviation[:n], self.spread.freedom[:n], (self.x + self._step)[:n]
+        half, one_sided = quantile(freedom) * u, quantile(freedom, one_sided=True) * u
+        lower = np.where(self.limit > 0, np.minimum(free, high) - one_sided, self.estimate - half)
+        upper = np.where(self.limit < 0, np.maximum(free, low) + one_sided, self.estimate + half)
+        return np.maximum(np.where(self.limit < 0, low, lower), low), np.minimum(
+            np.where(self.limit > 0, high, upper), high
+        )
+
+    # ---- residuals --------------------------------------------------------------------------------------------
+
+    @cached_property
+    def by_block(self) -> dict[str, NDArray[Any]]:
+        """Residuals, (channel, condition) and (channel, condition, position), with the phases of the conditions."""
+        fit, conditions, channels = self.fit, self.measurement.conditions, list(self.fit.model.measures)
+        longest = max(len(one.phase) for one in conditions)
+        sizes = {"channel": len(channels), "condition": len(conditions), "position": longest}
+        arrays = {name: one.blank(sizes) for name, one in VARIABLES.items() if one.dims and set(one.dims) <= set(sizes)}
+        for k, condition in enumerate(conditions):
+            arrays["phase"][k, : len(condition.phase)] = condition.phase
+        allowed = fit.allowed(self.x)
+        for k, block in enumerate(fit.blocks):
+            at, mask = (channels.index(block.channel), block.condition), fit.masks[k]
+            figures: dict[str, float] = {"turns": len(block.turns), "held_out_turns": len(block.held)}
+            if len(block.turns):
+                before, after = (np.where(mask, fit.gap(x, k), np.nan) for x in (fit.start, self.x))
+                # of the positions that are used: beside jumps turns scatter more
+                scatter = np.sqrt(block.pooled(mask) / np.maximum(block.count, 1) + block.unresolved**2)
+                expected = np.where(mask & block.repeats, scatter, np.nan)
+                for name, row in zip(CURVES, (block.mean, before, after, expected), strict=True):
+                    arrays[name][at][: len(row)] = row
+                figures |= {"rms_before": rms(before), "rms_after": rms(after), "rms_expected": rms(expected)}
+                figures["used"] = int(np.count_nonzero(mask))
+                figures["left_out"] = int(np.count_nonzero(np.isfinite(block.mean) & ~mask))
+            if len(block.held):
+                where = allowed[k] & np.isfinite(block.held_mean)
+                before, after = (fit.gap(x, k, block.held_mean)[where] for x in (fit.start, self.x))
+                columns = np.nan_to_num(fit.reading(self.x, k)[1][:, where])
+                predicted = np.einsum("pi,pq,qi->i", columns, self.spread.covariance, columns)
+                count = np.maximum(np.count_nonzero(np.isfinite(block.held), axis=0), 1)[where]
+                expected = np.sqrt(self._scatter(k) / count + predicted)
+                figures |= {"held_out_before": rms(before), "held_out_after": rms(after)}
+                figures["held_out_expected"] = rms(expected)
+            for name, figure in figures.items():
+                arrays[name][at] = figure
+        return arrays
+
+    def _scatter(self, k: int) -> float:
+        """Variance of one turn of a block of which turns are held out."""
+        block, mask = self.fit.blocks[k], self.fit.masks[k]
+        if block.repeats:
+            return block.pooled(mask)
+        if len(block.held) > 1:
+            return float(np.nanmean(np.nanvar(block.held[:, mask], axis=0, ddof=1)))
+        alike = [one for one in self.fit.fitted() if self.fit.blocks[one].channel == block.channel]
+        return float(np.mean([self.fit.variances[one] for one in alike])) if alike else float("nan")
+
+    @property
+    def positions(self) -> tuple[int, int]:
+        """How many are used, and how many with data are left out."""
+        return int(self.by_block["used"].sum()), int(self.by_block["left_out"].sum())
+
+    @property
+    def hold_out_ratio(self) -> float:
+        """Rms of all predictions over what is expected of them; NaN if nothing is held out."""
+        return rms(self.by_block["held_out_after"] / self.by_block["held_out_expected"])
+
+
+# ---- as a Dataset -----------------------------------------------------------------------------------------------
+
+
+def dataset(identified: Identified, findings: Sequence[Finding]) -> xr.Dataset:
     """Estimates with their uncertainty, residuals and findings."""
     fit, measurement, mechanism = identified.fit, identified.measurement, identified.mechanism
     model, conditions = fit.model, measurement.conditions
@@ -69,13 +286,13 @@ def dataset(identified: Identified) -> xr.Dataset:
         "starts": identified.starts,
         "converged": int(identified.solution.converged),
         "references": "\n".join([*SOURCES, *references(mechanism)]),
-        "findings": finding_rows(findings_of(identified)),
+        "findings": finding_rows(findings),
     }
     variables = described({name: arrays[name] for name in VARIABLES}, VARIABLES)
     return dataset_of("identification", variables, labels, attributes)
 
 
-def _parameters(identified: Identified) -> dict[str, Array]:
+def _parameters(identified: Identified) -> dict[str, NDArray[Any]]:
     """What belongs to unknowns and sensors, and to the fit."""
     fit, spread, n, lost = identified.fit, identified.spread, identified.fit.count, identified.lost
     u, (lower, upper) = identified.deviation, identified.interval

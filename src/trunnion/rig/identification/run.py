@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Literal
 
@@ -14,6 +15,7 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measures.measures import Measure, named
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
+from trunnion.rig.identification.findings import findings_of
 from trunnion.rig.identification.fit import (
     EFFICIENCY,
     FILE_ZERO,
@@ -28,13 +30,12 @@ from trunnion.rig.identification.fit import (
     solved,
 )
 from trunnion.rig.identification.identifiability import inseparable
-from trunnion.rig.identification.identified import Identified
 from trunnion.rig.identification.misfit import explanations
-from trunnion.rig.identification.result import dataset
+from trunnion.rig.identification.result import Identified, dataset
 from trunnion.rig.identification.signals import Model, SeatedModel
 from trunnion.rig.identification.uncertainty import excess, spread_of
 from trunnion.rig.identification.unknowns import Parameters, described, unknowns
-from trunnion.rig.modelled import apart, check_settings, measure_of, refuse_backwards, refuse_unit
+from trunnion.rig.modelled import apart, each, in_condition, measure_of, refuse_backwards, refuse_unit
 from trunnion.rig.reading.efficiency import efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.solve.friction_method import FrictionMethod
@@ -54,7 +55,6 @@ HALVINGS = 8  # of a friction that locks at the start
 OTHERS = (0.3, 3.0)  # times the start: where else a search begins first
 CLOSE = 1e-3  # of the sizes: two searches ended at one place
 AS_GOOD = 4.0  # sum of squares: another place is named if it is not worse by more
-COURSE = 1e-3  # of the largest value: what the model must change by over the cycle to have a course
 
 
 @strict_arguments
@@ -103,9 +103,12 @@ def identify(
     MechanismError
         For names, channels or conditions that are not there, or where the model has no answer.
     """
-    _check(sensors, guard, starts)
-    check_settings(mechanism, measurement)
+    if guard is not None and guard < 0:
+        raise MechanismError(Finding(f"{guard} positions cannot be left out", "guard", "give 0 or more"))
+    if starts < 1:
+        raise MechanismError(Finding(f"the number of start points is {starts}", "starts", "give 1 or more"))
     conditions = measurement.conditions
+    each(conditions, partial(in_condition, mechanism))
     paths = described(mechanism, parameters)
     mechanism = _stated(mechanism, measurement, paths, start or {})
     settings = _settings(mechanism, measurement, paths)
@@ -123,8 +126,8 @@ def identify(
     if channels is None:
         model, blocks, unused = _acted_on(model, blocks)
     at = np.array([one.start for one in model.unknowns])
-    speeds = [(one, model.driven(k, at)[2]) for k, one in enumerate(conditions)]
-    refuse_backwards(next(iter(mechanism.drivers), ""), speeds)
+    speeds = iter([model.driven(k, at)[2] for k in range(len(conditions))])
+    each(conditions, lambda one: refuse_backwards(mechanism, one, next(speeds)))
     fit = Fit(
         Evaluations(model, progress), blocks, sensor_errors(model, conditions, blocks, sensors == "condition"), guard
     )
@@ -138,18 +141,8 @@ def identify(
     other_speeds = [apart(one.speed, model.driven(k, best.x[: fit.count])[2]) for k, one in enumerate(conditions)]
     causes = explanations(fit, begin, spread.test) if spread.test.misfit and not any(other_speeds) else []
     groups = inseparable(fit, best.x, spread)
-    return dataset(Identified(mechanism, measurement, fit, best, starts, other, spread, groups, causes, unused))
-
-
-def _check(sensors: str, guard: int | None, starts: int) -> None:
-    """MechanismError for options that mean nothing."""
-    if sensors not in ("channel", "condition"):
-        what = f"errors of sensors are not alike by '{sensors}'"
-        raise MechanismError(Finding(what, "sensors", "give channel or condition"))
-    if guard is not None and guard < 0:
-        raise MechanismError(Finding(f"{guard} positions cannot be left out", "guard", "give 0 or more"))
-    if starts < 1:
-        raise MechanismError(Finding(f"the number of start points is {starts}", "starts", "give 1 or more"))
+    identified = Identified(mechanism, measurement, fit, best, starts, other, spread, groups, causes, unused)
+    return dataset(identified, findings_of(identified))
 
 
 # ---- the data -------------------------------------------------------------------------------------------------
@@ -364,7 +357,7 @@ def _searched(fit: Fit, begin: Array, starts: int) -> tuple[Fit, Solution, Array
 
 
 def _runnable(fit: Fit) -> Array:
-    """The start, with less friction where that locks. MechanismError if nothing runs, or a channel is dead."""
+    """The start, with less friction where that locks. MechanismError if no position can be used."""
 
     def unanswered(x: Array) -> int:
         return sum(int(np.count_nonzero(status >= Status.NOT_CONVERGED)) for status in fit.courses(x).status)
@@ -380,49 +373,11 @@ def _runnable(fit: Fit) -> Array:
         less[rubs] = np.maximum(fit.start[rubs] * 0.5**k, low[rubs])
         if unanswered(less) < lost:
             best, lost = less, unanswered(less)
-    findings = list(_dead(fit, best)) or list(_unusable(fit, best))
-    if findings:
-        raise MechanismError(findings)
+    masks = replace(fit, variances=fit.first_scatter()).allowed(best)
+    if not any(np.any(masks[k]) for k in fit.fitted()):
+        codes = np.concatenate([np.asarray(status) for status in fit.courses(best).status])
+        what = "no position can be used: no channel has a value there, friction reverses beside it, or the model has "
+        what += f"no sound answer (most often {list(Status)[int(np.bincount(codes).argmax())].text})"
+        remedy = "see the gaps with `trunnion data`; give a smaller guard, or start values with which the model runs"
+        raise MechanismError(Finding(what, "data", remedy))
     return best
-
-
-def _unusable(fit: Fit, start: Array) -> Iterator[Finding]:
-    """Why no position is used, if none is."""
-
-    def usable(fit: Fit) -> bool:
-        masks = replace(fit, variances=fit.first_scatter()).allowed(start)
-        return any(bool(np.any(masks[k])) for k in fit.fitted())
-
-    if usable(fit):
-        return
-    codes = np.concatenate([np.asarray(status) for status in fit.courses(start).status])
-    worst = list(Status)[int(np.bincount(codes).argmax())]
-    if not any(np.any(np.isfinite(fit.blocks[k].mean)) for k in fit.fitted()):
-        what = "no channel has a value at any position"
-        yield Finding(what, "data", "check the gaps and columns with `trunnion data`")
-    elif usable(replace(fit, guard=0)):
-        what = "all positions are left out: each is next to a friction reversal"
-        yield Finding(what, "guard", "give a smaller guard, or resample to more positions")
-    else:
-        what = f"no position of the data has a sound answer of the model: {worst.text}"
-        yield Finding(what, "start", "give start values with which the model has a solution, see `trunnion analyse`")
-
-
-def _dead(fit: Fit, start: Array) -> Iterator[Finding]:
-    """Channels that read one number, without scatter or course, where the model has a course."""
-    dead: dict[str, list[tuple[float, float, float]]] = {}
-    for k in fit.fitted():
-        block, reading = fit.blocks[k], fit.reading(start, k)[0]
-        data, reading = block.turns[np.isfinite(block.turns)], reading[np.isfinite(reading)]
-        if block.turns.shape[1] < 3 or not data.size or not reading.size or np.ptp(data) != 0:
-            continue
-        most, step = float(np.max(np.abs(reading))), block.signal.accuracy.resolution
-        if np.ptp(reading) > max(COURSE * most, 2 * step) or (data[0] == 0 and most > 2 * step):
-            row = float(data[0]), float(np.min(reading)), float(np.max(reading))
-            dead.setdefault(block.channel, []).append(row)
-    for channel, rows in dead.items():
-        value, low, high = rows[0]
-        many = f" in {len(rows)} conditions" if len(rows) > 1 else ""
-        what = f"reads {value:.4g} at all positions of all turns{many}, where the model has {low:.4g} to {high:.4g}"
-        remedy = "check the sensor, its column and its gain, or name the other channels"
-        yield Finding(what, f"channel {channel}", remedy)

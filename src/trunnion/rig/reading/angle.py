@@ -16,13 +16,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import convolve1d, median_filter, minimum_filter1d, uniform_filter1d
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.units import UnitError
 from trunnion.rig.reading.channels import unit_differs
-from trunnion.rig.reading.log import at_times, counted, note, warning
+from trunnion.rig.reading.log import at_times, counted, warning
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.tables import Column, DataTable
 from trunnion.rig.reading.timebase import GAP, Timeline
-from trunnion.rig.reading.units import alike, dimensions
 
 __all__ = ["Coordinate", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved", "unwrapped"]
 
@@ -35,7 +33,6 @@ FEWEST = 5  # pulses in a span
 BOUND = 1.1  # of what a pulse may be off: more shows that the shaft itself runs unevenly
 EVEN = 1.1 / np.sqrt(3.0)  # the same of the root mean square, of errors spread evenly
 STANDS = 3.0  # times the usual time of a count, from which the shaft stands or a pulse is lost
-FULL = (1 << 8, 1 << 16, 1 << 24, 1 << 32)  # at which counters usually begin anew
 SET_BACK = 20.0  # times the largest usual step, by which a counter is set back
 
 
@@ -87,13 +84,6 @@ def coordinate(source: AngleSource, table: DataTable, line: Timeline, speed: Arr
     values, spoilt = source.sign * values, np.empty((0, 2))
     if index.size > 1 and source.from_ in ("time", "speed"):
         values, spoilt = _tied(values, index, line.seconds, say)
-    elif index.size > 1:
-        at = np.interp(index, line.seconds, values)
-        far = np.flatnonzero(np.abs(np.angle(np.exp(1j * (at - at[0])))) > np.radians(5.0))
-        if far.size:
-            what = f"{counted(far.size, 'index pulse')} of {index.size} more than 5 deg off the first, "
-            remedy = "check unit and zero of the angle, and whether its sensor slips"
-            say(warning("index.off", "angle.index", what + at_times(index[far]), remedy))
     return Coordinate(values + zero, spoilt, lag, source.sign * cut)
 
 
@@ -101,18 +91,7 @@ def coordinate(source: AngleSource, table: DataTable, line: Timeline, speed: Arr
 
 
 def _of_column(source: AngleSource, column: Column, line: Timeline, say: Say) -> Array:
-    unit = source.unit or column.unit
-    if not unit:
-        what = f"the column '{source.column}' has no unit; rad is assumed"
-        say(note("angle.no_unit", "angle", what, "state angle.unit"))
-    try:
-        factor, kind = dimensions(unit or "rad")
-    except UnitError as error:
-        what, remedy = f"the column '{source.column}': {error.what}", "state angle.unit in the mapping, such as deg"
-        raise MechanismError(Finding(what, "angle", f"{remedy}; in the file, {error.remedy}")) from None
-    if not alike(kind, dimensions("rad")[1]):
-        what = f"the column '{source.column}' has the unit '{unit}', which is no angle"
-        raise MechanismError(Finding(what, "angle", "name another column"))
+    factor = column.factor("angle", str(source.column), source.unit, "rad", say)
     if source.unit and (finding := unit_differs("angle", str(source.column), source.unit, column)):
         say(finding)
     values = line.rows(column.values) * factor
@@ -121,15 +100,8 @@ def _of_column(source: AngleSource, column: Column, line: Timeline, say: Say) ->
         what = f"{counted(values.size - known.size, 'cell')} of '{source.column}' of {values.size:,} are no number"
         remedy = "check the angle sensor and its cable"
         say(warning("angle.missing", "angle", f"{what}; these rows are left out", remedy))
-    if known.size < 3:
-        return np.full(values.size, np.nan)
     values = values.copy()
     values[known] = np.unwrap(values[known])
-    steps = np.abs(np.diff(values[known]))
-    usual = float(np.median(steps[steps > 0])) if steps.any() else 0.0
-    if usual > TURN / 4:
-        what = f"a turn has {TURN / usual:.3g} samples: the direction of rotation cannot be determined"
-        say(warning("angle.few_samples", "angle", what, "sample at least 8 times a turn"))
     return values
 
 
@@ -237,10 +209,7 @@ def _counted(source: AngleSource, readings: Array, seconds: Array, step: float) 
 
 
 def unwrapped(source: AngleSource, readings: Array, seconds: Array) -> Array:
-    """A count that goes on where its counter is full; MechanismError for one that is set back otherwise.
-
-    Full it is at `wrap`; if that is not stated, at a turn or at a power of 2 that all falls show alike.
-    """
+    """A count that goes on where its counter is full, at `wrap`; MechanismError for one that is set back otherwise."""
     if source.wrap is not None:
         return np.unwrap(readings, period=float(source.wrap))
     steps = np.diff(readings)
@@ -250,9 +219,6 @@ def unwrapped(source: AngleSource, readings: Array, seconds: Array) -> Array:
     back = np.flatnonzero(steps < -least)
     if not back.size or np.ptp(readings) < 2:
         return readings
-    for full in (source.per_turn or 0, *FULL):
-        if full and np.all(np.abs(full + steps[back] - usual) <= usual + 1):
-            return np.unwrap(readings, period=float(full))
     fall = f"from {readings[back[0]]:,.0f} to {readings[back[0] + 1]:,.0f}"
     what = f"the count of '{source.column}' is set back {counted(back.size, 'time')}, {at_times(seconds[back])}, first "
     remedy = "state wrap: the count at which the counter returns to 0; or select a part by files: over:"
@@ -308,12 +274,9 @@ def by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say)
     way = np.sign(at[-1] - at[0]) or 1.0
     between = np.diff(at) * way
     usual = float(np.median(between))
-    alike = np.abs(between - usual) < max(1.5, 0.01 * abs(usual))
-    if between.size > 1 and np.mean(alike) > 0.5 and abs(usual - per_turn) >= max(0.75, 0.01 * per_turn):
-        mean = float(np.mean(between[alike]))
-        what = f"from one index pulse to the next the encoder counts {mean:.4g}, angle.per_turn is {per_turn:,}"
-        remedy = f"state per_turn: {mean:.0f}, if the index comes once a turn"
-        say(warning("pulses.per_turn", "angle.per_turn", what, remedy))
+    if abs(usual - per_turn) >= max(0.75, 0.01 * per_turn):
+        what = f"from one index pulse to the next the encoder counts {usual:.4g}, angle.per_turn is {per_turn:,}"
+        say(warning("pulses.per_turn", "angle.per_turn", what, "correct per_turn, if the index comes once a turn"))
     turns = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(between / per_turn), 1.0))])
     over = (at - at[0]) * way - per_turn * turns
     fraction = float(np.angle(np.mean(np.exp(2j * np.pi * over)))) / (2 * np.pi)

@@ -14,14 +14,13 @@ from scipy.ndimage import median_filter
 from scipy.special import bdtrc
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.names import as_key
 from trunnion.rig.reading.log import counted, note, places, runs, warning
 from trunnion.rig.reading.mapping import Channel
 from trunnion.rig.reading.tables import Column
 from trunnion.rig.reading.turns import Turns, turn_means
 
 __all__ = [
-    "Drift", "FaultSpan", "backward_finding", "backwards", "clipped", "drift", "faults", "missing", "outliers", "signs",
+    "Drift", "clipped", "drift", "faults", "missing", "outliers", "signs",
     "speeds", "steady",
 ]  # fmt: skip
 
@@ -35,8 +34,7 @@ WIDTH = 7  # samples of the median that spikes are told from: up to three in a r
 FAR = 12.0  # robust standard deviations from it
 SEEN = 0.1  # of the span from the 1st to the 99th percentile, that a spike exceeds
 NEAR, CHANCE = 0.01, 0.025  # of a turn, in which what recurs is in the same place; chance that faults lie so close
-FEW = 4  # turns from which what comes back can be told from faults
-RPM = np.pi / 30
+FEW = 4  # turns from which what comes back in them can be told from faults
 STEADY = 0.03  # of the mean speed, between the slowest and the fastest turn
 CERTAIN = 6.0  # standard errors from which a slope is one
 PLAIN, SHARE = 3.0, 0.002  # times what turns scatter about the line, and share of the channel, that a drift comes to
@@ -82,54 +80,21 @@ def outliers(readings: Array) -> Mask:
     return np.asarray(off > FAR * float(np.percentile(off, 99))) if readings.size > WIDTH else off > np.inf
 
 
-@dataclass(frozen=True)
-class FaultSpan:
-    """The rows in which the drive runs, and when its turns begin and end there, s.
+def faults(
+    where: str, readings: Array, seconds: Array, turns: tuple[Array, Array], beside: int, moves: bool = True
+) -> Iterator[Finding]:
+    """Stuck readings and spikes while the drive runs, which become NaN; what comes back in the turns is the signal's.
 
-    beside: rows before and after them that reach into the turns, by interpolation or a filter.
+    Parameters
+    ----------
+    where, readings, seconds : channel, its readings and their times.
+    turns : when they begin and end, s; with fewer than `FEW` nothing tells a fault from the signal.
+    beside : rows before and after the turns that reach into them, by interpolation or a filter.
+    moves : whether the readings are to change.
     """
-
-    low: int
-    high: int
-    begin: Array
-    end: Array
-    beside: int = 0
-
-    def periodic(self, count: int) -> bool:
-        """Whether something happens in so many places that it belongs to the signal."""
-        return self.begin.size >= FEW and count >= 0.5 * self.begin.size
-
-    def recurring(self, time: Array) -> Mask:
-        """What comes back in the same place of the turn more often than chance would have it (binomial).
-
-        Once found, it does not count any more when the rest is looked at.
-        """
-        turn = np.clip(np.searchsorted(self.begin, time, side="right") - 1, 0, self.begin.size - 1)
-        phase = ((time - self.begin[turn]) / (self.end - self.begin)[turn]) % 1.0
-        own = np.zeros(phase.size, dtype=np.bool_)
-        while np.count_nonzero(~own) > 1:
-            rest = phase[~own]
-            around = np.sort(np.concatenate([rest - 1, rest, rest + 1]))
-            others = np.searchsorted(around, rest + NEAR, side="right") - np.searchsorted(around, rest - NEAR) - 1
-            again = np.asarray(bdtrc(others - 1, rest.size - 1, 2 * NEAR) < CHANCE)
-            if not again.any():
-                break
-            own[np.flatnonzero(~own)[again]] = True
-        return own
-
-    def leave_out(self, readings: Array, mask: Mask) -> str:
-        """Leave out what may be the signal's own only where there are turns enough to tell; what was done."""
-        if self.begin.size < FEW:
-            turns = counted(self.begin.size, "turn")
-            return f"left in: in {turns} it cannot be decided whether this belongs to the signal"
-        readings[mask] = np.nan
-        return "left out"
-
-
-def faults(where: str, readings: Array, seconds: Array, span: FaultSpan, moves: bool = True) -> Iterator[Finding]:
-    """Stuck readings and spikes while the drive runs, which become NaN; moves: whether the readings are to change."""
-    running = readings[span.low : span.high]
-    known = running[np.isfinite(running)]
+    begin, end = turns
+    running = slice(int(np.searchsorted(seconds, begin[0])), int(np.searchsorted(seconds, end[-1], "right")))
+    known = readings[running][np.isfinite(readings[running])]
     if known.size < 10:
         return
     if known.min() == known.max():
@@ -137,52 +102,70 @@ def faults(where: str, readings: Array, seconds: Array, span: FaultSpan, moves: 
         remedy = "check that the sensor is connected and the column the right one"
         yield (warning if moves else note)("readings.constant", where, what, remedy)
         return
-    wide = max(float(np.subtract(*np.percentile(known, (99, 1)))), 1e-300)
-    yield from _stuck(where, running, seconds[span.low : span.high], span)
-    near = slice(max(span.low - span.beside, 0), span.high + span.beside)
-    yield from _spikes(where, readings[near], seconds[near], wide, span)
-
-
-def _stuck(where: str, part: Array, time: Array, span: FaultSpan) -> Iterator[Finding]:
-    """The same reading in a row much more often than is usual for the channel."""
-    starts, lengths = runs(np.concatenate([np.diff(part) == 0, [False]]))
-    if not starts.size:
+    if begin.size < FEW:
         return
+    wide = max(float(np.subtract(*np.percentile(known, (99, 1)))), 1e-300)
+    stuck = _stuck(readings[running])
+    if 0 < (times := runs(stuck)[0].size) < 0.5 * begin.size:
+        what = f"stuck: the reading does not change for {counted(int(stuck.sum()) + times, 'sample')}, "
+        what += f"{places(stuck, seconds[running])}; left out"
+        readings[running][stuck] = np.nan
+        yield warning("readings.stuck", where, what, "check sensor and logger")
+    near = slice(max(running.start - beside, 0), running.stop + beside)
+    part, (far, off) = readings[near], _spikes(readings[near], wide)
+    if runs(far)[0].size < 0.5 * begin.size:
+        far[np.flatnonzero(far)[_recurring(seconds[near][far], begin, end)]] = False
+    else:
+        far[:] = False
+    if far.any():
+        what = (
+            f"spikes: {counted(int(far.sum()), 'reading')} of {known.size:,} up to {off[far].max() / wide:.2g} times "
+        )
+        what += f"the usual span off their neighbours, {places(far, seconds[near])}; left out"
+        part[far] = np.nan
+        yield warning("readings.spikes", where, what, "check shielding and earth")
+
+
+def _recurring(time: Array, begin: Array, end: Array) -> Mask:
+    """What others are in the same place of the turn as, more than chance has it (binomial): the signal's own."""
+    turn = np.clip(np.searchsorted(begin, time, side="right") - 1, 0, begin.size - 1)
+    phase, own = ((time - begin[turn]) / (end - begin)[turn]) % 1.0, np.zeros(time.size, dtype=np.bool_)
+    while np.count_nonzero(~own) > 1:  # what is found does not count any more
+        rest = phase[~own]
+        around = np.sort(np.concatenate([rest - 1, rest, rest + 1]))
+        others = np.searchsorted(around, rest + NEAR, side="right") - np.searchsorted(around, rest - NEAR) - 1
+        again = np.asarray(bdtrc(others - 1, rest.size - 1, 2 * NEAR) < CHANCE)
+        if not again.any():
+            break
+        own[np.flatnonzero(~own)[again]] = True
+    return own
+
+
+def _stuck(part: Array) -> Mask:
+    """The same reading in a row much more often than is usual for the channel; none where that is most of it."""
+    starts, lengths = runs(np.concatenate([np.diff(part) == 0, [False]]))
+    stuck = np.zeros(part.size, dtype=np.bool_)
+    if not starts.size:
+        return stuck
     single = part.size - int(np.sum(lengths + 1))
     ranks = np.sort(np.concatenate([lengths + 1, np.ones(min(single, 10 * lengths.size), dtype=np.intp)]))
     usual = float(ranks[int(0.99 * (ranks.size - 1))])
     long = lengths + 1 > max(STUCK, 10 * usual if usual < 0.1 * part.size else STUCK)
-    held = int(np.sum(lengths[long] + 1))
-    if not long.any() or span.periodic(int(long.sum())) or held > 0.5 * part.size:
-        return
-    bad = np.zeros(part.size, dtype=np.bool_)
     for begin, length in zip(starts[long], lengths[long], strict=True):
-        bad[begin + 1 : begin + length + 1] = True
-    what = f"stuck: the reading does not change for {counted(held, 'sample')}, {places(bad, time)}"
-    yield warning("readings.stuck", where, f"{what}; {span.leave_out(part, bad)}", "check sensor and logger")
+        stuck[begin + 1 : begin + length + 1] = True
+    return stuck if stuck.sum() <= 0.5 * part.size else np.zeros_like(stuck)
 
 
-def _spikes(where: str, part: Array, time: Array, wide: float, span: FaultSpan) -> Iterator[Finding]:
-    """One to three readings far from the median of those around them; wide: what the readings span."""
-    finite = np.isfinite(part)
-    if np.count_nonzero(finite) < 2 * WIDTH:
-        return
-    known = part[finite]
-    off = np.abs(known - median_filter(known, size=WIDTH, mode="nearest"))
-    ends = np.abs(known - median_filter(known, size=WIDTH, mode="mirror"))  # which a slope moves, too
-    off = np.where(ends > wide, np.maximum(off, ends), off)
-    far = off > max(FAR * 1.4826 * float(np.median(off)), 2.5 * float(np.percentile(off, 99)), SEEN * wide)
-    if span.periodic(int(runs(far)[0].size)):
-        return
-    bad = np.zeros(part.size, dtype=np.bool_)
-    bad[np.flatnonzero(finite)[far]] = True
-    bad[np.flatnonzero(bad)[span.recurring(time[bad])]] = False
-    far = bad[finite]
-    if not far.any():
-        return
-    what = f"spikes: {counted(int(far.sum()), 'reading')} of {span.high - span.low:,} up to "
-    what += f"{off[far].max() / wide:.2g} times the usual span off their neighbours, {places(bad, time)}"
-    yield warning("readings.spikes", where, f"{what}; {span.leave_out(part, bad)}", "check shielding and earth")
+def _spikes(part: Array, wide: float) -> tuple[Mask, Array]:
+    """One to three readings far from the median of those around them, and how far; wide: what the readings span."""
+    finite, far, distance = np.isfinite(part), np.zeros(part.size, dtype=np.bool_), np.zeros(part.size)
+    if np.count_nonzero(finite) >= 2 * WIDTH:
+        known = part[finite]
+        off = np.abs(known - median_filter(known, size=WIDTH, mode="nearest"))
+        ends = np.abs(known - median_filter(known, size=WIDTH, mode="mirror"))  # which a slope moves, too
+        distance[finite] = off = np.where(ends > wide, np.maximum(off, ends), off)
+        far[finite] = off > max(FAR * 1.4826 * np.median(off), 2.5 * np.percentile(off, 99), SEEN * wide)
+    return far, distance
 
 
 # ---- turns ----------------------------------------------------------------------------------------------------
@@ -288,27 +271,6 @@ def signs(
             what = f"{what} ({power.mean():.4g} W) while the drive delivers power"
             remedy = f"write sign: {-channels[key].sign} (or turn that of {rate})"
             yield warning("power.sign", f"channels.{key}", what, remedy)
-
-
-def backwards(
-    channels: Mapping[str, Channel], settings: Sequence[Mapping[str, float]], turning: float
-) -> Finding | None:
-    """An angle that runs the other way than a driver whose speed is set; turning: by the angle, rad/s."""
-    drivers = list(_subjects(channels, "effort"))
-    if len(drivers) != 1:
-        return None
-    speeds = [row[f"{drivers[0]}.speed"] for row in settings if f"{drivers[0]}.speed" in row]
-    against = next((speed for speed in speeds if speed * turning < 0), None)
-    return None if against is None else backward_finding(drivers[0], turning, against)
-
-
-def backward_finding(driver: str, measured: float, stated: float) -> Finding:
-    """An error of an angle that runs against the driver; speeds in rad/s."""
-    what = f"the angle runs backwards: {measured / RPM:.4g} rpm measured, {stated / RPM:.4g} rpm stated of {driver}"
-    speed = as_key(f"{driver}.speed")
-    remedy = f"if it does turn so, set {speed} below zero; else add sign: -1 to angle:, or remove it there"
-    figures = {"measured": measured, "stated": stated, "driver": driver}
-    return Finding(what, "angle", remedy, code="data.angle.backwards", figures=figures)
 
 
 def speeds(

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, Tag, ValidationError, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError
 from trunnion.model.entry import Name, Part, forms, problem
 from trunnion.model.file import Lines, place, read_entries
 from trunnion.model.findings import schema_findings
@@ -343,35 +343,19 @@ class Mapped:
         """Findings about the mapping with its file and line; those of other files as they are."""
         return place(findings, self.file, self.lines, self.data) if self.file else findings
 
-    def files(self, named: Iterable[str | os.PathLike[str]] | None) -> tuple[list[tuple[Path, File]], list[Finding]]:
-        """Data files with their entries; a note where files of the command line have less than those of the mapping.
-
-        A file of the command line has the entry of the same file, and the settings of the one entry that has its name.
-        """
+    def files(self, named: Iterable[str | os.PathLike[str]] | None) -> list[tuple[Path, File]]:
+        """Data files with their entries; one of the command line has the entry of the same file, else of its name."""
         entries, paths = self.mapping.files, [Path(one) for one in named or ()]
         if not paths and not entries:
             remedy = "write files: [{file: run-01.csv}], or name them after the mapping"
             raise MechanismError(self.placed([Finding("no data file is named", "files", remedy)]))
         if not paths:
-            return [(self.folder / entry.file, entry) for entry in entries], []
+            return [(self.folder / entry.file, entry) for entry in entries]
         stated = {(self.folder / entry.file).resolve(): entry for entry in entries}
         names = [Path(entry.file).name for entry in entries]
-        rows, bare = [], []
-        for path in paths:
-            entry = stated.get(path.resolve())
-            if entry is None:
-                like = [one for one, name in zip(entries, names, strict=True) if name == path.name]
-                unique = len(like) == 1 == [one.name for one in paths].count(path.name)
-                entry = File(file=path.name or ".", set=like[0].set if unique else {})
-                others = like if unique else entries
-                if any(one.over or one.angle or one.channels or (one.set and not unique) for one in others):
-                    bare.append(str(path))
-            rows.append((path, entry))
-        if not bare:
-            return rows, []
-        what = f"{', '.join(bare[:4])}{' …' * (len(bare) > 4)} read without what the mapping states for other files"
-        remedy = "add them to `files` with their set, over, angle or channels"
-        return rows, [Finding(what, "files", remedy, Severity.NOTE, code="data.files.less")]
+        alike = {name: entry for entry, name in zip(entries, names, strict=True) if names.count(name) == 1}
+        return [(path, stated.get(path.resolve()) or alike.get(path.name) or File(file=path.name or "."))
+                for path in paths]  # fmt: skip
 
 
 def read_mapping(source: str | os.PathLike[str] | Mapping[str, Any]) -> Mapped:
@@ -407,7 +391,7 @@ def _explained(finding: Finding, data: Mapping[str, Any]) -> Finding:
 
 
 def _check(mapping: DataMapping) -> Iterator[Finding]:
-    """What one part alone cannot tell: names of channels, the rate of the sampling."""
+    """What one part alone cannot tell: names of channels."""
     channels, settings = mapping.channels, {"set": mapping.set}
     settings |= {f"files.{k}.set": file.set for k, file in enumerate(mapping.files)}
     if not channels:
@@ -424,10 +408,6 @@ def _check(mapping: DataMapping) -> Iterator[Finding]:
     elif source is not None and not channels[source].measures.startswith("rate:"):
         what = f"the channel '{source}' measures {channels[source].measures}, not a speed"
         yield Finding(what, "angle.channel", "name a channel that measures rate:DRIVER")
-    base = mapping.time
-    if mapping.filter and base and base.rate and 2 * mapping.filter.cut_off.value >= base.rate.value:
-        what = f"a cut-off of {mapping.filter.cut_off.value:g} Hz, samples come at {base.rate.value:g} Hz"
-        yield Finding(what, "filter.cut_off", f"write less than half of that, {base.rate.value / 2:g} Hz")
 
 
 def _check_cycle(mapping: DataMapping) -> Iterator[Finding]:

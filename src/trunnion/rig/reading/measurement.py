@@ -138,8 +138,7 @@ class Condition:
     start, cycle: coordinate of the driver at phase 0, and how far it goes in a cycle, rad; NaN where that is not known.
     lag: standard uncertainty, s, of when the coordinate is passed, of all channels together, by the sampling of pulses;
     cut: that of the angle, rad with its sign, by readings that may be cut off, alike in all files of that resolution.
-    dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI; followed: those of
-    `values` that are the mean of what was measured.
+    dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI.
     duration: of a cycle that is a time, s; NaN of one that is an angle.
     """
 
@@ -154,7 +153,6 @@ class Condition:
     lag: float = 0.0
     cut: float = 0.0
     dimensions: Mapping[str, Dimension] = field(default_factory=dict)
-    followed: Sequence[str] = ()
     duration: float = float("nan")
 
 

@@ -41,7 +41,6 @@ from trunnion.rig.reading.units import Dimensions, dimensions
 __all__ = ["read_measured"]
 
 Array = NDArray[np.float64]
-FEW_HARMONICS = 5.0
 SPARSE = 0.25  # samples a position, below which nearly all values are interpolated
 PASSED = 1.25  # times what a cubic between samples leaves of white noise, at the least
 PERIODS = 5.0  # of the cut-off of a filter, over which a reading reaches
@@ -71,7 +70,7 @@ def read_measured(
         With every finding, where mapping or files cannot be read or there is no turn at all.
     """
     mapped = read_mapping(mapping)
-    entries, notes = mapped.files(files)
+    entries = mapped.files(files)
     recordings: list[_Recording] = []
     conditions: list[Condition] = []
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers near the end of the floats
@@ -83,7 +82,7 @@ def read_measured(
         for recording in recordings:
             with recording.failing():
                 conditions += recording.conditions(steps)
-    findings = mapped.placed([finding for recording in recordings for finding in recording.findings] + notes)
+    findings = mapped.placed([finding for recording in recordings for finding in recording.findings])
     if not conditions or any(recording.failed for recording in recordings):
         raise MechanismError(gathered((one for one in findings if one.severity is not Severity.NOTE), same=True))
     name = mapped.mapping.name or Path(mapped.file).stem
@@ -104,15 +103,9 @@ def _steps(recordings: Sequence[_Recording]) -> dict[tuple[object, ...], float]:
 
 def _done(conditions: Sequence[Condition], recordings: Sequence[_Recording]) -> tuple[str, ...]:
     """How many turns are used, and what was done to the data, each sentence once."""
-    recorded, lost = sum(one.recorded for one in recordings), sum(one.left_out for one in recordings)
-    counts = [next(iter(one.courses.values())).turns.shape[0] for one in conditions]
+    counts = [len(next(iter(one.courses.values())).turns) for one in conditions]
     each = f"{min(counts):,}" if min(counts) == max(counts) else f"{min(counts):,} to {max(counts):,}"
     where = "" if len(counts) == 1 else f" in each of {len(counts):,} conditions"
-    if sum(counts) < recorded - 2 * len(counts):
-        where += f", {sum(counts):,}" if len(counts) > 1 else ""
-        where += f" of {recorded:,.0f} recorded"
-    elif lost:
-        where += f", {lost:,} more left out as the findings say"
     sentences = [f"{each} whole turns{where}; rows before, between and after them are not used"]
     for text in dict.fromkeys(text for one in recordings for text in one.done):
         names = [one.path.name for one in recordings if text in one.done]
@@ -171,7 +164,7 @@ class _Part:
 
 
 class _Recording:
-    """One data file on its way to conditions. recorded: turns gone through; left_out: whole ones that are not used."""
+    """One data file on its way to conditions."""
 
     def __init__(self, mapping: DataMapping, path: Path, entry: File) -> None:
         self.mapping, self.path, self.entry = mapping, path, entry
@@ -179,7 +172,7 @@ class _Recording:
         self.done: list[str] = []
         self.sensors: dict[str, ChannelReading] = {}
         self.parts: list[_Part] = []
-        self.recorded, self.left_out, self.failed = 0.0, 0, False
+        self.failed = False
 
     def say(self, finding: Finding | str | None) -> None:
         """Take a finding, or a sentence about what was done."""
@@ -228,7 +221,6 @@ class _Recording:
             turns = cut(share, self.line, setting.window, allowed, mapping.positions, spoilt, say, setting.where)
             steps = np.abs(np.diff(share[setting.window])[allowed[1:] & allowed[:-1]])
             gone = float(np.sum(steps[np.isfinite(steps)]))
-            self.recorded, self.left_out = self.recorded + gone, self.left_out + turns.left_out
             if not turns.numbers.size:
                 what = f"there is no whole turn: {gone:.3g} cycles in {counted(int(allowed.sum()), 'row')}"
                 say(Finding(what, setting.where, "check angle, or record for longer", code="data.turns.none"))
@@ -245,14 +237,11 @@ class _Recording:
         low_pass, rate = self.mapping.filter, 1.0 / self.line.step
         if low_pass is None:
             return
-        cut_off, lasted = low_pass.cut_off.value, float(np.ptp(self.line.seconds))
+        cut_off = low_pass.cut_off.value
         if 2 * cut_off >= rate:
             what = f"the sampling is too slow for the filter: {rate:.6g} Hz, a cut-off of {cut_off:g} Hz"
             remedy = f"state a cut-off below {rate / 2:.4g} Hz, or sample faster"
             raise MechanismError(Finding(what, "filter.cut_off", remedy))
-        if cut_off * lasted < 2:
-            what = f"the cut-off of {cut_off:g} Hz is slower than the recording of {lasted:.4g} s"
-            raise MechanismError(Finding(what, "filter.cut_off", "state a higher one"))
         if not self.line.even:
             what = "the samples are not evenly spaced in time, as a filter needs them"
             self.say(warning("filter.uneven", "filter", what, "record at a fixed rate, or leave out the filter"))
@@ -347,11 +336,6 @@ class _Recording:
                 what = f"the sampling is slow: {samples}; between them it is interpolated"
                 slow = warning if turns.density < SPARSE else note  # no fault of the readings
                 say(slow("sampling.slow", where, what, "state fewer positions, or sample faster"))
-            length = float(np.mean(turns.end - turns.begin))
-            passed = self.mapping.filter.cut_off.value * length if self.mapping.filter else np.inf
-            if passed < FEW_HARMONICS:
-                what = f"the filter leaves the first {passed:.2g} harmonics of a turn"
-                say(note("filter.harmonics", where, what, "state a higher cut-off"))
             for name, channel in self.mapping.channels.items():
                 for low, high in channel.zero.over if isinstance(channel.zero, Zero) else ():
                     if inside := int(np.sum((turns.begin < high.value) & (turns.end > low.value))):
@@ -362,9 +346,7 @@ class _Recording:
         if most >= positions:
             say("values at a position: mean of the samples within half a position to either side")
             return
-        size = 10 ** max(len(str(most)) - 2, 0)
-        tail = f"; of at most {most // size * size} positions each has four samples, which are averaged"
-        say(f"values at a position: interpolated by a cubic between four samples{tail * (most > 1)}")
+        say(f"values at a position: interpolated by a cubic; with up to {most} positions they are means of samples")
 
     def _find_faults(self) -> None:
         """Leave out stuck readings and spikes from before the first turn to after the last."""
@@ -375,10 +357,10 @@ class _Recording:
         self.running = slice(low, high)
         reach = float(np.median(end - begin)) / self.mapping.positions
         reach += PERIODS / self.mapping.filter.cut_off.value if self.mapping.filter is not None else 0.0
-        span = checks.FaultSpan(low, high, begin, end, checks.WIDTH + int(reach / self.line.step))
+        beside = checks.WIDTH + int(reach / self.line.step)
         for name, channel in self.mapping.channels.items():
             where, readings, moves = f"channels.{name}", self.readings[name], not channel.measures.startswith("rate:")
-            for finding in checks.faults(where, readings, self.line.seconds, span, moves):
+            for finding in checks.faults(where, readings, self.line.seconds, (begin, end), beside, moves):
                 self.say(finding)
 
     def levels(self, name: str) -> Array:
@@ -397,17 +379,12 @@ class _Recording:
         together = {name: np.concatenate([part.courses[name] for part in parts]) for name in channels}
         if not self.mapping.timed:
             turning = self._speed(parts)
-            against = checks.backwards(channels, [part.setting.values for part in parts], turning)
-            self.say(against)
-            if against is None:
-                zeros = {name: accuracy.zero for name, accuracy in accuracies.items()}
-                wrong = list(checks.signs(channels, together, zeros, turning))
-                units = {name: sensor.shown for name, sensor in self.sensors.items()}
-                speed = checks.speeds(channels, together, units, turning)
-                for finding in wrong:
-                    self.say(finding)
-                if speed is not None and speed.where not in {finding.where for finding in wrong}:
-                    self.say(speed)
+            zeros = {name: accuracy.zero for name, accuracy in accuracies.items()}
+            wrong = list(checks.signs(channels, together, zeros, turning))
+            units = {name: sensor.shown for name, sensor in self.sensors.items()}
+            speed = checks.speeds(channels, together, units, turning)
+            for finding in [*wrong, *([speed] if speed and speed.where not in {one.where for one in wrong} else [])]:
+                self.say(finding)
         return [self._condition(part, accuracies) for part in parts]
 
     def _courses(self, name: str, steps: Mapping[tuple[object, ...], float]) -> Accuracy:
@@ -483,7 +460,7 @@ class _Recording:
         phase = np.arange(mapping.positions) / mapping.positions
         return Condition(
             setting.name or self.path.stem, values, phase, courses, (str(self.path),), speed, start, span,
-            lag=self.lag, cut=self.cut, dimensions=kinds, followed=tuple(setting.means), duration=duration,
+            lag=self.lag, cut=self.cut, dimensions=kinds, duration=duration,
         )  # fmt: skip
 
 
@@ -541,11 +518,9 @@ def _of_text(where: str, table: DataTable, name: str) -> Finding | None:
     numbers = int(np.count_nonzero(~np.isnan(column.values)))
     if column.stamp or column.texts <= numbers:
         return None
-    cells = f"text in {column.texts:,} cells and a number in {numbers:,}"
-    remedy = "name a column of numbers"
-    if column.example[:1].isdigit() or column.example[1:2].isdigit():
-        unit = f"{where.removesuffix('column')}unit"
-        remedy = f"remove the unit from the cells; state {unit} if the heading has none"
-    figures = {"texts": column.texts, "numbers": numbers}
-    what = f"'{name}' has {cells}; the first text is '{column.example}'"
-    return Finding(what, where, remedy, code="data.readings.text", figures=figures)
+    what = f"'{name}' has text in {column.texts:,} cells and a number in {numbers:,}; the first text is "
+    remedy, figures = (
+        "name a column of numbers; a unit belongs in the heading",
+        {"texts": column.texts, "numbers": numbers},
+    )
+    return Finding(f"{what}'{column.example}'", where, remedy, code="data.readings.text", figures=figures)

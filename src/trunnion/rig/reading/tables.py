@@ -24,11 +24,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.files import reading
 from trunnion.model.names import nearest, unguarded
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.units import dimensions
+from trunnion.rig.reading.units import alike, dimensions
 
 __all__ = ["FORMATS", "Column", "DataTable", "read_table", "ungrouped"]
 
@@ -49,6 +49,25 @@ class Column:
     texts: int = 0
     example: str = ""
     stamp: str = ""
+
+    def factor(self, where: str, name: str, stated: str | None, si: str, say: Callable[[Finding], None]) -> float:
+        """What a 1 in the column is, SI: in the unit that is stated, else in the file's, else it is SI.
+
+        where: the entry that names the column, `time` or `angle`; say: takes a note that there is no unit.
+        """
+        unit = stated or self.unit
+        if not unit:
+            what = f"the column '{name}' has no unit; {si} is assumed"
+            say(Finding(what, where, f"state {where}.unit", Severity.NOTE, code=f"data.{where}.no_unit"))
+        try:
+            factor, kind = dimensions(unit or si)
+        except UnitError as error:
+            remedy = f"state {where}.unit in the mapping; in the file, {error.remedy}"
+            raise MechanismError(Finding(f"the column '{name}': {error.what}", where, remedy)) from None
+        if not alike(kind, dimensions(si)[1]):
+            what = f"the column '{name}' has the unit '{unit}', which is no {where}"
+            raise MechanismError(Finding(what, where, "name another column"))
+        return factor
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.units import UnitError
-from trunnion.rig.reading.log import at_times, counted, note, warning
+from trunnion.rig.reading.log import at_times, counted, warning
 from trunnion.rig.reading.mapping import TimeBase
-from trunnion.rig.reading.tables import Column, DataTable
-from trunnion.rig.reading.units import dimensions
+from trunnion.rig.reading.tables import DataTable
 
 __all__ = ["GAP", "Timeline", "timeline"]
 
@@ -62,7 +60,7 @@ def timeline(table: DataTable, base: TimeBase | None, say: Callable[[Finding | s
             what = f"the column '{base.column}' has texts, such as '{column.example}', where times are needed"
             remedy = "write them in s, as 11:40:00.0002 or as 2026-11-22 11:40:00.0002, or state time: {rate: …}"
             raise MechanismError(Finding(what, "time.column", remedy))
-        return _stated(column.values * _factor(base, column, say), say)
+        return _stated(column.values * column.factor("time", str(base.column), base.unit, "s", say), say)
     if base is not None and base.rate is not None:
         start, step = 0.0, 1.0 / base.rate.value
     elif table.interval is not None:
@@ -72,22 +70,6 @@ def timeline(table: DataTable, base: TimeBase | None, say: Callable[[Finding | s
         remedy = "add time: {column: …, unit: s} or time: {rate: 2 kHz} to the mapping"
         raise MechanismError(Finding("no column gives the time of its rows", "time", remedy))
     return Timeline(start + np.arange(table.rows, dtype=np.float64) * step, None, step, np.empty(0, dtype=np.intp))
-
-
-def _factor(base: TimeBase, column: Column, say: Callable[[Finding | str], None]) -> float:
-    """Seconds of a unit of the column: by the mapping, else by the file, else seconds."""
-    if not base.unit and not column.unit:
-        what = f"the column '{base.column}' has no unit; seconds are assumed"
-        say(note("time.no_unit", "time", what, "state time.unit"))
-    try:
-        factor, kind = dimensions(base.unit or column.unit or "s")
-    except UnitError as error:
-        remedy = f"state time.unit in the mapping, such as s; in the file, {error.remedy}"
-        raise MechanismError(Finding(f"the column '{base.column}': {error.what}", "time", remedy)) from None
-    if kind != dimensions("s")[1]:
-        what = f"the column '{base.column}' has the unit '{column.unit}', which is no time"
-        raise MechanismError(Finding(what, "time", "name another column"))
-    return factor
 
 
 def _stated(seconds: Array, say: Callable[[Finding | str], None]) -> Timeline:

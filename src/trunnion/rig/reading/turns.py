@@ -32,7 +32,6 @@ class Turns:
 
     share: (row of the window,), the cycle counted on, rising, whole at the start of each; numbers: of the turns;
     begin, end: their times, s; rows: those that belong to them; positions: how many a turn; line: time of the rows;
-    left_out: whole turns that are not used.
     """
 
     share: Array
@@ -43,7 +42,6 @@ class Turns:
     positions: int
     line: Timeline
     window: slice
-    left_out: int = 0
 
     @property
     def density(self) -> float:
@@ -80,12 +78,11 @@ def cut(
     inside = _covered(begin, end, allowed, line)
     begin, end, numbers = begin[inside], end[inside], numbers[inside]
     odd, hit = np.zeros(numbers.size, dtype=np.bool_), np.zeros(numbers.size, dtype=np.bool_)
-    left_out = 0
     if numbers.size:
         usual = float(np.median(end - begin))
         odd = np.abs((end - begin) / usual - 1) > APART
+    if odd.any():
         left_out = int(np.sum(np.maximum(np.rint((end - begin)[odd] / usual), 1)))  # over a gap it may be several
-    if left_out:
         lengths = (end - begin)[odd]
         span = f"{lengths.min():.4g} to {lengths.max():.4g} s" if odd.sum() > 1 else f"{lengths[0]:.4g} s"
         what = f"{counted(left_out, 'turn')} left out, {at_times(begin[odd])}: {span} long where {usual:.4g} s is usual"
@@ -94,11 +91,10 @@ def cut(
     for low, high in spoilt:
         slack = min(line.step, 0.25 * (high - low))  # an index may lie where a turn begins
         hit |= (begin <= high - slack) & (end >= low + slack)
-    left_out += int(np.count_nonzero(hit & ~odd))
     keep = ~odd & ~hit
     numbers, begin, end = numbers[keep], begin[keep], end[keep]
     rows = _rows_of(share, numbers, begin, end, line, known & allowed, positions)
-    return Turns(share, numbers, begin, end, rows, positions, line, window, left_out)
+    return Turns(share, numbers, begin, end, rows, positions, line, window)
 
 
 def _whole(share: Array, highest: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]]:

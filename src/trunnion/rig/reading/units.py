@@ -221,13 +221,6 @@ class SensorScale:
             return amount.value / self.raw
         if alike(amount.dimensions, self.of_quantity):
             return amount.value / (self.factor if key == "zero" else abs(self.factor))
-        others = QUANTITIES.get(_kind(self.measures), ())
-        if any(alike(amount.dimensions, dimensions(one)[1]) for one in others):  # the other one that it may be
-            raise UnitError(
-                f"the column '{self.column}' is in {unit_name(self.of_reading)}, {key} in {amount.unit}; "
-                f"{self.measures} is in {' or '.join(others)}, as its joint turns or slides",
-                f"{OTHER_COLUMN}, or write {key} in {self.unit}",
-            )
         raise UnitError(
             f"{key}: '{amount.source}' is neither of the readings ({unit_name(self.of_reading)}) nor of what they "
             f"measure ({self.unit})",

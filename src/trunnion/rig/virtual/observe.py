@@ -24,7 +24,7 @@ from trunnion.measures.measures import Measure, named
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
-from trunnion.rig.modelled import told_at
+from trunnion.rig.modelled import without_course
 from trunnion.rig.reading.rig_file import Rig, Value
 from trunnion.rig.virtual import files
 from trunnion.rig.virtual.observation import Case, Recorded, case_names, check_seed, speed_differs
@@ -144,7 +144,7 @@ def _measures(rig: Rig, run: Run) -> list[Measure]:
             findings += [replace(one, where=where) for one in error.findings]
             continue
         if not measure.everywhere or not measure.single(run.system):
-            what = f"'{sensor.measures}' is no number that a sensor shows at every instant{told_at(measure)}"
+            what = f"'{sensor.measures}' is no number that a sensor shows at every instant{without_course(measure)}"
             remedy = "write effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT, slide:JOINT or link.point.x"
             findings.append(Finding(what, where, remedy))
         measures.append(measure)

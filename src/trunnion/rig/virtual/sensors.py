@@ -7,6 +7,7 @@ steps of the converter. All is worked out in the SI unit of what is measured; a 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from zlib import crc32
@@ -18,7 +19,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.measure_table import MEASURES
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.rig_file import Sensor
-from trunnion.rig.reading.units import Amount, alike, dimensions, multiplied
+from trunnion.rig.reading.units import Amount, alike, dimensions, multiplied, scale
 
 __all__ = ["SensorChannel", "SensorErrors", "draw", "resolved", "stream"]
 
@@ -156,38 +157,22 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel
 
 def _reading(sensor: Sensor, unit: str) -> tuple[str, float]:
     """Unit of the reading, and how many of these there are for an SI unit of what is measured."""
-    measured = dimensions(unit)[1]
-    if sensor.sensitivity is None:
-        reading = sensor.unit or unit
-        factor, found = dimensions(reading)
-        if not alike(found, measured):
-            remedy = f"state a unit of {unit}, or the sensitivity: 100 mV/({unit})"
-            raise UnitError(f"'{reading}' does not measure a quantity in {unit}", remedy)
-        return reading, 1 / factor
     given = sensor.sensitivity
-    ways = (
-        (multiplied(given.dimensions, measured), given.value),
-        (multiplied(measured, given.dimensions, -1), 1 / given.value),
-    )
-    for found, value in ways:
-        wanted = (sensor.unit,) if sensor.unit else READINGS
-        known = next((one for one in wanted if alike(found, dimensions(one)[1])), None)
-        if known:
-            reading = sensor.unit or _written(given.unit, known)
-            return reading, value / dimensions(reading)[0]
+    if sensor.unit or given is None:
+        readings = [sensor.unit or unit]
+        dimensions(readings[0])
+    else:  # `mV` of `mV/(N m)`, `V` of `N m/V`
+        readings = [given.unit.partition("/")[0].strip(), given.unit.rpartition("/")[2].strip("() "), *READINGS]
+    for reading in filter(None, readings):
+        with suppress(UnitError):
+            of_sensor = scale(sensor.measures, reading, given)
+            if alike(of_sensor.of_quantity, dimensions(unit)[1]):
+                return reading, 1 / of_sensor.factor
+    if given is None:
+        remedy = f"state a unit of {unit}, or the sensitivity: 100 mV/({unit})"
+        raise UnitError(f"'{readings[0]}' does not measure a quantity in {unit}", remedy)
     what = f"'{given.source}' does not turn {unit} into {sensor.unit or 'a reading in volt, ampere or hertz'}"
     raise UnitError(what, f"write a reading per {unit}, such as 100 mV/({unit}), and the `unit` of the reading")
-
-
-def _written(text: str, known: str) -> str:
-    """The unit of the reading as it stands in a sensitivity, `mV` of `mV/(N m)`; else that of the table."""
-    for one in (text.partition("/")[0].strip(), text.rpartition("/")[2].strip("() ")):
-        try:
-            if one and alike(dimensions(one)[1], dimensions(known)[1]):
-                return one
-        except UnitError:
-            continue
-    return known
 
 
 # ---- readings -------------------------------------------------------------------------------------------------

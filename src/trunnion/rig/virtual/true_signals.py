@@ -28,7 +28,7 @@ MOST_EXACT = 20_000  # instants at which a model is solved without asking
 GRID, FINEST = 8_192, 131_072  # positions of the cycle to interpolate between
 CHUNK = 8_192
 EFFICIENCY_STEPS = 720
-ALIKE = 1e-6  # of a sample: instants nearer than that are one
+DIGITS = 12  # of a share of the cycle, in which instants that are one agree
 WORST = 0.999  # share of the positions that the error of interpolation is told of: it has no bound at a jump
 
 
@@ -83,7 +83,7 @@ def sampled(
     if not periodic:
         instants, place = np.minimum(time, duration), np.arange(count)
     else:
-        instants, place = phases(duration, rate, count, lead) or np.unique(np.mod(time, duration), return_inverse=True)
+        instants, place = phases(duration, rate, count, lead)
     if periodic and len(instants) > MOST_EXACT:
         grid = GRID
         while grid <= FINEST:
@@ -97,22 +97,14 @@ def sampled(
     return SampledSignals(instants, *_solved(run, measures, instants), place, time, duration if periodic else None)
 
 
-def phases(duration: float, rate: float, count: int, lead: float = 0.0) -> tuple[Array, NDArray[np.intp]] | None:
+def phases(duration: float, rate: float, count: int, lead: float = 0.0) -> tuple[Array, NDArray[np.intp]]:
     """Distinct times (s) in the cycle of `count` samples, ascending, and the place of each sample among them.
 
-    lead: how many sampling intervals the first comes before the start of the cycle. None if samples never fall on the
-    same phases again.
+    lead: how many sampling intervals the first comes before the start of the cycle.
     """
-    per_cycle = duration * rate
-    for cycles in range(1, int(count / per_cycle) + 2):
-        multiple = round(cycles * per_cycle)
-        if multiple and abs(cycles * per_cycle - multiple) < ALIKE * max(cycles, 1):
-            # sample k is at (k − lead)·cycles/multiple of a cycle, k·cycles mod multiple of them after the first
-            number, place = np.unique((np.arange(count, dtype=np.int64) * cycles) % multiple, return_inverse=True)
-            time = np.mod((number - lead * cycles) / multiple, 1.0) * duration
-            order = np.argsort(time)
-            return time[order], np.argsort(order)[place]
-    return None
+    share = np.round(np.mod((np.arange(count) - lead) / (duration * rate), 1.0), DIGITS) % 1.0
+    distinct, place = np.unique(share, return_inverse=True)
+    return distinct * duration, place
 
 
 def _error(row: Array, time: Array, duration: float) -> float:

@@ -1,16 +1,29 @@
-"""Tables of a measurement for the command line: its conditions, its channels."""
+"""Tables of a measurement for the command line: its conditions, by names short enough for a table, its channels."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from trunnion.rig.reading.measurement import Measurement, Signal
-from trunnion.views.rig.conditions import shortened
 from trunnion.views.table import Table
 
-__all__ = ["tables"]
+__all__ = ["shortened", "tables"]
 
 MOST = 40  # conditions shown
+
+
+def shortened(names: Sequence[str]) -> tuple[str, list[str]]:
+    """Head of a column and its entries: "misalignment, input.speed" and "0 deg, 250 rpm", …
+
+    A number keeps to its unit. Names that do not set the same numbers in the same order stay whole, under "condition".
+    """
+    rows = [[part.partition(" ") for part in name.split(", ")] for name in names]
+    keys = [[key for key, _, _ in row] for row in rows]
+    if not rows or any(one != keys[0] for one in keys) or not all(value for row in rows for _, _, value in row):
+        return "condition", list(names)
+    return ", ".join(keys[0]), [", ".join(value.replace(" ", "\u00a0") for _, _, value in row) for row in rows]
 
 
 def tables(measurement: Measurement) -> list[Table]:

@@ -101,8 +101,16 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.of("actions", "m.openExample({ name: 'drawing-press' })")
         user.until("s.solved.value")
         assert "K, R" in user.page.locator("text.name").all_text_contents()
-        user.page.locator(".slot").click()
+        user.page.locator(".cylinder [data-name=barrel]").click()
         assert user.state("s.selection.value") == {"kind": "links", "name": "barrel"}
+        assert user.page.locator(".cylinder .chosen").count() == 1
+        user.of("actions", "m.openExample({ name: 'whitworth-quick-return' })")
+        user.until("s.solved.value && s.text.value.includes('hitworth')")
+        link = user.page.locator(".slot").get_attribute("data-name")
+        end = "(path => path.getPointAtLength(4).matrixTransform(path.getScreenCTM()))"
+        spot = user.page.evaluate(f"(({{ x, y }}) => [x, y])({end}(document.querySelector('.slot .slit')))")
+        user.page.mouse.click(*spot)
+        assert user.state("s.selection.value") == {"kind": "links", "name": link}
         assert user.page.locator(".slot.chosen").count() == 1
         user.of("actions", "m.openExample({ name: 'durango-fourbar' })")
         user.until("s.solved.value && s.answer.value.scene.loads.length")

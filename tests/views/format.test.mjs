@@ -122,6 +122,12 @@ test("arrows", () => {
   assert.match(right.head, /^M20.0/);
 });
 
+test("a page has one unit for a quantity", () => {
+  const units = { W: [1, "W"], N: [1e-3, "kN"] };
+  const shown = [[0.1136, "W"], [0.004, "W"], [2e4, "W"], [-950, "N"], [3, "N m"]].map(([value, unit]) => quantity(value, unit, value, units));
+  assert.deepEqual(shown, ["0.1136\u00a0W", "4.000\u00a0mW", "20.00\u00a0kW", "−0.9500\u00a0kN", "3.000\u00a0N\u00a0m"].map((text) => text.replace("N\u00a0m", "N m")));
+});
+
 test("places of the drive in words", () => {
   assert.equal(say({ abscissa: { values: [32], unit: "°" } }, 0), "32°");
   assert.equal(say({ abscissa: { values: [12.5], unit: "mm" } }, 0), "12.5\u00a0mm");

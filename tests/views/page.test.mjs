@@ -89,8 +89,12 @@ const { start } = await import("../../src/trunnion/views/web/report.js");
 const scene = JSON.parse(readFileSync(process.argv[2], "utf8"));
 const places = Object.fromEntries(["stage", "charts", "polars", "seats", "events"].map((name) => [name, new Element(name)]));
 const crank = start(scene, places);
-for (let index = 0; index < scene.count; index += 1) crank.go(index);
 const classes = (name) => (element) => element.attributes.class?.split(" ").includes(name);
+let covered = 0; // names of joints over values of loads, at all positions
+for (let index = 0; index < scene.count; index += 1) {
+  crank.go(index);
+  covered += overlaps();
+}
 const built = scene.built ? enlarged() : null;
 const space = scene.space === "spatial" && scene.solids.length ? steered() : null;
 for (const name of ["beforeprint", "afterprint"]) events[name].forEach((act) => act());
@@ -101,6 +105,40 @@ const motion = scene.motion ? played() : null;
 const alone = { stage: new Element("stage") }; // an animation has no more than the drawing and its player
 start(scene, alone).go(scene.count - 1);
 assert.equal(alone.stage.find(classes("player")).length, 1);
+
+/** How many names of joints lie on values of loads. */
+function overlaps() {
+  const shift = (element) => /translate\(([-\d.]+),([-\d.]+)\)/.exec(element.attributes.transform ?? "")?.slice(1).map(Number);
+  const seen = (element) => shift(element) && element.attributes.visibility !== "hidden" && element.attributes.display !== "none";
+  const names = places.stage.find(classes("name")).filter(seen).map((name) => {
+    const [[x, y], half] = [shift(name), 4 * name.textContent.length];
+    return [x - half, x + half, y - 9, y + 2];
+  });
+  const values = places.stage.find(classes("load")).filter(seen).map((load) => {
+    const text = load.find((part) => part.name === "text")[0];
+    const [[x, y], wide] = [shift(load), 6.5 * text.textContent.length];
+    const left = x + Number(text.attributes.x) - (text.attributes.class ? wide : 0);
+    return [left, left + wide, y + Number(text.attributes.y) - 4, y + Number(text.attributes.y) + 4];
+  });
+  const meet = (one, other) => one[0] < other[1] && one[1] > other[0] && one[2] < other[3] && one[3] > other[2];
+  return names.filter((name) => values.some((value) => meet(name, value))).length;
+}
+
+/** Lengths of the arrows of loads and of the reference, px, with what they stand for. */
+function arrows() {
+  const numbers = (path) => path.match(/-?[\d.]+/g).map(Number);
+  const long = (path) => {
+    const [x, y, , , tipX, tipY] = numbers(path);
+    return Math.hypot(tipX - x, tipY - y);
+  };
+  const loads = places.stage.find(classes("load")).filter((load) => load.find(classes("arc")).length === 0 && load.attributes.display !== "none");
+  const key = places.stage.find(classes("reference")).map((path) => long(path.attributes.d));
+  const texts = places.stage.find(classes("key"))[0]?.find((part) => part.name === "text").map((part) => part.textContent) ?? [];
+  return [
+    ...loads.map((load) => [long(load.find((part) => part.name === "path")[0].attributes.d), load.find((part) => part.name === "text")[0].textContent]),
+    ...key.map((length) => [length, texts.find((text) => text.startsWith("force")) ?? ""]),
+  ];
+}
 
 /** What a motion in time shows beside a cycle: its charts, events that are chosen, and what playing it in real time does. */
 function played() {
@@ -215,6 +253,9 @@ console.log(
     polars: seen("polars", "polar"),
     loads: seen("stage", "load"),
     moments: seen("stage", "arc"),
+    covered,
+    arrows: scene.space === "spatial" ? [] : arrows(),
+    cylinders: places.stage.find(classes("cylinder")).map((one) => one.children.map((part) => part.find((path) => path.name === "path")[0].attributes.d)),
     springs: places.stage.find(classes("spring")).map((element) => element.attributes.d),
     dashes: places.stage.find(classes("spring")).map((element) => element.attributes["stroke-dasharray"]),
     slits: places.stage.find(classes("slit")).map((element) => element.attributes.d),

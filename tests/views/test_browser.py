@@ -78,6 +78,29 @@ if NODE:  # not a skip: what must hold everywhere is tested in Python; this is t
         assert np.hypot(*np.subtract(*ends)) > 2 * 26
         assert page(analyse(slider_crank(), 24), tmp_path)["slits"] == []
 
+    def test_a_driven_slide_is_a_barrel_with_a_rod_out_of_it(tmp_path):
+        """Rod and barrel end at their eyes and overlap; neither sticks out behind the other's pin."""
+        result = analysed(read(EXAMPLES / "toggle-press.yaml"), 24)
+        ((rod, barrel),) = page(result, tmp_path)["cylinders"]
+        ends = [[float(text) for text in re.findall(r"-?[\d.]+", path)] for path in (rod, barrel)]
+        (x, y), by = ends[1][:2], ends[0][:2]
+        apart = np.hypot(by[0] - x, by[1] - y)
+        lengths = [np.hypot(*end[2:]) for end in ends]
+        assert max(lengths) < apart < sum(lengths)
+        for end in ends:
+            assert (by[0] - x) * end[3] - (by[1] - y) * end[2] == pytest.approx(0, abs=0.3 * apart)
+        assert page(analyse(MODELS["inverted slider-crank"](), 24), tmp_path)["cylinders"] == []
+
+    @pytest.mark.parametrize("example", ["toggle-press", "drawing-press", "slider-crank"])
+    def test_loads_are_on_the_scale_of_the_reactions_and_no_name_covers_their_values(example, tmp_path):
+        shown = page(analysed(read(EXAMPLES / f"{example}.yaml"), 24), tmp_path)
+        assert shown["covered"] == 0
+        units = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
+        sizes = [(length, re.search(r"([\d.]+)\u00a0(\w+)", text)) for length, text in shown["arrows"]]
+        scale = [length / (float(text[1]) * units[text[2]]) for length, text in sizes if length > 12.5]
+        assert len(scale) >= 2
+        assert scale == pytest.approx([scale[-1]] * len(scale), rel=0.02)
+
     @pytest.mark.slow
     def test_labels_of_loads_stay_in_the_picture(tmp_path):
         """A force at the right edge of a picture that is printed 490 px wide."""

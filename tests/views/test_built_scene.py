@@ -116,10 +116,10 @@ def test_the_table_of_errors_has_the_figures_of_the_result(cardan):
     efficiency = rows["Efficiency of the cycle"]
     assert efficiency["built"] == f"{float(cardan.efficiency):.4f}"
     assert efficiency["ideal"] == f"{float(cardan.efficiency_ideal):.4f}"
-    wrong = np.degrees(cardan.joint_rotation_error.sel(joint="output").values) * 60
+    wrong = np.degrees(cardan.joint_rotation_error.sel(joint="output").values)
     index = int(np.argmax(np.abs(wrong)))
     told = rows["Transmission error, rotation of output, largest"]
-    assert told["difference"] == f"{wrong[index]:.2f}\u00a0arcmin".replace("-", "−")
+    assert told["difference"] == f"{wrong[index]:.4g}°".replace("-", "−")
     assert told["place"] == f"{5 * index}°"
     effort = cardan.drive_effort.sel(driver="input").values
     ideal = effort - cardan.drive_effort_change.sel(driver="input").values

@@ -21,10 +21,10 @@ from trunnion.views.cycle.report import report
 from trunnion.views.cycle.scene import scene
 from trunnion.views.space.bodies import space
 from trunnion.views.space.camera import best, looking
-from trunnion.views.space.paint import facets
+from trunnion.views.space.paint import facets, normal_of
 from trunnion.views.space.scene import screw_axis
 from trunnion.views.space.scenery import scenery
-from trunnion.views.space.solids import SYMBOLS, Solid, solids
+from trunnion.views.space.solids import BAR, SYMBOLS, Solid, solids
 
 BLANK = ("nowhere", "locked")  # no position can be drawn
 
@@ -218,6 +218,35 @@ def test_wide_ends_of_a_rod_are_cut_into_pieces_that_sort():
     assert len(ends) > 16
     area = sum(np.linalg.norm(sum(np.cross(a, b) for a, b in pairwise([*one, one[0]]))) / 2 for one in ends)
     assert area == pytest.approx(16 / 2 * 0.25 * np.sin(2 * np.pi / 16))
+
+
+def test_of_crossing_bars_the_nearer_is_painted_over_the_farther():
+    """Bars that all but touch, from any side: wherever the nearer one is seen, no facet of the other comes after it."""
+    rng = np.random.default_rng(0)
+    for _ in range(150):
+        camera = looking(rng.uniform(-np.pi, np.pi), rng.uniform(-1.2, 1.2))
+        ways = rng.standard_normal((2, 3))
+        ways /= np.linalg.norm(ways, axis=1)[:, None]
+        across = np.cross(*ways)
+        across *= np.sign(across @ camera.matrix[2]) / np.linalg.norm(across)
+        if abs(ways[0] @ ways[1]) > 0.9 or across @ camera.matrix[2] < 0.35:
+            continue
+        middles = [2.2 * BAR * across + rng.uniform(-0.3, 0.3) * ways[0], rng.uniform(-0.3, 0.3) * ways[1]]
+        bars = [Solid("rod", "bar", np.array([middle - 0.5 * way, middle + 0.5 * way]), BAR)
+                for middle, way in zip(middles, ways, strict=True)]  # fmt: skip
+        seen = [(camera.seen(facet), order) for order, bar in enumerate(bars) for facet in facets(bar, 1.0)]
+        seen = [(one, order) for one, order in seen if len(one) == 4 and normal_of(one)[2] > 0]
+        seen.sort(key=lambda one: one[0][:, 2].mean())
+        corners = np.array([one[:, :2] for one, _ in seen])
+        flat = camera.matrix[:2] @ np.array([ways[0], -ways[1]]).T
+        along = np.linalg.solve(flat, camera.matrix[:2] @ (middles[1] - middles[0]))[0]
+        middle = camera.matrix[:2] @ (middles[0] + along * ways[0])
+        beside = np.array([-flat[1, 0], flat[0, 0]]) / np.linalg.norm(flat[:, 0])
+        for u, v in rng.uniform(-0.95, 0.95, (30, 2)) * BAR:
+            to = middle + u * flat[:, 0] + v * beside - corners
+            edges = np.roll(corners, -1, axis=1) - corners
+            covers = (edges[..., 0] * to[..., 1] - edges[..., 1] * to[..., 0] >= 0).all(axis=1)
+            assert seen[int(np.flatnonzero(covers)[-1])][1] == 0
 
 
 def test_a_swash_plate_is_a_disc_as_wide_as_its_shoe_travels():

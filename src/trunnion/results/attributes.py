@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.model.units import UnitError, si_unit, unit
 from trunnion.results.figure import Figure
+from trunnion.results.quantities import Units, common
 from trunnion.version import __version__
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ __all__ = [
     "origin",
     "stated_units",
     "summary_of",
+    "units_of",
     "whole",
 ]
 
@@ -122,6 +124,12 @@ def figure_rows(figures: Iterable[Figure]) -> list[dict[str, Any]]:
 def summary_of(result: Described) -> list[Figure]:
     """The figures that one looks at first."""
     return [Figure.read(row) for row in attribute(result, "summary")]
+
+
+def units_of(result: Described) -> Units:
+    """The units in which a report shows forces, moments, powers and lengths: those of its first figures."""
+    rows = [row for row in summary_of(result) if not row.numerical]
+    return common((row.value, row.unit) for row in rows if isinstance(row.value, float))
 
 
 STATED = re.compile(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*([A-Za-zµ°][^±(]*?)\s*(?:[±+(-].*)?")  # "60 mm ± 0.05 mm"

@@ -9,7 +9,8 @@ import math
 from collections.abc import Iterable
 
 __all__ = [
-    "between", "decimals_of", "drawn_in", "joined", "number", "parts", "prefixed", "quantity", "readable", "scale_of",
+    "Units", "between", "common", "decimals_of",
+    "drawn_in", "joined", "number", "parts", "prefixed", "quantity", "readable", "scale_of",
     "scaled", "signed",
 ]  # fmt: skip
 
@@ -46,8 +47,21 @@ def number(value: float, digits: int = 4) -> str:
     return f"{value:,.{max(digits - 1 - size, 0)}f}".replace(",", "\u202f").replace("-", "−")
 
 
-def quantity(value: object, unit: str = "") -> str:
-    """A value with its unit for a table; what is no number is shown as its text."""
+Units = dict[str, tuple[float, str]]  # SI unit → factor and unit in which a page shows it
+SMALLEST, LARGEST = 0.01, 1e4  # of a figure in the unit of its page; others have their own
+
+
+def common(sizes: Iterable[tuple[float, str]]) -> Units:
+    """The units of a page: of each quantity that of the largest of its figures, (value, SI unit)."""
+    most: dict[str, float] = {}
+    for size, unit in sizes:
+        if unit in SCALABLE and math.isfinite(size):
+            most[unit] = max(most.get(unit, 0.0), abs(size))
+    return {unit: prefixed(size, unit) for unit, size in most.items() if size > 0}
+
+
+def quantity(value: object, unit: str = "", units: Units | None = None) -> str:
+    """A value with its unit for a table, in those of its page where it fits; what is no number is shown as its text."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         text = "" if value is None else str(value)
         return f"{text}\u00a0{unit}" if text and unit not in ("", "1") else text
@@ -55,7 +69,9 @@ def quantity(value: object, unit: str = "") -> str:
         return number(value, 1)
     if math.isnan(value):
         return number(value)
-    factor, shown = prefixed(value, unit)
+    factor, shown = (units or {}).get(unit, (0.0, ""))
+    if not SMALLEST <= abs(value) * factor < LARGEST:
+        factor, shown = prefixed(value, unit)
     return joined(number(value * factor), shown)
 
 

@@ -21,7 +21,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.file import text_of
 from trunnion.model.rewrite import changed_text
-from trunnion.results.attributes import findings_of, summary_of
+from trunnion.results.attributes import findings_of, summary_of, units_of
 from trunnion.results.quantities import quantity
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
@@ -147,8 +147,9 @@ def _model(asked: Asked) -> dict[str, Any]:
     if result is None:
         return head
     shown = scene(result, max_positions=MOST_STEPS)
+    units = units_of(result)
     figures = {
-        one.label: one.value if isinstance(one.value, str) else quantity(one.value, one.unit) or "—"
+        one.label: one.value if isinstance(one.value, str) else quantity(one.value, one.unit, units) or "—"
         for one in summary_of(result)
         if not one.numerical
     }

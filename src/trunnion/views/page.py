@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -17,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import agreeing
 from trunnion.model.names import is_number
-from trunnion.results.attributes import attribute, summary_of
+from trunnion.results.attributes import attribute, summary_of, units_of
 from trunnion.results.figure import MORE_THAN
 from trunnion.results.figure import Figure as Stated
-from trunnion.results.quantities import quantity
+from trunnion.results.quantities import Units, quantity
 from trunnion.views.common.bundle import web_text
 from trunnion.views.common.markup import with_code
 from trunnion.views.table import Table
@@ -30,7 +31,8 @@ if TYPE_CHECKING:
     from jinja2 import Template
     from matplotlib.figure import Figure
 
-__all__ = ["Section", "Summary", "counts", "hashed", "headline", "inputs_of", "page", "said", "source", "template"]
+__all__ = ["Section", "Summary", "counts", "hashed", "headline", "inputs_of", "page", "said", "source", "template",
+           "value_of"]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,7 @@ class Section:
     anchor: str = ""
 
 
+FIGURE = re.compile(r"(?<=\d) (?=\S+$)")  # between the number of a place and its unit
 Summary = Sequence[tuple[str, list[tuple[str, str]]]]
 
 
@@ -158,14 +161,16 @@ def hashed(text: str) -> str:
 def headline(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
     """Subjects, each with its figures and what they are: ("drive torque of A", [("9.3 kN m", "maximum, at 24°")])."""
     rows = [row for row in summary_of(result) if not row.numerical]
+    units = units_of(result)
     return [
-        (subject, [(_value(row), row.remark) for row in members])
+        (subject, [(value_of(row, units), FIGURE.sub("\u00a0", row.remark)) for row in members])
         for subject, members in groupby(rows, key=lambda row: row.subject)
     ]
 
 
-def _value(row: Stated) -> str:
-    text = row.value if isinstance(row.value, str) else quantity(row.value, row.unit) or "—"
+def value_of(row: Stated, units: Units) -> str:
+    """A figure with its unit, in those of its page."""
+    text = row.value if isinstance(row.value, str) else quantity(row.value, row.unit, units) or "—"
     return f"> {text}" if row.aspect == MORE_THAN else text
 
 

@@ -15,7 +15,6 @@ from trunnion.results.quantities import prefixed
 from trunnion.views.charts import Axis, Line, Look, Mark, outside
 from trunnion.views.common.cycle import Array
 from trunnion.views.common.peaks import ease_of_status, usual_peak
-from trunnion.views.cycle.deviations import angle_scale
 from trunnion.views.scales import Arrangement, Scale, arrange, grid, meaning, statuses, thinned, written
 
 if TYPE_CHECKING:
@@ -86,7 +85,7 @@ def field_of(result: xr.Dataset, measure: str, x: str, family: str) -> Field:
     values, status = panelled(values), panelled(statuses(result, plan))
     ideal = None if ideal is None else panelled(ideal)
     scope = usual_peak(ease_of_status(result, status), values, ideal)
-    factor, shown = angle_scale(scope) if unit == "rad" else prefixed(scope, unit)
+    factor, shown = prefixed(scope, unit)
     titles = [", ".join(s.told(i) for s, i in zip(plan.facets, place, strict=True)) for place in places]
     columns = len({place[-1] for place in places}) if len(plan.facets) == 2 else 0
     return Field(

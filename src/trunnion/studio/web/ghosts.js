@@ -1,8 +1,8 @@
 // The other ways in which the mechanism can be put together, drawn faintly; one click takes one.
 
 import { effect, signal } from "@preact/signals";
-import { hull, place } from "../web/data.js";
 import { set, svg } from "../web/dom.js";
+import { outline, standing } from "../web/plane.js";
 import { assemblies, edit } from "./actions.js";
 import * as state from "./state.js";
 
@@ -33,12 +33,7 @@ export function poseGhosts({ layers, scene, frame, exact: index }, list) {
     set(node, { "data-name": name });
     node.firstChild.textContent = `other assembly: ${name}; click to take it`;
     const links = scene.links.filter((link) => !link.ground);
-    set(node.lastChild, { d: links.map((link) => outline(link, points, frame, index)).join("") });
+    const { spots } = standing({ points }, frame, index, {});
+    set(node.lastChild, { d: links.map((link) => outline(spots(link.points))).join("") });
   });
-}
-
-function outline(link, points, frame, index) {
-  const spots = link.points.map((key) => place({ points }, key, index)).filter(Boolean);
-  const corners = hull(spots.map(frame.to)).map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`);
-  return corners.length > 1 ? `M${corners.join("L")}Z` : "";
 }

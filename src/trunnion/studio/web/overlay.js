@@ -2,10 +2,11 @@
 // angles, values at the arrows, and the outlines of variant A. Python works it out; here it is only drawn.
 
 import { arrow } from "../web/arrow.js";
-import { angleAt, at, forceAt, hull, magnitude, peak, place } from "../web/data.js";
+import { angleAt, at, forceAt, magnitude, peak, place } from "../web/data.js";
 import { svg } from "../web/dom.js";
 import { quantity, roundBelow, short, stated } from "../web/format.js";
-import { KEY, perNewton, trackPath } from "./drawing.js";
+import { outline, standing, trackPath } from "../web/plane.js";
+import { KEY, metres, perNewton } from "./drawing.js";
 import { roundAbove } from "./geometry.js";
 import { laid } from "./layers.js";
 import { sheet, shown } from "./sheet.js";
@@ -39,7 +40,7 @@ export function poseOverlay(view) {
   const told = known && laid.peek()?.scene === scene ? laid.peek() : {};
   const key = []; // lines of the key, from below
   room = view.frame.width - 6;
-  taken = [...(wanted.names ? names(view) : []), ...loads(view)];
+  taken = [...view.parts.names, ...view.parts.loads].flatMap(({ box }) => box ?? []);
   if (sheet.beside().length) key.push(keyed(view, 22, "other assemblies", (x, y) => svg("g", { class: "ghost" }, svg("path", { d: `M${x},${y}h22` }))));
   layers.variants.replaceChildren(...(wanted.variant ? variants(view, key) : []));
   layers.overlay.replaceChildren(
@@ -101,7 +102,7 @@ function motion(view, point, wanted, key) {
 
 /** The path of a place that was clicked; it is drawn in metres once. */
 function curve({ frame }, scenery, point) {
-  point.path ??= trackPath(scenery, point.key);
+  point.path ??= trackPath(scenery, point.key, metres);
   const transform = `matrix(${frame.scale},0,0,${-frame.scale},${frame.left},${frame.foot})`;
   return svg("path", { class: "track free", d: point.path, transform, "vector-effect": "non-scaling-stroke" });
 }
@@ -217,29 +218,6 @@ function values(view) {
   });
 }
 
-/** The names of joints and points as words that stand already. */
-function names({ parts, scene, frame, drawn }) {
-  return (parts?.names ?? []).flatMap(({ key, other, beside, node }) => {
-    const found = place(scene, key, drawn) ?? place(scene, other, drawn);
-    if (!found) return [];
-    const [x, y] = frame.to(found);
-    const half = (LETTER * node.textContent.length) / 2 + 3;
-    return [{ left: x + beside[0] - half, right: x + beside[0] + half, y: y + beside[1] }];
-  });
-}
-
-/** The values of the loads as words that stand already. */
-function loads({ parts }) {
-  return (parts?.loads ?? []).flatMap(({ node, label }) => {
-    const [x, y] = /translate\(([-\d.]+),([-\d.]+)\)/.exec(node.getAttribute("transform") ?? "")?.slice(1).map(Number) ?? [];
-    if (x === undefined) return [];
-    const [dx, dy] = ["x", "y"].map((axis) => Number(label.node.getAttribute(axis)));
-    const wide = label.measured || label.size;
-    const left = x + dx - (label.left ? wide : 0);
-    return [{ left, right: left + wide, y: y + dy + 4 }];
-  });
-}
-
 // ---- variant A ------------------------------------------------------------------------------------------------------
 
 function variants(view, key) {
@@ -251,8 +229,7 @@ function variants(view, key) {
   return other.scene.links
     .filter((link) => !link.ground)
     .map((link) => {
-      const spots = link.points.map((name) => place(other.scene, name, index)).filter(Boolean);
-      const corners = hull(spots.map(frame.to)).map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`);
-      return svg("path", { class: "outline-of-variant", d: corners.length > 1 ? `M${corners.join("L")}Z` : "" });
+      const spots = standing(other.scene, frame, index, {}).spots(link.points);
+      return svg("path", { class: "outline-of-variant", d: outline(spots) });
     });
 }

@@ -40,7 +40,7 @@ from trunnion.views.charts import (
 )
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, layout, mean_friction, names
 from trunnion.views.common.peaks import ease, peak, usual_peak
-from trunnion.views.cycle.deviations import angle_scale, losses, need, outputs, point_errors, worst_points
+from trunnion.views.cycle.deviations import losses, need, outputs, point_errors, worst_points
 from trunnion.views.space.bodies import is_spatial
 
 if TYPE_CHECKING:
@@ -418,7 +418,7 @@ def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
             lines.append(Line(over.values, each.error, each.joint, nth(k), close=True))
         edges = [edge for band in bands for edge in (band.low, band.high)]
         usual = usual_peak(ease(result), *(line.y for line in lines), *edges)
-        scale = angle_scale(usual) if unit == "rad" else prefixed(usual, "m")
+        scale = prefixed(usual, unit)
         charts.append(
             over_drive(
                 result,

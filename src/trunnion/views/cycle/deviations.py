@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
 __all__ = [
-    "JUMP", "NOWHERE", "Output", "Seats", "angle_scale", "broken", "has", "jumps", "losses", "need", "outputs",
+    "JUMP", "NOWHERE", "Output", "Seats", "broken", "has", "jumps", "losses", "need", "outputs",
     "point_errors", "seated",
     "with_worst_case", "worst_points",
 ]  # fmt: skip
@@ -52,14 +52,6 @@ def need(result: xr.Dataset, part: str, figure: str) -> None:
     else:
         what, remedy = LACKS[part], REMEDIES[part]
     raise MechanismError(Finding(f"{what}, and there is no figure '{figure}'", "--kind", remedy))
-
-
-def angle_scale(peak: float) -> tuple[float, str]:
-    """Factor and unit for a small angle of so many rad at most: degrees, minutes or seconds of arc."""
-    degrees = float(np.degrees(peak))
-    if degrees >= 1 or not degrees > 0:
-        return 180 / np.pi, "°"
-    return (60 * 180 / np.pi, "arcmin") if degrees >= 1 / 60 else (3600 * 180 / np.pi, "arcsec")
 
 
 # ---- errors ---------------------------------------------------------------------------------------------------

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.results.quantities import prefixed
 from trunnion.views.common.cycle import Array, abscissa, column, names, numbers
 from trunnion.views.cycle.deviations import (
     JUMP,
     Seats,
-    angle_scale,
     continued,
     jumps,
     outputs,
@@ -156,15 +156,12 @@ def _drawn(shown: Space, link: str, point: str, place: Array) -> list[float]:
 
 
 def _outputs(result: xr.Dataset) -> list[dict[str, Any]]:
-    """Transmission errors in the unit they are read in: µm as metres, small angles in minutes or seconds of arc; the
-    band of the worst case of the play if the result has it.
-    """
+    """Transmission errors, m or °; the band of the worst case of the play if the result has it."""
     rows = []
     for one in outputs(result):
         centre, reach = (column(result, f"transmission_{name}", joint=one.joint) for name in ("centre", "reach"))
         band = [] if centre is None or reach is None else [centre - reach, centre + reach]
-        peak = max(float(np.nanmax(np.abs(values), initial=0.0)) for values in [one.error, *band])
-        factor, unit = angle_scale(peak) if one.unit == "rad" else (1.0, "m")
+        factor, unit = prefixed(1.0, "rad") if one.unit == "rad" else (1.0, "m")
         worst = {side: _series(edge * factor) for side, edge in zip(("low", "high"), band, strict=False)}
         rows.append({"label": one.label, "unit": unit, "values": _series(one.error * factor), "worst": worst or None})
     return rows

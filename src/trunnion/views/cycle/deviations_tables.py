@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trunnion.results.attributes import units_of
 from trunnion.results.dataset import units_along
-from trunnion.results.quantities import number, quantity
+from trunnion.results.quantities import Units, number, quantity
 from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, mean_friction, names, valid
-from trunnion.views.cycle.deviations import angle_scale, losses, outputs, worst_points
+from trunnion.views.cycle.deviations import losses, outputs, worst_points
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,11 +54,7 @@ def _error(label: str, error: Array, unit: str, over: Abscissa) -> Row:
         return _row(label, "", "", "—")
     index = int(np.nanargmax(np.abs(error)))
     value = float(error[index])
-    if unit == "m":
-        return _row(label, "", "", quantity(value, "m"), over.say(index))
-    factor, shown = angle_scale(abs(value))
-    gap = "" if shown == "°" else "\u00a0"
-    return _row(label, "", "", f"{number(value * factor)}{gap}{shown}", over.say(index))
+    return _row(label, "", "", quantity(value, unit), over.say(index))
 
 
 def _change(result: xr.Dataset, name: str, dim: str, member: str, label: str, unit: str, over: Abscissa) -> Row:
@@ -71,13 +68,13 @@ def _change(result: xr.Dataset, name: str, dim: str, member: str, label: str, un
         return _row(label, "—", "—", "—")
     index = int(np.nanargmax(sizes[0]))
     most = [float(np.nanmax(size)) if np.isfinite(size).any() else float("nan") for size in sizes]
-    return _row(
-        label, quantity(most[0], unit), quantity(most[1], unit), _signed(most[0] - most[1], unit), over.say(index)
-    )
+    units = units_of(result)
+    built_as, ideally = (quantity(one, unit, units) for one in most)
+    return _row(label, built_as, ideally, _signed(most[0] - most[1], unit, units), over.say(index))
 
 
-def _signed(value: float, unit: str) -> str:
-    return ("+" if value > 0 else "") + quantity(value, unit)
+def _signed(value: float, unit: str, units: Units | None = None) -> str:
+    return ("+" if value > 0 else "") + quantity(value, unit, units)
 
 
 def _mean_friction(result: xr.Dataset) -> Row:
@@ -85,7 +82,9 @@ def _mean_friction(result: xr.Dataset) -> Row:
     one, two = (sum(mean_friction(result, joint, of) for joint in joints) for of in ("", "_ideal"))
     if not np.isfinite([one, two]).all():
         return _row("Friction power, mean", "—", "—", "—")
-    return _row("Friction power, mean", quantity(one, "W"), quantity(two, "W"), _signed(one - two, "W"))
+    units = units_of(result)
+    figures = quantity(one, "W", units), quantity(two, "W", units), _signed(one - two, "W", units)
+    return _row("Friction power, mean", *figures)
 
 
 def _efficiency(result: xr.Dataset) -> Row:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.joints.pairs import GUIDED
+from trunnion.results.attributes import units_of
 from trunnion.results.dataset import units_along
 from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import abscissa, column, course, intervals, layout, names, numbers, series
@@ -74,6 +75,7 @@ def scene(
         "springs": _springs(kept, stated, points),
         "gears": [{"name": name, **circle} for name, pair in stated["gears"].items() for circle in pair],
         "drivers": _drivers(kept, other, stated),
+        "units": units_of(result),
         "sums": {name: series(column(kept, name)) for name in SUMS if name in kept and not (steady and name in DRIVEN)},
         "efficiency": _single(result, "efficiency"),
         "built": built(kept, _lost(result, picked)),

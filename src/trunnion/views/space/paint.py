@@ -19,11 +19,11 @@ from trunnion.views.common.figures import INK
 from trunnion.views.space.camera import Camera
 from trunnion.views.space.solids import Solid
 
-__all__ = ["Strokes", "facets", "paint"]
+__all__ = ["Strokes", "facets", "normal_of", "paint"]
 
 SIDES = 16  # of a rod
 RINGS = 10  # of a ball
-STEP = 0.06  # rods are cut into pieces of this share of the size, so that they sort
+STEP = 0.03  # rods are cut into pieces of this share of the size: with twice that, crossing bars sort wrongly
 OUTLINE = 0.0026  # share of the size
 LIGHT = np.array([-0.35, 0.55, 0.76])  # from the left and above, in the picture's frame
 JOINT = "#f7f8fa"
@@ -138,7 +138,7 @@ def paint(
         for grown in (OUTLINE * size, 0.0):
             for corners in facets(solid, size, grown):
                 seen = camera.seen(corners @ matrix.T + origin)
-                normal = _normal(seen)
+                normal = normal_of(seen)
                 if (normal[2] > 0) == (grown == 0.0):  # the outline is what looks away, the body what looks here
                     face = shaded(colour, normal) if grown == 0.0 else INK
                     pieces.append((float(seen[:, 2].mean()), np.vstack([seen, seen[:1]])[:, :2], face, face, 0.35))
@@ -159,7 +159,7 @@ def _lines(pieces: Array, colour: str, width: float, forward: float) -> list[tup
     return [(float(piece[:, 2].mean()) + forward, piece[:, :2], "none", colour, width) for piece in pieces]
 
 
-def _normal(corners: Array) -> Array:
+def normal_of(corners: Array) -> Array:
     """Unit normal of a polygon, also where two corners fall together."""
     across = np.cross(corners[2] - corners[0], corners[3 % len(corners)] - corners[1])
     return np.asarray(across / (np.linalg.norm(across) or 1.0), dtype=float)

@@ -18,10 +18,10 @@ const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
 export function lineChart(scene, { title, unit, series, band = null, limits = null, note = "", marks = [], pick }) {
   const columns = [...series.map((one) => one.values), ...(band ? [band.low, band.high] : [])];
   const scope = limits ? peak(limits) : usualPeak(scene, ...columns);
-  const scale = prefixed(scope, unit);
+  const scale = prefixed(scope, unit, scene.units);
   const most = scope * scale.factor;
   const cut = !limits && scope < peak(...columns);
-  const remark = [cut ? `The peak of ${quantity(peak(...columns), unit)} ${OUTSIDE}` : "", note].filter(Boolean).join(" ");
+  const remark = [cut ? `The peak of ${quantity(peak(...columns), unit, undefined, scene.units)} ${OUTSIDE}` : "", note].filter(Boolean).join(" ");
   const plot = html("div", { class: "plot" });
   const values = series.map(() => html("span", { class: "value" }, "—"));
   const element = html(

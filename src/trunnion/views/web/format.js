@@ -2,10 +2,16 @@
 // The same rules as trunnion/views/quantities.py; tests/views holds both to one table of cases.
 
 const PREFIXES = { "-4": "p", "-3": "n", "-2": "µ", "-1": "m", 0: "", 1: "k", 2: "M", 3: "G" };
+const [SMALLEST, LARGEST] = [0.01, 1e4]; // of a figure in the unit of its page; others have their own
 const SCALABLE = new Set(["N m", "N", "W", "m", "s", "J", "Pa"]);
 
-/** Factor and unit that bring `peak` between 1 and 1000: {factor: 0.001, unit: "kN m"} for 18 750 N m. */
-export function prefixed(peak, unit) {
+/**
+ * Factor and unit for `peak`: those of its page, `units` {SI unit: [factor, unit]}, where it fits, else those that bring
+ * it between 1 and 1000: {factor: 0.001, unit: "kN m"} for 18 750 N m.
+ */
+export function prefixed(peak, unit, units = {}) {
+  const [common, name] = units[unit] ?? [0, ""];
+  if (Math.abs(peak) * common >= SMALLEST && Math.abs(peak) * common < LARGEST) return { factor: common, unit: name };
   if (unit === "rad") return { factor: 180 / Math.PI, unit: "°" };
   if (!SCALABLE.has(unit) || !Number.isFinite(peak) || peak === 0) {
     return { factor: 1, unit: unit === "1" ? "" : unit };
@@ -28,9 +34,9 @@ export function number(value, digits = 4) {
 }
 
 /** A number with its unit, the prefix chosen for it or for `peak`, so that a running figure keeps its unit. */
-export function quantity(value, unit, peak = value) {
+export function quantity(value, unit, peak = value, units = {}) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "—";
-  const scale = prefixed(peak, unit);
+  const scale = prefixed(peak, unit, units);
   // A figure that runs keeps its decimals: those that give its peak four digits.
   const text = peak === value ? number(value * scale.factor) : fixed(value * scale.factor, peak * scale.factor);
   return text + (scale.unit === "" || scale.unit === "°" ? "" : "\u00a0") + scale.unit;

@@ -1,18 +1,20 @@
-// Loads in the drawing: a force as an arrow at its point, a moment as a bent one on its link. Their length is no scale.
+// Loads in the drawing: a force as an arrow at its point on the scale of the reactions, a moment as a bent one on its link.
 
 import { arrow, bentArrow } from "./arrow.js";
 import { angleAt, at, guide } from "./data.js";
 import { set, svg } from "./dom.js";
 import { stated } from "./format.js";
 
-const LENGTH = 44; // px
+const LENGTH = 44; // px, of a force where no reaction gives a scale
+const LEAST = 12; // px, of a force that is small beside the reactions
 const RADIUS = 19; // px
 const CHARACTER = 7.6; // px, a wide mean of the labels' letters, until the browser tells
 const EDGE = 5; // px between a label and the edge of the picture
 
 /**
  * What can be drawn of the loads, [{name, keys, node, aim, label}]; a load stands at the middle of the points `keys`.
- * `aim(scene, index)` makes it what it is at a position of a scene of the same structure, hidden where it does not act.
+ * `aim(scene, index, perNewton)` makes it what it is at a position of a scene of the same structure, hidden where it does
+ * not act, and tells whether it acts; `force(scene, index)` is that of a force, [x, y] N.
  */
 export function loadsOf(scene) {
   return scene.loads.flatMap((load) => {
@@ -56,14 +58,19 @@ function along(joint, scene, load, index) {
 
 function force(load, course) {
   const shaft = svg("path");
-  const put = (scene, one, index, label) => {
+  const put = (scene, one, index, label, perNewton) => {
     const { size, angle } = course(scene, one, index);
-    const [dx, dy] = [LENGTH * Math.cos(angle), -LENGTH * Math.sin(angle)];
+    const length = perNewton > 0 ? Math.max(size * perNewton, LEAST) : LENGTH;
+    const [dx, dy] = [length * Math.cos(angle), -length * Math.sin(angle)];
     set(shaft, { d: arrow(0, 0, dx, dy) });
-    Object.assign(label, { tip: [dx, dy], left: dx < -0.3 * LENGTH });
+    Object.assign(label, { tip: [dx, dy], left: dx < -0.3 * length });
     return size;
   };
-  return part(load, "N", [shaft], put);
+  const vector = (scene, index) => {
+    const { size, angle } = course(scene, load, index);
+    return [size * Math.cos(angle), size * Math.sin(angle)];
+  };
+  return { ...part(load, "N", [shaft], put), force: vector };
 }
 
 function moment(load, course) {
@@ -84,16 +91,18 @@ function moment(load, course) {
 function part({ name, varies, course }, unit, shapes, put) {
   const [words, title] = [svg("text", { dy: "0.32em" }), svg("title")];
   const label = { node: words, size: 0, measured: 0, tip: [0, 0], left: false };
-  const node = svg("g", { class: "load" }, title, ...shapes, words);
+  const node = svg("g", { class: "load", "data-kind": "loads", "data-name": name }, title, ...shapes, words);
   const most = varies && !course ? "≤ " : ""; // of one whose course is not known its largest
-  const aim = (scene, index) => {
-    const size = put(scene, scene.loads.find((one) => one.name === name) ?? {}, index, label);
+  const aim = (scene, index, perNewton) => {
+    const size = put(scene, scene.loads.find((one) => one.name === name) ?? {}, index, label, perNewton);
     const text = `${most}${stated(size, unit)}`;
     set(node, { display: size > 0 ? null : "none" });
-    if (text === words.textContent) return;
-    words.textContent = text;
-    title.textContent = `${name}: ${text}`;
-    Object.assign(label, { size: text.length * CHARACTER, measured: 0 });
+    if (text !== words.textContent) {
+      words.textContent = text;
+      title.textContent = `${name}: ${text}`;
+      Object.assign(label, { size: text.length * CHARACTER, measured: 0 });
+    }
+    return size > 0;
   };
   return { name, node, aim, label };
 }
@@ -107,20 +116,22 @@ function settle(label, /** @type {number[]} */ [x, y], { width, height }) {
   const wanted = left ? dx - 8 - size : dx + 8;
   const start = Math.max(Math.min(wanted, width - EDGE - size - x), EDGE - x);
   const clear = start === wanted ? dy : dy + (dy > 0 ? 14 : -14);
-  set(node, {
-    x: left ? start + size : start,
-    y: Math.max(Math.min(clear, height - EDGE - 6 - y), EDGE + 6 - y),
-    class: left ? "end" : null,
-  });
+  const line = Math.max(Math.min(clear, height - EDGE - 6 - y), EDGE + 6 - y);
+  set(node, { x: left ? start + size : start, y: line, class: left ? "end" : null });
+  return { left: x + start, right: x + start + size, top: y + line - 8, bottom: y + line + 7, y: y + line + 4 };
 }
 
-/** Put a load to the middle of the places of its points, in a picture of a width and height. */
-export function poseLoad({ keys, node, label }, spots, room) {
+/** Put a load to the middle of the places of its points; returns where its value stands, null where there is none. */
+export function poseLoad(load, { scene, spots: spotsOf, index, perNewton, room }) {
+  const { keys, node, label } = load;
+  const acts = load.aim(scene, index, perNewton);
+  const spots = spotsOf(keys);
   const known = spots.length === keys.length;
   const middle = [0, 1].map((axis) => spots.reduce((sum, spot) => sum + spot[axis], 0) / spots.length);
   set(node, {
     transform: known ? `translate(${middle[0].toFixed(1)},${middle[1].toFixed(1)})` : null,
     visibility: known ? null : "hidden",
   });
-  if (known) settle(label, middle, room);
+  const box = known ? settle(label, middle, room) : null;
+  return acts ? box : null;
 }

@@ -19,7 +19,7 @@ export function polarChart(scene, { name, reaction, ideal }, kind, pick, /** @ty
   const most = usualPeak(scene, sizes, free);
   const highest = peak(sizes, free);
   const cut = most < highest ? most : null; // then the window shows what is usual, around the origin
-  const scale = prefixed(most, "N");
+  const scale = prefixed(most, "N", scene.units);
   const plot = html("div", { class: "plot" });
   const value = html("span", { class: "value" }, "—");
   const element = html(
@@ -33,7 +33,7 @@ export function polarChart(scene, { name, reaction, ideal }, kind, pick, /** @ty
       value,
     ),
     plot,
-    cut === null ? null : html("p", { class: "remark" }, `The peak of ${quantity(highest, "N")} ${OUTSIDE}`),
+    cut === null ? null : html("p", { class: "remark" }, `The peak of ${quantity(highest, "N", undefined, scene.units)} ${OUTSIDE}`),
   );
   const chart = { scene, joint, kind, scale, cut, plot, axes: [across, up], frame: null, index: 0 };
   onWidth(plot, (width) => draw(chart, width), 220);

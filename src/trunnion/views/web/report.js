@@ -12,8 +12,6 @@ import { polarChart } from "./polar.js";
 import { seatCharts } from "./seat.js";
 import { spaceView } from "./space.js";
 
-const NO_KILO = 999; // W: what is lost in some positions is small beside what is in others
-
 /** Class that colours the n-th joint's curves and vectors; after six the dash changes. */
 export function kindOf(order) {
   return `k${order % 6} d${Math.floor(order / 6) % 4}`;
@@ -186,9 +184,9 @@ export function readout(scene) {
     ...stateRows(scene),
     ...drivers.map(({ name, unit, effort }) => [
       `${unit === "N" ? "force" : "torque"} ${name}`,
-      (index) => quantity(at(effort, index), unit, usualPeak(scene, effort)),
+      (index) => quantity(at(effort, index), unit, usualPeak(scene, effort), scene.units),
     ]),
-    ["friction power", (index) => quantity(lost[index], "W", Math.min(usualPeak(scene, lost), NO_KILO))],
+    ["friction power", (index) => quantity(lost[index], "W", usualPeak(scene, lost), scene.units)],
     ["status", (index) => state(scene, index)],
   ];
   const cells = rows.map(() => html("dd", {}, "—"));

@@ -5,7 +5,7 @@ import { apply, cross, dot, plus, product, scaled, unit } from "./vector.js";
 
 const SIDES = 14; // of a rod
 const RINGS = 8; // of a ball
-const STEP = 0.06; // bodies are cut into pieces of this share of the size, so that they sort
+const STEP = 0.03; // bodies are cut into pieces of this share of the size: with twice that, crossing bars sort wrongly
 const OUTLINE = 0.0028; // share of the size
 const SHADES = 24;
 const LIGHT = [-0.35, 0.55, 0.76]; // from the left and above, in the picture's frame

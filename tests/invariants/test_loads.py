@@ -190,7 +190,9 @@ def test_a_resistance_in_space_that_only_touches_0_does_not_drive() -> None:
     laws = {"abs(sin(2 * drive + 0.5))": 0, "(cos(drive)^2 + sin(drive)^2 - 1)": 0, "sin(2 * drive + 0.5)": 1}
     for law, count in laws.items():
         loads = {"brake": {"joint": "D", "resisting_torque": f"2 N m * {law}"}}
-        assert [row["code"] for row in findings(analysed({**rssr().data, "loads": loads}))].count("load.drives") == count
+        assert [row["code"] for row in findings(analysed({**rssr().data, "loads": loads}))].count(
+            "load.drives"
+        ) == count
 
 
 # ---- tables ---------------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -87,9 +88,15 @@ def four_bar(
     }
 
 
-def solved(data: Data | trunnion.Mechanism, steps: int = 72, **options: Any) -> xr.Dataset:
+def solved(data: Data | trunnion.Mechanism, steps: int = 12, **options: Any) -> xr.Dataset:
     mechanism = data if isinstance(data, trunnion.Mechanism) else trunnion.Mechanism(**data)
     return trunnion.assemble(mechanism, steps, **options)
+
+
+@cache
+def leaned_four_bar(steps: int = 12) -> xr.Dataset:
+    """The four-bar with the hole of B leaned in its link, no play stated."""
+    return solved(four_bar({"B": LEAN}), steps)
 
 
 def sound(result: xr.Dataset) -> None:
@@ -122,7 +129,7 @@ def leaned(apart: float, pin: float, tilt: float) -> float:
 @pytest.mark.parametrize("degrees", [0.02, 0.2, 1.0])
 def test_hinges_with_a_leaned_hole(apart: float, pin: float, degrees: float) -> None:
     lean = {"misalignment": {"tilt": np.radians(degrees), "towards": 0.7}}
-    found = solved(hinges(apart, pin, lean, "cylindrical"), 6)
+    found = solved(hinges(apart, pin, lean, "cylindrical"), 3)
     sound(found)
     wanted = leaned(apart, pin, np.radians(degrees))
     small = np.radians(degrees) * pin * (2 * apart + pin) / (4 * (apart + pin))
@@ -130,7 +137,7 @@ def test_hinges_with_a_leaned_hole(apart: float, pin: float, degrees: float) -> 
     np.testing.assert_allclose(found.needed_clearance, wanted, rtol=1e-7)
     floating = {**lean, "pin": {"end_float": 1e-3}}  # the float moves the pin's ends a little along the hole
     np.testing.assert_allclose(
-        solved(hinges(apart, pin, floating), 6).needed_clearance, wanted, rtol=1e-6 + np.radians(degrees) ** 2
+        solved(hinges(apart, pin, floating), 3).needed_clearance, wanted, rtol=1e-6 + np.radians(degrees) ** 2
     )
 
 
@@ -148,7 +155,7 @@ def test_hinges_with_a_hole_out_of_line(towards: float) -> None:
 def test_hinges_held_along_their_axis() -> None:
     """Without any end float the pins also keep their distance: against SciPy on the geometry of the pin line."""
     apart, pin, tilt = 0.3, 0.03, np.radians(0.2)
-    found = solved(hinges(apart, pin, {"misalignment": {"tilt": tilt}}), 4)
+    found = solved(hinges(apart, pin, {"misalignment": {"tilt": tilt}}), 2)
     sound(found)
     hole = Rotation.from_rotvec([0, tilt, 0]).as_matrix()
     middle, unit = np.array([0, 0, apart]), 5e-5
@@ -168,7 +175,7 @@ def test_hinges_held_along_their_axis() -> None:
 
     rng = np.random.default_rng(5)
     best = np.inf
-    for _ in range(12):
+    for _ in range(4):
         rules = [
             {"type": "ineq", "fun": lambda x: x[4] ** 2 - (ends(x) ** 2).sum(axis=1)},
             {"type": "eq", "fun": length},
@@ -319,7 +326,7 @@ def test_four_bar_against_an_independent_closure(joint: str) -> None:
         q = q - np.linalg.lstsq(slope, turns(q), rcond=None)[0]
     assert np.abs(turns(q)).max() < 1e-12
     above = loop.closed_within(1.001 * need, 0)
-    below = [loop.closed_within(0.999 * need, seed) for seed in range(3)]
+    below = [loop.closed_within(0.999 * need, seed) for seed in range(2)]
     assert above < 1e-8
     assert min(below) > 1e-3  # from every start the same
     assert max(below) < 1.001 * min(below)
@@ -328,7 +335,7 @@ def test_four_bar_against_an_independent_closure(joint: str) -> None:
 @pytest.mark.slow
 def test_stated_clearances_enough_and_not() -> None:
     errors = {"B": LEAN}
-    need = float(solved(four_bar(errors)).smallest_clearance)
+    need = float(leaned_four_bar().smallest_clearance)
     tall = {name: {"clearance": 1.0001 * need} for name in "ABCD"}
     enough = solved(four_bar(errors, tall))
     assert (enough.status == AssemblyStatus.FITS).all()
@@ -340,7 +347,8 @@ def test_stated_clearances_enough_and_not() -> None:
     np.testing.assert_allclose(short.needed_share * 0.9 * need, short.needed_clearance, rtol=1e-9)
     (told,) = json.loads(short.attrs["findings"])
     assert told["severity"] == "error"
-    assert "between 125° and 310° of A" in told["what"]
+    assert told["figures"] == pytest.approx({"share": 1 / 0.9, "clearance": need}, rel=1e-9)
+    assert "between 150° and 300° of A: at 210.2° of A" in told["what"]
     assert 1e6 * need == pytest.approx(14.3451, rel=1e-6)
     assert "14.346 um" in told["remedy"]  # rounded up
 
@@ -365,7 +373,7 @@ def test_a_joint_without_play_has_no_offset() -> None:
 
 @pytest.mark.slow
 def test_no_play_is_stated() -> None:
-    found = solved(four_bar({"B": LEAN}), 36)
+    found = leaned_four_bar()
     assert (found.status == AssemblyStatus.RIGID).all()
     assert np.isinf(found.needed_share).all()
     (told,) = json.loads(found.attrs["findings"])
@@ -383,7 +391,7 @@ def test_no_play_is_stated() -> None:
 def told_of(clearance: str) -> tuple[str, str, dict[str, Any]]:
     """What is said of the misaligned four-bar, whose need is the same everywhere, with a clearance of all pins."""
     model = trunnion.read("examples/misaligned-fourbar.yaml").with_values({"joint_defaults.pin.clearance": clearance})
-    found = solved(model, 12)
+    found = solved(model, 4)
     (told,) = json.loads(found.attrs["findings"])
     return told["what"], told["remedy"], {row.name: row.value for row in summary_of(found)}
 
@@ -426,10 +434,10 @@ def test_check_says_that_it_goes_together_by_its_play_only() -> None:
 def test_part_is_the_derivative() -> None:
     """A little more clearance in one pin lowers the needed share of all by its part."""
     errors, clearance, more = {"B": LEAN}, 2e-5, 1e-9
-    flat = solved(four_bar(errors, {name: {"clearance": clearance} for name in "ABCD"}), 9)
+    flat = solved(four_bar(errors, {name: {"clearance": clearance} for name in "ABCD"}), 4)
     for joint in "AC":
         pins = {name: {"clearance": clearance + more * (name == joint)} for name in "ABCD"}
-        slope = (solved(four_bar(errors, pins), 9).needed_share / flat.needed_share - 1) * clearance / more
+        slope = (solved(four_bar(errors, pins), 4).needed_share / flat.needed_share - 1) * clearance / more
         np.testing.assert_allclose(-slope, flat.stated_part.sel(joint=joint).sum("end"), atol=2e-4)
 
 
@@ -443,11 +451,11 @@ def test_bennett_with_a_twist_that_is_off() -> None:
     twist = float(plain.parameters()["loop.B.twist"])
     off = np.radians(0.1)
     stated, twice = (
-        solved(trunnion.Mechanism(**{**plain.data(), "errors": {"loop.B.twist": size}}), 24) for size in (off, 2 * off)
+        solved(trunnion.Mechanism(**{**plain.data(), "errors": {"loop.B.twist": size}}), 6) for size in (off, 2 * off)
     )
     sound(stated)
     np.testing.assert_allclose(twice.needed_clearance, 2 * stated.needed_clearance, rtol=0.02)
-    direct = solved(plain.with_values({"loop.B.twist": twist + off}), 24)
+    direct = solved(plain.with_values({"loop.B.twist": twist + off}), 6)
     np.testing.assert_allclose(direct.needed_clearance, stated.needed_clearance, rtol=1e-9)
     assert any(row["code"] == "assembly.misfit" for row in json.loads(direct.attrs["findings"]))
 
@@ -508,11 +516,11 @@ def test_guide_and_pins() -> None:
             "assembly": {"C": [0.25, 0, 0]},
         }
 
-    stiff = solved(model({}), 24)
+    stiff = solved(model({}), 8)
     loose = model({"clearance": 1e-4})
     for joint in "ABC":
         loose["joints"][joint]["pin"] = {"clearance": 5e-5}
-    helped, shared = solved(loose, 24), solved(loose, 24, uniform="all")
+    helped, shared = solved(loose, 8), solved(loose, 8, uniform="all")
     for found in (stiff, helped, shared):
         sound(found)
     assert (helped.needed_clearance < 0.9 * stiff.needed_clearance).all()
@@ -550,25 +558,25 @@ def test_derivatives_by_differences() -> None:
 def test_invariances() -> None:
     """Lengths times 1000, another frame of the ground, other orders of the joints."""
     errors = {"B": LEAN, "C": {"tilt": 1e-3, "towards": 1.0, "offset": 2e-5}}
-    plain = solved(four_bar(errors), 24)
+    plain = solved(four_bar(errors), 6)
     sound(plain)
     large = {
         name: {**error, **({"offset": 1e3 * error["offset"]} if "offset" in error else {})}
         for name, error in errors.items()
     }
     np.testing.assert_allclose(
-        solved(four_bar(large, scale=1e3), 24).needed_clearance, 1e3 * plain.needed_clearance, rtol=1e-8
+        solved(four_bar(large, scale=1e3), 6).needed_clearance, 1e3 * plain.needed_clearance, rtol=1e-8
     )
     moved = (Rotation.from_rotvec([0.4, -1.1, 0.7]), np.array([0.3, -0.2, 0.5]))
     for other in (four_bar(errors, moved=moved), four_bar(errors, order="DCBA"), four_bar(errors, order="CADB")):
-        found = solved(other, 24).sel(joint=plain.joint)
+        found = solved(other, 6).sel(joint=plain.joint)
         np.testing.assert_allclose(found.needed_clearance, plain.needed_clearance, rtol=1e-8)
         np.testing.assert_allclose(found.uniform_part.sum("end"), plain.uniform_part.sum("end"), atol=1e-4)
 
 
 @pytest.mark.slow
 def test_sampling_does_not_decide_the_smallest_clearance() -> None:
-    coarse, fine = (float(solved(four_bar({"B": LEAN}), steps).smallest_clearance) for steps in (10, 144))
+    coarse, fine = (float(leaned_four_bar(steps).smallest_clearance) for steps in (12, 60))
     assert coarse == pytest.approx(fine, rel=1e-7)
 
 
@@ -577,9 +585,9 @@ def test_where_it_cannot_be_assembled() -> None:
     """A linkage that does not turn all the way says where, with its answer elsewhere."""
     data = four_bar({"B": LEAN})
     data["links"]["crank"]["points"]["B"]["at"] = [0.065, 0, 0]
-    found = solved(data, 36)
+    found = solved(data, 18)
     apart = found.status == AssemblyStatus.APART
-    assert 0 < int(apart.sum()) < 36
+    assert 0 < int(apart.sum()) < 18
     assert np.isnan(found.needed_clearance[apart]).all()
     assert np.isfinite(found.needed_clearance[~apart]).all()
     assert float(found.closure_residual.max()) < OPEN
@@ -600,7 +608,7 @@ def test_a_freedom_that_nothing_drives_is_refused() -> None:
 @pytest.mark.parametrize("degrees", [1, 5, 15])
 def test_errors_that_are_not_small(degrees: float) -> None:
     """The sequence of cone programmes settles on the exact closure there too; the need is nearly proportional."""
-    small, large = (solved(four_bar({"B": {"tilt": np.radians(one)}}), 12) for one in (0.01, degrees))
+    small, large = (solved(four_bar({"B": {"tilt": np.radians(tilt)}}), 4) for tilt in (0.01, degrees))
     sound(large)
     ratio = np.tan(np.radians(degrees)) / np.radians(0.01)
     np.testing.assert_allclose(large.needed_clearance, ratio * small.needed_clearance, rtol=0.02 * degrees)

@@ -9,8 +9,9 @@ import trunnion
 from brief import brief
 from mechanisms import Data, analyse, build, findings, five_bar, four_bar, model, slider_crank
 from trunnion import Mechanism, Status, locking
+from trunnion.cycle.locking_course import critical_multiples
 from trunnion.results.attributes import summary_of
-from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import prepare
 from trunnion.solve.status import status_of
 
@@ -56,20 +57,33 @@ CASES = {
 }
 
 
+def multiples_of(mechanism: Mechanism, steps: int) -> dict[str, np.ndarray]:
+    """Critical multiples of the joints at every position, without what `locking` asks of the cycle."""
+    run = prepare(mechanism)
+    return critical_multiples(run.solve(run.cycle.times(steps), method=FrictionMethod()), MARGIN)
+
+
+def test_the_result_has_the_multiples_of_every_position() -> None:
+    data, options = CASES["four-bar"]
+    found, expected = (of(build(data(), **options), 4) for of in (locking, multiples_of))
+    assert any(np.any(np.isfinite(multiple)) for multiple in expected.values())
+    for joint, multiple in expected.items():
+        np.testing.assert_array_equal(found["critical_multiple"].sel(joint=joint), multiple)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_critical_multiples_are_where_it_locks(name: str) -> None:
     """Just below it runs, just above it is locked: one joint's coefficient changed in the model, at every position."""
     data, options = CASES[name]
-    steps, coefficient = 24, options["friction"]
+    steps, coefficient = 12, options["friction"]
     mechanism = build(data(), **options)
-    found = locking(mechanism, steps)
+    found = multiples_of(mechanism, steps)
     time = prepare(mechanism).cycle.times(steps)
     factors = np.array([1 - 1e-6, 1 + 1e-6])
     checked = 0
-    for joint in map(str, found["joint"].values):
-        multiple = found["critical_multiple"].sel(joint=joint).values
-        at = np.flatnonzero(np.isfinite(multiple) & (multiple > 0))[::5]
+    for joint, multiple in found.items():
+        at = np.flatnonzero(np.isfinite(multiple) & (multiple > 0))[::3]
         stated = float(coefficient) * multiple[at][:, None] * factors
         whole = model(data(), **options)
         whole["joints"][joint]["friction"] = coefficient
@@ -95,8 +109,9 @@ def test_critical_multiples_are_where_it_locks(name: str) -> None:
 def test_joint_without_which_it_still_locks() -> None:
     """Where all friction together locks early, no single joint need be able to free it: then its multiple is 0."""
     data, options = CASES["slider-crank"]
-    found = locking(build(data(), **{**options, "friction": 0.9}), 24)
-    margin, multiple = found["locking_margin"].values, found["critical_multiple"].values
+    mechanism = build(data(), **{**options, "friction": 0.9})
+    margin = brief(mechanism, 8)["locking_margin"].values
+    multiple = np.array(list(multiples_of(mechanism, 8).values()))
     assert np.any(margin < 1)
     assert np.all(np.nanmin(multiple, axis=0)[margin < 1] < 1)
     assert np.any(multiple == 0)
@@ -105,7 +120,7 @@ def test_joint_without_which_it_still_locks() -> None:
 @pytest.mark.slow
 def test_locked_findings_name_the_joint_that_decides() -> None:
     data, options = CASES["slider-crank"]
-    result = analyse(data(), 36, **{**options, "friction": 0.9})
+    result = analyse(data(), 12, **{**options, "friction": 0.9})
     assert np.any(result["status"] == Status.LOCKED)
     (finding,) = [one for one in findings(result) if one["code"] == "friction.locked"]
     assert "decides" in finding["remedy"] or "lower these" in finding["remedy"]
@@ -122,8 +137,8 @@ def test_there_is_nothing_to_lock_without_friction() -> None:
 def test_coefficient_only_where_the_law_is_proportional_to_it() -> None:
     data, options = CASES["slider-crank"]
     stribeck = {"law": "stribeck", "coefficient": 0.2, "static": 0.35, "stribeck_speed": 0.5}
-    curved = summary_of(analyse(data(), 24, **{**options, "friction": stribeck}))
-    plain = summary_of(analyse(data(), 24, **options))
+    curved = summary_of(analyse(data(), 12, **{**options, "friction": stribeck}))
+    plain = summary_of(analyse(data(), 12, **options))
     ends = [{row.name.partition(".critical_")[2] for row in rows} - {""} for rows in (curved, plain)]
     assert ends == [{"multiple"}, {"coefficient"}]
 
@@ -131,8 +146,9 @@ def test_coefficient_only_where_the_law_is_proportional_to_it() -> None:
 @pytest.mark.slow
 def test_successive_approximation_has_the_same_margin() -> None:
     data, options = CASES["slider-crank"]
-    plain = analyse(data(), 24, **{**options, "friction": 0.2})
-    named = analyse(data(), 24, FrictionMethod("successive-approximation", 1e-10), **{**options, "friction": 0.2})
+    mechanism = build(data(), **{**options, "friction": 0.2})
+    plain = brief(mechanism, 12)
+    named = brief(mechanism, 12, FrictionMethod("successive-approximation", 1e-10))
     assert np.isfinite(plain["locking_margin"]).any()
     solved = named["status"].values < Status.NOT_CONVERGED
     np.testing.assert_allclose(

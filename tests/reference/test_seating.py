@@ -197,7 +197,7 @@ def one_crank() -> Data:
 @pytest.mark.parametrize("steps", [72, 70, 101])
 def test_crank_whose_bearing_is_relieved_at_one_angle(steps: int) -> None:
     """Loss of contact at 90°, in closed form, whether a position is there or not, and nowhere else."""
-    result = analysed(one_crank(), steps)
+    result = trunnion.analyse(trunnion.Mechanism(trunnion=1, **one_crank()), steps)
     angle = np.degrees(result.joint_rotation.sel(joint="A").values)
     where = losses(result, "A")
     assert len(where) == 1
@@ -354,8 +354,9 @@ def test_where_a_pin_crosses_or_lifts_off_does_not_depend_on_the_positions() -> 
     (crossing,) = seating_of(crank).loads.crossings
     assert crossing.time / crank.cycle.duration == pytest.approx(0.25, abs=1e-9)
     assert crossing.low < crossing.time < crossing.high
+    slider = trunnion.Mechanism(trunnion=1, **loaded("slider-crank", 0.12, 4e-3))
     told = [
-        {one["code"]: one["what"] for one in json.loads(analysed(loaded("slider-crank", 0.12, 4e-3), steps).findings)}
+        {one["code"]: one["what"] for one in json.loads(trunnion.analyse(slider, steps).findings)}
         for steps in (24, 101)
     ]
     assert told[0]["contact.lifted"] == told[1]["contact.lifted"]

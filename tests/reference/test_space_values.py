@@ -284,7 +284,7 @@ def test_bennett() -> None:
 def test_no_bennett() -> None:
     """Without sin α : a = sin β : b four pins in space do not move: there is no number, and it is said why."""
     data = loop("RRRR", (40, 100, 40, 100), (0.2, 0.2, 0.2, 0.2), start=0.1, over_constraint="minimum-norm")
-    result = analysed(data, 12)
+    result = trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), 12)
     assert set(result.status.values[1:]) == {int(trunnion.Status.NOT_ASSEMBLED)}
     assert np.isnan(result.joint_rotation.sel(joint="B").values[1:]).all()
     assert "cannot be assembled" in result.attrs["findings"]

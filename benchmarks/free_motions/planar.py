@@ -24,6 +24,7 @@ TOLERANCE = 1e-10
 STEPS = 60
 ROUNDS = 60  # of friction and multipliers at one moment
 SETTLED = 1e-13
+STILL = 1e-11  # of the largest spin
 MOST = 5_000  # evaluations of a motion: a stiff one is left out
 
 __all__ = ["AllLinks", "examine", "free"]
@@ -175,9 +176,9 @@ class AllLinks:
         name = spring["joint"]
         one, two = self.data["joints"][name]["links"]
         if self.data["joints"][name]["type"] == "revolute":
-            begin = float(np.arctan2(np.sin(self.start[name]), np.cos(self.start[name])))
-            turn = begin + self.turn(x, name) - self.start[name]
-            torque = k * (turn - float(spring.get("free_angle", 0.0))) + c * (self.of(v, two)[2] - self.of(v, one)[2])
+            begin = self.start[name] - float(spring.get("free_angle", 0.0))  # of all turns that nearest to the free one
+            wound = float(np.arctan2(np.sin(begin), np.cos(begin))) + self.turn(x, name) - self.start[name]
+            torque = k * wound + c * (self.of(v, two)[2] - self.of(v, one)[2])
             self.put(q, two, np.array([0.0, 0.0, -torque]))
             self.put(q, one, np.array([0.0, 0.0, torque]))
             return
@@ -204,6 +205,8 @@ class AllLinks:
             if joint["type"] == "revolute":
                 radius = float(joint["pin"]["radius"])
                 rate = self.of(v, two)[2] - self.of(v, one)[2]
+                if abs(rate) <= STILL * float(np.max(np.abs(v[2::3]))):
+                    continue  # neither link can turn: the rate is rounding
                 torque = float(slope(law, np.array(radius * rate))) * radius * float(np.hypot(*own))
                 self.put(q, two, np.array([0.0, 0.0, torque]))
                 self.put(q, one, np.array([0.0, 0.0, -torque]))

@@ -53,6 +53,9 @@ def free(seed: int) -> Data | None:
     for row in rows:
         row.pop("friction", None)
     data["loads"] = {key: load for key, load in data["loads"].items() if "joint" not in load}
+    for load in data["loads"].values():
+        if "loop" not in data and _spins(data, load["link"]):
+            load.pop("frame", None)  # which way such a link has spun is a rule of each, see `mobility.spin`
     rng = np.random.default_rng([20_30, seed])
     begin = driver["range"][0] if "range" in driver else driver["start"]
     speed = float(driver["speed"])
@@ -61,6 +64,11 @@ def free(seed: int) -> Data | None:
     if "loop" not in data and rng.random() < 0.5:
         _sprung(data, rng, abs(speed))
     return data
+
+
+def _spins(data: Data, link: str) -> bool:
+    """Whether a link can turn about the line of two balls without moving anything else."""
+    return sum(link in joint["links"] and joint["type"] == "spherical" for joint in data["joints"].values()) > 1
 
 
 def _sprung(data: Data, rng: np.random.Generator, pace: float) -> None:

@@ -47,6 +47,7 @@ VALUES = {  # two of each key, which differ
     "misalignment.offset": ("0.1 mm", "0.2 mm"), "misalignment.offset_towards": ("10 deg", "80 deg"),
     "friction.coefficient": (0.02, 0.03), "friction.model": ("two-contact", "pezzuti"),
     "friction.pair_factor": (1, 1.2), "pitch": ("0.2 m", "0.21 m"),
+    "stiffness.radial": ("2e6 N/m", "3e6 N/m"),
 }  # fmt: skip
 BASES: list[dict[str, Any]] = [  # beside what the key is stated: alone, with friction, with a play, with an axis off
     {},

@@ -39,6 +39,7 @@ def joint_findings(mechanism: Numbers) -> Iterator[Finding]:
             yield from _ends(mechanism, name, joint)
         yield from _pitch(joint, where)
         yield from _contact(joint, where, mechanism.space == "spatial")
+        yield from _stiffness(mechanism, joint, where)
         if joint.contact is not None:
             yield from _contact_law(mechanism, name, joint, joint.contact)
         yield from _losses(joint, f"{where}.losses")
@@ -79,6 +80,20 @@ def _parameters_of_law(friction: Friction, where: str) -> Iterator[Finding]:
         if one.default is None and parameter not in friction.parameters:
             remedy = f"add {parameter}" + f" ({one.meaning})" * bool(one.meaning)
             yield Finding(f"the friction law {law} needs '{parameter}'", where, remedy)
+
+
+def _stiffness(mechanism: Numbers, joint: Joint, where: str) -> Iterator[Finding]:
+    """Stiffness that changes nothing: where statics decides, and in the plane what a joint there does not carry."""
+    if joint.stiffness is None:
+        return
+    if mechanism.over_constraint == "refuse":
+        what, remedy = "stiffness is not used where reactions are decided", "state over_constraint: minimum-norm"
+        yield Finding(what, f"{where}.stiffness.radial", remedy, Severity.NOTE)
+    elif mechanism.space == "planar":
+        for key in ("axial", "tilting") if has_pin(joint.type) else ("axial",):
+            if getattr(joint.stiffness, key) is not None:
+                what = f"a {joint.type} joint in the plane has no {key} stiffness: it is not used"
+                yield Finding(what, f"{where}.stiffness.{key}", "remove it", Severity.NOTE)
 
 
 def _contact(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:

@@ -253,7 +253,7 @@ class Determinacy:
         return len(self.system.mechanism.drivers) + len(self.system.plan.passive) + undetermined
 
     def refuse(self) -> None:
-        """Raises MechanismError for what is not determined, unless the smallest reactions are asked for."""
+        """Raises MechanismError for what is not determined, unless those of least elastic energy are asked for."""
         errors = [finding for finding in self.findings() if finding.severity is Severity.ERROR]
         if errors:
             raise MechanismError(errors)
@@ -284,7 +284,7 @@ class Determinacy:
                 if self.system.mechanism.over_constraint == "refuse":
                     what += "statics does not determine their reactions"
                     remedy = "use a joint with more freedoms (cylindrical, spherical), or state over_constraint: "
-                    remedy += "minimum-norm for the smallest reactions"
+                    remedy += "minimum-norm for those of least elastic energy"
                     findings.append(Finding.error("mobility.redundant", "joints", what, remedy, **figures))
                 else:
                     findings += self._shared(part, what, figures)

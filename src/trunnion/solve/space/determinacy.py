@@ -305,10 +305,8 @@ class Determinacy:
         yield Finding.warning("mobility.redundant_least", "joints", what, remedy, **figures)
         if part.rubbing and lacking:
             what = f"the friction in the joints {', '.join(part.rubbing)} depends on how the joints share the load: "
-            what += (
-                f"normal loads change by up to {100 * part.change:.2g} % of the largest if one joint is twice or half "
-            )
-            what += "as stiff"
+            what += f"normal loads change by up to {100 * part.change:.2g} % of the largest "
+            what += "if one joint is twice or half as stiff"
             remedy = f"state the stiffness of the joints, or give them {counted(part.redundant, 'freedom')} more "
             remedy += "(cylindrical, spherical)"
             figures = {"joints": list(part.rubbing), "constraints": part.redundant, "change": part.change}

@@ -1,7 +1,8 @@
 """The studio in a real browser: start to first picture and to the solved cycle, drags solved and drawn a second,
-pictures a second while it is scrubbed; memory while it plays. Needs Chromium and the extra dev.
+pictures a second while it is scrubbed; memory while it plays; how long a chain of many links takes. Needs Chromium
+and the extra dev.
 
-    python -m benchmarks.studio [--play MINUTES]
+    python -m benchmarks.studio [--play MINUTES] [--links DYADS]
 """
 
 from __future__ import annotations
@@ -65,11 +66,55 @@ SCRUB = """async (seconds) => {
 }"""
 
 
+ANSWER = """async (text) => {
+  const { module_studio_state: state, module_studio_actions: actions } = await import("/modules.js");
+  const begin = performance.now();
+  state.text.value = text;
+  const whole = actions.solve();
+  const frame = () => new Promise(requestAnimationFrame);
+  while (state.answer.value?.text !== text || !state.answer.value.scene) await frame();
+  await frame();
+  await frame();
+  const drawn = performance.now() - begin;
+  await whole;
+  return [drawn / 1000, (performance.now() - begin) / 1000];
+}"""
+
+
+def chain(dyads: int) -> str:
+    """A crank with dyads in a row, friction in every joint, a load on the last rocker."""
+    numbers = range(dyads)
+    rows = [
+        "trunnion: 1", "name: chain", "dimensions: {a: 40 mm, b: 140 mm, c: 100 mm, d: 150 mm}", "links:",
+        "  ground: {points: {O: [0, 0]" + "".join(f", C{k}: [{150 + 150 * k} mm, 0]" for k in numbers) + "}}",
+        "  crank: {points: {O: [0, 0], A0: [a, 0]}, mass: 0.2 kg, centre: [a/2, 0]}",
+    ]  # fmt: skip
+    for k in numbers:
+        end = f", A{k + 1}: [c, 0]" if k + 1 < dyads else ""
+        rows.append(f"  coupler{k}: {{points: {{A{k}: [0, 0], B{k}: [{'d' if k else 'b'}, 0]}}}}")
+        rows.append(f"  rocker{k}: {{points: {{C{k}: [0, 0], B{k}: [c, 0]{end}}}, mass: 0.3 kg, centre: [c/2, 0]}}")
+    rows += ["joints:", "  O: {type: revolute, links: [ground, crank]}"]
+    for k in numbers:
+        before = f"rocker{k - 1}" if k else "crank"
+        for joint, links in (
+            ("A", f"{before}, coupler{k}"),
+            ("B", f"coupler{k}, rocker{k}"),
+            ("C", f"ground, rocker{k}"),
+        ):
+            rows.append(f"  {joint}{k}: {{type: revolute, links: [{links}]}}")
+    hints = ", ".join(f"B{k}: [{170 + 150 * k} mm, 100 mm]" for k in numbers)
+    return "\n".join(
+        [*rows, "joint_defaults: {friction: 0.1, pin: {radius: 5 mm}}", "drivers: {O: {speed: 10 rad/s}}",
+         f"loads: {{F: {{joint: C{dyads - 1}, resisting_torque: 1 N m}}}}", f"assembly: {{{hints}}}", ""]
+    )  # fmt: skip
+
+
 def main() -> None:
     """Print the figures of both mechanisms."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.studio", description=__doc__)
     parser.add_argument("--play", type=int, default=0, metavar="MINUTES", help="of play whose memory is measured")
-    minutes = parser.parse_args().play
+    parser.add_argument("--links", type=int, default=0, metavar="DYADS", help="of a chain that is solved and drawn")
+    minutes, dyads = (asked := parser.parse_args()).play, asked.links
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
         for name, joint in DRAGGED.items():
@@ -83,6 +128,9 @@ def main() -> None:
                     _measure(page, name, joint, address, begin)
                     if minutes and name == next(iter(DRAGGED)):
                         _played(page, minutes, process.pid)
+                    if dyads and name == next(iter(DRAGGED)):
+                        drawn, whole = page.evaluate(ANSWER, chain(dyads))
+                        print(f"  {2 * dyads + 2} links: drawn with forces {drawn:.1f} s, figures {whole:.1f} s")
                     page.close()
                 finally:
                     process.terminate()

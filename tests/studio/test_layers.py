@@ -248,16 +248,16 @@ def test_a_table_has_the_stroke_and_the_time_ratio_of_a_quick_return():
     short = 2 * np.arccos(40 / 120)
     assert rows["time ratio of G"]["a"] == pytest.approx((2 * np.pi - short) / short, rel=1e-4)
     assert rows["stroke of G"]["texts"] == ["200.0\u00a0mm", "200.0\u00a0mm", "0 %"]
-    figures = dict(ask("model", after)["figures"])
+    figures = dict(ask("cycle", after)["figures"])
     assert figures["time ratio of G"] == "2.000 (forth 240.0°, back 120.0° from 210.0° to 330.0°)"
     assert figures["stroke of G"] == "200.0\u00a0mm"
-    backwards = dict(ask("model", after.replace("speed: 40 rpm", "speed: -40 rpm"))["figures"])
+    backwards = dict(ask("cycle", after.replace("speed: 40 rpm", "speed: -40 rpm"))["figures"])
     assert backwards["time ratio of G"] == "2.000 (forth 120.0° from 330.0° to 210.0°, back 240.0°)"
-    sharp = dict(ask("model", after.replace("d: 60 mm", "d: 40 mm").replace("r: 120 mm", "r: 40.01 mm"))["figures"])
+    sharp = dict(ask("cycle", after.replace("d: 60 mm", "d: 40 mm").replace("r: 120 mm", "r: 40.01 mm"))["figures"])
     short = 2 * np.arccos(40 / 40.01)
     assert sharp["time ratio of G"].startswith(f"{(2 * np.pi - short) / short:.1f} (")
     assert "from 268.7° to 271.3°" in sharp["time ratio of G"]
-    jumps = dict(ask("model", after.replace("d: 60 mm", "d: 120 mm"))["figures"])
+    jumps = dict(ask("cycle", after.replace("d: 60 mm", "d: 120 mm"))["figures"])
     assert "time ratio of G" not in jumps
     assert "time ratio of G" not in compared(after, after, friction=("off", "stated"))[1]
 

@@ -334,6 +334,20 @@ def test_questions_over_the_socket(served):
         assert (found["revision"], found["solved"]) == (3, True)
 
 
+def test_figures_of_a_cycle_hold_nothing_up(served):
+    text = EXAMPLES["jansen"]
+    with socket_of(served, f"http://127.0.0.1:{served.port}") as line:
+        line.send(json.dumps({"ask": "model", "revision": 1, "text": text}))
+        motion = unpacked(line.recv(timeout=60))
+        assert motion["solved"]
+        assert "figures" not in motion
+        line.send(json.dumps({"ask": "cycle", "revision": 1, "text": text}))
+        line.send(json.dumps({"ask": "example", "revision": 1, "name": "hoecken"}))
+        answers = [unpacked(line.recv(timeout=60)) for _ in range(2)]
+    assert [found["ask"] for found in answers] == ["example", "cycle"]
+    assert answers[1]["figures"]
+
+
 QUESTIONS = [
     "", "no question", "[", "[" * 100_000, "5", "null", b"", b"\xff\xfe", b'{"ask": "start"}', b"\x00" * 9, "{}",
     '{"ask": "\\ud800"}', '{"ask": "start", "revision": "\\ud800"}', '{"ask": ["start"], "revision": {}}',

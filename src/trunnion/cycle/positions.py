@@ -130,9 +130,12 @@ def positions(
     steps = steps if run.cycle.duration > 0 else 1
     time = run.cycle.times(steps) if at is None else np.array([at])
     found = stretch(run, time, method, engine, wanted, progress)
-    if not averaged:
-        return found
-    quick = replace(method, margin_up_to=0.0)  # the margin is known by now
+    return over_cycle(run, found) if averaged else found
+
+
+def over_cycle(run: Run, found: Positions) -> Positions:
+    """The same with the course of the cycle and its means, which do not depend on the positions."""
+    quick = replace(found.method, margin_up_to=0.0)  # the margin is known by now
     course = course_of(run, quick)
     ideal = course_of(run, quick, ideal=True).means if run.erring else None
     return replace(found, course=course, means=course.means, ideal=ideal)

@@ -7,7 +7,6 @@ there, for one contact after the other.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -46,18 +45,16 @@ def bracket(
     """
     if not resting or not run.system.mechanism.drivers:
         return  # both are the effort itself, or there is none
-    for end, sign in (("lower", -1.0), ("upper", 1.0)):
-        efforts = arrays[f"drive_effort_{end}"] = arrays["drive_effort"].copy()
-        for joint, positions in resting.items():
-            for low in range(0, len(positions), LANES):
-                part = positions[low : low + LANES]
-                rests = _Resting(run, joint, time[part], seating.offsets(time[part]) if seating else {}, method)
-                change, key = (
-                    functools.partial(rests.change, sign),
-                    ("resting", joint, sign, rests.time.tobytes(), method),
-                )
-                again = len(positions) <= FEW and not seating  # a few are asked for again and again
-                efforts[:, part] += run.once(key, change) if again else change()
+    ends = {sign: arrays["drive_effort"].copy() for sign in (-1.0, 1.0)}
+    for joint, positions in resting.items():
+        again = len(positions) <= FEW and not seating  # a few are asked for again and again
+        for low in range(0, len(positions), LANES):
+            part = positions[low : low + LANES]
+            rests = _Resting(run, joint, time[part], seating.offsets(time[part]) if seating else {}, method)
+            key = ("resting", joint, rests.time.tobytes(), method)
+            for sign, change in (run.once(key, rests.changes) if again else rests.changes()).items():
+                ends[sign][:, part] += change
+    arrays["drive_effort_lower"], arrays["drive_effort_upper"] = ends.values()
 
 
 @dataclass(frozen=True)
@@ -79,18 +76,27 @@ class _Resting:
         rows = [np.broadcast_to(efforts[name], count * len(lanes)) for name in drivers]
         return np.array(rows).reshape(len(drivers), count, -1)
 
-    def change(self, sign: float) -> Array:
-        """By how much each effort may be more, or with sign −1 less, (driver, lane); NaN where it may lock."""
+    def changes(self) -> dict[float, Array]:
+        """By how much each effort may be less, sign −1, and more, 1, (driver, lane); NaN where it may lock."""
+        contacts, lanes = self.run.system.resting(self.joint), np.arange(len(self.time))
+        spots = np.zeros((contacts, len(SHARES), len(lanes)))
+        middle = self.efforts(spots[:, :1], lanes)[:, 0]
+        spots[0] = SHARES[:, None]
+        first = self.efforts(spots, lanes)
+        return {sign: self._change(sign, middle, first) for sign in (-1.0, 1.0)}
+
+    def _change(self, sign: float, middle: Array, first: Array) -> Array:
+        """first: the efforts under shares of the first contact's resistance alone, from which its search sets out."""
         contacts, every = self.run.system.resting(self.joint), np.arange(len(self.time))
-        middle = self.efforts(np.zeros((contacts, 1, len(every))), every)[:, 0]
         most, best = np.zeros(middle.shape), np.zeros((len(middle), contacts, len(every)))
         for driver, at_rest in enumerate(middle):
             for contact in list(range(contacts)) * (ROUNDS if contacts > 1 else 1):
                 lanes, spots = every, np.repeat(SHARES[:, None], len(every), axis=1)
-                for _ in range(ZOOMED):
+                for round_ in range(ZOOMED):
                     tried = np.repeat(best[driver][:, None, lanes], len(spots), axis=1)
                     tried[contact] = spots
-                    values = sign * (self.efforts(tried, lanes)[driver] - at_rest[lanes])
+                    alone = round_ == 0 and contact == 0 and not np.any(best[driver])
+                    values = sign * ((first if alone else self.efforts(tried, lanes))[driver] - at_rest[lanes])
                     k, lane = np.argmax(values, axis=0), np.arange(len(lanes))  # of one without a value, if any
                     better = ~(values[k, lane] <= most[driver, lanes])
                     most[driver, lanes[better]] = values[k, lane][better]

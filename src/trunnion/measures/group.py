@@ -162,25 +162,31 @@ class Group:
         """Of measures that turn: times, s, and the angle of the nominal mechanism there, without jumps."""
         turning = [measure for measure in self.measures if measure.turning(self.run.system)]
         if not self.at_place:
-            return {measure.name: self._turned(measure) for measure in turning}
+            return self._turned(turning) if turning else {}
         parts = self._evaluated(self.values, np.array(self.ends)[:, None, None])[0]
         return {measure.name: (np.array(self.ends), np.ravel(primal(parts[measure.name][0]))) for measure in turning}
 
-    def _turned(self, measure: Measure) -> tuple[Array, Array]:
-        """An angle without jumps at many times, s, to tell by how many turns others are off: its integral."""
-        run, coordinate = self.run, measure.coordinate(self.run.system)
+    def _turned(self, turning: Sequence[Measure]) -> dict[str, tuple[Array, Array]]:
+        """Angles without jumps at many times, s, to tell by how many turns others are off: integrals of their rates."""
+        run, coordinates = self.run, [measure.coordinate(self.run.system) for measure in turning]
 
         def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
             walk = run.walk(within(run, time))
-            speed = np.asarray(primal(rate(coordinate, walk)), float)
-            return np.broadcast_to(speed, (1, *time.shape)), pose_status(walk, time.shape)
+            speeds = [np.asarray(primal(rate(coordinate, walk)), float) for coordinate in coordinates]
+            return np.array(np.broadcast_arrays(*speeds, time)[:-1]), pose_status(walk, time.shape)
 
         knots = np.array([bend.time for bend in run.bends if bend.scan < 0])
         rates = Courses.of(look, breaks_between(run.cycle, knots, *self.span), None, accuracy_of(run.cycle, TURNING))
-        time, turned = rates.integral(0)
-        start = int(np.argmax(np.isfinite(rates.at(time)[0])))
-        first = float(np.ravel(primal(measure.curve(run.walk(within(run, time[start : start + 1])))[0]))[0])
-        return time, turned - turned[start] + np.nan_to_num(first)
+        turned = [rates.integral(row) for row in range(len(turning))]
+        nodes = turned[0][0]
+        starts = np.argmax(np.isfinite(rates.at(nodes)), axis=1)
+        walk = run.walk(within(run, nodes[starts]))
+        angles = {}
+        for row, measure in enumerate(turning):
+            time, angle = turned[row]
+            first = np.broadcast_to(primal(measure.curve(walk)[0]), starts.shape)[row]
+            angles[measure.name] = (time, angle - angle[starts[row]] + np.nan_to_num(float(first)))
+        return angles
 
     @cached_property
     def _counts(self) -> dict[str, int]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from functools import lru_cache, partial
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
@@ -56,8 +57,9 @@ MOST_STEPS = 3600
 KEPT = 1e-2  # of the size: a locked joint that stays may be off by as much as a position is fine
 
 
-def answer(request: bytes) -> bytes:
-    """The answer to a question; one that cannot be answered says why in a sentence."""
+def answer(request: bytes, turn: AbstractContextManager[object] | None = None) -> bytes:
+    """The answer to a question; one that cannot be answered says why in a sentence. turn: of what is answered in turn;
+    what takes long is answered beside, for nobody is to wait for it."""
     head: dict[str, Any] = {}
     try:
         asked = json.loads(request)
@@ -68,7 +70,8 @@ def answer(request: bytes) -> bytes:
         about = ANSWERS.get(str(kind))
         if about is None:
             raise ValueError(f"nothing is known of '{head['ask']}'")
-        return packed(head | about(asked))
+        with nullcontext() if turn is None or about in BESIDE else turn:
+            return packed(head | about(asked))
     except MechanismError as error:
         return packed(head | {"error": "; ".join(_sentence(one) for one in error.findings[:3])})
     except Exception as error:  # whatever it is: whoever asked gets a sentence, and can go on asking
@@ -121,49 +124,59 @@ def _example(asked: Asked) -> dict[str, Any]:
 
 
 def _model(asked: Asked) -> dict[str, Any]:
-    """Findings, numbers and the solved cycle of a text."""
+    """Findings, numbers, motion and forces of a text; the figures of its cycle are asked for by `cycle`."""
     state, steps = loaded(str(asked["text"])), _steps(asked)
-    found, result = list(state.findings), None
     friction = asked.get("friction") != "off"
-    if state.mechanism is not None:
-        try:
-            result = state.result(steps, friction)
-            told = state.placed(tuple(findings_of(result)))
-            found = [*found, *told] if state.bare else told or found
-        except MechanismError as error:
-            found += state.placed(error.findings)
-    drawn = Sketch(copy.deepcopy(dict(state.entries or {})))
-    lacks = missing(drawn, found)
+    result, told = _solved(state, lambda: state.motion(steps, friction))
     head = {
-        "findings": [_row(one) for one in found],
-        "missing": lacks,
+        **told,
         "entries": state.entries,
-        "numbers": _numbers(state, drawn),
+        "numbers": _numbers(state, Sketch(copy.deepcopy(dict(state.entries or {})))),
         "solved": result is not None,
-        "ready": readiness(state.mechanism, result, found, lacks),
         "bare": state.bare,
         "scene": None,
     }
     if result is None:
         return head
     shown = scene(result, max_positions=MOST_STEPS)
-    units = units_of(result)
-    figures = {
-        one.label: one.value if isinstance(one.value, str) else quantity(one.value, one.unit, units) or "—"
-        for one in summary_of(result)
-        if not one.numerical
-    }
     return head | {
         "scene": shown,
         "places": {key: [track[axis][0] for axis in "xy"] for key, track in shown["points"].items()},
         **margin_of(result, friction and bool(rubbing(state.run.system))),
         **({"margin_why": "friction lacks something"} if state.bare and friction else {}),
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
-        "figures": [
-            [label, told]
-            for label, told in (figures | dict(row for way in state.ways(steps) for row in way.rows)).items()
-        ],
     }
+
+
+def _cycle(asked: Asked) -> dict[str, Any]:
+    """Findings and figures of the whole cycle of a text, which take longer than its motion."""
+    state, steps = loaded(str(asked["text"])), _steps(asked)
+    result, told = _solved(state, lambda: state.result(steps, asked.get("friction") != "off"))
+    if result is None:
+        return told
+    units = units_of(result)
+    figures = {
+        one.label: one.value if isinstance(one.value, str) else quantity(one.value, one.unit, units) or "—"
+        for one in summary_of(result)
+        if not one.numerical
+    }
+    figures |= dict(row for way in state.ways(steps) for row in way.rows)
+    return told | {"figures": [[label, value] for label, value in figures.items()]}
+
+
+def _solved(state: Loaded, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset | None, dict[str, Any]]:
+    """The result of a text, None where it has none, and what there is to say of it."""
+    findings, result = list(state.findings), None
+    if state.mechanism is not None:
+        try:
+            result = solve()
+            more = state.placed(tuple(findings_of(result)))
+            findings = [*findings, *more] if state.bare else more or findings
+        except MechanismError as error:
+            findings += state.placed(error.findings)
+    lacks = missing(Sketch(copy.deepcopy(dict(state.entries or {}))), findings)
+    ready = readiness(state.mechanism, result, findings, lacks)
+    return result, {"findings": [_row(finding) for finding in findings], "missing": lacks, "ready": ready}
 
 
 def _row(one: Finding) -> dict[str, Any]:
@@ -355,6 +368,7 @@ ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "start": _start,
     "example": _example,
     "model": _model,
+    "cycle": _cycle,
     "drag": _drag,
     "try": _try,
     "edit": _edit,
@@ -364,3 +378,4 @@ ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "compare": _compare,
     "tolerances": _tolerances,
 }
+BESIDE = (_cycle,)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.file import Lines, entries_of, place, version_findings
 from trunnion.model.mechanism import Mechanism
@@ -16,6 +18,7 @@ from trunnion.solve.run import Run, prepare
 if TYPE_CHECKING:
     import xarray as xr
 
+    from trunnion.cycle.positions import Positions
     from trunnion.studio.ways import Way
 
 __all__ = ["MOST_LINKS", "Loaded", "loaded"]
@@ -56,14 +59,34 @@ class Loaded:
         return prepare(self.run.system.mechanism.with_friction("off"))
 
     @lru_cache(maxsize=2)  # noqa: B019  # a handful of texts is kept, see `loaded`
-    def result(self, steps: int, friction: bool) -> xr.Dataset:
-        """Its cycle with or without friction; MechanismError where it has none."""
-        if self.mechanism is None:
-            raise MechanismError(self.findings)
-        from trunnion.cycle.analyse import analyse  # not for the first picture
+    def positions(self, steps: int, friction: bool) -> Positions:
+        """Motion and forces with or without friction at the positions; MechanismError where it has no cycle."""
+        from trunnion.cycle.positions import positions  # not for the first picture
 
-        mechanism = self.mechanism if friction else self.mechanism.with_friction("off")
-        return analyse(mechanism, steps)
+        run = self.run if friction else self.frictionless_run
+        if run.determinacy is not None:
+            run.determinacy.refuse()
+        with np.errstate(all="ignore"):
+            return positions(run, steps, averaged=False)
+
+    @lru_cache(maxsize=2)  # noqa: B019
+    def motion(self, steps: int, friction: bool) -> xr.Dataset:
+        """The positions as a result that has no figures of the cycle yet, which may take many times as long."""
+        from trunnion.cycle.summary import result_of
+
+        found = self.positions(steps, friction)
+        with np.errstate(all="ignore"):
+            return result_of(self.run if friction else self.frictionless_run, found).dataset
+
+    @lru_cache(maxsize=2)  # noqa: B019
+    def result(self, steps: int, friction: bool) -> xr.Dataset:
+        """What `analyse` gives, of the same positions."""
+        from trunnion.cycle.positions import over_cycle
+        from trunnion.cycle.summary import result_of
+
+        found, run = self.positions(steps, friction), self.run if friction else self.frictionless_run
+        with np.errstate(all="ignore"):
+            return result_of(run, over_cycle(run, found)).dataset
 
     @lru_cache(maxsize=2)  # noqa: B019
     def ways(self, steps: int) -> tuple[Way, ...]:

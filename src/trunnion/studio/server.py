@@ -3,8 +3,8 @@
 Loopback only; Host, Origin and Sec-Fetch-Site are checked. Who asks for more than the code of the page names the token
 in a header. It is no cookie: browsers send those to every port of a machine. The page has it from the address that
 opened it and keeps it in the browser's storage, which belongs to one port. Files are the regular files of one folder
-that are models: names with no way out of it, links resolved. Answers are made in a thread of their own, one after
-another; nothing but the text of a model comes from the page.
+that are models: names with no way out of it, links resolved. Answers are made in threads, one after another but for
+those that take long; nothing but the text of a model comes from the page.
 """
 
 from __future__ import annotations
@@ -278,10 +278,16 @@ class Studio:
             await socket.close(code=4403)
             return
         await socket.accept(subprotocol=SUBPROTOCOL)
-        with contextlib.suppress(WebSocketDisconnect):
-            while (question := await socket.receive())["type"] == "websocket.receive":
-                content = question.get("bytes") or (question.get("text") or "").encode()
-                await socket.send_bytes(await run_in_threadpool(_answered, content))
+
+        async def tell(question: bytes) -> None:
+            content = await run_in_threadpool(_answered, question)
+            with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # nobody is there any more
+                await socket.send_bytes(content)
+
+        async with asyncio.TaskGroup() as answering:
+            with contextlib.suppress(WebSocketDisconnect):
+                while (question := await socket.receive())["type"] == "websocket.receive":
+                    answering.create_task(tell(question.get("bytes") or (question.get("text") or "").encode()))
 
 
 async def _thumbnail(request: Request) -> Response:
@@ -310,7 +316,8 @@ def _look(text: str, seen: Event) -> None:
     seen.wait(PATIENCE)  # to load the rest beside would hold up the page
     import trunnion.studio.answers  # noqa: F401  # not while answers are being made: the page may ask for the picture
 
-    _answered(json.dumps({"ask": "model", "text": text}).encode())
+    for ask in ("model", "cycle"):
+        _answered(json.dumps({"ask": ask, "text": text}).encode())
 
 
 def _placed(text: str) -> bytes:
@@ -325,8 +332,7 @@ def _answered(question: bytes) -> bytes:
     """The answer to a question; what it takes is loaded with the first."""
     from trunnion.studio.answers import answer
 
-    with ANSWERING:
-        return answer(question)
+    return answer(question, ANSWERING)
 
 
 def _reason(error: Exception) -> str:

@@ -75,11 +75,25 @@ async function answered() {
   if (!found || sent !== state.text.value) return;
   if (found.error) return state.say(found.error, true);
   const read = Object.keys(found.numbers).length > 0; // else it is drawn by those that were there before the mistake
-  state.answer.value = { ...found, numbers: read ? found.numbers : (state.answer.value?.numbers ?? {}), text: sent, friction: asked.friction };
+  const { numbers = {}, figures = [] } = state.answer.value ?? {};
+  state.answer.value = { ...found, numbers: read ? found.numbers : numbers, figures, coming: found.solved, text: sent, friction: asked.friction };
   if (state.live.value?.text === null) state.live.value = null; // the dragged mechanism has its answer
   if (state.selection.value && !isPart(found, state.selection.value)) state.selection.value = null; // its name was undone, or it is gone
   if (found.scene && state.index.value >= found.scene.count) state.index.value = 0;
   if (!state.solved.value) state.places.value = { ...found.places, ...state.places.value };
+  if (found.solved) await (cycles = cycles.then(() => figured(asked)));
+}
+
+let cycles = Promise.resolve(); // one after another, for a long one would hold up the next
+
+/** Findings and figures of the whole cycle of the present text. */
+async function figured(asked) {
+  const present = () => state.answer.value?.text === asked.text && state.text.value === asked.text && state.answer.value.friction === asked.friction;
+  if (!present()) return;
+  const found = await link.ask("cycle", asked);
+  if (!found || !present()) return;
+  if (found.error) state.say(found.error, true);
+  state.answer.value = { ...state.answer.value, ...(found.error ? {} : found), coming: false };
 }
 
 let typing = 0;

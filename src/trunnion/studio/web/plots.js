@@ -144,9 +144,10 @@ function loops({ scene }, others) {
 }
 
 function Figures() {
-  const { figures = [], facts = [] } = state.answer.value ?? {};
-  if (!state.solved.value || !figures.length) return null;
-  return html`<dl class="figures">
+  const { figures = [], facts = [], coming } = state.answer.value ?? {};
+  if (!state.solved.value || (!figures.length && !coming)) return null;
+  return html`<dl class="figures" aria-busy=${Boolean(coming)}>
+    ${coming && !figures.length && html`<div><dt>figures of the cycle</dt><dd>being calculated …</dd></div>`}
     ${[...figures, ...facts].map(([label, value]) => html`<div><dt>${label}</dt><dd>${value}</dd></div>`)}
   </dl>`;
 }

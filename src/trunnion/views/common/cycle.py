@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -73,8 +75,13 @@ class Interval:
 
 
 def layout(result: xr.Dataset) -> dict[str, Any]:
-    """The mechanism as a small dict: ground, links with points, joints with links, loads."""
-    stated: dict[str, Any] = attribute(result, "scene", "{}")
+    """The mechanism as a small dict: ground, links with points, joints with links, loads. It is read, never changed."""
+    return _layout(result.attrs.get("scene") or "{}")
+
+
+@lru_cache(maxsize=4)  # every part of a view asks for it
+def _layout(text: str) -> dict[str, Any]:
+    stated: dict[str, Any] = json.loads(text)
     return {"ground": "", "links": {}, "joints": {}, "loads": {}, "springs": {}, "gears": {}} | stated
 
 
@@ -95,8 +102,9 @@ def column(result: xr.Dataset, name: str, **where: str) -> Array | None:
     """One variable as an array, picked by names along its dimensions; None if the result lacks it."""
     if name not in result:
         return None
-    picked = result[name].sel(where) if where else result[name]
-    return np.asarray(picked.values, dtype=float)
+    variable = result[name]
+    place = tuple(variable.indexes[dim].get_loc(where[dim]) if dim in where else slice(None) for dim in variable.dims)
+    return np.asarray(variable.values[place], dtype=float)
 
 
 def abscissa(result: xr.Dataset) -> Abscissa:

@@ -45,7 +45,7 @@ def course(run: Run, name: str, time: Any) -> Any:
 
 
 def test_every_kind_has_a_course() -> None:
-    assert list(CURVES) == list(MEASURES)
+    assert list(CURVES) == [kind for kind in MEASURES if kind != "expression"]
 
 
 # ---- the slider-crank -----------------------------------------------------------------------------------------

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measures import curves
+from trunnion.measures.angles import within
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure, named
-from trunnion.measures.positions import ends_by_name, plan, within
+from trunnion.measures.positions import ends_by_name, plan
 from trunnion.results.dataset import MemberUnits, Variable, described
 from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.solve.friction_method import MARGIN, FrictionMethod

@@ -121,7 +121,7 @@ def _others(run: Run) -> Iterator[Measure]:
     mechanism = run.system.mechanism
     walk = forward(run.system, run.values, run.chosen.assembly, np.zeros(1))
     for kind, of in MEASURES.items():
-        if of.space not in ("", mechanism.space):
+        if of.space not in ("", mechanism.space) or kind == "expression":
             continue
         for subject in mechanism.named(of.of) if isinstance(of.of, str) else of.of:
             if subject.partition(".")[0] == mechanism.fixed_link and of.of in ("point", "link"):

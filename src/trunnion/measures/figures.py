@@ -36,13 +36,14 @@ from trunnion.algebra.panels import (
     weighted,
 )  # fmt: skip
 from trunnion.errors import Status
+from trunnion.measures.angles import near
 from trunnion.measures.lines import direction
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import gain_of, path_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.run import Run
 
-__all__ = ["Figures", "Panels", "Reading", "combined", "near", "within_limits"]
+__all__ = ["Figures", "Panels", "Reading", "combined", "within_limits"]
 
 Array = NDArray[np.float64]
 SHORTEST = 1e-5  # of a period: a way back that is shorter is a jump
@@ -393,11 +394,6 @@ def combined(of: Callable[..., Array], *numbers: Number) -> Number:
     reals = [np.asarray(primal(number)) for number in numbers]
     duals = [np.broadcast_to(derivative(number), real.shape) for number, real in zip(numbers, reals, strict=True)]
     return Dual(of(*reals), of(*duals))
-
-
-def near(number: Number, to: Any, turn: float) -> Number:
-    """The number and so many whole turns that it is as near as can be to another."""
-    return number - turn * np.rint((primal(number) - to) / turn)
 
 
 def within_limits(measure: Measure, figures: Array, least: Array, most: Array) -> NDArray[np.bool_]:

@@ -21,15 +21,14 @@ from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import FIT, ON_GAUSS, POINTS, RATE, linear
-from trunnion.measures.curves import rate
+from trunnion.measures.angles import angles, near, within
 from trunnion.measures.evaluation import Kernel, lanes_of, picked, step_of
-from trunnion.measures.figures import Panels, Reading, combined, near
+from trunnion.measures.figures import Panels, Reading, combined
 from trunnion.measures.lines import turn
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import moved, within
+from trunnion.measures.positions import moved
 from trunnion.results.scales import ROUNDING, Scales
 from trunnion.solve.run import Run
-from trunnion.solve.status import pose_status
 from trunnion.solve.switches import (
     MARGINS,
     Bend,
@@ -48,7 +47,6 @@ __all__ = ["MOTION", "Group", "Read", "matters"]
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Lanes = NDArray[np.intp]
-TURN = 2 * np.pi
 READ = 512  # mechanisms whose courses are read at a time: their arrays stay in cache
 ALONE = 64  # the same of courses of their own
 FINE, FINE_MOTION = 1e-8, 1e-12  # of the size of a course: how far figures may be off, of forces and of the motion
@@ -57,7 +55,6 @@ NONE = 1e-9  # of the largest derivative: less is none
 FINE_CHANGE = 1e-6  # of the size of derivatives: how far those of figures may be off
 FIRM = 0.3  # of that: where panels are tuned
 MOTION = Accuracy(1e-12, 1e-14)  # of the motion, which has neither friction nor corners but where a law has some
-TURNING = Accuracy(1e-4, 1e-6, shortest=1e-6)  # of the rate of an angle, whose integral tells its whole turns
 FIRST = Accuracy(1e-4, 1e-5, rounds=2)  # of the courses whose panels are tuned
 OWN = Accuracy(1e-7, 1e-8, rounds=20)  # of courses of mechanisms by themselves
 GAP, GROSS = 1 / 360, 1e-3  # of the courses: panels that hide nothing; of their size: what tells of a gap
@@ -162,31 +159,10 @@ class Group:
         """Of measures that turn: times, s, and the angle of the nominal mechanism there, without jumps."""
         turning = [measure for measure in self.measures if measure.turning(self.run.system)]
         if not self.at_place:
-            return self._turned(turning) if turning else {}
+            coordinates = {measure.name: measure.coordinate(self.run.system) for measure in turning}
+            return angles(self.run, coordinates, self.span)
         parts = self._evaluated(self.values, np.array(self.ends)[:, None, None])[0]
         return {measure.name: (np.array(self.ends), np.ravel(primal(parts[measure.name][0]))) for measure in turning}
-
-    def _turned(self, turning: Sequence[Measure]) -> dict[str, tuple[Array, Array]]:
-        """Angles without jumps at many times, s, to tell by how many turns others are off: integrals of their rates."""
-        run, coordinates = self.run, [measure.coordinate(self.run.system) for measure in turning]
-
-        def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
-            walk = run.walk(within(run, time))
-            speeds = [np.asarray(primal(rate(coordinate, walk)), float) for coordinate in coordinates]
-            return np.array(np.broadcast_arrays(*speeds, time)[:-1]), pose_status(walk, time.shape)
-
-        knots = np.array([bend.time for bend in run.bends if bend.scan < 0])
-        rates = Courses.of(look, breaks_between(run.cycle, knots, *self.span), None, accuracy_of(run.cycle, TURNING))
-        turned = [rates.integral(row) for row in range(len(turning))]
-        nodes = turned[0][0]
-        starts = np.argmax(np.isfinite(rates.at(nodes)), axis=1)
-        walk = run.walk(within(run, nodes[starts]))
-        angles = {}
-        for row, measure in enumerate(turning):
-            time, angle = turned[row]
-            first = np.broadcast_to(primal(measure.curve(walk)[0]), starts.shape)[row]
-            angles[measure.name] = (time, angle - angle[starts[row]] + np.nan_to_num(float(first)))
-        return angles
 
     @cached_property
     def _counts(self) -> dict[str, int]:
@@ -410,8 +386,8 @@ class Group:
         """The rows that the figure is read of, (row, lane, panel, node)."""
         own, before = parts[measure.name], nominal.get(measure.name)
         if measure.turning(self.run.system):
-            own = [near(own[0], np.interp(primal(time), *self.angles[measure.name]), TURN)]
-            before = before and [near(before[0], primal(own[0]), TURN)]
+            own = [near(own[0], np.interp(primal(time), *self.angles[measure.name]))]
+            before = before and [near(before[0], primal(own[0]))]
         if before and measure.of_attitude(self.run.system):
             own = [turn(own, before, measure.axis)]
         elif before:

@@ -6,8 +6,8 @@ more numbers, position by position, that its figure is made of (`figures`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,9 +16,12 @@ from pydantic import ValidationError
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
+from trunnion.measures.angles import angle_at, near
 from trunnion.measures.curves import AXES, CURVES, MOTIONS
 from trunnion.model.checks.measures import check_measure
+from trunnion.model.expression import Expression
 from trunnion.model.joint_parts import motions
+from trunnion.model.measure_kinds import course_kind, operands
 from trunnion.model.measure_table import MEASURES, STATISTICS, MeasureKind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
@@ -26,9 +29,30 @@ from trunnion.model.parts import Measure as Stated
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work
+from trunnion.solve.run import Run, prepare
 from trunnion.solve.system import System, Values
 
-__all__ = ["Measure", "chosen", "coordinate_unit", "named", "outputs"]
+__all__ = ["Formula", "Measure", "chosen", "coordinate_unit", "named", "outputs"]
+
+
+@dataclass(frozen=True)
+class Formula:
+    """An expression of measures. parts: those that are no expressions, by name; inner: those that are."""
+
+    expression: Expression
+    parts: Mapping[str, Measure]
+    inner: Mapping[str, Formula]
+    kind: MeasureKind
+
+    def at(self, numbers: Mapping[str, Number], values: Values) -> Number:
+        """Its value, from the numbers of its parts and the dimensions among the values of the mechanism."""
+
+        def number(name: str) -> Number:
+            if name in self.inner:
+                return self.inner[name].at(numbers, values)
+            return numbers[name] if name in numbers else values[f"dimensions.{name}"]
+
+        return self.expression.evaluate({name: number(name) for name in self.expression.names})
 
 
 @dataclass(frozen=True)
@@ -59,11 +83,12 @@ class Measure:
     along: tuple[float, ...] = ()
     within: tuple[float, float] | None = None
     duration: float | None = None
+    formula: Formula | None = field(default=None, compare=False, repr=False)
 
     @property
     def of(self) -> MeasureKind:
-        """What the table says of its kind."""
-        return MEASURES[self.kind]
+        """What the table says of its kind; of an expression by its parts."""
+        return self.formula.kind if self.formula else MEASURES[self.kind]
 
     @property
     def limit(self) -> float | None:
@@ -159,8 +184,28 @@ class Measure:
         Floats, arrays or dual numbers, as the values were.
         """
         walk = back if isinstance(back, Forward) else back.walk
+        return self.joined(self.numbers(back), prepare(walk.system.mechanism), walk.values, walk.time)
+
+    def numbers(self, back: Backward | Forward) -> tuple[Number, ...]:
+        """What the course is made of, as the compiled engine finds it: of an expression the number of each part."""
+        if self.formula:
+            return tuple(number for part in self.formula.parts.values() for number in part.numbers(back))
+        walk = back if isinstance(back, Forward) else back.walk
         numbers = CURVES[self.kind](self, back if self.of.of_forces else walk)
         return numbers if isinstance(numbers, tuple) else (numbers,)
+
+    def joined(self, numbers: Sequence[Number], run: Run, values: Values, time: Number) -> tuple[Number, ...]:
+        """The course of its numbers at times, s, of mechanisms with these values: an expression is worked out.
+
+        Angles in it go on through whole turns, as they do from the start of the cycle of the run.
+        """
+        if not self.formula:
+            return tuple(numbers)
+        known: dict[str, Number] = {}
+        for (name, part), number in zip(self.formula.parts.items(), numbers, strict=True):
+            turns = run.cycle.duration > 0 and part.turning(run.system)
+            known[name] = near(number, angle_at(run, part, primal(time))) if turns else number
+        return (self.formula.at(known, values),)
 
     def coordinate(self, system: System) -> Measure:
         """The rotation or slide of a joint that a stroke, a dead centre or a transmission error is of."""
@@ -274,7 +319,27 @@ def _measure(name: str, stated: Stated, values: Values, mechanism: Mechanism) ->
         along=numbers(*(f"along.{axis}" for axis in AXES)),
         within=(within[0], within[1]) if within else None,
         duration=number("duration"),
+        formula=_formula(mechanism, stated, values),
     )  # fmt: skip
+
+
+def _formula(mechanism: Mechanism, stated: Stated, values: Values) -> Formula | None:
+    """The expression of a measure, None of another kind: it needs what the most demanding of its parts does."""
+    if stated.formula is None:
+        return None
+    parts, inner = dict[str, Measure](), dict[str, Formula]()
+    for name, part in operands(mechanism, stated).items():
+        if part is None:
+            continue
+        measure = _measure(name, part, values, mechanism)
+        if measure.formula is None:
+            parts[name] = measure
+        else:
+            inner[name] = measure.formula
+            parts |= measure.formula.parts
+    needs = max((part.of.needs for part in parts.values()), key=("places", "motion", "forces").index)
+    kind = replace(MEASURES["expression"], quantity=course_kind(mechanism, stated), needs=needs)
+    return Formula(stated.formula, parts, inner, kind)
 
 
 def outputs(system: System) -> list[Measure]:

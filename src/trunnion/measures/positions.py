@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.measures.angles import within
 from trunnion.measures.measures import Measure
 from trunnion.model.checks.magnitudes import in_radians
+from trunnion.model.measure_kinds import place_kind
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.parameters import place_kind
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import UnitError
 from trunnion.solve.system import System, Values
@@ -82,14 +83,6 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
     grid = run.cycle.times(steps) if any(len(own) != 1 for own in ends.values()) else np.zeros(0)
     times = np.unique(np.concatenate([grid, *(within(run, np.array(own)) for own in ends.values())]))
     return PositionPlan(times, {name: _window(run, own, times, grid) for name, own in ends.items()})
-
-
-def within(run: Run, times: Number) -> Number:
-    """Times within the cycle, s, of such as may run over its end."""
-    if not run.cycle.periodic or run.cycle.duration <= 0:
-        return times
-    real = primal(times) % run.cycle.duration
-    return Dual(real, times.dual) if isinstance(times, Dual) else real
 
 
 def place_of(mechanism: Mechanism, at: float | str) -> tuple[float, bool]:

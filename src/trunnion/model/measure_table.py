@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from math import inf
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, create_model
+from pydantic import Field, create_model, model_validator
 
 from trunnion.model.entry import Direction, Part
+from trunnion.model.expression import Expression, parse
 from trunnion.model.limits import LimitText
 from trunnion.model.quantity import AnyQuantity
 from trunnion.model.rules import InSpace, Positive
-from trunnion.model.units import KINDS, Kind
+from trunnion.model.units import KINDS, Kind, UnitError
 
 __all__ = [
     "MEASURES",
@@ -209,6 +211,11 @@ MEASURES: dict[str, MeasureKind] = {
         "free driver whose coefficient of fluctuation is measured, (largest − smallest speed)/mean of its last turn",
         "coefficient of fluctuation of a driver", NUMBER, "free driver", "simulation", rule="value", reduced=True,
     ),
+    "expression": MeasureKind(
+        "expression of other measures of the model, of dimensions and of columns of a result, by their names, such as "
+        "output - input, D.rotation - O.rotation or atan2(top.Q.y - low.P.y, AB)",
+        "expression of measures", NUMBER, "expression",
+    ),
     "peak_effort": MeasureKind(
         "free driver whose largest effort in its motion in time is measured, its magnitude",
         "largest effort of a driver in time", EFFORT, "free driver", "simulation", rule="value", reduced=True,
@@ -238,8 +245,8 @@ else:
 class Measure(_Subject):
     """A number to watch, of one subject: a point, a link, a joint, a driver or the whole.
 
-    It is taken `at` a position, as a figure `over` a range, or, if neither is stated, at every position. `limit` is of
-    its deviation from nominal, `at_least` and `at_most` are of the number itself.
+    A text alone is an expression. It is taken `at` a position, as a figure `over` a range, or, if neither is stated, at
+    every position. `limit` is of its deviation from nominal, `at_least` and `at_most` are of the number itself.
     """
 
     axis: Literal["x", "y", "z"] | None = Field(
@@ -289,6 +296,18 @@ class Measure(_Subject):
     )
     at_least: AnyQuantity | None = Field(default=None, description="least that it may be itself")
     at_most: AnyQuantity | None = Field(default=None, description="most that it may be itself")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_text(cls, value: object) -> object:
+        return {"expression": value} if isinstance(value, str) else value
+
+    @property
+    def formula(self) -> Expression | None:
+        """Its expression; None of another kind, or of one that cannot be read, which is a finding."""
+        with suppress(UnitError):
+            return parse(self.subject) if self.kind == "expression" else None
+        return None
 
     @property
     def kinds(self) -> list[str]:

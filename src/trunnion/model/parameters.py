@@ -23,28 +23,23 @@ from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.expression import MOTION, PLACED, RESERVED
 from trunnion.model.fields import Fields
 from trunnion.model.limits import Limits
-from trunnion.model.measure_table import MEASURES, Measure
+from trunnion.model.measure_kinds import course_kind, dimension_kinds, drive_kind, figure_kind, is_place, place_kind
+from trunnion.model.measure_table import Measure
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import ERRORS, ParameterNames
 from trunnion.model.parts import Contact, Driver, Friction, Gear, Joint, Losses, Point, freedoms
 from trunnion.model.quantity import Quantity, evaluation_order
 from trunnion.model.rules import Within, markers
-from trunnion.model.units import ANY, KINDS, Dimension, Kind, UnitError, si_unit, unit
+from trunnion.model.units import ANY, KINDS, Kind, unit
 
 __all__ = [
     "LIMITS",
     "Entry",
     "Numbers",
     "ParameterSet",
-    "course_kind",
     "dimension_errors",
-    "dimension_kinds",
-    "drive_kind",
     "entries",
-    "figure_kind",
-    "is_place",
     "measured",
-    "place_kind",
     "placed_measures",
 ]
 
@@ -306,20 +301,6 @@ def dimension_errors(found: Iterable[Entry]) -> dict[str, Quantity]:
     return {one.path.removeprefix(before): one.quantity for one in found if one.path.startswith(before)}
 
 
-def dimension_kinds(mechanism: Fields) -> dict[str, Kind]:
-    """What each dimension measures, as far as its value tells."""
-    known: dict[str, Dimension | None] = {}
-    for name in evaluation_order(mechanism.dimensions)[0]:
-        with suppress(UnitError, KeyError):  # findings of their own
-            known[name] = mechanism.dimensions[name].check(known, ANY)
-    usual = {kind.dimensions[0]: kind for kind in KINDS.values()}
-    return {
-        name: usual.get(one) or Kind("quantity", si_unit(one), f"1 {si_unit(one)}", (one,))
-        for name, one in known.items()
-        if one is not None
-    }
-
-
 def measured(mechanism: Fields, found: Iterable[Entry]) -> dict[str, Kind]:
     """What each number measures, by path: of a dimension, as far as its value tells."""
     of_dimensions = {f"dimensions.{name}": kind for name, kind in dimension_kinds(mechanism).items()}
@@ -436,60 +417,6 @@ def _is_error(path: str) -> bool:
     section, _, rest = path.partition(".")
     misaligned = section == "joints" and rest.endswith((".misalignment.tilt", ".misalignment.offset"))
     return misaligned or path.startswith(ERRORS)
-
-
-def drive_kind(mechanism: Fields) -> Kind:
-    """What the coordinate of the first driver measures."""
-    joint = mechanism.effective_joints.get(next(iter(mechanism.drivers), ""))
-    return KINDS["length" if joint and "rotation" not in freedoms(joint.type) else "angle"]
-
-
-def is_place(measure: Measure) -> bool:
-    """Whether a measure gives a position: a dead centre, or where something is largest or smallest."""
-    return (measure.statistic or "").startswith("place-of-") or measure.kind == "dead_centre"
-
-
-def figure_kind(mechanism: Fields, measure: Measure) -> Kind:
-    """What a measure gives: of a joint with two motions the rotation, of a place the drive coordinate.
-
-    A driver that does not run one way passes a coordinate twice: its places are times, which `place_kind` tells.
-    """
-    if is_place(measure):
-        return drive_kind(mechanism)
-    if measure.statistic == "dwell" or measure.kind == "time_ratio":
-        return KINDS["number"]
-    return course_kind(mechanism, measure)
-
-
-def course_kind(mechanism: Fields, measure: Measure) -> Kind:
-    """What a measure is at every position; of a joint with two motions the rotation."""
-    if not measure.kind:  # a finding of its own
-        return ANY
-    both = MEASURES[measure.kind].quantities
-    return both[-1 if slides(mechanism, measure) else 0]
-
-
-def slides(mechanism: Fields, measure: Measure) -> bool:
-    """Whether the joint, driver, load or spring that a measure is of slides and does not turn."""
-    load = mechanism.loads.get(measure.subject)
-    if MEASURES[measure.kind].of == "load on a joint":
-        return load is None or load.resisting_torque is None
-    name: str | None = measure.subject
-    if MEASURES[measure.kind].of == "spring":
-        spring = mechanism.springs.get(measure.subject)
-        name = spring.joint if spring else None
-        if name is None:  # between two points
-            return True
-    joint = mechanism.effective_joints.get(name or "")
-    return joint is not None and "rotation" not in freedoms(joint.type)
-
-
-def place_kind(mechanism: Fields, quantity: Quantity, dimensions: Mapping[str, Dimension | None]) -> Kind:
-    """A time if it is stated as one, else the coordinate of the first driver. dimensions: of the names in it."""
-    with suppress(UnitError, KeyError):  # findings of their own
-        if quantity.check(dimensions) in KINDS["time"].dimensions:
-            return KINDS["time"]
-    return drive_kind(mechanism)
 
 
 def placed_measures(mechanism: Fields) -> dict[str, str]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from trunnion.errors import Finding
 from trunnion.model.joint_parts import motions
+from trunnion.model.measure_kinds import expression_findings
 from trunnion.model.measure_table import MEASURES, Measure
 from trunnion.model.parameters import Numbers, ParameterSet
 from trunnion.model.rules import Refers
@@ -24,14 +25,18 @@ def check_measure(mechanism: Numbers, measure: Measure, where: str) -> Iterator[
         found, known = " and ".join(measure.kinds) or "nothing", list(MEASURES)
         yield Finding(f"measures {found}", where, f"state one of {', '.join(known[:-1])} or {known[-1]}")
     for key in measure.kinds:
-        yield from _subject(mechanism, key, getattr(measure, key), where)
+        yield from _subject(mechanism, measure, key, where)
     yield from _component(mechanism, measure, where)
     yield from _taken(mechanism, measure, where)
 
 
-def _subject(mechanism: Numbers, key: str, name: str, where: str) -> Iterator[Finding]:
+def _subject(mechanism: Numbers, measure: Measure, key: str, where: str) -> Iterator[Finding]:
     """Whether what is measured exists, and has it."""
+    name = getattr(measure, key)
     kind = MEASURES[key]
+    if key == "expression":
+        yield from expression_findings(mechanism, measure, f"{where}.{key}")
+        return
     if kind.space not in ("", mechanism.space):
         yield Finding(f"there is no {key} in space", f"{where}.{key}", "measure an angle or a rotation")
     if not isinstance(kind.of, tuple):

@@ -47,14 +47,14 @@ class CompiledCourses:
         """Measure and number of each part of each course, by a name."""
         kernel = self.numpy
         back = kernel.solved(kernel.run.values, np.zeros(1))
-        counts = [len(measure.curve(back)) for measure in kernel.measures]
+        counts = [len(measure.numbers(back)) for measure in kernel.measures]
         pairs = zip(kernel.measures, counts, strict=True)
         return {f"{measure.name} {k}": (measure, k) for measure, count in pairs for k in range(count)}
 
     @cached_property
     def _compiled(self) -> WalkKernel:
         def figure(measure: Measure, k: int) -> Callable[[Backward], Number]:
-            return lambda back: measure.curve(back.walk if measure.of_motion else back)[k]
+            return lambda back: measure.numbers(back.walk if measure.of_motion else back)[k]
 
         figures = {name: figure(*part) for name, part in self._parts.items()}
         description = repr(list(self._parts.items()))
@@ -68,11 +68,18 @@ class CompiledCourses:
         """As `NumpyKernel.courses`; that takes dual numbers."""
         if any(isinstance(number, Dual) for number in (time, *values.values())):
             return self.numpy.courses(values, time)
-        curves, status = self._compiled.curves(values, np.asarray(time, float))
-        courses: Curves = {measure.name: () for measure in self.numpy.measures}
+        place = np.asarray(time, float)
+        curves, status = self._compiled.curves(values, place)
+        numbers: Curves = {measure.name: () for measure in self.numpy.measures}
         for name, (measure, _) in self._parts.items():
-            courses[measure.name] += (where_known(measure, status, curves[name]),)
-        return courses, status
+            numbers[measure.name] += (curves[name],)
+        return {
+            measure.name: tuple(
+                where_known(measure, status, part)
+                for part in measure.joined(numbers[measure.name], self.numpy.run, values, place)
+            )
+            for measure in self.numpy.measures
+        }, status
 
 
 def engine_for(engine: Engine, numpy: NumpyKernel, values: Mapping[str, Number], configurations: int) -> Engine:

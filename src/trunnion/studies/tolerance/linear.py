@@ -18,12 +18,12 @@ from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import selected
 from trunnion.errors import Status
+from trunnion.measures.angles import near, within
 from trunnion.measures.evaluation import NumpyKernel
-from trunnion.measures.figures import near
 from trunnion.measures.lines import turn
 from trunnion.measures.many import Many, Read
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import PositionPlan, Window, moved, within
+from trunnion.measures.positions import PositionPlan, Window, moved
 from trunnion.studies.tolerance.effects import Effects, FirstOrder, Spread
 from trunnion.studies.tolerance.search import Corner, search
 
@@ -111,7 +111,7 @@ def references(kernel: NumpyKernel, plan: PositionPlan, many: Many) -> dict[str,
             for part in curves[measure.name]
         ]
         if turning:
-            parts[0] = near(parts[0], many.angle(measure, window.time), 2 * np.pi)
+            parts[0] = near(parts[0], many.angle(measure, window.time))
         attitude = measure.of_attitude(system)
         against = measure.against_nominal(system)
         figure, time = many.figures[measure.name], many.times[measure.name]

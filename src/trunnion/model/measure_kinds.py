@@ -1,0 +1,213 @@
+"""What measures are of: kinds of their courses and figures, and what the names in their expressions stand for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+
+from trunnion.errors import Finding
+from trunnion.model.expression import parse
+from trunnion.model.fields import Fields
+from trunnion.model.measure_table import MEASURES, Measure
+from trunnion.model.names import nearest
+from trunnion.model.parts import freedoms
+from trunnion.model.quantity import Quantity, evaluation_order
+from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError, si_unit
+
+__all__ = [
+    "course_kind",
+    "dimension_kinds",
+    "drive_kind",
+    "expression_findings",
+    "figure_kind",
+    "is_place",
+    "operands",
+    "place_kind",
+]
+
+_COLUMN = re.compile(r"(?P<part>\w+)\.(?P<kind>rotation|slide|effort)|(?P<point>\w+\.\w+)\.(?P<axis>[xyz])")
+
+
+def dimension_kinds(mechanism: Fields) -> dict[str, Kind]:
+    """What each dimension measures, as far as its value tells."""
+    known: dict[str, Dimension | None] = {}
+    for name in evaluation_order(mechanism.dimensions)[0]:
+        with suppress(UnitError, KeyError):  # findings of their own
+            known[name] = mechanism.dimensions[name].check(known, ANY)
+    return {name: _of_dimension(one) for name, one in known.items() if one is not None}
+
+
+def _of_dimension(dimension: Dimension | None) -> Kind:
+    """The usual kind of a dimension, a number where none is known."""
+    usual = {kind.dimensions[0]: kind for kind in KINDS.values()}
+    own = dimension or NUMBER
+    return usual.get(own) or Kind("quantity", si_unit(own), f"1 {si_unit(own)}", (own,))
+
+
+def drive_kind(mechanism: Fields) -> Kind:
+    """What the coordinate of the first driver measures."""
+    joint = mechanism.effective_joints.get(next(iter(mechanism.drivers), ""))
+    return KINDS["length" if joint and "rotation" not in freedoms(joint.type) else "angle"]
+
+
+def is_place(measure: Measure) -> bool:
+    """Whether a measure gives a position: a dead centre, or where something is largest or smallest."""
+    return (measure.statistic or "").startswith("place-of-") or measure.kind == "dead_centre"
+
+
+def figure_kind(mechanism: Fields, measure: Measure) -> Kind:
+    """What a measure gives: of a joint with two motions the rotation, of a place the drive coordinate.
+
+    A driver that does not run one way passes a coordinate twice: its places are times, which `place_kind` tells.
+    """
+    if is_place(measure):
+        return drive_kind(mechanism)
+    if measure.statistic == "dwell" or measure.kind == "time_ratio":
+        return KINDS["number"]
+    return course_kind(mechanism, measure)
+
+
+def course_kind(mechanism: Fields, measure: Measure) -> Kind:
+    """What a measure is at every position; of a joint with two motions the rotation."""
+    if not measure.kind:  # a finding of its own
+        return ANY
+    if measure.kind == "expression":
+        with suppress(UnitError, KeyError):  # findings of their own
+            return _of_dimension(
+                measure.formula.dimension(_dimensions(mechanism, measure)) if measure.formula else None
+            )
+        return ANY
+    both = MEASURES[measure.kind].quantities
+    return both[-1 if slides(mechanism, measure) else 0]
+
+
+def slides(mechanism: Fields, measure: Measure) -> bool:
+    """Whether the joint, driver, load or spring that a measure is of slides and does not turn."""
+    load = mechanism.loads.get(measure.subject)
+    if MEASURES[measure.kind].of == "load on a joint":
+        return load is None or load.resisting_torque is None
+    name: str | None = measure.subject
+    if MEASURES[measure.kind].of == "spring":
+        spring = mechanism.springs.get(measure.subject)
+        name = spring.joint if spring else None
+        if name is None:  # between two points
+            return True
+    joint = mechanism.effective_joints.get(name or "")
+    return joint is not None and "rotation" not in freedoms(joint.type)
+
+
+def place_kind(mechanism: Fields, quantity: Quantity, dimensions: Mapping[str, Dimension | None]) -> Kind:
+    """A time if it is stated as one, else the coordinate of the first driver. dimensions: of the names in it."""
+    with suppress(UnitError, KeyError):  # findings of their own
+        if quantity.check(dimensions) in KINDS["time"].dimensions:
+            return KINDS["time"]
+    return drive_kind(mechanism)
+
+
+# ---- expressions ----------------------------------------------------------------------------------------------
+
+
+def operands(mechanism: Fields, measure: Measure) -> dict[str, Measure | None]:
+    """What each name in the expression of a measure stands for: a measure, None for a dimension or for nothing.
+
+    A name is that of a measure or a dimension of the model, or of a column of a result: JOINT.rotation, JOINT.slide,
+    DRIVER.effort or LINK.POINT.x.
+    """
+    names = measure.formula.names if measure.formula else ()
+    return {name: mechanism.measures.get(name) or _column(name) for name in names}
+
+
+def _column(name: str) -> Measure | None:
+    found = _COLUMN.fullmatch(name)
+    if found is None:
+        return None
+    of_point = {"point": found["point"], "axis": found["axis"]}
+    return Measure.model_validate(of_point if found["point"] else {found["kind"]: found["part"]})
+
+
+def _dimensions(mechanism: Fields, measure: Measure) -> dict[str, Dimension | None]:
+    """The dimension of each name in an expression, None where it is not known; KeyError for what is nothing."""
+    of_dimensions = dimension_kinds(mechanism)
+    kinds: dict[str, Dimension | None] = {}
+    for name, part in operands(mechanism, measure).items():
+        if part is not None:
+            kind = course_kind(mechanism, part)
+        elif name in mechanism.dimensions:
+            kind = of_dimensions.get(name, ANY)
+        else:
+            raise KeyError(name)
+        kinds[name] = next(iter(kind.dimensions), None)
+    return kinds
+
+
+def expression_findings(mechanism: Fields, measure: Measure, where: str) -> Iterator[Finding]:
+    """What is wrong with the expression of a measure: its text, its names, that it speaks of itself, its units."""
+    text = measure.subject
+    try:
+        formula = parse(text)
+    except UnitError as error:
+        yield Finding(error.what, where, error.remedy)
+        return
+    parts = operands(mechanism, measure)
+    wrong = [*_wrong_operands(mechanism, parts, where)]
+    if not wrong and _circular(mechanism, measure):
+        wrong = [Finding(f"'{text}' depends on itself", where, "remove the circle")]
+    if not wrong and not any(part is not None for part in parts.values()):
+        wrong = [Finding(f"'{text}' has no measure in it: it never changes", where, "name one, or a joint's rotation")]
+    if wrong:
+        yield from wrong
+        return
+    try:
+        formula.dimension(_dimensions(mechanism, measure))
+    except UnitError as error:
+        yield Finding(error.what, where, error.remedy)
+
+
+def _wrong_operands(mechanism: Fields, parts: Mapping[str, Measure | None], where: str) -> Iterator[Finding]:
+    """What is wrong with the names in an expression."""
+    for name, part in parts.items():
+        if part is None and name not in mechanism.dimensions:
+            near = nearest(name, [*mechanism.measures, *mechanism.dimensions])
+            columns = "name a measure, a dimension, JOINT.rotation, JOINT.slide, DRIVER.effort or LINK.POINT.x"
+            yield Finding(f"there is no measure or dimension '{name}'", where, columns if "." in name else near)
+        elif part is None:
+            continue
+        elif name in mechanism.dimensions:
+            yield Finding(f"'{name}' is a measure and a dimension", where, "give one of them another name")
+        elif name not in mechanism.measures and (missing := _missing(mechanism, part)):
+            yield Finding(f"there is no {missing}", where, "name a joint, a driver or a link.point of the model")
+        elif why := _no_operand(part):
+            yield Finding(f"the measure '{name}' {why}", where, "name measures that are one number at every position")
+
+
+def _missing(mechanism: Fields, column: Measure) -> str:
+    """The part of a column of a result that the model has not; empty if it has all."""
+    noun = MEASURES[column.kind].of
+    return "" if column.subject in mechanism.named(str(noun)) else f"{noun} '{column.subject}'"
+
+
+def _no_operand(part: Measure) -> str:
+    """Why a measure is no number at every position of one mechanism; empty if it is."""
+    if not part.kind:
+        return "measures nothing"
+    if part.at is not None or part.over is not None or part.statistic:
+        return "is taken at a place or over a range"
+    kind = MEASURES[part.kind]
+    if part.reduced or kind.in_time or kind.rule not in ("deviation", "ratio"):
+        return "is one number of the whole cycle"
+    if kind.against or (part.kind == "angle" and part.axis):
+        return "is a deviation from the nominal mechanism"
+    return ""
+
+
+def _circular(mechanism: Fields, measure: Measure) -> bool:
+    """Whether an expression depends on itself, directly or through others."""
+    reached: list[Measure] = []
+    for part in (left := [measure]):  # it grows
+        more = [other for other in operands(mechanism, part).values() if other is not None]
+        if measure in more:
+            return True
+        left += [other for other in more if other not in reached]
+        reached += more
+    return False

@@ -237,6 +237,14 @@ def _not_assembled(cycle: Cycle) -> Iterator[Finding]:
             what = f"{nowhere}: {by or 'an earlier group has no position'}"
             yield Finding.error("assembly.gap", where, what, remedy, at=at, everywhere=everywhere, gaps=gaps)
             continue
+        if past := _past_dead_centre(cycle, places):
+            driver, moved = past
+            what = (
+                f"has no position {at}: {moved} is past a dead centre of {driver}, which cannot move it on from there"
+            )
+            remedy = "end the motion before it"
+            yield Finding.error("assembly.past_dead_centre", f"drivers.{driver}.moves", what, remedy, at=at)
+            continue
         start, redundant, errors = bool(np.any(places == 0)), bool(module.redundant), mechanism.has_errors
         why = "these links do not close"
         if everywhere and redundant and errors:
@@ -251,6 +259,18 @@ def _not_assembled(cycle: Cycle) -> Iterator[Finding]:
             why = f"{why} there, where the motion starts" if start else unreached
         figures = {"at": at, "everywhere": everywhere, "start": start}
         yield Finding.error("assembly.open", where, f"{nowhere}: {why}", remedy, **figures)
+
+
+def _past_dead_centre(cycle: Cycle, places: NDArray[np.intp]) -> tuple[str, str] | None:
+    """The driver, and the joint that it moves, of positions at which it cannot; None where there is another cause."""
+    system, time = cycle.run.system, cycle.at.time[places]
+    for name, joint in (system.inverse.moves if system.inverse else {}).items():
+        coordinate, rate, _ = (
+            np.broadcast_to(number, time.shape) for number in system.drive(cycle.run.values, name, time)
+        )
+        if np.all(np.isnan(coordinate) & np.isfinite(rate)):
+            return name, joint
+    return None
 
 
 def _undecided_senses(cycle: Cycle) -> Iterator[Finding]:

@@ -270,7 +270,8 @@ def _narrow(mechanism: Fields, section: str, name: str, entry: Entry) -> Kind:
         place = entry.location[-1] in (0, "period")
         return (KINDS["time"] if in_time else drive_kind(mechanism)) if place else ANY
     spring = mechanism.springs[name] if section == "springs" else None
-    joint = mechanism.effective_joints.get((spring.joint or "") if spring else name)
+    moved = mechanism.drivers[name].moves if section == "drivers" else None
+    joint = mechanism.effective_joints.get((spring.joint or "") if spring else moved or name)
     if joint is None:  # of a spring along a line; else a finding of its own
         return entry.kind.of(turns=False) if spring else entry.kind
     turns = "rotation" in freedoms(joint.type)

@@ -243,7 +243,7 @@ _LAW = Selects(
     "motion law",
     MOTION_LAWS,
     _MOTION_EXAMPLES,
-    also=("free", "motor", "initial", "columns"),
+    also=("moves", "free", "motor", "initial", "columns"),
     instead={"file": "points"},
 )
 
@@ -255,6 +255,11 @@ class Driver(Part):
     """
 
     law: Annotated[str, _check_motion, _schema_motion, _LAW] = "constant"
+    moves: Annotated[
+        str | None,
+        Refers("joint"),
+        OnlyWith("prescribed", "remove it, or free and motor", "a motion that is prescribed"),
+    ] = None
     speed: Annotated[Rate | None, NotZero("the driver does not move", "give a speed, however small")] = None
     start: AngleOrLength | None = None
     range: tuple[AngleOrLength, AngleOrLength] | None = None
@@ -281,6 +286,11 @@ class Driver(Part):
     def found(self) -> bool:
         """Whether motion in time finds the coordinate."""
         return self.free or self.motor is not None
+
+    @property
+    def prescribed(self) -> bool:
+        """Whether its law prescribes the motion in every analysis."""
+        return not self.found
 
     @property
     def motion(self) -> MotionLaw:

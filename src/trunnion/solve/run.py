@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding, MechanismError
 from trunnion.groups.gear import rotation
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
@@ -21,6 +22,7 @@ from trunnion.solve.backward import Backward, Given, Sense, solve
 from trunnion.solve.bristles import History, histories
 from trunnion.solve.forward import Forward, Travel, forward
 from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.inverse import Inverse, driven_at_outputs
 from trunnion.solve.memory import in_blocks, keep_pages
 from trunnion.solve.shifts import GivenSeat, seats
 from trunnion.solve.space.determinacy import Determinacy, look
@@ -189,7 +191,8 @@ def prepare(mechanism: Mechanism, free: bool = False) -> Run:
 
 def _prepared(mechanism: Mechanism, free: bool) -> Run:
     keep_pages()
-    system, values = build(mechanism), mechanism.parameters()
+    inverse, values = _inverse(mechanism), mechanism.parameters()
+    system = build(mechanism, inverse)
 
     def over(cycle: Cycle) -> Run:
         return Run(system, values, cycle, choose(system, values, cycle))
@@ -197,7 +200,24 @@ def _prepared(mechanism: Mechanism, free: bool) -> Run:
     run = over(system.cycle(values, None, free))
     if any((turns := _unknown_turns(run)).values()):
         run = over(system.cycle(values, turns, free))
+    if inverse:
+        inverse.check(system, values, run.chosen.assembly)
     return run if _comes_back(run) else over(replace(run.cycle, periodic=False, advances=True))
+
+
+def _inverse(mechanism: Mechanism) -> Inverse | None:
+    """What the drivers do that move other joints than their own; None where there is none."""
+    own = driven_at_outputs(mechanism)
+    if own is None:
+        return None
+    moves = {name: driver.moves for name, driver in mechanism.drivers.items() if driver.moves}
+    try:
+        run = prepare(own)
+    except MechanismError as error:
+        name, joint = next(iter(moves.items()))
+        what = f"the mechanism is not moved by {joint}: {error.findings[0].what}"
+        raise MechanismError(Finding(what, f"drivers.{name}.moves", error.findings[0].remedy)) from None
+    return Inverse(moves, run.system, run.values, run.cycle, run.chosen.assembly)
 
 
 def _comes_back(run: Run) -> bool:

@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,12 +114,25 @@ class Cycle:
         return np.linspace(0.0, self.duration, steps, endpoint=not self.periodic)
 
 
+class Outputs(Protocol):
+    """What drivers do whose laws are of other joints, see `inverse.Inverse`."""
+
+    @property
+    def moves(self) -> Mapping[str, str]: ...
+    def drive(self, values: Values, name: str, time: Number) -> tuple[Number, Number, Number]: ...
+    def span(self, name: str, span: Span) -> Span: ...
+
+
 @dataclass(frozen=True)
 class System:
-    """A mechanism, its plan and its modules. Numbers stay outside: every walk is given its `Values`."""
+    """A mechanism, its plan and its modules. Numbers stay outside: every walk is given its `Values`.
+
+    inverse: where a driver moves another joint by the law that it states.
+    """
 
     mechanism: Mechanism
     plan: Plan
+    inverse: Outputs | None = None
 
     @cached_property
     def spatial(self) -> bool:
@@ -372,6 +385,8 @@ class System:
         """
         if self.is_free(values, name):
             return tuple(values[f"{STATE}{name}.{key}"] for key in FREED)
+        if self.inverse and name in self.inverse.moves:
+            return self.inverse.drive(values, name, time)
         law = self.mechanism.drivers[name].motion
         return law.function(time, self.motion_of(values, name))
 
@@ -381,7 +396,8 @@ class System:
 
     def span(self, values: Values, name: str) -> Span:
         """One cycle of a driver."""
-        return self.mechanism.drivers[name].motion.span(self.motion_of(values, name))
+        span = self.mechanism.drivers[name].motion.span(self.motion_of(values, name))
+        return self.inverse.span(name, span) if self.inverse and name in self.inverse.moves else span
 
     def knots(self, values: Values, name: str) -> list[Number]:
         """Times, s, within one cycle of a driver at which a derivative of its coordinate jumps."""
@@ -513,11 +529,11 @@ def _widest(links: Sequence[Sequence[Sequence[Number]]]) -> Number:
     return widest
 
 
-def build(mechanism: Mechanism) -> System:
+def build(mechanism: Mechanism, inverse: Outputs | None = None) -> System:
     """Decompose a mechanism and prepare its modules. Raises MechanismError if its structure does not determine it."""
     if mechanism.space == "spatial" and (findings := list(_bristles(mechanism))):
         raise MechanismError(findings)
-    return System(mechanism, decompose(mechanism))
+    return System(mechanism, decompose(mechanism), inverse)
 
 
 def _bristles(mechanism: Mechanism) -> Iterator[Finding]:

@@ -101,6 +101,9 @@ def _check(run: Run, method: FrictionMethod) -> None:
     if method.name != "newton" or method.criterion is not None or method.limit < STUBBORN:
         what = "friction by successive approximation, or with a criterion or limit of its own, is not compiled"
         raise MechanismError(Finding(what, "engine", remedy))
+    if run.system.inverse:
+        what = "a driver that moves another joint by its law is not compiled"
+        raise MechanismError(Finding(what, f"drivers.{next(iter(run.system.inverse.moves))}.moves", remedy))
     for module in run.system.plan.modules:
         if module.redundant:
             what = f"the links {', '.join(module.links)} are over-constrained, which is solved by least squares"

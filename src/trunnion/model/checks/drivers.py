@@ -12,7 +12,7 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.checks.loads import unread
 from trunnion.model.names import nearest
 from trunnion.model.parameters import Numbers
-from trunnion.model.parts import Driver, freedoms
+from trunnion.model.parts import Driver, Joint, freedoms
 
 __all__ = ["driver_findings", "driver_values", "gear_values", "gears"]
 
@@ -29,9 +29,16 @@ def driver_findings(mechanism: Numbers) -> Iterator[Finding]:
             moves = f"has {counted(pair.count, 'freedom')}" if pair.count else "does not move"
             what = f"the joint '{name}' is {joints[name].type}: it {moves} and cannot be driven by one number"
             yield Finding(what, where, f"drive one that is {', '.join(drivable[:-1])} or {drivable[-1]}")
-        elif "rotation" not in freedoms(joints[name].type) and driver.law == "constant" and driver.range is None:
-            yield Finding(f"a driven {joints[name].type} joint needs a range", where, "add range: [0 mm, 50 mm]")
+        elif driver.moves in mechanism.drivers:
+            yield Finding(f"the joint '{driver.moves}' is driven itself", f"{where}.moves", "name one that is not")
+        elif (moved := joints.get(driver.moves or name)) and _slides_without_end(driver, moved):
+            yield Finding(f"a driven {moved.type} joint needs a range", where, "add range: [0 mm, 50 mm]")
         yield from _motion(driver, where)
+
+
+def _slides_without_end(driver: Driver, moved: Joint) -> bool:
+    """Whether a joint that does not turn is to move at a constant speed for ever."""
+    return "rotation" not in freedoms(moved.type) and driver.law == "constant" and driver.range is None
 
 
 def _motion(driver: Driver, where: str) -> Iterator[Finding]:
@@ -70,7 +77,7 @@ def _table(mechanism: Numbers, name: str, values: Mapping[str, Number]) -> Itera
         yield Finding(what, f"{where}.0", "begin it at 0 s and shift it by delay: …")
     if all(coordinate == coordinates[0] for coordinate in coordinates):
         yield Finding("the table never moves", where, "give it an extent")
-    joint = mechanism.effective_joints.get(name)
+    joint = mechanism.effective_joints.get(driver.moves or name)
     gap = coordinates[-1] - coordinates[0]
     if driver.periodic and joint and abs(gap) > 1e-9 * np.max(np.abs(coordinates)):
         turns = gap / (2 * np.pi)

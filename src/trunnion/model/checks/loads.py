@@ -227,7 +227,7 @@ def _cycle(mechanism: Numbers, over: str, values: Values) -> tuple[float | None,
         turns = joint is not None and "rotation" in freedoms(joint.type)
         return (2 * np.pi if turns else None), "deg"
     driver, before = mechanism.drivers.get(first), f"drivers.{first}."
-    if driver is None or len(mechanism.drivers) > 1 or driver.law == "table":
+    if driver is None or len(mechanism.drivers) > 1 or driver.law == "table" or driver.moves:
         return None, "s"
     numbers = {path.removeprefix(before): value for path, value in values.items() if path.startswith(before)}
     with suppress(KeyError, ZeroDivisionError):  # findings of their own

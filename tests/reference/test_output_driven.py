@@ -1,0 +1,205 @@
+"""Motion stated at one joint, effort at another: against closed forms, virtual work and the way in two runs."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+import trunnion
+from mechanisms import four_bar
+from trunnion import Mechanism, MechanismError, Status
+from trunnion.algebra.dual import Dual, derivative
+from trunnion.solve.run import prepare
+
+R, L = 0.03, 0.2  # crank and rod of a press, m
+RAM: dict[str, Any] = {"law": "cycloidal", "range": ["180 mm", "225 mm"], "duration": "0.5 s", "dwell": "0.1 s"}
+EXAMPLES = "examples"
+
+
+def press(drivers: dict[str, Any], friction: float = 0.1, **more: Any) -> Mechanism:
+    """A crank press: the crank's pin O, the ram's guide S."""
+    return Mechanism(
+        **{
+            "gravity": [0, -9.81],
+            "links": {
+                "frame": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+                "crank": {"points": {"O": [0, 0], "P": [R, 0]}, "mass": 2.0, "inertia": 1e-3},
+                "rod": {"points": {"P": [0, 0], "Q": [L, 0]}, "mass": 1.0, "centre": [L / 2, 0], "inertia": 3e-3},
+                "ram": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}, "mass": 5.0},
+            },
+            "joints": {
+                "O": {"type": "revolute", "links": ["frame", "crank"]},
+                "P": {"type": "revolute", "links": ["crank", "rod"]},
+                "Q": {"type": "revolute", "links": ["rod", "ram"]},
+                "S": {"type": "prismatic", "links": ["frame", "ram"], "guide": {"length": 0.15}},
+            },
+            "joint_defaults": {"pin": {"radius": 0.025}, "friction": friction},
+            "drivers": drivers,
+            "loads": {"cut": {"joint": "S", "resisting_force": "5 kN", "useful": True}},
+            "assembly": {"Q": [0.18, 0], "P": [0, 0.03]},
+            **more,
+        }
+    )
+
+
+def test_the_crank_of_a_ram_that_moves_by_a_law() -> None:
+    """cos θ = (s² + r² − l²)/(2 r s), differentiated along the motion of the ram."""
+    own = prepare(press({"O": {"moves": "S", **RAM}}))
+    ram = prepare(press({"S": RAM}))
+    time = np.linspace(0.02, 0.48, 24)
+    s, v, a = ram.system.drive(ram.values, "S", time)
+    cosine = (s**2 + R**2 - L**2) / (2 * R * s)
+    slope = (s**2 - R**2 + L**2) / (2 * R * s**2)
+    bend = -(L**2 - R**2) / (R * s**3)
+    angle, sine = np.arccos(cosine), np.sqrt(1 - cosine**2)
+    rate = -slope * v / sine
+    second = -(bend * v**2 + slope * a + cosine * rate**2) / sine
+    for found, wanted in zip(own.system.drive(own.values, "O", time), (angle, rate, second), strict=True):
+        assert found == pytest.approx(wanted, rel=1e-10)
+    assert own.cycle.duration == ram.cycle.duration
+
+
+def test_effort_is_that_of_two_runs() -> None:
+    """The ram's motion gives the crank's by a table of 4000 points, which drives it: the effort is the same."""
+    rows = 4000
+    ram = trunnion.analyse(press({"S": {**RAM, "returns": False, "dwell": 0}}), steps=rows)
+    points = np.transpose([ram.time.values, ram.joint_rotation.sel(joint="O").values]).tolist()
+    table = {"law": "table", "points": [[f"{t!r} s", f"{q!r} rad"] for t, q in points]}
+    twice = trunnion.analyse(press({"O": table}), steps=rows)
+    once = trunnion.analyse(press({"O": {"moves": "S", **RAM, "returns": False, "dwell": 0}}), steps=rows)
+    inner = slice(40, -40)
+    efforts = (found.drive_effort.sel(driver="O").values[inner] for found in (once, twice))
+    size = float(np.max(np.abs(once.drive_effort.values)))
+    np.testing.assert_allclose(*efforts, rtol=0, atol=2e-6 * size)
+
+
+@pytest.mark.parametrize(
+    ("example", "driver", "moved"),
+    [("watt-six-bar", "", ""), ("stephenson-six-bar", "", ""), ("four-bar", "A", "D")],
+)
+def test_power_is_the_same_at_whatever_joint_it_enters(example: str, driver: str, moved: str) -> None:
+    """Without friction the effort times the rate of the driver is that of a driver at the joint that moves."""
+    data = four_bar() if example == "four-bar" else trunnion.read(f"{EXAMPLES}/{example}.yaml").data()
+    data["joint_defaults"] = {}
+    data["joints"] = {name: {**joint, "friction": 0} for name, joint in data["joints"].items()}
+    plain = Mechanism(**data)
+    driver = driver or next(iter(plain.drivers))
+    start = trunnion.analyse(plain, steps=360)
+    moved = moved or _swinging(plain, driver)
+    begin = float(start.joint_rotation.sel(joint=moved)[30])
+    law = {"law": "cycloidal", "duration": 1.0, "returns": False,
+           "range": [begin, float(start.joint_rotation.sel(joint=moved)[45])]}  # fmt: skip
+    places = {name: start.point_position.sel(point=name).isel(position=30).values for name in start.point.values}
+    hints = {joint: list(places[f"{plain.joints[joint].links[1]}.{joint}"]) for joint in plain.joints}
+    data["assembly"] = {joint: list(map(float, at)) for joint, at in hints.items() if joint not in (driver, moved)}
+    data.pop("measures", None)
+    driven = trunnion.analyse(Mechanism(**{**data, "drivers": {moved: law}}), steps=50)
+    found = trunnion.analyse(Mechanism(**{**data, "drivers": {driver: {"moves": moved, **law}}}), steps=50)
+    size = float(np.max(np.abs(driven.drive_power.values)))
+    assert found.drive_power.values == pytest.approx(driven.drive_power.values, abs=1e-9 * size)
+    assert found.joint_rotation.sel(joint=moved).values == pytest.approx(
+        driven.joint_rotation.sel(joint=moved).values, abs=1e-11
+    )
+
+
+def _swinging(mechanism: Mechanism, driver: str) -> str:
+    """A joint to the ground that is not the driver's."""
+    ground = mechanism.fixed_link
+    return next(
+        name for name, joint in mechanism.joints.items()
+        if ground in joint.links and name != driver and joint.type == "revolute"
+    )  # fmt: skip
+
+
+def test_a_hand_that_two_drivers_move() -> None:
+    """A five-bar whose hand is led along two slides: the power of both motors is that of forces at the hand."""
+    data = hand()
+    led = {"X": {"law": "cycloidal", "range": [0.05, 0.12], "duration": 1.0, "returns": False},
+           "Y": {"law": "cycloidal", "range": [0.2, 0.16], "duration": 1.0, "returns": False}}  # fmt: skip
+    driven = trunnion.analyse(Mechanism(**{**data, "drivers": led}), steps=40)
+    motors = {"A": {"moves": "X", **led["X"]}, "D": {"moves": "Y", **led["Y"]}}
+    found = trunnion.analyse(Mechanism(**{**data, "drivers": motors}), steps=40)
+    power = driven.drive_power.sum("driver").values
+    assert found.drive_power.sum("driver").values == pytest.approx(power, abs=1e-9 * np.max(np.abs(power)))
+    for joint in ("X", "Y"):
+        slides = (one.joint_slide.sel(joint=joint).values for one in (found, driven))
+        np.testing.assert_allclose(*slides, atol=1e-12)
+
+
+def hand() -> dict[str, Any]:
+    """Two cranks A and D, two rods to a hand H, which slides along y on a slide along x."""
+    return {
+        "gravity": [0, -9.81],
+        "links": {
+            "ground": {"points": {"A": [0, 0], "D": [0.15, 0], "X": {"at": [0, 0], "axis": [1, 0]}}},
+            "left": {"points": {"A": [0, 0], "B": [0.15, 0]}, "mass": 0.4, "centre": [0.07, 0], "inertia": 1e-3},
+            "right": {"points": {"D": [0, 0], "C": [0.15, 0]}, "mass": 0.4, "centre": [0.07, 0], "inertia": 1e-3},
+            "rod": {"points": {"B": [0, 0], "H": [0.18, 0]}, "mass": 0.3, "centre": [0.09, 0], "inertia": 1e-3},
+            "other": {"points": {"C": [0, 0], "J": [0.18, 0]}, "mass": 0.3, "centre": [0.09, 0], "inertia": 1e-3},
+            "sledge": {"points": {"X": {"at": [0, 0], "axis": [1, 0]}, "Y": {"at": [0, 0], "axis": [0, 1]}}, "mass": 1},
+            "hand": {"points": {"Y": {"at": [0, 0], "axis": [0, 1]}, "H": [0, 0], "J": [0, 0]}, "mass": 2.0},
+        },
+        "joints": {
+            "A": {"type": "revolute", "links": ["ground", "left"]},
+            "D": {"type": "revolute", "links": ["ground", "right"]},
+            "B": {"type": "revolute", "links": ["left", "rod"]},
+            "C": {"type": "revolute", "links": ["right", "other"]},
+            "H": {"type": "revolute", "links": ["rod", "hand"]},
+            "J": {"type": "revolute", "links": ["other", "hand"]},
+            "X": {"type": "prismatic", "links": ["ground", "sledge"]},
+            "Y": {"type": "prismatic", "links": ["sledge", "hand"]},
+        },
+        "assembly": {"B": [-0.08, 0.12], "C": [0.23, 0.12], "H": [0.05, 0.2]},
+    }
+
+
+def test_past_a_dead_centre_there_is_no_position() -> None:
+    """A ram that turns a crank: past its dead centre the same place of the ram is another of the crank."""
+    turning = {"moves": "O", "start": "30 deg", "speed": "60 rpm"}
+    engine = press({"S": turning}, friction=0.0, loads={}, assembly={"O": "30 deg", "P": [0.026, 0.015]})
+    found = trunnion.analyse(engine, steps=24)
+    angle = np.degrees(found.joint_rotation.sel(joint="O").values)
+    turn = np.arange(24) * 15 + 30
+    past, between = (turn > 180) & (turn < 360), turn % 180 != 0
+    assert np.array_equal(np.isnan(angle)[between], past[between])
+    assert np.all(found.status.values[past] == Status.NOT_ASSEMBLED)
+    codes = [finding["code"] for finding in json.loads(found.attrs["findings"])]
+    assert "assembly.past_dead_centre" in codes
+
+
+def test_its_derivatives_are_those_of_differences() -> None:
+    run = prepare(press({"O": {"moves": "S", **RAM}}))
+    path, time = "links.crank.points.P.x", np.linspace(0.05, 0.45, 9)
+
+    def efforts(radius: Any) -> Any:
+        return run.solve(time, {**run.values, path: radius}).efforts["O"]
+
+    slope = (efforts(R + 1e-7) - efforts(R - 1e-7)) / 2e-7
+    assert derivative(efforts(Dual(R, 1.0))) == pytest.approx(slope, rel=1e-5)
+    several = efforts(np.array([[R - 1e-4], [R], [R + 1e-4]]))
+    assert several.shape == (3, 9)
+    assert several[2] == pytest.approx(efforts(R + 1e-4), rel=1e-12)
+
+
+def test_a_driver_that_moves_what_it_cannot_is_a_finding() -> None:
+    for moves, says in [("O", "driven itself"), ("X", "no joint")]:
+        with pytest.raises(MechanismError) as error:
+            trunnion.analyse(press({"O": {"moves": moves, **RAM}}), steps=4)
+        assert says in str(error.value)
+        assert "drivers.O.moves" in str(error.value), str(error.value)
+
+
+def test_tolerances_take_it() -> None:
+    own = {"peak": {"effort": "O", "as": "largest"}}
+    model = press(
+        {"O": {"moves": "S", **RAM}}, measures=own, tolerances={"links.rod.points.Q.x": {"limits": "±0.1 mm"}}
+    )
+    found = trunnion.tolerance(model, methods=("linear",), steps=24).isel(measure=0)
+    low, high = (
+        float(trunnion.analyse(model.with_values({"links.rod.points.Q.x": L + d}), steps=4).measure_figure[0])
+        for d in (-1e-4, 1e-4)
+    )
+    assert 2 * float(found.worst_case_upper) == pytest.approx(abs(high - low), rel=1e-2)

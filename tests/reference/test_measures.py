@@ -561,12 +561,13 @@ SUBJECTS = {
     "velocity": ("rod.P", "y"), "acceleration": ("rod.P", ""), "angular_velocity": ("rod", ""),
     "angular_acceleration": ("rod", ""), "transmission_angle": ("P", ""), "pressure_angle": ("C", ""),
     "power": ("press", ""), "friction_power": ("C", ""), "friction_energy": ("C", ""),
-    "effort": ("A", ""), "reaction": ("P", ""), "efficiency": ("cycle", ""),
+    "effort": ("A", ""), "reaction": ("P", ""), "end_load": ("C", ""), "efficiency": ("cycle", ""),
     "locking_margin": ("mechanism", ""),
 }  # fmt: skip
 
 
-OF_CYCLES = [kind for kind, one in MEASURES.items() if not one.in_time]  # the others: `test_measures_in_time`
+# the others: `test_measures_in_time`, `test_expressions_of_measures`
+OF_CYCLES = [kind for kind, one in MEASURES.items() if not one.in_time and kind != "expression"]
 UNITS = {quantity.unit for kind in MEASURES.values() for quantity in kind.quantities}
 
 

@@ -17,12 +17,15 @@ import numpy as np
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.nested import flat
 from trunnion.algebra.plane import Wrench
 from trunnion.algebra.space import Screw
 from trunnion.algebra.vector import Vector3, cross, dot
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups.dyad import DyadPose
+from trunnion.joints.spatial_load import BearingLoad
 from trunnion.solve.backward import Backward
+from trunnion.solve.contacts import bearing_middle
 from trunnion.solve.forward import Forward, PointMotion, SpatialWalk
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.loads import SpringState, has_useful_work, springs, useful_powers
@@ -221,6 +224,30 @@ def _reaction(measure: MotionRequest, back: Backward) -> Number:
     return _component(measure, (load.x, load.y) if hasattr(load, "x") else load.u)
 
 
+def _end_load(measure: MotionRequest, back: Backward) -> Number:
+    """The largest of |F⊥/2 ∓ g| with g = M⊥ × u/L, N: what presses on the ends of a bearing or guide of the length L.
+
+    It is the load that friction with two contacts counts, see `joints.spatial_load`.
+    """
+    walk, joint, reaction = back.walk, measure.subject, back.reactions[measure.subject]
+    path = f"joints.{joint}"
+    length = walk.values.get(f"{path}.guide.length", walk.values.get(f"{path}.pin.bearing"))
+    if not isinstance(walk, SpatialWalk):
+        axis, _ = walk.ends(joint)
+        across, couple = -axis.s * reaction.x + axis.c * reaction.y, reaction.m / length
+        squares = [(0.5 * across - couple) ** 2, (0.5 * across + couple) ** 2]
+    else:
+        middle, second = bearing_middle(walk, joint), walk.ends(joint)[1]
+        squares = []
+        for pin in walk.ends(joint) if walk.pair(joint).crossed else (second,):
+            fx, fy, gx, gy = BearingLoad(pin._replace(place=middle), length).felt(tuple(flat(reaction)))
+            squares += [(0.5 * fx + sign * gx) ** 2 + (0.5 * fy + sign * gy) ** 2 for sign in (-1.0, 1.0)]
+    largest = functools.reduce(namespace(*squares).maximum, squares)
+    loaded = primal(largest) > 0
+    xp = namespace(largest)
+    return xp.where(loaded, xp.sqrt(xp.where(loaded, largest, 1.0)), 0.0)
+
+
 def _power(measure: MotionRequest, back: Backward) -> Number:
     """What a driver, or a load, gives the mechanism."""
     name = measure.subject
@@ -290,6 +317,7 @@ CURVES: dict[str, Callable[[MotionRequest, Any], Number | tuple[Number, ...]]] =
     "spring_force": lambda measure, walk: _spring(measure, walk).force,
     "spring_elongation": lambda measure, walk: _spring(measure, walk).elongation,
     "reaction": _reaction,
+    "end_load": _end_load,
     "power": _power,
     "friction_power": lambda measure, back: back.losses[measure.subject],
     "friction_energy": _friction_energy,

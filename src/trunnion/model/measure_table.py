@@ -179,6 +179,10 @@ MEASURES: dict[str, MeasureKind] = {
         "joint whose reaction is watched, its magnitude or, with `axis` or `along`, a component",
         "reaction in a joint", FORCE, "any joint", "forces", vector="may",
     ),
+    "end_load": MeasureKind(
+        "joint with a bearing or guide length, the larger load on its two ends; of a universal joint on those of both "
+        "pins", "load on an end of a bearing", FORCE, "any joint", "forces",
+    ),
     "power": MeasureKind(
         "driver or load whose power is measured, positive into the mechanism",
         "power of a driver or load", POWER, "driver or load", "forces",

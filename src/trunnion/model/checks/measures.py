@@ -44,6 +44,19 @@ def _subject(mechanism: Numbers, measure: Measure, key: str, where: str) -> Iter
         yield from Refers(subject).missing(name, f"{where}.{key}", mechanism)
         if kind.of == "joint" and name in mechanism.effective_joints:
             yield from _moves(mechanism, name, key, where)
+        if key == "end_load" and name in mechanism.effective_joints:
+            yield from _has_ends(mechanism, name, where)
+
+
+def _has_ends(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
+    """Whether a joint has a bearing or a guide of a stated length; a pin in the plane bears its load in its middle."""
+    joint = mechanism.effective_joints[name]
+    guide = joint.guide.length if joint.guide else None
+    bearing = joint.pin.bearing if joint.pin and mechanism.space == "spatial" else None
+    if guide is None and bearing is None:
+        what = f"the joint '{name}' has no ends: it states no length of a bearing or guide"
+        plane = "in the plane only guides have ends; " if mechanism.space == "planar" else ""
+        yield Finding(what, f"{where}.end_load", f"{plane}add guide: {{length: …}} or pin: {{bearing: …}}")
 
 
 def _component(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding]:

@@ -199,7 +199,7 @@ def fill_power(arrays: Into, back: Backward, time: Number, window: slice) -> Non
         arrays["drive_power"][i, window] = power
         driven = driven + power
     useful: Number = 0.0
-    for power in useful_powers(walk.system.mechanism, back.load_powers, back.springs):
+    for power in useful_powers(walk, back.load_powers, back.springs):
         useful = useful - power
     arrays["useful_power"][window] = useful
     defined = np.greater(driven, 0) & has_useful_work(walk.system.mechanism)

@@ -118,7 +118,7 @@ class Passage(NamedTuple):
         walk, shape = back.walk, np.shape(back.walk.time)
         efforts = {name: np.broadcast_to(effort, shape) for name, effort in back.efforts.items()}
         delivered = -sum((effort * walk.rate(name) for name, effort in efforts.items()), np.zeros(shape))
-        useful = useful_powers(walk.system.mechanism, back.load_powers, back.springs)
+        useful = useful_powers(walk, back.load_powers, back.springs)
         every = [back.body_power, *back.load_powers.values(), *(spring.power for spring in back.springs.values())]
         given, acting = (
             sum((np.broadcast_to(power, shape) for power in powers), np.zeros(shape)) for powers in (useful, every)
@@ -585,7 +585,7 @@ def _beside(run: Run) -> str:
     mechanism = run.system.mechanism
     loads, springs = useful_loads(mechanism), useful_springs(mechanism)
     sources = {
-        "masses": any(link.mass.source != 0 for link in mechanism.effective_links.values()),
+        "masses": any(link.mass.source != 0 and not link.useful for link in mechanism.effective_links.values()),
         "springs": any(name not in springs for name in mechanism.springs),
         "loads that are not useful": any(name not in loads for name in mechanism.loads),
     }

@@ -268,7 +268,7 @@ def _efficiency(measure: MotionRequest, back: Backward) -> Number | tuple[Number
     walk = back.walk
     useful: Number = 0.0 if has_useful_work(walk.system.mechanism) else np.nan
     driven: Number = 0.0
-    for power_in in useful_powers(walk.system.mechanism, back.load_powers, back.springs):
+    for power_in in useful_powers(walk, back.load_powers, back.springs):
         useful = useful - power_in
     for name in walk.system.mechanism.drivers:
         driven = driven + back.efforts[name] * walk.rate(name)

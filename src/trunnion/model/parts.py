@@ -173,6 +173,7 @@ class Link(Part):
     ] = Quantity(0, KINDS["moment of inertia"])
     inertia_about: Literal["centre", "origin"] = "centre"
     frame: str | None = None
+    useful: bool = False
 
 
 _MOTOR_EXAMPLES = {

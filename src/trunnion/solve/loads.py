@@ -23,12 +23,12 @@ from trunnion.solve.system import System, Values
 __all__ = [
     "NOTHING_USEFUL", "STATE_USEFUL", "LoadAction", "Share", "SpringState", "Stated", "Switch", "has_useful_work",
     "losses", "placed", "spring_state", "springs", "stated_loads", "stated_walk", "useful_loads", "useful_powers",
-    "useful_springs",
+    "useful_springs", "useful_weights",
 ]  # fmt: skip
 
 
-NOTHING_USEFUL = "there is no load, and no spring is marked useful"  # so that an efficiency is undefined
-STATE_USEFUL = "state what it lifts or drives as a load, a weight as a force in place of its mass"
+NOTHING_USEFUL = "there is no load, and no spring or weight is marked useful"  # so that an efficiency is undefined
+STATE_USEFUL = "state what it drives as a load; of what it lifts mark the link useful: true"
 SPLINED = 3  # of a spline every so many points: it bends at none, but may be anything between two that are far apart
 
 Share = float | NDArray[np.float64]  # of what resists a joint at rest, with the sign of the slip about to begin
@@ -317,9 +317,10 @@ def spring_state(walk: Forward, path: str, elongation: Number, rate: Number, onl
 
 
 def useful_loads(mechanism: Mechanism) -> list[str]:
-    """Loads whose power is the purpose: those marked useful, or all if neither a load nor a spring is."""
+    """Loads whose power is the purpose: those marked useful, or all if no load, spring or weight is."""
     marked = [name for name, load in mechanism.loads.items() if load.useful]
-    return marked if marked or useful_springs(mechanism) else list(mechanism.loads)
+    others = useful_springs(mechanism) or useful_weights(mechanism)
+    return marked if marked or others else list(mechanism.loads)
 
 
 def useful_springs(mechanism: Mechanism) -> list[str]:
@@ -327,14 +328,22 @@ def useful_springs(mechanism: Mechanism) -> list[str]:
     return [name for name, spring in mechanism.springs.items() if spring.useful]
 
 
+def useful_weights(mechanism: Mechanism) -> list[str]:
+    """Links whose weight is the purpose, as of a lift: those marked useful."""
+    return [name for name, link in mechanism.effective_links.items() if link.useful]
+
+
 def has_useful_work(mechanism: Mechanism) -> bool:
     """Whether it is stated what work is useful, without which there is no efficiency."""
-    return bool(useful_loads(mechanism) or useful_springs(mechanism))
+    return bool(useful_loads(mechanism) or useful_springs(mechanism) or useful_weights(mechanism))
 
 
-def useful_powers(
-    mechanism: Mechanism, loads: Mapping[str, Number], springs_: Mapping[str, SpringState]
-) -> Iterator[Number]:
-    """What each useful load and spring gives the mechanism, W. loads: powers by name; springs_: states by name."""
+def useful_powers(walk: Forward, loads: Mapping[str, Number], springs_: Mapping[str, SpringState]) -> Iterator[Number]:
+    """What each useful load, spring and weight gives the mechanism, W. loads: powers; springs_: states, by name."""
+    mechanism, values = walk.system.mechanism, walk.values
     yield from (loads[name] for name in useful_loads(mechanism))
     yield from (springs_[name].power for name in useful_springs(mechanism))
+    gravity = walk.system.vector(values, "gravity")
+    for link in useful_weights(mechanism):
+        velocity = walk.at(link, walk.system.centre(values, link)).velocity
+        yield values[f"links.{link}.mass"] * _dot(gravity, velocity)

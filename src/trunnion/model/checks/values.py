@@ -46,6 +46,7 @@ def check_values(
             yield from group_findings(f"{section}.{name}", getattr(mechanism, section)[name], values)
     for name in among("links", mechanism.links):
         yield from _inertia(mechanism, mechanism.links[name], values, f"links.{name}")
+        yield from _weight(mechanism, mechanism.links[name], values, f"links.{name}")
     for name in among("joints", mechanism.effective_joints):
         yield from group_findings(f"joints.{name}", mechanism.effective_joints[name], values)
         yield from joint_values(mechanism, name, numbers)
@@ -62,6 +63,13 @@ def check_values(
     if sections is None or "links" in sections:
         yield from direction_values(mechanism, values)
         yield from _sides(mechanism, values)
+
+
+def _weight(mechanism: Numbers, link: Link, values: Values, where: str) -> Iterator[Finding]:
+    """Whether a link whose weight is useful has one."""
+    gravity = [values[f"gravity.{axis}"] for axis in "xyz"[: mechanism.coordinates]]
+    if link.useful and (values[f"{where}.mass"] == 0 or not any(gravity)):
+        yield Finding("has no weight that could be useful", f"{where}.useful", "state mass and gravity, or remove it")
 
 
 def _unfollowed(numbers: ParameterSet) -> Iterator[Finding]:

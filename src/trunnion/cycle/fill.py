@@ -405,8 +405,8 @@ def unwrap(arrays: Arrays, system: System, values: Values, time: NDArray[np.floa
         rotation = arrays["joint_rotation"][i]
         if not spatial:
             np.subtract(arrays["link_angle"][places[second]], arrays["link_angle"][places[first]], out=rotation)
-        if name in system.mechanism.drivers and system.turns(name):
-            rotation[:] = np.where(np.isfinite(rotation), system.drive(values, name, time)[0], np.nan)
+        if name in system.mechanism.drivers:  # known where the rest is not
+            arrays["joint_rotation" if system.turns(name) else "joint_slide"][i] = system.drive(values, name, time)[0]
         elif spatial and PAIRS[kind].angle:
             unwrap_row(rotation, arrays["joint_rotation_velocity"][i], step)
         if PAIRS[kind].threaded:  # its slide follows the whole turns

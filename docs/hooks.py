@@ -97,7 +97,7 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
             raise PluginError(f"there is no generated table '{name}'; known: {', '.join(TABLES)}")
         return TABLES[name](argument) if argument else TABLES[name]()
 
-    markdown = re.sub(r"^> In the repository the tables .*\n\n", "", markdown, flags=re.M)  # not so in the built pages
+    markdown = re.sub(r"^> `make docs` fills in the tables? .*\n\n", "", markdown, flags=re.M)
     return re.sub(r"<!-- generated: (.+?) -->", table, markdown)
 
 

@@ -150,6 +150,8 @@ def _over_cycle(
             notes[measure.name] = f"no {what} within the cycle; for a {other}"
         elif measure.rule == "time ratio":
             notes[measure.name] = "it does not go forth and back in a cycle that repeats, or jumps back"
+        elif measure.formula:
+            notes[measure.name] = "it has no value at some positions: check roots and divisions, or state over:"
     return measures, findings, figures, {name: (least[name], most[name]) for name in least}, notes
 
 

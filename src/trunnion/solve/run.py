@@ -29,7 +29,7 @@ from trunnion.solve.space.determinacy import Determinacy, look
 from trunnion.solve.switches import Bend, Mechanisms, accuracy_of, breaks_between, stated_bends
 from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values, build
 
-__all__ = ["Run", "prepare"]
+__all__ = ["Run", "built", "prepare"]
 
 TURN_STEPS = 720
 COMES_BACK = 1e-6  # of the mechanism's size
@@ -191,8 +191,7 @@ def prepare(mechanism: Mechanism, free: bool = False) -> Run:
 
 def _prepared(mechanism: Mechanism, free: bool) -> Run:
     keep_pages()
-    inverse, values = _inverse(mechanism), mechanism.parameters()
-    system = build(mechanism, inverse)
+    system, values = built(mechanism), mechanism.parameters()
 
     def over(cycle: Cycle) -> Run:
         return Run(system, values, cycle, choose(system, values, cycle))
@@ -200,16 +199,18 @@ def _prepared(mechanism: Mechanism, free: bool) -> Run:
     run = over(system.cycle(values, None, free))
     if any((turns := _unknown_turns(run)).values()):
         run = over(system.cycle(values, turns, free))
-    if inverse:
-        inverse.check(system, values, run.chosen.assembly)
+    if isinstance(system.inverse, Inverse):
+        system.inverse.check(system, values, run.chosen.assembly)
     return run if _comes_back(run) else over(replace(run.cycle, periodic=False, advances=True))
 
 
-def _inverse(mechanism: Mechanism) -> Inverse | None:
-    """What the drivers do that move other joints than their own; None where there is none."""
+def built(mechanism: Mechanism) -> System:
+    """The mechanism decomposed; with what its drivers do that move other joints than their own."""
     own = driven_at_outputs(mechanism)
-    if own is None:
-        return None
+    return build(mechanism, None if own is None else _inverse(mechanism, own))
+
+
+def _inverse(mechanism: Mechanism, own: Mechanism) -> Inverse:
     moves = {name: driver.moves for name, driver in mechanism.drivers.items() if driver.moves}
     try:
         run = prepare(own)

@@ -385,7 +385,8 @@ class System:
         """
         if self.is_free(values, name):
             return tuple(values[f"{STATE}{name}.{key}"] for key in FREED)
-        if self.inverse and name in self.inverse.moves:
+        if self.mechanism.drivers[name].moves:
+            assert self.inverse
             return self.inverse.drive(values, name, time)
         law = self.mechanism.drivers[name].motion
         return law.function(time, self.motion_of(values, name))

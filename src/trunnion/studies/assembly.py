@@ -29,8 +29,9 @@ from trunnion.results.scales import EVERYWHERE, Scales
 from trunnion.solve import shifts
 from trunnion.solve.assembly import choose
 from trunnion.solve.forward import forward
+from trunnion.solve.run import built
 from trunnion.solve.space.loops import CLOSED, Ask, End, LeastPlay, Loops, Start, ends_of, least_play, start_of
-from trunnion.solve.system import Cycle, System, Values, build
+from trunnion.solve.system import Cycle, System, Values
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -117,7 +118,7 @@ def assemble(
         For a play without a length, or a structure that leaves a freedom undetermined.
     """
     check_steps(steps)
-    system, values = build(mechanism), mechanism.parameters()
+    system, values = built(mechanism), mechanism.parameters()
     cycle = system.cycle(values)
     time = cycle.times(steps if cycle.duration > 0 else 1)
     if any(module.redundant for module in system.plan.modules):

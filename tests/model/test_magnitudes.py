@@ -38,7 +38,7 @@ drivers: {A: {speed: 60 rpm}}
         ("C: [BC, 0]", "C: [2 * BC, 0]", "", ""),
         ("C: [BC, 0]", "C: [0.09, 0]", "", ""),
         ("100 mm, AB: 30 mm, BC: 90 mm, CD: 70 mm", "10, AB: 3, BC: 9, CD: 7", "", ""),  # all of them plain
-        ("AB: 30 mm, BC: 90 mm", "AB: 30, BC: 90", "dimensions.AB", "300 times"),
+        ("AB: 30 mm, BC: 90 mm", "AB: 30, BC: 90", "dimensions.BC", "as is another"),
         ("AB: 30 mm, BC: 90 mm, CD: 70 mm", "AB: 30, BC: 90, CD: 70", "dimensions.BC", "as are 2 others"),
         ("AD: 100 mm, AB: 30 mm", "AD: 100 mm, AB: 1", "dimensions.AB", "10 times"),
         ("radius: 6 mm", "radius: 6", "joint_defaults.pin.radius", "60 times"),

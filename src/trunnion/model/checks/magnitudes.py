@@ -47,15 +47,17 @@ def magnitudes(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
     bare = _without_unit(mechanism, entries, nominal) if known > 0 else None
     yield from _of_unit_one(mechanism, numbers) if bare is not None else ()
     bare = bare or {}
+    told: dict[str, float] = {}
     for path, kind in bare.items():
         if path.endswith(".limit.lower"):
             continue  # a plain limit is one number, told as the upper one
         narrow = path in plain or path.endswith(".limit.upper")
-        long = kind is KINDS["length"] and values[path] > (WIDE if narrow else 1.0) * known
-        yield _forgotten(path, values[path], known) if long else _meant(path, nominal[path], kind)
+        if kind is KINDS["length"] and values[path] > (WIDE if narrow else 1.0) * known:
+            told[path] = values[path]
+        else:
+            yield _meant(path, nominal[path], kind)
     far = [one for one in (*places, *pins) if values[one.path] > FAR * known > 0]
-    told = {path: values[path] for one in far for path in _plain(mechanism, one) if values[path] > FAR * known}
-    told = {path: value for path, value in told.items() if path not in bare}
+    told |= {path: values[path] for one in far for path in _plain(mechanism, one) if values[path] > FAR * known}
     if told:
         path = max(told, key=told.__getitem__)
         yield _forgotten(path, told[path], known, len(told) - 1)
@@ -68,7 +70,8 @@ def magnitudes(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
 
 def _forgotten(path: str, value: float, known: float, others: int = 0) -> Finding:
     """A warning of a length (m) above all that have a unit."""
-    more = f", as are {others} others without a unit: units" if others else ": a unit"
+    also = "as is another" if others == 1 else f"as are {others} others"
+    more = f", {also} without a unit: units" if others else ": a unit"
     times = f"{value / known:.3g} times the largest length with a unit, {known:g} m"
     what = f"is {value:g} m, {times}{more} forgotten?"
     return Finding(what, path, f"write it, as {value:g} mm", Severity.WARNING)

@@ -26,9 +26,10 @@ from trunnion.groups.spins import unspun
 from trunnion.groups.tree import OUTER
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import as_key
+from trunnion.model.parts import FOLDS
 from trunnion.results.quantities import quantity
 from trunnion.solve import change_points
-from trunnion.solve.forward import Forward, pose_of, start
+from trunnion.solve.forward import Forward, pose_of, posed, start
 from trunnion.solve.system import Cycle, Dial, Positions, System, Values, driven_coordinates
 from trunnion.solve.track import (
     GUESSES,
@@ -36,8 +37,10 @@ from trunnion.solve.track import (
     STRIDE,
     Assemblies,
     Follower,
+    Passing,
     Track,
     TrackClock,
+    alternating,
     closed_at,
     each_once,
     key_of,
@@ -46,7 +49,8 @@ from trunnion.solve.track import (
 from trunnion.structure.decompose import Module
 
 __all__ = [
-    "Chosen", "choose", "coordinate", "distance", "grid", "hints", "joint_rows", "named_way", "way_name", "ways_of",
+    "Chosen", "choose", "coordinate", "distance", "folds", "grid", "hints", "joint_rows", "named_way", "way_name",
+    "ways_of",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -58,19 +62,23 @@ NEARER = 1e-9  # of how far it is from a hint, and of the size: an assembly that
 LOOKED = 2  # of the grid every which position the assemblies are compared at
 TRIED = 64  # guesses at each place where it is tried whether there is an assembly at all
 SPREAD = 25  # such places
+BEFORE = 4  # positions before a change point that lead over it
+NEARBY = 0.3  # of an interval of the grid: nearer to a change point Newton may take one assembly for the other
 
 
 @dataclass(frozen=True)
 class Chosen:
     """Assembly of every module (±1, Track, None for a driver), how many there were, and what there is to say.
 
-    meetings: of modules, by their number, the times at which two assemblies meet in the nominal cycle, s.
+    meetings: of modules, by their number, where two assemblies meet in the nominal cycle; mirrored: whether a module is
+    in its other assembly after it, so that twice the cycle brings it back.
     """
 
     assembly: tuple[Any, ...]
     found: tuple[int, ...]
     findings: tuple[Finding, ...]
-    meetings: Mapping[int, Sequence[change_points.Meeting]] = field(default_factory=dict)
+    meetings: Mapping[int, change_points.Meetings] = field(default_factory=dict)
+    mirrored: bool = False
 
 
 class Decision(NamedTuple):
@@ -96,7 +104,7 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
     walk = start(system, values)
     chosen: list[Any] = []
     counts: list[int] = []
-    meetings: dict[int, Sequence[change_points.Meeting]] = {}
+    meetings: dict[int, change_points.Meetings] = {}
     with np.errstate(all="ignore"):
         for number, module in enumerate(system.plan.modules):
             group = system.groups[number]
@@ -119,11 +127,15 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             if not assembled and number == len(system.plan.modules) - 1:  # nothing stands on it
                 continue
             pose = pose_of(walk, number, assembly, times)
+            if assembled and (at := change_points.find(walk, number, assembly, times, pose, cycle)):
+                through = _through if group.BRANCHES else _followed_through
+                chosen[number], meetings[number] = through(walk, number, assembly, at, times, cycle)
+                walk.assembly[number] = chosen[number]
+                findings.append(change_points.finding(system, values, module, meetings[number]))
+                pose = pose_of(walk, number, chosen[number], times)
             walk.stand(number, pose)  # an assembly is a matter of places
-            if assembled and (meeting := change_points.find(walk, number, assembly, times, pose)):
-                findings.append(change_points.finding(system, values, module, meeting))
-                meetings[number] = meeting
-    return Chosen(tuple(chosen), tuple(counts), tuple(findings), meetings)
+    mirrored = any(len(met.crossed) % 2 and not met.folds for met in meetings.values()) and cycle.periodic
+    return Chosen(tuple(chosen), tuple(counts), tuple(findings), meetings, mirrored)
 
 
 def grid(cycle: Cycle) -> Array:
@@ -173,6 +185,83 @@ def _first_apart(walk: Forward, number: int, poses: Sequence[Any], times: Array)
         if len(lanes):
             return int(lanes[0])
     return None
+
+
+# ---- change points --------------------------------------------------------------------------------------------
+
+
+def folds(system: System, module: Module) -> bool:
+    """Whether a module is stated to stay on its side of its change points."""
+    return any(system.mechanism.assembly.get(link) == FOLDS for link in module.links)
+
+
+def _through(
+    walk: Forward, number: int, branch: int, at: Sequence[change_points.Meeting], times: Array, cycle: Cycle
+) -> tuple[Any, change_points.Meetings]:
+    """A closed form through its change points: in the branch that it has where its hints are compared, and from there
+    on, unless it folds, in the other one wherever that goes on smoothly."""
+    system, module, group = walk.system, walk.system.plan.modules[number], walk.system.groups[number]
+    size = float(np.max(primal(walk.size)))
+
+    def numbers(which: int, moments: Array) -> Array:
+        trial = posed(system, walk.values, walk.assembly[:number], moments)
+        pose = pose_of(trial, number, group.BRANCHES[which], moments)
+        return np.array([np.broadcast_to(primal(n), moments.shape) for n in key_of(group, pose, size)])
+
+    places, crossed = list[change_points.Meeting](), list[float]()
+    for first, last in at:
+        exact = change_points.crosses(numbers, first, times[1], cycle) if first == last else None
+        crossed += [] if exact is None else [exact]
+        places.append((first, last) if exact is None else (exact, exact))
+    folding = folds(system, module)
+    smooth = not (crossed and folding) and all(first == last for first, last in at)
+    met = change_points.Meetings(tuple(places), tuple(crossed), folding, smooth)
+    if folding or not crossed:
+        return branch, met
+    lane, _ = ways_of(walk, number, times)
+    clock, duration = TrackClock.of(system, walk.values), cycle.duration if cycle.periodic else None
+    first = branch * int(alternating(crossed, times[lane or 0]))
+    return Passing(first, tuple(crossed), duration, clock), met
+
+
+def _followed_through(
+    walk: Forward, number: int, track: Track, at: Sequence[change_points.Meeting], times: Array, cycle: Cycle
+) -> tuple[Any, change_points.Meetings]:
+    """A general group through its change points, onward from where it was put together: beyond one it is followed from
+    where the coordinates before it lead, there with the other sign of det J."""
+    module, group = walk.system.plan.modules[number], walk.system.groups[number]
+    folding, passed, kinks = folds(walk.system, module), list[float](), False
+    if group.redundant or folding:  # the least-squares way on is smooth by itself
+        return track, change_points.Meetings(tuple(at), (), folding, bool(group.redundant))
+    drive, _, _ = driven_coordinates(walk.system, module, walk.system.places[number], walk.values, times)
+    elements = walk.pairs(walk.system.places[number])
+    drive = [track.turns.get(slot, one) for slot, one in enumerate(drive)]
+    last, begin = track.begin, int(np.searchsorted(times, track.begin))
+    while ahead := [first for first, end in at if first == end and first > last + NEARBY * times[1]]:
+        last = ahead[0]
+        before = np.flatnonzero(times < last - NEARBY * times[1])[-BEFORE:]
+        beyond = np.flatnonzero(times > last + NEARBY * times[1])
+        if len(before) < BEFORE or before[0] < begin or not len(beyond):
+            continue
+        rows, place = track.coordinates.copy(), beyond[0]
+        guess = change_points.carried_on(times[before], rows[:, before], float(times[place]))
+        follower = Follower(group, elements, drive, -float(track.sense(times[before[-1]])), STRIDE)
+        fresh = follower.solved_from(place, guess)
+        kink = np.max(np.abs(rows[:, place] - guess))
+        if fresh is None or not np.max(np.abs(fresh - guess)) < kink:
+            kinks = kinks or fresh is None
+            continue
+        for between in range(before[-1] + 1, place):
+            rows[:, between] = change_points.carried_on(times[before], rows[:, before], float(times[between]))
+        rows[:, place:] = np.nan
+        rows[:, place] = fresh
+        follower.run(rows, np.arange(place, len(times)))
+        passed.append(last)
+        track = replace(track, coordinates=rows, passed=tuple(passed))
+        pose = pose_of(walk, number, track, times)
+        at = change_points.find(walk, number, track, times, pose, cycle)
+    smooth = not kinks and all(first == end for first, end in at)
+    return track, change_points.Meetings(tuple(at), tuple(passed), False, smooth)
 
 
 # ---- general groups -------------------------------------------------------------------------------------------
@@ -257,7 +346,9 @@ def way_name(index: int) -> str:
 def _names(system: System, module: Module) -> dict[str, str]:
     """The hints that name an assembly of a module, by link."""
     stated = system.mechanism.assembly
-    return {key: hint for key, hint in stated.items() if key in module.links and isinstance(hint, str)}
+    return {
+        key: hint for key, hint in stated.items() if key in module.links and isinstance(hint, str) and hint != FOLDS
+    }
 
 
 def named_way(system: System, module: Module, count: int) -> int | None:

@@ -29,6 +29,7 @@ from trunnion.model.names import as_key
 from trunnion.model.parts import FOLDS
 from trunnion.results.quantities import quantity
 from trunnion.solve import change_points
+from trunnion.solve.drawn import drawn_at, off_drawing
 from trunnion.solve.forward import Forward, pose_of, posed, start
 from trunnion.solve.system import Cycle, Dial, Positions, System, Values, driven_coordinates
 from trunnion.solve.track import (
@@ -43,9 +44,11 @@ from trunnion.solve.track import (
     alternating,
     closed_at,
     each_once,
+    extent,
     key_of,
     lane_of,
 )
+from trunnion.solve.track import at as elements_at
 from trunnion.structure.decompose import Module
 
 __all__ = [
@@ -82,11 +85,12 @@ class Chosen:
 
 
 class Decision(NamedTuple):
-    """Assembly of a module, how many there were, and what there is to say."""
+    """Assembly of a module, how many there were, what there is to say, and the position at which it is so."""
 
     assembly: Any
     ways: int
     findings: Sequence[Finding] = ()
+    lane: int = 0
 
 
 def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
@@ -102,6 +106,7 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
         raise MechanismError(findings)
     times = grid(cycle)
     walk = start(system, values)
+    drawn = drawn_at(walk, times)
     chosen: list[Any] = []
     counts: list[int] = []
     meetings: dict[int, change_points.Meetings] = {}
@@ -111,10 +116,10 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             if module.rank == 1 or not (group.BRANCHES or getattr(group, "kept", ())):  # nothing to choose
                 decision = Decision(None, 1)
             elif group.BRANCHES:
-                decision = _closed_form(walk, number, times)
+                decision = _closed_form(walk, number, times, drawn)
             else:
-                decision = _general(walk, number, times, cycle.periodic)
-            assembly, count, remarks = decision
+                decision = _general(walk, number, times, cycle.periodic, drawn)
+            assembly, count, remarks, lane = decision
             findings += remarks
             chosen.append(assembly)
             walk.assembly.append(assembly)
@@ -128,8 +133,10 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
                 continue
             pose = pose_of(walk, number, assembly, times)
             if assembled and (at := change_points.find(walk, number, assembly, times, pose, cycle)):
-                through = _through if group.BRANCHES else _followed_through
-                chosen[number], meetings[number] = through(walk, number, assembly, at, times, cycle)
+                if group.BRANCHES:
+                    chosen[number], meetings[number] = _through(walk, number, assembly, lane, at, times, cycle)
+                else:
+                    chosen[number], meetings[number] = _followed_through(walk, number, assembly, at, times, cycle)
                 walk.assembly[number] = chosen[number]
                 findings.append(change_points.finding(system, values, module, meetings[number]))
                 pose = pose_of(walk, number, chosen[number], times)
@@ -147,17 +154,39 @@ def grid(cycle: Cycle) -> Array:
 # ---- closed forms ---------------------------------------------------------------------------------------------
 
 
-def _closed_form(walk: Forward, number: int, times: Array) -> Decision:
-    """+1 or −1: the one that is named, else the one nearest the hints by place."""
+def _closed_form(walk: Forward, number: int, times: Array, drawn: int | None) -> Decision:
+    """+1 or −1: the one that is named, else the one nearest the hints by place, else the one that is drawn."""
     system, module = walk.system, walk.system.plan.modules[number]
     branches = system.groups[number].BRANCHES
     named, count = named_way(system, module, len(branches)), len(branches)
-    if count == 1 or not hints(walk, module):
-        return Decision(branches[named or 0], count, [_undecided(walk, module, count)] * (count > 1 and named is None))
+    if drawn is not None and count > 1 and named is None and not hints(walk, module):
+        poses = [pose_of(walk, number, branch, times) for branch in branches]
+        if len(lanes := _apart(walk, number, poses, times)[1].nonzero()[0]):
+            near = int(lanes[np.argmin(np.abs(lanes - drawn))])
+            off = [_off_drawing(walk, number, pose, near) for pose in poses]
+            if len(tied := _tied(walk, np.array(off))) == 1:
+                return Decision(branches[tied[0]], count, (), near)
     lane, frames = ways_of(walk, number, times)
+    if count == 1 or not hints(walk, module):
+        undecided = [_undecided(walk, module, count)] * (count > 1 and named is None)
+        return Decision(branches[named or 0], count, undecided, lane or 0)
     tied = _tied(walk, distance(walk, module, frames, lane or 0)) if lane is not None else [0]
     best = tied[0] if named is None else named
-    return Decision(branches[best], count, _said(walk, module, count, frames, lane or 0, named, tied))
+    return Decision(branches[best], count, _said(walk, module, count, frames, lane or 0, named, tied), lane or 0)
+
+
+def _off_drawing(walk: Forward, number: int, pose: Any, lane: int | NDArray[np.intp]) -> Array:
+    """How far a module is from where it is drawn in a pose at a position, or in a lane of many, m²."""
+    module, group = walk.system.plan.modules[number], walk.system.groups[number]
+    frames = each(pose.frames, lambda part: lane_of(primal(part), lane))
+    spun = sorted({link for spin in getattr(group, "spinning", ()) for link in group.spun(*spin)})
+    points = [
+        (link, walk.local[module.links[link], joint].place)
+        for link in spun
+        for joint in module.joints
+        if module.links[link] in walk.system.joints[joint][1]
+    ]
+    return off_drawing(walk, frames, spun, points)
 
 
 def ways_of(walk: Forward, number: int, times: Array) -> tuple[int | None, Any]:
@@ -173,18 +202,25 @@ def ways_of(walk: Forward, number: int, times: Array) -> tuple[int | None, Any]:
 
 
 def _first_apart(walk: Forward, number: int, poses: Sequence[Any], times: Array) -> int | None:
+    exist, differ = _apart(walk, number, poses, times)
+    for lanes in (np.flatnonzero(differ[::LOOKED]) * LOOKED, np.flatnonzero(exist)):
+        if len(lanes):
+            return int(lanes[0])
+    return None
+
+
+def _apart(
+    walk: Forward, number: int, poses: Sequence[Any], times: Array
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """At which times all poses of a module exist, and are apart."""
     spread = float(np.max(primal(walk.size)))
     shape = times.shape
     keys = [
         np.array([np.broadcast_to(primal(n), shape) for n in key_of(walk.system.groups[number], pose, spread)])
         for pose in poses
     ]
-    exist = np.isfinite(keys).all(axis=(0, 1))
-    differ = exist & (np.ptp(keys, axis=0).max(axis=0) > SAME)
-    for lanes in (np.flatnonzero(differ[::LOOKED]) * LOOKED, np.flatnonzero(exist)):
-        if len(lanes):
-            return int(lanes[0])
-    return None
+    exist = np.asarray(np.isfinite(keys).all(axis=(0, 1)))
+    return exist, exist & (np.ptp(keys, axis=0).max(axis=0) > SAME)
 
 
 # ---- change points --------------------------------------------------------------------------------------------
@@ -196,10 +232,10 @@ def folds(system: System, module: Module) -> bool:
 
 
 def _through(
-    walk: Forward, number: int, branch: int, at: Sequence[change_points.Meeting], times: Array, cycle: Cycle
+    walk: Forward, number: int, branch: int, lane: int, at: Sequence[change_points.Meeting], times: Array, cycle: Cycle
 ) -> tuple[Any, change_points.Meetings]:
-    """A closed form through its change points: in the branch that it has where its hints are compared, and from there
-    on, unless it folds, in the other one wherever that goes on smoothly."""
+    """A closed form through its change points: in the branch that it has at a position of the grid, and from there on,
+    unless it folds, in the other one wherever that goes on smoothly."""
     system, module, group = walk.system, walk.system.plan.modules[number], walk.system.groups[number]
     size = float(np.max(primal(walk.size)))
 
@@ -218,9 +254,8 @@ def _through(
     met = change_points.Meetings(tuple(places), tuple(crossed), folding, smooth)
     if folding or not crossed:
         return branch, met
-    lane, _ = ways_of(walk, number, times)
     clock, duration = TrackClock.of(system, walk.values), cycle.duration if cycle.periodic else None
-    first = branch * int(alternating(crossed, times[lane or 0]))
+    first = branch * int(alternating(crossed, times[lane]))
     return Passing(first, tuple(crossed), duration, clock), met
 
 
@@ -267,8 +302,8 @@ def _followed_through(
 # ---- general groups -------------------------------------------------------------------------------------------
 
 
-def _general(walk: Forward, number: int, times: Array, periodic: bool) -> Decision:
-    """The assembly that is named or nearest the hints, followed both ways from the first position where there is one.
+def _general(walk: Forward, number: int, times: Array, periodic: bool, drawn: int | None) -> Decision:
+    """The assembly that is named, nearest the hints or drawn, followed both ways from the first position with any.
 
     Where it ends and the links can be assembled again farther on, in the same sense, the assembly nearest to what
     was left is taken there and followed too.
@@ -290,6 +325,9 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool) -> Decisi
     frames = each(solved.pose.frames, lambda n: np.broadcast_to(n, shape)[lanes])
     named = named_way(system, module, ways)
     tied = _tied(walk, np.broadcast_to(distance(walk, module, frames, begin), (ways,)))
+    if drawn is not None and named is None and not hints(walk, module):
+        follower = Follower(group, elements, drive, 0.0, STRIDE)
+        tied = _drawn(walk, number, follower, solved, lanes, begin, drawn, grid, periodic) or tied
     best = tied[0] if named is None else named
     orientation = float(np.broadcast_to(solved.pose.orientation, shape)[lanes[best]])
     rows[:, begin] = solved.q[:, lanes[best]]
@@ -305,6 +343,44 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool) -> Decisi
         rows = unspun(group, elements, rows, drive)
     track = Track(times, rows, orientation, periodic, clock, turns, again, float(times[begin]), frames, best)
     return Decision(track, ways, _said(walk, module, ways, frames, begin, named, tied))
+
+
+def _drawn(
+    walk: Forward, number: int, follower: Follower, solved: Assemblies, lanes: Sequence[int], begin: int, drawn: int,
+    grid: int, periodic: bool,
+) -> list[int]:  # fmt: skip
+    """Of the assemblies at a position, by their lanes, that which leads to where links are drawn; none if none does.
+
+    It is the nearest where the drivers are as drawn, followed from there.
+    """
+    group, there, lanes_there = follower.group, solved, list(lanes)
+    if drawn != begin:
+        there = closed_at(group, follower.elements, follower.drive, [drawn], GUESSES)
+        lanes_there = each_once(group, there)
+    if not lanes_there:
+        return []
+    shape = there.closed.shape
+    frames = each(there.pose.frames, lambda n: np.broadcast_to(primal(n), shape))
+    off = _off_drawing(walk, number, there.pose._replace(frames=frames), np.array(lanes_there))
+    nearest = _tied(walk, np.broadcast_to(off, (len(lanes_there),)))
+    if len(nearest) > 1 or drawn == begin:
+        return nearest if len(nearest) == 1 else []
+    lane, index = lanes_there[nearest[0]], np.array([begin])
+    follower = replace(follower, orientation=float(np.broadcast_to(there.pose.orientation, shape)[lane]))
+    elements, drive = elements_at(follower.elements, index), [lane_of(n, index) for n in follower.drive]
+    way = 1 if begin > drawn else -1
+    orders = [np.arange(drawn, begin + way, way)]
+    if periodic:  # the last position of the grid is the first
+        orders.append(np.arange(drawn, begin - way * grid, -way) % (grid - 1))
+    for order in orders:
+        rows = np.full((len(group.kept), grid), np.nan)
+        rows[:, drawn] = there.q[:, lane]
+        follower.run(rows, order)
+        pose = group.position(elements, list(rows[:, index]), drive)
+        key = np.array([np.ravel(n)[0] for n in key_of(group, pose, extent(group, elements))])
+        if same := [k for k, other in enumerate(lanes) if np.max(np.abs(solved.key[:, other] - key)) < SAME]:
+            return same[:1]
+    return []
 
 
 def _first_closed(group: Any, elements: Sequence[Any], drive: Sequence[Number], grid: int) -> tuple[int, Assemblies]:

@@ -10,6 +10,7 @@ from ruamel.yaml import YAML
 
 from manual.conftest import Run
 from timed import LINEAR, PARALLELOGRAM, beside, driven_four_bar, swinging, two_wheels
+from trunnion import Mechanism
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 PRESS = EXAMPLES / "flywheel-press.yaml"
@@ -84,15 +85,17 @@ def test_a_clutch_beside_joints_in_play_is_refused_with_what_to_remove(program: 
 
 
 def test_the_command_line_tells_where_a_motion_ends(program: Run, tmp_path: Path) -> None:
+    data = driven_four_bar("planar", *PARALLELOGRAM).data()
+    folding = Mechanism(**data | {"assembly": data["assembly"] | {"rocker": "folds"}})
     for name, mechanism in {
-        "p": driven_four_bar("planar", *PARALLELOGRAM), "s": swinging("planar", stiffness=1e12),
+        "p": driven_four_bar("planar", *PARALLELOGRAM), "f": folding, "s": swinging("planar", stiffness=1e12),
         "w": beside(driven_four_bar("planar", *PARALLELOGRAM, range=[0.2, 2.0])),
     }.items():  # fmt: skip
         (tmp_path / f"{name}.json").write_text(json.dumps(mechanism.data()))
-    code, _, err = program("simulate", "p.json", "--time=1s")
+    code, _, err = program("simulate", "f.json", "--time=1s")
     assert code == 1
     assert "at 180° of A, the links coupler, rocker come to a change point" in err
-    code, _, err = program("simulate", "p.json", "--time=0.7s", "--pass-change-points")
+    code, _, err = program("simulate", "p.json", "--time=0.7s")
     assert code == 0
     assert "change points are passed" in err
     code, _, err = program("simulate", "s.json", "--time=1s", "--evaluations", 1000, "--out", "s.csv")

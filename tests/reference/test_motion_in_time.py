@@ -212,7 +212,7 @@ WANTED = np.array([
 @pytest.mark.slow
 def test_three_posts_pass_poses_with_all_rods_in_line() -> None:
     """IFToMM A02 by its own equation, 3 θ″ = −3.5 g cos θ (THEORY 8), twice through the singular pose."""
-    result = simulate(three_posts(), 2.0, 2, 1e-11, pass_change_points=True)
+    result = simulate(three_posts(), 2.0, 2, 1e-11)
     assert at(result, "drive_coordinate", 1.0) == pytest.approx(-1.7670744763, abs=1e-8)
     assert at(result, "drive_rate", 1.0) == pytest.approx(-6.8073852409, abs=1e-8)
     assert at(result, "drive_coordinate", 2.0) == pytest.approx(-4.7702370345, abs=1e-8)

@@ -52,7 +52,7 @@ def stays() -> xr.Dataset:
 @cache
 def swing() -> xr.Dataset:
     """Without friction and motor: rounding is all that the effort is."""
-    return simulate(three_posts(), 1.0, 50, pass_change_points=True)
+    return simulate(three_posts(), 1.0, 50)
 
 
 @cache

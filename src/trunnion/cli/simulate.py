@@ -51,9 +51,6 @@ def simulate(
     evaluations: Annotated[
         int, typer.Option("--evaluations", help="Evaluations of the forces, after which the motion ends.")
     ] = EVALUATIONS,
-    pass_change_points: Annotated[
-        bool, typer.Option("--pass-change-points", help="Go on by momentum where two assemblies of the links meet.")
-    ] = False,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
@@ -80,7 +77,7 @@ def simulate(
     with lines_of(file), bar("%", PERCENT) as progress:
         reached = None if progress is None else lambda share: progress(int(PERCENT * share))
         try:
-            result = simulated(mechanism, duration, steps, tolerance, reached, steady, evaluations, pass_change_points)
+            result = simulated(mechanism, duration, steps, tolerance, reached, steady, evaluations)
         except UnsteadyError as none:
             say(placed(none.findings, file, ["drivers"]))
             raise typer.Exit(exit_status(none.findings)) from None

@@ -17,6 +17,7 @@ import numpy as np
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
+from trunnion.solve.assembly import folds
 from trunnion.solve.forward import Forward, Motion
 from trunnion.solve.run import Run
 from trunnion.solve.track import Track
@@ -35,17 +36,21 @@ class Snapshot:
 
 @dataclass
 class Followed:
-    """The assembly of one module, as a walk asks for it: a pose from the last one."""
+    """The assembly of one module, as a walk asks for it: a pose from the last one.
+
+    passing: whether it goes on where two assemblies meet.
+    """
 
     number: int
     chosen: Any
     pace: float
+    passing: bool
     snapshot: Snapshot | None = None
 
     def pose(self, group: Any, elements: Any, drive: Sequence[Number], walk: Forward, time: Number) -> Any:
         """The pose that goes on from the snapshot; that of the chosen assembly before there is one."""
         if self.snapshot is None:
-            if isinstance(self.chosen, Track):
+            if hasattr(self.chosen, "pose"):
                 return self.chosen.pose(group, elements, drive, walk, time)
             return group.position(elements, self.chosen, drive)
         if not group.BRANCHES:
@@ -76,16 +81,17 @@ class Followed:
         return missed
 
 
-def follows(run: Run, several: bool, passing: bool) -> tuple[Any, ...]:
+def follows(run: Run, several: bool) -> tuple[Any, ...]:
     """The assembly of every module, followed where free drivers may lead it past a pose in which two meet.
 
-    several: whether there is more than one free driver, so that the nominal cycle is not the way it goes; passing:
-    whether the motion goes on there.
+    several: whether there is more than one free driver, so that the nominal cycle is not the way it goes.
     """
+    if not several:
+        return run.chosen.assembly
     pace = float(np.ravel(primal(run.system.pace(run.values)))[0])
     found: list[Any] = []
     for number, chosen in enumerate(run.chosen.assembly):
         closed = chosen is not None and len(run.system.groups[number].BRANCHES) == 2
-        follow = (closed and (several or passing)) or (isinstance(chosen, Track) and several)
-        found.append(Followed(number, chosen, pace) if follow else chosen)
+        passing = closed and not folds(run.system, run.system.plan.modules[number])
+        found.append(Followed(number, chosen, pace, passing) if closed or isinstance(chosen, Track) else chosen)
     return tuple(found)

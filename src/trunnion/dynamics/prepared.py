@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from trunnion.dynamics.active_motion import ActiveMotion
+from trunnion.dynamics.bridged import bridged
 from trunnion.dynamics.clutch_motion import ClutchMotion
 from trunnion.dynamics.compiled_rates import CompiledRates
 from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
@@ -31,6 +32,6 @@ def integration_of(
         )
     kind = ClutchMotion if any(drive.clutched for drive in motion.drives.values()) else Integration
     return kind(
-        motion, rates, duration, tolerance, known.bends, known.period, limits, progress,
+        motion, bridged(motion, rates), duration, tolerance, known.bends, known.period, limits, progress,
         times, evaluations, known.meetings,
     )  # fmt: skip

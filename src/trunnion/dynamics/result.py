@@ -115,7 +115,8 @@ class Course(NamedTuple):
             for part in np.split(order, range(PORTION, len(order), PORTION)):
                 books = between(time[part])
                 works, changes = books.works - begin.works, books.energies - begin.energies
-                account = _residual(works, changes), np.concatenate([works, changes]), books.energies
+                residual = np.where(books.arrays["condition"] > BLURRED, np.nan, _residual(works, changes))
+                account = residual, np.concatenate([works, changes]), books.energies
                 scales = largest(run, books.arrays)
                 sizes.append(np.array([*scales, *(np.nanmax(np.abs(one), initial=0.0) for one in account)]))
                 found[:, part] = np.concatenate([books.at.rate, flat(books)])
@@ -303,6 +304,7 @@ def _residual(works: Array, energies: Array) -> Array:
 
 
 PORTION = 10_000  # times whose books are read at once: these are many numbers
+BLURRED = 1e3  # condition from which the velocities of links in line, and so energies, are not told to all digits
 SHORTEST = 1e-12  # of the duration: a step that has no course of its own
 # of what an integration knows; a step is one panel, but where a force bends or jumps within it
 ACCURACY = Accuracy(tolerance=1e-6, widest=1.0, rounds=10, most=16)
@@ -413,8 +415,7 @@ def _end(ended: Ended, driver: str, unit: str) -> Finding:
             what = f"at {at}, at {readable(figures['coordinate'], unit)} of {driver}, the links "
             what += f"{', '.join(figures['links'])} come to a change point, where two of their assembly modes "
             what += "coincide: neither reactions nor what follows are determined, and the motion ends there"
-            remedy = f"change a length, or stop the motion before it by drivers.{driver}.range, a load or a brake; or "
-            remedy += "pass it with the velocities that the links have: --pass-change-points"
+            remedy = f"change a length, or stop the motion before it by drivers.{driver}.range, a load or a brake"
             return Finding.error("simulate.change_point", where, what, remedy, **figures)
         case "simulate.evaluations":
             what = f"{figures['count']:,} evaluations of the forces are used up at {at} of "

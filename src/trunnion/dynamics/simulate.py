@@ -56,7 +56,6 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     steady: bool = False,
     evaluations: int = MOST_EVALUATIONS,
-    pass_change_points: bool = False,
 ) -> xr.Dataset:
     """Motion in time of a mechanism whose drivers are free: coordinates, forces, energy and events.
 
@@ -77,9 +76,6 @@ def simulate(
     evaluations
         Of the accelerations, at most. A motion that needs more ends there, with a finding that names what makes it
         stiff.
-    pass_change_points
-        Go on through poses in which two assemblies meet, with the velocities that the links have, instead of ending
-        there. Reactions have no bound at such a pose.
 
     Returns
     -------
@@ -98,7 +94,7 @@ def simulate(
     The free coordinates accelerate so that the effort the modules demand is what the motors give (`dynamics.state`);
     integrated from event to event (`dynamics.integrate`).
     """
-    return simulated(mechanism, duration, steps, tolerance, progress, steady, evaluations, pass_change_points).dataset
+    return simulated(mechanism, duration, steps, tolerance, progress, steady, evaluations).dataset
 
 
 @np.errstate(all="ignore")
@@ -110,7 +106,6 @@ def simulated(
     progress: Callable[[float], None] | None = None,
     steady: bool = False,
     evaluations: int = MOST_EVALUATIONS,
-    pass_change_points: bool = False,
 ) -> Result:
     """What `simulate` does, before it becomes a Dataset."""
     refuse(mechanism)
@@ -123,8 +118,8 @@ def simulated(
     if steady:
         return steady_result(mechanism, duration, steps, tolerance, progress, evaluations)
     if playing:
-        return _with_play(run, duration, steps, tolerance, progress, evaluations, pass_change_points)
-    motion = FreeMotion.of(run, passing=pass_change_points)
+        return _with_play(run, duration, steps, tolerance, progress, evaluations)
+    motion = FreeMotion.of(run)
     known = places(motion)
     rates, row, time = rates_of(motion), initial_row(motion), np.linspace(0.0, duration, steps + 1)
     _check_start(motion, row, ranges(motion, motion.names, known))
@@ -164,14 +159,14 @@ def _exhausted(found: Found) -> bool:
 
 def _with_play(
     run: Run, duration: float, steps: int, tolerance: float, progress: Callable[[float], None] | None,
-    evaluations: int, passing: bool,
+    evaluations: int,
 ) -> Result:  # fmt: skip
     """The motion of a mechanism whose joints in play are taken out, as one of the mechanism that was stated."""
     bare = opened(run)
     contacts = contacts_of(run, in_play(run.system.mechanism))
     loose = prepare(bare.mechanism, free=True)
     refuse_undetermined(loose, in_play(run.system.mechanism))
-    motion = FreeMotion.of(loose, contacts, passing)
+    motion = FreeMotion.of(loose, contacts)
     row, limits = initial_row(motion), ranges(motion, run.system.mechanism.drivers, Places())
     _check_start(motion, row, limits)
     refuse_massless(motion, row)

@@ -100,7 +100,7 @@ def places(motion: FreeMotion) -> Places:
         (time, module)
         for module, each in run.chosen.meetings.items()
         if not motion.passes(module)
-        for meeting in each
+        for meeting in each.at
         for time in sorted(set(meeting))
     ]
     met = tuple((begin + speed * time, module) for time, module in meetings)

@@ -109,7 +109,7 @@ class FreeMotion:
     """A mechanism with free drivers, ready to be asked for its accelerations.
 
     run: prepared for the nominal cycle; drives: what drives the free coordinates, by name; assembly: of every module;
-    passing: whether it goes on through change points, where it can; walked: how often forces were asked for by a walk.
+    walked: how often forces were asked for by a walk.
     """
 
     run: Run
@@ -117,11 +117,10 @@ class FreeMotion:
     assembly: Assembly
     method: FrictionMethod = field(default_factory=FrictionMethod)
     contacts: Contacts = field(default_factory=Contacts)
-    passing: bool = False
     walked: list[int] = field(default_factory=lambda: [0], compare=False, repr=False)
 
     @classmethod
-    def of(cls, run: Run, contacts: Contacts | None = None, passing: bool = False) -> Self:
+    def of(cls, run: Run, contacts: Contacts | None = None) -> Self:
         """The free motion of a prepared mechanism.
 
         Raises MechanismError where the links do not come back with the drivers, as of a nut, and no range says how far
@@ -132,8 +131,7 @@ class FreeMotion:
             where, remedy = next(iter(run.system.mechanism.drivers)), "state how far it goes: range: [0 turn, 20 turn]"
             raise MechanismError(Finding(what, f"drivers.{where}.range", remedy))
         free = drives(run.system, run.values)
-        assembly = follows(run, len(free) > 1, passing)
-        return cls(run, free, assembly, contacts=contacts or Contacts(), passing=passing)
+        return cls(run, free, follows(run, len(free) > 1), contacts=contacts or Contacts())
 
     @property
     def system(self) -> System:
@@ -230,8 +228,12 @@ class FreeMotion:
         return tuple(number for number, module in enumerate(self.system.plan.modules) if module.rank > 1)
 
     def passes(self, number: int) -> bool:
-        """Whether a module goes on through poses in which two of its assemblies meet: closed forms can."""
-        return self.passing and bool(self.system.groups[number].BRANCHES)
+        """Whether a module goes on through poses in which two of its assemblies meet, as the file has it."""
+        if len(self.system.mechanism.drivers) == 1:
+            met = self.run.chosen.meetings.get(number)
+            return met is not None and met.smooth
+        followed = self.assembly[number]
+        return isinstance(followed, Followed) and followed.passing
 
     def change_point(self, number: int, coordinate: float) -> dict[str, Any]:
         """What is told of a motion that ends where two assemblies of a module meet, at a place of the first driver."""

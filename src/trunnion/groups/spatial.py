@@ -19,7 +19,7 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.space import NULL, Screw, about, moment_at, vector_minus
 from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled
-from trunnion.groups.tree import Coordinates, Element, Pose, Tree
+from trunnion.groups.tree import OUTER, Coordinates, Element, Pose, Tree
 from trunnion.joints.spatial import MOTIONS, PairMotion
 
 __all__ = ["SpatialGroup"]
@@ -29,7 +29,7 @@ __all__ = ["SpatialGroup"]
 class SpatialGroup(Tree):
     """The module with the given joints; its reactions are about the origin.
 
-    spinning: links whose spin is free, each with its two joints.
+    spinning: links whose spin is free, each with the two joints between which it is.
     """
 
     spinning: tuple[tuple[int, int, int], ...] = ()
@@ -90,6 +90,15 @@ class SpatialGroup(Tree):
 
     # ---- free spins -------------------------------------------------------------------------------------------
 
+    def spun(self, link: int, a: int, b: int) -> tuple[int, ...]:
+        """The links that spin as one between two joints, one of which is stated."""
+        together = [link]
+        for member in together:
+            for k, joint in enumerate(self.joints):
+                if k not in (a, b) and member in joint.sides:
+                    together += [other for other in joint.sides if other not in (OUTER, *together)]
+        return tuple(together)
+
     def spin_axis(self, placed: Sequence[Element], a: int, b: int) -> Vector3:
         """Unit vector of the line about which a link can spin: from ball to ball, or the axis of its other joint."""
         for k in (a, b):
@@ -128,12 +137,13 @@ class SpatialGroup(Tree):
         return self.multipliers(pose, loads)[6 * len(self.chords) :]
 
     def signature(self, pose: Pose, spread: float) -> list[Number]:
-        """Axes and places of the links; of a spinning one its two joints."""
-        spun = {link for link, _, _ in self.spinning}
+        """Axes and places of the links; of those that spin their joints, which lie on the line."""
+        spun = {member for spin in self.spinning for member in self.spun(*spin)}
         numbers: list[Number] = []
         for link, frame in enumerate(pose.frames):
             if link not in spun:
                 numbers += [*frame.x, *frame.y, *frame.z, *(n / spread for n in frame.place)]
-        for _, a, b in self.spinning:
-            numbers += [n / spread for k in (a, b) for n in pose.elements[k].second.place]
+        for k, joint in enumerate(self.joints):
+            if spun.intersection(joint.sides) and joint.kind != "planar":
+                numbers += [n / spread for n in pose.elements[k].second.place]
         return numbers

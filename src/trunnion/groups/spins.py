@@ -9,7 +9,7 @@ way from one direction of its line to the other.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,19 +33,53 @@ def unspun(group: SpatialGroup, elements: Sequence[Element], rows: Array, drive:
     place = {i: n for n, i in enumerate(group.kept)}
     rows = rows.copy()
     for link, a, b in group.spinning:
+        members = group.spun(link, a, b)
         axis = _full(group.spin_axis(pose.elements, a, b), grid)
+        centre = _full(pose.elements[a if group.joints[a].pair.ball else b].second.place, grid)
         spun = _spun(axis, _full(pose.frames[link].x, grid), _full(pose.frames[link].y, grid))
         for k in (a, b):
-            first = pose.elements[k].first
-            sense = -1.0 if group.joints[k].sides[1] == link else 1.0  # back by what it has spun
+            first, second, _ = pose.elements[k]
+            sense = -1.0 if group.joints[k].sides[1] in members else 1.0  # back by what it has spun
             begin = group.starts[k]
             if group.joints[k].pair.ball:
                 local = np.array([np.sum(axis * _full(one, grid), axis=0) for one in (first.x, first.y, first.z)])
                 where = [place[begin + i] for i in range(4)]
                 rows[where] = _turned(rows[where], local, sense * spun)
+            elif group.joints[k].kind == "planar":
+                ends = [
+                    _Plate(_full(end.x, grid), _full(end.y, grid), _full(end.place, grid)) for end in (first, second)
+                ]
+                turns = int(group.joints[k].sides[1] in members)
+                ends[turns] = _Plate(
+                    _about(ends[turns].x, axis, -spun), _about(ends[turns].y, axis, -spun),
+                    centre + _about(ends[turns].place - centre, axis, -spun),
+                )  # fmt: skip
+                rows[[place[begin + i] for i in range(3)]] = _planar(*ends)
             elif begin in place:
                 rows[place[begin]] += sense * spun
     return rows
+
+
+class _Plate(NamedTuple):
+    """Axes in the plane and place of an element of a planar joint, each (3, grid)."""
+
+    x: Array
+    y: Array
+    place: Array
+
+
+def _planar(first: _Plate, second: _Plate) -> Array:
+    """Both slides and the turn of a planar joint, (3, grid)."""
+    apart = second.place - first.place
+    slides = [np.sum(apart * axis, axis=0) for axis in (first.x, first.y)]
+    turn = np.arctan2(np.sum(second.x * first.y, axis=0), np.sum(second.x * first.x, axis=0))
+    return np.array([*slides, np.unwrap(turn)])
+
+
+def _about(vector: Array, axis: Array, angle: Array) -> Array:
+    """Vectors turned about unit axes (Rodrigues), (3, grid)."""
+    along = np.sum(vector * axis, axis=0) * axis
+    return np.asarray(along + np.cos(angle) * (vector - along) + np.sin(angle) * np.cross(axis, vector, axis=0))
 
 
 def _full(vector: Sequence[Any], grid: int) -> Array:

@@ -77,7 +77,7 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
             remedy = DATA_SHEET
     elif kind == "string_pattern_mismatch":  # the only texts with a pattern
         what = f"'{error['input'][:40]}' is not the name of an assembly mode"
-        remedy = "write way-1, way-2, … as `check` lists them"
+        remedy = "write way-1, way-2, … as `check` lists them, or folds"
     elif kind == "literal_error" and key.startswith("trunnion"):
         what, remedy = f"the file is of version {error['input']!r}, this program reads 1", f"write {key}: 1"
     elif kind == "literal_error":

@@ -67,6 +67,7 @@ from trunnion.model.tolerance_parts import Correlation, Cost, CostOption, Variat
 from trunnion.model.units import KINDS
 
 __all__ = [
+    "FOLDS",
     "FORMS",
     "FRICTION_MODELS",
     "JOINT_TYPES",
@@ -414,8 +415,9 @@ class Gear(Part):
         return self if self.pressure_angle else self.model_copy(update={"pressure_angle": usual})
 
 
-_WAY = re.compile(r"^way-[1-9][0-9]{0,3}$")
-_LIKE_A_WAY = re.compile(r"(?i)^way[-_ ]\w*$")  # meant as a name, whatever is wrong with it
+FOLDS = "folds"  # at a change point a group stays on its side of it
+_WAY = re.compile(rf"^(way-[1-9][0-9]{{0,3}}|{FOLDS})$")
+_LIKE_A_WAY = re.compile(r"(?i)^(way[-_ ]\w*|folds?)$")  # meant as a name, whatever is wrong with it
 
 
 def _hint_shape(value: object) -> str:
@@ -429,6 +431,7 @@ Hint = Annotated[
     Discriminator(
         _hint_shape,
         custom_error_type="forms",
-        custom_error_message="takes coordinates of a point, rotation or slide of a joint, or way-1, way-2, … of a link",
+        custom_error_message="takes coordinates of a point, rotation or slide of a joint, or way-1, way-2, …, folds of "
+        "a link",
     ),
 ]

@@ -26,9 +26,11 @@ from trunnion.groups.spins import unspun
 from trunnion.groups.tree import OUTER
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import as_key
+from trunnion.model.parts import FOLDS
 from trunnion.results.quantities import quantity
 from trunnion.solve import change_points
-from trunnion.solve.forward import Forward, pose_of, start
+from trunnion.solve.drawn import drawn_at, off_drawing
+from trunnion.solve.forward import Forward, pose_of, posed, start
 from trunnion.solve.system import Cycle, Dial, Positions, System, Values, driven_coordinates
 from trunnion.solve.track import (
     GUESSES,
@@ -36,17 +38,22 @@ from trunnion.solve.track import (
     STRIDE,
     Assemblies,
     Follower,
+    Passing,
     Track,
     TrackClock,
+    alternating,
     closed_at,
     each_once,
+    extent,
     key_of,
     lane_of,
 )
+from trunnion.solve.track import at as elements_at
 from trunnion.structure.decompose import Module
 
 __all__ = [
-    "Chosen", "choose", "coordinate", "distance", "grid", "hints", "joint_rows", "named_way", "way_name", "ways_of",
+    "Chosen", "choose", "coordinate", "distance", "folds", "grid", "hints", "joint_rows", "named_way", "way_name",
+    "ways_of",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -58,27 +65,32 @@ NEARER = 1e-9  # of how far it is from a hint, and of the size: an assembly that
 LOOKED = 2  # of the grid every which position the assemblies are compared at
 TRIED = 64  # guesses at each place where it is tried whether there is an assembly at all
 SPREAD = 25  # such places
+BEFORE = 4  # positions before a change point that lead over it
+NEARBY = 0.3  # of an interval of the grid: nearer to a change point Newton may take one assembly for the other
 
 
 @dataclass(frozen=True)
 class Chosen:
     """Assembly of every module (±1, Track, None for a driver), how many there were, and what there is to say.
 
-    meetings: of modules, by their number, the times at which two assemblies meet in the nominal cycle, s.
+    meetings: of modules, by their number, where two assemblies meet in the nominal cycle; mirrored: whether a module is
+    in its other assembly after it, so that twice the cycle brings it back.
     """
 
     assembly: tuple[Any, ...]
     found: tuple[int, ...]
     findings: tuple[Finding, ...]
-    meetings: Mapping[int, Sequence[change_points.Meeting]] = field(default_factory=dict)
+    meetings: Mapping[int, change_points.Meetings] = field(default_factory=dict)
+    mirrored: bool = False
 
 
 class Decision(NamedTuple):
-    """Assembly of a module, how many there were, and what there is to say."""
+    """Assembly of a module, how many there were, what there is to say, and the position at which it is so."""
 
     assembly: Any
     ways: int
     findings: Sequence[Finding] = ()
+    lane: int = 0
 
 
 def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
@@ -94,19 +106,20 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
         raise MechanismError(findings)
     times = grid(cycle)
     walk = start(system, values)
+    drawn = drawn_at(walk, times)
     chosen: list[Any] = []
     counts: list[int] = []
-    meetings: dict[int, Sequence[change_points.Meeting]] = {}
+    meetings: dict[int, change_points.Meetings] = {}
     with np.errstate(all="ignore"):
         for number, module in enumerate(system.plan.modules):
             group = system.groups[number]
             if module.rank == 1 or not (group.BRANCHES or getattr(group, "kept", ())):  # nothing to choose
                 decision = Decision(None, 1)
             elif group.BRANCHES:
-                decision = _closed_form(walk, number, times)
+                decision = _closed_form(walk, number, times, drawn)
             else:
-                decision = _general(walk, number, times, cycle.periodic)
-            assembly, count, remarks = decision
+                decision = _general(walk, number, times, cycle.periodic, drawn)
+            assembly, count, remarks, lane = decision
             findings += remarks
             chosen.append(assembly)
             walk.assembly.append(assembly)
@@ -119,11 +132,17 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             if not assembled and number == len(system.plan.modules) - 1:  # nothing stands on it
                 continue
             pose = pose_of(walk, number, assembly, times)
+            if assembled and (at := change_points.find(walk, number, assembly, times, pose, cycle)):
+                if group.BRANCHES:
+                    chosen[number], meetings[number] = _through(walk, number, assembly, lane, at, times, cycle)
+                else:
+                    chosen[number], meetings[number] = _followed_through(walk, number, assembly, at, times, cycle)
+                walk.assembly[number] = chosen[number]
+                findings.append(change_points.finding(system, values, module, meetings[number]))
+                pose = pose_of(walk, number, chosen[number], times)
             walk.stand(number, pose)  # an assembly is a matter of places
-            if assembled and (meeting := change_points.find(walk, number, assembly, times, pose)):
-                findings.append(change_points.finding(system, values, module, meeting))
-                meetings[number] = meeting
-    return Chosen(tuple(chosen), tuple(counts), tuple(findings), meetings)
+    mirrored = any(len(met.crossed) % 2 and not met.folds for met in meetings.values()) and cycle.periodic
+    return Chosen(tuple(chosen), tuple(counts), tuple(findings), meetings, mirrored)
 
 
 def grid(cycle: Cycle) -> Array:
@@ -135,17 +154,39 @@ def grid(cycle: Cycle) -> Array:
 # ---- closed forms ---------------------------------------------------------------------------------------------
 
 
-def _closed_form(walk: Forward, number: int, times: Array) -> Decision:
-    """+1 or −1: the one that is named, else the one nearest the hints by place."""
+def _closed_form(walk: Forward, number: int, times: Array, drawn: int | None) -> Decision:
+    """+1 or −1: the one that is named, else the one nearest the hints by place, else the one that is drawn."""
     system, module = walk.system, walk.system.plan.modules[number]
     branches = system.groups[number].BRANCHES
     named, count = named_way(system, module, len(branches)), len(branches)
-    if count == 1 or not hints(walk, module):
-        return Decision(branches[named or 0], count, [_undecided(walk, module, count)] * (count > 1 and named is None))
+    if drawn is not None and count > 1 and named is None and not hints(walk, module):
+        poses = [pose_of(walk, number, branch, times) for branch in branches]
+        if len(lanes := _apart(walk, number, poses, times)[1].nonzero()[0]):
+            near = int(lanes[np.argmin(np.abs(lanes - drawn))])
+            off = [_off_drawing(walk, number, pose, near) for pose in poses]
+            if len(tied := _tied(walk, np.array(off))) == 1:
+                return Decision(branches[tied[0]], count, (), near)
     lane, frames = ways_of(walk, number, times)
+    if count == 1 or not hints(walk, module):
+        undecided = [_undecided(walk, module, count)] * (count > 1 and named is None)
+        return Decision(branches[named or 0], count, undecided, lane or 0)
     tied = _tied(walk, distance(walk, module, frames, lane or 0)) if lane is not None else [0]
     best = tied[0] if named is None else named
-    return Decision(branches[best], count, _said(walk, module, count, frames, lane or 0, named, tied))
+    return Decision(branches[best], count, _said(walk, module, count, frames, lane or 0, named, tied), lane or 0)
+
+
+def _off_drawing(walk: Forward, number: int, pose: Any, lane: int | NDArray[np.intp]) -> Array:
+    """How far a module is from where it is drawn in a pose at a position, or in a lane of many, m²."""
+    module, group = walk.system.plan.modules[number], walk.system.groups[number]
+    frames = each(pose.frames, lambda part: lane_of(primal(part), lane))
+    spun = sorted({link for spin in getattr(group, "spinning", ()) for link in group.spun(*spin)})
+    points = [
+        (link, walk.local[module.links[link], joint].place)
+        for link in spun
+        for joint in module.joints
+        if module.links[link] in walk.system.joints[joint][1]
+    ]
+    return off_drawing(walk, frames, spun, points)
 
 
 def ways_of(walk: Forward, number: int, times: Array) -> tuple[int | None, Any]:
@@ -161,25 +202,108 @@ def ways_of(walk: Forward, number: int, times: Array) -> tuple[int | None, Any]:
 
 
 def _first_apart(walk: Forward, number: int, poses: Sequence[Any], times: Array) -> int | None:
-    spread = float(np.max(primal(walk.size)))
-    shape = times.shape
-    keys = [
-        np.array([np.broadcast_to(primal(n), shape) for n in key_of(walk.system.groups[number], pose, spread)])
-        for pose in poses
-    ]
-    exist = np.isfinite(keys).all(axis=(0, 1))
-    differ = exist & (np.ptp(keys, axis=0).max(axis=0) > SAME)
+    exist, differ = _apart(walk, number, poses, times)
     for lanes in (np.flatnonzero(differ[::LOOKED]) * LOOKED, np.flatnonzero(exist)):
         if len(lanes):
             return int(lanes[0])
     return None
 
 
+def _apart(
+    walk: Forward, number: int, poses: Sequence[Any], times: Array
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """At which times all poses of a module exist, and are apart."""
+    spread = float(np.max(primal(walk.size)))
+    shape = times.shape
+    keys = [
+        np.array([np.broadcast_to(primal(n), shape) for n in key_of(walk.system.groups[number], pose, spread)])
+        for pose in poses
+    ]
+    exist = np.asarray(np.isfinite(keys).all(axis=(0, 1)))
+    return exist, exist & (np.ptp(keys, axis=0).max(axis=0) > SAME)
+
+
+# ---- change points --------------------------------------------------------------------------------------------
+
+
+def folds(system: System, module: Module) -> bool:
+    """Whether a module is stated to stay on its side of its change points."""
+    return any(system.mechanism.assembly.get(link) == FOLDS for link in module.links)
+
+
+def _through(
+    walk: Forward, number: int, branch: int, lane: int, at: Sequence[change_points.Meeting], times: Array, cycle: Cycle
+) -> tuple[Any, change_points.Meetings]:
+    """A closed form through its change points: in the branch that it has at a position of the grid, and from there on,
+    unless it folds, in the other one wherever that goes on smoothly."""
+    system, module, group = walk.system, walk.system.plan.modules[number], walk.system.groups[number]
+    size = float(np.max(primal(walk.size)))
+
+    def numbers(which: int, moments: Array) -> Array:
+        trial = posed(system, walk.values, walk.assembly[:number], moments)
+        pose = pose_of(trial, number, group.BRANCHES[which], moments)
+        return np.array([np.broadcast_to(primal(n), moments.shape) for n in key_of(group, pose, size)])
+
+    places, crossed = list[change_points.Meeting](), list[float]()
+    for first, last in at:
+        exact = change_points.crosses(numbers, first, times[1], cycle) if first == last else None
+        crossed += [] if exact is None else [exact]
+        places.append((first, last) if exact is None else (exact, exact))
+    folding = folds(system, module)
+    smooth = not (crossed and folding) and all(first == last for first, last in at)
+    met = change_points.Meetings(tuple(places), tuple(crossed), folding, smooth)
+    if folding or not crossed:
+        return branch, met
+    clock, duration = TrackClock.of(system, walk.values), cycle.duration if cycle.periodic else None
+    first = branch * int(alternating(crossed, times[lane]))
+    return Passing(first, tuple(crossed), duration, clock), met
+
+
+def _followed_through(
+    walk: Forward, number: int, track: Track, at: Sequence[change_points.Meeting], times: Array, cycle: Cycle
+) -> tuple[Any, change_points.Meetings]:
+    """A general group through its change points, onward from where it was put together: beyond one it is followed from
+    where the coordinates before it lead, there with the other sign of det J."""
+    module, group = walk.system.plan.modules[number], walk.system.groups[number]
+    folding, passed, kinks = folds(walk.system, module), list[float](), False
+    if group.redundant or folding:  # the least-squares way on is smooth by itself
+        return track, change_points.Meetings(tuple(at), (), folding, bool(group.redundant))
+    drive, _, _ = driven_coordinates(walk.system, module, walk.system.places[number], walk.values, times)
+    elements = walk.pairs(walk.system.places[number])
+    drive = [track.turns.get(slot, one) for slot, one in enumerate(drive)]
+    last, begin = track.begin, int(np.searchsorted(times, track.begin))
+    while ahead := [first for first, end in at if first == end and first > last + NEARBY * times[1]]:
+        last = ahead[0]
+        before = np.flatnonzero(times < last - NEARBY * times[1])[-BEFORE:]
+        beyond = np.flatnonzero(times > last + NEARBY * times[1])
+        if len(before) < BEFORE or before[0] < begin or not len(beyond):
+            continue
+        rows, place = track.coordinates.copy(), beyond[0]
+        guess = change_points.carried_on(times[before], rows[:, before], float(times[place]))
+        follower = Follower(group, elements, drive, -float(track.sense(times[before[-1]])), STRIDE)
+        fresh = follower.solved_from(place, guess)
+        kink = np.max(np.abs(rows[:, place] - guess))
+        if fresh is None or not np.max(np.abs(fresh - guess)) < kink:
+            kinks = kinks or fresh is None
+            continue
+        for between in range(before[-1] + 1, place):
+            rows[:, between] = change_points.carried_on(times[before], rows[:, before], float(times[between]))
+        rows[:, place:] = np.nan
+        rows[:, place] = fresh
+        follower.run(rows, np.arange(place, len(times)))
+        passed.append(last)
+        track = replace(track, coordinates=rows, passed=tuple(passed))
+        pose = pose_of(walk, number, track, times)
+        at = change_points.find(walk, number, track, times, pose, cycle)
+    smooth = not kinks and all(first == end for first, end in at)
+    return track, change_points.Meetings(tuple(at), tuple(passed), False, smooth)
+
+
 # ---- general groups -------------------------------------------------------------------------------------------
 
 
-def _general(walk: Forward, number: int, times: Array, periodic: bool) -> Decision:
-    """The assembly that is named or nearest the hints, followed both ways from the first position where there is one.
+def _general(walk: Forward, number: int, times: Array, periodic: bool, drawn: int | None) -> Decision:
+    """The assembly that is named, nearest the hints or drawn, followed both ways from the first position with any.
 
     Where it ends and the links can be assembled again farther on, in the same sense, the assembly nearest to what
     was left is taken there and followed too.
@@ -201,6 +325,9 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool) -> Decisi
     frames = each(solved.pose.frames, lambda n: np.broadcast_to(n, shape)[lanes])
     named = named_way(system, module, ways)
     tied = _tied(walk, np.broadcast_to(distance(walk, module, frames, begin), (ways,)))
+    if drawn is not None and named is None and not hints(walk, module):
+        follower = Follower(group, elements, drive, 0.0, STRIDE)
+        tied = _drawn(walk, number, follower, solved, lanes, begin, drawn, grid, periodic) or tied
     best = tied[0] if named is None else named
     orientation = float(np.broadcast_to(solved.pose.orientation, shape)[lanes[best]])
     rows[:, begin] = solved.q[:, lanes[best]]
@@ -216,6 +343,44 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool) -> Decisi
         rows = unspun(group, elements, rows, drive)
     track = Track(times, rows, orientation, periodic, clock, turns, again, float(times[begin]), frames, best)
     return Decision(track, ways, _said(walk, module, ways, frames, begin, named, tied))
+
+
+def _drawn(
+    walk: Forward, number: int, follower: Follower, solved: Assemblies, lanes: Sequence[int], begin: int, drawn: int,
+    grid: int, periodic: bool,
+) -> list[int]:  # fmt: skip
+    """Of the assemblies at a position, by their lanes, that which leads to where links are drawn; none if none does.
+
+    It is the nearest where the drivers are as drawn, followed from there.
+    """
+    group, there, lanes_there = follower.group, solved, list(lanes)
+    if drawn != begin:
+        there = closed_at(group, follower.elements, follower.drive, [drawn], GUESSES)
+        lanes_there = each_once(group, there)
+    if not lanes_there:
+        return []
+    shape = there.closed.shape
+    frames = each(there.pose.frames, lambda n: np.broadcast_to(primal(n), shape))
+    off = _off_drawing(walk, number, there.pose._replace(frames=frames), np.array(lanes_there))
+    nearest = _tied(walk, np.broadcast_to(off, (len(lanes_there),)))
+    if len(nearest) > 1 or drawn == begin:
+        return nearest if len(nearest) == 1 else []
+    lane, index = lanes_there[nearest[0]], np.array([begin])
+    follower = replace(follower, orientation=float(np.broadcast_to(there.pose.orientation, shape)[lane]))
+    elements, drive = elements_at(follower.elements, index), [lane_of(n, index) for n in follower.drive]
+    way = 1 if begin > drawn else -1
+    orders = [np.arange(drawn, begin + way, way)]
+    if periodic:  # the last position of the grid is the first
+        orders.append(np.arange(drawn, begin - way * grid, -way) % (grid - 1))
+    for order in orders:
+        rows = np.full((len(group.kept), grid), np.nan)
+        rows[:, drawn] = there.q[:, lane]
+        follower.run(rows, order)
+        pose = group.position(elements, list(rows[:, index]), drive)
+        key = np.array([np.ravel(n)[0] for n in key_of(group, pose, extent(group, elements))])
+        if same := [k for k, other in enumerate(lanes) if np.max(np.abs(solved.key[:, other] - key)) < SAME]:
+            return same[:1]
+    return []
 
 
 def _first_closed(group: Any, elements: Sequence[Any], drive: Sequence[Number], grid: int) -> tuple[int, Assemblies]:
@@ -257,7 +422,9 @@ def way_name(index: int) -> str:
 def _names(system: System, module: Module) -> dict[str, str]:
     """The hints that name an assembly of a module, by link."""
     stated = system.mechanism.assembly
-    return {key: hint for key, hint in stated.items() if key in module.links and isinstance(hint, str)}
+    return {
+        key: hint for key, hint in stated.items() if key in module.links and isinstance(hint, str) and hint != FOLDS
+    }
 
 
 def named_way(system: System, module: Module, count: int) -> int | None:

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
+from trunnion.model.parts import FOLDS
 from trunnion.solve.assembly import grid, joint_rows, way_name, ways_of
 from trunnion.solve.forward import Forward, posed
 from trunnion.solve.run import Run
-from trunnion.solve.track import Track
+from trunnion.solve.track import Passing, Track
 
 __all__ = ["AssemblyMode", "GroupModes", "choices", "put_together"]
 
@@ -80,7 +81,8 @@ def _modes(run: Run, walk: Forward, times: NDArray[np.float64]) -> Iterator[Grou
             first, frames = ways_of(walk, number, times)
             if first is None:
                 continue
-            lane, taken = first, run.system.groups[number].BRANCHES.index(assembly)
+            here = int(assembly.branch(times[first])) if isinstance(assembly, Passing) else assembly
+            lane, taken = first, run.system.groups[number].BRANCHES.index(here)
         rows = joint_rows(walk, module, count, frames, lane)
         if not rows:
             continue
@@ -105,6 +107,6 @@ def put_together(mechanism: Mechanism, choice: GroupModes, way: AssemblyMode) ->
     others = {
         key: hint
         for key, hint in data.get("assembly", {}).items()
-        if key not in choice.links or not isinstance(mechanism.assembly[key], str)
+        if key not in choice.links or mechanism.assembly[key] == FOLDS or not isinstance(mechanism.assembly[key], str)
     }
     return Mechanism(**{**data, "assembly": {**others, choice.link: way.name}})

@@ -377,13 +377,15 @@ class SpatialWalk(Forward):
 
     def unspun(self, number: int, pose: Any, twists: Mapping[str, Any]) -> dict[str, Any]:
         """Twists of a module's links with a free spin, without what they spin about the line of their joints."""
-        group, found = self.system.groups[number], {}
-        for (link, _, _), (_, a, b) in zip(self.system.plan.modules[number].spinning, group.spinning, strict=True):
+        group, links, unturned = self.system.groups[number], self.system.plan.modules[number].links, {}
+        for link, a, b in group.spinning:
             elements = each(pose.elements, primal)
             axis = group.spin_axis(elements, a, b)
-            line = Screw(axis, cross(elements[a].second.place, axis))
-            found[link] = space.minus(twists[link], space.times(dot(axis, twists[link].u), line))
-        return found
+            line = Screw(axis, cross(elements[a if group.joints[a].pair.ball else b].second.place, axis))
+            spin = space.times(dot(axis, twists[links[link]].u), line)
+            for member in group.spun(link, a, b):
+                unturned[links[member]] = space.minus(twists[links[member]], spin)
+        return unturned
 
     # ---- joints -----------------------------------------------------------------------------------------------
 

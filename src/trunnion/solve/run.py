@@ -124,7 +124,9 @@ class Run:
         return self.bends if self.ideal_values is self.values else self._bends(self.ideal_values)
 
     def _bends(self, values: Values) -> list[Bend]:
-        return stated_bends(Mechanisms(self.system, self.chosen.assembly, values, [self.cycle]))
+        passed = {time for met in self.chosen.meetings.values() for place in met.at for time in place}
+        stated = stated_bends(Mechanisms(self.system, self.chosen.assembly, values, [self.cycle]))
+        return [*stated, *(Bend(time) for time in sorted(passed))]
 
     @np.errstate(all="ignore")
     def courses(
@@ -201,6 +203,8 @@ def _prepared(mechanism: Mechanism, free: bool) -> Run:
         run = over(system.cycle(values, turns, free))
     if isinstance(system.inverse, Inverse):
         system.inverse.check(system, values, run.chosen.assembly)
+    while run.chosen.mirrored and run.cycle.turns < COMMON_TURNS:
+        run = over(replace(run.cycle, duration=2 * run.cycle.duration, turns=2 * run.cycle.turns))
     return run if _comes_back(run) else over(replace(run.cycle, periodic=False, advances=True))
 
 

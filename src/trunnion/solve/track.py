@@ -21,8 +21,8 @@ from trunnion.solve.forward import Forward
 from trunnion.solve.system import System, Values
 
 __all__ = [
-    "GUESSES", "SEED", "Assemblies", "Follower", "Track", "TrackClock", "at", "closed_at", "each_once", "extent",
-    "guess_reaches", "key_of", "lane_of",
+    "GUESSES", "SEED", "Assemblies", "Follower", "Passing", "Track", "TrackClock", "alternating", "at", "closed_at",
+    "each_once", "extent", "guess_reaches", "key_of", "lane_of",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -226,6 +226,13 @@ class Follower:
         """
         return self._solved(at(self.elements, places), [lane_of(n, places) for n in self.drive], guess, 0)
 
+    def solved_from(self, place: int, guess: Array) -> Array | None:
+        """Coordinates at a position, by Newton from a guess, (kept,); None if they are not of the right sense."""
+        index = np.array([place])
+        drive = [lane_of(n, index) for n in self.drive]
+        solved, good = self._solved(at(self.elements, index), drive, guess[:, None], NEAR_LIMIT)
+        return solved[:, 0] if good[0] else None
+
     def _solved(
         self, elements: Elements, drive: Sequence[Number], guess: Array, late: int
     ) -> tuple[Array, NDArray[np.bool_]]:
@@ -324,7 +331,8 @@ class Track:
     times: (grid,) s; coordinates: (free, grid), NaN where the group cannot be assembled. turns: rotations, whole
     turns counted, that gear pairs ask for and the group does not hold, by their place in the drive. again: places in
     the grid where it was put together anew after it had come apart. ways: frames of its links in every assembly found
-    at the time `begin`, s, in the order of their names; taken: which of them is followed.
+    at the time `begin`, s, in the order of their names; taken: which of them is followed. passed: times of change
+    points, s, at which det J changes its sign on the smooth way on.
     """
 
     times: Array
@@ -337,6 +345,14 @@ class Track:
     begin: float = 0.0
     ways: tuple[Any, ...] = ()
     taken: int = 0
+    passed: tuple[float, ...] = ()
+
+    def sense(self, moment: Number) -> Number:
+        """Sign of det J at times of the nominal cycle, s."""
+        if not self.passed:
+            return self.orientation
+        again = alternating(self.passed, moment) * float(alternating(self.passed, np.float64(self.begin)))
+        return self.orientation * again
 
     def pose(
         self,
@@ -350,12 +366,13 @@ class Track:
         moment = primal(self.clock.nominal(walk, time))
         moment = np.mod(moment, self.times[-1]) if self.periodic else moment
         near = np.clip(np.searchsorted(self.times, moment), 1, len(self.times) - 1) if len(self.times) > 1 else 0
-        guess = [_interpolated(self.times, row, moment, near) for row in self.coordinates]
+        between = _curved if self.passed else _interpolated  # beside a change point a guess must tell assemblies apart
+        guess = [between(self.times, row, moment, near) for row in self.coordinates]
         drive = list(drive)
         for slot, row in self.turns.items():
             drive[slot] = _interpolated(self.times, row, moment, near)
         pose = group.position(elements, guess, drive)
-        stays = pose.orientation == self.orientation
+        stays = pose.orientation == self.sense(moment)
         size = group.size(elements)
         reach = 4 * limits(group, 1.0)
         for i, kind, most, from_ in zip(group.kept, group.kept_kinds, reach, guess, strict=True):
@@ -395,6 +412,47 @@ class TrackClock(NamedTuple):
         if not self.speed:
             return time * (self.duration / walk.system.span(walk.values, self.driver).duration)
         return (walk.system.drive(walk.values, self.driver, time)[0] - self.start) / self.speed
+
+
+@dataclass(frozen=True)
+class Passing:
+    """A closed form that goes over to its other assembly at change points, so that its links move on smoothly.
+
+    assembly: ±1 at the start of the nominal cycle; passed: times of the change points, s, rising; duration: of the
+    cycle that it comes back after, None if it does not.
+    """
+
+    assembly: int
+    passed: tuple[float, ...]
+    duration: float | None
+    clock: TrackClock
+
+    def branch(self, moment: Number) -> Number:
+        """±1 at times of the nominal cycle, s."""
+        moment = moment if self.duration is None else np.mod(moment, self.duration)
+        return self.assembly * alternating(self.passed, moment)
+
+    def pose(self, group: Any, elements: Sequence[Any], drive: Sequence[Number], walk: Forward, time: Number) -> Any:
+        """Pose in the assembly in which the links then are."""
+        return group.position(elements, self.branch(primal(self.clock.nominal(walk, time))), drive)
+
+
+def alternating(passed: Sequence[float], moment: Number) -> Number:
+    """1 at times up to the first of some that rise, then −1 and 1 in turn."""
+    signs = 1.0 - 2.0 * (np.arange(len(passed) + 1) % 2)
+    return namespace(moment).take(signs, np.searchsorted(np.array(passed), moment))
+
+
+def _curved(times: Array, row: Array, moment: Array, near: Places | int) -> Array:
+    """The cubic through four neighbours of an even grid; linear where one of these does not exist."""
+    if len(times) < 4:
+        return _interpolated(times, row, moment, near)
+    take, first = namespace(moment).take, np.clip(near, 2, len(times) - 2) - 2
+    x = (moment - take(times, first)) / (times[1] - times[0])
+    y = [take(row, first + k) for k in range(4)]
+    cubic = ((1 - x) * (2 - x) * (3 - x) * y[0] - x * (x - 1) * (2 - x) * y[3]) / 6
+    cubic = cubic + (x * (2 - x) * (3 - x) * y[1] - x * (1 - x) * (3 - x) * y[2]) / 2
+    return np.where(np.isfinite(cubic), cubic, _interpolated(times, row, moment, near))
 
 
 def _interpolated(times: Array, row: Array, moment: Array, near: Places | int) -> Array:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,7 @@ __all__ = ["FREEDOMS", "Module", "Plan", "decompose", "mobility_by_formula", "mo
 FREEDOMS = {"planar": 3, "spatial": 6}  # of a free link
 # outer, inner, outer joint of the dyads in closed form, in the plane and in space
 CLOSED_FORMS = {"planar": ("RRR", "RRP", "RPR", "PRP", "RPP"), "spatial": ("CCC",)}
+IN_LINE = 1e-9  # of the distance: a point that lies on an axis
 ROMAN = {1: "I", 2: "II", 3: "III", 4: "IV", 5: "V", 6: "VI", 7: "VII", 8: "VIII", 9: "IX", 10: "X"}
 
 
@@ -37,7 +39,7 @@ class Module:
     joints: in the order of the group; `reversed_` tells which of them name their links in the file the other way
     round than the group does. driven: joints whose coordinate is prescribed. rank: the class (1 for a driver).
     gears: gear pairs that it holds; witnesses: joints between known links that these speak of. spinning: links whose
-    spin about the line of their two spherical joints is free, with these; redundant: its joints constrain more than the
+    spin is free, with the two joints between which it is, see `passive`; redundant: its joints constrain more than the
     links have freedoms.
     """
 
@@ -122,36 +124,71 @@ def mobility_by_rank(
 
 
 def passive(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
-    """Links whose spin is free, with their two joints: the link can turn about a line without moving anything else.
+    """Links whose spin is free, with the two joints between which it is: it moves nothing else.
 
-    Both joints are spherical; or one is, and the axis of the other, which frees a turn, goes through its centre. A turn
-    that is driven is not free.
+    A link between two joints, or several in a row that slide along one line or screw on it, such as a strut between two
+    balls, turns about that line as one: it is named by the first. One of both joints is spherical; the other is, too,
+    or its own turn, which no driver holds, is about the line.
     """
     spinning: dict[str, tuple[str, str]] = {}
     if mechanism.space == "planar" or mechanism.loop:
         return spinning
-    for link in mechanism.links:
-        joints = [name for name, joint in mechanism.joints.items() if link in joint.links]
-        balls = [name for name in joints if PAIRS[mechanism.joints[name].type].ball]
-        if link == mechanism.fixed_link or len(joints) != 2 or not balls:
+    of_link: dict[str, list[str]] = {link: [] for link in mechanism.links}
+    for name, joint in mechanism.joints.items():
+        for link in joint.links:
+            of_link[link].append(name)
+    order, values = list(mechanism.links), mechanism.parameters()
+    for ball, joint in mechanism.joints.items():
+        for link in joint.links if PAIRS[joint.type].ball else ():
+            row, ends = _row_from(mechanism, of_link, ball, link)
+            if ends and all(_in_line(mechanism, values, *part) for part in row):
+                links = sorted((part[0] for part in row), key=order.index)
+                spinning[links[0]] = (ends[0], ends[1])
+    return {link: spinning[link] for link in order if link in spinning}
+
+
+def _row_from(
+    mechanism: Mechanism, of_link: Mapping[str, Sequence[str]], ball: str, link: str
+) -> tuple[list[tuple[str, str, str]], list[str]]:
+    """Links in a row from a ball, each with its two joints, up to one that lets them turn together, and both its ends.
+
+    No ends where the row branches, or ends at the ground or at a joint that holds the turn.
+    """
+    row: list[tuple[str, str, str]] = []
+    before = ball
+    while link != mechanism.fixed_link and len(of_link[link]) == 2 and link not in (part[0] for part in row):
+        after = next((name for name in of_link[link] if name != before), before)
+        row.append((link, before, after))
+        pair = PAIRS[mechanism.joints[after].type]
+        if pair.ball or ((pair.bored or pair.name == "planar") and after not in mechanism.drivers):
+            inner = len(row) > 1
+            return row, [ball, after] if inner else list(of_link[link])
+        if not (pair.guided or pair.threaded):
+            break
+        before, link = after, next(other for other in mechanism.joints[after].links if other != link)
+    return row, []
+
+
+def _in_line(mechanism: Mechanism, values: Mapping[str, Any], link: str, first: str, second: str) -> bool:
+    """Whether two joints of a link, as far as they have one, have one axis, and it goes through the centre of a ball.
+
+    The normal of a planar joint is an axis wherever it stands.
+    """
+
+    def vector(path: str) -> np.ndarray:
+        return np.array([float(np.ravel(values[f"links.{link}.points.{path}.{letter}"])[0]) for letter in "xyz"])
+
+    apart = vector(second) - vector(first)
+    axes = []
+    for name in (first, second):
+        pair = PAIRS[mechanism.joints[name].type]
+        if pair.ball:
             continue
-        if len(balls) == 2 or _through(mechanism, link, balls[0], *(name for name in joints if name not in balls)):
-            spinning[link] = (joints[0], joints[1])
-    return spinning
-
-
-def _through(mechanism: Mechanism, link: str, ball: str, other: str) -> bool:
-    """Whether the axis of a joint that turns goes through the centre of a ball on the same link."""
-    pair = PAIRS[mechanism.joints[other].type]
-    if not pair.bored or other in mechanism.drivers:
-        return False
-    values = mechanism.parameters()
-    centre, place, axis = (
-        np.array([float(np.ravel(values[f"links.{link}.points.{path}.{letter}"])[0]) for letter in "xyz"])
-        for path in (ball, other, f"{other}.axis")
-    )
-    apart = float(np.linalg.norm(np.cross(centre - place, axis / np.linalg.norm(axis))))
-    return apart <= 1e-9 * max(float(np.linalg.norm(centre - place)), 1e-300)
+        axis = vector(f"{name}.axis") / np.linalg.norm(vector(f"{name}.axis"))
+        axes.append(axis)
+        if pair.name != "planar" and np.linalg.norm(np.cross(apart, axis)) > IN_LINE * np.linalg.norm(apart):
+            return False
+    return len(axes) < 2 or bool(np.linalg.norm(np.cross(*axes)) <= IN_LINE)
 
 
 def decompose(mechanism: Mechanism) -> Plan:

@@ -43,6 +43,7 @@ from trunnion.results.quantities import readable
 from trunnion.solve import shifts
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
+from trunnion.solve.space.determinacy import spins_of
 from trunnion.statistics.population import Population
 from trunnion.studies.tolerance.effects import FirstOrder
 from trunnion.studies.tolerance.first_order import ToleranceStudy, none_stated
@@ -360,11 +361,11 @@ def _fits(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
 
 def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
     """Measures of links that may spin about the line of their joints."""
-    for link, *ends in (one for module in run.system.plan.modules for one in module.spinning):
+    for _, (link, *ends), members in spins_of(run.system):
         for measure in measures:
             owner, _, point = measure.subject.partition(".")
-            if owner == link and (measure.kind == "angle" or (measure.kind == "point" and point not in ends)):
-                what = f"'{link}' can spin about the line {ends[0]}-{ends[1]}; this study sets that spin to zero"
+            if owner in members and (measure.kind == "angle" or (measure.kind == "point" and point not in ends)):
+                what = f"'{owner}' can spin about the line {ends[0]}-{ends[1]}; this study sets that spin to zero"
                 remedy = "measure one of these two points"
                 figures = {"link": link, "points": list(ends)}
                 yield Finding.warning("play.spin", f"measures.{measure.name}", what, remedy, **figures)

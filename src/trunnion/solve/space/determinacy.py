@@ -19,10 +19,11 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
 from trunnion.algebra.space import moment_at
-from trunnion.algebra.vector import dot, minus
+from trunnion.algebra.vector import dot
 from trunnion.errors import Finding, MechanismError, Severity, agreeing, counted
 from trunnion.groups.redundant import RANK, stacked
 from trunnion.groups.tree import Pose, Tree
+from trunnion.joints.pairs import PAIRS
 from trunnion.results.quantities import readable
 from trunnion.solve.assembly import Chosen
 from trunnion.solve.backward import Given, backward
@@ -32,7 +33,7 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.system import Cycle, System, Values, driven_coordinates, felt
 from trunnion.solve.track import SEED, at, extent, guess_reaches, lane_of
 
-__all__ = ["Determinacy", "ModuleDeterminacy", "look"]
+__all__ = ["Determinacy", "ModuleDeterminacy", "look", "spins_of"]
 
 LOOKED = 12  # positions: what is special at one of them only is a singular position
 TRIES = 96  # guesses at a pose
@@ -136,24 +137,30 @@ def _spins(walk: Forward) -> tuple[dict[str, float], dict[str, float]]:
         return {}, {}
     with np.errstate(all="ignore"):
         back = backward(walk, FrictionMethod(), Given())
-    torques, dragged = {}, {}
-    for link, torque in back.spins.items():
-        joints = [name for name, (_, links) in walk.system.joints.items() if link in links]
+    torques, dragged, size = {}, {}, _largest(walk.system.size(walk.values))
+    for number, (link, *joints), members in spins_of(walk.system):
+        torque, group = back.spins[link], walk.system.groups[number]
         force = max(_largest(np.sqrt(dot(back.reactions[name].u, back.reactions[name].u))) for name in joints)
-        size = _largest(walk.system.size(walk.values))
         if _largest(torque) > PRESENT * force * size:
             torques[link] = _largest(torque)
-        start, end = (walk.element(link, name).place for name in joints)
-        line = minus(end, start)
+        a, b = (walk.system.plan.modules[number].joints.index(name) for name in joints)
+        axis, pose = group.spin_axis(walk.poses[number].elements, a, b), walk.poses[number]
+        centre = pose.elements[a if group.joints[a].pair.ball else b].second.place
         drag: Any = 0.0
         for name in joints:
-            sign = 1.0 if walk.system.joints[name][1][1] == link else -1.0
-            drag = drag + sign * dot(moment_at(back.friction_wrenches[name], start), line)
-        length = np.sqrt(primal(dot(line, line)))
-        drag = primal(drag) / np.where(length > 0, length, np.nan)
+            sign = 1.0 if walk.system.joints[name][1][1] in members else -1.0
+            drag = drag + sign * dot(moment_at(back.friction_wrenches[name], centre), axis)
         if _largest(drag) > PRESENT * force * size:
             dragged[link] = _largest(drag)
     return torques, dragged
+
+
+def spins_of(system: System) -> Iterator[tuple[int, tuple[str, str, str], list[str]]]:
+    """Every free spin: the number of its module, the link it is named by with its two joints, and all that spin."""
+    for number, module in enumerate(system.plan.modules):
+        for spin, places in zip(module.spinning, getattr(system.groups[number], "spinning", ()), strict=True):
+            members = system.groups[number].spun(*places)
+            yield number, spin, [module.links[member] for member in sorted(members)]
 
 
 def _largest(values: Any) -> float:
@@ -314,17 +321,20 @@ class Determinacy:
 
     def _spinning(self) -> Iterator[Finding]:
         """Links that can spin about the line of their joints, and what would drag them."""
-        for module in self.system.plan.modules:
-            for link, *points in module.spinning:
-                where, drag = f"links.{link}", self.dragged.get(link)
-                what = f"the link '{link}' can spin about the line {points[0]}-{points[1]} (a passive freedom)"
-                remedy = "the analysis sets this spin to zero"
-                if drag is not None:
-                    remedy += f"; friction of its joints would drag it with up to {readable(drag, 'N m')}"
-                yield Finding.note("mobility.spin", where, what, remedy, link=link, points=points, torque=drag)
-                if link in self.spins:
-                    what = f"the link '{link}' is free to spin about {points[0]}-{points[1]}, but a torque of up to "
-                    what += f"{readable(self.spins[link], 'N m')} acts about that line"
-                    remedy = "make the link symmetric about the line, or use a universal joint at one end"
-                    figures = {"link": link, "points": points, "torque": self.spins[link]}
-                    yield Finding.warning("mobility.spin_loaded", where, what, remedy, **figures)
+        for _, (link, *points), members in spins_of(self.system):
+            where, drag = f"links.{link}", self.dragged.get(link)
+            who = f"the link '{link}'" if len(members) == 1 else f"the links {', '.join(members)} together"
+            what = f"{who} can spin about the line {points[0]}-{points[1]} (a passive freedom)"
+            remedy = "the analysis sets this spin to zero"
+            if drag is not None:
+                remedy += f"; friction of its joints would drag it with up to {readable(drag, 'N m')}"
+            figures = {"link": link, "links": members, "points": points}
+            yield Finding.note("mobility.spin", where, what, remedy, torque=drag, **figures)
+            if link in self.spins:
+                what = f"{who} may spin about {points[0]}-{points[1]}, but a torque of up to "
+                what += f"{readable(self.spins[link], 'N m')} acts about that line"
+                ball = next(name for name in points if PAIRS[self.system.joints[name][0]].ball)
+                remedy = f"make it symmetric about the line, or {ball} a universal joint, which holds the spin"
+                # joints that err a little leave the line, and the spin is no less free
+                say = Finding.warning if self.system.mechanism.has_errors else Finding.error
+                yield say("mobility.spin_loaded", where, what, remedy, torque=self.spins[link], **figures)

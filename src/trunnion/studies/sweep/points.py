@@ -146,7 +146,7 @@ class Points:
         """Whether points may differ in nothing but numbers that flow through the modules' closed forms."""
         run, mechanism = self.run, self.run.system.mechanism
         joints = mechanism.effective_joints.values()
-        if run.cycle.duration <= 0 or self.steps < FEWEST or mechanism.gears:
+        if run.cycle.duration <= 0 or self.steps < FEWEST or mechanism.gears or run.chosen.meetings:
             return False
         if any(joint.seat not in (None, "free") for joint in joints):
             return False

@@ -1,0 +1,77 @@
+"""Rates through a change point: beside it they are read from those on both sides of it.
+
+Where the links go on smoothly through a pose in which two assemblies meet, so do the rates of one free coordinate, if
+nothing rubs. Yet the digits of the accelerations are lost there like the third power of the distance: the place of a
+pin that two links in line hold is known across them only as well as rounding over the distance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from trunnion.algebra.dual import primal
+from trunnion.dynamics.rates import Dynamics, Rates
+from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.solve.change_points import carried_on
+from trunnion.solve.system import felt
+
+__all__ = ["Bridged", "bridged"]
+
+WIDTH = 0.02  # rad, or of the size: from a change point to the first place at which rates are asked for
+PLACES = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])  # in such widths
+APART = 8.0  # widths to the next change point
+
+
+@dataclass(frozen=True)
+class Bridged:
+    """Rates of one free coordinate, beside some of its places by the polynomial through those farther off.
+
+    places: of change points; period: after which they come again, None if they do not.
+    """
+
+    inner: Any
+    places: Sequence[float]
+    period: float | None
+    width: float
+
+    def __call__(self, at: Moment) -> Rates:
+        """The rates; one lane."""
+        away = float(at.q[0, 0]) - np.array(self.places)
+        if self.period is not None:
+            away -= self.period * np.round(away / self.period)
+        nearest = float(away[np.argmin(np.abs(away))])
+        if not abs(nearest) < self.width:
+            return self.inner(at)  # type: ignore[no-any-return]
+        about = [self.inner(at._replace(q=at.q - nearest + place * self.width)) for place in PLACES]
+        columns = [
+            carried_on(self.width * PLACES, np.array([getattr(one, key) for one in about], float).T, nearest)
+            for key in ("second", "integral", "bristles", "works", "slip")
+        ]
+        second, integral, bristles, works, slip = columns
+        sound, locked = all(one.sound for one in about), any(one.locked for one in about)
+        return Rates(second, integral, bristles, works, sound, locked, slip)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.inner, name)
+
+
+def bridged(motion: FreeMotion, rates: Any) -> Dynamics:
+    """The rates of a motion, through the change points that it passes where nothing rubs."""
+    system, run = motion.system, motion.run
+    if len(system.mechanism.drivers) != 1 or felt(system, motion.values):
+        return rates  # type: ignore[no-any-return]
+    times = [time for number, met in run.chosen.meetings.items() if motion.passes(number) for time in met.crossed]
+    if not times:
+        return rates  # type: ignore[no-any-return]
+    (name,) = system.mechanism.drivers
+    places = [float(np.ravel(primal(system.drive(run.values, name, time)[0]))[0]) for time in times]
+    span, periodic = float(np.ravel(system.span(run.values, name).peak)[0]) * run.cycle.duration, run.cycle.periodic
+    width = WIDTH if system.turns(name) else WIDTH * float(np.ravel(system.size(run.values))[0])
+    ordered = np.sort(places)
+    gaps = np.diff([*ordered, ordered[0] + span] if periodic else ordered)
+    width = min([width, *(gap / APART for gap in gaps)])
+    return Bridged(rates, places, span if periodic else None, width)

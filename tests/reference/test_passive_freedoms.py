@@ -1,0 +1,220 @@
+"""Struts between balls, pads under balls: their spins move nothing else, and statics says what they carry."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from trunnion import Mechanism, MechanismError, analyse, check, simulate
+
+Array = NDArray[np.float64]
+UPPER, LOWER = [0.1, 0.3, 0.8], [0.5, 0.05, 0.1]
+
+
+def arm(slide: str | None, driver: str = "H", **parts: Any) -> Mechanism:
+    """An arm on a hinge with a strut to the ground; without one a spring between the same points."""
+    links: dict[str, Any] = {
+        "ground": {"points": {"H": {"at": [0, 0, 0], "axis": [0, 1, 0]}, "U": UPPER}},
+        "arm": {"points": {"H": {"at": [0, 0, 0], "axis": [0, 1, 0]}, "L": LOWER, "W": [0.6, 0, 0.05]}},
+    }
+    joints: dict[str, Any] = {"H": {"type": "revolute", "links": ["ground", "arm"]}}
+    if slide:
+        links["tube"] = {"points": {"U": [0, 0, 0], "T": {"at": [0.2, 0, 0], "axis": [1, 0, 0]}}}
+        links["rod"] = {"points": {"T": {"at": [-0.1, 0, 0], "axis": [1, 0, 0]}, "L": [0.15, 0, 0]}}
+        joints |= {
+            "U": {"type": "spherical", "links": ["ground", "tube"]}, "T": {"type": slide, "links": ["tube", "rod"]},
+            "L": {"type": "spherical", "links": ["arm", "rod"]},
+        }  # fmt: skip
+    for name, more in parts.items():
+        links[name] |= more
+    ranges = {"H": {"speed": 1.0, "range": [-0.3, 0.4]}, "T": {"speed": 0.1, "range": [0.3, 0.4]}}
+    spring = {"between": ["ground.U", "arm.L"], "stiffness": 2e3, "free_length": 0.9}
+    return Mechanism(
+        space="spatial", links=links, joints=joints, drivers={driver: ranges[driver]}, gravity=[0, 0, -9.81],
+        loads={"w": {"link": "arm", "at": "W", "force": [10, 20, -300]}},
+        springs={} if driver == "T" else {"s": spring},
+    )  # fmt: skip
+
+
+def codes(result: Any) -> list[str]:
+    return [one.code for one in result.trunnion.findings]
+
+
+@pytest.mark.parametrize(("slide", "spins"), [("prismatic", 1), ("cylindrical", 2)])
+def test_a_strut_between_balls_changes_nothing(slide: str, spins: int) -> None:
+    """A strut without mass or load: the arm moves and is loaded as without it; its spin is told once."""
+    bare, result = analyse(arm(None), 9), analyse(arm(slide), 9)
+    np.testing.assert_allclose(result["drive_effort"], bare["drive_effort"], rtol=1e-12)
+    assert codes(result).count("mobility.spin") == spins
+    np.testing.assert_allclose(result["reaction_force"].sel(joint="U"), 0.0, atol=1e-9)
+    assert check(arm(slide)).mobility == 1 + spins
+
+
+def test_a_strut_is_a_force_between_two_points() -> None:
+    """A driven slide: F dl/dθ + load = 0 about the hinge, and both balls carry F along the line."""
+    result = analyse(arm("prismatic", "T"), 7)
+    upper = np.array(UPPER)[:, None]
+    lower, wheel = (result["point_position"].sel(point=point).values for point in ("arm.L", "arm.W"))
+    along = (lower - upper) / np.linalg.norm(lower - upper, axis=0)
+    axis = np.array([0.0, 1.0, 0.0])
+    load = axis @ np.cross(wheel, [10.0, 20.0, -300.0], axis=0)
+    force = -load / (axis @ np.cross(lower, along, axis=0))
+    np.testing.assert_allclose(result["drive_effort"].values[0], force, rtol=1e-10)
+    np.testing.assert_allclose(np.linalg.norm(result["reaction_force"].sel(joint="U").values, axis=0), np.abs(force))
+
+
+@pytest.mark.parametrize("slide", ["prismatic", "cylindrical"])
+def test_a_strut_does_not_spin(slide: str) -> None:
+    """Its angular velocity is that of its poses, and has no part along the line."""
+    result = analyse(arm(slide), 401)
+    step = float(np.diff(result["time"].values[:2])[0])
+    for link in ("tube", "rod"):
+        w, x, y, z = result["link_rotation"].sel(link=link).values
+        conjugate = np.array([w, -x, -y, -z])
+        before, here, after = (
+            np.array([w, x, y, z])[:, :-2], conjugate[:, 1:-1], np.array([w, x, y, z])[:, 2:]
+        )  # fmt: skip
+        rate = (after - before) / (2 * step)
+        omega = 2 * (here[0] * rate[1:] + rate[0] * here[1:] + np.cross(rate[1:], here[1:], axis=0))
+        stated = result["link_angular_velocity"].sel(link=link).values
+        np.testing.assert_allclose(stated[:, 1:-1], omega, atol=3e-6)
+        line = result["point_position"].sel(point="arm.L").values - np.array(UPPER)[:, None]
+        np.testing.assert_allclose(np.sum(stated * line, axis=0), 0.0, atol=1e-12)
+
+
+def test_a_strut_changes_no_motion_in_time() -> None:
+    moved = []
+    for slide in (None, "prismatic"):
+        data = arm(slide).data()
+        data["links"]["arm"] |= {"mass": 20.0, "centre": [0.3, 0, 0], "inertia": {"xx": 1.0, "yy": 1.5, "zz": 1.5}}
+        data["drivers"] = {"H": {"speed": 1.0, "range": [-0.9, 0.9], "free": True, "initial": {"coordinate": 0.0}}}
+        moved.append(simulate(Mechanism(**data), 0.15, 10, 1e-10))
+    np.testing.assert_allclose(moved[1]["drive_coordinate"], moved[0]["drive_coordinate"], rtol=1e-8, atol=1e-10)
+    assert abs(float(moved[0]["drive_coordinate"].values[0, -1])) > 0.1
+
+
+def test_a_strut_whose_spin_matters_is_refused() -> None:
+    with pytest.raises(MechanismError, match=r"the links tube, rod together may spin about L-U.*L a universal joint"):
+        analyse(arm("prismatic", rod={"mass": 1.0, "centre": [0.0, 0.02, 0.0]}), 5)
+
+
+def test_a_slide_beside_the_line_is_no_strut() -> None:
+    data = arm("prismatic").data()
+    data["links"]["rod"]["points"]["L"] = [0.15, 0.01, 0]
+    with pytest.raises(MechanismError, match="mobility is 2"):
+        analyse(Mechanism(**data), 3)
+
+
+# ---- double wishbone -------------------------------------------------------------------------------------------
+
+PLACES: dict[str, Any] = {  # m, as drawn
+    "A": [0.0, 0.35, 0.20], "B": [0.0, 0.42, 0.45], "E": [0.0, 0.78, 0.18], "F": [-0.02, 0.72, 0.47],
+    "M": [0.12, 0.38, 0.24], "N": [0.13, 0.75, 0.23], "U": [0.02, 0.48, 0.62], "L": [0.01, 0.62, 0.20],
+    "W": [0.0, 0.85, 0.0],
+}  # fmt: skip
+AXES = {"A": [1.0, 0.02, 0.01], "B": [1.0, -0.03, 0.04]}
+FORCE = np.array([400.0, 900.0, 4200.0])
+
+
+def wishbone() -> Mechanism:
+    """Two arms, an upright with a tie rod, and a strut from the chassis to the lower arm, driven along its slide."""
+    up, low = np.array(PLACES["U"]), np.array(PLACES["L"])
+    length = float(np.linalg.norm(low - up))
+    links = {
+        "ground": ["A", "B", "M", "U"], "lower": ["A", "E", "L"], "upper": ["B", "F"], "upright": ["E", "F", "N", "W"],
+        "tie": ["M", "N"],
+    }  # fmt: skip
+    drawn: dict[str, Any] = {
+        link: {"points": {p: {"at": PLACES[p], **({"axis": AXES[p]} if p in AXES else {})} for p in points}}
+        for link, points in links.items()
+    }
+    drawn["tube"] = {"points": {"U": [0, 0, 0], "T": {"at": [0, 0, 0], "axis": [1, 0, 0]}}}
+    drawn["rod"] = {"points": {"T": {"at": [0, 0, 0], "axis": [1, 0, 0]}, "L": [0, 0, 0]}}
+    ends = {"E": "lower upright", "F": "upper upright", "M": "ground tie", "N": "tie upright", "U": "ground tube",
+            "L": "rod lower"}  # fmt: skip
+    joints: dict[str, Any] = {name: {"type": "spherical", "links": pair.split()} for name, pair in ends.items()}
+    joints |= {
+        "A": {"type": "revolute", "links": ["ground", "lower"]},
+        "B": {"type": "revolute", "links": ["ground", "upper"]},
+        "T": {"type": "prismatic", "links": ["tube", "rod"]},
+    }
+    return Mechanism(
+        space="spatial", links=drawn, joints=joints,
+        drivers={"T": {"speed": 0.01, "range": [length - 0.02, length + 0.02]}},
+        loads={"road": {"link": "upright", "at": "W", "force": FORCE.tolist()}},
+        assembly={"E": PLACES["E"], "F": PLACES["F"], "N": PLACES["N"], "L": PLACES["L"]},
+    )  # fmt: skip
+
+
+def test_a_double_wishbone_with_a_strut() -> None:
+    """8 × 8: equilibrium of the upright, and of both arms about their axes; two spins, of the strut and the tie rod."""
+    result = analyse(wishbone(), 9)
+    assert codes(result).count("mobility.spin") == 2
+    place = {
+        point: result["point_position"].sel(point=f"{link}.{point}").values.T
+        for link, points in {"lower": "EL", "upper": "F", "upright": "NW"}.items()
+        for point in points
+    }
+    eye = np.eye(3)
+    for k in range(9):
+        e, f, n, w, low = (place[name][k] for name in "EFNWL")
+        tie, strut = n - PLACES["M"], low - PLACES["U"]
+        tie, strut = tie / np.linalg.norm(tie), strut / np.linalg.norm(strut)
+        lower, upper = (np.array(AXES[name]) / np.linalg.norm(AXES[name]) for name in "AB")
+        columns = [[*unit, *np.cross(e, unit), -lower @ np.cross(e - PLACES["A"], unit), 0.0] for unit in eye]
+        columns += [[*unit, *np.cross(f, unit), 0.0, -upper @ np.cross(f - PLACES["B"], unit)] for unit in eye]
+        columns += [[*tie, *np.cross(n, tie), 0.0, 0.0], [0.0] * 6 + [lower @ np.cross(low - PLACES["A"], strut), 0.0]]
+        found = np.linalg.solve(np.array(columns).T, [*-FORCE, *-np.cross(w, FORCE), 0.0, 0.0])
+        forces = result["reaction_force"].isel(position=k)
+        np.testing.assert_allclose(forces.sel(joint="E"), found[:3], rtol=1e-8, atol=1e-6)
+        np.testing.assert_allclose(forces.sel(joint="F"), found[3:6], rtol=1e-8, atol=1e-6)
+        np.testing.assert_allclose(forces.sel(joint="N"), found[6] * tie, rtol=1e-8, atol=1e-6)
+        np.testing.assert_allclose(result["drive_effort"].values[0, k], found[7], rtol=1e-8)
+
+
+# ---- a pad under a ball ------------------------------------------------------------------------------------------
+
+
+def test_a_pad_on_a_plane_under_a_ball() -> None:
+    """The ball of a lever in a pad that slides on the face of a crank: where it is follows from the plane alone."""
+    length, face, hinge = 0.5, 0.1, {"at": [0, 0, 0], "axis": [1, 0, 0]}
+    lever: dict[str, Any] = {"V": {"at": [0, 0, 0], "axis": [0, 1, 0]}, "Q": [length, 0, 0]}
+    mechanism = Mechanism(
+        space="spatial",
+        links={
+            "ground": {"points": {"C": hinge, "V": {"at": [-0.4, 0.15, 0.3], "axis": [0, 1, 0]}}},
+            "crank": {"points": {"C": hinge, "P": {"at": [0, 0, face], "axis": [0, 0, 1]}}},
+            "pad": {"points": {"P": {"at": [0.03, 0, 0], "axis": [0, 0, 1]}, "Q": [0, 0.01, 0.02]}},
+            "lever": {"points": lever},
+        },
+        joints={
+            "C": {"type": "revolute", "links": ["ground", "crank"]},
+            "P": {"type": "planar", "links": ["crank", "pad"]},
+            "Q": {"type": "spherical", "links": ["pad", "lever"]},
+            "V": {"type": "revolute", "links": ["ground", "lever"]},
+        },
+        drivers={"C": {"speed": 1.0, "range": [-0.4, 0.5]}},
+        loads={"turn": {"link": "lever", "moment": [0, -5.0, 0]}},
+        assembly={"Q": [0.05, 0.15, 0.12]},
+    )  # fmt: skip
+    result = analyse(mechanism, 10)
+    assert codes(result).count("mobility.spin") == 1
+
+    def ball(angle: float) -> Array:
+        return np.array([-0.4 + length * np.cos(angle), 0.15, 0.3 - length * np.sin(angle)])
+
+    def lifted(theta: float) -> float:
+        normal = np.array([0.0, -np.sin(theta), np.cos(theta)])
+        return float(brentq(lambda angle: normal @ ball(angle) - face - 0.02, -0.6, 1.2, xtol=1e-15))
+
+    theta = -0.4 + result["time"].values
+    angles = [lifted(angle) for angle in theta]
+    places = result["point_position"].sel(point="lever.Q").values
+    np.testing.assert_allclose(places, np.array([ball(angle) for angle in angles]).T, atol=1e-9)
+    step = 1e-4
+    ratio = np.array([(lifted(at + step) - lifted(at - step)) / (2 * step) for at in theta])
+    np.testing.assert_allclose(result["drive_effort"].values[0], 5.0 * ratio, atol=1e-5)

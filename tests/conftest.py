@@ -32,7 +32,7 @@ collect_ignore = [] if find_spec("uvicorn") else ["studio"]  # the extra studio 
 # Every run the same cases, no database on disk, no deadline that a loaded machine could miss.
 settings.register_profile(
     "trunnion",
-    max_examples=60,
+    max_examples=25,
     deadline=None,
     derandomize=True,
     database=None,

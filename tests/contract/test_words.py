@@ -1,14 +1,12 @@
 """Sentences agree with their numbers, and say what is so."""
 
 import json
-import re
 
 import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from trunnion import Mechanism, MechanismError, analyse, check, sweep
-from trunnion.errors import agreeing, counted
+from trunnion import Mechanism, analyse
 from trunnion.results.attributes import summary_of
 from trunnion.views.cycle.deviations import continued
 
@@ -58,20 +56,6 @@ def told_of_assembly(mechanism):
     return [one["what"] for one in said(mechanism) if one["code"] == "assembly.choice"]
 
 
-def test_a_number_with_its_noun():
-    assert counted(1, "row") == "1 row"
-    assert counted(2000, "row") == "2,000 rows"
-    assert counted(0, "assembly", "assemblies") == "0 assemblies"
-    assert agreeing(1, "is", "are") == "is"
-
-
-@pytest.mark.parametrize(("drivers", "words"), [(0, "there is no driver"), (2, "there are 2 drivers")])
-def test_drivers_and_freedoms(drivers, words):
-    driven = {name: {"speed": 1.0} for name in "AB"[:drivers]}
-    with pytest.raises(MechanismError, match=words):
-        analyse(model(FOUR_BAR, drivers=driven), 4)
-
-
 @pytest.mark.slow
 def test_a_hint_that_starts_in_a_dead_centre_decides_beside_it():
     """At 95 mm both assemblies are one; the pin goes up if the hint lies above, else down."""
@@ -82,28 +66,12 @@ def test_a_hint_that_starts_in_a_dead_centre_decides_beside_it():
         assert np.sign(np.nanmean(place)) == side
 
 
-def test_a_hint_that_does_not_decide_is_named():
-    (none,) = told_of_assembly(model(FOUR_BAR))
-    assert "no assembly hint selects one" in none
-    (known,) = told_of_assembly(model(FOUR_BAR, assembly={"B": ["40 mm", "1 mm"]}))
-    assert "the hint of B does not distinguish them" in known
-    (even,) = told_of_assembly(model(FOUR_BAR, assembly={"C": ["70 mm", "0 mm"]}))
-    assert "the hint of C does not distinguish them: C is at (70.00\xa0mm, 74.16\xa0mm) in way-1, (" in even
-    assert "no hint" not in known + even
-
-
 def test_no_locking_margin_where_nothing_can_be_assembled():
     mechanism = model(FOUR_BAR).with_values({"links.coupler.points.C.x": "5 mm", "links.rocker.points.C.x": "5 mm"})
     result = analyse(mechanism, 24)
     assert np.isnan(result["locking_margin"].values).all()
     (figure,) = [one for one in summary_of(result) if one.name == "locking_margin"]
     assert (figure.value, figure.aspect) == (None, "")
-
-
-def test_one_point_of_a_sweep_has_no_figures():
-    result = sweep(model(FOUR_BAR), {"links.coupler.points.C.x": ["80 mm", "5 mm"]}, 24)
-    (what,) = [one["what"] for one in json.loads(result.attrs["findings"]) if one["code"] == "sweep.no_answer"]
-    assert re.match(r"1 of 2 points has no result", what)
 
 
 def test_beta_stays_within_a_turn():
@@ -118,7 +86,3 @@ def test_beta_stays_within_a_turn():
         assert np.allclose(np.cos(one - other), 1.0)
     steps = np.abs(np.diff(shown))
     assert np.count_nonzero(steps > 1.0) <= 3  # whole turns only, at which the curve is broken
-
-
-def test_a_check_says_what_the_hint_is():
-    assert not [one for one in check(model(ENGINE, assembly={"P": ["0 mm", "35 mm"]})).findings if "hint" in one.what]

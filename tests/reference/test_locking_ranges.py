@@ -99,9 +99,9 @@ def test_friction_that_holds_a_mechanism_of_many_joints_is_what_it_holds_with() 
     for joint in ("H", "K"):
         data["joints"][joint] |= {"pin": {"radius": 0.004}, "friction": 0.3}
     known = locking(Mechanism(**data), 41)["holding_multiple"].values
-    at = np.flatnonzero(np.isfinite(known))[::3]
-    assert len(at) >= 3
-    for i in at:
+    at = np.flatnonzero(np.isfinite(known))
+    assert len(at) >= 7
+    for i in at[[0, len(at) // 2, -1]]:
         for factor, held in ((1 - 1e-6, False), (1 + 1e-6, True)):
             for joint, own in (("A", FRICTION), ("H", 0.3), ("K", 0.3)):
                 data["joints"][joint]["friction"] = own * known[i] * factor

@@ -240,7 +240,7 @@ def test_what_a_drag_changes_is_named_in_words():
 # ---- dragging ------------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(st.integers(0, 359), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
 def test_what_is_dragged_goes_there_and_its_neighbours_stay(index, x, y):
     text = EXAMPLES[FOURBAR]
@@ -449,14 +449,12 @@ def test_the_other_assembly_is_one_click_away():
 
 
 SHORT_ROCKER = {"AD: 5.50 m": "AD: 4.2 m", "AB: 2.00 m": "AB: 2.6 m", "CD: 3.00 m": "CD: 1.2 m"}
-NEAR_AXES = {"d: 100 mm": "d: 30 mm", "friction: 0.1": "friction: 0.002"}
 
 
-@pytest.mark.parametrize(("name", "other"), [(FOURBAR, SHORT_ROCKER), ("rssr", NEAR_AXES)])
-def test_the_least_margin_is_that_of_a_position_that_has_one(name, other):
+def test_the_least_margin_is_that_of_a_position_that_has_one():
     """The first positions cannot be assembled, the others do not lock."""
-    text = EXAMPLES[name]
-    for old, new in other.items():
+    text = EXAMPLES[FOURBAR]
+    for old, new in SHORT_ROCKER.items():
         text = text.replace(old, new)
     found = ask(ask="model", text=text)
     assert found["margin"][0] is None

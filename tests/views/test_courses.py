@@ -9,8 +9,6 @@ import pytest
 from stand_in import four_bar
 
 import trunnion
-from trunnion.views.charts import Line, over_drive
-from trunnion.views.common.cycle import abscissa
 from trunnion.views.common.drawing import cylinder, picture
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.courses import turned_from_start
@@ -64,18 +62,6 @@ def test_a_crank_in_space_turns_on_and_a_rocker_comes_back():
     assert turned_from_start(hole)[25:] == pytest.approx(angle[25:], abs=1e-7)
 
 
-def test_ripple_is_seen():
-    result = four_bar(72)
-    over = abscissa(result)
-    even = 100.0 + np.sin(np.radians(over.values))
-    chart = over_drive(result, over, "torque", "N m", [Line(over.values, even, "even")])
-    assert not chart.zero
-    wide = over_drive(result, over, "torque", "N m", [Line(over.values, 20 * (even - 95.0), "wide")])
-    assert wide.zero
-    constant = over_drive(result, over, "torque", "N m", [Line(over.values, 0 * even + 5, "constant")])
-    assert constant.zero
-
-
 def test_curves_that_coincide_are_named_together_and_have_the_colour_of_the_first():
     result = four_bar(36)
     forces = result["reaction_force"].values
@@ -85,12 +71,6 @@ def test_curves_that_coincide_are_named_together_and_have_the_colour_of_the_firs
     assert labels == ["A", "B", "C = D"]
     alone = plots.figure(result.isel(joint=[0, 1, 2]), "reactions")
     assert _line(figure.axes[0], "C = D").get_color() == _line(alone.axes[0], "C").get_color()
-
-
-def test_slides_are_told_in_millimetres_as_their_drive():
-    result = trunnion.analyse(trunnion.read(EXAMPLES / "slider-crank.yaml").with_values({"r": "1.2 m", "l": "5 m"}), 12)
-    labels = [axes.get_ylabel() for axes in plots.figure(result, "motion").axes]
-    assert "slide [mm]" in labels
 
 
 def test_a_cylinder_is_a_barrel_with_a_rod_in_it():

@@ -10,7 +10,7 @@ import pytest
 from as_built_models import EXAMPLES, four_bar, loaded
 
 import trunnion
-from trunnion.views.cycle.deviations_tables import error_rows
+from trunnion.views.cycle.deviations_tables import error_rows, loss_rows
 from trunnion.views.cycle.scene import scene
 
 
@@ -81,6 +81,14 @@ def test_the_table_of_errors_has_the_figures_of_the_result(cardan):
     torque = rows["Drive torque of input, largest"]
     assert torque["built"] == f"{np.max(effort):.2f}\u00a0N m"
     assert torque["ideal"] == f"{np.max(ideal):.2f}\u00a0N m"
+
+
+def test_losses_are_told_with_their_angles(slider):
+    (row,) = loss_rows(slider)
+    lost = np.flatnonzero(slider.contact_lost.sel(joint="S").values)
+    assert row["joint"] == "S"
+    assert row["places"] == ", ".join(f"{5 * index}°" for index in lost)
+    assert loss_rows(four_bar()) == []
 
 
 if shutil.which("node"):  # as in test_browser.py

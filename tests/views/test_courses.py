@@ -9,6 +9,8 @@ import pytest
 from stand_in import four_bar
 
 import trunnion
+from trunnion.views.charts import Line, over_drive
+from trunnion.views.common.cycle import abscissa
 from trunnion.views.common.drawing import cylinder, picture
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.courses import turned_from_start
@@ -60,6 +62,18 @@ def test_a_crank_in_space_turns_on_and_a_rocker_comes_back():
     hole[:, 20:25] = np.nan
     assert np.isnan(turned_from_start(hole)[20:25]).all()
     assert turned_from_start(hole)[25:] == pytest.approx(angle[25:], abs=1e-7)
+
+
+def test_ripple_is_seen():
+    result = four_bar(72)
+    over = abscissa(result)
+    even = 100.0 + np.sin(np.radians(over.values))
+    chart = over_drive(result, over, "torque", "N m", [Line(over.values, even, "even")])
+    assert not chart.zero
+    wide = over_drive(result, over, "torque", "N m", [Line(over.values, 20 * (even - 95.0), "wide")])
+    assert wide.zero
+    constant = over_drive(result, over, "torque", "N m", [Line(over.values, 0 * even + 5, "constant")])
+    assert constant.zero
 
 
 def test_curves_that_coincide_are_named_together_and_have_the_colour_of_the_first():

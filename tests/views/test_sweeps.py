@@ -90,6 +90,16 @@ def test_of_many_panels_some_are_drawn_and_the_rest_is_said():
     assert "(12 of 18 panels)" in sheet.get_suptitle()
 
 
+def test_unsorted_values_are_drawn_in_order_and_the_gap_is_told():
+    angles = scale([20, 0, 10, 10, 30], "rad", "deg", DEG)
+    axes = figure(swept({"misalignment": angles}, lambda a: a / 30, lambda a: Status.LOCKED if a > 25 else 0)).axes[0]
+    line = curves(axes, 1)[0]
+    assert line[:, 0] == pytest.approx([0, 10, 10, 20, 30])
+    assert line[:4, 1] == pytest.approx([0, 1 / 3, 1 / 3, 2 / 3])
+    assert np.isnan(line[4, 1])
+    assert [text.get_text() for text in axes.texts] == ["locked"]
+
+
 def test_scales_are_logarithmic_where_the_values_are_spaced_so():
     kinds = {
         "log": ([1, 2, 5, 10, 20, 50], [0.001, 0.01, 0.1, 1], [30, 1, 10, 3, 10]),
@@ -290,6 +300,13 @@ def test_a_table_has_the_ends_of_an_effort_that_lie_beyond_zero(least, most, sho
         result[f"drive_effort_{end}"].attrs = given.attrs
     (table,) = tables(result)
     assert [one for one in table.head if one.startswith("input.effort")] == [f"input.effort {k} [N m]" for k in shown]
+
+
+def test_a_measure_that_the_sweep_lacks_is_told():
+    with pytest.raises(MechanismError, match="does not hold it"):
+        figure(swept(GRID, margin=False), "locking_margin")
+    with pytest.raises(MechanismError, match="no mechanism of the sweep has errors"):
+        figure(swept(GRID), "efficiency_ideal")
 
 
 def test_the_file_has_a_row_a_point_of_any_number_of_names(tmp_path):

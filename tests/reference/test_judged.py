@@ -21,6 +21,7 @@ DRAWN = {"planar": planar.drawn, "spatial": spatial.drawn}
 JUDGED = {"planar": judged_planar.judge, "spatial": judged_spatial.judge}
 
 
+@pytest.mark.sample(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("space", "seeds"),

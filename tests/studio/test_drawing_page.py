@@ -241,14 +241,3 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         np.testing.assert_allclose(after, middle + [25, 0] + 1.5 * (np.array(origin) - middle), atol=1e-3)
         assert user.state("s.text.value") == before
         assert user.state("s.live.value") is None
-
-    @pytest.mark.slow
-    def test_a_joint_dropped_on_its_neighbour_is_refused_in_a_sentence(user):
-        user.new_sheet()
-        user.draw_four_bar()
-        drawn = user.state("s.text.value")
-        drag(user, "C", *np.subtract(user.handle("D"), user.handle("C")))
-        assert user.state("s.text.value") == drawn
-        told = user.state("s.notice.value")
-        assert told["bad"]
-        assert "would have no length" in told["words"]

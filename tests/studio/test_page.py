@@ -234,17 +234,6 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         assert index_at(0.3) < clicked == index_at(-0.5)  # what was clicked stays
 
     @pytest.mark.slow
-    def test_a_plot_moves_the_mechanism(user):
-        user.page.click("role=tab[name=Plots]")
-        box = user.page.locator(".plot").first.bounding_box()
-        where = user.handle("B")
-        user.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 50)
-        user.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60)
-        user.page.wait_for_timeout(150)
-        assert 100 < user.state("s.index.value") < 300
-        assert np.hypot(*np.subtract(user.handle("B"), where)) > 20
-
-    @pytest.mark.slow
     def test_a_slider_crank_by_keys_alone(user):
         user.new_sheet()
         user.keys("l", "ArrowLeft", "Shift+Enter", "ArrowRight", "ArrowUp", "ArrowUp", "ArrowUp", "Enter")

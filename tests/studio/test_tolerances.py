@@ -50,12 +50,6 @@ def test_a_stroke_that_no_tolerance_changes_is_told_as_that():
     assert ratio["worst"] == pytest.approx([-(low - high) / 2, (low - high) / 2], rel=1e-4)
 
 
-def test_a_part_of_the_cycle_that_cannot_be_reached_is_told_with_the_rest():
-    ready = {one["what"]: one for one in ask(ask="model", text=TEXT.replace("[100 mm, 0]", "[10 mm, 0]"))["ready"]}
-    assert ready["motion"]["ok"]
-    assert "the other" in ready["motion"]["why"]
-
-
 if CHROMIUM:  # not a skip: the numbers are tested above
 
     @pytest.fixture(scope="module")

@@ -1,12 +1,13 @@
 """Sentences agree with their numbers, and say what is so."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from trunnion import Mechanism, analyse
+from trunnion import Mechanism, analyse, check, sweep
 from trunnion.results.attributes import summary_of
 from trunnion.views.cycle.deviations import continued
 
@@ -74,6 +75,12 @@ def test_no_locking_margin_where_nothing_can_be_assembled():
     assert (figure.value, figure.aspect) == (None, "")
 
 
+def test_one_point_of_a_sweep_has_no_figures():
+    result = sweep(model(FOUR_BAR), {"links.coupler.points.C.x": ["80 mm", "5 mm"]}, 24)
+    (what,) = [one["what"] for one in json.loads(result.attrs["findings"]) if one["code"] == "sweep.no_answer"]
+    assert re.match(r"1 of 2 points has no result", what)
+
+
 def test_beta_stays_within_a_turn():
     """Ends of which one goes round and round against the other."""
     way = np.linspace(0.0, 6 * np.pi, 400)
@@ -86,3 +93,7 @@ def test_beta_stays_within_a_turn():
         assert np.allclose(np.cos(one - other), 1.0)
     steps = np.abs(np.diff(shown))
     assert np.count_nonzero(steps > 1.0) <= 3  # whole turns only, at which the curve is broken
+
+
+def test_a_check_says_what_the_hint_is():
+    assert not [one for one in check(model(ENGINE, assembly={"P": ["0 mm", "35 mm"]})).findings if "hint" in one.what]

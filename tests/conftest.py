@@ -29,10 +29,12 @@ gc.set_threshold(50_000, 20, 50)
 
 collect_ignore = [] if find_spec("uvicorn") else ["studio"]  # the extra studio is not installed
 
+AT_MOST = 6  # slow cases of a test with like cases, where the test does not say how many
+
 # Every run the same cases, no database on disk, no deadline that a loaded machine could miss.
 settings.register_profile(
     "trunnion",
-    max_examples=60,
+    max_examples=25,
     deadline=None,
     derandomize=True,
     database=None,
@@ -65,28 +67,38 @@ def _keep_what_is_asked_for_again() -> None:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """`pytest -m slow --every-case` runs the cases that `sample` leaves out."""
-    parser.addoption("--every-case", action="store_true", help="run also the like cases that `sample` leaves out")
+    """`pytest -m slow --every-case` runs also the like cases that are left out."""
+    parser.addoption("--every-case", action="store_true", help="run also the like cases that are left out")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Of a test marked `spread(n, *also)`, n of its cases, evenly chosen, and those named stay in `make test`; of the
-    slow cases of one marked `sample(n)`, n evenly chosen run."""
+    others at most `AT_MOST` are slow tests, of the slow cases of a test marked `sample(n)` n, evenly chosen as well."""
+    left: list[pytest.Item] = []
     for (_, count, *also), found in _marked(items, "spread").items():
         kept = _evenly(count, len(found))
-        for k, item in enumerate(found):
-            if k not in kept and item.nodeid.partition("[")[2].removesuffix("]") not in also:
-                item.add_marker(pytest.mark.slow)
-    if config.getoption("--every-case"):
-        return
-    slow = [item for item in items if item.get_closest_marker("slow")]
-    left: list[pytest.Item] = []
-    for (_, count), found in _marked(slow, "sample").items():
-        kept = _evenly(count, len(found))
-        left += [item for k, item in enumerate(found) if k not in kept]
-    out = set(map(id, left))
-    items[:] = [item for item in items if id(item) not in out]
-    config.hook.pytest_deselected(items=left)
+        others = [item for k, item in enumerate(found) if k not in kept and _case(item) not in also]
+        for item in others:
+            item.add_marker(pytest.mark.slow)
+        if not found[0].get_closest_marker("sample"):
+            left += _but_evenly(AT_MOST, others)
+    for (_, count), found in _marked([item for item in items if item.get_closest_marker("slow")], "sample").items():
+        left += _but_evenly(count, found)
+    if not config.getoption("--every-case"):
+        out = set(map(id, left))
+        items[:] = [item for item in items if id(item) not in out]
+        config.hook.pytest_deselected(items=left)
+
+
+def _case(item: pytest.Item) -> str:
+    """The case of a test: what stands in brackets behind its name."""
+    return item.nodeid.partition("[")[2].removesuffix("]")
+
+
+def _but_evenly(count: int, items: list[pytest.Item]) -> list[pytest.Item]:
+    """All but so many, evenly chosen."""
+    kept = _evenly(min(count, len(items)), len(items))
+    return [item for k, item in enumerate(items) if k not in kept]
 
 
 def _marked(items: list[pytest.Item], name: str) -> dict[tuple[Any, ...], list[pytest.Item]]:

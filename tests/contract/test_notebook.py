@@ -70,18 +70,6 @@ def test_results_are_combined_position_by_position(four_bar: xr.Dataset) -> None
     assert (four_bar["drive_effort"] - other["drive_effort"]).sizes["position"] == STEPS
 
 
-def test_the_drive_can_be_looked_up(four_bar: xr.Dataset) -> None:
-    at = four_bar["drive_effort"].sel(driver="A").set_xindex("drive").sel(drive=91.0, method="nearest")
-    assert float(at) == float(four_bar["drive_effort"][0, 3])
-
-
-def test_a_result_read_again_is_drawn_over_the_drive(four_bar: xr.Dataset, tmp_path: Path) -> None:
-    trunnion.save(four_bar, tmp_path / "cycle.nc")
-    again = xr.load_dataset(tmp_path / "cycle.nc")
-    assert np.array_equal(again["position"], four_bar["drive"])
-    assert again["position"].attrs == four_bar["drive"].attrs
-
-
 class Read(HTMLParser):
     """Text and elements of a page; every element that is opened must be closed."""
 
@@ -136,15 +124,6 @@ def test_a_mechanism_that_cannot_be_drawn_shows_why(changed: dict[str, Any]) -> 
     shown = Read(trunnion.Mechanism(**data)._repr_html_())
     assert "svg" not in shown.elements
     assert "error" in shown.words
-
-
-def test_whatever_goes_wrong_a_mechanism_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> None:
-        raise ZeroDivisionError("<deep inside>")
-
-    mechanism = example("durango-fourbar")
-    monkeypatch.setattr(notebook, "check", broken)
-    assert "ZeroDivisionError: <deep inside>" in Read(mechanism._repr_html_()).words
 
 
 def test_names_become_no_markup(four_bar: xr.Dataset) -> None:

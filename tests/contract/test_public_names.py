@@ -167,13 +167,6 @@ def test_one_name_is_a_list_of_one() -> None:
     assert trunnion.analyse(mechanism, np.int64(6), variables="drive_effort").sizes["position"] == 6
 
 
-def test_a_copy_with_other_sections_is_checked() -> None:
-    mechanism = trunnion.Mechanism(**MODELS["four-bar"]())
-    assert mechanism.copy(update={"gravity": [0, -1]}).parameters()["gravity.y"] == -1
-    with pytest.raises(trunnion.MechanismError, match="gravity"):
-        mechanism.copy(update={"gravity": "nonsense"})
-
-
 def test_the_options_of_a_view_are_its_own(tmp_path: Path) -> None:
     mechanism = trunnion.Mechanism(**MODELS["four-bar"]())
     cycle = trunnion.analyse(mechanism, 6)
@@ -208,13 +201,6 @@ def test_a_mechanism_and_a_result_are_drawn_by_one_function() -> None:
     assert trunnion.plot(trunnion.analyse(mechanism, 6), "reactions").axes
     with pytest.raises(trunnion.MechanismError, match="one drawing"):
         trunnion.plot(mechanism, "reactions")
-
-
-def test_the_package_runs_as_a_module() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "trunnion", "--version"], capture_output=True, text=True, timeout=60, check=True
-    )
-    assert trunnion.__version__ in done.stdout
 
 
 def test_importing_the_package_loads_nothing() -> None:

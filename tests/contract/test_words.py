@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from trunnion import Mechanism, MechanismError, analyse, check, sweep
-from trunnion.errors import agreeing, counted
+from trunnion import Mechanism, analyse, check, sweep
 from trunnion.results.attributes import summary_of
 from trunnion.views.cycle.deviations import continued
 
@@ -58,20 +57,6 @@ def told_of_assembly(mechanism):
     return [one["what"] for one in said(mechanism) if one["code"] == "assembly.choice"]
 
 
-def test_a_number_with_its_noun():
-    assert counted(1, "row") == "1 row"
-    assert counted(2000, "row") == "2,000 rows"
-    assert counted(0, "assembly", "assemblies") == "0 assemblies"
-    assert agreeing(1, "is", "are") == "is"
-
-
-@pytest.mark.parametrize(("drivers", "words"), [(0, "there is no driver"), (2, "there are 2 drivers")])
-def test_drivers_and_freedoms(drivers, words):
-    driven = {name: {"speed": 1.0} for name in "AB"[:drivers]}
-    with pytest.raises(MechanismError, match=words):
-        analyse(model(FOUR_BAR, drivers=driven), 4)
-
-
 @pytest.mark.slow
 def test_a_hint_that_starts_in_a_dead_centre_decides_beside_it():
     """At 95 mm both assemblies are one; the pin goes up if the hint lies above, else down."""
@@ -80,16 +65,6 @@ def test_a_hint_that_starts_in_a_dead_centre_decides_beside_it():
         assert told_of_assembly(mechanism) == []
         place = analyse(mechanism, 24)["point_position"].sel(point="crank.P", axis="y").values
         assert np.sign(np.nanmean(place)) == side
-
-
-def test_a_hint_that_does_not_decide_is_named():
-    (none,) = told_of_assembly(model(FOUR_BAR))
-    assert "no assembly hint selects one" in none
-    (known,) = told_of_assembly(model(FOUR_BAR, assembly={"B": ["40 mm", "1 mm"]}))
-    assert "the hint of B does not distinguish them" in known
-    (even,) = told_of_assembly(model(FOUR_BAR, assembly={"C": ["70 mm", "0 mm"]}))
-    assert "the hint of C does not distinguish them: C is at (70.00\xa0mm, 74.16\xa0mm) in way-1, (" in even
-    assert "no hint" not in known + even
 
 
 def test_no_locking_margin_where_nothing_can_be_assembled():

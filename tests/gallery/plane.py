@@ -6,8 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-Complex = np.ndarray  # or a plain complex number
-
 
 def corner(a: complex, b: complex, ac: float, bc: float, side: int) -> complex:
     """C with |AC| = ac and |BC| = bc, left of the line from A to B if side is +1, right of it if −1. Takes arrays.
@@ -17,12 +15,6 @@ def corner(a: complex, b: complex, ac: float, bc: float, side: int) -> complex:
     d = np.abs(b - a)
     p = (d**2 + ac**2 - bc**2) / (2 * d)
     return a + (p + 1j * side * np.sqrt(ac**2 - p**2)) * (b - a) / d
-
-
-def on_line(a: complex, ac: float, level: float, side: int) -> complex:
-    """C with |AC| = ac on the horizontal line y = level, right of A if side is +1. Takes arrays."""
-    drop = level - np.imag(a)
-    return np.real(a) + side * np.sqrt(ac**2 - drop**2) + 1j * level
 
 
 def slope(f: Callable[[float], complex], x: float, h: float = 1e-4) -> complex:

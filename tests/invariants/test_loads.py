@@ -137,14 +137,6 @@ def test_expressions_of_loads_take_samples_and_duals() -> None:
     np.testing.assert_allclose(one, fixed * (1 + np.cos(data["drivers"]["A"]["speed"] * time)), atol=1e-9)
 
 
-def test_what_the_inputs_say_of_an_expression() -> None:
-    data = bare(slider_crank())
-    data["loads"] = {"gas": {"link": "piston", "at": "P", "force": ["-600 N * cos(drive)", 0]}}
-    from trunnion import report
-
-    assert "-600 N * cos(drive)" in report(analysed(data))
-
-
 # ---- following forces, one-way resistance ---------------------------------------------------------------------
 
 
@@ -414,23 +406,6 @@ def test_a_balanced_lamp_needs_no_torque() -> None:
     assert np.abs(effort(result)).max() < 1e-12 * m * 9.81 * length
 
 
-def test_results_of_springs_are_written(tmp_path: Path) -> None:
-    import csv
-
-    from trunnion.results.export import save
-
-    data = spring_four_bar(stiffness=900.0, free_length=0.3)
-    data["springs"]["T"] = {"joint": "C", "stiffness": 3.0, "free_angle": 1.0}
-    result = analysed(data, 6)
-    save(result, tmp_path / "r.csv", units_row=True)
-    names, units = list(csv.reader((tmp_path / "r.csv").read_text().splitlines()))[:2]
-    told = dict(zip(names, units, strict=True))
-    assert (told["S.force"], told["S.elongation"]) == ("N", "m")
-    assert (told["T.force"], told["T.elongation"]) == ("N m", "rad")
-    save(result, tmp_path / "r.nc")
-    assert "spring" not in run(bare(four_bar()), 6).dims
-
-
 def test_round_trip(tmp_path: Path) -> None:
     data = spring_four_bar(stiffness="0.9 N/mm", free_length="300 mm ± 2 mm", damping="20 N s/m", preload="5 N")
     data["tables"] = {"p": table_of("spline")}
@@ -486,13 +461,6 @@ def test_bad_torsional_springs_are_refused() -> None:
     assert "this spring turns — state free_angle" in message(stiffness=2.0, free_length=0.1)
     assert "is 2.5 turns" in message(stiffness=2.0, free_angle="900 deg")
     assert "there is no joint 'Q'" in message(joint="Q", preload=1.0)
-
-
-def test_zero_stiffness_is_doubted() -> None:
-    from trunnion.model.checks.check import check_model
-
-    found = check_model(Mechanism(**spring_four_bar(stiffness=0.0, free_length=0.1)))
-    assert [finding.severity for finding in found if finding.where == "springs.S.stiffness"] == ["warning"]
 
 
 @pytest.mark.parametrize(
@@ -570,20 +538,3 @@ def test_example_of_the_lamp() -> None:
     rubbing = brief(mechanism, 30)
     np.testing.assert_allclose(rubbing["drive_power"][0], rubbing["friction_power"].sum("joint"), rtol=1e-9)
     balanced(rubbing)
-
-
-def test_drawings_show_springs_and_following_loads(tmp_path: Path) -> None:
-    from trunnion.views.cycle.plots import figure
-    from trunnion.views.cycle.scene import scene
-
-    data = spring_four_bar(stiffness=900.0, free_length=0.3)
-    data["loads"] = {"push": {"link": "coupler", "at": "E", "force": ["30 N * cos(drive)", 0], "frame": "link"}}
-    result = analysed(data)
-    shown = scene(result)
-    (spring,) = shown["springs"]
-    assert (spring["name"], spring["ends"]) == ("S", ["ground.S", "coupler.E"])
-    assert spring["pull"] == pytest.approx(result["spring_force"].values[0], rel=1e-3)
-    push = shown["loads"][0]
-    assert (push["frame"], push["varies"], abs(push["force"][0])) == ("link", True, pytest.approx(30))
-    for kind in ("mechanism", "power"):
-        figure(result, kind).savefig(tmp_path / f"{kind}.png")

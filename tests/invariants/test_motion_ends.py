@@ -65,9 +65,9 @@ def test_the_figures_at_the_end_are_of_the_end() -> None:
 # ---- ranges -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("compiled", [True, False])
-@pytest.mark.parametrize("first", [True, False])
-@pytest.mark.parametrize("space", ["planar", "spatial"])
+@pytest.mark.parametrize(
+    ("space", "first", "compiled"), [("planar", True, True), ("planar", False, False), ("spatial", False, True)]
+)
 def test_a_range_ends_the_motion_of_several_drivers(
     space: str, first: bool, compiled: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

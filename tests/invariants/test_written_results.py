@@ -224,11 +224,6 @@ def test_a_folder_is_no_file(result: Any, tmp_path: Path) -> None:
     assert list((tmp_path / "r.csv").iterdir()) == []
 
 
-def test_extension_in_capitals(result: Any, tmp_path: Path) -> None:
-    trunnion.save(result, tmp_path / "R.CSV")
-    assert (tmp_path / "R.CSV").stat().st_size > 1000
-
-
 def test_names_with_commas_and_quotes(tmp_path: Path) -> None:
     data = four_bar()
     name = 'crank, "big"'

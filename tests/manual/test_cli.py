@@ -11,9 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from unittest import mock
 
-import pandas as pd
 import pytest
-import xarray as xr
 
 from manual.conftest import Run
 
@@ -63,12 +61,6 @@ def test_analyse_prints_the_figures_of_the_case_study_and_writes_every_format(ru
     assert rows[0]["status"] == "zero_slip"
     assert rows[1]["status"] == "solved"
     assert json.loads((tmp_path / "r.json").read_text("utf-8"))["attrs"]["formula"] == "I(0,1)R → II(2,3)RRR"
-
-
-def test_friction_off_changes_the_torque(run: Run, tmp_path: Path) -> None:
-    assert run("analyse", FOUR_BAR, "--friction", "off", "--out", "off.csv").code == 0
-    rows = table(tmp_path / "off.csv")
-    assert float(rows[60]["A.effort"]) == pytest.approx(3364.879649, abs=1e-6)
 
 
 def test_set_replaces_dimensions_and_paths(run: Run) -> None:
@@ -135,18 +127,7 @@ def test_check_lists_the_ways_and_draws_them(run: Run, tmp_path: Path) -> None:
     assert files(tmp_path) == {"ways.svg", "ways.png", "ways.pdf"}
 
 
-def test_bad_pictures_of_the_ways(run: Run, tmp_path: Path) -> None:
-    assert "no kind of figure" in run("check", FOUR_BAR, "--assemblies", "ways.txt").err
-    assert "folder" in run("check", FOUR_BAR, "--assemblies", "no/such/ways.png").err
-    done = run("check", EXAMPLES / "scotch-yoke.yaml", "--assemblies", "ways.png")
-    assert done.code == 2
-    assert "1 assembly mode\n" in done.out
-    assert "nothing to draw" in done.err
-    assert not files(tmp_path)
-
-
-@pytest.mark.spread(17)
-@pytest.mark.parametrize("verb", ["check", "analyse", "design", "plot", "report"])
+@pytest.mark.parametrize("verb", ["check", "report"])
 @pytest.mark.parametrize(
     ("hint", "told"),
     [
@@ -162,28 +143,11 @@ def test_a_wrong_name_of_an_assembly_is_found_in_its_line(
 ) -> None:
     path = model(tmp_path, lambda text: text.replace("C: [7.6, 2.1]", hint))
     line = next(i for i, one in enumerate(path.read_text("utf-8").splitlines(), 1) if hint in one)
-    out = {"plot": ["--out", "plots"], "report": ["--out", "r.html"]}.get(verb, [])
-    done = run(verb, path, *out)
+    done = run(verb, path, *(["--out", "r.html"] if verb == "report" else []))
     assert done.code == 2
     assert done.err.startswith(f"{path}:{line}: error: assembly.")
     assert told in done.err
     assert files(tmp_path) == {"model.yaml"}
-
-
-@pytest.mark.parametrize("verb", ["check", "analyse"])
-def test_a_name_and_a_place_are_doubted_in_their_line(run: Run, tmp_path: Path, verb: str) -> None:
-    path = model(tmp_path, lambda text: text.replace("{C: [7.6, 2.1]}", "\n  C: [7.6, 2.1]\n  rocker: way-2"))
-    line = next(i for i, one in enumerate(path.read_text("utf-8").splitlines(), 1) if "way-2" in one)
-    done = run(verb, path)
-    assert done.code == 0
-    assert f"{path}:{line}: warning: assembly.rocker: " in done.err
-    assert "which means way-1; the name is used" in done.err
-
-
-def test_a_value_set_on_the_command_line_is_not_blamed_on_a_line(run: Run) -> None:
-    done = run("check", FOUR_BAR, "--set", "AB=2 kg")
-    assert done.code == 2
-    assert not done.err.startswith(str(FOUR_BAR))
 
 
 @pytest.mark.slow
@@ -205,18 +169,6 @@ def test_examples_are_listed_and_copied(run: Run, tmp_path: Path) -> None:
     assert "--force" in again.err
     assert run("examples", "durango-fourbar", "--force").code == 0
     assert "durango-fourbar" in run("examples", "nothing-like-it").err
-
-
-@pytest.mark.slow
-def test_parquet_and_zarr_hold_the_same_numbers(run: Run, tmp_path: Path) -> None:
-    assert (
-        run("analyse", FOUR_BAR, "--steps", "24", "--out", "r.parquet", "--out", "r.zarr", "--out", "r.csv").code == 0
-    )
-    flat = pd.read_parquet(tmp_path / "r.parquet")
-    text = pd.read_csv(tmp_path / "r.csv")
-    assert (flat["A.effort"].to_numpy() == text["A.effort"].to_numpy()).all()
-    with xr.open_zarr(tmp_path / "r.zarr") as stored:
-        assert (stored["drive_effort"].values[0] == flat["A.effort"].to_numpy()).all()
 
 
 def test_schema_is_shown_and_written(run: Run, tmp_path: Path) -> None:
@@ -253,48 +205,6 @@ def test_a_linkage_that_does_not_close_everywhere_says_where_and_by_how_much(run
     assert not any(row["A.effort"] or row["coupler.C.x"] for row in missing)
 
 
-def test_a_linkage_that_never_closes_is_said_to(run: Run) -> None:
-    done = run("analyse", FOUR_BAR, "--set", "BC=0.3m")
-    assert done.code == 1
-    assert "cannot be assembled at any position" in done.err
-    assert "no answer" in done.out or "0" in done.out
-
-
-@pytest.mark.slow
-def test_friction_that_locks_gives_a_status_and_no_number(run: Run, tmp_path: Path) -> None:
-    done = run("analyse", FOUR_BAR, "--set", "joint_defaults.pin.radius=4m", "--out", "r.csv")
-    assert done.code == 1
-    assert "locked by friction" in done.err
-    rows = table(tmp_path / "r.csv")
-    locked = [row for row in rows if row["status"] == "locked"]
-    assert locked
-    assert not any(row["A.effort"] for row in locked)
-
-
-def test_a_dead_centre_is_a_finding(run: Run, tmp_path: Path) -> None:
-    # driven at the rocker over a range that ends where crank and coupler are in line
-    def drive_rocker(text: str) -> str:
-        text = text.replace(
-            "  A: {speed: 10 rad/s}               # one turn unless a range is given", "  D: {speed: 1 rad/s}"
-        )
-        return text
-
-    done = run("analyse", model(tmp_path, drive_rocker))
-    assert done.code == 1
-    assert "cannot be assembled" in done.err
-
-
-def test_wrong_mobility_is_bad_input(run: Run, tmp_path: Path) -> None:
-    path = model(
-        tmp_path, lambda text: text.replace("  A: {speed: 10 rad/s} ", "  A: {speed: 10 rad/s}\n  D: {speed: 1 rad/s} ")
-    )
-    done = run("analyse", path, "--out", "r.csv")
-    assert done.code == 2
-    assert "mobility is 1" in done.err
-    assert "2 drivers" in done.err
-    assert files(tmp_path) == {"model.yaml"}
-
-
 @pytest.mark.slow
 def test_a_spatial_model_is_checked_and_analysed(run: Run) -> None:
     done = run("check", EXAMPLES / "rssr.yaml")
@@ -303,19 +213,6 @@ def test_a_spatial_model_is_checked_and_analysed(run: Run) -> None:
     assert run("analyse", EXAMPLES / "pezzuti-cardan.yaml").code == 0
     locked = run("analyse", EXAMPLES / "pezzuti-cardan-10mm.yaml")
     assert (locked.code, "locked by friction at every position" in locked.err) == (1, True)
-
-
-def test_an_over_constrained_model_is_refused_with_its_joints(run: Run) -> None:
-    done = run("analyse", EXAMPLES / "fourbar-in-space.yaml")
-    assert done.code == 2
-    assert "in the joints A, B, C, D" in done.err
-    assert "minimum-norm" in done.err
-
-
-def test_design_is_of_the_plane(run: Run) -> None:
-    done = run("design", EXAMPLES / "pezzuti-cardan.yaml")
-    assert done.code == 2
-    assert "of the plane" in done.err
 
 
 # ---- bad input ------------------------------------------------------------------------------------------------
@@ -339,13 +236,11 @@ BAD_TEXTS = {
 }
 
 
-@pytest.mark.spread(20)
-@pytest.mark.parametrize("verb", ["check", "analyse"])
 @pytest.mark.parametrize("case", BAD_TEXTS)
-def test_bad_models_are_refused_with_a_message(run: Run, tmp_path: Path, verb: str, case: str) -> None:
+def test_bad_models_are_refused_with_a_message(run: Run, tmp_path: Path, case: str) -> None:
     change, word = BAD_TEXTS[case]
     path = model(tmp_path, change)
-    done = run(verb, path, *(["--out", "r.csv"] if verb == "analyse" else []))
+    done = run("analyse", path, "--out", "r.csv")
     assert done.code == 2
     assert word in done.err
     assert "error:" in done.err
@@ -414,11 +309,6 @@ def test_bad_tables_are_refused(run: Run, text: str) -> None:
     outcome = run("check", FOUR_BAR, "--table", text)
     assert outcome.code == 2
     assert " — " in outcome.err
-
-
-def test_bad_plot_options(run: Run) -> None:
-    assert "torque" in run("plot", FOUR_BAR, "--kind", "nothing", "--out", "x.png").err
-    assert run("plot", FOUR_BAR, "--out", "x.png").code == 2
 
 
 @pytest.mark.slow
@@ -504,25 +394,27 @@ for model in {models}:
     assert [line for line in done.stdout.splitlines() if line.startswith("loaded")] == ["loaded []"] * len(models)
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
+def test_a_study_on_the_terminal_draws_nothing() -> None:
+    """Matplotlib is loaded for figures and reports only."""
+    studies = [
         ["sweep", "durango-fourbar.yaml", "--over", "AB=1.9m,2.0m"],
         ["tolerance", "toleranced-fourbar.yaml", "--samples", "10"],
         ["play", "fourbar-with-play.yaml"],
         ["allocate", "toleranced-fourbar.yaml"],
-    ],
-    ids=lambda arguments: arguments[0],
-)
-def test_a_study_on_the_terminal_draws_nothing(arguments: list[str]) -> None:
-    """Matplotlib is loaded for figures and reports only."""
-    command = ["trunnion", arguments[0], str(EXAMPLES / arguments[1]), *arguments[2:], "--steps", "24"]
-    code = f"import sys; sys.argv = {command}; sys.exit = lambda _: print('matplotlib' in sys.modules)"
-    done = subprocess.run(
-        [sys.executable, "-c", f"{code}; from trunnion.cli.app import main; main()"],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.stdout.splitlines()[-1] == "False"
+    ]
+    commands = [["trunnion", verb, str(EXAMPLES / file), *more, "--steps", "24"] for verb, file, *more in studies]
+    code = f"""
+import sys
+from trunnion.cli.app import main
+for sys.argv in {commands}:
+    try:
+        main()
+    except SystemExit as end:
+        assert end.code in (0, 1), sys.argv
+    print("loaded", "matplotlib" in sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert [line for line in done.stdout.splitlines() if line.startswith("loaded")] == ["loaded False"] * len(studies)
 
 
 # ---- in space -------------------------------------------------------------------------------------------------
@@ -537,32 +429,6 @@ def test_redundant_bearings_are_refused_by_every_verb_and_can_be_asked_for(run: 
         assert "3 constraints are redundant" in done.err
     assert run("check", model).code == 1
     assert run("analyse", model, "--set", "over_constraint=minimum-norm", "--steps", "8").code == 0
-
-
-def test_friction_of_forces_that_statics_leaves_open_is_warned_of(run: Run, tmp_path: Path) -> None:
-    text, model = (EXAMPLES / "bennett.yaml").read_text("utf-8"), tmp_path / "model.yaml"
-    model.write_text(text.replace("bearing: 40 mm}", "bearing: 40 mm}\n  friction: 0.1"), "utf-8")
-    for verb in ("analyse", "locking", "check"):
-        done = run(verb, model)
-        assert done.code == 0, done.err
-        assert "friction in the joints A, B, C, D depends on how the joints share the load" in done.err
-
-
-@pytest.mark.slow
-def test_too_many_drivers_in_space(run: Run, tmp_path: Path) -> None:
-    text = (EXAMPLES / "rccc.yaml").read_text("utf-8").replace("drivers:", "drivers:\n  D: {speed: 5 rpm}", 1)
-    model = tmp_path / "model.yaml"
-    model.write_text(text, "utf-8")
-    done = run("analyse", model)
-    assert done.code == 2
-    assert "the mobility is 1 by Grübler's formula and 1 by rank, but there are 2 drivers" in done.err
-
-
-def test_a_report_is_html(run: Run, tmp_path: Path) -> None:
-    done = run("report", EXAMPLES / "rssr.yaml", "--out", tmp_path / "report.pdf")
-    assert done.code == 2
-    assert "HTML" in done.err
-    assert not list(tmp_path.iterdir())
 
 
 def test_check_tells_ways_a_turn_of_a_screw_apart(run: Run, tmp_path: Path) -> None:
@@ -587,11 +453,3 @@ assembly: {{H: 5 turn}}
     shown = [line.strip() for line in run("check", path).out.splitlines()]
     ways = [line.split("  ")[1] for line in shown if line.startswith("way-")]
     assert len(set(ways)) == len(ways) > 2
-
-
-def test_freedoms_that_no_driver_moves_are_told_without_a_made_up_name(run: Run, tmp_path: Path) -> None:
-    done = run(
-        "check",
-        model(tmp_path, lambda text: "".join(line for line in text.splitlines(True) if "  D: {type" not in line)),
-    )
-    assert "drive a joint for each freedom left, or add a link" in done.err

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -87,16 +86,6 @@ def test_the_model_is_written_with_its_comments(run: Run, tmp_path: Path) -> Non
     assert "cost 28.6, as stated 28.6" in again.out
 
 
-def test_plays_are_written(run: Run, tmp_path: Path) -> None:
-    code, _, _ = run(PISTON, *QUICK, "--write", "bought.json", "--out", "p.png", "--kind", "cost")
-    assert code == 0
-    read = trunnion.read(tmp_path / "bought.json")
-    assert read.parameters()["joints.Q.pin.clearance"] == 1.8109e-5  # of 1.81095e-5
-    code, _, err = run(PISTON, *QUICK, "--write", "bought.toml")
-    assert code == 2
-    assert "write .yaml or .json" in err
-
-
 def test_the_model_itself_is_not_overwritten(run: Run, tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(FOURBAR.read_text("utf-8"), "utf-8")
     before = (tmp_path / "m.yaml").read_bytes()
@@ -110,24 +99,6 @@ def test_the_model_itself_is_not_overwritten(run: Run, tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"m.yaml"}
 
 
-@pytest.mark.slow
-def test_yield_and_rss(run: Run) -> None:
-    code, out, _ = run(FOURBAR, "--steps", 24, "--samples", 1000, "--yield", 0.95)
-    assert code == 0
-    assert "yield of 95.0 %" in out
-    assert "trials" in out
-    code, out, _ = run(FOURBAR, *QUICK, "--criterion", "rss")
-    assert code == 0
-    assert "root of the sum of squares: cost" in out
-
-
-def test_exact(run: Run) -> None:
-    code, out, err = run(FOURBAR, *QUICK, "--exact")
-    assert code == 0
-    assert "so that the mechanism meets them exactly" in err
-    assert "100 %" in out
-
-
 def test_limits_that_nothing_keeps(run: Run, tmp_path: Path) -> None:
     code, out, err = run(
         GRADES, *QUICK, "--set", "measures.rocker-angle.limit=±0.05 deg", "--out", "a.json", "--out", "a.svg",
@@ -138,17 +109,6 @@ def test_limits_that_nothing_keeps(run: Run, tmp_path: Path) -> None:
     assert "error: measures.rocker-angle: the limit +0.05° is infeasible" in err
     assert {path.name for path in tmp_path.iterdir()} == {"a.json", "a.html"}
     assert json.loads((tmp_path / "a.json").read_text("utf-8"))["attrs"]["found"] == 0
-
-
-def test_names_of_the_file(run: Run) -> None:
-    """A finding about a cost has the line of it, though the file has a shorter name for the number."""
-    code, _, err = run(
-        FOURBAR, *QUICK, "--measure", "rocker-angle", "--set", "measures.rocker-angle.limit=+0.1/-inf deg"
-    )
-    assert code == 2
-    code, _, err = run(GRADES, *QUICK, "--choice", "continuous")
-    assert code == 1
-    assert "fourbar-by-grades.yaml:40: error: costs.l1: has a table of processes" in err
 
 
 @pytest.mark.parametrize(
@@ -181,16 +141,6 @@ def test_models_without_costs_or_limits(run: Run) -> None:
     code, _, err = run(EXAMPLES / "slider-crank.yaml", *QUICK)
     assert code == 2
     assert "no measure is stated" in err
-
-
-@pytest.mark.slow
-def test_the_figures_of_the_verification(run: Run, tmp_path: Path) -> None:
-    for kind in ("cost", "histogram", "envelope", "contributions"):
-        code, _, _ = run(FOURBAR, *QUICK, "--kind", kind, "--out", f"{kind}.svg")
-        assert code == 0
-        ElementTree.parse(tmp_path / f"{kind}.svg")
-    result = trunnion.allocate(trunnion.read(FOURBAR), steps=24, samples=100)
-    assert np.all(np.isfinite(result["tolerance"].values))
 
 
 INLINE = """\
@@ -276,38 +226,3 @@ def test_no_model_of_limits_that_are_not_kept(run: Run, tmp_path: Path) -> None:
     assert "24 of 24 positions exceed their limits" in err
     (place,) = [line for line in err.split("\n") if "measures.place: the limit " in line and "is infeasible" in line]
     assert "positions" not in place
-
-
-@pytest.mark.slow
-def test_a_yield_within_its_interval_is_said(run: Run, tmp_path: Path) -> None:
-    """The samples that choose reach the yield, whatever their seed; a note says where fresh ones have a little less."""
-    said = []
-    for seed in range(1, 7):
-        code, out, err = run(FOURBAR, "--steps", 12, "--samples", 200, "--yield", 0.9, "--seed", seed)
-        assert code == 0
-        assert "(sampled " not in out
-        said.append("note: yield: the yield found is 0.8" in err)
-        assert ("the required one 0.9 — take more samples; --sure" in err) == said[-1]
-    assert 0 < sum(said) < 6
-    code, out, err = run(FOURBAR, "--steps", 12, "--samples", 200, "--yield", 0.9, "--sure")
-    assert code == 0
-    assert "note: yield" not in err
-    assert float(re.findall(r"yield of fresh samples .* \(([\d.]+) to", out)[0]) >= 90
-
-
-def test_a_number_of_a_cost_that_is_not_stated(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
-    _, out, _ = run("m.yaml", "--steps", 12, "--samples", 0, "--set", "costs.dimensions.l1.most=15 um")
-    assert "±0.015 mm" in out
-    code, _, err = run("m.yaml", "--steps", 12, "--samples", 0, "--set", "costs.l5.most=15 um")
-    assert code == 2
-    assert "costs.l5.most" in err
-
-
-def test_the_play_of_a_fit_cannot_be_bought(run: Run, tmp_path: Path) -> None:
-    cost = "  C.clearance: {options: {close: {tolerance: 10 um, cost: 3}}}\n"
-    (tmp_path / "m.yaml").write_text(INLINE + cost, "utf-8")
-    code, _, err = run("m.yaml", *QUICK)
-    assert code == 2
-    assert "its play is derived from the fit 12 mm H7/g6" in err
-    assert "state pin.clearance instead" in err

@@ -15,7 +15,6 @@ import xarray as xr
 
 import trunnion
 from manual.conftest import Run
-from trunnion.views.assembly.figure import figure
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
@@ -100,26 +99,3 @@ def test_bad_input(run: Run, model: Path, options: list[str], said: str) -> None
     done = run(model, *options)
     assert done.code == 2
     assert said in done.err
-
-
-def test_a_pin_without_a_length(run: Run) -> None:
-    done = run(EXAMPLES / "fourbar-in-space.yaml", "--set", "joints.B.misalignment.tilt=0.2deg", "--steps", 6)
-    assert done.code == 2
-    assert done.err.count("depends on its length, which is not stated — state length or bearing: 20 mm") == 4
-
-
-@pytest.mark.slow
-def test_figure_says_what_it_shows(model: Path) -> None:
-    """Every panel is labelled; where the clearances do not suffice it is grey."""
-    short = figure(trunnion.assemble(trunnion.read(model), 12))
-    assert [axes.get_ylabel() for axes in short.axes] == [
-        "needed clearance [µm]",
-        "share of the stated",
-        "share of the joint [%]",
-    ]
-    assert short.axes[0].patches
-    texts = [text.get_text() for axes in short.axes for text in axes.texts]
-    assert "smallest clearance, the same in A, B, C, D: 14.35\N{NO-BREAK SPACE}µm" in texts
-    none = figure(trunnion.assemble(trunnion.read(EXAMPLES / "fourbar-in-space.yaml"), 12))
-    assert len(none.axes) == 1
-    assert none.axes[0].texts[0].get_text() == "no clearance is needed"

@@ -103,7 +103,7 @@ def limited() -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, 5_000))
 
 
-@pytest.mark.spread(3, "r.xlsx", "r.pdf")
+@pytest.mark.spread(1, "r.xlsx")
 @pytest.mark.parametrize(
     ("out", "words"),
     [

@@ -37,13 +37,6 @@ def test_a_list_is_json(program: Run, tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_measures_are_drawn(program: Run, tmp_path: Path) -> None:
-    code, out, _ = program("plot", SLIDER, "--steps", 24, "--kind", "measures", "--out", "measures.svg")
-    assert code == 0
-    assert "wrote measures.svg" in out
-    assert "drive-torque" in (tmp_path / "measures.svg").read_text("utf-8")
-
-
 def test_channels_may_measure_speeds_and_powers() -> None:
     mechanism = trunnion.read(SLIDER)
     run = prepare(mechanism)

@@ -37,44 +37,12 @@ def test_ranges_and_files(program: Run, tmp_path: Path) -> None:
         np.testing.assert_array_equal(read["locking_state"].values, result["locking_state"].values)
 
 
-def test_efforts_of_a_slide_are_forces(program: Run, tmp_path: Path) -> None:
-    assert program("locking", PRESS, "--steps", 4, "--units-row", "--out", "l.csv").code == 0
-    with (tmp_path / "l.csv").open(encoding="utf-8", newline="") as file:
-        head, units = list(csv.reader(file))[:2]
-    assert dict(zip(head, units, strict=True))["Z.effort_reverse"] == "N"
-
-
-@pytest.mark.slow
-def test_the_margin_is_that_of_the_seats(program: Run, tmp_path: Path) -> None:
-    """Pins at the rims of large holes change the arms, and with them the margin."""
-    wide = ("--set", "joint_defaults.pin.clearance=2mm")
-    for name, seats in (("free", ()), ("loaded", ("--seat", "loaded"))):
-        done = program("locking", PRESS, "--steps", 6, *wide, *seats, "--out", f"{name}.nc")
-        assert done.code == 0, done.err
-        assert ("critical multiples of single joints" in done.err) == (name == "loaded")
-    with xr.open_dataset(tmp_path / "free.nc") as free, xr.open_dataset(tmp_path / "loaded.nc") as loaded:
-        assert float(np.abs(free["locking_margin"] - loaded["locking_margin"]).max()) > 1e-3
-
-
 def test_without_friction_the_ranges_are_those_of_coefficients_of_zero(program: Run) -> None:
     off = program("locking", FREE, "--friction", "off", "--steps", 24).out.splitlines()
     zero = program("locking", FREE, "--set", "joint_defaults.friction=0", "--steps", 24).out.splitlines()
     start = next(k for k, line in enumerate(zero) if line.startswith("ranges of "))
     assert len(zero) - start > 3
     assert off[-len(zero[start:]) :] == zero[start:]
-
-
-def test_ranges_with_seats_are_labelled_as_of_centred_pins(program: Run) -> None:
-    options = "locking", PRESS, "--steps", 6, "--set", "joint_defaults.pin.clearance=0.1mm"
-    for seats in ((), ("--seat", "loaded")):
-        assert ("ranges of Z, pins centred" in program(*options, *seats).out) == bool(seats)
-
-
-def test_nothing_to_draw_without_friction(program: Run, tmp_path: Path) -> None:
-    code, _, err = program("locking", PRESS, "--friction", "off", "--steps", 4, "--out", "l.png")
-    assert code == 2
-    assert "no joint has friction" in err
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

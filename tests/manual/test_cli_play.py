@@ -62,15 +62,6 @@ def test_measures_of_the_command_line(run: Run) -> None:
     assert "stroke-position" not in out
 
 
-def test_outputs_where_no_measure_is_stated(run: Run, tmp_path: Path) -> None:
-    four_bar("C").write(tmp_path / "bar.yaml")
-    code, out, err = run("bar.yaml", "--steps", 12, "--set", "C.pin.clearance=0.04mm")
-    assert code == 0
-    assert "rotation:D" in out
-    assert "±40.00 µm" in out
-    assert "the model states no measure; rotation:D" in err
-
-
 def test_a_limit_is_a_finding_with_the_line_of_the_file(run: Run, tmp_path: Path) -> None:
     data = four_bar("C").data() | {"measures": {"swing": {"rotation": "D", "limit": "0.01 deg"}}}
     trunnion.Mechanism(**data).write(tmp_path / "bar.yaml")
@@ -109,17 +100,6 @@ def test_the_figure_stacks_the_joints_up_to_the_sum() -> None:
     assert axes.get_ylabel() == "worst case of piston.Q.x [µm]"
 
 
-def test_one_position_and_no_answer_are_drawn_and_told() -> None:
-    result = trunnion.play(four_bar("C"), ["rotation:D"], steps=1)
-    assert figure(result).axes
-    assert tables(result)[0].rows[0][0] == "C"
-    empty = result.copy(deep=True)
-    for key in ("worst_case", "worst_case_total", "rss", "deviation_total", "extreme_worst_case"):
-        empty[key] = np.nan * empty[key]
-    assert "no value at" in tables(empty)[0].title
-    assert figure(empty).axes
-
-
 def test_a_place_and_joints_without_effect_are_told(tmp_path: Path) -> None:
     """The table and the summary of a measure with a place have its figure there."""
     model = tmp_path / "model.yaml"
@@ -136,14 +116,6 @@ def test_a_place_and_joints_without_effect_are_told(tmp_path: Path) -> None:
     assert summary_of(result)[0].value == pytest.approx(there, rel=1e-9)
     assert tables(result)[0].title == "place, at 90°"
     assert findings["play.no_effect"].figures["measure"] == "held"
-
-
-def test_what_a_guide_holds_is_no_matter_of_the_driver() -> None:
-    """The piston's angle: no pin turns it, and no other driver would make one do so."""
-    result = trunnion.play(trunnion.read(SLIDER), ["angle:piston"], steps=12)
-    findings = {one.code: one for one in result.trunnion.findings}
-    assert findings["play.no_effect"].figures["joints"]
-    assert not findings["play.no_effect"].remedy
 
 
 def test_an_extreme_is_of_its_place_and_other_statistics_are_left_out(tmp_path: Path) -> None:
@@ -170,13 +142,6 @@ def test_an_extreme_is_of_its_place_and_other_statistics_are_left_out(tmp_path: 
     titles = [one.title for one in tables(result)]
     assert titles[1].startswith("least, the minimum at ")
     assert figure(result).axes
-
-
-def test_no_effect_at_one_position_is_no_matter_of_the_driver() -> None:
-    """Elsewhere the play may have one, and another driver need not help."""
-    result = trunnion.play(trunnion.read(EXAMPLES / "fourbar-with-play.yaml"), ["angle:crank"], at="90 deg")
-    found = {one.code: one for one in result.trunnion.findings}
-    assert not found["play.no_effect"].remedy
 
 
 def test_rounding_is_shown_as_zero() -> None:

@@ -24,12 +24,6 @@ def test_a_duration_that_is_none_is_refused(program: Run, time: str) -> None:
     assert time.strip() in err
 
 
-@pytest.mark.parametrize("time", ["0.004", "4ms", "4 ms"])
-def test_a_duration_is_a_number_of_seconds_or_has_a_unit(program: Run, tmp_path: Path, time: str) -> None:
-    assert program("simulate", PRESS, f"--time={time}", "--steps", 2, "--out", "m.csv").code == 0
-    assert float((tmp_path / "m.csv").read_text().splitlines()[-1].split(",")[0]) == pytest.approx(0.004)
-
-
 def test_a_steady_cycle_is_written_as_a_cycle(program: Run, tmp_path: Path) -> None:
     files = ["--out", "c.csv", "--report", "c.html", "--out", "c.svg", "--kind", "speed"]
     assert program("simulate", PRESS, "--steady", "--steps", 36, *files).code == 0

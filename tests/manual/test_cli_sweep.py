@@ -14,7 +14,6 @@ import xarray as xr
 import trunnion
 from manual.conftest import Run
 from trunnion.views import sweep as view
-from trunnion.views.sweep import tables
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
@@ -78,14 +77,6 @@ def test_a_grid_in_csv_has_a_row_a_point(run: Run, tmp_path: Path) -> None:
     assert (tmp_path / "g.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_slide_is_driven_by_a_force(run: Run, tmp_path: Path) -> None:
-    assert (
-        run(SLIDER, "--over", "S.friction.coefficient=0.05,0.1", "--steps", 9, "--out", "s.csv", "--units-row").code
-        == 0
-    )
-    assert rows(tmp_path / "s.csv")[0]["S.effort_rms"] == "N"
-
-
 def test_options_of_the_model_come_first(run: Run, tmp_path: Path) -> None:
     same = ("--over", "AB=2m,2.1m", "--steps", 12)
     run(FOUR_BAR, *same, "--friction", "off", "--set", "BC=6.2m", "--out", "s.csv")
@@ -94,36 +85,6 @@ def test_options_of_the_model_come_first(run: Run, tmp_path: Path) -> None:
     found = rows(tmp_path / "s.csv")
     assert [float(row["A.effort_max"]) for row in found] == wanted["drive_effort_max"].values[0].tolist()
     assert {row["friction_power_mean"] for row in found} == {"0.0"}
-
-
-@pytest.mark.parametrize(
-    ("measures", "meant"), [([], "rocker-angle, torque are not in this sweep — add them"), (["torque"], "add it")]
-)
-def test_measures_that_are_left_out_are_named(run: Run, measures: list[str], meant: str) -> None:
-    done = run(
-        EXAMPLES / "toleranced-fourbar.yaml", "--over", "l1=100mm,101mm", "--steps", 24,
-        *(f"--measure={one}" for one in measures),
-    )  # fmt: skip
-    assert meant in done.err
-
-
-def test_a_measure_of_choice(run: Run) -> None:
-    done = run(FOUR_BAR, "--over", "AB=2m,2.1m", "--steps", 12, "--measure", "B.reaction_max", "--out", "b.svg")
-    assert done.code == 0
-    assert "B.reaction max [N]" in done.out
-
-
-def test_several_measures_are_figures_in_a_folder(run: Run, tmp_path: Path) -> None:
-    grid = ("--over", "AB=2m,2.1m", "--over", "B.friction.coefficient=0.1,0.2", "--over", "CD=3m,3.1m", "--steps", 4)
-    measures = ("--measure", "efficiency", "--measure", "A.effort_max")
-    options = ("--x", "CD", "--family", "AB", "--kind", "map", "--format", "svg")
-    done = run(FOUR_BAR, *grid, *measures, *options, "--out", "figures", "--out", "all.csv")
-    assert done.code == 0
-    assert files(tmp_path) == {"figures", "all.csv"}
-    assert files(tmp_path / "figures") == {"efficiency.svg", "A.effort_max.svg"}
-    assert "efficiency over CD and, in columns, AB, at B.friction.coefficient" in done.out
-    assert "A.effort max [N m] over CD" in done.out
-    assert len(rows(tmp_path / "all.csv")) == 8
 
 
 BAD = {
@@ -182,38 +143,3 @@ def test_a_figure_shows_units_and_gaps() -> None:
     for k, name in enumerate(("A.pin.radius = 50 mm", "A.pin.radius = 100 mm")):
         shown = next(line for line in axes.get_lines() if line.get_label() == name)
         assert np.allclose(shown.get_ydata() * 1e3, grid["drive_effort_max"].values[0, :, k], equal_nan=True)
-
-
-def test_a_figure_of_nothing_and_of_many() -> None:
-    """All points locked or out of reach; more curves than a legend can name; one point; an infinite margin."""
-    mechanism = trunnion.read(FOUR_BAR)
-    view.figure(trunnion.sweep(mechanism, {"AB": ["2.7 m", "2.8 m"]}, 36))
-    view.figure(trunnion.sweep(mechanism, {"AB": ["2.1 m"]}, 4, margin=True), "locking_margin")
-    many = trunnion.sweep(mechanism, {"AB": ["2.2 m", "2 m"], "B.friction.coefficient": (0.1, 0.2, 9)}, 4)
-    figure = view.figure(many, "A.effort_max")
-    assert figure.axes[0].get_legend() is None
-    assert figure.axes[1].get_ylabel() == "B.friction.coefficient"
-
-
-@pytest.mark.slow
-def test_measures_stand_in_millimetres_and_degrees() -> None:
-    measures = {"height": {"point": "coupler.E", "axis": "y", "as": "maximum"},
-                "swing": {"angle": "rocker", "as": "maximum"}}  # fmt: skip
-    model = trunnion.Mechanism(**{**trunnion.read(FOUR_BAR).data(), "measures": measures})
-    result = trunnion.sweep(model, {"AB": [1.9, 2.0]}, steps=24, measures=["height", "swing"])
-    (one,) = tables(result, ["height", "swing"])
-    assert one.head[1:3] == ["height [mm]", "swing [deg]"]
-    for row, height, swing in zip(one.rows, result["height"].values, result["swing"].values, strict=True):
-        assert [float(cell) for cell in row[1:3]] == pytest.approx([1e3 * height, np.degrees(swing)], rel=1e-5)
-
-
-def test_long_tables_are_thinned() -> None:
-    mechanism = trunnion.read(FOUR_BAR)
-    table = tables(trunnion.sweep(mechanism, {"AB": ("2 m", "2.1 m", 50)}, 1))[0]
-    assert len(table.rows) == 40
-    assert table.left_out == 10
-    assert (table.rows[0][0], table.rows[-1][0]) == ("2", "2.1")
-    table = tables(trunnion.sweep(mechanism, {"AB": [2, 2.1], "BC": ("6 m", "6.1 m", 12)}, 1))[0]
-    assert len(table.head) == 9
-    assert table.left_out == 8
-    assert table.head[-1] == "6.1 m"

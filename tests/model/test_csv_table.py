@@ -65,15 +65,6 @@ def test_units_are_converted_exactly_and_kept(tmp_path: Path) -> None:
     assert Mechanism(**mechanism.data()) == mechanism
 
 
-def test_a_table_driver_keeps_the_rest_of_what_it_states(tmp_path: Path) -> None:
-    stated = {"law": "table", "points": [[0, 0], [1, 1], [2, 0]], "periodic": True, "delay": "10 ms"}
-    data = {**MODEL.data(), "drivers": {"O": stated}}
-    driver = Mechanism(**data).with_table("O", csv(tmp_path, "0,0\n1,2\n3,0\n")).drivers["O"]
-    assert driver.periodic
-    assert driver.delay is not None
-    assert [[q.source for q in row] for row in driver.points or ()] == [[0, 0], [1, 2], [3, 0]]
-
-
 def test_points_of_a_table(tmp_path: Path) -> None:
     """The example's own points in a file give its own results; their unit is still that of a pressure."""
     own = [[str(q.source) for q in row] for row in MODEL.tables["pressure"].points]
@@ -167,16 +158,3 @@ def test_what_is_no_text_or_not_there(tmp_path: Path) -> None:
         MODEL.with_table("O", tmp_path / "latin.csv")
     with pytest.raises(MechanismError, match="there is no driver or table 'presure' — did you mean 'pressure'"):
         MODEL.with_table("presure", csv(tmp_path, "0,0\n"))
-
-
-def test_findings_of_several_files_and_of_the_model_come_at_once(tmp_path: Path) -> None:
-    files = {"O": csv(tmp_path, "0;x\n1;0\n", "one.csv"), "pressure": csv(tmp_path, "0\n", "two.csv")}
-    with pytest.raises(MechanismError) as caught:
-        read_mechanism(SLIDER_CRANK, files)
-    assert [Path(finding.file).name for finding in caught.value.findings] == ["one.csv", "two.csv"]
-    text = SLIDER_CRANK.read_text("utf-8").replace("speed: 1450 rpm", "speed: 1450 rpm").replace("mass: ", "mass: -", 1)
-    (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
-    with pytest.raises(MechanismError) as caught:
-        read_mechanism(tmp_path / "model.yaml", {"O": csv(tmp_path, "0;0\n2;1\n1;0\n", "one.csv")})
-    assert [Path(finding.file).name for finding in caught.value.findings] == ["model.yaml", "one.csv"]
-    assert caught.value.findings[1].line == 3

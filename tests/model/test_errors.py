@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from trunnion import sweep
 from trunnion.algebra.dual import Dual
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.checks.check import check_model
 from trunnion.model.joint_parts import has_play, play
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.parts import Joint, Misalignment, Seat
+from trunnion.model.parts import Misalignment, Seat
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FindingsOf = Callable[..., tuple[Finding, ...]]
@@ -81,17 +80,6 @@ def test_errors_may_speak_of_dimensions() -> None:
     assert changed["joints.C.pin.radius"] == pytest.approx(off.ideal_parameters()["joints.C.pin.radius"] - 1e-3)
 
 
-def test_tolerances_stay_beside_errors() -> None:
-    off = FOURBAR.with_values({"AB": "2 m ± 1 mm", "errors.AB": "0.5 mm ± 0.1 mm"})
-    assert off.tolerances() == {"dimensions.AB": (-1e-3, 1e-3), "errors.dimensions.AB": (-1e-4, 1e-4)}
-
-
-def test_short_names_stay_unique_beside_errors() -> None:
-    off = FOURBAR.with_values({"errors.crank.mass": 0.1})
-    assert off.parameters({"crank.mass": 5.0})["links.crank.mass"] == 5.0
-    assert off.with_values({"errors.links.crank.mass": 0.2}).errors["crank.mass"].evaluate() == 0.2
-
-
 def test_paths_of_what_is_not_stated_yet() -> None:
     paths = {
         "errors.AB": "errors.dimensions.AB",
@@ -112,15 +100,6 @@ def test_paths_of_what_is_not_stated_yet() -> None:
             FOURBAR.path_of(name)
     kinds = FOURBAR.with_values({"errors.AB": 1e-5, "errors.gamma": 1e-5}).parameter_kinds()
     assert [kinds[f"errors.dimensions.{name}"].unit for name in ("AB", "gamma")] == ["m", "rad"]
-
-
-def test_sweeps_over_what_is_not_stated_and_what_has_an_error() -> None:
-    off = FOURBAR.with_values({"errors.AB": "1 mm"})
-    lengths = sweep(off, {"AB": ("1.9 m", "2.1 m", 3)}, steps=6)
-    assert lengths["AB"].values == pytest.approx([1.9, 2.0, 2.1], rel=1e-15)
-    errors = sweep(FOURBAR, {"errors.AB": ("0 mm", "2 mm", 3)}, steps=6)
-    expected = sweep(FOURBAR, {"AB": ("2 m", "2.002 m", 3)}, steps=6)
-    np.testing.assert_allclose(errors["efficiency"], expected["efficiency"], rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -268,11 +247,6 @@ def test_one_way_to_state_the_play_replaces_the_default_one() -> None:
     values = found.parameters()
     plays = [play(joint, name, values) for name, joint in found.effective_joints.items()]
     assert plays == pytest.approx([1e-4, 10.25e-6, 3e-5, 2e-5], abs=1e-12)  # 15 H7/g6: 6 to 35 µm, halved
-
-
-def test_tolerances_of_defaults_count_for_each_joint() -> None:
-    found = PLAYING.with_values({"joint_defaults.pin.clearance": "20 um ± 5 um"})
-    assert found.tolerances() == {f"joints.{name}.pin.clearance": (-5e-6, 5e-6) for name in "ABCD"}
 
 
 def test_seats_of_joints_and_defaults() -> None:
@@ -454,12 +428,6 @@ def test_large_plays_and_short_pins() -> None:
     assert doubts(RSSR.with_values({"D.pin.length": "19 mm", "D.seat": "free", "D.misalignment.tilt": 1e-3}))
     (doubt,) = doubts(FOURBAR.with_values({"joint_defaults.seat": "loaded"}))
     assert "joint_defaults.seat: no joint has play" in doubt
-
-
-def test_merging_knows_the_types() -> None:
-    assert not has_play(Joint(type="universal", links=("a", "b"), pin={"clearance": 1}))
-    assert not has_play(Joint(type="prismatic", links=("a", "b"), pin={"clearance": 1}))
-    assert has_play(Joint(type="prismatic", links=("a", "b"), guide={"clearance": 0}))
 
 
 # ---- the link that carries a seat -----------------------------------------------------------------------------

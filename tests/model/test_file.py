@@ -41,10 +41,6 @@ def test_examples_are_read_and_written_without_loss(example: Path, extension: st
     assert os.listdir(tmp_path) == [copy.name]  # no temporary file stays behind
 
 
-def test_there_are_examples() -> None:
-    assert len(EXAMPLES) >= 3
-
-
 def test_toml(tmp_path: Path, findings_of: FindingsOf) -> None:
     text = """
 trunnion = 1

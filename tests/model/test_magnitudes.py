@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from studio.asking import ask
 from trunnion import MechanismError, read, sweep
 from trunnion.errors import Severity
 
@@ -205,12 +204,9 @@ def test_an_angle_without_a_unit(
     found = [one for one in read(tmp_path / "model.yaml").checked if "radians" in one.what]
     assert [(one.where, one.severity) for one in found] == [(place, severity) for place in places]
     assert all(figure in one.what for one in found)
-    shown = [one for one in ask(ask="model", text=text)["findings"] if "radians" in one["what"]]
-    assert {one["severity"] for one in shown} == ({str(severity)} if severity else set())
 
 
-@pytest.mark.parametrize("stated", ["10 deg", "0 deg"])
-@pytest.mark.parametrize("values", [(0, 10, 3), (10, 0, 3), (-10, 0, 3), [10, 3]])
+@pytest.mark.parametrize(("stated", "values"), [("10 deg", (-10, 0, 3)), ("0 deg", [10, 3])])
 def test_plain_angles_of_a_sweep_are_told_once(tmp_path: Path, stated: str, values: object) -> None:
     (tmp_path / "shaft.yaml").write_text(shaft(TURNED, f"  phase: {stated}\n"), encoding="utf-8")
     found = sweep(read(tmp_path / "shaft.yaml"), {"phase": values}, 4).trunnion.findings  # type: ignore[dict-item]

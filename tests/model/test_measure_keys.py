@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -80,31 +79,6 @@ def test_written_as_it_was_read(varied: Mechanism, tmp_path: Path, suffix: str) 
     assert again.data()["measures"]["peak"] == {"effort": "A", "as": "maximum", "at_most": "12 N m"}
     assert again.data()["tolerances"]["AB"] == "±t"
     assert again.digest == varied.digest
-
-
-def test_toml(varied: Mechanism, tmp_path: Path) -> None:
-    """The sections in TOML, whose keys of grades are texts."""
-    lines = ["trunnion = 1\nspace = 'planar'\n[processes.boring]\n7 = 9\n8 = 6\n[costs.CD]\nprocess = 'boring'"]
-    data = varied.data()
-    for name in ("dimensions", "links", "joints", "joint_defaults", "drivers", "assembly"):
-        lines.append(f"[{name}]")
-        for key, value in data[name].items():
-            lines.append(f"{key} = {_toml(value)}")
-    lines += ["[tolerances]", "AB = '±t'", '"B.seat.xi" = {distribution = "direction"}']
-    lines += ["[measures.peak]", "effort = 'A'", "as = 'maximum'"]
-    (tmp_path / "model.toml").write_text("\n".join(lines), encoding="utf-8")
-    found = read_mechanism(tmp_path / "model.toml")
-    assert found.measures["peak"].statistic == "maximum"
-    assert [one.path for one in found.prices()] == ["dimensions.CD"]
-    assert found.variations.keys() == {"AB", "B.seat.xi"}
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{key} = {_toml(one)}" for key, one in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return json.dumps(value, ensure_ascii=False)
 
 
 KINDS = [

@@ -381,14 +381,6 @@ def test_curve_of_cost_over_accuracy() -> None:
     assert result["trade_off_tolerance"].values[2, :4] == pytest.approx(2 * result["tolerance"].values[:4])
 
 
-def test_names_of_any_script() -> None:
-    """Names are as the user has them."""
-    model = fourbar(measures={"Winkel-φ測": {"angle": "rocker", "limit": "±0.1 deg"}})
-    result = trunnion.allocate(model, steps=12, samples=50)
-    assert result["measure"].values.tolist() == ["Winkel-φ測"]
-    assert result.attrs["found"]
-
-
 def test_the_curve_of_a_yield_passes_through_the_answer() -> None:
     """Samples ask for another margin than normal deviations do: the curve is of that one."""
     model = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
@@ -400,14 +392,3 @@ def test_the_curve_of_a_yield_passes_through_the_answer() -> None:
     plain = trunnion.allocate(model, ["rocker-angle"], "yield", 0.9, steps=12, samples=0, curve=3)
     ratio = costs / plain["trade_off_cost"].values
     assert ratio == pytest.approx(np.full(3, ratio[1]), rel=2e-2)  # as much dearer everywhere
-
-
-def test_the_least_limits_of_a_curve_that_can_be_kept() -> None:
-    model = trunnion.read(EXAMPLES / "fourbar-by-grades.yaml")
-    result = trunnion.allocate(model, steps=24, samples=0, curve=25)
-    kept = result["trade_off_factor"].values[np.isfinite(result["trade_off_cost"].values)]
-    (said,) = [one for one in json.loads(result.attrs["findings"]) if one["code"] == "allocation.curve_short"]
-    missing = 25 - len(kept)
-    assert missing > 0
-    assert (said["figures"]["lost"], said["figures"]["points"]) == (missing, 25)
-    assert f"at least {kept.min():.3g} times" in said["remedy"]

@@ -317,7 +317,7 @@ def test_the_printed_places_of_a_way_of_an_example_select_it(file: Path) -> None
 
 @pytest.mark.parametrize("space", [planar, spatial], ids=["planar", "spatial"])
 @given(seed=st.integers(0, 10**6))
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=4, deadline=None)
 def test_the_printed_places_of_a_way_of_any_mechanism_select_it(space: Any, seed: int) -> None:
     _, data = space.drawn(seed)
     try:
@@ -329,7 +329,7 @@ def test_the_printed_places_of_a_way_of_any_mechanism_select_it(space: Any, seed
 
 
 @given(turn=st.floats(-1e-3, 1e-3), crank=st.floats(0.1, 0.5), longer=st.sampled_from([0.0, 1e-9, 1e-6, 1e-3, 0.1]))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_ways_that_nearly_meet_are_told_apart(turn: float, crank: float, longer: float) -> None:
     """A linkage that starts in line, or nearly so, or only closes farther on, has as many digits as it takes."""
     data = named(four_bar(crank, 0.7, 0.6, 1.3 - crank + longer))

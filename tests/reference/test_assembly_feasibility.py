@@ -175,7 +175,7 @@ def test_hinges_held_along_their_axis() -> None:
 
     rng = np.random.default_rng(5)
     best = np.inf
-    for _ in range(4):
+    for _ in range(16):
         rules = [
             {"type": "ineq", "fun": lambda x: x[4] ** 2 - (ends(x) ** 2).sum(axis=1)},
             {"type": "eq", "fun": length},
@@ -408,21 +408,6 @@ def test_close_to_the_limit_the_share_is_told_from_one() -> None:
     assert rows["largest_share.place"] == "everywhere"
 
 
-@pytest.mark.slow
-def test_a_clearance_of_none_and_lengths_of_rounding() -> None:
-    what, _, rows = told_of("0 mm")
-    assert what == (
-        "the joints with play cannot close the loops, "
-        "however large the play (a clearance of 0 gives no play): they stay open by up to 0.2° at every position"
-    )
-    assert "open_length" not in rows
-    assert "open_angle" in rows
-    (told,) = json.loads(solved(four_bar({"B": LEAN}, {"A": {"clearance": 0.0}}), 4).attrs["findings"])
-    assert told["what"].startswith(
-        "a stated clearance of 0 gives no play: the loops stay open by up to 0.3898 mm and 0.2°"
-    )
-
-
 def test_check_says_that_it_goes_together_by_its_play_only() -> None:
     told = "\n".join(map(str, trunnion.check(trunnion.read("examples/misaligned-fourbar.yaml"), 12).findings))
     assert "with their errors they need play to fit together, and as rigid parts they cannot be analysed" in told
@@ -575,12 +560,6 @@ def test_invariances() -> None:
 
 
 @pytest.mark.slow
-def test_sampling_does_not_decide_the_smallest_clearance() -> None:
-    coarse, fine = (float(leaned_four_bar(steps).smallest_clearance) for steps in (12, 60))
-    assert coarse == pytest.approx(fine, rel=1e-7)
-
-
-@pytest.mark.slow
 def test_where_it_cannot_be_assembled() -> None:
     """A linkage that does not turn all the way says where, with its answer elsewhere."""
     data = four_bar({"B": LEAN})
@@ -612,13 +591,3 @@ def test_errors_that_are_not_small(degrees: float) -> None:
     sound(large)
     ratio = np.tan(np.radians(degrees)) / np.radians(0.01)
     np.testing.assert_allclose(large.needed_clearance, ratio * small.needed_clearance, rtol=0.02 * degrees)
-
-
-def test_pins_held_along_one_axis_and_out_of_line() -> None:
-    """No end float, parallel holes: a line that leans nowhere fits to first order only; it is not guessed."""
-    found = solved(hinges(0.3, 0.03, {"misalignment": {"offset": 1e-4}}), 6)
-    unsettled = found.status == AssemblyStatus.UNSETTLED
-    assert unsettled.any()
-    assert np.isnan(found.needed_clearance[unsettled]).all()
-    assert np.isnan(found.smallest_clearance)
-    assert any("give one an end float" in row["remedy"] for row in json.loads(found.attrs["findings"]))

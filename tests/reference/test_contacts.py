@@ -269,23 +269,6 @@ def test_friction_that_sticks_is_refused_in_play() -> None:
     assert [finding.where for finding in raised.value.findings] == ["joints.Q.friction"]
 
 
-def test_soft_surfaces_are_told() -> None:
-    soft = {"restitution": 0.5, "stiffness": 1e3, "exponent": 1}
-    codes = {one.code for one in trunnion.simulate(rattling(soft), duration=3e-3, steps=3).trunnion.findings}
-    assert "simulate.soft" in codes
-    codes = {one.code for one in trunnion.simulate(rattling(), duration=3e-4, steps=3).trunnion.findings}
-    assert "simulate.soft" not in codes
-
-
-def test_slow_onsets_are_told_where_they_lose_something() -> None:
-    """At 0.05 rad/s every contact begins slower than the law is followed; the first at 0.42 mm/s."""
-    slow = trunnion.simulate(rattling(drivers={"O": {"speed": 0.05}}), duration=12.0, steps=2)
-    (told,) = [one for one in slow.trunnion.findings if one.code == "simulate.slow_onsets"]
-    assert told.figures["count"] == told.figures["of"] == slow.sizes["impact"] > 2
-    assert told.figures["share"] == pytest.approx(1.0)
-    assert float(slow["impact_approach"].max()) == pytest.approx(4.38578315 * 0.05 / SPEED, rel=1e-6)
-
-
 def test_a_drive_that_hardly_moves() -> None:
     """The mass matrix keeps its digits where weights are all that is large."""
     slow = rattling({}, gravity=[0, -9.81]).data()

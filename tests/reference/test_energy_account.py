@@ -43,6 +43,7 @@ def test_the_account_of_the_examples_as_they_begin(example: str) -> None:
     assert unbalanced(simulate(read(EXAMPLES / f"{example}.yaml"), MOVING[example], 200)) < 1e-8
 
 
+@pytest.mark.sample(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("example", MOVING)
 def test_the_account_of_the_examples_as_they_stand(example: str) -> None:

@@ -290,6 +290,7 @@ def test_random_planar_mechanisms(seed: int) -> None:
     assert found.refused or found.agrees
 
 
+@pytest.mark.sample(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(30, 36))
 def test_random_spatial_mechanisms(seed: int) -> None:

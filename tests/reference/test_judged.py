@@ -26,12 +26,11 @@ JUDGED = {"planar": judged_planar.judge, "spatial": judged_spatial.judge}
     ("space", "seeds"),
     [
         ("planar", range(20)),
-        ("planar", range(20, 40)),
         ("planar", KINKS),
-        ("spatial", range(12)),
-        ("seated", [*range(10), 16]),  # 16: seats beside a locked stretch
+        ("spatial", range(8)),
+        ("seated", [*range(6), 16]),  # 16: seats beside a locked stretch
     ],
-    ids=["planar", "planar too", "kinks", "spatial", "seats"],
+    ids=["planar", "kinks", "spatial", "seats"],
 )
 def test_random_mechanisms(space: str, seeds: Any) -> None:
     """Every solved position keeps every limit, and most positions are solved."""

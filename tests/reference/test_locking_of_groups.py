@@ -49,8 +49,7 @@ def margins(mechanism: Mechanism) -> Any:
     return brief(mechanism, STEPS)["locking_margin"].values
 
 
-@pytest.mark.parametrize("aside", [0.0, 400.0])
-@pytest.mark.parametrize("coefficient", [0.4, 2.0])
+@pytest.mark.parametrize(("coefficient", "aside"), [(0.4, 0.0), (2.0, 400.0)])
 def test_below_the_margin_nothing_locks_and_above_it_something_does(coefficient: float, aside: float) -> None:
     """Whether it runs, one group locks or both, and whatever loads the inner one beside the outer."""
     found = margins(ram(coefficient, aside))

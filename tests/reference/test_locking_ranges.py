@@ -99,9 +99,9 @@ def test_friction_that_holds_a_mechanism_of_many_joints_is_what_it_holds_with() 
     for joint in ("H", "K"):
         data["joints"][joint] |= {"pin": {"radius": 0.004}, "friction": 0.3}
     known = locking(Mechanism(**data), 41)["holding_multiple"].values
-    at = np.flatnonzero(np.isfinite(known))[::3]
-    assert len(at) >= 3
-    for i in at:
+    at = np.flatnonzero(np.isfinite(known))
+    assert len(at) >= 7
+    for i in at[[0, len(at) // 2, -1]]:
         for factor, held in ((1 - 1e-6, False), (1 + 1e-6, True)):
             for joint, own in (("A", FRICTION), ("H", 0.3), ("K", 0.3)):
                 data["joints"][joint]["friction"] = own * known[i] * factor
@@ -152,11 +152,6 @@ def test_where_the_drive_effort_changes_sign_is_told_and_kept_in_the_result() ->
     ]
     np.testing.assert_allclose(kept["rows"][-1]["ends"][0], limit, atol=0.01)
     assert kept["rows"][-1]["ends"][1] == pytest.approx(np.degrees(2.5), abs=1e-3)
-
-
-def test_an_end_at_zero_is_zero() -> None:
-    """Of a slide that drives the crank over its top, where its coordinate is 0: rounded to what it is known to."""
-    assert "0 mm" in [part.places[0] for part in course(slide_hoist()).ranges()]
 
 
 def slide_hoist() -> Mechanism:
@@ -397,25 +392,6 @@ def test_ranges_cover_the_cycle_once_and_near_ones_are_below_the_margin() -> Non
         assert part.margin <= np.nanmin(margin[inside], initial=np.inf) * (1 + 1e-6)
     running = ~np.isin(states(found), NO_MARGIN)
     np.testing.assert_array_equal(close, (margin < near) & running)
-
-
-def test_states_are_flags_with_meanings() -> None:
-    found = locking(hoist(), 12)
-    words = found["locking_state"].attrs["flag_meanings"].split()
-    assert words == [one.name.lower() for one in LockingState]
-    columns = trunnion.analyse(hoist(), 12)
-    assert "locking_state" not in columns
-
-
-def test_joints_whose_friction_is_zero_are_not_named() -> None:
-    """Neither where a joint is at rest nor among the multiples of single joints."""
-    for friction, named in ((0.0, ["A"]), (0.1, ["A", "H"])):
-        data: Data = slide_hoist().model_dump(by_alias=True, exclude_unset=True)
-        for joint in ("H", "K"):
-            data["joints"][joint] |= {"pin": {"radius": 0.004}, "friction": friction if joint == "H" else 0.0}
-        run = prepare(Mechanism(**data))
-        names = {one.name.partition(".")[0] for one in report_figures(run) if "critical" in one.name}
-        assert names == set(named)
 
 
 def test_what_masses_hold_is_no_self_locking() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,6 @@ from mechanisms import DURANGO, Data, build, four_bar, slider_crank
 from mechanisms_space import rssr
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative, primal
-from trunnion.errors import Severity
 from trunnion.measures.evaluation import where_known
 from trunnion.measures.figures import within_limits
 from trunnion.measures.measures import Measure, coordinate_unit, named
@@ -718,23 +716,6 @@ def test_places_that_are_not(driver: Any, measure: Measure, expected: str) -> No
         plan(press(**driver), [measure], 36)
 
 
-@pytest.mark.parametrize(
-    ("place", "said"),
-    [
-        ({"at": 3.0}, ["171.887 deg is outside the range of 'A', 11.4592 to 137.51 deg"]),
-        ({"over": [0.5, 3.0], "as": "rms"}, ["171.887 deg is outside the range of 'A', 11.4592 to 137.51 deg"]),
-        ({"at": 2.0}, []),
-        ({"as": "maximum"}, []),
-    ],
-)
-def test_check_tells_places_that_are_not(place: dict[str, Any], said: list[str]) -> None:
-    data = press(**RISE).system.mechanism.model_dump(by_alias=True, exclude_unset=True)
-    data["measures"] = {"slide": {"slide": "C", **place}}
-    found = [one for one in trunnion.check(Mechanism(**data)).findings if one.where.startswith("measures.slide")]
-    assert [one.what for one in found] == said
-    assert all(one.severity is Severity.WARNING for one in found)
-
-
 def test_names(crank: Run) -> None:
     """On the command line: kinds, axes, statistics before them, and none of what means nothing."""
     forms = {
@@ -769,15 +750,3 @@ def test_names(crank: Run) -> None:
         with pytest.raises(MechanismError):
             named(crank.system.mechanism, [name], crank.values)
     assert coordinate_unit(crank.system, crank.values) == "rad"
-
-
-def test_play_is_of_some_measures_only() -> None:
-    """Those of the model that it does not know are left out with a note, asked for they are refused."""
-    data = trunnion.read(EXAMPLES / "fourbar-with-play.yaml").data()
-    data["measures"] = {"turn": {"rotation": "D", "limit": "0.1 deg"}, "swing": {"stroke": "D", "limit": "0.1 deg"}}
-    mechanism = Mechanism(**data)
-    result = trunnion.play(mechanism, steps=12)
-    assert list(result["measure"].values) == ["turn"]
-    assert any(one["figures"].get("measures") == ["swing"] for one in json.loads(result.attrs["findings"]))
-    with pytest.raises(MechanismError, match="which swing has not"):
-        trunnion.play(mechanism, ["swing"], steps=12)

@@ -50,21 +50,6 @@ def test_first_order_of_the_starting_time() -> None:
     assert float(found["yield_all"]) == 1.0
 
 
-def test_a_duration_too_short_is_told() -> None:
-    """Turns of the nominal wheel come to differ by less than 2 %, those of a heavier one do not yet."""
-    duration = 1.15 * 0.05 * 150 / 4
-    mechanism = stated(
-        wheel(LINEAR),
-        tolerances={"links.wheel.inertia": 0.005},
-        measures={"start": {"starting_time": "A", "duration": duration}},
-    )
-    found = trunnion.tolerance(mechanism, methods=("linear", "worst-case"), jobs=1)
-    assert "first_order.corner_not_steady" in [one.code for one in found.trunnion.findings]
-    short = stated(mechanism, measures={"start": {"starting_time": "A", "duration": 1.0}})
-    found = trunnion.tolerance(short, methods=("linear",), jobs=1)
-    assert "tolerance.nominal_not_steady" in [one.code for one in found.trunnion.findings]
-
-
 def test_samples_that_do_not_start_are_outside_every_limit() -> None:
     """Torques about the drag: half of them do not start."""
     motor = {**LINEAR, "stall_effort": 0.6}
@@ -168,12 +153,6 @@ def test_a_prescribed_cycle_leaves_them_out() -> None:
     assert any(one.where == "measures.one" for one in found.trunnion.findings)
     with pytest.raises(MechanismError):
         trunnion.play(stated(mechanism, joint_defaults={"pin": {"radius": 0.01, "clearance": 1e-5}}), ["one"])
-
-
-def test_only_numpy_has_them() -> None:
-    mechanism = stated(wheel(LINEAR), tolerances={"links.wheel.inertia": 0.001}, measures={"start": MEASURE})
-    with pytest.raises(MechanismError):
-        trunnion.tolerance(mechanism, methods=("monte-carlo",), samples=4, engine="compiled")
 
 
 def test_tolerances_are_allocated_to_a_limit_of_the_starting_time() -> None:

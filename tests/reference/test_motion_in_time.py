@@ -66,16 +66,6 @@ def test_a_flywheel_runs_down(grease: float, time: float, angle: float) -> None:
     assert result["resting"].values[-1] == 1
 
 
-def test_a_flywheel_runs_down_by_the_losses_of_its_joint() -> None:
-    """The same, stated with the joint; all that it turns over is lost to friction."""
-    data = wheel(None, 0.0, 0.0, initial={"speed": 127.5}).data()
-    data["joints"]["A"]["losses"] = {"constant": 0.6, "viscous": 0.004}
-    result = simulate(Mechanism(**data), 12.0, 12, 1e-12)
-    assert events(result, "rest") == [pytest.approx(7.689820488627919, rel=1e-10)]
-    assert at(result, "drive_coordinate", 12.0) == pytest.approx(440.27692670581223, rel=1e-10)
-    assert float(result["work_friction"].values[-1]) == pytest.approx(0.5 * 0.05 * 127.5**2, rel=1e-9)
-
-
 def test_an_induction_motor_runs_up_by_kloss() -> None:
     """Without a load the time to a slip is J ω_s/(2 T_k) ∫ (s/s_k + s_k/s) ds."""
     motor = {"kind": "induction", "breakdown_effort": 20, "breakdown_slip": 0.2, "synchronous_speed": 50 * np.pi}

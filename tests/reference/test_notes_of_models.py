@@ -8,7 +8,7 @@ import pytest
 
 from mechanisms_parts import Data, revolute
 from toleranced import slider_crank
-from trunnion import Mechanism, MechanismError, analyse, play
+from trunnion import Mechanism, analyse, play
 
 
 def lever(**options: object) -> Mechanism:
@@ -42,21 +42,6 @@ def test_a_dead_centre_that_is_not_passed_says_why(statistic: Data, reason: str)
     (figure,) = [one for one in analyse(model, steps=36).trunnion.summary if one.name == "dead"]
     assert figure.value is None
     assert reason in figure.note
-
-
-@pytest.mark.parametrize(
-    ("change", "remedy"),
-    [
-        (lambda: lever().with_friction("0.2"), "joint_defaults.friction=0.2"),
-        (lambda: rubbing().with_values({"friction": 0.2}), "joint_defaults.friction, or that of one joint, such as A."),
-        (lambda: lever().with_values({"A.friction": "off"}), "write 0"),
-        (lambda: lever(joint_defaults={"friction": "none"}), "write 0"),
-    ],
-)
-def test_friction_stated_in_other_words_names_the_right_ones(change: object, remedy: str) -> None:
-    with pytest.raises(MechanismError) as error:
-        change()  # type: ignore[operator]
-    assert remedy in error.value.findings[0].remedy
 
 
 def test_play_that_is_the_mean_of_a_fit_tells_the_largest() -> None:

@@ -289,12 +289,6 @@ def test_totals_and_attributes() -> None:
     assert "stroke-position.worst_case" in [figure.name for figure in summary_of(result)]
 
 
-def test_angles_gain_whole_turns() -> None:
-    result = trunnion.play(four_bar("C"), ["rotation:A", "angle:crank"], steps=90)
-    np.testing.assert_allclose(np.diff(result["value"].values, axis=1), 2 * np.pi / 90, rtol=1e-9)
-    assert np.all(result["worst_case"].values < 1e-15)  # the driver holds it, and its own pin has no play
-
-
 def test_driven_joints_have_play_too() -> None:
     """The pin of the driver moves the crank's point B as it moves itself."""
     result = trunnion.play(four_bar("A"), ["crank.B.x"], steps=8)
@@ -383,17 +377,3 @@ def test_redundant_constraints_make_it_a_bound() -> None:
         mechanism = trunnion.Mechanism(**{**mechanism.data(), "over_constraint": "minimum-norm"})
     result = trunnion.play(with_play(mechanism.data()), steps=12)
     assert any(row["code"] == "play.redundant" for row in json.loads(result.attrs["findings"]))
-
-
-def test_play_at_the_teeth_is_told_of() -> None:
-    result = trunnion.play(with_play(mechanisms.model(mechanisms.geared_five_bar())), ["effort:A"], steps=12)
-    assert any(row["code"] == "play.gears" for row in json.loads(result.attrs["findings"]))
-
-
-def test_the_limit_that_is_drawn_is_the_one_that_is_judged() -> None:
-    """Of an extreme too."""
-    data = four_bar("C").data() | {"measures": {"swing": {"rotation": "D", "as": "maximum", "limit": "0.01 deg"}}}
-    result = trunnion.play(trunnion.Mechanism(**data), steps=36)
-    (finding,) = [row for row in json.loads(result.attrs["findings"]) if row["where"] == "measures.swing.limit"]
-    assert finding["figures"]["limit"] == pytest.approx(0.01)
-    assert np.degrees(json.loads(result.attrs["limits"])) == pytest.approx([0.01])

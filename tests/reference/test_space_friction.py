@@ -61,14 +61,6 @@ def test_massless_cardan(delta: float, shafts: float) -> None:
     assert left[1] / left[2] == pytest.approx(4, rel=0.1)
 
 
-def test_efficiency_is_even_in_the_angle() -> None:
-    """η(δ) = η(−δ), and η = 1 where the shafts are in line but for friction of nothing that turns."""
-    one, other = (float(analysed(hooke(delta, 0.1), 360).efficiency) for delta in (20.0, -20.0))
-    assert one == pytest.approx(other, abs=1e-12)
-    assert 0.9 < one < 1
-    assert 1 - float(analysed(hooke(0.01, 0.1), 360).efficiency) < 1e-4
-
-
 @pytest.mark.parametrize(
     "data",
     [
@@ -331,8 +323,7 @@ VERBS = {
 
 
 @pytest.mark.parametrize("verb", VERBS)
-@pytest.mark.parametrize("apart", [0.5, 1.0, 2.0])
-@pytest.mark.parametrize("bearing", [0.02, 0.08, 0.2])
+@pytest.mark.parametrize(("apart", "bearing"), [(0.5, 0.2), (2.0, 0.02)])
 def test_hinges_share_the_load_as_two_ends_of_a_bearing_each_do(verb: str, apart: float, bearing: float) -> None:
     """A hinge gives way across by F/k and tilts by M/(k h²), h half its bearing: F a = C/(1 + 4 h²/a²)."""
     model = door({"lower": 0.0, "upper": apart}, bearing, **STILL)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,8 +13,7 @@ import trunnion
 from toleranced import FOURBAR, fourbar, fourbar_angle, slider_crank
 from trunnion import Mechanism
 from trunnion.results.attributes import summary_of
-from trunnion.views.readings import readings
-from trunnion.views.tolerance import figure, tables
+from trunnion.views.tolerance import tables
 
 WIDE = 0.05e-3 / 3  # σ of each length
 
@@ -85,40 +83,3 @@ def test_rss_says_that_it_leaves_correlation_out() -> None:
     plain = study(0.0)
     assert not any("uncorrelated" in row[0] for row in tables(plain)[0].rows)
     assert not any("correlations" in row["code"] for row in json.loads(plain.attrs["findings"]))
-
-
-def test_table_and_chart_show_the_same_shares() -> None:
-    found = study(-0.85)
-    table = next(one for one in tables(found) if one.title.startswith("contributions to"))
-    told = [float(row[table.head.index("of variance")].split("\u00a0")[0].replace("−", "-")) for row in table.rows]
-    assert sum(told) == pytest.approx(100, abs=0.2)
-    assert min(told) < 0  # one of two that work against each other
-    axes = figure(found, "contributions").findobj(lambda one: hasattr(one, "containers") and one.containers)[0]
-    bars = {one.get_label(): [bar.get_width() for bar in one] for one in axes.containers}
-    np.testing.assert_allclose(bars["variance"], told, atol=0.051)
-    np.testing.assert_allclose(
-        bars["RSS², uncorrelated"], [100 * one.rss_share for one in readings(found)[0].contributions]
-    )
-    assert axes.get_xlim()[0] < min(bars["variance"])
-
-
-def test_columns_have_the_shares_of_the_variance(tmp_path: Path) -> None:
-    from trunnion.results.export import save
-
-    found = study(0.5)
-    save(found, tmp_path / "x.parameters.csv")
-    head, *rows = (tmp_path / "x.parameters.csv").read_text("utf-8").splitlines()
-    place = next(k for k, name in enumerate(head.split(",")) if name.startswith("angle.contribution_variance"))
-    shares = [float(row.split(",")[place]) for row in rows]
-    np.testing.assert_allclose(shares, found["contribution_variance"].values[0], rtol=1e-12)
-
-
-@pytest.mark.parametrize("criterion", ["worst-case", "rss", "yield"])
-def test_an_allocation_says_when_it_leaves_correlation_out(criterion: str) -> None:
-    costs = {name: {"model": "power", "B": 1, "k": 1, "unit": "mm"} for name in FOURBAR}
-    measures = {"angle": {"angle": "rocker", "at": "60 deg", "limit": "±0.1 deg"}}
-    rows = [{"of": ["l2", "l3"], "coefficient": 0.5}]
-    mechanism = fourbar(correlations=rows, costs=costs, measures=measures)
-    found = trunnion.allocate(mechanism, criterion=criterion, samples=0)  # type: ignore[arg-type]
-    said = any(row["code"] == "allocation.correlations_left_out" for row in json.loads(found.attrs["findings"]))
-    assert said == (criterion != "yield")

@@ -147,7 +147,7 @@ def deviations(nominal: Run, other: Run, measure: Measure) -> tuple[Array, Array
 SMOOTH = ("mean", "rms", "maximum", "minimum", "efficiency", "peak-to-peak", "stroke", "straightness")
 
 
-@pytest.mark.spread(4)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize(
     "name", ["four-bar", "class III", "geared five-bar", "Cardan", "lamp", "RCCC", "lugre friction"]
 )

@@ -16,7 +16,6 @@ from toleranced import FOURBAR, fourbar, fourbar_angle
 from trunnion import Mechanism
 from trunnion.cli.app import app
 from trunnion.studies.allocation.allocate import half_widths
-from trunnion.views.tolerance import report
 
 NOMINAL = float(fourbar_angle(**FOURBAR))
 COSTS = {name: {"model": "power", "B": 1, "k": 1, "unit": "mm"} for name in FOURBAR}
@@ -92,13 +91,6 @@ def test_what_allocate_can_mend() -> None:
     assert "if the model states `costs`" in advice(fourbar(**made(limit="±0.1 deg")))
 
 
-def test_what_has_no_cost_is_named() -> None:
-    """One cheap number has a cost, and the others alone are beyond the limit."""
-    mechanism = fourbar(**made(limit="±0.02 deg"), costs={"l2": COSTS["l2"]})
-    assert "tolerances without a cost, which" in advice(mechanism)
-    assert not trunnion.allocate(mechanism, samples=0).attrs["found"]
-
-
 def test_rss_whose_yield_is_short_is_an_error() -> None:
     """Uniform numbers fill their limits: what RSS keeps within the limit three in a hundred break."""
     tolerances = {name: {"limits": "±0.05 mm", "distribution": "uniform"} for name in FOURBAR}
@@ -135,24 +127,6 @@ def test_the_first_line_and_the_exit_status(tmp_path: Path, limit: str, code: in
     assert first.startswith("Error measures.angle limits not met") == bool(code)
 
 
-def test_play_and_allocate_say_it_first_too(tmp_path: Path) -> None:
-    joints = fourbar().data()["joints"]
-    joints["B"] |= {"pin": {"clearance": "0.05 mm"}}
-    mechanism = fourbar(joints=joints, measures={"angle": {"angle": "rocker", "limit": "±0.01 deg"}}, costs=COSTS)
-    status, out, _ = run(tmp_path, mechanism, "play")
-    assert status == 1
-    assert out.startswith("measures.angle.limit: the worst case to first order, ")
-    status, out, _ = run(tmp_path, mechanism, "allocate", "--samples", "0")
-    assert status == 1
-    assert out.startswith("measures.angle: the limit ")
-
-
-def test_the_report_of_no_limits_has_no_such_line() -> None:
-    found = trunnion.tolerance(fourbar(), methods=["linear"])
-    assert json.loads(found.attrs["missed"]) == []
-    assert "limits not met" not in report(found)
-
-
 @pytest.mark.parametrize(("asked", "fine"), [(0.9, True), (0.9999, False)])
 def test_a_yield_that_is_asked_for_decides_alone(asked: float, fine: bool) -> None:
     """The worst case is far outside either way."""
@@ -161,12 +135,6 @@ def test_a_yield_that_is_asked_for_decides_alone(asked: float, fine: bool) -> No
     assert 0.95 < found["yield"].item() < 0.999
     assert bool(missed(found)) != fine
     assert missed(trunnion.tolerance(mechanism, samples=4000))
-
-
-@pytest.mark.parametrize(("target", "methods"), [(1.2, ["monte-carlo"]), (0.9, ["linear"])])
-def test_a_yield_that_cannot_be_asked_for(target: float, methods: list[str]) -> None:
-    with pytest.raises(trunnion.MechanismError):
-        trunnion.tolerance(fourbar(), methods=methods, target=target)
 
 
 @pytest.mark.parametrize("coefficient", [0.0, 0.9])

@@ -8,12 +8,11 @@ from typing import Any
 
 import pytest
 
-from mechanisms_parts import prismatic, slide
-from toleranced import clutch, rssr, slider_crank
-from trunnion import Mechanism, save, tolerance
+from toleranced import clutch, slider_crank
+from trunnion import save, tolerance
 from trunnion.results.dataset import units_along
 from trunnion.views.readings import readings
-from trunnion.views.tolerance import drawable, figure, figures, headline
+from trunnion.views.tolerance import figures
 
 MEASURES: dict[str, dict[str, Any]] = {
     "top": {"point": "piston.P", "axis": "x", "at": "60 deg"},
@@ -55,30 +54,6 @@ def test_where_a_measure_is_taken(result: Any) -> None:
     assert told(still, "measure_texts") == {"wedge": "angle of link strut"}
 
 
-def test_the_headline_has_the_nominal_value_before_the_deviation(result: Any) -> None:
-    """So that a deviation is not taken for the measure itself."""
-    told = {name: {label: text for text, label in pairs} for name, pairs in headline(result)}
-    assert list(told["top"]) == ["nominal", "worst-case deviation, first order"]
-    assert told["top"]["nominal"] == readings(result)[0].say(float(result["nominal"].sel(measure="top")))
-
-
-def test_place_on_a_slide_and_axis_in_space() -> None:
-    """A driver that slides has places in mm; the turn of a link in space is about an axis."""
-    ram = Mechanism(
-        links={
-            "ground": {"points": {"A": {"at": [0, 0], "axis": [1, 0]}}},
-            "ram": {"points": {"A": slide(0, 0), "P": ["10 mm ± 0.1 mm", 0]}},
-        },
-        joints={"A": prismatic("ground", "ram")},
-        drivers={"A": {"speed": "10 mm/s", "range": ["0 mm", "50 mm"]}},
-        measures={"x": {"point": "ram.P", "axis": "x", "at": "20 mm"}},
-    )
-    found = tolerance(ram, methods=("linear",), steps=5)
-    assert told(found, "measure_texts") == {"x": "coordinate of point ram.P, x at 20 mm of A"}
-    found = tolerance(rssr(measures={"it": {"angle": "rod", "axis": "z"}}), methods=("linear",), steps=12)
-    assert told(found, "curve_texts") == {"it": "angle of rod about z"}
-
-
 def test_the_course_is_told_in_its_own_unit(result: Any) -> None:
     """Of a dead centre it is the slide in m, though its figure is an angle of the crank."""
     units = {"top": "m", "soon": "m", "swing": "rad", "back": "rad", "stroke": "m", "dead": "m", "late": "rad",
@@ -89,14 +64,6 @@ def test_the_course_is_told_in_its_own_unit(result: Any) -> None:
     assert texts["stroke"] == texts["dead"] == "slide of C"
     assert (texts["top"], texts["swing"], texts["wave"]) == ("x of piston.P", "angle of rod", "rotation of P")
     assert told(result, "measure_rules")["dead"] == "dead centre"
-
-
-def test_an_envelope_is_that_of_the_course(result: Any) -> None:
-    """None of a place in the cycle; of a stroke it says that it is the slide, whose limits are others."""
-    reads = {read.name: read for read in readings(result)}
-    assert [name for name, read in reads.items() if "envelope" in drawable(read)] == ["swing", "back", "stroke", "wave"]
-    (axes,) = figure(result, "envelope", ["stroke"]).axes
-    assert axes.get_ylabel() == "deviation of slide of C [mm]"
 
 
 def test_place_of_the_nominal_extreme(result: Any) -> None:

@@ -73,12 +73,6 @@ def test_an_empty_sheet_has_nothing_wrong():
     assert (found["entries"], found["findings"], found["solved"]) == ({}, [], False)
 
 
-def test_a_finding_names_what_it_is_about_once():
-    found = ask(ask="model", text=EXAMPLES["scotch-yoke"])["findings"]
-    rest = [f"{one['place']} {one['what']}"[:30] for one in found if "at rest" in one["what"]]
-    assert rest == ["joint S is momentarily at rest", "joint G is momentarily at rest"]
-
-
 def test_masses_of_links_are_not_solved():
     links = "".join(f"  l{k}: {{points: {{A: [0, 0]}}}}\n" for k in range(500))
     found = ask(ask="model", text=f"trunnion: 1\nlinks:\n{links}")
@@ -112,13 +106,6 @@ def test_every_example_opens(example):
     assert "error" not in found
     why = [one["code"] for one in found["findings"] if one["severity"] == "error"]
     assert found["solved"] or set(why) <= {"mobility.redundant", "input.drivers", "input.tables"}, found["findings"]
-
-
-def test_friction_of_forces_that_statics_leaves_open_is_a_warning():
-    found = ask(ask="model", text=EXAMPLES["bennett"].replace("bearing: 40 mm}", "bearing: 40 mm}\n  friction: 0.1"))
-    assert "error" not in found
-    assert found["solved"]
-    assert "mobility.friction_open" in {one["code"] for one in found["findings"] if one["severity"] == "warning"}
 
 
 def test_a_margin_is_of_positions_that_there_are():
@@ -240,7 +227,7 @@ def test_what_a_drag_changes_is_named_in_words():
 # ---- dragging ------------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(st.integers(0, 359), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
 def test_what_is_dragged_goes_there_and_its_neighbours_stay(index, x, y):
     text = EXAMPLES[FOURBAR]
@@ -346,11 +333,6 @@ def test_a_number_that_is_tried_gives_the_cycle_of_a_model_that_has_it(name, pat
         np.testing.assert_allclose(column(live.get("friction", [0.0] * 360)), along, rtol=0, atol=1e-6 * size)
 
 
-def test_a_mechanism_in_space_is_not_tried():
-    found = ask(ask="try", text=EXAMPLES["rssr"], values={"dimensions.b": 0.1}, index=0)
-    assert "in space" in found["error"]
-
-
 def test_a_position_that_is_locked_while_it_is_dragged_has_its_margin_and_no_forces():
     text = EXAMPLES["drawing-press"].replace("friction: 0.1", "friction: 0.4")
     place = ask(ask="model", text=text)["places"]["lower.K"]
@@ -412,14 +394,6 @@ def test_lengths_are_written_in_a_unit_that_suits_the_size(size, unit, factor):
     assert entries_of(text)[0]["links"]["bar"]["points"]["D"][0].endswith(f" {unit}")  # and so it stays
 
 
-def test_a_ground_without_joints_is_to_be_pinned():
-    text, _ = edited(
-        "", {}, {"do": "link", "from": [0, 0], "to": [1, 0]}, {"do": "link", "from": "link1.B", "to": [2, 1]}
-    )
-    told = {one["where"]: one["remedy"] for one in ask(ask="model", text=text)["findings"]}
-    assert told["links.ground"] == "pin another link to it"
-
-
 def test_a_step_says_what_a_value_was_set_to():
     text, path = EXAMPLES[FOURBAR], ["dimensions", "BC"]
     assert ask(ask="edit", text=text, gestures=[{"do": "set", "path": path, "value": "5 m"}])["says"] == "Set BC to 5 m"
@@ -449,14 +423,12 @@ def test_the_other_assembly_is_one_click_away():
 
 
 SHORT_ROCKER = {"AD: 5.50 m": "AD: 4.2 m", "AB: 2.00 m": "AB: 2.6 m", "CD: 3.00 m": "CD: 1.2 m"}
-NEAR_AXES = {"d: 100 mm": "d: 30 mm", "friction: 0.1": "friction: 0.002"}
 
 
-@pytest.mark.parametrize(("name", "other"), [(FOURBAR, SHORT_ROCKER), ("rssr", NEAR_AXES)])
-def test_the_least_margin_is_that_of_a_position_that_has_one(name, other):
+def test_the_least_margin_is_that_of_a_position_that_has_one():
     """The first positions cannot be assembled, the others do not lock."""
-    text = EXAMPLES[name]
-    for old, new in other.items():
+    text = EXAMPLES[FOURBAR]
+    for old, new in SHORT_ROCKER.items():
         text = text.replace(old, new)
     found = ask(ask="model", text=text)
     assert found["margin"][0] is None
@@ -472,13 +444,6 @@ def test_where_nothing_loads_the_joints_there_is_no_margin(name):
     found = ask(ask="model", text=text_of({**entries, "links": links, "loads": {}}))
     assert found["solved"]
     assert (found["margin_least"], found["margin_why"]) == (None, "nothing loads its joints")
-
-
-def test_the_chip_counts_what_the_section_of_tolerances_states():
-    for text in (EXAMPLES[FOURBAR] + "tolerances: {BC: ±1 mm}\n", EXAMPLES["rssr"] + "tolerances: {b: ±0.1 mm}\n"):
-        found = ask(ask="model", text=text)
-        assert next(one for one in found["ready"] if one["what"] == "tolerance")["ok"]
-        assert any(row["worst"][1] > 0 for row in ask(ask="tolerances", text=text)["rows"])
 
 
 @pytest.mark.parametrize(

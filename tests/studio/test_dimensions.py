@@ -1,11 +1,9 @@
-"""Dimensions made in the panel: by a form, or by a name typed for a number."""
+"""Dimensions made in the panel: by a name typed for a number."""
 
 from __future__ import annotations
 
 import pytest
 
-from browsing import CHROMIUM
-from served import served
 from studio.asking import ask, edited
 from studio.whitworth import TEXT
 from trunnion.model.file import entries_of
@@ -47,29 +45,3 @@ def test_what_an_expression_cannot_say_is_told_with_what_can(force, says):
     text = put(TEXT, ["loads", "load1", "force"], [force, "0 N"])
     (error,) = [one for one in ask(ask="model", text=text)["findings"] if one["severity"] == "error"]
     assert says in error["remedy"]
-
-
-if CHROMIUM:  # not a skip: what becomes of what is typed is tested above
-
-    @pytest.fixture(scope="module")
-    def studio(tmp_path_factory):
-        folder = tmp_path_factory.mktemp("rams")
-        (folder / "ram.yaml").write_text(TEXT, encoding="utf-8")
-        with served(folder, "ram.yaml") as own:
-            yield own
-
-    def test_a_dimension_is_added_and_used(user):
-        page = user.page
-        page.fill("[aria-label='Name of the new dimension']", "rod")
-        page.fill("[aria-label='Value of the new dimension']", "100")
-        page.keyboard.press("Enter")
-        user.until("s.answer.value.entries.dimensions.rod === '100 mm'")
-        page.fill("[aria-label='Name of the new dimension']", "rod")
-        page.click("button:has-text('Add dimension')")
-        user.idle()
-        assert "already" in user.state("s.notice.value.words")
-        page.click(".parts button:text-is('link3')")
-        page.fill("#value-links-link3-points-E-0", "rod")
-        page.keyboard.press("Enter")
-        user.until("s.answer.value.numbers['links.link3.points.E.x'] === 0.1 && s.past.value.length === 2")
-        assert user.state("s.solved.value")

@@ -86,33 +86,6 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         user.idle()
         assert np.abs(effort(user) - torque).max() <= PEAK * np.abs(torque).max()
 
-    def test_a_typed_length_is_shown_as_it_is_drawn(user):
-        user.new_sheet()
-        user.keys("Control+a")
-        assert user.page.evaluate("getSelection().toString()") == ""
-        user.keys("l")
-        user.click(200, 300)
-        user.page.mouse.move(user.box["x"] + 300, user.box["y"] + 300)
-        user.page.keyboard.type("30")
-        ends = [float(user.page.locator(".rubber").get_attribute(name)) for name in ("x1", "x2", "y1", "y2")]
-        scale = user.of("sheet", "m.sheet.view.frame.scale")
-        assert np.hypot(ends[1] - ends[0], ends[3] - ends[2]) == pytest.approx(0.03 * scale, abs=0.2)
-
-    def test_a_link_is_pinned_in_its_middle(user):
-        user.new_sheet()
-        draw(user, ("l", (200, 300), (400, 240)))
-        (ax, ay), (bx, by) = user.handle("link1.A"), user.handle("link1.B")
-        draw(user, ("p", ((ax + bx) / 2 - user.box["x"], (ay + by) / 2 - user.box["y"])))
-        entries = entries_of(user.state("s.text.value"))[0]
-        assert entries["joints"]["C"]["links"] == ["ground", "link1"]
-        assert float(entries["links"]["link1"]["points"]["C"][0].split()[0]) > 0
-
-    def test_a_tool_is_left_from_a_choice_too(user):
-        user.keys("f")
-        user.page.focus("header select")
-        user.keys("Escape")
-        assert user.state("s.tool.value") == "select"
-
     def test_a_load_against_the_motion_is_put_on_a_pivot_and_on_its_link(user):
         user.box = {"x": 0, "y": 0}
         for spot in (user.handle("D"), None):
@@ -242,18 +215,6 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         user.keys("Control+z")
         assert user.state("s.text.value") == drawn
 
-    def test_a_pin_on_the_ground_keeps_the_lengths_of_its_links(user):
-        user.new_sheet()
-        user.draw_four_bar()
-        before = lengths(user)
-        x, y = drag(user, "D", 40, 20)
-        assert np.hypot(*np.subtract(user.handle("D"), (x + 40, y + 20))) < 4
-        assert lengths(user) == before
-        user.page.keyboard.down("Alt")
-        drag(user, "D", -40, -20)
-        user.page.keyboard.up("Alt")
-        assert lengths(user) != before
-
     @pytest.mark.slow
     def test_two_fingers_shift_and_zoom_the_sheet(user):
         touch = user.page.context.new_cdp_session(user.page)
@@ -280,14 +241,3 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         np.testing.assert_allclose(after, middle + [25, 0] + 1.5 * (np.array(origin) - middle), atol=1e-3)
         assert user.state("s.text.value") == before
         assert user.state("s.live.value") is None
-
-    @pytest.mark.slow
-    def test_a_joint_dropped_on_its_neighbour_is_refused_in_a_sentence(user):
-        user.new_sheet()
-        user.draw_four_bar()
-        drawn = user.state("s.text.value")
-        drag(user, "C", *np.subtract(user.handle("D"), user.handle("C")))
-        assert user.state("s.text.value") == drawn
-        told = user.state("s.notice.value")
-        assert told["bad"]
-        assert "would have no length" in told["words"]

@@ -146,15 +146,15 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user = tabs()
         typed(user, FOURBAR + "# old\n")
         user.page.evaluate(FULL, free)
-        for k in range(20):
+        for k in range(6):
             user.of("actions", "m.takeText(given, 'Step')", FOURBAR + f"# {k}\n" + "# and more\n" * 2000)
         user.idle()
         full = user.page.locator("[role=alert]:has-text('no room for this work')")
         assert full.count() == (0 if free else 1)
         reloaded(user)
-        assert user.state("s.text.value").startswith(FOURBAR + "# 19\n" if free else FOURBAR)
+        assert user.state("s.text.value").startswith(FOURBAR + "# 5\n" if free else FOURBAR)
         assert "# old" not in user.state("s.text.value")
-        assert user.state("s.past.value.length") < 21
+        assert user.state("s.past.value.length") < 7
         assert user.page.locator("text=recovered").count() == (1 if free else 0)
 
     # ---- who is let in --------------------------------------------------------------------------------------------

@@ -74,22 +74,6 @@ if CHROMIUM:  # not a skip: this is the page's own part
         a1, b1, a2, b2 = user.page.evaluate(slot)
         assert (b2 - b1) * (x2 - x1) == pytest.approx((y2 - y1) * (a2 - a1), abs=1.0)
 
-    def test_a_step_of_many_is_named_by_what_it_came_to(user):
-        for value in ("31 mm", "32 mm", "33 mm"):
-            user.of("actions", "m.setValue(['dimensions', 'crank'], given, 'slider crank')", value)
-            user.idle()
-        assert user.state("s.past.value.map(({ name }) => name)") == ["Set crank to 33 mm"]
-
-    def test_variant_a_is_not_compared_with_another_sheet(user):
-        user.until("s.solved.value")
-        user.page.click("role=tab[name=Plots]")
-        user.page.click("button:has-text('Keep as variant A')")
-        user.idle()
-        user.page.reload()
-        user.until("s.solved.value && s.variant.value")
-        user.new_sheet()
-        assert user.state("s.variant.value") is None
-
     def test_what_is_wrong_leaves_the_mechanism_in_view_until_it_is_pointed_at(user):
         user.of("actions", "m.typed(given)", TEXT.replace("friction: 0.12", "friction: 2"))
         user.until("s.answer.value.margin_least?.value < 1")
@@ -99,13 +83,3 @@ if CHROMIUM:  # not a skip: this is the page's own part
         user.page.wait_for_timeout(60)
         assert low < 40 < card.bounding_box()["height"]
         assert "all joints below 0.742" in card.text_content()
-
-    def test_hints_for_fingers_ask_for_no_keys(browser, studio):
-        context = browser.new_context(viewport={"width": 1280, "height": 720}, has_touch=True, is_mobile=True)
-        page = context.new_page()
-        page.goto(studio.address)
-        page.wait_for_selector(".sheet svg")
-        page.click("button.tool:has-text('Link')")
-        words = page.text_content(".next-step")
-        context.close()
-        assert words == "Touch the first end: a joint, a place on a link, or a free place."

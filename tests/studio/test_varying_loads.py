@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 import trunnion
-from browsing import CHROMIUM
-from served import served
 from studio.asking import solved
 from studio.whitworth import TEXT
 from trunnion.model.file import entries_of
@@ -37,27 +35,3 @@ def test_of_thinned_positions_it_is_that_of_those_shown_and_of_others_unknown():
     (whole,) = scene(result)["loads"]
     assert load["course"]["force"][0] == whole["course"]["force"][0][::4]
     assert scene(result.isel(position=slice(0, 90)))["loads"][0]["course"] is None
-
-
-if CHROMIUM:  # not a skip: what is drawn is tested above
-
-    @pytest.fixture(scope="module")
-    def studio(tmp_path_factory):
-        folder = tmp_path_factory.mktemp("rams")
-        (folder / "ram.yaml").write_text(TEXT, encoding="utf-8")
-        with served(folder, "ram.yaml") as own:
-            yield own
-
-    def test_the_arrow_turns_round_with_the_force(user):
-        user.until("s.solved.value")
-        seen = []
-        for index in (90, 200):
-            user.of("state", "{ m.index.value = given; }", index)
-            user.idle()
-            words, shaft = (user.page.locator(f'.sheet [data-kind="loads"] {one}').first for one in ("text", "path"))
-            along = shaft.get_attribute("d").split("L")[1].split(",")[0]
-            force = user.state(f"s.answer.value.scene.loads[0].course.force[0][{index}]")
-            assert np.sign(float(along)) == np.sign(force)
-            assert words.text_content() == "150\u00a0N"
-            seen.append(np.sign(force))
-        assert set(seen) == {-1.0, 1.0}

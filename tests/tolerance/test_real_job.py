@@ -115,11 +115,11 @@ def test_seed_and_only_the_seed_changes_samples() -> None:
 
 @pytest.mark.parametrize("engine", ["numpy", "compiled"])
 def test_memory_grows_with_the_figures_kept_alone(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Four times as many samples need the bytes of their figures more at any time: two copies while they are joined."""
+    """Three times as many samples need the bytes of their figures more: two copies while they are joined."""
     monkeypatch.setattr(sampling, "CURVES", 100 * 360)
     found = study(fourbar(loaded=True, tolerances={"l3": "±1 mm"}, measures={"peak": {"effort": "A", "as": "maximum"}}))
     first = found.sampling("monte-carlo", 1, 5, engine)
-    few, many = (found.sampling("monte-carlo", blocks * first.block_size, 5, engine) for blocks in (3, 12))
+    few, many = (found.sampling("monte-carlo", blocks * first.block_size, 5, engine) for blocks in (2, 6))
     run(few, threads=True)  # what is worked out once: machine code, tables
     peaks = []
     for one in (few, many):

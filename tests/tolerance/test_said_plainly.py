@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import trunnion
 from trunnion import Mechanism
 from trunnion.results.attributes import findings_of
-from trunnion.results.quantities import drawn_in, signed
-from trunnion.views.allocation import headed, prices, trade_off
-from trunnion.views.readings import readings
-from trunnion.views.tolerance import report, tables
+from trunnion.views.tolerance import tables
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SLIDER = {
@@ -83,75 +78,6 @@ def test_an_allocated_clearance_keeps_its_stated_tolerance_and_that_is_said() ->
     assert worst == pytest.approx(size * abs(float(play["sensitivity"].sel(measure="tip"))), rel=1e-6)
 
 
-def test_limits_are_told_in_units_that_fit() -> None:
-    assert signed(-2.441e5, *drawn_in(2.4e5, "N")) == "−244.1 kN"
-    assert signed(4.831e-4, *drawn_in(6e-4, "m")) == "+0.4831 mm"
-    assert signed(np.radians(0.1), *drawn_in(np.radians(0.1), "rad")) == "+0.1°"
-    assert signed(0.5, *drawn_in(0.5, "1"), sign="") == "0.5"
-    mechanism = trunnion.read(EXAMPLES / "drawing-press.yaml")
-    data = mechanism.data() | {
-        "measures": {"force": {"reaction": "O", "at": "10 mm", "at_most": "100 kN"}},
-        "tolerances": {"L": "±0.1 mm"},
-    }
-    (found,) = coded(trunnion.tolerance(Mechanism(**data), methods=["linear"], steps=12), "limit.missed")
-    assert "at most 100 kN" in found.what
-    assert "first order" in found.what
-    assert not re.search(r"\de\+\d", str(found))
-
-
-def test_a_limit_and_the_tables_have_one_unit() -> None:
-    """A bound of 100 kN beside a scatter of some newtons: both in the unit of the table of the measure."""
-    mechanism = trunnion.read(EXAMPLES / "drawing-press.yaml")
-    for bound in ("100 kN", "1 N"):
-        data = mechanism.data() | {
-            "measures": {"force": {"reaction": "O", "at": "10 mm", "at_most": bound}},
-            "tolerances": {"L": "±0.001 mm"},
-        }
-        result = trunnion.tolerance(Mechanism(**data), methods=["linear"], steps=12)
-        (read,) = readings(result)
-        (found,) = coded(result, "limit.missed")
-        units = set(re.findall(r"[\d.]+ ([kM]?N)\b", found.what))
-        assert units == {read.label}
-
-
-def test_no_samples_are_none_where_no_method_draws_any() -> None:
-    result = trunnion.tolerance(slider(), methods=["linear"], samples=0, steps=12)
-    assert "yield" not in result
-    with pytest.raises(trunnion.MechanismError, match="samples"):
-        trunnion.tolerance(slider(), methods=["monte-carlo"], samples=0, steps=12)
-
-
-def test_shares_are_shown_beside_those_of_the_variance() -> None:
-    result = trunnion.tolerance(slider(), samples=50, steps=12)
-    heads = next(one.head for one in tables(result) if one.title.startswith("contributions"))
-    assert {"share", "of RSS²", "of variance"} <= set(heads)
-
-
-def test_a_report_has_a_missed_limit_once_and_no_backtick() -> None:
-    tight = slider(measures={"tip": {"point": "ram.T", "axis": "x", "limit": "±0.1 mm"}})
-    result = trunnion.tolerance(tight, samples=50, steps=12)
-    page = report(result)
-    (found,) = coded(result, "limit.missed")
-    assert page.count("limits not met") == 1
-    assert "<code>trunnion allocate</code>" in page
-    assert "`" in found.remedy
-    assert "`" not in re.sub(r"<style>.*?</style>", "", page, flags=re.S)
-
-
-def test_costs_of_formulas_are_a_line_and_a_play_has_no_sign() -> None:
-    result = trunnion.allocate(slider(), steps=12, samples=0, curve=9)
-    figure = result.trunnion.plot("trade-off")
-    assert figure.axes[0].lines[0].get_drawstyle() == "default"
-    plays = {one.name: one.play for one in prices(result)}
-    assert plays == {"dimensions.k": False, "joints.O.clearance": True}
-    panels = {axes.get_title(loc="left").split("\n")[0]: axes for axes in result.trunnion.plot("cost").axes}
-    assert panels["joints.O.clearance"].get_xlabel().startswith("clearance")
-    assert "±" not in panels["joints.O.clearance"].get_title(loc="left")
-    assert panels["dimensions.k"].get_xlabel().startswith("±")
-    steps = trade_off(result, [(0.5, 3.0), (1.0, 1.0), (2.0, 1.0)], stepped=True)
-    assert steps.axes[0].lines[0].get_drawstyle() == "steps-post"
-
-
 def test_the_largest_part_is_named_and_a_play_is_within_its_radius() -> None:
     """At 0° the rod and the ram have 30 µm, three pins 20 µm each, the crank 10 µm."""
     tip = {"point": "ram.T", "axis": "x", "at": "0 deg", "limit": "±0.05 mm"}
@@ -163,17 +89,6 @@ def test_the_largest_part_is_named_and_a_play_is_within_its_radius() -> None:
     rows = next(one.rows for one in tables(result) if one.title.startswith("contributions"))
     told = {row[0]: row[1].replace("\u00a0", " ") for row in rows}
     assert (told["k"], told["O.clearance"]) == ("±0.015 mm", "within 0.02 mm")
-
-
-def test_fresh_samples_of_an_allocation_are_told() -> None:
-    """Processes are so few that more is bought than is required."""
-    options = {"fine": {"tolerance": "5 um", "cost": 2}, "rough": {"tolerance": "1 mm", "cost": 1}}
-    model = slider(
-        costs={"k": {"options": options}}, measures={"tip": {"point": "ram.T", "axis": "x", "limit": "±0.25 mm"}}
-    )
-    result = trunnion.allocate(model, criterion="yield", target=0.9, samples=400, steps=12)
-    assert float(result["yield_checked_low"]) > 0.9
-    assert "yield of fresh samples" in headed(result)
 
 
 def test_a_sensitivity_is_by_the_unit_of_the_tolerance() -> None:
@@ -188,11 +103,3 @@ def test_a_sensitivity_is_by_the_unit_of_the_tolerance() -> None:
     assert row[2].endswith("/kN")
     assert float(row[3].split()[0]) == pytest.approx(abs(torque) * half * 1e-3, abs=1e-4)  # kN m
     assert float(row[2].split()[0].replace("−", "-")) == pytest.approx(torque / 250e3, rel=1e-3)
-
-
-def test_a_yield_and_its_interval_have_the_same_digits() -> None:
-    tight = slider(measures={"tip": {"point": "ram.T", "axis": "x", "limit": "±0.25 mm"}})
-    (found,) = coded(trunnion.tolerance(tight, samples=300, steps=12), "limit.missed")
-    told = re.search(r"yield ([\d.]+) % \(95 % interval ([\d.]+) to ([\d.]+) %\)", found.what)
-    assert told
-    assert len({len(one.partition(".")[2]) for one in told.groups()}) == 1

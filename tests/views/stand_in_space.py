@@ -14,7 +14,6 @@ import xarray as xr
 from trunnion.errors import Status
 
 X, Y, Z = np.eye(3)
-LONG = {"units": "", "long_name": ""}
 
 
 def matrices(*columns):

@@ -15,10 +15,8 @@ from trunnion.views.cycle.deviations import (
     broken,
     continued,
     losses,
-    outputs,
     seated,
     with_worst_case,
-    worst_points,
 )
 from trunnion.views.cycle.plots import READY, drawable, save
 from trunnion.views.cycle.seats import PIN
@@ -54,21 +52,6 @@ def test_every_figure_is_drawn(which, request, tmp_path):
     assert {"error", "seat"} <= set(kinds)
     for name in READY.keys() & set(kinds):
         assert save(plots.figure(result, name), tmp_path / f"{name}.svg").stat().st_size > 10_000
-
-
-@pytest.mark.parametrize(
-    ("name", "why"), [("error", "has no errors"), ("seat", "has a pin with a seat"), ("beta", "with a seat")]
-)
-def test_without_errors_the_reason_is_told(plain, name, why):
-    with pytest.raises(MechanismError, match=f"{why}.*no figure '{name}'.*seat=loaded"):
-        plots.figure(plain, name)
-    assert name not in drawable(plain)
-
-
-@pytest.mark.slow
-def test_balls_have_no_angles(balls):
-    with pytest.raises(MechanismError, match="the seats of balls are directions"):
-        plots.figure(balls, "beta")
 
 
 def test_errors_are_those_of_the_result(slider):
@@ -107,22 +90,6 @@ def test_the_band_lies_about_the_error_of_the_dimensions():
     assert centre == pytest.approx(free.joint_rotation_error.sel(joint="D").values, abs=1e-12)
     assert (np.abs(result.joint_rotation_error.sel(joint="D").values - centre) <= reach * (1 + 1e-3)).all()
     assert np.isnan(result["transmission_centre"].sel(joint="B")).all()
-
-
-def test_without_play_there_is_no_band(plain):
-    assert with_worst_case(plain, four_bar_model()) is plain
-    model = four_bar_model(AB="0.1 mm").with_values({"B.pin.clearance": 0})
-    assert "transmission_reach" not in with_worst_case(trunnion.analyse(model, 12), model)
-
-
-def test_worst_points_are_those_and_each_once():
-    result = four_bar(AB="0.1 mm")
-    worst = worst_points(result)
-    first = next(iter(worst))
-    sizes = np.linalg.norm(result.point_error.values, axis=1)
-    assert np.max(worst[first]) == pytest.approx(np.max(sizes))
-    assert len({tuple(np.round(values, 12)) for values in worst.values()}) == len(worst)
-    assert [one.joint for one in outputs(result)] == ["D"]
 
 
 def test_positions_without_an_answer_are_gaps(slider, tmp_path):
@@ -173,23 +140,6 @@ def test_the_locus_has_the_offsets_and_no_jump(slider):
     drawn = np.concatenate(pieces)
     assert all(np.min(np.linalg.norm(offset - place, axis=1)) < 1e-9 for place in drawn)
     assert max(np.linalg.norm(np.diff(piece, axis=0)) for piece in pieces) < 20
-
-
-def test_a_guide_lies_between_its_limits_in_its_own_scale(slider):
-    axes = _drawn(plots.figure(slider, "seat"))["S"]
-    assert axes.get_xlabel().startswith("along the guide [mm]\nguide of frame in piston")
-    assert axes.get_ylabel() == "across [µm]"
-    bars = [line for line in axes.lines if line.get_marker() == "o" and len(line.get_xdata()) == 2]
-    assert len(bars) == 4
-    for bar in bars:
-        assert np.abs(bar.get_ydata()) == pytest.approx([30, 30])
-        assert bar.get_xdata() == pytest.approx([-20, 20])
-
-
-def test_a_ball_is_seen_twice(balls):
-    diagrams = _drawn(plots.figure(balls, "seat"))
-    assert list(diagrams) == ["B: xy", "B: xz", "C: xy", "C: xz"]
-    assert diagrams["C: xz"].get_ylabel() == "z [µm]"
 
 
 def test_a_seat_that_is_given_is_drawn_where_it_is():
@@ -244,19 +194,6 @@ def test_a_jump_is_a_step_far_above_its_neighbours():
     assert np.flatnonzero(np.isnan(broken(x, halfway, 60.0, np.array([3]))[1])).tolist() == [3, 5]
 
 
-def test_the_scene_of_the_result_tells_the_plays(cardan):
-    import json
-
-    plays = json.loads(cardan.attrs["scene"])["plays"]
-    assert set(plays) == {"input", "pin-1", "pin-2", "output"}
-    assert plays["pin-1"] == {
-        "kind": "pin", "clearance": pytest.approx(1e-5), "float": 0.0, "length": 0.01, "radius": 0.01002,
-        "hole": plays["pin-1"]["hole"],
-    }  # fmt: skip
-    free = trunnion.analyse(trunnion.Mechanism.read(EXAMPLES / "pezzuti-cardan.yaml"), 4)
-    assert json.loads(free.attrs["scene"])["plays"] == {}
-
-
 # ---- sweeps ---------------------------------------------------------------------------------------------------
 
 
@@ -278,9 +215,3 @@ def test_a_sweep_is_drawn_beside_the_ideal_mechanism(slider, tmp_path):
     free = trunnion.sweep(mechanism.with_values({"joint_defaults.friction.coefficient": 0.1}),
                           {"misalignment": ["10 deg", "20 deg"], "input.speed": [10, 100]}, 12)  # fmt: skip
     assert "ideal, dashed" in [text.get_text() for text in sweep_figure(free).axes[0].get_legend().get_texts()]
-
-
-def test_a_figure_of_errors_that_a_sweep_lacks_is_told(plain):
-    mechanism = trunnion.Mechanism.read(EXAMPLES / "durango-fourbar.yaml")
-    with pytest.raises(MechanismError, match="no mechanism of the sweep has errors"):
-        sweep_figure(trunnion.sweep(mechanism, {"AB": [2.0, 2.1]}, 4), "efficiency_ideal")

@@ -8,11 +8,9 @@ import shutil
 import numpy as np
 import pytest
 from as_built_models import EXAMPLES, four_bar, loaded
-from test_report import Page
 
 import trunnion
 from trunnion.views.cycle.deviations_tables import error_rows, loss_rows
-from trunnion.views.cycle.report import report
 from trunnion.views.cycle.scene import scene
 
 
@@ -28,14 +26,6 @@ def cardan():
 
 def _full(series, count):
     return np.array(series * count if len(series) == 1 else series, dtype=float)
-
-
-def test_a_result_without_errors_tells_none(plain):
-    assert scene(plain)["built"] is None
-    assert error_rows(plain) == []
-    text = report(plain)
-    assert 'id="seats"' not in text
-    assert "Errors relative to the ideal mechanism" not in text
 
 
 def test_points_less_their_errors_are_those_of_the_ideal_mechanism():
@@ -74,41 +64,6 @@ def test_a_link_in_space_is_moved_turned_and_stretched_to_its_errors(cardan):
             np.array([np.linalg.norm(row["by"]) for row in told["stretch"]]) if told["stretch"] else np.zeros(len(own))
         )
         assert left == pytest.approx(np.repeat(bys[:, None], 72, axis=1), abs=2e-9)
-
-
-@pytest.mark.slow
-def test_what_is_offered_shows_the_errors(slider, cardan):
-    for result in (slider, cardan):
-        preset = scene(result)["built"]["preset"]
-        assert preset >= 10
-        assert preset * np.nanmax(np.abs(result.link_error.values)) < 0.5
-        assert preset / 10 ** np.floor(np.log10(preset)) in (1, 2, 5)
-
-
-def test_positions_without_contact_are_told_when_positions_are_thinned(slider):
-    lost = np.flatnonzero(slider.contact_lost.values.any(axis=0))
-    assert scene(slider)["built"]["lost"] == lost.tolist()
-    assert scene(slider, max_positions=24)["built"]["lost"] == sorted({int(index) // 3 for index in lost})
-
-
-def _efficiencies(result):
-    return f"{float(result.efficiency):.4f}", f"{float(result.efficiency_ideal):.4f}"
-
-
-def test_the_report_has_errors_seats_and_losses_and_fetches_nothing(slider, cardan):
-    for result, figures in (
-        (slider, ("loses contact", "Loss of contact", "rad/(N s)")),
-        (cardan, _efficiencies(cardan)),
-    ):
-        text = report(result)
-        page = Page(text)
-        assert not page.open
-        assert set(re.findall(r"https?://[^\s\"'<)]+", text)) <= {"http://www.w3.org/2000/svg"}
-        words = " ".join("".join(page.words).split()).replace("\u00a0", " ")
-        for expected in ("Errors relative to the ideal", "Seats of the pins in their holes", "Transmission error",
-                         "Efficiency of the cycle", "Friction power, mean", *figures):  # fmt: skip
-            assert expected in words, expected
-        assert len(text) < 1_500_000
 
 
 def test_the_table_of_errors_has_the_figures_of_the_result(cardan):

@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import functools
-import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
-from test_browser import NODE, run
 from test_report import Page
 
 import trunnion
-from playing import loose_slider, rattling
+from playing import rattling
 from playing_space import rattling_in_space
 from trunnion.dynamics.spectrum import spectrum
 from trunnion.errors import MechanismError
 from trunnion.results.tables import columns
 from trunnion.views.motion.figure import figure
 from trunnion.views.motion.report import report
-from trunnion.views.motion.scene import motion_scene
-from trunnion.views.motion.shown import shown
 
 
 @functools.cache
@@ -72,33 +67,12 @@ def test_the_report_has_force_gap_orbit_and_spectrum() -> None:
     assert "frequency" in pictures[1]
 
 
-def test_the_report_of_a_guide_in_play_has_no_orbit() -> None:
-    page = Page(report(trunnion.simulate(loose_slider(), duration=1e-3, steps=10)))
-    assert len(page.scene()["motion"]["contacts"]) == 4
-    assert not [attrs for tag, attrs in page.tags if tag == "img" and "holes" in attrs["alt"]]
-
-
-@pytest.mark.skipif(not NODE, reason="without node")
-def test_the_page_draws_forces_and_gaps(tmp_path: Path) -> None:
-    path = tmp_path / "scene.json"
-    path.write_text(json.dumps(motion_scene(shown(rattled()))), encoding="utf-8")
-    titles = json.loads(run("page.test.mjs", path))["motion"]["titles"]
-    assert {"Contact forces", "Gaps"} <= set(titles)
-
-
 def test_a_motion_without_play_has_no_such_figures() -> None:
     result = trunnion.simulate(trunnion.read("examples/flywheel-press.yaml"), duration=1e-3, steps=1)
     for kind in ("orbit", "gaps", "contacts", "spectrum"):
         with pytest.raises(MechanismError) as raised:
             figure(result, kind)
         assert [finding.where for finding in raised.value.findings] == [f"--kind {kind}"]
-
-
-def test_a_guide_has_gaps_and_no_orbit() -> None:
-    result = trunnion.simulate(loose_slider(), duration=1e-3, steps=10)
-    assert len(figure(result, "gaps").axes) == 1
-    with pytest.raises(MechanismError):
-        figure(result, "orbit")
 
 
 def test_columns_of_contacts_and_impacts() -> None:
@@ -111,20 +85,6 @@ def test_columns_of_contacts_and_impacts() -> None:
     assert list(impacts["contact"][1]) == ["Q", "Q"]
     assert impacts["approach"][0] == "m/s"
     assert impacts["approach"][1][0] == pytest.approx(4.38578315, rel=1e-8)
-
-
-def test_summary_of_contacts() -> None:
-    summary = {one.name: one for one in rattled().trunnion.summary}
-    assert summary["Q.impacts"].value == 2
-    assert summary["Q.contact_force_max"].value == pytest.approx(45872.2, rel=1e-5)
-    assert 0 < summary["Q.contact_time"].value < 1
-    assert summary["Q.wear"].value == pytest.approx(float(rattled()["impact_wear"].sum()))
-
-
-def test_a_table_of_no_impacts(tmp_path: Path) -> None:
-    result = trunnion.simulate(rattling(), duration=1e-4, steps=4)
-    trunnion.save(result, tmp_path / "none.impacts.csv")
-    assert (tmp_path / "none.impacts.csv").read_text().splitlines()[0].startswith("contact,begin,end")
 
 
 def test_the_spectrum_of_harmonics_is_theirs() -> None:

@@ -87,12 +87,6 @@ def test_curves_that_coincide_are_named_together_and_have_the_colour_of_the_firs
     assert _line(figure.axes[0], "C = D").get_color() == _line(alone.axes[0], "C").get_color()
 
 
-def test_slides_are_told_in_millimetres_as_their_drive():
-    result = trunnion.analyse(trunnion.read(EXAMPLES / "slider-crank.yaml").with_values({"r": "1.2 m", "l": "5 m"}), 12)
-    labels = [axes.get_ylabel() for axes in plots.figure(result, "motion").axes]
-    assert "slide [mm]" in labels
-
-
 def test_a_cylinder_is_a_barrel_with_a_rod_in_it():
     """0.95 m shut, a stroke of 0.75 m: the barrel stays off the rod's eye, and the rod off the foot."""
     result = trunnion.analyse(trunnion.read(EXAMPLES / "inverted-slider-crank.yaml"), 24)

@@ -6,20 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from stand_in import blank, four_bar, slider
+from stand_in import blank, slider
 
 from trunnion.errors import Status
-from trunnion.views.common.cycle import abscissa, intervals, status_text, thin
+from trunnion.views.common.cycle import abscissa, intervals, thin
 
 
 def test_a_turning_drive_is_drawn_over_its_angle_and_the_turn_closes(plain):
     over = abscissa(plain)
     assert (over.title, over.closed, over.period) == ("drive angle A [°]", True, pytest.approx(360.0))
     assert over.values[90] == pytest.approx(90.0)
-
-
-def test_part_of_a_turn_does_not_close(plain):
-    assert not abscissa(plain.isel(position=slice(0, 200))).closed
 
 
 def test_a_drive_turning_backwards_closes_too(plain):
@@ -62,14 +58,6 @@ def test_intervals_name_each_run_without_an_answer(plain):
         (10, 20, Status.LOCKED.text),
         (300, 360, Status.NOT_ASSEMBLED.text),
     ]
-
-
-def test_an_unknown_status_is_still_said():
-    assert status_text(99) == "not solved (status 99)"
-
-
-def test_intervals_of_nothing():
-    assert intervals(four_bar(12)) == []
 
 
 @given(st.lists(st.floats(-1e6, 1e6) | st.just(np.nan), min_size=1, max_size=400), st.integers(4, 60))

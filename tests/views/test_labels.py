@@ -53,16 +53,6 @@ def sheet() -> tuple[Figure, mpl.axes.Axes]:
     return figure, axes
 
 
-def test_a_name_goes_where_nothing_is_drawn() -> None:
-    """All but the left of its place is dark."""
-    figure, axes = sheet()
-    axes.fill_between([0.5, 1.0], 0, 1, color="black")
-    labels = Labels(figure)
-    labels.add(axes, "A", np.array([0.5, 0.5]))
-    labels.place()
-    assert boxes(figure)["A"][1, 0] < 200
-
-
 def test_names_that_would_meet_are_moved_apart_and_led() -> None:
     """Eight places within a few points of each other."""
     figure, axes = sheet()
@@ -74,11 +64,3 @@ def test_names_that_would_meet_are_moved_apart_and_led() -> None:
     assert len(found) == 8
     assert not [pair for pair in combinations(found, 2) if meet(*(found[text] for text in pair))]
     assert any(text.arrow_patch is not None for text in axes.texts), "those further off have a leader"
-
-
-def test_a_place_that_is_not_known_has_no_name() -> None:
-    figure, axes = sheet()
-    labels = Labels(figure)
-    labels.add(axes, "A", np.array([np.nan, 0.5]))
-    labels.place()
-    assert not axes.texts

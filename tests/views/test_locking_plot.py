@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +10,9 @@ from matplotlib.colors import to_rgb
 
 import trunnion
 from trunnion.cycle.locking import LockingState
-from trunnion.results.attributes import summary_of
 from trunnion.views.charts import Line, joined
-from trunnion.views.common.markup import with_code
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.courses import STATES
-from trunnion.views.cycle.report import report
-from trunnion.views.page import headline
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 STEPS = 24
@@ -59,19 +54,6 @@ def test_margin_and_multiples_are_drawn_as_computed(press):
     assert ahead == pytest.approx(100 * found["efficiency_instant"].values)
 
 
-@pytest.mark.parametrize("friction", [0.1, 0.5])
-def test_every_state_is_coloured_and_named_once(press, friction):
-    found = trunnion.locking(press.with_values({"joint_defaults.friction": friction}), STEPS)
-    codes = set(found["locking_state"].values.tolist())
-    upper, lower = plots.figure(found, "locking").axes
-    for state in LockingState:
-        assert labels(upper).count(state.short) == (int(state) in codes)
-    drive = found["drive"].values
-    for axes in (upper, lower):
-        spans = [(patch.get_x() - 1e-9, patch.get_x() + patch.get_width() + 1e-9) for patch in axes.patches]
-        assert all(any(low <= x <= high for low, high in spans) for x in drive)
-
-
 def test_colours_change_where_the_state_does_and_the_drive_effort_its_sign():
     """Ends of the shaded ranges are those found between the positions."""
     hoist = trunnion.Mechanism.model_validate(HOIST)
@@ -93,20 +75,6 @@ def test_states_are_told_apart_by_their_colours():
     colours = np.array([to_rgb(colour) for _, colour in STATES])
     apart = np.linalg.norm(colours[:, None] - colours[None], axis=-1) + 9 * np.eye(len(STATES))
     assert apart.min() > 0.08
-
-
-def test_every_state_has_a_colour_of_its_own_in_the_report():
-    style = (EXAMPLES.parent / "src/trunnion/views/web/report.css").read_text(encoding="utf-8")
-    found = {state: re.findall(rf"\.state\.{state.name.lower()} {{([^}}]*)}}", style) for state in LockingState}
-    assert all(len(one) == 1 for one in found.values()), found
-    assert len({one[0] for one in found.values()}) == len(LockingState)
-
-
-def test_locked_ranges_are_shaded(press):
-    found = trunnion.locking(press.with_values({"joint_defaults.friction": 0.4}), STEPS)
-    assert np.any(found["locking_margin"] < 1)
-    upper = plots.figure(found, "locking").axes[0]
-    assert any("locked" in text.get_text() for text in upper.texts)
 
 
 def test_a_result_of_analyse_has_the_figure_where_there_is_friction(press, cycle):
@@ -133,32 +101,9 @@ def test_the_mechanism_is_drawn_at_a_place(cycle):
     assert "= 350°" in plots.figure(turning, "mechanism", at="-10 deg").axes[0].get_title(loc="left")
 
 
-def test_joints_with_the_same_reaction_are_one_curve(cycle):
-    """K and P are the ends of the lower link, which has no mass; C and R those of the cylinder."""
-    shown = labels(plots.figure(cycle, "reactions").axes[0])
-    assert "K = P" in shown
-    members = [name for label in shown for name in label.split(" = ")]
-    assert sorted(members) == sorted(cycle["joint"].values.tolist())
-
-
 def test_curves_are_joined_by_values_and_gaps():
     gap = np.array([1.0, np.nan, 3.0])
     courses = {"a": gap, "b": gap + 1e-9, "c": np.array([1.0, 2.0, 3.0]), "d": 2 * gap}
     found = joined([Line(np.arange(3.0), values, name) for name, values in courses.items()])
     assert [line.name for line in found] == ["a = b", "c", "d"]
     assert found[0].y is gap
-
-
-def test_numerical_figures_are_in_their_own_table(cycle):
-    names = {one.name for one in summary_of(cycle) if one.numerical}
-    assert {"efficiency_error", "power_residual", "friction_iterations"} <= names
-    subjects = [subject for subject, _ in headline(cycle)]
-    assert not {one.subject for one in summary_of(cycle) if one.numerical} & set(subjects)
-    page = report(cycle)
-    assert "Numerical quality" in page
-    assert "Error of the efficiency" in page
-
-
-def test_backticks_become_code_and_text_stays_escaped():
-    assert with_code("see `trunnion play` <b>") == "see <code>trunnion play</code> &lt;b&gt;"
-    assert with_code("one ` alone") == "one ` alone"

@@ -24,7 +24,6 @@ from trunnion import analyse, simulate
 from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.views.cycle import plots
-from trunnion.views.cycle.report import report as cycle_report
 from trunnion.views.cycle.scene import scene
 from trunnion.views.motion.figure import KINDS, OF_CONTACTS, figure
 from trunnion.views.motion.report import _account, report
@@ -141,23 +140,6 @@ def test_a_motion_that_ends_early_is_shown_to_its_end() -> None:
     assert "then the motion ends" in words
 
 
-@pytest.mark.slow
-def test_rounding_is_not_drawn() -> None:
-    result = swing()
-    assert float(abs(result["drive_effort"]).max()) > 0
-    scene = motion_scene(shown(result))
-    assert [one["effort"] for one in scene["drivers"]] == [[0.0]]
-    assert [one["label"] for one in scene["motion"]["energies"]] == ["kinetic energy", "potential energy"]
-    assert "drive torque" not in " ".join(Page(report(result)).words)
-
-
-@pytest.mark.slow
-def test_at_rest_is_said() -> None:
-    scene = motion_scene(shown(run_down()))
-    assert scene["states"][str(scene["status"][-1])] == "at rest: friction holds it"
-    assert all(joint["friction_power"][-1] == 0.0 for joint in scene["joints"])
-
-
 def test_many_rows_are_thinned_and_events_are_not() -> None:
     result = simulate(wheel({"kind": "constant", "effort": 4}), 1.0, 3 * MOST_ROWS)
     scene = motion_scene(shown(result))
@@ -177,27 +159,6 @@ def test_thinned_rows_keep_the_peaks() -> None:
     assert max(abs(value) for value in scene["joints"][0]["reaction"]["x"]) == 17.0
 
 
-def test_several_free_drivers_have_a_curve_each() -> None:
-    scene = motion_scene(shown(simulate(_two_wheels(), 0.2, 20)))
-    assert [one["name"] for one in scene["motion"]["free"]] == ["A", "B"]
-
-
-def _two_wheels() -> Mechanism:
-    """Two flywheels on shafts of their own."""
-    return Mechanism(
-        links={
-            "ground": {"points": {"A": [0, 0], "B": [1, 0]}},
-            "left": {"points": {"A": [0, 0]}, "inertia": 0.05},
-            "right": {"points": {"B": [0, 0]}, "inertia": 0.1},
-        },
-        joints={
-            "A": {"type": "revolute", "links": ["ground", "left"]},
-            "B": {"type": "revolute", "links": ["ground", "right"]},
-        },
-        drivers={name: {"speed": 10, "motor": {"kind": "constant", "effort": 1}} for name in ("A", "B")},
-    )
-
-
 def test_the_speed_over_a_cycle_is_drawn_where_it_varies() -> None:
     """Cycloidal: (φ/T) (1 − cos 2π t/T)."""
     data = four_bar()
@@ -211,12 +172,6 @@ def test_the_speed_over_a_cycle_is_drawn_where_it_varies() -> None:
     assert scene(even)["drivers"][0]["speed"] == []
     with pytest.raises(MechanismError, match="the speed of no driver varies"):
         plots.figure(even, "speed")
-
-
-def test_the_report_of_a_cycle_says_nothing_of_it() -> None:
-    words = " ".join(Page(cycle_report(analyse(Mechanism(**four_bar()), 24))).words)
-    assert "Dots stand every twelfth of a turn" in words
-    assert "Motion in time" not in words
 
 
 @pytest.mark.sample(9)
@@ -245,22 +200,6 @@ def _with_events(times: dict[float, str]) -> xr.Dataset:
 
 
 CLOSE_BY = {0.05: "motor-off", 0.06: "brake", 0.07: "clutch-slips", 0.25: "rest", 0.251: "impact"}
-
-
-def test_words_of_events_that_meet_stand_in_rows_above_each_other() -> None:
-    """In one row no two meet; a later word takes the lowest row in which there is room; an impact has no word."""
-    drawn = figure(_with_events(CLOSE_BY), "speed")
-    drawn.canvas.draw()
-    boxes = {text.get_text(): text.get_window_extent() for text in drawn.axes[0].texts}
-    assert list(boxes) == ["motor off", "brake on", "clutch slips", "rests", "ends"]
-    assert boxes["motor off"].y0 < boxes["brake on"].y0 < boxes["clutch slips"].y0
-    assert boxes["rests"].y0 == pytest.approx(boxes["motor off"].y0, abs=2.0)
-    apart = list(boxes.values())
-    assert not any(one.overlaps(other) for k, one in enumerate(apart) for other in apart[:k])
-    frame = drawn.axes[0].get_window_extent()
-    assert all(one.y0 >= frame.y1 - 1 and one.x0 >= frame.x0 - 1 and one.x1 <= frame.x1 + 1 for one in apart)
-    assert len(drawn.axes[0].lines) == len(figure(ends_early(), "speed").axes[0].lines) + 3  # it started and ended
-    plt.close("all")
 
 
 if NODE:
@@ -302,16 +241,6 @@ if NODE:
         assert told["axes"] == ["time"]
         end, rows = shown(result).end, motion_scene(shown(result))["count"]
         assert told["clicked"] == [pytest.approx(one.time / end * (rows - 1), abs=1) for one in shown(result).events]
-
-    def test_many_events_do_not_hide_the_curves(tmp_path: Path) -> None:
-        """As impacts in play are: a mark on the axis each, and no line."""
-        scene = motion_scene(shown(ends_early()))
-        scene["motion"]["events"] = [{"at": 0.25 * k, "word": "impact"} for k in range(100)]
-        path = tmp_path / "scene.json"
-        path.write_text(json.dumps(scene), encoding="utf-8")
-        told = json.loads(run("page.test.mjs", path))["motion"]
-        assert told["marks"] == 100 * len(told["titles"])
-        assert told["lines"] == 0
 
     @pytest.mark.slow
     def test_it_is_played_in_real_time_and_stops_at_its_end(tmp_path: Path) -> None:

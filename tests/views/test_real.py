@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +10,8 @@ from test_report import Page
 
 from trunnion import Mechanism, analyse
 from trunnion.results.attributes import summary_of
-from trunnion.views.cycle import plots
-from trunnion.views.cycle.plots import PLOTS, READY, save
 from trunnion.views.cycle.report import report
 from trunnion.views.cycle.scene import scene
-from trunnion.views.page import inputs_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -66,29 +62,6 @@ def test_where_it_cannot_be_assembled_the_drive_is_still_told(stuck):
     assert shown["points"]["rocker.C"]["x"][missing[0]] is None
     words = "".join(Page(report(stuck)).words)
     assert "cannot be assembled" in words
-
-
-def test_a_slider_has_its_guide_along_the_frame(slider_crank):
-    joint = next(one for one in scene(slider_crank)["joints"] if one["name"] == "S")
-    assert (joint["type"], joint["axis"], joint["at"]) == ("prismatic", [1.0, 0.0], "piston.S")
-
-
-@pytest.mark.spread(4)
-@pytest.mark.parametrize("name", [name for name in PLOTS if name not in READY])
-@pytest.mark.parametrize("which", ["stuck", "slider_crank"])
-def test_figures(name, which, request, tmp_path):
-    result = request.getfixturevalue(which)
-    assert save(plots.figure(result, name), tmp_path / "figure.svg").stat().st_size > 5_000
-
-
-def test_input_data_are_told_as_they_were_written(slider_crank):
-    words = " ".join("".join(Page(report(slider_crank)).words).split())
-    texts = [row["text"] for row in json.loads(slider_crank.attrs["inputs"])]
-    assert "1500 rpm" in texts
-    assert "1500 rpm" in words
-    rows = [{"path": "links.a.x", "value": -0.044, "unit": "m", "text": text} for text in ("-dx", "-44 mm")]
-    ((_, lines),) = inputs_of(slider_crank.assign_attrs(inputs=json.dumps(rows)))
-    assert [line["text"].replace("\u00a0", " ") for line in lines] == ["-dx = −44.00 mm", "-44 mm"]
 
 
 def test_a_joint_that_bears_nothing_has_no_reaction_from_rounding():

@@ -15,7 +15,6 @@ from test_report import Page
 from trunnion.errors import MechanismError, Status
 from trunnion.results.tables import columns
 from trunnion.views.cycle import plots
-from trunnion.views.cycle.courses import turned_from_start
 from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
 from trunnion.views.cycle.report import report
 from trunnion.views.cycle.scene import scene
@@ -54,38 +53,11 @@ def _texts(figure):
     return [text.get_text() for axes in figure.axes for text in [*axes.texts, axes.xaxis.label, axes.yaxis.label]]
 
 
-def test_magnitudes_have_three_components():
-    result = rssr(36)
-    figure = plots.figure(result, "reactions")
-    for axes, variable in zip(figure.axes, ("reaction_force", "reaction_moment"), strict=True):
-        line = next(one for one in axes.lines if one.get_label() == "O")
-        expected = np.linalg.norm(result[variable].sel(joint="O").values, axis=0)
-        assert line.get_ydata()[:-1] == pytest.approx(expected)
-    assert {"force of the reaction [N]", "moment of the reaction [N m]"} <= set(_texts(figure))
-
-
-def test_polar_diagrams_show_three_planes():
-    result = rssr(36)
-    figure = plots.figure(result, "polar")
-    assert len(figure.axes) == 12
-    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes[:3]]
-    assert labels == [("Fx [N]", "Fy [N]"), ("Fx [N]", "Fz [N]"), ("Fy [N]", "Fz [N]")]
-    track = max((line.get_xydata() for line in figure.axes[2].lines), key=len)
-    assert track[:-1] == pytest.approx(result.reaction_force.sel(joint="O", axis=["y", "z"]).values.T)
-
-
 def test_motion_tells_rotations_slides_and_links():
     figure = plots.figure(every_kind(24), "motion")
     assert {"joint rotation [°]", "joint slide [mm]", "turn of the link [°]", "angular velocity [rad/s]"} <= set(
         _texts(figure)
     )
-
-
-def test_the_turn_of_a_link_is_its_angle():
-    angle = np.linspace(0, np.pi, 7)
-    axis = np.array([0.6, 0.0, 0.8])
-    turn = np.vstack([np.cos(angle / 2 + 0.2), axis[:, None] * np.sin(angle / 2 + 0.2)])
-    assert turned_from_start(turn * np.array([1, -1, 1, 1, -1, 1, 1])) == pytest.approx(angle, abs=1e-7)
 
 
 def test_the_figure_says_where_how_long_and_how_strong():
@@ -110,15 +82,6 @@ def test_where_all_axes_meet_there_is_no_scale_unless_a_pin_gives_one():
     ]
     words = _texts(mechanism(cardan(inputs=pins)))
     assert any(word.endswith(" mm") for word in words)
-
-
-def test_joints_of_one_point_are_drawn_apart():
-    shown = space(cardan())
-    spots = np.array([shown.seated(name)[:, 10] for name in shown.joints])
-    apart = np.linalg.norm(spots[:, None] - spots, axis=2)[~np.eye(4, dtype=bool)]
-    assert apart.min() > 0.2 * shown.size
-    for name in shown.joints:  # along their axes, which leaves the drawing true
-        assert abs(np.cross(shown.seated(name)[:, 10], shown.axis(name)[:, 10])).max() < 1e-12
 
 
 def test_no_mechanism_is_seen_on_its_edge():
@@ -211,19 +174,10 @@ def test_a_cardan_joint_is_a_fork_a_cross_and_a_fork():
         assert (prongs[0][-1] + prongs[1][-1]) / 2 == pytest.approx(centre, abs=1e-12)
 
 
-def test_wide_ends_of_a_rod_are_cut_into_pieces_that_sort():
-    """They cover the end: the areas of the pieces are that of the polygon."""
-    solid = Solid("rod", "plate", np.array([[0.0, 0, 0], [0, 0, 0.01]]), 0.5)
-    ends = [one for one in facets(solid, 1.0) if np.ptp(one[:, 2]) == 0 and one[0, 2] > 0]
-    assert len(ends) > 16
-    area = sum(np.linalg.norm(sum(np.cross(a, b) for a, b in pairwise([*one, one[0]]))) / 2 for one in ends)
-    assert area == pytest.approx(16 / 2 * 0.25 * np.sin(2 * np.pi / 16))
-
-
 def test_of_crossing_bars_the_nearer_is_painted_over_the_farther():
     """Bars that all but touch, from any side: wherever the nearer one is seen, no facet of the other comes after it."""
     rng = np.random.default_rng(0)
-    for _ in range(150):
+    for _ in range(40):
         camera = looking(rng.uniform(-np.pi, np.pi), rng.uniform(-1.2, 1.2))
         ways = rng.standard_normal((2, 3))
         ways /= np.linalg.norm(ways, axis=1)[:, None]
@@ -247,16 +201,6 @@ def test_of_crossing_bars_the_nearer_is_painted_over_the_farther():
             edges = np.roll(corners, -1, axis=1) - corners
             covers = (edges[..., 0] * to[..., 1] - edges[..., 1] * to[..., 0] >= 0).all(axis=1)
             assert seen[int(np.flatnonzero(covers)[-1])][1] == 0
-
-
-def test_a_swash_plate_is_a_disc_as_wide_as_its_shoe_travels():
-    shown = space(every_kind())
-    (name,) = [name for name, joint in shown.joints.items() if joint["type"] == "planar"]
-    discs = [one for one in solids(shown) if one.kind == "rod" and one.radius > 0.05 * shown.size]
-    (disc,) = discs
-    side = shown.joints[name]["links"].index(disc.link)
-    apart = shown.at(name, 1 - side) - shown.poses[disc.link].place(shown.element(name, side)[0])
-    assert disc.radius > np.nanmax(np.linalg.norm(apart, axis=0))
 
 
 # ---- scene ----------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ import xarray as xr
 from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
 
 from trunnion import MechanismError, Status, save
-from trunnion.views.scales import Scale, arrange, written
+from trunnion.views.scales import Scale, arrange
 from trunnion.views.sweep import figure, tables
 from trunnion.views.sweep_field import on_scale
 
@@ -50,10 +50,6 @@ def test_names_are_laid_out_in_their_order_or_as_told(x, family, expected):
     assert names(arrange(result, x, family)) == expected
 
 
-def test_names_with_one_value_are_the_axis_if_there_are_no_others():
-    assert names(arrange(swept({"a": scale([1]), "b": scale([2])}))) == ("a", "", [], ["b"])
-
-
 @pytest.mark.parametrize(
     ("x", "family", "word"),
     [
@@ -83,20 +79,6 @@ def test_both_families_come_from_one_sweep():
     assert [axes.get_ylabel() for axes in left.axes] == ["efficiency", "input.speed [rpm]"]
     assert [axes.get_ylabel() for axes in right.axes] == ["efficiency", "misalignment [°]"]
     assert (left.axes[0].get_xlabel(), right.axes[0].get_xlabel()) == ("misalignment [°]", "input.speed [rpm]")
-
-
-def test_further_names_are_panels_and_single_values_stand_in_the_title():
-    grid = {"mu": FRICTION, "misalignment": ANGLE, "r": scale([20], "m", "mm", 1e-3), "input.speed": FEW}
-    result = swept(grid, lambda mu, angle, r, speed: cardan(angle, speed) * (1 - mu))
-    sheet = figure(result, x="misalignment", family="input.speed")
-    assert sheet.get_suptitle() == "Efficiency over misalignment at r\u00a0=\u00a020\u00a0mm"
-    panels = [axes for axes in sheet.axes if axes.get_title(loc="left")]
-    assert [axes.get_title(loc="left") for axes in panels] == ["mu = 0.05", "mu = 0.1", "mu = 0.2"]
-    for i, axes in enumerate(panels):
-        for k, line in enumerate(curves(axes, 4)):
-            assert line[:, 1] == pytest.approx(result["efficiency"].values[i, :, 0, k])
-    told = [text.get_text() for axes in sheet.axes if axes.get_legend() for text in axes.get_legend().get_texts()]
-    assert told == [f"input.speed = {speed} rpm" for speed in (50, 500, 1000, 1500)]
 
 
 def test_of_many_panels_some_are_drawn_and_the_rest_is_said():
@@ -130,12 +112,6 @@ def test_scales_are_logarithmic_where_the_values_are_spaced_so():
     assert axes.get_xscale() == "log"
     assert [text.get_text() for text in axes.get_xticklabels()] == ["1", "2", "5", "10", "20"]
     assert axes.get_xlabel() == "c [µm]"
-
-
-def test_numbers_are_written_as_they_were_given():
-    assert [written(value) for value in (-5.0, 2.5e-6, -0.0, 1234.5, 126.3157894)] == [
-        "−5", "2.5×10⁻⁶", "0", "1234.5", "126.316",
-    ]  # fmt: skip
 
 
 # ---- maps -----------------------------------------------------------------------------------------------------
@@ -266,14 +242,6 @@ ODD = {
 }
 
 
-def test_points_without_a_number_are_told_beside_those_with_one():
-    """As of an efficiency where the load is never reached."""
-    (axes,) = figure(swept(ONE, lambda angle: 0.8 if angle < 20 else np.nan)).axes
-    assert "no value" in [text.get_text() for text in axes.texts]
-    (axes,) = figure(swept(ONE, lambda angle: 0.8)).axes
-    assert not axes.texts
-
-
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("case", ODD)
 def test_odd_cases_are_drawn_and_nothing_is_cut_off(case):
@@ -310,19 +278,6 @@ def test_a_table_for_each_value_of_further_names():
     many = tables(swept({"a": FEW, "b": FEW, "c": scale(range(50))}))
     assert len(many) == 6
     assert sum(len(one.rows) * (len(one.head) - 1) + one.left_out for one in many) == 4 * 4 * 50
-
-
-def test_tables_follow_the_figure_and_take_several_measures():
-    result = swept(GRID, cardan)
-    found = tables(result, ["efficiency", "input.effort_max"], x="input.speed")
-    assert [one.title for one in found] == [
-        "efficiency over input.speed and, in columns, misalignment",
-        "input.effort max [N m] over input.speed and, in columns, misalignment",
-    ]
-    assert found[0].head[:2] == ["input.speed [rpm]", "0 deg"]
-    (one,) = tables(swept({"misalignment": ANGLE}, lambda a: a, margin=False), ["pin-1.reaction_max", "efficiency"])
-    assert one.head[:3] == ["misalignment [deg]", "pin-1.reaction max [N]", "efficiency"]
-    assert "locking margin" not in one.head
 
 
 @pytest.mark.parametrize(

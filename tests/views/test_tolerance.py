@@ -13,27 +13,23 @@ from as_built_models import EXAMPLES
 from matplotlib.axis import Tick
 from matplotlib.colors import to_hex
 from matplotlib.text import Text
-from stand_in_tolerances import CASES, LIMIT, QUANTILES, at_one_position, gap, odd_names, toleranced
+from stand_in_tolerances import CASES, LIMIT, QUANTILES, gap, toleranced
 
 import trunnion
 from trunnion.cli.result import check_files
 from trunnion.cli.tolerance import shown_of
 from trunnion.errors import MechanismError
 from trunnion.results.export import save as export
-from trunnion.results.quantities import scaled
 from trunnion.views.allocation import PriceCurve, tolerance_cost, trade_off
 from trunnion.views.common.figures import PALETTE
-from trunnion.views.cycle.plots import save
 from trunnion.views.readings import readings
-from trunnion.views.texts import fixed, limits_text, share, share_interval
+from trunnion.views.texts import limits_text, share, share_interval
 from trunnion.views.tolerance import (
     KINDS,
     MOST_PANELS,
     check_kind,
     corners,
-    drawable,
     figure,
-    figures,
     indices,
     inputs,
     overview,
@@ -96,14 +92,6 @@ def test_every_figure_of_every_result_stays_on_its_sheet(case, kind):
     assert not outside(figure(case, kind, few(case)))
 
 
-@pytest.mark.slow
-def test_every_result_makes_a_sheet(case, tmp_path):
-    drawn = sheet(case, few(case))
-    assert not outside(drawn)
-    drawn.set_layout_engine("none")  # it is arranged by now
-    assert save(drawn, tmp_path / "sheet.svg").stat().st_size > 20_000
-
-
 def test_the_legend_of_correlated_tolerances_stays_on_a_sheet_of_three_columns():
     """ "RSS, uncorrelated" is longer than "RSS"."""
     result = toleranced(24, 500, measures=2).assign_attrs(correlated=1, limits=json.dumps([None, None]))
@@ -137,16 +125,6 @@ def test_the_histogram_counts_the_samples_within_and_beyond_the_limits():
     value = float(result["yield"][0])
     assert f"within {share_interval(value, float(result.yield_low[0]), float(result.yield_high[0]))}" in labels(axes)
     assert axes.get_xlabel() == "angle-error [°]"
-
-
-def test_a_narrow_distribution_is_told_as_a_deviation_from_nominal():
-    (axes,) = figure(at_one_position(), "histogram").axes
-    assert axes.get_xlabel() == "deviation of theta from nominal 112.3000° [°]"
-    told = labels(axes)
-    assert "nominal 112.3000°" in told
-    assert "limits +0.1/−0.05°" in told
-    assert line(axes, "nominal")[0, 0] == pytest.approx(0.0, abs=1e-9)
-    assert axes.get_xlim()[1] > 0.1
 
 
 def test_bins_of_uneven_width_are_drawn_over_even_ones():
@@ -190,15 +168,6 @@ def test_the_envelope_has_the_bands_of_the_result_and_closes_the_turn():
     assert {round(one.get_ydata()[0], 9) for one in axes.lines if str(one.get_linestyle()) != "-"} >= {0.1, -0.1}
 
 
-def test_bands_of_values_are_drawn_as_deviations():
-    result = toleranced(72)
-    other = result.copy()
-    other["band"] = result["band"] + result["curve"]
-    other["band"].attrs = {"of": "value"}
-    paths = [figure(one, "envelope").axes[0].collections[1].get_paths()[0].vertices[:, 1] for one in (result, other)]
-    assert paths[0] == pytest.approx(paths[1])
-
-
 def test_a_gap_breaks_the_envelope_and_other_measures_positions_do_not():
     (axes,) = figure(gap(), "envelope").axes
     assert np.isnan(line(axes, "RSS")[:, 1]).sum() == 1
@@ -211,13 +180,6 @@ def test_a_gap_breaks_the_envelope_and_other_measures_positions_do_not():
     assert not np.isnan(line(figure(both, "envelope").axes[0], "RSS")).any()
 
 
-def test_one_position_and_a_structure_have_no_envelope():
-    for result in (at_one_position(), CASES["structure"]()):
-        assert "envelope" not in drawable(readings(result)[0])
-    with pytest.raises(MechanismError, match="use a measure at every position"):
-        figure(at_one_position(), "envelope")
-
-
 def test_contributions_are_sorted_and_add_up():
     result = toleranced(72)
     (axes,) = figure(result, "contributions").axes
@@ -226,12 +188,6 @@ def test_contributions_are_sorted_and_add_up():
     assert sum(widths) == pytest.approx(100)
     assert line(axes, "RSS², added up")[-1, 0] == pytest.approx(100)
     assert axes.get_yticklabels()[0].get_text() == "coupler.length  ±0.07\u00a0mm"
-
-
-def test_small_contributions_are_drawn_together():
-    (axes,) = figure(CASES["thirty parameters"](), "contributions").axes
-    assert [text.get_text() for text in axes.get_yticklabels()][-1] == "26 others"
-    assert len(axes.get_yticks()) == 5
 
 
 def test_intervals_shrink_with_independent_samples_and_are_told_of_all_others_at_the_end_only():
@@ -297,17 +253,6 @@ def test_the_trade_off_marks_the_stated_limits_and_what_cannot_be_kept():
 # ---- texts --------------------------------------------------------------------------------------------------------
 
 
-def test_numbers_of_a_measure_share_unit_and_decimals():
-    read = readings(at_one_position())[0]
-    assert read.label == "°"
-    assert read.say(np.radians(112.3)) == "112.3000°"
-    assert read.say(np.radians(0.0486), sign=True) == "+0.0486°"
-    assert fixed(-0.00001, 4) == "0.0000"
-    assert fixed(-12345.678, 1) == "−12\u202f345.7"
-    assert scaled(2e-5, "m") == (1e3, "mm")
-    assert scaled(2e-6, "m") == (pytest.approx(1e6), "µm")
-
-
 @pytest.mark.parametrize(
     ("value", "low", "high", "text"),
     [
@@ -332,14 +277,6 @@ def test_limits_as_a_drawing_has_them():
     assert limits_text(-0.01, 0.02) == "+0.02/−0.01"
     assert limits_text(0.0, 0.02) == "+0.02/0"
     assert limits_text(-np.inf, 0.02) == "+0.02/—"
-
-
-def test_a_table_has_a_column_for_each_method_that_was_run():
-    rows = {row[0]: row[1:] for row in figures(readings(toleranced(72))[0]).rows}
-    assert figures(readings(toleranced(72))[0]).head == ["", "linear", "searched", "Monte Carlo", "95 % interval"]
-    assert rows["worst case"] == ["±0.2391°", "−0.2344 to +0.2423°", "", ""]
-    assert figures(readings(CASES["linear only"]())[0]).head == ["", "linear"]
-    assert "quasi-Monte Carlo" in figures(readings(CASES["sobol"]())[0]).head
 
 
 def test_corners_indices_and_failures_are_told():
@@ -411,20 +348,6 @@ def test_tables_of_a_file_by_its_name(tmp_path):
     export(result, tmp_path / "x.2026-11.csv")  # a date asks for no table
     export(CASES["linear only"](), tmp_path / "y.histogram.csv")
     assert (tmp_path / "y.histogram.csv").read_text().startswith("measure,from,to,count")
-
-
-def test_names_are_shown_as_they_are():
-    (axes,) = figure(odd_names(), "contributions").axes
-    told = " ".join(text.get_text() for text in axes.get_yticklabels())
-    assert r"_\$x\$ & <!--" in told
-
-
-def test_a_unit_of_two_words_is_not_broken():
-    result = CASES["torque"]()
-    (read,) = readings(result)
-    assert read.say(read.nominal).endswith("\u00a0kN\u00a0m")
-    cells = [cell for table in tables(result) for row in table.rows for cell in row]
-    assert not [cell for cell in cells if "N m" in cell]
 
 
 def test_a_measure_that_is_undefined_has_a_row_that_says_so():

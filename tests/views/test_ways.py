@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
@@ -14,7 +12,7 @@ from trunnion.errors import MechanismError
 from trunnion.solve.assembly_modes import choices
 from trunnion.solve.run import prepare
 from trunnion.views.assembly.mode_drawings import _drawn, ways
-from trunnion.views.assembly.modes import lines, places
+from trunnion.views.assembly.modes import lines
 from trunnion.views.common.cycle import layout
 from trunnion.views.common.drawing import PALE
 from trunnion.views.common.figures import INK, RULE
@@ -131,39 +129,6 @@ def test_nothing_to_choose_is_no_figure():
 
 
 # ---- in words -------------------------------------------------------------------------------------------------
-
-
-def test_lines_say_names_places_and_what_to_write():
-    (choice,) = choices(prepare(build(four_bar())))
-    assert lines(choice) == [
-        "way-1  C (878.6, 689.4) mm  <- used",
-        "way-2  C (878.6, -689.4) mm",
-        "to use another: assembly: {coupler: way-2}",
-    ]
-
-
-@pytest.mark.parametrize(
-    ("scale", "told"), [(1.0, "C (878.6, 689.4) mm"), (10.0, "C (8.786, 6.894) m"), (1e-3, "C (878.6, 689.4) µm")]
-)
-def test_units_fit_the_size(scale, told):
-    (choice,) = choices(prepare(build(four_bar(0.3 * scale, 0.9 * scale, 0.7 * scale, 1.0 * scale))))
-    assert places(choice, choice.ways[0]) == told
-
-
-def test_of_many_ways_some_are_told_and_the_one_that_is_taken():
-    (choice,) = choices(prepare(build(four_bar())))
-    many = replace(choice, ways=tuple(replace(choice.ways[0], name=f"way-{n}", taken=n == 30) for n in range(1, 41)))
-    told = lines(many)
-    assert len(told) == 26
-    assert told[22].startswith("way-23")
-    assert told[23].startswith("way-30")
-    assert told[23].endswith("<- used")
-    assert told[24] == "… and 16 more"
-
-
-def test_a_slide_is_told_by_how_far_it_is_out():
-    (choice,) = choices(prepare(build(MODELS["inverted slider-crank"]())))
-    assert [places(choice, way) for way in choice.ways] == ["S at -856.5 mm", "S at 904.3 mm"]
 
 
 def test_a_start_in_line_is_told_farther_on():

@@ -171,8 +171,8 @@ def _groups(identified: Identified) -> Iterator[Finding]:
             remedy = "fix it, or measure a quantity that depends on it"
             yield Finding.warning("parameter.no_effect", where, what, remedy)
             continue
-        what = f"{_joined(names)} are not separately identifiable: they have {'' if group.exact else 'nearly '}the "
-        what += f"same effect on {channels}; {_determined(identified, group, names)}"
+        what = f"{_joined(names)} are not separately identifiable: they have the same "
+        what += f"effect on {channels}; {_determined(identified, group, names)}"
         remedy = "fix one or more of them, or measure a quantity that separates them"
         yield Finding.warning("parameter.not_told_apart", where, what, remedy, names=names)
 

@@ -251,7 +251,7 @@ def test_clipped_readings_and_lost_pulses_are_told(mechanism: Mechanism) -> None
     ("changes", "where", "what"),
     [
         ({"sensors": {"a": {"measures": "effort:Q"}}}, "sensors.a.measures", "Q"),
-        ({"sensors": {"a": {"measures": "efficiency:cycle"}}}, "sensors.a.measures", "no number that a sensor shows"),
+        ({"sensors": {"a": {"measures": "efficiency:cycle"}}}, "sensors.a.measures", "as a sensor shows it"),
         ({"sensors": {"a": {"measures": "rate:D", "per_turn": 60}}}, "sensors.a.per_turn", "changes its sign"),
         ({"schedule": {"conditions": [{"speeed": 1}]}}, "schedule.conditions.0", "speeed"),
         ({"schedule": {"over": {"A.speed": ["60 rpm", "90 rpm"]}}, "encoder": None,

@@ -97,18 +97,6 @@ def uncertainty_of(signal: Signal) -> Uncertainty:
     return Uncertainty(random, local, shared, signal.count, signal.turns - signal.mean)
 
 
-def _bias_expanded(of: Uncertainty, coverage: float) -> float:
-    """U of the mean residual: scatter of the means of the turns, zero and gain; NaN with fewer than two turns."""
-    means = np.mean(_nearly_complete(of.turns), axis=1)
-    if len(means) < 2:
-        return float("nan")
-    random = np.array([np.std(means, ddof=1) / np.sqrt(len(means))])
-    local = np.array([np.sqrt(np.mean(of.local**2) / len(of.local))])
-    shared = np.mean(of.shared, axis=1, keepdims=True)
-    mean = Uncertainty(random, local, shared, np.array([len(means)]), of.turns[:, :1])
-    return float(expanded(mean.total, mean.freedom, coverage)[0])
-
-
 def _nearly_complete(turns: Array) -> Array:
     """The turns that have at least half of their positions, with no deviation where a position is missing."""
     return np.asarray(np.nan_to_num(turns[np.mean(np.isfinite(turns), axis=1) >= 0.5]))
@@ -157,8 +145,17 @@ def judge(signal: Signal, model: Array, comparable: NDArray[np.bool_], coverage:
     measured, modelled = signal.mean[where], model[where]
     residual = difference(measured, modelled)
     size = float(np.max(np.abs(np.append(measured, modelled))))
-    bias = float(np.mean(residual))
+    bias, bias_expanded, correlation = float(np.mean(residual)), np.nan, np.nan
     of = uncertainty_of(signal).at(where)
+    means = np.mean(_nearly_complete(of.turns), axis=1)
+    if len(means) > 1:  # of the mean residual: scatter of the means of the turns, zero and gain
+        random = np.array([np.std(means, ddof=1) / np.sqrt(len(means))])
+        local = np.array([np.sqrt(np.mean(of.local**2) / len(of.local))])
+        shared, count = np.mean(of.shared, axis=1, keepdims=True), np.array([len(means)])
+        mean = Uncertainty(random, local, shared, count, of.turns[:, :1])
+        bias_expanded = float(expanded(mean.total, mean.freedom, coverage)[0])
+    if min(np.max(np.abs(course - np.mean(course))) for course in (measured, modelled)) > ROUNDING * size:
+        correlation = float(np.corrcoef(measured, modelled)[0, 1])  # Pearson's; of none that is flat
     worst = int(np.argmax(np.abs(residual)))
     share, least = _share(residual, of, coverage, ROUNDING * size)
     # a constant is taken out: what is left is against the scatter and what the gain makes of the shape
@@ -172,8 +169,8 @@ def judge(signal: Signal, model: Array, comparable: NDArray[np.bool_], coverage:
     elif unbiased_share >= unbiased_least:
         verdict = Verdict.OFFSET
     return Judgement(
-        _rms(residual), float(residual[worst]), int(np.flatnonzero(where)[worst]), bias, _bias_expanded(of, coverage),
-        _rms(residual - bias), share, least, _correlation(measured, modelled), verdict,
+        _rms(residual), float(residual[worst]), int(np.flatnonzero(where)[worst]), bias, bias_expanded,
+        _rms(residual - bias), share, least, correlation, verdict,
     )  # fmt: skip
 
 
@@ -234,11 +231,3 @@ def going_on(signal: Signal) -> tuple[float, int]:
     if square <= (ROUNDING * float(np.nanmax(np.abs(signal.mean), initial=0.0))) ** 2:
         return float("nan"), 0
     return float(np.sum(means[1:] * means[:-1])) / square + 1 / len(means), len(means)
-
-
-def _correlation(measured: Array, model: Array) -> float:
-    """Pearson's; NaN where one of them is flat."""
-    flat = ROUNDING * float(np.max(np.abs(np.append(measured, model)), initial=0.0))
-    if np.max(np.abs(measured - np.mean(measured))) <= flat or np.max(np.abs(model - np.mean(model))) <= flat:
-        return float("nan")
-    return float(np.corrcoef(measured, model)[0, 1])

@@ -21,7 +21,7 @@ from trunnion.model.file import place, read_entries
 from trunnion.model.findings import schema_findings
 from trunnion.model.units import normalise
 from trunnion.rig.reading.mapping import FixedAngle, FixedNumber, FixedTime
-from trunnion.rig.reading.units import Amount, Frequency, Number
+from trunnion.rig.reading.units import Frequency, Number
 
 __all__ = ["FORMATS", "Accuracy", "Encoder", "Idle", "Rig", "Schedule", "Sensor", "placed_in_rig"]
 
@@ -238,20 +238,20 @@ def _shared_columns(rig: Rig) -> Iterable[Finding]:
 
 
 def _unsound_sensor(where: str, sensor: Sensor) -> Iterable[Finding]:
-    if sensor.bits and not (sensor.span or sensor.range):
-        remedy = "state what they are spread over: span: 10 V"
-        yield Finding("has bits and neither span nor range", f"{where}.bits", remedy)
-    if sensor.span and not sensor.bits:
-        yield Finding("is a span without bits", f"{where}.span", "state bits: 16")
-    for key in ("range", "span"):
-        stated: Amount | None = getattr(sensor, key)
-        if stated and stated.value <= 0:
-            yield Finding(f"{stated.source} is not positive", f"{where}.{key}", "state a positive one")
-    if sensor.noise.value < 0:
-        yield Finding(f"{sensor.noise.source} is negative", f"{where}.noise", "state a standard deviation")
-    if sensor.sensitivity and sensor.sensitivity.value == 0:
-        yield Finding("is zero", f"{where}.sensitivity", "state reading per quantity: 100 mV/(N m)")
-    if sensor.accuracy.gain.evaluate() < 0 or sensor.accuracy.zero.value < 0 or sensor.offset.value < 0:
-        yield Finding("a standard uncertainty is negative", f"{where}.accuracy", "state it positive")
-    if sensor.per_turn and not sensor.measures.startswith("rate:"):
-        yield Finding("pulses measure a speed only", f"{where}.per_turn", "measure rate:JOINT, or remove per_turn")
+    gain, zero = sensor.accuracy.gain.evaluate(), sensor.accuracy.zero.value
+    for wrong, key, what, remedy in (
+        (sensor.bits and not (sensor.span or sensor.range), "bits", "has bits and neither span nor range",
+         "state what they are spread over: span: 10 V"),
+        (sensor.span and not sensor.bits, "span", "is a span without bits", "state bits: 16"),
+        (sensor.range and sensor.range.value <= 0, "range", "is not positive", "state a positive range"),
+        (sensor.span and sensor.span.value <= 0, "span", "is not positive", "state a positive span"),
+        (sensor.noise.value < 0, "noise", f"{sensor.noise.source} is negative", "state a standard deviation"),
+        (sensor.sensitivity and sensor.sensitivity.value == 0, "sensitivity", "is zero",
+         "state reading per quantity: 100 mV/(N m)"),
+        (gain < 0 or zero < 0 or sensor.offset.value < 0, "accuracy", "a standard uncertainty is negative",
+         "state it positive"),
+        (sensor.per_turn and not sensor.measures.startswith("rate:"), "per_turn", "pulses measure a speed only",
+         "measure rate:JOINT, or remove per_turn"),
+    ):  # fmt: skip
+        if wrong:
+            yield Finding(what, f"{where}.{key}", remedy)

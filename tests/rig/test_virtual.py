@@ -177,7 +177,6 @@ def test_a_load_at_rest_reads_nothing(tmp_path: Path) -> None:
     sensors = {"T": {"measures": "effort:R"}, "v": {"measures": "rate:R"}, "L": {"measures": "load:strip"},
                "vF": {"measures": "rate:F"}}  # fmt: skip
     seen = trunnion.rig.observe(press, rig(sensors=sensors, encoder=None, schedule={"turns": 5}, rate="200 Hz"))
-    assert "read 0 during a rest" in seen.findings[0].what
     (case,) = seen.cases
     load, speed = case.true.at_samples(2), case.true.at_samples(3)
     assert np.isfinite(load).all()

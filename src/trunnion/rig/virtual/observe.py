@@ -231,11 +231,6 @@ def _findings(cases: Sequence[Case], channels: Mapping[str, SensorChannel], rig:
     sound = [case for case in cases if case.worst.solved]
     if not sound:
         return
-    if mended := [case for case in sound if case.true.mended]:
-        most = counted(max(case.true.mended for case in mended), "position")
-        what = f"{_which(mended)}: a load has no unique value at up to {most}, because its joint is at rest; sensors "
-        what += "read 0 during a rest, and the mean of the neighbours at a single position"
-        yield Finding(what, where, "", Severity.NOTE, code="rig.load_at_rest")
     yield from _of_encoder(sound, channels, rig)
     for i, (name, channel) in enumerate(channels.items()):
         peaks = {case.number: float(np.max(np.abs(case.true.values[i]))) for case in sound}

@@ -36,14 +36,12 @@ WORST = 0.999  # share of the positions that the error of interpolation is told 
 class SampledSignals:
     """The courses of one condition at the samples of its run, SI.
 
-    values: (measure, instant) at `time`; mended: instants where a course has no single value; place: of each sample
-    among the instants, None to interpolate at `phase`.
+    values: (measure, instant) at `time`; place: of each sample among the instants, None to interpolate at `phase`.
     """
 
     time: Array
     values: Array
     status: NDArray[np.int8]
-    mended: int
     place: NDArray[np.intp] | None
     phase: Array
     period: float | None
@@ -88,11 +86,11 @@ def sampled(
         grid = GRID
         while grid <= FINEST:
             at = np.linspace(0.0, duration, grid, endpoint=False)
-            values, status, mended = _solved(run, measures, at)
+            values, status = _solved(run, measures, at)
             limits = {i: limit for i, limit in (tolerances or {}).items() if limit > 0}
             fine = all(not _error(values[i], at, duration) > limit for i, limit in limits.items())
             if fine or np.any(status >= Status.NOT_CONVERGED):
-                return SampledSignals(at, values, status, mended, None, np.mod(time, duration), duration)
+                return SampledSignals(at, values, status, None, np.mod(time, duration), duration)
             grid *= 4
     return SampledSignals(instants, *_solved(run, measures, instants), place, time, duration if periodic else None)
 
@@ -113,8 +111,8 @@ def _error(row: Array, time: Array, duration: float) -> float:
     return float(np.quantile(np.abs(middle - row[1::2]), WORST)) / 4
 
 
-def _solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, NDArray[np.int8], int]:
-    """Courses of measures at ascending times (s) of the cycle, with pins in their seats; status; how many are mended.
+def _solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, NDArray[np.int8]]:
+    """Courses of measures at ascending times (s) of the cycle, with pins in their seats; status.
 
     Where a load or friction is an interval, at a speed of zero, a course is the mean of its neighbours; a load whose
     joint rests at several positions on end is 0 there: nothing moves against it.
@@ -133,7 +131,7 @@ def _solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, 
     values[:, lost] = np.nan
     gaps = ~np.isfinite(values)
     if lost.any() or not gaps.any():
-        return values, status, 0
+        return values, status
     for row in np.flatnonzero(gaps.any(axis=1)).tolist():
         if measures[row].kind == "load":
             before, after = np.roll(gaps[row], 1), np.roll(gaps[row], -1)
@@ -144,7 +142,7 @@ def _solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, 
         if known.any():
             period = run.cycle.duration if run.cycle.periodic else None
             values[row, ~known] = np.interp(time[~known], time[known], values[row, known], period=period)
-    return values, status, int(np.count_nonzero(gaps.any(axis=0)))
+    return values, status
 
 
 def cycle_efficiency(run: Run) -> float:

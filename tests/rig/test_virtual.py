@@ -14,7 +14,6 @@ from trunnion.errors import MechanismError, Severity
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.reading.efficiency import efficiency_of
 from trunnion.rig.reading.rig_file import Rig
-from trunnion.rig.virtual import true_signals as virtual_courses
 from trunnion.rig.virtual.files import units_of
 from trunnion.rig.virtual.observe import Observation
 from trunnion.rig.virtual.plan import plan
@@ -64,7 +63,6 @@ def test_perfect_sensors_show_the_model(mechanism: Mechanism) -> None:
     }
     found = trunnion.rig.observe(mechanism, rig(sensors=sensors))
     (case,) = found.cases
-    assert case.true.exact
     (record,) = found.records()
     run = prepare(mechanism)
     time = (np.arange(case.running) - case.lead) / 500.0
@@ -81,22 +79,6 @@ def test_perfect_sensors_show_the_model(mechanism: Mechanism) -> None:
     assert record.columns["t"][1] == 0.002
     result = trunnion.analyse(mechanism, 720)
     assert case.efficiency == pytest.approx(float(result["efficiency"]), rel=1e-9)
-
-
-def test_interpolated_courses_are_the_exact_ones(mechanism: Mechanism, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With a grid of the cycle, readings differ by no more than what is stated, but at jumps."""
-    stated = rig(
-        rate="517.3 Hz", sensors={"T": {"measures": "effort:A", "noise": "1 mN m"}, "n": {"measures": "rate:D"}}
-    )
-    exact = trunnion.rig.observe(mechanism, stated)
-    monkeypatch.setattr(virtual_courses, "MOST_EXACT", 100)
-    monkeypatch.setattr(virtual_courses, "GRID", 2048)
-    between = trunnion.rig.observe(mechanism, stated)
-    assert exact.cases[0].true.exact
-    assert not between.cases[0].true.exact
-    for i in range(2):
-        error = np.abs(between.cases[0].true.at_samples(i) - exact.cases[0].true.at_samples(i))
-        assert np.quantile(error, 0.99) < 1e-4
 
 
 def test_same_seed_same_bits_and_sensors_of_their_own(mechanism: Mechanism, seen: Observation) -> None:

@@ -288,11 +288,10 @@ def truth_of(observation: Recorded) -> dict[str, Any]:
     for case in observation.cases:
         whole = round(observation.rig.schedule.turns * case.run.cycle.duration * observation.rate)
         part = slice(case.first, case.first + whole)
-        exact = "solved at each" if case.true.exact else f"between {len(case.true.time)} solved a cycle"
         found["conditions"].append({
             "name": case.name, "set": dict(case.settings),
             "efficiency": case.efficiency if math.isfinite(case.efficiency) else None,
-            "cycle_seconds": case.run.cycle.duration, "samples": exact,
+            "cycle_seconds": case.run.cycle.duration,
             "mean": {name: float(np.mean(case.true.at_samples(i)[part]))
                      for i, name in enumerate(observation.channels)},
         })  # fmt: skip

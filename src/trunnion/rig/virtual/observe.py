@@ -196,8 +196,7 @@ def _case(
     if running < 3:
         what = f"a cycle of condition {number} takes {cycle.duration:.4g} s, no three samples"
         raise MechanismError(Finding(what, "rate", "sample faster"))
-    tolerances = {i: max(one.step, one.noise) / 10 for i, one in enumerate(channels.values())}
-    true = sampled(run, measures, rate, running, lead, tolerances)
+    true = sampled(run, measures, rate, running, lead)
     case = Case(number, name, row, run, before, running, after, lead, true)
     if not case.worst.solved:
         return case

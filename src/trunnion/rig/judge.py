@@ -92,8 +92,9 @@ def uncertainty_of(signal: Signal) -> Uncertainty:
     zero = np.full_like(signal.mean, np.hypot(signal.accuracy.zero, signal.accuracy.cut))
     shared = np.array([zero, signal.accuracy.gain * signal.read])
     random = signal.scatter / np.sqrt(np.maximum(signal.count, 1))
-    local = np.sqrt(np.maximum(signal.uncertainty**2 - random**2 - np.sum(shared**2, axis=0), 0.0))
-    return Uncertainty(random, local, shared, signal.count, signal.turns - signal.mean)
+    return Uncertainty(
+        random, np.full_like(random, signal.unresolved), shared, signal.count, signal.turns - signal.mean
+    )
 
 
 def _nearly_complete(turns: Array) -> Array:

@@ -27,8 +27,8 @@ from trunnion.rig.reading.units import Amount, Frequency, MeasureText, Number, S
 from trunnion.rig.reading.units import dimensions as unit_dimensions
 
 __all__ = [
-    "AngleSource", "Channel", "DataMapping", "File", "Filter", "FixedAngle", "FixedNumber", "FixedTime", "FromData",
-    "Mapped", "TimeBase", "Zero", "read_mapping", "schema_text",
+    "Accuracies", "AngleSource", "Channel", "DataMapping", "File", "Filter", "FixedAngle", "FixedNumber", "FixedTime",
+    "FromData", "Mapped", "TimeBase", "Zero", "read_mapping", "schema_text",
 ]  # fmt: skip
 
 Sign = Literal[1, -1]

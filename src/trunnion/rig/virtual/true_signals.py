@@ -14,16 +14,14 @@ from numpy.typing import NDArray
 
 from trunnion.cycle.positions import positions
 from trunnion.errors import Status
+from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
-from trunnion.solve.seating import seating_of
-from trunnion.solve.status import status_of
 
 __all__ = ["SampledSignals", "cycle_efficiency", "phases", "sampled"]
 
 Array = NDArray[np.float64]
-CHUNK = 8_192
 EFFICIENCY_STEPS = 720
 DIGITS = 12  # of a share of the cycle, in which instants that are one agree
 
@@ -79,16 +77,8 @@ def _solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, 
     Where a load or friction is an interval, at a speed of zero, a course is the mean of its neighbours; a load whose
     joint rests at several positions on end is 0 there: nothing moves against it.
     """
-    values, status = np.empty((len(measures), len(time))), np.empty(len(time), np.int8)
-    method = FrictionMethod()
-    for low in range(0, len(time), CHUNK):
-        window = slice(low, min(low + CHUNK, len(time)))
-        part = time[window]
-        back = seating_of(run, method).at(part, method).back if run.seats else run.solve(part)
-        status[window] = status_of(back, part.shape)
-        with np.errstate(all="ignore"):
-            for i, measure in enumerate(measures):
-                values[i, window] = np.broadcast_to(measure.curve(back)[0], part.shape)
+    by_name, status = courses_of(run, list({one.name: one for one in measures}.values()), time, FrictionMethod())
+    values = np.array([np.broadcast_to(np.asarray(by_name[one.name][0], float), time.shape) for one in measures])
     lost = status >= Status.NOT_CONVERGED
     values[:, lost] = np.nan
     gaps = ~np.isfinite(values)

@@ -24,7 +24,7 @@ from trunnion.model.arguments import strict_arguments
 from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key, nearest
-from trunnion.model.units import unit as unit_of
+from trunnion.model.units import UnitError, normalise, unit
 from trunnion.results.attributes import cited, codes, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import readable
@@ -39,7 +39,18 @@ from trunnion.solve.loads import useful_loads, useful_springs
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CAUSES", "GUM", "VARIABLES", "Cause", "causes", "compare", "data_findings", "hashed_files", "other_speed"]
+__all__ = [
+    "CAUSES",
+    "GUM",
+    "VARIABLES",
+    "Cause",
+    "causes",
+    "compare",
+    "data_findings",
+    "hashed_files",
+    "other_speed",
+    "written_unit",
+]
 
 Array = NDArray[np.float64]
 GUM = "JCGM 100:2008, Evaluation of measurement data - Guide to the expression of uncertainty in measurement (GUM)"
@@ -388,7 +399,9 @@ def _attributes(
 ) -> dict[str, Any]:
     first = rows[0].model
     signals = {name: next(row.channels[name].signal for row in rows if name in row.channels) for name in measures}
-    units = _units_set(mechanism, rows)
+    entries = {row["path"]: row for row in inputs(mechanism)}
+    names = dict.fromkeys(name for row in rows for name in row.condition.values)
+    sets = [entries.get(mechanism.path_of(name), {"unit": "", "text": ""}) for name in names]
     efficiencies = [row.efficiency.within for row in rows if row.efficiency is not None]
     verdicts = [channel.judgement.verdict for row in rows for channel in row.channels.values()]
     return {
@@ -410,8 +423,8 @@ def _attributes(
         "channel_units": [signal.unit for signal in signals.values()],
         "channel_read_in": [signal.read_in for signal in signals.values()],
         "channel_measures": list(measures.values()),
-        "set_units": [si for si, _, _ in units],
-        "set_written": [(unit, factor) for _, unit, factor in units],
+        "set_units": [one["unit"] for one in sets],
+        "set_written": [written_unit(one["text"], one["unit"]) for one in sets],
         "findings": finding_rows(_findings(mechanism, measures, rows)),
         "data_findings": data_findings(measurement),
         "done": list(measurement.done),
@@ -421,16 +434,16 @@ def _attributes(
     }
 
 
-def _units_set(mechanism: Mechanism, rows: Sequence[ConditionComparison]) -> list[tuple[str, str, float]]:
-    """SI unit of each number that is set, and the unit with its factor that the model states it in."""
-    entries = {row["path"]: row for row in inputs(mechanism)}
-    units = []
-    for name in dict.fromkeys(name for row in rows for name in row.condition.values):
-        entry = entries.get(mechanism.path_of(name), {"unit": "", "text": ""})
-        literal = LITERAL.fullmatch(entry["text"].strip().removeprefix("-"))
-        unit = (literal and (literal["unit"] or literal["per"])) or {"rad": "deg"}.get(entry["unit"], entry["unit"])
-        units.append((entry["unit"], unit, float(unit_of(unit)[0]) if unit and unit != "1" else 1.0))
-    return units
+def written_unit(source: object, si: str) -> tuple[str, float]:
+    """The unit that a number is written in, else one that is usual for its SI unit, and its factor to SI."""
+    text = normalise(source).strip().removeprefix("-").strip() if isinstance(source, str) else ""
+    literal = LITERAL.fullmatch(text)
+    usual = {"rad": "deg", "m": "mm", "1": ""}.get(si, si)
+    written = (literal["unit"] or literal["per"] if literal else "") or usual
+    try:
+        return written, float(unit(written)[0]) if written else 1.0
+    except UnitError:
+        return "", 1.0
 
 
 def data_findings(measurement: Measurement) -> list[dict[str, Any]]:

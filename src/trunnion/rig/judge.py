@@ -14,10 +14,9 @@ from math import erf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from trunnion.errors import Coded
-from trunnion.rig.reading.measurement import Signal
+from trunnion.rig.reading.measurement import Signal, rms, student
 
 __all__ = [
     "Judgement", "Uncertainty", "Verdict", "difference", "expanded", "independent", "judge", "probability",
@@ -83,8 +82,7 @@ def probability(coverage: float) -> float:
 
 def expanded(standard: Array, freedom: Array, coverage: float) -> Array:
     """U = k_p u, with k_p of Student's distribution; GUM, G.3.2."""
-    factor = stdtrit(np.where(np.isinf(freedom), 1e12, freedom), 0.5 + probability(coverage) / 2)
-    return np.asarray(np.where(np.isinf(freedom), coverage, factor) * standard)
+    return np.asarray(student(freedom, coverage) * standard)
 
 
 def uncertainty_of(signal: Signal) -> Uncertainty:
@@ -169,8 +167,8 @@ def judge(signal: Signal, model: Array, comparable: NDArray[np.bool_], coverage:
     elif unbiased_share >= unbiased_least:
         verdict = Verdict.OFFSET
     return Judgement(
-        _rms(residual), float(residual[worst]), int(np.flatnonzero(where)[worst]), bias, bias_expanded,
-        _rms(residual - bias), share, least, correlation, verdict,
+        rms(residual), float(residual[worst]), int(np.flatnonzero(where)[worst]), bias, bias_expanded,
+        rms(residual - bias), share, least, correlation, verdict,
     )  # fmt: skip
 
 
@@ -179,10 +177,6 @@ def difference(measured: Array, model: Array) -> Array:
     residual = measured - model
     size = float(np.nanmax(np.abs(np.append(measured, model)), initial=0.0))
     return np.where(np.abs(residual) <= ROUNDING * size, 0.0, residual)
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _share(residual: Array, of: Uncertainty, coverage: float, rounding: float) -> tuple[float, float]:

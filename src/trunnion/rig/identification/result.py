@@ -13,17 +13,15 @@ from numpy.typing import NDArray
 
 from trunnion.cycle.summary import inputs, references
 from trunnion.errors import Finding
-from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.units import UnitError, normalise, unit
 from trunnion.results.attributes import attribute, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import decimals
 from trunnion.results.tables.studies import CURVES
-from trunnion.rig.comparison import data_findings, hashed_files
-from trunnion.rig.identification.fit import FAR, Fit, Solution, rms
+from trunnion.rig.comparison import data_findings, hashed_files, written_unit
+from trunnion.rig.identification.fit import FAR, Fit, Solution
 from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, InseparableUnknowns, LackOfFit, quantile
-from trunnion.rig.reading.measurement import Measurement
+from trunnion.rig.reading.measurement import Measurement, rms
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +29,6 @@ if TYPE_CHECKING:
 __all__ = ["VARIABLES", "Identified", "MisfitCause", "dataset", "with_estimates"]
 
 Array = NDArray[np.float64]
-USUAL = {"rad": "deg", "m": "mm"}  # units of numbers that the model states without one
 SOURCES = (
     "G. A. F. Seber, C. J. Wild, Nonlinear Regression, Wiley, 1989, doi:10.1002/0471725315",
     "JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in measurement",
@@ -369,15 +366,7 @@ def with_estimates(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
 def _text(mechanism: Mechanism, path: str, value: float, u: float, si: str) -> float | str:
     """A number in the unit that is written at its path, with the digits that it has."""
     entry = mechanism.parameter_set.entries.get(path)
-    source = entry.quantity.source if entry else ""
-    literal = (
-        LITERAL.fullmatch(normalise(source).strip().removeprefix("-").strip()) if isinstance(source, str) else None
-    )
-    written = (literal["unit"] if literal else "") or USUAL.get(si, "" if si == "1" else si)
-    try:
-        factor = float(unit(written)[0]) if written else 1.0
-    except UnitError:
-        written, factor = "", 1.0
+    written, factor = written_unit(entry.quantity.source if entry else "", si)
     places = decimals(u / factor) if u > 0 else 6
     number = f"{round(value / factor, places):.{max(places, 0)}f}" if places < 12 else f"{value / factor:.6g}"
     return f"{number} {written}" if written else float(number)

@@ -30,7 +30,6 @@ from trunnion.rig.identification.fit import (
     SensorError,
     Solution,
     refined,
-    rms,
     sensor_errors,
     shared_zero,
     sizes_of,
@@ -50,7 +49,7 @@ from trunnion.rig.identification.uncertainty import (
 from trunnion.rig.identification.unknowns import Parameters, described, unknowns
 from trunnion.rig.modelled import apart, each, in_condition, measure_of, refuse_backwards, refuse_unit
 from trunnion.rig.reading.efficiency import efficiency_of, load_joints, pairs_of
-from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
+from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, rms
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 

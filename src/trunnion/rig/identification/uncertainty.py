@@ -17,6 +17,7 @@ from scipy import special
 from scipy.sparse.csgraph import connected_components
 
 from trunnion.rig.identification.fit import FAR, Fit, sizes_of, solved
+from trunnion.rig.reading.measurement import student
 from trunnion.rig.reading.steps import covariance_of_steps
 
 __all__ = [
@@ -92,11 +93,9 @@ class Covariances:
         return np.asarray(np.sqrt(np.maximum(np.diagonal(self.covariance), 0.0)))
 
 
-def quantile(freedom: Array | float, confidence: float = CONFIDENCE, one_sided: bool = False) -> Array:
-    """Student's quantile, of the normal distribution for infinite freedom."""
-    level = confidence if one_sided else (1 + confidence) / 2
-    freedom = np.asarray(freedom, float)
-    return np.asarray(special.stdtrit(np.where(np.isfinite(freedom), np.maximum(freedom, 1.0), 1e9), level))
+def quantile(freedom: Array | float, one_sided: bool = False) -> Array:
+    """Student's of the intervals."""
+    return student(freedom, float(special.ndtri(CONFIDENCE if one_sided else (1 + CONFIDENCE) / 2)))
 
 
 def spread_of(fit: Fit, x: Array) -> Covariances:

@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, stdtrit
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.rig.reading.measurement import Condition, Signal
+from trunnion.rig.reading.measurement import Condition, Signal, student
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
@@ -81,9 +80,7 @@ class Efficiency:
 
     def factor(self, coverage: float = COVERAGE) -> float:
         """k of U = k u: Student's for the freedom, with the probability that `coverage` has of a normal one."""
-        if not np.isfinite(self.freedom):
-            return coverage
-        return float(stdtrit(self.freedom, ndtr(coverage)))
+        return float(student(self.freedom, coverage))
 
     @property
     def expanded(self) -> float:

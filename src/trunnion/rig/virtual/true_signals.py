@@ -23,6 +23,7 @@ __all__ = ["SampledSignals", "cycle_efficiency", "phases", "sampled"]
 
 Array = NDArray[np.float64]
 EFFICIENCY_STEPS = 720
+CHUNK = 8_192  # instants at once: memory and cache
 DIGITS = 12  # of a share of the cycle, in which instants that are one agree
 
 
@@ -77,8 +78,15 @@ def _solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, 
     Where a load or friction is an interval, at a speed of zero, a course is the mean of its neighbours; a load whose
     joint rests at several positions on end is 0 there: nothing moves against it.
     """
-    by_name, status = courses_of(run, list({one.name: one for one in measures}.values()), time, FrictionMethod())
-    values = np.array([np.broadcast_to(np.asarray(by_name[one.name][0], float), time.shape) for one in measures])
+    alike, parts = list({one.name: one for one in measures}.values()), np.array_split(time, -(-len(time) // CHUNK))
+    solved = [courses_of(run, alike, part, FrictionMethod()) for part in parts]
+    status = np.concatenate([codes for _, codes in solved])
+    rows = [
+        [np.broadcast_to(np.asarray(curves[one.name][0], float), part.shape)
+         for (curves, _), part in zip(solved, parts, strict=True)]
+        for one in measures
+    ]  # fmt: skip
+    values = np.array([np.concatenate(row) for row in rows])
     lost = status >= Status.NOT_CONVERGED
     values[:, lost] = np.nan
     gaps = ~np.isfinite(values)

@@ -154,6 +154,13 @@ _RIG = (
         ("tests/rig/test_compare.py", "tests/rig/test_judge.py", "-k", "gum or bias"),
     ),
     Fault(
+        "correlation-of-turns-biased",
+        "rig/judge.py",
+        "/ square + 1 / len(means), len(means)",
+        "/ square, len(means)",
+        ("tests/rig/test_compare.py", "tests/rig/test_judge.py", "-k", "go_on or follow"),
+    ),
+    Fault(
         "residual-is-model-less-measured",
         "rig/judge.py",
         "residual = measured - model\n",

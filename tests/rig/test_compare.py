@@ -337,6 +337,24 @@ def test_turns_that_faults_left_are_told_from_those_measured():
     assert said(result, "no position with values from two turns, of 3 turns", "see the gaps")
 
 
+def test_errors_that_go_on_from_turn_to_turn_are_said():
+    """Of an AR(1) over turns; independent turns are not said to be so."""
+    random, settings = np.random.default_rng(7), ({"A.speed": 4.0}, {"A.speed": 6.0})
+    whole = measured(turns=30, settings=settings)
+    assert not said(compare(whole), "successive turns")
+    conditions = []
+    for one in whole.conditions:
+        steps = random.normal(size=30)
+        for k in range(1, 30):
+            steps[k] += 0.72 * steps[k - 1]
+        torque = one.courses["torque"]
+        wandering = replace(torque, turns=torque.turns + 0.1 * steps[:, None])
+        conditions.append(replace(one, courses={**one.courses, "torque": wandering}))
+    result = compare(replace(whole, conditions=tuple(conditions)))
+    (row,) = said(result, "successive turns are correlated")
+    assert (row["where"], row["severity"]) == ("channels.torque", "warning")
+
+
 def test_a_timed_cycle_is_the_models():
     """A turn at 4 rad/s lasts π/2 s."""
     whole = measured()

@@ -1,4 +1,4 @@
-"""Figures of a comparison against closed forms: uncertainty of a bias, and scatter."""
+"""Figures of a comparison against closed forms: uncertainty of a bias, scatter, and how turns follow each other."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from rig_measurements import course
-from trunnion.rig.judge import judge
+from trunnion.rig.judge import going_on, judge
 from trunnion.rig.reading.measurement import Accuracy
 
 COVERED = stats.norm.cdf(2) - stats.norm.cdf(-2)  # of k = 2
@@ -38,3 +38,18 @@ def test_uncertainty_of_a_bias(resolution: float, zero: float) -> None:
     factor = stats.t.ppf(0.5 + COVERED / 2, 3 * total**2 / own**2)
     assert found.bias == pytest.approx(1.0)
     assert found.bias_expanded == pytest.approx(factor * total**0.5, rel=1e-6)
+
+
+def test_how_turns_follow_each_other() -> None:
+    """Σ mₖ mₖ₊₁/Σ mₖ² + 1/n of the means of the turns: of +1, −1, … six times −5/6 + 1/6."""
+    turns = np.repeat([[1.0], [-1.0]] * 3, 4, axis=1).reshape(6, 4)
+    found, count = going_on(course("torque", 10.0 + turns))
+    assert (found, count) == (pytest.approx(-4 / 6), 6)
+    rising = np.arange(5.0)[:, None] + np.zeros((5, 4))  # −2 … 2: (2 + 0 + 0 + 2)/10 + 1/5
+    assert going_on(course("torque", rising))[0] == pytest.approx(0.6)
+
+
+def test_independent_turns_follow_each_other_by_nothing_in_the_mean() -> None:
+    random = np.random.default_rng(0)
+    found = [going_on(course("torque", random.normal(size=(8, 1))))[0] for _ in range(1000)]
+    assert np.mean(found) == pytest.approx(0.0, abs=0.03)

@@ -7,6 +7,7 @@ of its own here: what its numbers are uncertain by is not in the verdict.
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -28,7 +29,7 @@ from trunnion.model.units import UnitError, normalise, unit
 from trunnion.results.attributes import cited, codes, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import readable
-from trunnion.rig.judge import Judgement, Verdict, difference, expanded, judge, probability, uncertainty_of
+from trunnion.rig.judge import Judgement, Verdict, difference, expanded, going_on, judge, probability, uncertainty_of
 from trunnion.rig.modelled import Modelled, apart, each, in_condition, modelled
 from trunnion.rig.reading.efficiency import efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.log import gathered
@@ -55,6 +56,7 @@ __all__ = [
 Array = NDArray[np.float64]
 GUM = "JCGM 100:2008, Evaluation of measurement data - Guide to the expression of uncertainty in measurement (GUM)"
 VAGUE = 0.5  # expanded uncertainty from which an efficiency is none
+SIGNIFICANT = 3.5  # standard deviations: of a correlation of turns that is none, in 1 of 4000 channels
 SLOWER = 0.01  # of a speed: a difference to speak of
 MOST_NAMED = 3  # conditions in one finding
 
@@ -496,7 +498,7 @@ def _in_which(conditions: Sequence[Condition], count: int) -> str:
 
 
 def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
-    """Where a channel is not within U, or cannot be judged."""
+    """Where a channel is not within U, cannot be judged, or has turns that resemble each other."""
     cases = [(row.condition, row.channels[name]) for row in rows if name in row.channels]
     where = f"channels.{name}"
 
@@ -526,6 +528,13 @@ def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Find
     if nothing:
         what = f"not compared, for lack of measured values or of a solution of the model, {in_which}"
         yield Finding.warning("compare.nothing", where, what)
+    correlations = [going_on(one.signal) for _, one in cases]
+    count = sum(turns for _, turns in correlations)
+    mean = sum(value * turns for value, turns in correlations if turns) / max(count, 1)
+    if mean * math.sqrt(count) > SIGNIFICANT:
+        what = f"the errors of successive turns are correlated, {mean:+.2f}: U assumes independent turns"
+        remedy = "measure many more turns, or turns further apart; state the drift of the zero in accuracy:"
+        yield Finding.warning("compare.turns_alike", where, what, remedy, correlation=mean)
 
 
 def _of_efficiency(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:

@@ -19,12 +19,13 @@ from trunnion.errors import Coded
 from trunnion.rig.reading.measurement import Signal, rms, student
 
 __all__ = [
-    "Judgement", "Uncertainty", "Verdict", "difference", "expanded", "independent", "judge", "probability",
+    "Judgement", "Uncertainty", "Verdict", "difference", "expanded", "going_on", "independent", "judge", "probability",
     "uncertainty_of",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
 SURE = 2.326  # standard deviations: the share of a true model falls below its least in 1 % of courses
+FEWEST_TURNS = 5  # that show whether errors go on from turn to turn
 ROUNDING = 1e-9  # of the size of a course: differences below it are none
 
 
@@ -210,3 +211,18 @@ def independent(of: Uncertainty) -> float:
     mixed = 2 * float(np.sum((rows @ parts.T) ** 2))
     both = max(scatter, 0.0) + mixed + float(np.sum((parts @ parts.T) ** 2))
     return float(np.clip(count**2 / max(both, count), 1.0, count))
+
+
+def going_on(signal: Signal) -> tuple[float, int]:
+    """Correlation of the mean error of a turn with that of the next, and of how many; (NaN, 0) of fewer than five.
+
+    That of n independent turns is −1/n in the mean, which is taken off, and scatters by 1/√n.
+    """
+    turns = _nearly_complete(signal.turns - signal.mean)
+    if len(turns) < FEWEST_TURNS:
+        return float("nan"), 0
+    means = np.mean(turns, axis=1) - np.mean(turns)
+    square = float(np.sum(means**2))
+    if square <= (ROUNDING * float(np.nanmax(np.abs(signal.mean), initial=0.0))) ** 2:
+        return float("nan"), 0
+    return float(np.sum(means[1:] * means[:-1])) / square + 1 / len(means), len(means)

@@ -177,8 +177,8 @@ _RIG = (
     Fault(
         "noon-is-midnight",
         "rig/reading/tables.py",
-        'hour = hour % 12 + 12 * (time["noon"] in "Pp")',
-        'hour = hour + 12 * (time["noon"] in "Pp")',
+        'hour = hour % 12 + 12 * (stamp["noon"] in "Pp")',
+        'hour = hour + 12 * (stamp["noon"] in "Pp")',
         ("tests/measured_data/test_laboratory_files.py", "-k", "noon"),
     ),
 )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import trunnion
 from trunnion.errors import Severity
-from trunnion.rig.identification.identifiability import _named
+from trunnion.rig.identification.uncertainty import _named
 
 Array = NDArray[np.float64]
 TRUE = {"A": 0.08, "B": 0.14, "C": 0.11, "D": 0.06}

@@ -165,7 +165,7 @@ def test_examples_of_rigs_are_read(path: Path) -> None:
 def test_the_page_tells_every_key() -> None:
     """Each key of a rig file is on the page."""
     page = (EXAMPLES.parent / "docs" / "how-to" / "virtual-rig.md").read_text("utf-8")
-    for part in (Rig, rig_file.Schedule, rig_file.Encoder, rig_file.Sensor, rig_file.Accuracy, rig_file.Idle):
+    for part in (Rig, rig_file.Schedule, rig_file.Encoder, rig_file.Sensor, rig_file.Accuracies, rig_file.Idle):
         for name, field in part.model_fields.items():
             assert re.search(rf"\b{re.escape(field.alias or name)}\b", page), (part.__name__, name)
 

@@ -45,7 +45,7 @@ def rig(
     seat: Seats = None,
 ) -> None:
     """Virtual test rig: plan sensors, or write simulated data files."""
-    from trunnion.rig.reading.rig_file import Rig
+    from trunnion.rig.reading.rig_file import Rig, placed_in_rig
     from trunnion.rig.virtual.files import check_folder, check_form
     from trunnion.rig.virtual.observe import observe
 
@@ -73,7 +73,7 @@ def rig(
         first, last, *_ = (*names[:1], *names[-3:-2])
         span = first if first == last else f"{first} … {last}"
         console().print(f"  {span}, {', '.join(names[-2:])}", markup=False, highlight=False, soft_wrap=True)
-    say(_placed(found, rig_file))
+    say(placed_in_rig(found, rig_file))
     raise typer.Exit(exit_status(found) or int(bool(observation.skipped)))
 
 
@@ -88,19 +88,12 @@ def _in_order(file: Path) -> None:
 @contextmanager
 def _lines_of_rig(path: Path) -> Iterator[None]:
     """Findings about the rig bear the line of its file also where `observe` finds them."""
-    try:
-        yield
-    except MechanismError as error:
-        raise MechanismError(_placed(error.findings, path)) from None
-
-
-def _placed(findings: tuple[Finding, ...] | list[Finding], path: Path) -> list[Finding]:
     from trunnion.rig.reading.rig_file import placed_in_rig
 
     try:
-        return placed_in_rig(findings, path)
-    except MechanismError:
-        return list(findings)
+        yield
+    except MechanismError as error:
+        raise MechanismError(placed_in_rig(error.findings, path)) from None
 
 
 def _about(observation: Observation) -> None:

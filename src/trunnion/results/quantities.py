@@ -9,9 +9,23 @@ import math
 from collections.abc import Iterable
 
 __all__ = [
-    "Units", "between", "common", "decimals_of",
-    "drawn_in", "joined", "number", "parts", "prefixed", "quantity", "readable", "scale_of",
-    "scaled", "signed",
+    "Units",
+    "between",
+    "common",
+    "decimals",
+    "decimals_of",
+    "drawn_in",
+    "joined",
+    "number",
+    "parts",
+    "prefixed",
+    "quantity",
+    "read_in",
+    "readable",
+    "scale_of",
+    "scaled",
+    "signed",
+    "with_uncertainty",
 ]  # fmt: skip
 
 PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
@@ -123,6 +137,33 @@ def scale_of(nominal: float, parts_of: Iterable[float], unit: str) -> tuple[floa
 def decimals_of(small: float) -> int:
     """Of a share in per cent, so that a part of this size shows two digits."""
     return min(max(1 - math.floor(math.log10(100 * small)), 1), 8) if small > 0 else 1
+
+
+def read_in(unit: str) -> tuple[float, str]:
+    """Factor and unit of a figure that is compared with others of its kind: degrees, millimetres, else SI."""
+    return {"rad": (180 / math.pi, "°"), "m": (1e3, "mm"), "1": (1.0, "")}.get(unit, (1.0, unit))
+
+
+def decimals(uncertainty: float) -> int:
+    """Decimals that leave two digits of an uncertainty (GUM 7.2.6), 6 of none; negative for tens, hundreds."""
+    if not math.isfinite(uncertainty) or uncertainty <= 0:
+        return 6
+    return 1 - math.floor(math.log10(float(f"{uncertainty:.1e}")))  # 0.0996 is 0.10
+
+
+def with_uncertainty(value: float, half: float | None, unit: str) -> str:
+    """A value ± U, if there is one, as `read_in` has it: "0.3012 ± 0.0034", "15.02 ± 0.05 °"."""
+    factor, shown = read_in(unit)
+    tail = f" {shown}" if shown else ""
+    value, half = value * factor + 0.0, (half or math.nan) * factor
+    places = decimals(half)
+    if not half > 0:
+        return f"{value:.6g}{tail}"
+    if not -7 < places < 7:
+        power = math.floor(math.log10(max(abs(value), half)))
+        digits = max(decimals(half / 10**power), 0)
+        return f"({value / 10**power:.{digits}f} ± {half / 10**power:.{digits}f})e{power}{tail}"
+    return f"{round(value, places):.{max(places, 0)}f} ± {round(half, places):.{max(places, 0)}f}{tail}"
 
 
 def signed(value: float, factor: float, shown: str, sign: str = "+", digits: int = 4) -> str:

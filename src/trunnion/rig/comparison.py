@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -24,7 +25,7 @@ from trunnion.model.arguments import strict_arguments
 from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key, nearest
-from trunnion.model.units import unit as unit_of
+from trunnion.model.units import UnitError, normalise, unit
 from trunnion.results.attributes import cited, codes, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import readable
@@ -39,7 +40,18 @@ from trunnion.solve.loads import useful_loads, useful_springs
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CAUSES", "GUM", "VARIABLES", "Cause", "causes", "compare", "data_findings", "hashed_files", "other_speed"]
+__all__ = [
+    "CAUSES",
+    "GUM",
+    "VARIABLES",
+    "Cause",
+    "causes",
+    "compare",
+    "data_findings",
+    "hashed_files",
+    "other_speed",
+    "written_unit",
+]
 
 Array = NDArray[np.float64]
 GUM = "JCGM 100:2008, Evaluation of measurement data - Guide to the expression of uncertainty in measurement (GUM)"
@@ -157,15 +169,15 @@ class ChannelComparison(NamedTuple):
 
 
 class EfficiencyComparison(NamedTuple):
-    """Efficiency of a condition by the channels: measured, its expanded uncertainty, and of the model.
+    """Efficiency of a condition: measured, its expanded uncertainty, and of the model.
 
-    reason: why the uncertainty is not known, with what to do about it; both empty if it is.
+    doubt: why the uncertainty is not known, with what to do about it; both empty if it is.
     """
 
     measured: float
     expanded: float
     model: float
-    reason: tuple[str, str] = ("", "")
+    doubt: tuple[str, str] = ("", "")
 
     @property
     def within(self) -> int:
@@ -229,26 +241,28 @@ def compare(
     measures = _measures(measurement, channels)
     method = friction_method or FrictionMethod()
     rows = each(measurement.conditions, lambda one: _condition(mechanism, one, measures, coverage, method), progress)
-    return _dataset(mechanism, measurement, measures, rows, coverage, method)
+    arrays, sets = _arrays(measures, rows, coverage)
+    labels = {"channel": list(measures), "condition": [row.condition.name for row in rows], "set": sets}
+    attributes = _attributes(mechanism, measurement, measures, rows, coverage, method)
+    return dataset_of("comparison", described(arrays, VARIABLES), labels, attributes)
 
 
 def _measures(measurement: Measurement, channels: Sequence[str] | None) -> dict[str, str]:
     """What each channel measures, by name; MechanismError if there is none, or not one that is asked for."""
     every: dict[str, str] = {}
-    for condition in measurement.conditions:
-        for name, signal in condition.courses.items():
-            if signal.measures:
-                every.setdefault(name, signal.measures)
-    missing = [name for name in channels or () if name not in every]
-    if missing:
+    for name, signal in (
+        (name, one) for condition in measurement.conditions for name, one in condition.courses.items()
+    ):
+        if signal.measures:
+            every.setdefault(name, signal.measures)
+    if missing := [name for name in channels or () if name not in every]:
         raise MechanismError(
             [Finding(f"there is no channel '{name}'", "--channel", nearest(name, every)) for name in missing]
         )
     if not every:
         what = "no channel measures anything of the model" if measurement.conditions else "there is no condition in it"
-        raise MechanismError(
-            Finding(what, measurement.name, "state measures: effort:DRIVER of a channel in the mapping")
-        )
+        remedy = "state measures: effort:DRIVER of a channel in the mapping"
+        raise MechanismError(Finding(what, measurement.name, remedy))
     return every if channels is None else {name: every[name] for name in dict.fromkeys(channels)}
 
 
@@ -258,11 +272,8 @@ def _condition(
     measured = {name: what for name, what in measures.items() if name in condition.courses}
     joints = load_joints(mechanism)
     powers = pairs_of(condition, joints)
-    of_powers = {
-        signal.channel: signal.measures
-        for pair in ((*powers.driven, *powers.loaded) if powers else ())
-        for signal in pair
-    }
+    pairs = (*powers.driven, *powers.loaded) if powers else ()
+    of_powers = {signal.channel: signal.measures for pair in pairs for signal in pair}
     model = modelled(mechanism, condition, measured, method, of_powers)
     without_friction = cache(lambda: _frictionless(mechanism, condition, measured, method))
     channels = {}
@@ -307,48 +318,36 @@ def _efficiency(
     condition: Condition, model: Modelled, joints: Mapping[str, str], coverage: float
 ) -> EfficiencyComparison:
     """Efficiency as a rig computes it: of the measured courses, and of the model's in their place."""
-    modelled_value = _efficiency_of_model(condition, model, joints)
-    try:
-        measured = efficiency_of(condition, joints)
-    except MechanismError as error:  # no turn is whole, or no power goes in
-        first = error.findings[0]
-        return EfficiencyComparison(np.nan, np.nan, modelled_value, (first.what, first.remedy))
-    wrong = "a sign, a gain, a unit or a column of its channels is wrong"
-    half, reason = measured.factor(coverage) * measured.uncertainty, ("", "")
-    if measured.turns < 2:
-        reason = "there is only one turn: the uncertainty cannot be estimated without scatter", "measure more turns"
-    elif half > VAGUE:
-        reason = f"its U of {half:.3g} is not meaningful: {wrong}", "check their means"
-    elif measured.value > 1 + half:
-        reason = f"{measured.value:.4g} is above 1: {wrong}", "check their means"
-    return EfficiencyComparison(measured.value, np.nan if reason[0] else half, modelled_value, reason)
-
-
-def _efficiency_of_model(condition: Condition, model: Modelled, joints: Mapping[str, str]) -> float:
-    """The efficiency of the model's courses; NaN where it has no answer at some position."""
-    solved = model.status < Status.NOT_CONVERGED
+    solved, theirs = model.status < Status.NOT_CONVERGED, float("nan")
     courses = {  # a load has no torque where its joint rests, and takes no power
         name: replace(condition.courses[name], turns=np.where(solved, np.nan_to_num(course), course)[np.newaxis])
         for name, course in model.courses.items()
     }
-    try:
+    with suppress(MechanismError):  # it has no answer at some position
         # its positions are equal steps of time, whatever those of the measurement are
-        return efficiency_of(replace(condition, courses=courses, speed=np.nan), joints).value
-    except MechanismError:
-        return float("nan")
+        theirs = efficiency_of(replace(condition, courses=courses, speed=np.nan), joints).value
+    try:
+        measured = efficiency_of(condition, joints)
+    except MechanismError as error:  # no turn is whole, or no power goes in
+        return EfficiencyComparison(np.nan, np.nan, theirs, (error.findings[0].what, error.findings[0].remedy))
+    wrong = "a sign, a gain, a unit or a column of its channels is wrong"
+    half, doubt = measured.factor(coverage) * measured.uncertainty, ("", "")
+    if measured.turns < 2:
+        doubt = "there is only one turn: the uncertainty cannot be estimated without scatter", "measure more turns"
+    elif half > VAGUE:
+        doubt = f"its U of {half:.3g} is not meaningful: {wrong}", "check their means"
+    elif measured.value > 1 + half:
+        doubt = f"{measured.value:.4g} is above 1: {wrong}", "check their means"
+    return EfficiencyComparison(measured.value, np.nan if doubt[0] else half, theirs, doubt)
 
 
 # ---- the result -----------------------------------------------------------------------------------------------
 
 
-def _dataset(
-    mechanism: Mechanism,
-    measurement: Measurement,
-    measures: Mapping[str, str],
-    rows: Sequence[ConditionComparison],
-    coverage: float,
-    method: FrictionMethod,
-) -> xr.Dataset:
+def _arrays(
+    measures: Mapping[str, str], rows: Sequence[ConditionComparison], coverage: float
+) -> tuple[dict[str, NDArray[Any]], list[str]]:
+    """All variables, and the names of what is set."""
     sets = list(dict.fromkeys(name for row in rows for name in row.condition.values))
     positions = max(len(row.condition.phase) for row in rows)
     sizes = {"set": len(sets), "condition": len(rows), "channel": len(measures), "position": positions}
@@ -356,48 +355,40 @@ def _dataset(
     arrays["verdict"][:], arrays["efficiency_within"][:] = Verdict.NOTHING, -1
     arrays["status"][:] = Status.NOT_ASSEMBLED  # of positions that a condition with fewer does not have
     for k, row in enumerate(rows):
-        size = len(row.condition.phase)
         arrays["value"][:, k] = [row.condition.values.get(name, np.nan) for name in sets]
-        for name, values in (("phase", row.condition.phase), ("drive", row.model.drive), ("status", row.model.status)):
-            arrays[name][k, :size] = values
+        for name, course in (("phase", row.condition.phase), ("drive", row.model.drive), ("status", row.model.status)):
+            arrays[name][k, : len(course)] = course
         for i, name in enumerate(measures):
             if name in row.channels:
-                _fill(arrays, (i, k), row.channels[name], row.model.drive, coverage)
-        if row.efficiency is not None:
-            arrays["efficiency"][k], arrays["efficiency_expanded"][k] = row.efficiency.measured, row.efficiency.expanded
-            arrays["efficiency_model"][k], arrays["efficiency_within"][k] = row.efficiency.model, row.efficiency.within
+                for key, number in _numbers(row.channels[name], row.model.drive, coverage):
+                    at = (i, k, slice(0, len(row.condition.phase)))
+                    arrays[key][at[: arrays[key].ndim]] = number
+        if (efficiency := row.efficiency) is not None:
+            arrays["efficiency"][k], arrays["efficiency_expanded"][k] = efficiency.measured, efficiency.expanded
+            arrays["efficiency_model"][k], arrays["efficiency_within"][k] = efficiency.model, efficiency.within
     if all(row.efficiency is None for row in rows):
         arrays = {name: array for name, array in arrays.items() if not name.startswith("efficiency")}
-    labels = {"channel": list(measures), "condition": [row.condition.name for row in rows], "set": sets}
-    attributes = _attributes(mechanism, measurement, measures, rows, coverage, method)
-    return dataset_of("comparison", described(arrays, VARIABLES), labels, attributes)
+    return arrays, sets
 
 
-def _fill(
-    arrays: Mapping[str, NDArray[Any]], at: tuple[int, int], channel: ChannelComparison, drive: Array, coverage: float
-) -> None:
-    """The numbers of one channel in one condition."""
-    signal, model, judgement = channel.signal, channel.model, channel.judgement
-    of = uncertainty_of(signal)
-    courses = {
+def _numbers(channel: ChannelComparison, drive: Array, coverage: float) -> Iterator[tuple[str, Any]]:
+    """The numbers of one channel in one condition, by variable."""
+    signal, model, judgement, of = channel.signal, channel.model, channel.judgement, uncertainty_of(channel.signal)
+    yield from {
         "measured": signal.mean, "scatter": signal.scatter, "uncertainty": of.total,
         "expanded": expanded(of.total, of.freedom, coverage), "model": model,
         "residual": difference(signal.mean, model),
         "compared": channel.comparable & np.isfinite(signal.mean) & np.isfinite(model),
-    }  # fmt: skip
-    for name, course in courses.items():
-        arrays[name][(*at, slice(0, len(model)))] = course
-    figures = {
         "turns": len(signal.turns), "accuracy_zero": signal.accuracy.zero, "accuracy_gain": signal.accuracy.gain,
-        "rms": judgement.rms, "largest": judgement.largest, "bias": judgement.bias,
-        "bias_expanded": judgement.bias_expanded, "rms_unbiased": judgement.rms_unbiased, "within": judgement.within,
-        "within_least": judgement.least, "correlation": judgement.correlation, "verdict": judgement.verdict,
+        "within_least": judgement.least,
         "largest_at": drive[judgement.place] if judgement.place >= 0 else np.nan,
-    }  # fmt: skip
-    for name, figure in figures.items():
-        arrays[name][at] = figure
+    }.items()  # fmt: skip
+    for name, figure in vars(judgement).items():
+        if name in VARIABLES:
+            yield name, figure
     for kind, cause in channel.causes.items():
-        arrays[f"{kind}_error"][at], arrays[f"{kind}_explains"][at] = cause
+        yield f"{kind}_error", cause.size
+        yield f"{kind}_explains", cause.share
 
 
 def _attributes(
@@ -410,7 +401,9 @@ def _attributes(
 ) -> dict[str, Any]:
     first = rows[0].model
     signals = {name: next(row.channels[name].signal for row in rows if name in row.channels) for name in measures}
-    units = _units_set(mechanism, rows)
+    entries = {row["path"]: row for row in inputs(mechanism)}
+    names = dict.fromkeys(name for row in rows for name in row.condition.values)
+    sets = [entries.get(mechanism.path_of(name), {"unit": "", "text": ""}) for name in names]
     efficiencies = [row.efficiency.within for row in rows if row.efficiency is not None]
     verdicts = [channel.judgement.verdict for row in rows for channel in row.channels.values()]
     return {
@@ -432,8 +425,8 @@ def _attributes(
         "channel_units": [signal.unit for signal in signals.values()],
         "channel_read_in": [signal.read_in for signal in signals.values()],
         "channel_measures": list(measures.values()),
-        "set_units": [si for si, _, _ in units],
-        "set_written": [(unit, factor) for _, unit, factor in units],
+        "set_units": [one["unit"] for one in sets],
+        "set_written": [written_unit(one["text"], one["unit"]) for one in sets],
         "findings": finding_rows(_findings(mechanism, measures, rows)),
         "data_findings": data_findings(measurement),
         "done": list(measurement.done),
@@ -443,16 +436,16 @@ def _attributes(
     }
 
 
-def _units_set(mechanism: Mechanism, rows: Sequence[ConditionComparison]) -> list[tuple[str, str, float]]:
-    """SI unit of each number that is set, and the unit with its factor that the model states it in."""
-    entries = {row["path"]: row for row in inputs(mechanism)}
-    units = []
-    for name in dict.fromkeys(name for row in rows for name in row.condition.values):
-        entry = entries.get(mechanism.path_of(name), {"unit": "", "text": ""})
-        literal = LITERAL.fullmatch(entry["text"].strip().removeprefix("-"))
-        unit = (literal and (literal["unit"] or literal["per"])) or {"rad": "deg"}.get(entry["unit"], entry["unit"])
-        units.append((entry["unit"], unit, float(unit_of(unit)[0]) if unit and unit != "1" else 1.0))
-    return units
+def written_unit(source: object, si: str) -> tuple[str, float]:
+    """The unit that a number is written in, else one that is usual for its SI unit, and its factor to SI."""
+    text = normalise(source).strip().removeprefix("-").strip() if isinstance(source, str) else ""
+    literal = LITERAL.fullmatch(text)
+    usual = {"rad": "deg", "m": "mm", "1": ""}.get(si, si)
+    written = (literal["unit"] or literal["per"] if literal else "") or usual
+    try:
+        return written, float(unit(written)[0]) if written else 1.0
+    except UnitError:
+        return "", 1.0
 
 
 def data_findings(measurement: Measurement) -> list[dict[str, Any]]:
@@ -487,23 +480,12 @@ def _findings(mechanism: Mechanism, channels: Iterable[str], rows: Sequence[Cond
         *_of_efficiency(rows),
         *_of_model(rows),
     ]
-    left_out, bare = dict.fromkeys(names, 0), dict.fromkeys(names)
-    for name, one in ((name, one) for row in rows for name, one in row.channels.items()):
-        left_out[name] += int(np.count_nonzero(np.isfinite(one.model) & ~one.comparable))
-        if one.signal.accuracy.zero or one.signal.accuracy.gain:
-            bare.pop(name, None)
-    if any(left_out.values()):
-        counts = {name: count for name, count in left_out.items() if count}
-        what = f"positions left out of the statistics: {', '.join(f'{name} {n:,}' for name, n in counts.items())}"
-        what += "; a joint is momentarily at rest there, or a dead centre is close"
-        remedy = "the model gives an interval there, not a single value"
-        findings.append(Finding.note("compare.left_out", "", what, remedy, counts=counts))
-    if bare:
-        what = (
-            f"no accuracy of zero and gain is stated for {', '.join(bare)}: U includes only the scatter between turns"
-        )
+    accuracies = [(name, one.signal.accuracy) for row in rows for name, one in row.channels.items()]
+    stated = {name for name, accuracy in accuracies if accuracy.zero or accuracy.gain}
+    if bare := [name for name in names if name not in stated]:
+        what = f"no accuracy of zero and gain is stated for {', '.join(bare)}: U includes only the scatter between "
         remedy = "state accuracy: {gain: …, zero: …} in the mapping"
-        findings.append(Finding.note("compare.no_accuracy", "channels", what, remedy, channels=list(bare)))
+        findings.append(Finding.note("compare.no_accuracy", "channels", f"{what}turns", remedy, channels=bare))
     return sorted(findings, key=lambda finding: list(Severity).index(finding.severity))
 
 
@@ -518,33 +500,37 @@ def _in_which(conditions: Sequence[Condition], count: int) -> str:
 def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
     """Where a channel is not within U, cannot be judged, or has turns that resemble each other."""
     cases = [(row.condition, row.channels[name]) for row in rows if name in row.channels]
-    where, by_verdict = f"channels.{name}", dict[Verdict, list[tuple[Condition, ChannelComparison]]]()
-    for condition, one in cases:
-        key = Verdict.NOT if one.judgement.verdict is Verdict.OFFSET else one.judgement.verdict
-        by_verdict.setdefault(key, []).append((condition, one))
-    in_which = {key: _in_which([one for one, _ in those], len(cases)) for key, those in by_verdict.items()}
-    if off := [one for _, one in by_verdict.get(Verdict.NOT, ())]:
+    where = f"channels.{name}"
+
+    def of(*verdicts: Verdict) -> tuple[list[ChannelComparison], str]:
+        chosen = [(condition, one) for condition, one in cases if one.judgement.verdict in verdicts]
+        return [one for _, one in chosen], _in_which([one for one, _ in chosen], len(cases)) if chosen else ""
+
+    off, in_which = of(Verdict.NOT, Verdict.OFFSET)
+    if off:
         rms, within = max(one.judgement.rms for one in off), min(one.judgement.within for one in off)
         unit, size = off[0].signal.shown
         rms_text = f"{rms / size:.3g} {unit}" if unit not in ("rad", "1") else readable(rms, unit, 3)
         offset = " apart from a constant offset" * all(one.judgement.verdict is Verdict.OFFSET for one in off)
         down, up = ("down to ", "up to ") if len(off) > 1 else ("", "")
-        what = f"does not agree within U {in_which[Verdict.NOT]}{offset}: {down}{100 * within:.0f} % of the positions "
-        what += f"agree, RMS of the residual {up}{rms_text}"
+        what = f"does not agree within U {in_which}{offset}: {down}{100 * within:.0f} % of the positions agree, RMS of "
+        what += f"the residual {up}{rms_text}"
         remedy = "see what would explain it; `trunnion identify` fits friction and other numbers of the model"
         yield Finding.error("compare.not_within", where, what, remedy, within_percent=100 * within, rms=rms)
-    if unknown := by_verdict.get(Verdict.UNKNOWN):
-        turns = max(len(one.signal.turns) for _, one in unknown)
+    unknown, in_which = of(Verdict.UNKNOWN)
+    if unknown:
+        turns = max(len(one.signal.turns) for one in unknown)
         what = f"has no position with values from two turns, of {counted(turns, 'turn')}: its uncertainty cannot be "
-        what += f"estimated without scatter, {in_which[Verdict.UNKNOWN]}"
+        what += f"estimated without scatter, {in_which}"
         remedy = "measure more turns, or see the gaps reported by `trunnion data`"
         yield Finding.warning("compare.turns_few", where, what, remedy, turns=turns)
-    if Verdict.NOTHING in by_verdict:
-        what = f"not compared, for lack of measured values or of a solution of the model, {in_which[Verdict.NOTHING]}"
-        yield Finding.warning("compare.nothing", where, what, "")
-    correlations = [(value, turns) for value, turns in (going_on(one.signal) for _, one in cases) if turns]
+    nothing, in_which = of(Verdict.NOTHING)
+    if nothing:
+        what = f"not compared, for lack of measured values or of a solution of the model, {in_which}"
+        yield Finding.warning("compare.nothing", where, what)
+    correlations = [going_on(one.signal) for _, one in cases]
     count = sum(turns for _, turns in correlations)
-    mean = sum(value * turns for value, turns in correlations) / max(count, 1)
+    mean = sum(value * turns for value, turns in correlations if turns) / max(count, 1)
     if mean * math.sqrt(count) > SIGNIFICANT:
         what = f"the errors of successive turns are correlated, {mean:+.2f}: U assumes independent turns"
         remedy = "measure many more turns, or turns further apart; state the drift of the zero in accuracy:"
@@ -552,23 +538,23 @@ def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Find
 
 
 def _of_efficiency(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
+    """Where the efficiencies do not agree, and where there is none."""
     cases = [(row.condition, row.efficiency) for row in rows if row.efficiency is not None]
     if off := [(condition, one) for condition, one in cases if one.within == 0]:
         worst, most = max(off, key=lambda case: abs(case[1].measured - case[1].model))
         where = _in_which([condition for condition, _ in off], len(cases))
         where += f"; the most in {worst.name}" if len(off) > 1 else ""
         what = f"does not agree within U {where}: measured {most.measured:.4f} ± {most.expanded:.2g}, "
-        what += f"model {most.model:.4f}"
         remedy = "check the channels; `trunnion identify` fits the friction of the model to them"
         figures = {"measured": most.measured, "expanded": most.expanded, "model": most.model}
-        yield Finding.error("compare.efficiency", "efficiency", what, remedy, **figures)
+        yield Finding.error("compare.efficiency", "efficiency", f"{what}model {most.model:.4f}", remedy, **figures)
     for missing in dict.fromkeys(row.unmeasured for row in rows if row.unmeasured):
         where = _in_which([row.condition for row in rows if row.unmeasured == missing], len(rows))
         what = f"not compared {where}: the power of {', '.join(missing)} is not measured"
         remedy = "measure effort: of every driver and load: of every useful load, each with its rate:"
         yield Finding.warning("compare.efficiency_unmeasured", "efficiency", what, remedy, missing=list(missing))
-    for what, remedy in dict.fromkeys(one.reason for _, one in cases if one.reason[0]):
-        where = _in_which([condition for condition, one in cases if one.reason == (what, remedy)], len(cases))
+    for what, remedy in dict.fromkeys(one.doubt for _, one in cases if one.doubt[0]):
+        where = _in_which([condition for condition, one in cases if one.doubt == (what, remedy)], len(cases))
         yield Finding.warning("compare.efficiency_unknown", "efficiency", f"not known {where}: {what}", remedy)
 
 

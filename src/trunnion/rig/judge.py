@@ -14,10 +14,9 @@ from math import erf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from trunnion.errors import Coded
-from trunnion.rig.reading.measurement import Signal
+from trunnion.rig.reading.measurement import Signal, rms, student
 
 __all__ = [
     "Judgement", "Uncertainty", "Verdict", "difference", "expanded", "going_on", "independent", "judge", "probability",
@@ -84,8 +83,7 @@ def probability(coverage: float) -> float:
 
 def expanded(standard: Array, freedom: Array, coverage: float) -> Array:
     """U = k_p u, with k_p of Student's distribution; GUM, G.3.2."""
-    factor = stdtrit(np.where(np.isinf(freedom), 1e12, freedom), 0.5 + probability(coverage) / 2)
-    return np.asarray(np.where(np.isinf(freedom), coverage, factor) * standard)
+    return np.asarray(student(freedom, coverage) * standard)
 
 
 def uncertainty_of(signal: Signal) -> Uncertainty:
@@ -93,20 +91,9 @@ def uncertainty_of(signal: Signal) -> Uncertainty:
     zero = np.full_like(signal.mean, np.hypot(signal.accuracy.zero, signal.accuracy.cut))
     shared = np.array([zero, signal.accuracy.gain * signal.read])
     random = signal.scatter / np.sqrt(np.maximum(signal.count, 1))
-    local = np.sqrt(np.maximum(signal.uncertainty**2 - random**2 - np.sum(shared**2, axis=0), 0.0))
-    return Uncertainty(random, local, shared, signal.count, signal.turns - signal.mean)
-
-
-def _bias_expanded(of: Uncertainty, coverage: float) -> float:
-    """U of the mean residual: scatter of the means of the turns, zero and gain; NaN with fewer than two turns."""
-    means = np.mean(_nearly_complete(of.turns), axis=1)
-    if len(means) < 2:
-        return float("nan")
-    random = np.array([np.std(means, ddof=1) / np.sqrt(len(means))])
-    local = np.array([np.sqrt(np.mean(of.local**2) / len(of.local))])
-    shared = np.mean(of.shared, axis=1, keepdims=True)
-    mean = Uncertainty(random, local, shared, np.array([len(means)]), of.turns[:, :1])
-    return float(expanded(mean.total, mean.freedom, coverage)[0])
+    return Uncertainty(
+        random, np.full_like(random, signal.unresolved), shared, signal.count, signal.turns - signal.mean
+    )
 
 
 def _nearly_complete(turns: Array) -> Array:
@@ -157,8 +144,17 @@ def judge(signal: Signal, model: Array, comparable: NDArray[np.bool_], coverage:
     measured, modelled = signal.mean[where], model[where]
     residual = difference(measured, modelled)
     size = float(np.max(np.abs(np.append(measured, modelled))))
-    bias = float(np.mean(residual))
+    bias, bias_expanded, correlation = float(np.mean(residual)), np.nan, np.nan
     of = uncertainty_of(signal).at(where)
+    means = np.mean(_nearly_complete(of.turns), axis=1)
+    if len(means) > 1:  # of the mean residual: scatter of the means of the turns, zero and gain
+        random = np.array([np.std(means, ddof=1) / np.sqrt(len(means))])
+        local = np.array([np.sqrt(np.mean(of.local**2) / len(of.local))])
+        shared, count = np.mean(of.shared, axis=1, keepdims=True), np.array([len(means)])
+        mean = Uncertainty(random, local, shared, count, of.turns[:, :1])
+        bias_expanded = float(expanded(mean.total, mean.freedom, coverage)[0])
+    if min(np.max(np.abs(course - np.mean(course))) for course in (measured, modelled)) > ROUNDING * size:
+        correlation = float(np.corrcoef(measured, modelled)[0, 1])  # Pearson's; of none that is flat
     worst = int(np.argmax(np.abs(residual)))
     share, least = _share(residual, of, coverage, ROUNDING * size)
     # a constant is taken out: what is left is against the scatter and what the gain makes of the shape
@@ -172,8 +168,8 @@ def judge(signal: Signal, model: Array, comparable: NDArray[np.bool_], coverage:
     elif unbiased_share >= unbiased_least:
         verdict = Verdict.OFFSET
     return Judgement(
-        _rms(residual), float(residual[worst]), int(np.flatnonzero(where)[worst]), bias, _bias_expanded(of, coverage),
-        _rms(residual - bias), share, least, _correlation(measured, modelled), verdict,
+        rms(residual), float(residual[worst]), int(np.flatnonzero(where)[worst]), bias, bias_expanded,
+        rms(residual - bias), share, least, correlation, verdict,
     )  # fmt: skip
 
 
@@ -182,10 +178,6 @@ def difference(measured: Array, model: Array) -> Array:
     residual = measured - model
     size = float(np.nanmax(np.abs(np.append(measured, model)), initial=0.0))
     return np.where(np.abs(residual) <= ROUNDING * size, 0.0, residual)
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _share(residual: Array, of: Uncertainty, coverage: float, rounding: float) -> tuple[float, float]:
@@ -234,11 +226,3 @@ def going_on(signal: Signal) -> tuple[float, int]:
     if square <= (ROUNDING * float(np.nanmax(np.abs(signal.mean), initial=0.0))) ** 2:
         return float("nan"), 0
     return float(np.sum(means[1:] * means[:-1])) / square + 1 / len(means), len(means)
-
-
-def _correlation(measured: Array, model: Array) -> float:
-    """Pearson's; NaN where one of them is flat."""
-    flat = ROUNDING * float(np.max(np.abs(np.append(measured, model)), initial=0.0))
-    if np.max(np.abs(measured - np.mean(measured))) <= flat or np.max(np.abs(model - np.mean(model))) <= flat:
-        return float("nan")
-    return float(np.corrcoef(measured, model)[0, 1])

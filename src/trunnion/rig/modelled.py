@@ -21,8 +21,8 @@ from trunnion.rig.reading.measurement import Condition, Signal
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 
-__all__ = ["Modelled", "apart", "each", "in_condition", "measure_of", "modelled", "refuse_backwards", "refuse_unit",
-           "without_course"]  # fmt: skip
+__all__ = ["Modelled", "apart", "each", "in_condition", "measure_of", "modelled", "refuse_backwards",
+           "refuse_unit"]  # fmt: skip
 
 Array = NDArray[np.float64]
 FAR = 0.05  # of a speed: an error of the settings
@@ -62,27 +62,23 @@ class Modelled:
         return there & (best if np.any(best) else self.status < Status.CONTACT_LOST)
 
 
-def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str) -> Measure:
-    """What a channel measures; MechanismError if the model has no such course."""
-    where = f"channels.{channel}.measures"
+def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str, section: str = "channels") -> Measure:
+    """What a channel or a sensor measures; MechanismError if the model has no such course."""
+    where = f"{section}.{channel}.measures"
     try:
         measure = named(mechanism, [name], run.values)[0]
     except MechanismError as error:
         raise MechanismError([replace(one, where=where) for one in error.findings]) from None
     if not measure.everywhere or not measure.single(run.system):
-        what = f"'{name}' is no number of a single position{without_course(measure)}"
-        remedy = "a channel measures such as effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT or link.point.x"
+        what = f"'{name}' is no number of a single position, as a sensor shows it"
+        if measure.in_time:
+            what += ": it is of a motion in time"
+        elif not measure.everywhere:
+            of = f"as {measure.statistic}" if measure.statistic else "at a place or over a range"
+            what += f": the model gives it {of}"
+        remedy = "a sensor measures such as effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT or link.point.x"
         raise MechanismError(Finding(what, where, remedy))
     return measure
-
-
-def without_course(measure: Measure) -> str:
-    """What a measure of the model is that no sensor follows; empty if it is of every position."""
-    if measure.everywhere:
-        return ""
-    if measure.in_time:
-        return ": it is of a motion in time"
-    return f": the model gives it {f'as {measure.statistic}' if measure.statistic else 'at a place or over a range'}"
 
 
 def refuse_unit(run: Run, measure: Measure, channel: str, course: Signal) -> None:

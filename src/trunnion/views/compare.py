@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.names import nearest
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import number, prefixed
+from trunnion.results.quantities import number, prefixed, with_uncertainty
 from trunnion.rig.comparison import CAUSES
 from trunnion.rig.judge import Verdict
 from trunnion.views.charts import Axis, Band, Chart, ColourScale, Legend, Line, Look, Mark, Panel, Stripe, silent
@@ -211,22 +211,13 @@ def _residual_cells(result: xr.Dataset, i: int, k: int) -> list[str]:
         text(value * factor, unit) if np.isfinite(value) else NONE for value in (rms, largest, bias)
     )
     if np.isfinite(bias) and np.isfinite(wide):
-        bias_text = _with_uncertainty(bias * factor, wide * factor, unit)
+        bias_text = with_uncertainty(bias * factor, wide * factor, unit).replace("-", "−").replace(" ", "\u00a0")
     place = NONE
     if np.isfinite(at):
         turned, shown = prefixed(at, str(result.attrs["drive_unit"]))
         place = setting(at * turned, shown)
     shares = (f"{100 * part:.1f}\u00a0%" if np.isfinite(part) else NONE for part in (within, least))
     return [rms_text, largest_text, place, bias_text, *shares, _plain(alike), verdict(result, i, k)]
-
-
-def _with_uncertainty(value: float, wide: float, unit: str) -> str:
-    """A value with its expanded uncertainty, to two digits of that (GUM 7.2.6)."""
-    places = 1 - math.floor(math.log10(wide)) if wide > 0 else 3
-    if not 0 <= places <= 6:
-        return f"{number(value, 3)}\u00a0±\u00a0{text(wide, unit, 2)}"
-    digits = f"{round(value, places) + 0.0:.{places}f}".replace("-", "−")  # no negative zero
-    return f"{digits}\u00a0±\u00a0{wide:.{places}f}\u00a0{unit}".rstrip().replace(" ", "\u00a0")
 
 
 def efficiencies(result: xr.Dataset) -> Table | None:

@@ -11,8 +11,7 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import number, prefixed
-from trunnion.rig.identification.number_text import amount, decimals, scaled
+from trunnion.results.quantities import decimals, number, prefixed, read_in, with_uncertainty
 from trunnion.rig.identification.uncertainty import quantile
 from trunnion.views.charts import Axis, Band, Cells, Chart, Legend, Line, Look, Mark, Note, Panel
 from trunnion.views.common.cycle import Array, names
@@ -121,7 +120,7 @@ def estimates(result: xr.Dataset) -> list[Estimate]:
     units, paths = attribute(result, "parameter_units"), attribute(result, "parameter_paths")
     sources = names(result, "source")
     for p, name in enumerate(names(result, "parameter")):
-        factor, shown = scaled(units[p])
+        factor, shown = read_in(units[p])
         keys = ("start", "estimate", "standard_uncertainty", "lower", "upper")
         start, value, deviation, lower, upper = (float(result[key].values[p]) * factor for key in keys)
         shares = dict(zip(sources, map(float, result["share"].values[p]), strict=True))
@@ -224,7 +223,7 @@ def sensors(result: xr.Dataset) -> Table | None:
         sized = math.isfinite(error) and math.isfinite(factor) and bool(unit)
         rows.append([
             name,
-            amount(error * factor, 2 * u * factor, unit).replace("-", "−") if sized else NONE,
+            with_uncertainty(error * factor, 2 * u * factor, unit).replace("-", "−") if sized else NONE,
             f"{error:.2f} ± {2 * u:.2f}".replace("-", "−") if math.isfinite(error) else "not identifiable",
         ])  # fmt: skip
     head = ["", "estimate ± 2 u", "in units of its stated standard uncertainty"]

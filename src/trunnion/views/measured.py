@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trunnion.rig.reading.measurement import Measurement, Signal
+from trunnion.rig.reading.measurement import Measurement, Signal, rms
 from trunnion.views.table import Table
 
 __all__ = ["shortened", "tables"]
@@ -59,7 +59,7 @@ def _channel(courses: list[Signal]) -> list[str]:
     known = means[np.isfinite(means)]
     extremes = [_figure(float(known.min())), _figure(float(known.max()))] if known.size else ["none", "none"]
     spreads = [np.concatenate([getattr(one, figure) for one in courses]) for figure in ("scatter", "uncertainty")]
-    return [courses[0].measures, _unit(unit), *extremes, *(_figure(_rms(one) / factor, 3) for one in spreads)]
+    return [courses[0].measures, _unit(unit), *extremes, *(_figure(rms(one) / factor, 3) for one in spreads)]
 
 
 def _overall(course: Signal, size: float) -> float:
@@ -67,12 +67,6 @@ def _overall(course: Signal, size: float) -> float:
     known = course.mean[np.isfinite(course.mean)]
     with np.errstate(over="ignore"):
         return float(known.mean()) / size if known.size else np.nan
-
-
-def _rms(values: np.ndarray) -> float:
-    known = values[np.isfinite(values)]
-    with np.errstate(over="ignore"):
-        return float(np.sqrt(np.mean(known**2))) if known.size else np.nan
 
 
 def _figure(value: float, digits: int = 5) -> str:

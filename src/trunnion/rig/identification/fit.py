@@ -22,11 +22,11 @@ from scipy.optimize import least_squares
 
 from trunnion.errors import Status
 from trunnion.rig.identification.signals import Courses, Model, Said
-from trunnion.rig.reading.measurement import Accuracy, Condition, Signal
+from trunnion.rig.reading.measurement import Accuracy, Condition, Signal, rms
 
 __all__ = [
     "EFFICIENCY", "FAR", "FILE_ZERO", "Block", "Evaluations", "Fit", "SensorError", "Solution", "corners", "refined",
-    "rms", "sensor_errors", "shared_zero", "sizes_of", "solved",
+    "sensor_errors", "shared_zero", "sizes_of", "solved",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -121,12 +121,6 @@ def _mean(turns: Array) -> Array:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of positions without a value
         return np.asarray(np.nanmean(turns, axis=0)) if len(turns) else np.full(turns.shape[1], np.nan)
-
-
-def rms(values: Array) -> float:
-    """Root mean square of what is there; NaN of nothing."""
-    finite = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
 
 
 # ---- errors of the sensors ------------------------------------------------------------------------------------

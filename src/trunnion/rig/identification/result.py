@@ -6,34 +6,29 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.summary import inputs, references
 from trunnion.errors import Finding
-from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.units import UnitError, normalise, unit
 from trunnion.results.attributes import attribute, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
+from trunnion.results.quantities import decimals
 from trunnion.results.tables.studies import CURVES
-from trunnion.rig.comparison import data_findings, hashed_files
-from trunnion.rig.identification.fit import FAR, Fit, Solution, rms
-from trunnion.rig.identification.identifiability import InseparableUnknowns
-from trunnion.rig.identification.misfit import MisfitCause
-from trunnion.rig.identification.number_text import decimals
-from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, quantile
-from trunnion.rig.reading.measurement import Measurement
+from trunnion.rig.comparison import data_findings, hashed_files, written_unit
+from trunnion.rig.identification.fit import FAR, Fit, Solution
+from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, InseparableUnknowns, LackOfFit, quantile
+from trunnion.rig.reading.measurement import Measurement, rms
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "Identified", "dataset", "with_estimates"]
+__all__ = ["VARIABLES", "Identified", "MisfitCause", "dataset", "with_estimates"]
 
 Array = NDArray[np.float64]
-USUAL = {"rad": "deg", "m": "mm"}  # units of numbers that the model states without one
 SOURCES = (
     "G. A. F. Seber, C. J. Wild, Nonlinear Regression, Wiley, 1989, doi:10.1002/0471725315",
     "JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in measurement",
@@ -97,12 +92,32 @@ VARIABLES = {
 }
 
 
+class MisfitCause(NamedTuple):
+    """One explanation of a misfit.
+
+    kind: zero, gain or angle; channel: empty of the angle; size: in the unit of the channel, relative, or rad by which
+    the readings are ahead of the model; expanded: U of it, 95 %; explains: share of the part of χ² above what scatter
+    leads to expect; estimates, halves: of the unknowns with it, and U of each, 95 %, (unknown,); left: how well the
+    model fits with it.
+    """
+
+    kind: str
+    channel: str
+    size: float
+    expanded: float
+    explains: float
+    estimates: Array
+    halves: Array
+    left: LackOfFit
+
+
 @dataclass(frozen=True)
 class Identified:
     """An identification, with the figures of it, (unknown,) unless said.
 
     starts: places that the search began at; other: another that fits as well; groups: what the data do not tell apart;
-    causes: what would explain a misfit, best first; unused: channels that no unknown acts on.
+    causes: what would explain a misfit, best first; beyond: errors of sensors that are no stated ones, by their place;
+    unused: channels that no unknown acts on.
     """
 
     mechanism: Mechanism
@@ -114,6 +129,7 @@ class Identified:
     spread: Covariances
     groups: Sequence[InseparableUnknowns]
     causes: Sequence[MisfitCause]
+    beyond: dict[int, float]
     unused: Sequence[str]
 
     @property
@@ -134,18 +150,12 @@ class Identified:
     @property
     def refuted(self) -> bool:
         """Whether the estimates stand for something else: a gross misfit, or an error beyond what is stated of it."""
-        return self.spread.test.gross or bool(self.spread.beyond) or self.times_stated > FAR
+        return self.spread.test.gross or bool(self.beyond) or self.times_stated > FAR
 
     @cached_property
     def lost(self) -> NDArray[np.bool_]:
         """Unknowns that the data do not tell, (unknown and sensor,)."""
-        members = [one for group in self.groups for one in group.members]
-        return np.isin(np.arange(len(self.x)), members)
-
-    @property
-    def values(self) -> Array:
-        """Estimates, of what the data do not tell the start."""
-        return np.asarray(np.where(self.lost, self.fit.start, self.x)[: self.fit.count])
+        return np.isin(np.arange(len(self.x)), [member for group in self.groups for member in group.members])
 
     @cached_property
     def deviation(self) -> Array:
@@ -162,10 +172,8 @@ class Identified:
         """−1 of an unknown on its lower limit, 1 on its upper, 0 of others."""
         (low, high), x = self.fit.bounds, self.x
         near = AT_LIMIT * np.nan_to_num(self.deviation) + 1e-9 * np.abs(x)
-        limit = np.where(
-            (high - x <= near) & (self._step >= 0), 1, np.where((x - low <= near) & (self._step <= 0), -1, 0)
-        )
-        return np.asarray(np.where(self.lost, 0, limit)[: self.fit.count], np.int8)
+        upper, lower = (high - x <= near) & (self._step >= 0), (x - low <= near) & (self._step <= 0)
+        return np.where(self.lost, 0, np.where(upper, 1, np.where(lower, -1, 0)))[: self.fit.count].astype(np.int8)
 
     @cached_property
     def estimate(self) -> Array:
@@ -184,9 +192,8 @@ class Identified:
         half, one_sided = quantile(freedom) * u, quantile(freedom, one_sided=True) * u
         lower = np.where(self.limit > 0, np.minimum(free, high) - one_sided, self.estimate - half)
         upper = np.where(self.limit < 0, np.maximum(free, low) + one_sided, self.estimate + half)
-        return np.maximum(np.where(self.limit < 0, low, lower), low), np.minimum(
-            np.where(self.limit > 0, high, upper), high
-        )
+        lower, upper = np.where(self.limit < 0, low, lower), np.where(self.limit > 0, high, upper)
+        return np.maximum(lower, low), np.minimum(upper, high)
 
     # ---- residuals --------------------------------------------------------------------------------------------
 
@@ -220,8 +227,8 @@ class Identified:
                 predicted = np.einsum("pi,pq,qi->i", columns, self.spread.covariance, columns)
                 count = np.maximum(np.count_nonzero(np.isfinite(block.held), axis=0), 1)[where]
                 expected = np.sqrt(self._scatter(k) / count + predicted)
-                figures |= {"held_out_before": rms(before), "held_out_after": rms(after)}
-                figures["held_out_expected"] = rms(expected)
+                values = zip(("before", "after", "expected"), (before, after, expected), strict=True)
+                figures |= {f"held_out_{name}": rms(row) for name, row in values}
             for name, figure in figures.items():
                 arrays[name][at] = figure
         return arrays
@@ -246,6 +253,11 @@ class Identified:
         """Rms of all predictions over what is expected of them; NaN if nothing is held out."""
         return rms(self.by_block["held_out_after"] / self.by_block["held_out_expected"])
 
+    def driven(self, condition: int) -> tuple[float, float, float]:
+        """Angles of the first driver where the cycle begins and ends, rad, and its speed, rad/s, with the estimates."""
+        values = np.where(self.lost, self.fit.start, self.x)[: self.fit.count]
+        return self.fit.model.driven(condition, np.asarray(values))
+
 
 # ---- as a Dataset -----------------------------------------------------------------------------------------------
 
@@ -264,9 +276,9 @@ def dataset(identified: Identified, findings: Sequence[Finding]) -> xr.Dataset:
         "channel": list(model.measures),
         "condition": [one.name for one in conditions],
     }
-    ends = (model.driven(k, identified.values)[:2] for k in range(len(conditions)))
+    ends = (identified.driven(k)[:2] for k in range(len(conditions)))
     attributes = {
-        "name": mechanism.name,  # ahead of `identified`, as it always was
+        "name": mechanism.name,
         "identified": measurement.name,
         **origin(mechanism, system.plan.formula),
         "confidence": CONFIDENCE,
@@ -354,15 +366,7 @@ def with_estimates(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
 def _text(mechanism: Mechanism, path: str, value: float, u: float, si: str) -> float | str:
     """A number in the unit that is written at its path, with the digits that it has."""
     entry = mechanism.parameter_set.entries.get(path)
-    source = entry.quantity.source if entry else ""
-    literal = (
-        LITERAL.fullmatch(normalise(source).strip().removeprefix("-").strip()) if isinstance(source, str) else None
-    )
-    written = (literal["unit"] if literal else "") or USUAL.get(si, "" if si == "1" else si)
-    try:
-        factor = float(unit(written)[0]) if written else 1.0
-    except UnitError:
-        written, factor = "", 1.0
+    written, factor = written_unit(entry.quantity.source if entry else "", si)
     places = decimals(u / factor) if u > 0 else 6
     number = f"{round(value / factor, places):.{max(places, 0)}f}" if places < 12 else f"{value / factor:.6g}"
     return f"{number} {written}" if written else float(number)

@@ -1,10 +1,15 @@
-"""`identify`: numbers of a model from measurements by least squares, with what they are worth."""
+"""`identify`: numbers of a model from measurements by least squares, with what they are worth.
+
+Settings of the conditions and paths of the unknowns → one prepared model → blocks of data → fit → covariances → result.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Literal
 
@@ -22,6 +27,7 @@ from trunnion.rig.identification.fit import (
     Block,
     Evaluations,
     Fit,
+    SensorError,
     Solution,
     refined,
     sensor_errors,
@@ -29,15 +35,21 @@ from trunnion.rig.identification.fit import (
     sizes_of,
     solved,
 )
-from trunnion.rig.identification.identifiability import inseparable
-from trunnion.rig.identification.misfit import explanations
-from trunnion.rig.identification.result import Identified, dataset
+from trunnion.rig.identification.result import Identified, MisfitCause, dataset
 from trunnion.rig.identification.signals import Model, SeatedModel
-from trunnion.rig.identification.uncertainty import excess, spread_of
+from trunnion.rig.identification.uncertainty import (
+    LackOfFit,
+    beyond_stated,
+    excess,
+    inseparable,
+    lack_of_fit,
+    quantile,
+    spread_of,
+)
 from trunnion.rig.identification.unknowns import Parameters, described, unknowns
 from trunnion.rig.modelled import apart, each, in_condition, measure_of, refuse_backwards, refuse_unit
 from trunnion.rig.reading.efficiency import efficiency_of, load_joints, pairs_of
-from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
+from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, rms
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 
@@ -55,6 +67,9 @@ HALVINGS = 8  # of a friction that locks at the start
 OTHERS = (0.3, 3.0)  # times the start: where else a search begins first
 CLOSE = 1e-3  # of the sizes: two searches ended at one place
 AS_GOOD = 4.0  # sum of squares: another place is named if it is not worse by more
+EXPLAINS = 0.8  # of a misfit, at least, for a cause of it to be named
+DEGREE, SETTLED = np.radians(1.0), np.radians(0.01)
+ROUNDS = 5  # of the angle
 
 
 @strict_arguments
@@ -110,27 +125,24 @@ def identify(
     conditions = measurement.conditions
     each(conditions, partial(in_condition, mechanism))
     paths = described(mechanism, parameters)
-    mechanism = _stated(mechanism, measurement, paths, start or {})
-    settings = _settings(mechanism, measurement, paths)
-    run = prepare(mechanism)
+    mechanism, settings = _with_settings(mechanism, measurement, paths, start or {})
+    run, joints = prepare(mechanism), load_joints(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    joints = load_joints(mechanism)
-    blocks = _blocks(measurement, _channels(measurement, channels, joints), held_out(mechanism, measurement, hold_out),
-                     joints)  # fmt: skip
+    names = _channels(measurement, channels, joints)
+    blocks = _blocks(measurement, names, held_out(mechanism, measurement, hold_out), joints)
     kind = SeatedModel if any(seat.given is None for seat in run.seats) else Model
-    sought, phases = unknowns(mechanism, paths, start or {}), tuple(np.asarray(one.phase, float) for one in conditions)
-    method = friction_method or FrictionMethod()
-    model = kind(run, tuple(sought), _measures(mechanism, run, blocks), settings, phases, method)
-    unused: list[str] = []
+    phases = tuple(np.asarray(one.phase, float) for one in conditions)
+    sought, measures = tuple(unknowns(mechanism, paths, start or {})), _measures(mechanism, run, blocks)
+    model = kind(run, sought, measures, settings, phases, friction_method or FrictionMethod())
     if channels is None:
-        model, blocks, unused = _acted_on(model, blocks)
-    at = np.array([one.start for one in model.unknowns])
+        model = replace(model, measures=_acted_on(model))
+        blocks = [block for block in blocks if block.channel in model.measures]
+    at = np.array([one.start for one in sought])
     speeds = iter([model.driven(k, at)[2] for k in range(len(conditions))])
     each(conditions, lambda one: refuse_backwards(mechanism, one, next(speeds)))
-    fit = Fit(
-        Evaluations(model, progress), blocks, sensor_errors(model, conditions, blocks, sensors == "condition"), guard
-    )
+    errors = sensor_errors(model, conditions, blocks, sensors == "condition")
+    fit = Fit(Evaluations(model, progress), blocks, errors, guard)
     begin = _runnable(fit)
     fit, best, other = _searched(fit, begin, starts)
     spread = spread_of(fit, best.x)
@@ -139,9 +151,10 @@ def identify(
         best = replace(solved(fit, best.x), evaluations=best.evaluations, settled=best.settled)
         spread = spread_of(fit, best.x)
     other_speeds = [apart(one.speed, model.driven(k, best.x[: fit.count])[2]) for k, one in enumerate(conditions)]
-    causes = explanations(fit, begin, spread.test) if spread.test.misfit and not any(other_speeds) else []
-    groups = inseparable(fit, best.x, spread)
-    identified = Identified(mechanism, measurement, fit, best, starts, other, spread, groups, causes, unused)
+    causes = _causes(fit, begin, spread.test) if spread.test.misfit and not any(other_speeds) else []
+    unused = [name for name in measures if name not in model.measures]
+    identified = Identified(mechanism, measurement, fit, best, starts, other, spread, inseparable(fit, best.x, spread),
+                            causes, beyond_stated(fit, best.x), unused)  # fmt: skip
     return dataset(identified, findings_of(identified))
 
 
@@ -168,24 +181,20 @@ def _blocks(
     ones; joints: of the loads, for the efficiency."""
     names, share = held
     blocks = []
-    for index, condition in enumerate(measurement.conditions):
-        for channel in channels:
-            signal = condition.courses.get(channel)
-            effects: dict[str, float] = {}
-            if signal is None and channel == EFFICIENCY and pairs_of(condition, joints):
-                signal, effects = _efficiency(condition, joints)
-            if signal is None:
-                continue
-            turns = np.where(np.isinf(signal.turns), np.nan, signal.turns)
-            fitted = len(turns) - (max(1, round(share * len(turns))) if share else 0)
-            if fitted < 1:
-                what = f"has {len(turns)} turn{'s' * (len(turns) != 1)}: none would be left to fit"
-                remedy = "name conditions to hold out, or give a smaller share"
-                raise MechanismError(Finding(what, f"condition {condition.name}", remedy))
-            fitted = 0 if condition.name in names else fitted
-            blocks.append(
-                Block(index, channel, signal, turns[:fitted], turns[fitted:], effects, tuple(condition.files))
-            )
+    for (index, condition), channel in product(enumerate(measurement.conditions), channels):
+        signal, effects = condition.courses.get(channel), dict[str, float]()
+        if signal is None and channel == EFFICIENCY and pairs_of(condition, joints):
+            signal, effects = _efficiency(condition, joints)
+        if signal is None:
+            continue
+        turns = np.where(np.isinf(signal.turns), np.nan, signal.turns)
+        fitted = len(turns) - (max(1, round(share * len(turns))) if share else 0)
+        if fitted < 1:
+            what = f"has {len(turns)} turn{'s' * (len(turns) != 1)}: none would be left to fit"
+            remedy = "name conditions to hold out, or give a smaller share"
+            raise MechanismError(Finding(what, f"condition {condition.name}", remedy))
+        fitted = 0 if condition.name in names else fitted
+        blocks.append(Block(index, channel, signal, turns[:fitted], turns[fitted:], effects, tuple(condition.files)))
     if not any(len(block.turns) for block in blocks):
         raise MechanismError(Finding("all conditions are held out", "hold_out", "leave some to fit"))
     return blocks
@@ -225,92 +234,62 @@ def held_out(mechanism: Mechanism, measurement: Measurement, hold_out: HoldOut) 
         exact = [one.name for one in conditions if text in (one.name, *(PurePath(file).stem for file in one.files))]
         settings = [one.name for one in conditions if part and f" {part}," in f"{one.name},"]
         parts = [one.name for one in conditions if part and part in one.name]
-        named = exact or _with_setting(mechanism, measurement, part) or settings or parts * (len(parts) == 1)
-        if not named:
-            what = (
-                f"'{text}' is in the names of {len(parts)} conditions" if parts else f"there is no condition '{text}'"
-            )
+        matching = exact or _with_setting(mechanism, conditions, part) or settings or parts * (len(parts) == 1)
+        if not matching:
+            what = f"there is no condition '{text}'"
+            what = f"'{text}' is in the names of {len(parts)} conditions" if parts else what
             several = parts or [one.name for one in conditions]
-            some = "; ".join(several[:MOST_NAMED]) + "; …" * (len(several) > MOST_NAMED)
-            remedy = f"name one of {some}; or a file, or a setting as NAME=VALUE"
-            raise MechanismError(Finding(what, "hold_out", remedy))
-        held |= set(named)
+            named_in = "; ".join(several[:MOST_NAMED]) + "; …" * (len(several) > MOST_NAMED)
+            raise MechanismError(Finding(what, "hold_out", f"name one of {named_in}; or a file, or NAME=VALUE"))
+        held |= set(matching)
     return frozenset(held), 0.0
 
 
-def _with_setting(mechanism: Mechanism, measurement: Measurement, text: str) -> list[str]:
+def _with_setting(mechanism: Mechanism, conditions: Sequence[Condition], text: str) -> list[str]:
     """Names of the conditions with a setting NAME=VALUE."""
     name, equals, value = (part.strip() for part in text.partition("="))
     if not equals:
         return []
     path = mechanism.path_of(name)
-    try:
-        changed = mechanism.with_values({path: float(value)})
-    except ValueError:  # with a unit
-        changed = mechanism.with_values({path: value})
+    number: float | str = value
+    with suppress(ValueError):  # with a unit
+        number = float(value)
+    changed = mechanism.with_values({path: number})
     stated = float(np.ravel(changed.parameters()[path])[0])
-    names = []
-    for one in measurement.conditions:
-        number = {mechanism.path_of(key): number for key, number in one.values.items()}.get(path, np.nan)
-        if abs(number - stated) <= SAME * max(abs(stated), abs(number)):
-            names.append(one.name)
-    return names
+    settings = {one.name: {mechanism.path_of(key): own for key, own in one.values.items()} for one in conditions}
+    return [name for name, own in settings.items() if np.isclose(own.get(path, np.nan), stated, rtol=SAME, atol=0)]
 
 
 # ---- the model ------------------------------------------------------------------------------------------------
 
 
-def _acted_on(model: Model, blocks: list[Block]) -> tuple[Model, list[Block], list[str]]:
-    """Only the channels that an unknown acts on, as far as the start shows, all if there are none; then the others."""
-    courses = model.courses(np.array([one.start for one in model.unknowns]))
-    sizes = np.array([one.size or 1.0 for one in model.unknowns])
-    moved = dict.fromkeys(model.measures, 0.0)
-    for said in courses.said:
-        for name, one in said.items():
-            most = float(np.nanmax(np.abs(one.value), initial=0.0))
-            change = float(np.nanmax(np.abs(np.nan_to_num(one.slope)) * sizes[:, None], initial=0.0))
-            moved[name] = max(moved[name], change / most if most else change)
-    acted_on = {name: model.measures[name] for name, share in moved.items() if share > NOTHING} or model.measures
-    unused = [name for name in model.measures if name not in acted_on]
-    return replace(model, measures=acted_on), [block for block in blocks if block.channel in acted_on], unused
-
-
-def _stated(
+def _with_settings(
     mechanism: Mechanism,
     measurement: Measurement,
     paths: Mapping[str, Sequence[str]],
     start: Mapping[str, float | str],
-) -> Mechanism:
-    """The mechanism with all numbers stated that the conditions set or that are looked for."""
-    entries = mechanism.parameter_set.entries
-    numbers: dict[str, float | str] = {}
-    for condition in measurement.conditions:
-        for name, value in condition.values.items():
-            numbers.setdefault(mechanism.path_of(name), float(value))
-    for name, own in paths.items():
-        numbers |= dict.fromkeys(own, start.get(name, 0.0))
-    missing = {path: value for path, value in numbers.items() if path not in entries}
-    return mechanism.with_values(missing) if missing else mechanism
+) -> tuple[Mechanism, tuple[dict[str, float], ...]]:
+    """The mechanism with all numbers stated that conditions set or that are looked for, and what each sets, by path.
 
-
-def _settings(
-    mechanism: Mechanism, measurement: Measurement, paths: Mapping[str, Sequence[str]]
-) -> tuple[dict[str, float], ...]:
-    """What each condition sets, by path; MechanismError where that is looked for."""
+    MechanismError where a condition sets what is looked for, or what is no number.
+    """
+    conditions = measurement.conditions
+    settings = [{mechanism.path_of(name): float(value) for name, value in one.values.items()} for one in conditions]
+    numbers: dict[str, float | str] = {path: value for own in reversed(settings) for path, value in own.items()}
     owners = {path: name for name, own in paths.items() for path in own}
-    settings = []
-    for condition in measurement.conditions:
-        values = {mechanism.path_of(name): float(value) for name, value in condition.values.items()}
-        for path in values:
-            if path in owners:
-                what = f"the condition {condition.name} sets {path}"
-                remedy = "leave it out of the conditions"
-                raise MechanismError(Finding(what, f"parameter {owners[path]}", remedy))
-            if path not in mechanism.parameters():
-                what = f"the condition {condition.name} sets it, but it is no number: it changes with the motion"
-                raise MechanismError(Finding(what, path, "set a dimension in it"))
-        settings.append(values)
-    return tuple(settings)
+    for condition, own in zip(conditions, settings, strict=True):
+        if path := next((path for path in own if path in owners), ""):
+            what, remedy = f"the condition {condition.name} sets {path}", "leave it out of the conditions"
+            raise MechanismError(Finding(what, f"parameter {owners[path]}", remedy))
+    numbers |= {path: start.get(name, 0.0) for path, name in owners.items()}
+    missing = {path: one for path, one in numbers.items() if path not in mechanism.parameter_set.entries}
+    mechanism = mechanism.with_values(missing) if missing else mechanism
+    values = mechanism.parameters()
+    for condition, own in zip(conditions, settings, strict=True):
+        if path := next((path for path in own if path not in values), ""):
+            what = f"the condition {condition.name} sets it, but it is no number: it changes with the motion"
+            raise MechanismError(Finding(what, path, "set a dimension in it"))
+    return mechanism, tuple(settings)
 
 
 def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[str, Measure]:
@@ -327,7 +306,47 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[s
     return measures
 
 
+def _acted_on(model: Model) -> dict[str, Measure]:
+    """The channels that an unknown acts on, as far as the start shows; all if there are none."""
+    courses = model.courses(np.array([one.start for one in model.unknowns]))
+    sizes = np.array([one.size or 1.0 for one in model.unknowns])
+    moved = dict.fromkeys(model.measures, 0.0)
+    for said in courses.said:
+        for name, one in said.items():
+            most = float(np.nanmax(np.abs(one.value), initial=0.0))
+            change = float(np.nanmax(np.abs(np.nan_to_num(one.slope)) * sizes[:, None], initial=0.0))
+            moved[name] = max(moved[name], change / most if most else change)
+    return {name: model.measures[name] for name, share in moved.items() if share > NOTHING} or dict(model.measures)
+
+
 # ---- the search -----------------------------------------------------------------------------------------------
+
+
+def _runnable(fit: Fit) -> Array:
+    """The start, with less friction where that locks. MechanismError if no position can be used."""
+
+    def unanswered(x: Array) -> int:
+        return sum(int(np.count_nonzero(status >= Status.NOT_CONVERGED)) for status in fit.courses(x).status)
+
+    unknowns = fit.model.unknowns
+    rubs = [p for p, one in enumerate(unknowns) if any(".friction." in path for path in one.paths)]
+    low = np.array([one.lower for one in unknowns])
+    best, lost = fit.start, unanswered(fit.start)
+    for k in range(1, HALVINGS + 1):
+        if not lost or not rubs:
+            break
+        less = fit.start.copy()
+        less[rubs] = np.maximum(fit.start[rubs] * 0.5**k, low[rubs])
+        if unanswered(less) < lost:
+            best, lost = less, unanswered(less)
+    masks = replace(fit, variances=fit.first_scatter()).allowed(best)
+    if not any(np.any(masks[k]) for k in fit.fitted()):
+        codes = np.concatenate([np.asarray(status) for status in fit.courses(best).status])
+        what = "no position can be used: no channel has a value there, friction reverses beside it, or the model has "
+        what += f"no sound answer (most often {list(Status)[int(np.bincount(codes).argmax())].text})"
+        remedy = "see the gaps with `trunnion data`; give a smaller guard, or start values with which the model runs"
+        raise MechanismError(Finding(what, "data", remedy))
+    return best
 
 
 def _searched(fit: Fit, begin: Array, starts: int) -> tuple[Fit, Solution, Array | None]:
@@ -356,28 +375,48 @@ def _searched(fit: Fit, begin: Array, starts: int) -> tuple[Fit, Solution, Array
     return best_fit, best, other
 
 
-def _runnable(fit: Fit) -> Array:
-    """The start, with less friction where that locks. MechanismError if no position can be used."""
+def _causes(fit: Fit, start: Array, test: LackOfFit) -> list[MisfitCause]:
+    """Errors that explain most of a misfit, each by itself, the best first: a fit with one free error more."""
+    causes, model = [], fit.model
+    for error, unit in _free_errors(fit):
+        moved, begin, size, rounds = (
+            fit,
+            start,
+            0.0,
+            ROUNDS if error.kind == "angle" and model.run.cycle.periodic else 1,
+        )
+        try:
+            for _ in range(rounds):  # the positions follow the angle until it is settled
+                more, best = refined(
+                    replace(moved, sensors=[*fit.sensors, error], inflation=1.0), np.append(begin, 0.0)
+                )
+                size, begin = size + float(best.x[-1]) * unit, best.x[:-1]
+                if rounds == 1 or abs(best.x[-1] * unit) < SETTLED or abs(size) > np.pi:
+                    break
+                phases = zip(model.phases, model.turns, strict=True)
+                shifted = replace(model, phases=tuple((phase + size / turn) % 1.0 for phase, turn in phases))
+                moved = replace(fit, courses_at=Evaluations(shifted))
+        except ValueError:  # no answer of the model there
+            continue
+        left, spread = lack_of_fit(more, best.x), spread_of(more, best.x)
+        half = quantile(spread.freedom) * spread.deviation
+        share, wide = (test.reduced - left.reduced) / (test.reduced - 1), float(half[-1]) * unit
+        nothing_left = error.kind == "gain" and size < 2e-6 - 1  # of the model
+        if share >= EXPLAINS and wide < abs(size) < (np.pi if error.kind == "angle" else np.inf) and not nothing_left:
+            causes.append(MisfitCause(error.kind, error.channel, size, wide, min(share, 1.0), best.x[: fit.count],
+                                      half[: fit.count], left))  # fmt: skip
+    return sorted(causes, key=lambda one: -round(one.explains, 2))  # of equal ones first the simplest
 
-    def unanswered(x: Array) -> int:
-        return sum(int(np.count_nonzero(status >= Status.NOT_CONVERGED)) for status in fit.courses(x).status)
 
-    unknowns = fit.model.unknowns
-    rubs = [p for p, one in enumerate(unknowns) if any(".friction." in path for path in one.paths)]
-    low = np.array([one.lower for one in unknowns])
-    best, lost = fit.start, unanswered(fit.start)
-    for k in range(1, HALVINGS + 1):
-        if not lost or not rubs:
-            break
-        less = fit.start.copy()
-        less[rubs] = np.maximum(fit.start[rubs] * 0.5**k, low[rubs])
-        if unanswered(less) < lost:
-            best, lost = less, unanswered(less)
-    masks = replace(fit, variances=fit.first_scatter()).allowed(best)
-    if not any(np.any(masks[k]) for k in fit.fitted()):
-        codes = np.concatenate([np.asarray(status) for status in fit.courses(best).status])
-        what = "no position can be used: no channel has a value there, friction reverses beside it, or the model has "
-        what += f"no sound answer (most often {list(Status)[int(np.bincount(codes).argmax())].text})"
-        remedy = "see the gaps with `trunnion data`; give a smaller guard, or start values with which the model runs"
-        raise MechanismError(Finding(what, "data", remedy))
-    return best
+def _free_errors(fit: Fit) -> Iterator[tuple[SensorError, float]]:
+    """A zero and a gain of each channel, and an offset of the angle, of which nothing is stated; and their units."""
+    model = fit.model
+    for kind, channel in product(("zero", "gain"), dict.fromkeys(fit.blocks[k].channel for k in fit.fitted())):
+        if kind == "zero" or not model.measures[channel].turning(model.run.system):
+            turns = np.concatenate([block.turns.ravel() for block in fit.blocks if block.channel == channel])
+            unit = 0.01 * (1.0 if kind == "gain" else rms(turns) or 1.0)
+            sizes = tuple(unit * (block.channel == channel) for block in fit.blocks)
+            yield SensorError(f"{kind} of {channel}", channel, kind, sizes, stated=False), unit
+    sizes = tuple(-DEGREE / model.turns[block.condition] * (block.turns.shape[1] > 2) for block in fit.blocks)
+    if np.isfinite(sizes).all() and any(sizes):
+        yield SensorError("offset of the drive angle", "", "angle", sizes, stated=False), DEGREE

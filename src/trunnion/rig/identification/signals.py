@@ -5,9 +5,10 @@ All conditions and unknowns are one batch: row c·P + p of it is condition c wit
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,20 +37,14 @@ STEP = 1e-6  # of a driver's number, for what it does to the duration of the cyc
 SEATED = 1e-4  # of an unknown, for derivatives by differences: seats are settled to some 1e-6 of their clearance
 
 
-@dataclass(frozen=True)
-class Said:
+class Said(NamedTuple):
     """One channel in one condition: values (position,) and their derivatives (unknown, position)."""
 
     value: Array
     slope: Array
 
 
-# what the model says in one condition by channel, statuses of its positions, where a sense changes
-ConditionSaid = tuple[Mapping[str, Said], NDArray[np.int8], NDArray[np.bool_]]
-
-
-@dataclass(frozen=True)
-class Courses:
+class Courses(NamedTuple):
     """All that the model says at some values of the unknowns.
 
     said: by condition, by channel; status: of the positions, by condition; turned: where the sense of a friction or
@@ -82,39 +77,36 @@ class Model:
 
     def courses(self, at: Array) -> Courses:
         """What the model says at these values of the unknowns, SI."""
-        rows: dict[int, ConditionSaid] = {}
-        for part in self._parts():
-            rows.update(zip(part, self._batch(part, at), strict=True))
+        rows: dict[int, tuple[Mapping[str, Said], NDArray[np.int8], NDArray[np.bool_]]] = {}
+        many, sizes = len(self.unknowns), [len(phase) for phase in self.phases]
+        for size in dict.fromkeys(sizes):  # conditions with as many positions as each other, not too many at once
+            alike = [k for k, one in enumerate(sizes) if one == size]
+            most = max(1, AT_ONCE // (size * many))
+            for part in (alike[low : low + most] for low in range(0, len(alike), most)):
+                courses, status, turned = self._batch(part, at, (len(part) * many, size))
+                for i, k in enumerate(part):
+                    own = slice(i * many, (i + 1) * many)
+                    said = {
+                        name: Said(np.broadcast_to(np.asarray(primal(one), float), status.shape)[own][0],
+                                   np.broadcast_to(np.asarray(derivative(one), float), status.shape)[own])
+                        for name, one in courses.items()
+                    }  # fmt: skip
+                    rows[k] = said, np.max(status[own], axis=0), np.any(turned[own], axis=0)
         return Courses(*zip(*(rows[k] for k in range(len(self.phases))), strict=True))
 
-    def _parts(self) -> Iterator[list[int]]:
-        """Conditions with as many positions as each other, not too many at once."""
-        sizes = [len(phase) for phase in self.phases]
-        for size in dict.fromkeys(sizes):
-            alike = [k for k, one in enumerate(sizes) if one == size]
-            most = max(1, AT_ONCE // (size * len(self.unknowns)))
-            for low in range(0, len(alike), most):
-                yield alike[low : low + most]
-
-    def _batch(self, part: Sequence[int], at: Array) -> list[ConditionSaid]:
-        many, size = len(self.unknowns), len(self.phases[part[0]])
-        values = self._values(part, at)
-        time = self._times(part, at)
-        shape = (len(part) * many, size)
+    def _batch(
+        self, part: Sequence[int], at: Array, shape: tuple[int, int]
+    ) -> tuple[dict[str, Number], NDArray[np.int8], NDArray[np.bool_]]:
+        """Courses by channel, statuses and where a sense changes, of conditions with as many positions."""
+        values, time = self._values(part, at), self._times(part, at)
         with np.errstate(all="ignore"):
             if self.forces:
-                found: Backward | Forward = self.run.solve(time, values, self.friction)
-            else:
-                found = posed(self.run.system, values, self.run.chosen.assembly, time)
-            status = status_of(found, shape) if isinstance(found, Backward) else pose_status(found, shape)
-            courses = {name: self._course(measure, found) for name, measure in self.measures.items()}
-            turned = self._turned(found, shape) if isinstance(found, Backward) else np.zeros(shape, bool)
-        rows: list[ConditionSaid] = []
-        for k in range(len(part)):
-            own = slice(k * many, (k + 1) * many)
-            said = {name: _rows(number, shape, own) for name, number in courses.items()}
-            rows.append((said, np.max(status[own], axis=0), np.any(turned[own], axis=0)))
-        return rows
+                back = self.run.solve(time, values, self.friction)
+                courses = {name: self._course(measure, back) for name, measure in self.measures.items()}
+                return courses, status_of(back, shape), self._turned(back, shape)
+            walk = posed(self.run.system, values, self.run.chosen.assembly, time)
+            courses = {name: self._course(measure, walk) for name, measure in self.measures.items()}
+            return courses, pose_status(walk, shape), np.zeros(shape, bool)
 
     def _course(self, measure: Measure, found: Backward | Forward) -> Number:
         parts = measure.curve(found)
@@ -277,14 +269,6 @@ class Model:
                 low, high = (self._duration(k, end) for end in ends)
                 slope[i * many + p] = (high - low) / (2 * step)
         return Dual(phase * duration, phase * slope)
-
-
-def _rows(number: Number, shape: tuple[int, ...], own: slice) -> Said:
-    """The rows of one condition: the number itself, and one derivative a row."""
-    value, slope = (
-        np.broadcast_to(np.asarray(part, float), shape)[own] for part in (primal(number), derivative(number))
-    )
-    return Said(value[0], slope)
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,22 @@ taken from what it is turn by turn, whatever the correlation within a turn (clus
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
+from scipy.sparse.csgraph import connected_components
 
-from trunnion.rig.identification.fit import FAR, Fit
+from trunnion.rig.identification.fit import FAR, Fit, sizes_of, solved
+from trunnion.rig.reading.measurement import student
 from trunnion.rig.reading.steps import covariance_of_steps
 
-__all__ = ["CONFIDENCE", "Covariances", "LackOfFit", "excess", "lack_of_fit", "quantile", "spread_of"]
+__all__ = [
+    "CONFIDENCE", "Combination", "Covariances", "InseparableUnknowns", "LackOfFit", "beyond_stated", "excess",
+    "inseparable", "lack_of_fit", "quantile", "spread_of",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 CONFIDENCE = 0.95
@@ -29,7 +35,9 @@ RARE = 0.01  # one below which conditions are said to disagree
 GROSS = 9.0  # reduced χ² of residuals of three times the scatter
 WORTH = 1.05  # reduced χ² up to which it is not
 ENOUGH_PAIRS = 10  # of turns, to see whether they follow each other
-ON_LIMIT = 0.05  # of how well an unknown would be known by itself
+NEAR_LIMIT = 0.02  # of the most that a stated error may come to
+PART = 0.05  # of the largest share in a direction: what is below it takes no part
+SAME = 0.02  # of 1: how near a factor is to it to be called it
 SINGULAR = 1e-10  # of the largest eigenvalue of the scaled information: derivatives are exact to some 1e-12 of it
 
 
@@ -63,7 +71,7 @@ class Covariances:
     inverse: of the information Jᵀ W J + Λ, pseudo where that is singular; null: (direction, unknown and sensor), of
     which nothing is known; parts: covariance by source; freedom: degrees of freedom, (unknown and sensor,); follows:
     how much a turn resembles the one before it, −1 to 1, NaN if not known; apart: (unknown,), how much more than turns
-    the conditions differ in what they say of it, as variances, 1 if not; beyond: see `_beyond_stated`.
+    the conditions differ in what they say of it, as variances, 1 if not.
     """
 
     inverse: Array
@@ -73,7 +81,6 @@ class Covariances:
     test: LackOfFit
     follows: float
     apart: Array
-    beyond: dict[int, float]
 
     @property
     def covariance(self) -> Array:
@@ -86,11 +93,9 @@ class Covariances:
         return np.asarray(np.sqrt(np.maximum(np.diagonal(self.covariance), 0.0)))
 
 
-def quantile(freedom: Array | float, confidence: float = CONFIDENCE, one_sided: bool = False) -> Array:
-    """Student's quantile, of the normal distribution for infinite freedom."""
-    level = confidence if one_sided else (1 + confidence) / 2
-    freedom = np.asarray(freedom, float)
-    return np.asarray(special.stdtrit(np.where(np.isfinite(freedom), np.maximum(freedom, 1.0), 1e9), level))
+def quantile(freedom: Array | float, one_sided: bool = False) -> Array:
+    """Student's of the intervals."""
+    return student(freedom, float(special.ndtri(CONFIDENCE if one_sided else (1 + CONFIDENCE) / 2)))
 
 
 def spread_of(fit: Fit, x: Array) -> Covariances:
@@ -125,8 +130,7 @@ def spread_of(fit: Fit, x: Array) -> Covariances:
     with np.errstate(all="ignore"):  # Welch and Satterthwaite; what was stated has infinite freedom
         below = sum(np.diagonal(part) ** 2 / own for part, own in random)
         freedom = np.where(below > 0, total**2 / below, np.inf)
-    beyond = _beyond_stated(fit, x, information)
-    return Covariances(inverse, null, parts, freedom, test, follows, apart[: fit.count], beyond)
+    return Covariances(inverse, null, parts, freedom, test, follows, apart[: fit.count])
 
 
 def _inverse(information: Array) -> tuple[Array, Array]:
@@ -210,28 +214,20 @@ def _apart(fit: Fit, x: Array, pulls: dict[int, Array], by_condition: dict[int, 
     return np.asarray(np.where(chance < RARE, np.maximum(squares / freedom, 1.0), 1.0))
 
 
-def _beyond_stated(fit: Fit, x: Array, information: Array) -> dict[int, float]:
-    """What errors of sensors on a limit would come to without it, where that is more than any stated error may be.
+def beyond_stated(fit: Fit, x: Array) -> dict[int, float]:
+    """What errors of sensors at a limit would come to without it, where that is more than any stated error may be.
 
-    In standard uncertainties, by the place among the sensors. Of each the Newton step in which it alone leaves its
-    limit, beside all that are on none: with what is stated of it more than `FAR`, and its size without that.
+    In standard uncertainties, by the place among the sensors; each by itself, with nothing stated of it.
     """
-    low, high = fit.bounds
-    size = np.sqrt(np.maximum(np.diagonal(information), 1e-300))
-    on = np.minimum(x - low, high - x) <= ON_LIMIT / size + 1e-9 * np.abs(x)
-    places = [s for s in range(fit.count, len(x)) if on[s] and fit.sensors[s - fit.count].stated]
-    slope = fit.jacobian(x).T @ fit.residuals(x) if places else x
-    beyond = {}
-    for s in places:
-        own = np.flatnonzero(~on | (np.arange(len(x)) == s))
-        stated = (own == s) * 1.0
-        rows = information[np.ix_(own, own)]
-        with_stated, alone = (
-            float(x[s] - stated @ _inverse(rows - left * np.diag(stated))[0] @ (slope[own] - left * stated * x[s]))
-            for left in (0.0, 1.0)
-        )
-        if abs(with_stated) >= FAR and with_stated * x[s] > 0:
-            beyond[s - fit.count] = alone
+    beyond, places = {}, zip(fit.sensors, x[fit.count :], strict=True)
+    for s, (sensor, size) in enumerate(places):
+        if sensor.stated and abs(size) > (1 - NEAR_LIMIT) * sensor.most:
+            lifted, free = (
+                replace(fit, sensors=[*fit.sensors[:s], other, *fit.sensors[s + 1 :]])
+                for other in (replace(sensor, most=np.inf), replace(sensor, stated=False))
+            )
+            if abs(solved(lifted, x).x[fit.count + s]) >= FAR:
+                beyond[s] = float(solved(free, x).x[fit.count + s])
     return beyond
 
 
@@ -336,3 +332,66 @@ def _alike(fit: Fit, gaps: dict[int, Array]) -> float:
         own, together = float(np.sum(np.square(rows))), float(np.sum(np.sum(rows, axis=0) ** 2))
         most = max(most, together / own if own > 0 else 1.0)
     return most
+
+
+# ---- what the data do not tell apart ---------------------------------------------------------------------------
+
+
+class Combination(NamedTuple):
+    """What is known of two unknowns that cannot be told apart: a sum with factors, a product or a ratio.
+
+    form: "sum", "product" or "ratio"; factors: of the two, the first 1; value, uncertainty: expanded, 95 %, SI.
+    """
+
+    form: str
+    factors: tuple[float, ...]
+    value: float
+    uncertainty: float
+
+
+class InseparableUnknowns(NamedTuple):
+    """Unknowns (and sensors, by their place behind them) that the data do not tell apart.
+
+    determined: the combination of two that they do. A single member has no effect on the data.
+    """
+
+    members: tuple[int, ...]
+    determined: Combination | None
+
+
+def inseparable(fit: Fit, x: Array, spread: Covariances) -> list[InseparableUnknowns]:
+    """The groups of unknowns that take part in directions of which nothing is known, together if they share one."""
+    sizes, groups = sizes_of(fit, x), []
+    basis, _ = np.linalg.qr((spread.null / sizes).T)
+    projector = basis @ basis.T
+    share = np.diagonal(projector)
+    takes = np.flatnonzero((share > PART**2 * np.max(share, initial=0.0)) & (share > 0))
+    _, labels = connected_components(np.abs(projector[np.ix_(takes, takes)]) > PART**2)
+    for label in range(labels.max(initial=-1) + 1):
+        index, determined = takes[labels == label], None
+        if len(index) == 2:  # the combination that does not change along the direction, unless it is vague too
+            direction = projector[index, index[0]] * sizes[index]
+            factors = np.array([1.0, -direction[0] / direction[1]])
+            variance = float(factors @ spread.covariance[np.ix_(index, index)] @ factors)
+            half = float(quantile(spread.freedom[index[0]])) * float(np.sqrt(max(variance, 0.0)))
+            if half < float(np.abs(factors) @ sizes[index]):
+                determined = _named(fit, x, index, factors, half)
+        groups.append(InseparableUnknowns(tuple(int(one) for one in index), determined))
+    return groups
+
+
+def _named(fit: Fit, x: Array, index: Array, factors: Array, half: float) -> Combination:
+    """A combination of two as a product or a ratio where it is one: p q moves by q dp + p dq.
+
+    Two of one kind, such as the frictions of two joints, add.
+    """
+    values = x[index]
+    if max(index) < fit.count and np.all(values != 0):
+        kinds = {fit.model.unknowns[i].paths[0].rpartition(".")[2] for i in index}
+        relative = float(factors[1] * values[1] / values[0])
+        if len(kinds) > 1 and abs(abs(relative) - 1) < SAME:
+            form = "product" if relative > 0 else "ratio"
+            value = float(values[0] * values[1]) if relative > 0 else float(values[0] / values[1])
+            return Combination(form, (1.0, 1.0 if relative > 0 else -1.0), value, half * abs(value / values[0]))
+    near = np.where(np.abs(np.abs(factors) - 1) < SAME, np.sign(factors), factors)
+    return Combination("sum", tuple(float(one) for one in near), float(near @ values), half)

@@ -22,7 +22,7 @@ from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.tables import Column, DataTable
 from trunnion.rig.reading.timebase import GAP, Timeline
 
-__all__ = ["Coordinate", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved", "unwrapped"]
+__all__ = ["Coordinate", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved"]
 
 Array = NDArray[np.float64]
 Say = Callable[[Finding | str], None]  # takes a finding, or a sentence about what was done
@@ -78,16 +78,17 @@ def coordinate(source: AngleSource, table: DataTable, line: Timeline, speed: Arr
         say(f"the angle is that of a constant speed of {float(source.speed.evaluate()):.6g} rad/s")
     else:
         assert speed is not None
-        values = _integrated(speed, line.seconds)
+        finite, values = np.isfinite(speed), np.full(speed.size, np.nan)
+        if np.count_nonzero(finite) > 1:  # where it is missing it is interpolated
+            bridged = speed if finite.all() else np.interp(line.seconds, line.seconds[finite], speed[finite])
+            steps = 0.5 * (bridged[1:] + bridged[:-1]) * np.diff(line.seconds)
+            values = np.concatenate([[0.0], np.cumsum(steps)])
         say("the angle is the integral of the speed from the first row; its zero creeps with the sensor's error")
     values, lag, cut = _refined(source, values, line, say)
     values, spoilt = source.sign * values, np.empty((0, 2))
     if index.size > 1 and source.from_ in ("time", "speed"):
         values, spoilt = _tied(values, index, line.seconds, say)
     return Coordinate(values + zero, spoilt, lag, source.sign * cut)
-
-
-# ---- a column, a speed ----------------------------------------------------------------------------------------
 
 
 def _of_column(source: AngleSource, column: Column, line: Timeline, say: Say) -> Array:
@@ -100,18 +101,8 @@ def _of_column(source: AngleSource, column: Column, line: Timeline, say: Say) ->
         what = f"{counted(values.size - known.size, 'cell')} of '{source.column}' of {values.size:,} are no number"
         remedy = "check the angle sensor and its cable"
         say(warning("angle.missing", "angle", f"{what}; these rows are left out", remedy))
-    values = values.copy()
     values[known] = np.unwrap(values[known])
     return values
-
-
-def _integrated(speed: Array, seconds: Array) -> Array:
-    """The integral of a speed, from the first row; where it is missing it is interpolated."""
-    finite = np.isfinite(speed)
-    if np.count_nonzero(finite) < 2:
-        return np.full(speed.size, np.nan)
-    bridged = speed if finite.all() else np.interp(seconds, seconds[finite], speed[finite])
-    return np.concatenate([[0.0], np.cumsum(0.5 * (bridged[1:] + bridged[:-1]) * np.diff(seconds))])
 
 
 def _tied(values: Array, index: Array, seconds: Array, say: Say) -> tuple[Array, Array]:
@@ -198,31 +189,25 @@ def _of_pulses(
 def _counted(source: AngleSource, readings: Array, seconds: Array, step: float) -> Pulses:
     """The rows where the count changes; the edge lies between two samples, its time is taken in the middle.
 
-    From a to b it passes b if it counts on by one; if it jumps, half way the count is (a + b + 1)/2 in the mean.
+    From a to b it passes b if it counts on by one; if it jumps, half way the count is (a + b + 1)/2 in the mean. It
+    goes on where its counter is full, at `wrap`; MechanismError for one that is set back otherwise.
     """
     if readings.size < 2:
         return Pulses(np.empty(0), np.empty(0))
-    counts = unwrapped(source, readings, seconds)
-    at = np.flatnonzero(np.diff(counts) != 0)
+    counts = readings if source.wrap is None else np.unwrap(readings, period=float(source.wrap))
+    steps = np.diff(counts)
+    rising = steps * (float(np.sign(np.sum(np.sign(steps)))) or 1.0)
+    usual = float(np.percentile(rising[rising > 0], 90)) if np.any(rising > 0) else 0.0
+    least = min(max(SET_BACK * usual, 1.0), 0.5 * (source.per_turn or np.inf), 0.5 * float(np.ptp(counts)))
+    back = np.flatnonzero(rising < -least)
+    if source.wrap is None and back.size and np.ptp(counts) >= 2:
+        fall = f"first from {readings[back[0]]:,.0f} to {readings[back[0] + 1]:,.0f}"
+        what = f"the count of '{source.column}' is set back {counted(back.size, 'time')}, {at_times(seconds[back])}, "
+        remedy = "state wrap: the count at which the counter returns to 0; or select a part by files: over:"
+        raise MechanismError(Finding(what + fall, "angle", remedy))
+    at = np.flatnonzero(steps != 0)
     at = at[np.diff(seconds)[at] <= GAP * step]
     return Pulses(0.5 * (seconds[at] + seconds[at + 1]), 0.5 * (counts[at] + counts[at + 1] + 1.0))
-
-
-def unwrapped(source: AngleSource, readings: Array, seconds: Array) -> Array:
-    """A count that goes on where its counter is full, at `wrap`; MechanismError for one that is set back otherwise."""
-    if source.wrap is not None:
-        return np.unwrap(readings, period=float(source.wrap))
-    steps = np.diff(readings)
-    steps *= float(np.sign(np.sum(np.sign(steps)))) or 1.0
-    usual = float(np.percentile(steps[steps > 0], 90)) if np.any(steps > 0) else 0.0
-    least = min(max(SET_BACK * usual, 1.0), 0.5 * (source.per_turn or np.inf), 0.5 * float(np.ptp(readings)))
-    back = np.flatnonzero(steps < -least)
-    if not back.size or np.ptp(readings) < 2:
-        return readings
-    fall = f"from {readings[back[0]]:,.0f} to {readings[back[0] + 1]:,.0f}"
-    what = f"the count of '{source.column}' is set back {counted(back.size, 'time')}, {at_times(seconds[back])}, first "
-    remedy = "state wrap: the count at which the counter returns to 0; or select a part by files: over:"
-    raise MechanismError(Finding(what + fall, "angle", remedy))
 
 
 def edges(readings: Array, line: Timeline) -> Pulses:

@@ -29,8 +29,8 @@ from trunnion.rig.reading.units import (
 )
 
 __all__ = [
-    "LOOKED_AT", "ChannelReading", "Zeroed", "filtered", "mean_uncertainty", "noise_of", "reading", "resolution",
-    "unit_differs", "zeroed",
+    "LOOKED_AT", "ChannelReading", "Zeroed", "check_filter", "filtered", "mean_uncertainty", "noise_of", "reading",
+    "resolution", "unit_differs", "zeroed",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -209,6 +209,20 @@ def mean_uncertainty(samples: Array) -> float:
 
 
 # ---- filter ---------------------------------------------------------------------------------------------------
+
+
+def check_filter(low_pass: Filter, line: Timeline, say: Say) -> None:
+    """Say what the filter is; MechanismError where the samples are too far apart for it."""
+    cut_off, rate = low_pass.cut_off.value, 1.0 / line.step
+    if 2 * cut_off >= rate:
+        what = f"the sampling is too slow for the filter: {rate:.6g} Hz, a cut-off of {cut_off:g} Hz"
+        remedy = f"state a cut-off below {rate / 2:.4g} Hz, or sample faster"
+        raise MechanismError(Finding(what, "filter.cut_off", remedy))
+    if not line.even:
+        what = "the samples are not evenly spaced in time, as a filter needs them"
+        say(warning("filter.uneven", "filter", what, "record at a fixed rate, or leave out the filter"))
+    passes = f"order {low_pass.order}, forward and backward, together 3 dB down at {cut_off:g} Hz"
+    say(f"low-pass filter: Butterworth of {passes}; gaps up to {100 / cut_off:.3g} ms are bridged for it")
 
 
 def filtered(values: Array, line: Timeline, low_pass: Filter, where: str) -> tuple[Array, Finding | None]:

@@ -248,15 +248,14 @@ def signs(
         if rate is None and len(drivers) > 1:
             continue
         against = courses[rate] if rate else np.full_like(courses[effort], turning)
-        power = _known_means(courses[effort] * against)
-        gives = gives or bool(power.size and np.mean(power > 0) > NEARLY_ALL)
-        if _negative(power, zeros[effort] * against):
-            gives = True
+        power, below = _power(courses[effort], against, zeros[effort])
+        gives = gives or bool(below or (power.size and np.mean(power > 0) > NEARLY_ALL))
+        if below:
             opposed = rate is not None and len(drivers) == 1 and float(np.nanmean(courses[rate])) * turning < 0
             suspect = str(rate) if opposed else effort
             cause = f"the sign of {suspect} is wrong, unless the load drives the motor"
             cause = "the angle has the wrong sign" if opposed else cause
-            what = f"sign: the power into {driver} is negative in {_of(power)} ({power.mean():.4g} W): {cause}"
+            what = f"sign: the power into {driver} is negative in {below} ({power.mean():.4g} W): {cause}"
             other = "" if rate else "; or sign: in angle:, if that runs backwards"
             remedy = f"write sign: {-channels[suspect].sign}{other}"
             yield warning("power.sign", f"channels.{suspect}", what, remedy)
@@ -265,12 +264,23 @@ def signs(
         rate = rates.get(load) or (free[0] if len(free) == 1 else None)
         if rate is None or not gives:
             continue
-        power = _known_means(courses[key] * courses[rate])
-        if _negative(power, zeros[key] * courses[rate]):
-            what = f"sign: the power delivered to {load} is negative in {_of(power)}"
-            what = f"{what} ({power.mean():.4g} W) while the drive delivers power"
+        power, below = _power(courses[key], courses[rate], zeros[key])
+        if below:
+            what = f"sign: the power delivered to {load} is negative in {below} ({power.mean():.4g} W) while the drive "
             remedy = f"write sign: {-channels[key].sign} (or turn that of {rate})"
-            yield warning("power.sign", f"channels.{key}", what, remedy)
+            yield warning("power.sign", f"channels.{key}", f"{what}delivers power", remedy)
+
+
+def _power(effort: Array, rate: Array, zero: float) -> tuple[Array, str]:
+    """Means of a power by turn, and in how many turns it is below zero, in words, if that is in nearly all of them and
+    by more than an error of the zero may make it."""
+    power = turn_means(effort * rate)
+    power = power[np.isfinite(power)]
+    below = int(np.count_nonzero(power < 0))
+    if below <= NEARLY_ALL * power.size or abs(np.mean(power)) <= 2 * abs(float(np.nanmean(zero * rate))):
+        return power, ""
+    turns = counted(power.size, "turn")
+    return power, f"all {turns}" if below == power.size else f"{below:,} of {turns}"
 
 
 def speeds(
@@ -303,20 +313,3 @@ def speeds(
         return warning("rate.sign", where, f"sign: {what}", f"write sign: {-channels[rate].sign}, or turn angle.sign")
     remedy = "check unit and gain of the channel, and per_turn or unit of angle"
     return warning("rate.ratio", where, f"{what}, {ratio:.4g} times", remedy)
-
-
-def _known_means(course: Array) -> Array:
-    means = turn_means(course)
-    return means[np.isfinite(means)]
-
-
-def _negative(power: Array, by_zero: Array) -> bool:
-    """Whether a power is below zero in most turns, by more than an error of the zero may make it."""
-    return bool(
-        power.size and np.mean(power < 0) > NEARLY_ALL and abs(np.mean(power)) > 2 * abs(float(np.nanmean(by_zero)))
-    )
-
-
-def _of(power: Array) -> str:
-    below = int(np.count_nonzero(power < 0))
-    return f"all {counted(below, 'turn')}" if below == power.size else f"{below:,} of {counted(power.size, 'turn')}"

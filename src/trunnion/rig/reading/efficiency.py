@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, stdtrit
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.rig.reading.measurement import Condition, Signal
+from trunnion.rig.reading.measurement import Condition, Signal, student
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
@@ -81,9 +80,7 @@ class Efficiency:
 
     def factor(self, coverage: float = COVERAGE) -> float:
         """k of U = k u: Student's for the freedom, with the probability that `coverage` has of a normal one."""
-        if not np.isfinite(self.freedom):
-            return coverage
-        return float(stdtrit(self.freedom, ndtr(coverage)))
+        return float(student(self.freedom, coverage))
 
     @property
     def expanded(self) -> float:
@@ -151,8 +148,11 @@ def efficiency_of(
         what = f"the channels do not measure input and output power; there are {there}"
         remedy = "measure effort: and rate: of the driver, load: of a load on a joint and rate: of that joint"
         raise MechanismError(Finding(what, condition.name, remedy))
-    clock = _clock(pairs, condition)
-    powers_in, powers_out, whole = _filled(_powers(pairs.driven, clock.dwell), _powers(pairs.loaded, clock.dwell))
+    dwell, timing = _dwell(pairs, condition)
+    powers_in, powers_out, whole = _filled(
+        *(np.sum([dwell * force.turns * speed.turns for force, speed in side], axis=0)  # NaN where one has a gap
+          for side in (pairs.driven, pairs.loaded))
+    )  # fmt: skip
     left_out = int(np.count_nonzero(~whole))
     if not np.any(whole):
         what = f"no turn is whole in all channels of {len(whole)}"
@@ -165,7 +165,7 @@ def efficiency_of(
     value = power_out / power_in
     with np.errstate(all="ignore"):
         per_turn = powers_out / powers_in
-    weights = _weights(pairs, value, power_in, whole, clock)
+    weights = _weights(pairs, value, power_in, whole, dwell, timing)
     if noise is None:
         several = len(per_turn) > 1
         scatter = float(np.std(per_turn, ddof=1)) / len(per_turn) ** 0.5 if several else float("nan")
@@ -175,41 +175,32 @@ def efficiency_of(
             UncertaintyContribution(name, "repeatability", noise.get(name, 0.0), float(np.sqrt(np.nanmean(weight**2))))
             for name, (_, weight) in weights.items()
         ]
-    contributions = (*(one for one in repeated if one.input != 0), *_type_b(weights))
+    contributions = [one for one in repeated if one.input != 0]
+    for name, (course, weight) in weights.items():  # of what it reads, x → (1 + gain) x + zero
+        by_zero, read = float(np.nanmean(weight)), course.turns - course.accuracy.datum
+        every = [
+            UncertaintyContribution(name, "gain", course.accuracy.gain, float(np.nanmean(weight * read))),
+            UncertaintyContribution(name, "zero", course.accuracy.zero, by_zero),
+            UncertaintyContribution(name, "resolution", course.unresolved, by_zero),
+        ]
+        contributions += [one for one in every if one.input > 0]
     uncertainty = float(np.sqrt(sum(one.effect * one.effect for one in contributions)))
-    return Efficiency(value, uncertainty, power_in, power_out, per_turn, contributions, left_out)
+    return Efficiency(value, uncertainty, power_in, power_out, per_turn, tuple(contributions), left_out)
 
 
-@dataclass(frozen=True, eq=False)
-class _Clock:
-    """Time that the driver spends at each position, (position,), 1 in the mean, and the courses it was taken from: one,
-    or none where positions are equal steps of time."""
+def _dwell(pairs: Pairs, condition: Condition) -> tuple[Array, list[Signal]]:
+    """Time that the driver spends at each position, (position,), 1 in the mean, and the course it was taken from.
 
-    dwell: Array
-    courses: tuple[Signal, ...] = ()
-
-
-def _clock(pairs: Pairs, condition: Condition) -> _Clock:
-    """The dwell by the driver whose mean speed is that of the angle; equal if it does not turn one way throughout.
-
-    By the mean course, not that of each turn: 1/ω of a noisy ω is too large by its variance.
+    By the driver whose mean speed is that of the angle; equal, of no course, if it does not turn one way throughout or
+    the cycle is a time. By the mean course, not that of each turn: 1/ω of a noisy ω is too large by its variance.
     """
-    size = len(condition.phase)
-    if not np.isfinite(condition.speed):  # the cycle is a time
-        return _Clock(np.ones(size))
-    speeds = [(abs(abs(float(np.mean(speed.mean))) - abs(condition.speed)), speed) for _, speed in pairs.driven]
-    driver = min(speeds, key=lambda one: one[0])[1]
-    mean = driver.mean
-    if not np.isfinite(mean).all() or np.min(mean) * np.max(mean) <= 0:
-        return _Clock(np.ones(size))
-    dwell = 1 / np.abs(mean)
-    return _Clock(dwell / np.mean(dwell), (driver,))
-
-
-def _powers(pairs: Sequence[tuple[Signal, Signal]], dwell: Array) -> Array:
-    """Power times dwell at each position, W, (turn, position); NaN where one of the channels has a gap."""
-    total: Array = np.sum([dwell * force.turns * speed.turns for force, speed in pairs], axis=0)
-    return total
+    if np.isfinite(condition.speed):
+        speeds = [(abs(abs(float(np.mean(speed.mean))) - abs(condition.speed)), speed) for _, speed in pairs.driven]
+        driver = min(speeds, key=lambda one: one[0])[1]
+        if np.isfinite(driver.mean).all() and np.min(driver.mean) * np.max(driver.mean) > 0:
+            dwell = 1 / np.abs(driver.mean)
+            return dwell / np.mean(dwell), [driver]
+    return np.ones(len(condition.phase)), []
 
 
 def _filled(powers_in: Array, powers_out: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
@@ -230,7 +221,7 @@ def _filled(powers_in: Array, powers_out: Array) -> tuple[Array, Array, NDArray[
 
 
 def _weights(
-    pairs: Pairs, value: float, power_in: float, whole: NDArray[np.bool_], clock: _Clock
+    pairs: Pairs, value: float, power_in: float, whole: NDArray[np.bool_], dwell: Array, timing: Sequence[Signal]
 ) -> dict[str, tuple[Signal, Array]]:
     """∂η/∂x of the readings of each channel, at every position of all whole turns; its mean is that of a zero.
 
@@ -240,25 +231,12 @@ def _weights(
     found: dict[str, tuple[Signal, Array]] = {}
     for side, factor in ((pairs.driven, -value), (pairs.loaded, 1.0)):
         for force, speed in side:
-            by = factor / power_in * clock.dwell
+            by = factor / power_in * dwell
             parts = [(force, by * speed.turns[whole]), (speed, by * force.turns[whole])]
             power = force.turns[whole] * speed.turns[whole]
-            parts += [(one, -by * power / one.mean) for one in clock.courses]
+            parts += [(one, -by * power / one.mean) for one in timing]
             for own, weight in parts:
                 before = found.get(own.channel)
                 found[own.channel] = (own, weight if before is None else before[1] + weight)
     return {name: (Signal(name, one.measures, one.unit, one.turns[whole], one.accuracy), weight)
             for name, (one, weight) in found.items()}  # fmt: skip
-
-
-def _type_b(weights: Mapping[str, tuple[Signal, Array]]) -> list[UncertaintyContribution]:
-    """Contributions of gain, zero and resolution, channel by channel: of what it reads, x → (1 + gain) x + zero."""
-    found = []
-    for name, (course, weight) in weights.items():
-        by_zero, read = float(np.nanmean(weight)), course.turns - course.accuracy.datum
-        found += [
-            UncertaintyContribution(name, "gain", course.accuracy.gain, float(np.nanmean(weight * read))),
-            UncertaintyContribution(name, "zero", course.accuracy.zero, by_zero),
-            UncertaintyContribution(name, "resolution", course.unresolved, by_zero),
-        ]
-    return [one for one in found if one.input > 0]

@@ -27,8 +27,8 @@ from trunnion.rig.reading.units import Amount, Frequency, MeasureText, Number, S
 from trunnion.rig.reading.units import dimensions as unit_dimensions
 
 __all__ = [
-    "AngleSource", "Channel", "DataMapping", "File", "Filter", "FixedAngle", "FixedNumber", "FixedTime", "FromData",
-    "Mapped", "TimeBase", "Zero", "read_mapping", "schema_text",
+    "Accuracies", "AngleSource", "Channel", "DataMapping", "File", "Filter", "FixedAngle", "FixedNumber", "FixedTime",
+    "FromData", "Mapped", "TimeBase", "Zero", "read_mapping", "schema_text",
 ]  # fmt: skip
 
 Sign = Literal[1, -1]
@@ -371,7 +371,7 @@ def read_mapping(source: str | os.PathLike[str] | Mapping[str, Any]) -> Mapped:
         file, folder = str(path), path.parent
     try:
         mapping = DataMapping.model_validate(data)
-        findings = [*_check(mapping), *_check_cycle(mapping), *_check_files(mapping, folder)]
+        findings = list(_unsound(mapping, folder))
     except ValidationError as error:
         findings = [_explained(one, data) for one in schema_findings(error, DataMapping, data)]
     if findings:
@@ -390,62 +390,55 @@ def _explained(finding: Finding, data: Mapping[str, Any]) -> Finding:
     return finding
 
 
-def _check(mapping: DataMapping) -> Iterator[Finding]:
-    """What one part alone cannot tell: names of channels."""
-    channels, settings = mapping.channels, {"set": mapping.set}
+def _unsound(mapping: DataMapping, folder: Path) -> Iterator[Finding]:
+    """What one part alone cannot tell: names of channels, the cycle, entries of files that do not fit the mapping."""
+    channels, settings, angle = mapping.channels, {"set": mapping.set}, mapping.angle
     settings |= {f"files.{k}.set": file.set for k, file in enumerate(mapping.files)}
     if not channels:
         yield Finding("'channels' is missing", "", "write channels: {torque: {column: …, measures: …}}")
-    sources = [*channels, *(["angle"] if mapping.angle else [])]  # the mean speed by the angle
-    for key, values in settings.items():
-        for name, value in values.items():
-            if isinstance(value, FromData) and value.mean is not None and value.mean not in sources:
-                what = f"there is no channel '{value.mean}'"
-                yield Finding(what, f"{key}.{name}.mean", nearest(value.mean, sources))
-    source = mapping.angle.channel if mapping.angle else None
-    if source is not None and source not in channels:
-        yield Finding(f"there is no channel '{source}'", "angle.channel", nearest(source, channels))
-    elif source is not None and not channels[source].measures.startswith("rate:"):
-        what = f"the channel '{source}' measures {channels[source].measures}, not a speed"
-        yield Finding(what, "angle.channel", "name a channel that measures rate:DRIVER")
-
-
-def _check_cycle(mapping: DataMapping) -> Iterator[Finding]:
-    """Whether the cycle is one, and something tells where in it a row is."""
+    sources = [*channels, *(["angle"] if angle else [])]  # the mean speed by the angle
+    for key, name, value in ((key, name, value) for key, values in settings.items() for name, value in values.items()):
+        if isinstance(value, FromData) and value.mean is not None and value.mean not in sources:
+            yield Finding(f"there is no channel '{value.mean}'", f"{key}.{name}.mean", nearest(value.mean, sources))
+    if angle is not None and (source := angle.channel) is not None:
+        if source not in channels:
+            yield Finding(f"there is no channel '{source}'", "angle.channel", nearest(source, channels))
+        elif not channels[source].measures.startswith("rate:"):
+            what = f"the channel '{source}' measures {channels[source].measures}, not a speed"
+            yield Finding(what, "angle.channel", "name a channel that measures rate:DRIVER")
     if mapping.cycle.check({}) not in (ANGLE, KINDS["time"].dimensions[0], None):
         yield Finding(f"'{mapping.cycle.source}' is no angle and no time", "cycle", "write it as 360 deg or 0.5 s")
     elif not float(mapping.cycle.evaluate()) > 0:
         yield Finding("the cycle is not above zero", "cycle", "write it as 360 deg or 0.5 s")
-    elif mapping.angle is None and not mapping.timed:
+    elif angle is None and not mapping.timed:
         remedy = "add angle: {from: …}, or write cycle: as a time"
         yield Finding("'angle' is missing: no column gives the coordinate of the driver", "", remedy)
-
-
-def _check_files(mapping: DataMapping, folder: Path) -> Iterator[Finding]:
-    """Files outside the folder of the mapping, which is data from a stranger; entries that do not fit the mapping."""
-    home, channels = folder.resolve(), mapping.channels
     for number, entry in enumerate(mapping.files):
-        where = f"files.{number}"
+        yield from _unsound_file(mapping, folder, f"files.{number}", entry)
+
+
+def _unsound_file(mapping: DataMapping, folder: Path, where: str, entry: File) -> Iterator[Finding]:
+    """A file outside the folder of the mapping, which is data from a stranger; entries that do not fit the mapping."""
+    try:
+        inside = not Path(entry.file).is_absolute()
+        inside = inside and (folder / entry.file).resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError, RuntimeError):
+        inside = False
+    if not inside:
+        what = f"'{entry.file[:80]}' is not below the folder of the mapping"
+        yield Finding(what, f"{where}.file", "put it there, or name it on the command line")
+    if entry.angle is not None and mapping.angle is None:
+        what = "states a zero of the angle, but no column gives an angle"
+        yield Finding(what, f"{where}.angle", "add angle: {from: …}, or remove it")
+    for name, change in entry.channels.items():
+        if name not in mapping.channels:
+            yield Finding(f"there is no channel '{name}'", f"{where}.channels.{name}", nearest(name, mapping.channels))
+            continue
         try:
-            inside = not Path(entry.file).is_absolute() and (folder / entry.file).resolve().is_relative_to(home)
-        except (OSError, ValueError, RuntimeError):
-            inside = False
-        if not inside:
-            what = f"'{entry.file[:80]}' is not below the folder of the mapping"
-            yield Finding(what, f"{where}.file", "put it there, or name it on the command line")
-        if entry.angle is not None and mapping.angle is None:
-            what = "states a zero of the angle, but no column gives an angle"
-            yield Finding(what, f"{where}.angle", "add angle: {from: …}, or remove it")
-        for name, change in entry.channels.items():
-            if name not in channels:
-                what = f"there is no channel '{name}'"
-                yield Finding(what, f"{where}.channels.{name}", nearest(name, channels))
-                continue
-            try:
-                change.of(channels[name])
-            except PydanticCustomError as error:
-                remedy = str((error.context or {}).get("remedy", ""))
-                yield Finding(error.message(), f"{where}.channels.{name}", remedy)
+            change.of(mapping.channels[name])
+        except PydanticCustomError as error:
+            remedy = str((error.context or {}).get("remedy", ""))
+            yield Finding(error.message(), f"{where}.channels.{name}", remedy)
 
 
 class _Generator(SchemaGenerator):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr, stdtrit
 
 from trunnion.errors import Finding
 from trunnion.model.units import Dimension
@@ -23,7 +24,7 @@ from trunnion.rig.reading.steps import LeftOfSteps
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Accuracy", "Condition", "Measurement", "Signal", "between_turns", "dataset"]
+__all__ = ["Accuracy", "Condition", "Measurement", "Signal", "between_turns", "dataset", "rms", "student"]
 
 Array = NDArray[np.float64]
 COURSE = ("condition", "channel", "position")
@@ -161,6 +162,21 @@ def between_turns(turns: Array) -> Array:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         return np.asarray(np.nanstd(turns, axis=0, ddof=1))
+
+
+def rms(values: Array) -> float:
+    """Root mean square of what is there; NaN of nothing."""
+    finite = values[np.isfinite(values)]
+    with np.errstate(over="ignore"):  # of numbers near the end of the floats
+        return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
+
+
+def student(freedom: Array | float, coverage: float) -> Array:
+    """k_p of U = k_p u by Student's distribution, with the probability that ± coverage has of a normal one, which it is
+    for infinite degrees of freedom; GUM, G.3.2."""
+    freedom = np.asarray(freedom, float)
+    factor = stdtrit(np.where(np.isfinite(freedom), np.maximum(freedom, 1.0), 1.0), ndtr(coverage))
+    return np.asarray(np.where(np.isfinite(freedom), factor, coverage))
 
 
 @dataclass(frozen=True)

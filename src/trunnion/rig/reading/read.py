@@ -23,6 +23,7 @@ from trunnion.rig.reading.channels import (
     LOOKED_AT,
     ChannelReading,
     Zeroed,
+    check_filter,
     filtered,
     noise_of,
     reading,
@@ -131,36 +132,29 @@ def _distinct(conditions: Sequence[Condition]) -> list[Condition]:
     return renamed
 
 
-@dataclass(frozen=True)
-class _Setting:
-    """What was set in one condition of a file.
+@dataclass
+class _Part:
+    """One condition of a file.
 
-    values: numbers of the model, SI, by name; dimensions: of those that were stated with a unit; means: channels whose
-    mean is the value; window: rows from the first to the last for which it was set; rows: those for which it was.
+    values: numbers of the model that were set, SI, by name; dimensions: of those that were stated with a unit; means:
+    channels whose mean is the value; window: rows from the first to the last for which it was set; rows: those for
+    which it was; courses: of the channels, (turn, position); left: what of the error by steps its turns repeat.
     """
 
     name: str
-    values: Mapping[str, float]
-    dimensions: Mapping[str, Dimension]
+    values: dict[str, float]
+    dimensions: dict[str, Dimension]
     means: Mapping[str, str]
     window: slice
     rows: NDArray[np.bool_]
+    turns: Turns = field(init=False)
+    courses: dict[str, Array] = field(default_factory=dict)
+    left: dict[str, LeftOfSteps] = field(default_factory=dict)
 
     @property
     def where(self) -> str:
         """What a finding about the condition is about; its file says which one, where nothing is set."""
         return f"condition {self.name}" if self.name else "turns"
-
-
-@dataclass(frozen=True)
-class _Part:
-    """One condition of a file: its turns, the courses of the channels, (turn, position), and what of the error by steps
-    its turns repeat."""
-
-    setting: _Setting
-    turns: Turns
-    courses: dict[str, Array] = field(default_factory=dict)
-    left: dict[str, LeftOfSteps] = field(default_factory=dict)
 
 
 class _Recording:
@@ -172,6 +166,7 @@ class _Recording:
         self.done: list[str] = []
         self.sensors: dict[str, ChannelReading] = {}
         self.parts: list[_Part] = []
+        self.cycle, self.start = float(mapping.cycle.evaluate()), float(mapping.start.evaluate())
         self.failed = False
 
     def say(self, finding: Finding | str | None) -> None:
@@ -200,7 +195,8 @@ class _Recording:
         if not self.table.encoding.startswith("utf-8"):
             say(f"read in the encoding {self.table.encoding}")
         self.line = timeline(self.table, mapping.time, say)
-        self._check_filter()
+        if mapping.filter is not None:
+            check_filter(mapping.filter, self.line, say)
         self.readings: dict[str, Array] = {}
         self.zeros: dict[str, Zeroed] = {}
         for name, channel in mapping.channels.items():
@@ -216,44 +212,28 @@ class _Recording:
             begin, end = (one.value for one in self.entry.over)
             self.used = (self.line.seconds >= begin) & (self.line.seconds <= end)
         share, spoilt = self._cycles()
-        for setting in self._settings():
-            allowed = self.used[setting.window] & setting.rows
-            turns = cut(share, self.line, setting.window, allowed, mapping.positions, spoilt, say, setting.where)
-            steps = np.abs(np.diff(share[setting.window])[allowed[1:] & allowed[:-1]])
-            gone = float(np.sum(steps[np.isfinite(steps)]))
-            if not turns.numbers.size:
+        for part in self._settings():
+            allowed = self.used[part.window] & part.rows
+            part.turns = cut(share, self.line, part.window, allowed, mapping.positions, spoilt, say, part.where)
+            steps = np.abs(np.diff(share[part.window])[allowed[1:] & allowed[:-1]])
+            gone, whole = float(np.nansum(steps[~np.isinf(steps)])), part.turns.numbers.size
+            if not whole:
                 what = f"there is no whole turn: {gone:.3g} cycles in {counted(int(allowed.sum()), 'row')}"
-                say(Finding(what, setting.where, "check angle, or record for longer", code="data.turns.none"))
+                say(Finding(what, part.where, "check angle, or record for longer", code="data.turns.none"))
                 continue
-            if turns.numbers.size < UNUSED * gone - 2:
-                what = f"{counted(turns.numbers.size, 'turn')} of {gone:,.0f} recorded can be used"
-                say(warning("turns.lost", setting.where, what, "correct what the other findings name"))
-            self.parts.append(_Part(setting, turns))
+            if whole < UNUSED * gone - 2:
+                what = f"{counted(whole, 'turn')} of {gone:,.0f} recorded can be used"
+                say(warning("turns.lost", part.where, what, "correct what the other findings name"))
+            self.parts.append(part)
         if self.parts:
             self._check_sampling()
             self._find_faults()
 
-    def _check_filter(self) -> None:
-        low_pass, rate = self.mapping.filter, 1.0 / self.line.step
-        if low_pass is None:
-            return
-        cut_off = low_pass.cut_off.value
-        if 2 * cut_off >= rate:
-            what = f"the sampling is too slow for the filter: {rate:.6g} Hz, a cut-off of {cut_off:g} Hz"
-            remedy = f"state a cut-off below {rate / 2:.4g} Hz, or sample faster"
-            raise MechanismError(Finding(what, "filter.cut_off", remedy))
-        if not self.line.even:
-            what = "the samples are not evenly spaced in time, as a filter needs them"
-            self.say(warning("filter.uneven", "filter", what, "record at a fixed rate, or leave out the filter"))
-        passes = f"order {low_pass.order}, forward and backward, together 3 dB down at {cut_off:g} Hz"
-        self.say(f"low-pass filter: Butterworth of {passes}; gaps up to {100 / cut_off:.3g} ms are bridged for it")
-
     def _cycles(self) -> tuple[Array, Array]:
         """Cycles gone through by row, and stretches of time in which they are wrong; which way the coordinate runs."""
         mapping, self.way, self.lag, self.cut = self.mapping, 1.0, 0.0, 0.0
-        cycle = float(mapping.cycle.evaluate())
         if mapping.timed:
-            return self.line.seconds / cycle, np.empty((0, 2))
+            return self.line.seconds / self.cycle, np.empty((0, 2))
         assert mapping.angle is not None
         speed = None
         if (name := mapping.angle.channel) is not None:
@@ -270,34 +250,26 @@ class _Recording:
             raise MechanismError(Finding("no row in use has a coordinate of the driver", "angle", "check angle.column"))
         self.way = 1.0 if angle.values[known[-1]] >= angle.values[known[0]] else -1.0
         backward = np.repeat(self.line.spoilt[:, None], 2, axis=1)  # times
-        share = self.way * (angle.values - float(mapping.start.evaluate())) / cycle
-        return share, np.concatenate([angle.spoilt, backward])
+        return self.way * (angle.values - self.start) / self.cycle, np.concatenate([angle.spoilt, backward])
 
-    def _settings(self) -> list[_Setting]:
+    def _settings(self) -> list[_Part]:
         """The conditions of the file: one, or as many as the columns that state them take different values."""
-        stated = self.mapping.settings(self.entry)
-        numbers = {path: one for path, one in stated.items() if isinstance(one, Quantity)}
-        values = {path: float(one.evaluate()) for path, one in numbers.items()}
-        texts = {path: str(one.source) for path, one in numbers.items()}
-        kinds = {path: one.check({}) for path, one in numbers.items() if not (one.expression and one.expression.bare)}
-        known_kinds = {path: kind for path, kind in kinds.items() if kind is not None}
-        taken = {path: one for path, one in stated.items() if isinstance(one, FromData)}
-        means = {path: one.mean for path, one in taken.items() if one.mean is not None}
-        columns = {path: str(one.column) for path, one in taken.items() if one.mean is None}
+        values, kinds, texts, means, columns = {}, dict[str, Dimension](), dict[str, str](), {}, dict[str, str]()
+        for path, one in self.mapping.settings(self.entry).items():
+            if isinstance(one, Quantity):
+                values[path], texts[path] = float(one.evaluate()), str(one.source)
+                kind = None if one.expression and one.expression.bare else one.check({})
+                kinds |= {path: kind} if kind is not None else {}
+            elif one.mean is not None:
+                means[path] = one.mean
+            else:
+                columns[path] = str(one.column)
         size = self.line.seconds.size
         if not columns:
             everywhere = np.ones(size, dtype=np.bool_)
-            return [_Setting(_named(texts), values, known_kinds, means, slice(0, size), everywhere)]
-        units = {path: taken[path].unit or self.table.columns[name].unit for path, name in columns.items()}
-        factors = {}
-        for path, unit in units.items():
-            try:
-                factors[path], exponents = dimensions(unit) if unit else (1.0, {})
-                if unit:
-                    known_kinds[path] = _dimension(exponents, unit)
-            except UnitError as error:
-                remedy = f"state the unit: set: {{{path}: {{column: …, unit: …}}}}; in the file, {error.remedy}"
-                raise MechanismError(Finding(error.what, f"set.{path}", remedy)) from None
+            return [_Part(_named(texts), values, kinds, means, slice(0, size), everywhere)]
+        units, factors = self._units_of(columns)
+        kinds |= {path: kind for path, (_, kind) in factors.items() if kind is not None}
         raw = np.column_stack([self.line.rows(self.table.columns[name].values) for name in columns.values()])
         known = np.isfinite(raw).all(axis=1)
         if not known.any():
@@ -310,32 +282,46 @@ class _Recording:
         if len(levels) > MOST_VALUES:
             what = f"the columns that state the condition have {len(levels):,} different values"
             raise MechanismError(Finding(what, "set", "a measured value is not a setting: write {mean: channel}"))
-        number = np.full(size, -1)
+        number, parts = np.full(size, -1), []
         number[known] = which.ravel()
-        settings = []
         for k in dict.fromkeys(which.ravel().tolist()):  # in the order of the file
             rows = np.flatnonzero(number == k)
             window = slice(int(rows[0]), int(rows[-1]) + 1)
             own = dict(zip(columns, levels[k].tolist(), strict=True))
             name = _named(texts | {path: f"{value:.6g} {units[path]}".strip() for path, value in own.items()})
-            si = values | {path: value * factors[path] for path, value in own.items()}
-            settings.append(_Setting(name, si, known_kinds, means, window, number[window] == k))
-        return settings
+            si = values | {path: value * factors[path][0] for path, value in own.items()}
+            parts.append(_Part(name, si, dict(kinds), means, window, number[window] == k))
+        return parts
+
+    def _units_of(self, columns: Mapping[str, str]) -> tuple[dict[str, str], dict[str, tuple[float, Dimension | None]]]:
+        """Units of the columns that state settings, and their factors to SI with their dimensions."""
+        stated = self.mapping.settings(self.entry)
+        units, factors = {}, dict[str, tuple[float, Dimension | None]]()
+        for path, column in columns.items():
+            one = stated[path]
+            unit = units[path] = (one.unit if isinstance(one, FromData) else "") or self.table.columns[column].unit
+            try:
+                factor, exponents = dimensions(unit) if unit else (1.0, {})
+                factors[path] = factor, _dimension(exponents, unit) if unit else None
+            except UnitError as error:
+                remedy = f"state the unit: set: {{{path}: {{column: …, unit: …}}}}; in the file, {error.remedy}"
+                raise MechanismError(Finding(error.what, f"set.{path}", remedy)) from None
+        return units, factors
 
     def _check_sampling(self) -> None:
-        """How turns are sampled, whether they are enough and equally fast, and what the filter leaves of them."""
+        """How turns are sampled, whether they are enough and equally fast, and stretches without load in them."""
         say, positions = self.say, self.mapping.positions
         for part in self.parts:
-            turns, where = part.turns, part.setting.where
+            turns = part.turns
             if turns.numbers.size < 2:
                 what = "has one turn: there is no scatter, so no uncertainty"
-                say(warning("turns.one", where, what, "record two turns or more"))
-            say(checks.steady(turns, self.line.step, where))
+                say(warning("turns.one", part.where, what, "record two turns or more"))
+            say(checks.steady(turns, self.line.step, part.where))
             if turns.density < 1:
                 samples = f"{turns.density * positions:.4g} samples a turn for {positions} positions"
                 what = f"the sampling is slow: {samples}; between them it is interpolated"
                 slow = warning if turns.density < SPARSE else note  # no fault of the readings
-                say(slow("sampling.slow", where, what, "state fewer positions, or sample faster"))
+                say(slow("sampling.slow", part.where, what, "state fewer positions, or sample faster"))
             for name, channel in self.mapping.channels.items():
                 for low, high in channel.zero.over if isinstance(channel.zero, Zero) else ():
                     if inside := int(np.sum((turns.begin < high.value) & (turns.end > low.value))):
@@ -343,10 +329,9 @@ class _Recording:
                         what, remedy = what + counted(inside, "turn"), "state a stretch without load"
                         say(warning("zero.in_turns", f"channels.{name}.zero", what, remedy))
         most = int(min(part.turns.density for part in self.parts) * positions / DENSE)
-        if most >= positions:
-            say("values at a position: mean of the samples within half a position to either side")
-            return
-        say(f"values at a position: interpolated by a cubic; with up to {most} positions they are means of samples")
+        averaged = "mean of the samples within half a position to either side"
+        by_cubic = f"interpolated by a cubic; with up to {most} positions they are means of samples"
+        say(f"values at a position: {averaged if most >= positions else by_cubic}")
 
     def _find_faults(self) -> None:
         """Leave out stuck readings and spikes from before the first turn to after the last."""
@@ -374,18 +359,18 @@ class _Recording:
         """The conditions of the file, each with its turns. steps: of the channels, by name, unit and factor."""
         if not self.parts:
             return []
-        channels, parts = self.mapping.channels, self.parts
+        channels = self.mapping.channels
         accuracies = {name: self._courses(name, steps) for name in channels}
-        together = {name: np.concatenate([part.courses[name] for part in parts]) for name in channels}
+        together = {name: np.concatenate([part.courses[name] for part in self.parts]) for name in channels}
         if not self.mapping.timed:
-            turning = self._speed(parts)
+            turning = self._speed(self.parts)
             zeros = {name: accuracy.zero for name, accuracy in accuracies.items()}
             wrong = list(checks.signs(channels, together, zeros, turning))
             units = {name: sensor.shown for name, sensor in self.sensors.items()}
             speed = checks.speeds(channels, together, units, turning)
             for finding in [*wrong, *([speed] if speed and speed.where not in {one.where for one in wrong} else [])]:
                 self.say(finding)
-        return [self._condition(part, accuracies) for part in parts]
+        return [self._condition(part, accuracies) for part in self.parts]
 
     def _courses(self, name: str, steps: Mapping[tuple[object, ...], float]) -> Accuracy:
         """Put the courses of a channel into the parts; the accuracy of its sensor."""
@@ -430,21 +415,21 @@ class _Recording:
 
     def _speed(self, parts: Sequence[_Part]) -> float:
         """Of the driver, with its sign, rad/s."""
-        lengths = np.concatenate([part.turns.end - part.turns.begin for part in parts])
-        return self.way * float(self.mapping.cycle.evaluate()) / float(np.mean(lengths))
+        return (
+            self.way * self.cycle / float(np.mean(np.concatenate([one.turns.end - one.turns.begin for one in parts])))
+        )
 
     def _condition(self, part: _Part, accuracies: Mapping[str, Accuracy]) -> Condition:
         """A condition with its courses, and values that are means of channels."""
-        mapping, setting, courses = self.mapping, part.setting, {}
+        mapping, courses = self.mapping, dict[str, Signal]()
         for name, channel in mapping.channels.items():
             sensor, accuracy = self.sensors[name], accuracies[name]
             course = Signal(name, channel.measures, sensor.scale.unit, part.courses[name], accuracy, sensor.read_in)
             cut_off = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
-            accuracy = replace(accuracy, cut=cut_off, left=part.left.get(name))
-            courses[name] = replace(course, accuracy=accuracy)
-        values, kinds = dict(setting.values), dict(setting.dimensions)
+            courses[name] = replace(course, accuracy=replace(accuracy, cut=cut_off, left=part.left.get(name)))
+        values, kinds = part.values, part.dimensions
         speed = np.nan if mapping.timed else self._speed([part])
-        for path, name in setting.means.items():
+        for path, name in part.means.items():
             if name not in courses:  # of the angle
                 values[path], kinds[path] = speed, _dimension(dimensions("rad/s")[1], "rad/s")
                 continue
@@ -453,14 +438,12 @@ class _Recording:
                 raise MechanismError(Finding(what, f"set.{path}", "correct the channel, or state it"))
             values[path] = time_mean(part.turns, courses[name].turns)
             kinds[path] = _dimension(self.sensors[name].scale.of_quantity, courses[name].unit)
-        cycle = float(mapping.cycle.evaluate())
-        start, span, duration = float(mapping.start.evaluate()), cycle, np.nan
+        start, span, duration = self.start, self.cycle, np.nan
         if mapping.timed:
-            start, span, duration = np.nan, np.nan, cycle
-        phase = np.arange(mapping.positions) / mapping.positions
+            start, span, duration = np.nan, np.nan, self.cycle
         return Condition(
-            setting.name or self.path.stem, values, phase, courses, (str(self.path),), speed, start, span,
-            lag=self.lag, cut=self.cut, dimensions=kinds, duration=duration,
+            part.name or self.path.stem, values, np.arange(mapping.positions) / mapping.positions, courses,
+            (str(self.path),), speed, start, span, lag=self.lag, cut=self.cut, dimensions=kinds, duration=duration,
         )  # fmt: skip
 
 

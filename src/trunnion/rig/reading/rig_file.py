@@ -20,10 +20,10 @@ from trunnion.model.expression import LITERAL
 from trunnion.model.file import place, read_entries
 from trunnion.model.findings import schema_findings
 from trunnion.model.units import normalise
-from trunnion.rig.reading.mapping import FixedAngle, FixedNumber, FixedTime
-from trunnion.rig.reading.units import Amount, Frequency, Number
+from trunnion.rig.reading.mapping import Accuracies, FixedAngle, FixedTime
+from trunnion.rig.reading.units import Frequency, Number
 
-__all__ = ["FORMATS", "Accuracy", "Encoder", "Idle", "Rig", "Schedule", "Sensor", "placed_in_rig"]
+__all__ = ["FORMATS", "Encoder", "Idle", "Rig", "Schedule", "Sensor", "placed_in_rig"]
 
 FORMATS = ("csv", "parquet", "tdms")
 MOST_CONDITIONS = 10_000
@@ -77,23 +77,14 @@ class Encoder(Part):
     index: Name | None = None
 
 
-class Accuracy(Part):
-    """Standard uncertainties that the actual errors of a sensor are drawn from, normally distributed.
-
-    gain: relative; zero: of the running sensor, beyond what it reads at rest.
-    """
-
-    gain: FixedNumber = Field(default=0, validate_default=True)
-    zero: Number = Field(default=0, validate_default=True)
-
-
 class Sensor(Part):
     """What a sensor measures, and what it makes of it. Quantities are in units of what is measured or of its reading.
 
     range: ± full scale; sensitivity: reading per quantity, or the other way round, as its dimensions tell; noise:
-    white, standard deviation; bits over ± span, the range if not stated; offset: standard deviation of what it reads at
-    rest; drift of its zero per time; bandwidth: of a first-order low-pass; per_turn: pulses of a speed sensor, told
-    by the time from each to the next.
+    white, standard deviation; bits over ± span, the range if not stated; accuracy: what the actual errors are drawn
+    from, normally distributed, of the zero while it runs; offset: standard deviation of what it reads at rest; drift
+    of its zero per time; bandwidth: of a first-order low-pass; per_turn: pulses of a speed sensor, told by the time
+    from each to the next.
     """
 
     measures: str
@@ -104,7 +95,7 @@ class Sensor(Part):
     noise: Number = Field(default=0, validate_default=True)
     bits: Annotated[int, Field(ge=1, le=48)] | None = None
     span: Number | None = None
-    accuracy: Accuracy = Accuracy()
+    accuracy: Accuracies = Accuracies()
     offset: Number = Field(default=0, validate_default=True)
     drift: Number = Field(default=0, validate_default=True)
     bandwidth: Frequency | None = None
@@ -167,10 +158,12 @@ class Rig(Part):
 _KEYS = {"trunnion": "models", "trunnion-data": "mappings"}
 
 
-def placed_in_rig(findings: Iterable[Finding], path: str | os.PathLike[str]) -> list[Finding]:
+def placed_in_rig(findings: Iterable[Finding], path: Path) -> list[Finding]:
     """Findings of a later stage with file and line of the entry of the rig file that they speak of, where it has it."""
-    path = Path(path)
-    data, lines = read_entries(path, "a rig file")
+    try:
+        data, lines = read_entries(path, "a rig file")
+    except MechanismError:
+        return list(findings)
     own = {one.alias or name for name, one in Rig.model_fields.items()}
     return [
         one if one.file or one.where.split(".")[0] not in own else place([one], str(path), lines, data)[0]
@@ -238,20 +231,18 @@ def _shared_columns(rig: Rig) -> Iterable[Finding]:
 
 
 def _unsound_sensor(where: str, sensor: Sensor) -> Iterable[Finding]:
-    if sensor.bits and not (sensor.span or sensor.range):
-        remedy = "state what they are spread over: span: 10 V"
-        yield Finding("has bits and neither span nor range", f"{where}.bits", remedy)
-    if sensor.span and not sensor.bits:
-        yield Finding("is a span without bits", f"{where}.span", "state bits: 16")
-    for key in ("range", "span"):
-        stated: Amount | None = getattr(sensor, key)
-        if stated and stated.value <= 0:
-            yield Finding(f"{stated.source} is not positive", f"{where}.{key}", "state a positive one")
-    if sensor.noise.value < 0:
-        yield Finding(f"{sensor.noise.source} is negative", f"{where}.noise", "state a standard deviation")
-    if sensor.sensitivity and sensor.sensitivity.value == 0:
-        yield Finding("is zero", f"{where}.sensitivity", "state reading per quantity: 100 mV/(N m)")
-    if sensor.accuracy.gain.evaluate() < 0 or sensor.accuracy.zero.value < 0 or sensor.offset.value < 0:
-        yield Finding("a standard uncertainty is negative", f"{where}.accuracy", "state it positive")
-    if sensor.per_turn and not sensor.measures.startswith("rate:"):
-        yield Finding("pulses measure a speed only", f"{where}.per_turn", "measure rate:JOINT, or remove per_turn")
+    for wrong, key, what, remedy in (
+        (sensor.bits and not (sensor.span or sensor.range), "bits", "has bits and neither span nor range",
+         "state what they are spread over: span: 10 V"),
+        (sensor.span and not sensor.bits, "span", "is a span without bits", "state bits: 16"),
+        (sensor.range and sensor.range.value <= 0, "range", "is not positive", "state a positive range"),
+        (sensor.span and sensor.span.value <= 0, "span", "is not positive", "state a positive span"),
+        (sensor.noise.value < 0, "noise", f"{sensor.noise.source} is negative", "state a standard deviation"),
+        (sensor.sensitivity and sensor.sensitivity.value == 0, "sensitivity", "is zero",
+         "state reading per quantity: 100 mV/(N m)"),
+        (sensor.offset.value < 0, "offset", f"{sensor.offset.source} is negative", "state a standard deviation"),
+        (sensor.per_turn and not sensor.measures.startswith("rate:"), "per_turn", "pulses measure a speed only",
+         "measure rate:JOINT, or remove per_turn"),
+    ):  # fmt: skip
+        if wrong:
+            yield Finding(what, f"{where}.{key}", remedy)

@@ -19,10 +19,9 @@ from trunnion.rig.reading.turns import DENSE, Turns
 __all__ = ["LeftOfSteps", "covariance_of_steps", "in_step", "left_in_turns", "left_of_steps", "noise_before"]
 
 Array = NDArray[np.float64]
-ALIKE = 0.9  # of 1, from which what a reading differs by from that a turn later is noise
+ALIKE = 0.9  # of 1, from which every turn is sampled at the same places
 HARMONICS = 10  # of the wave, that are looked at
 PLACES = 8  # of the first sample of a turn, between two
-MOST_TURNS = 4  # after which sampling is looked for at the same places
 _K = np.arange(1.0, 200.0)
 _NOISE = np.linspace(0.0, 1.0, 1001)  # σ/q
 
@@ -31,15 +30,14 @@ _NOISE = np.linspace(0.0, 1.0, 1001)  # σ/q
 class LeftOfSteps:
     """What all turns repeat of the error by steps.
 
-    share: its standard deviation, of step/√12; noise: σ, in steps; turns: how many; samples: of a turn; every: turns
-    after which they are at the same places again, 0 if not soon.
+    share: its standard deviation, of step/√12; noise: σ, in steps; samples: of a turn; every: whether every turn is
+    sampled at the same places.
     """
 
     share: float
     noise: float
-    turns: int
     samples: float
-    every: int
+    every: bool
 
 
 def left_in_turns(turns: Turns, course: Array, readings: Array, noise: float) -> LeftOfSteps:
@@ -48,23 +46,16 @@ def left_in_turns(turns: Turns, course: Array, readings: Array, noise: float) ->
     course: (turn, position); readings: one a row of the file; both in steps; noise: scatter of the readings from row to
     row, in steps, with the error by steps in it unless the course stays within one.
     """
-    share = in_step(turns, course)
-    if every := next((k for k in range(1, MOST_TURNS + 1) if in_step(turns, course, k) > ALIKE), 0):
-        squares = _turns_later(turns, readings, every) ** 2
-        noise = noise_before(float(np.sqrt(np.mean(squares) / 2))) if squares.size else 0.0
+    share, samples = in_step(turns, course), float(np.median(turns.end - turns.begin)) / turns.line.step
+    every = share > ALIKE
+    if every:  # then what a reading differs by from that a turn later is noise
+        rows = np.where(turns.rows, readings[turns.window], np.nan)
+        apart = rows[round(samples) :] - rows[: -round(samples)]
+        apart = apart[np.isfinite(apart)]
+        noise = noise_before(float(np.sqrt(np.mean(apart**2) / 2))) if apart.size else 0.0
     else:
         noise = float(np.sqrt(max(noise**2 - 1 / 12, 0.0)))
-    samples = float(np.median(turns.end - turns.begin)) / turns.line.step
-    found = float(np.sqrt(share * left_of_steps(noise)))
-    return LeftOfSteps(found, noise, turns.numbers.size, samples, every)
-
-
-def _turns_later(turns: Turns, readings: Array, every: int) -> Array:
-    """Differences between readings so many turns apart."""
-    own = np.where(turns.rows, readings[turns.window], np.nan)
-    turn = round(every * float(np.median(turns.end - turns.begin)) / turns.line.step)
-    apart = own[turn:] - own[:-turn]
-    return np.asarray(apart[np.isfinite(apart)])
+    return LeftOfSteps(float(np.sqrt(share * left_of_steps(noise))), noise, samples, every)
 
 
 def left_of_steps(noise: Array | float) -> Array:
@@ -78,10 +69,8 @@ def noise_before(scatter: float) -> float:
     return float(np.interp(scatter, np.sqrt(_NOISE**2 + (1 - left_of_steps(_NOISE)) / 12), _NOISE))
 
 
-def in_step(turns: Turns, course: Array, every: int = 1) -> float:
+def in_step(turns: Turns, course: Array) -> float:
     """How far turns are sampled at the same places of a step, 0 to 1; course: (turn, position), in steps.
-
-    every: compared are only turns so many apart.
 
     At a position the samples next to it are off it by a part of a position, and along the slope of the course by a part
     of a step: |mean of exp(2πi part)|², less what chance makes of n turns.
@@ -95,13 +84,12 @@ def in_step(turns: Turns, course: Array, every: int = 1) -> float:
     off = scaled - place
     order = np.lexsort((np.abs(off), place))
     nearest = order[np.diff(place[order], prepend=-np.inf) > 0]
-    turn, at = np.divmod(place[nearest].astype(np.int64), turns.positions)
+    at = place[nearest].astype(np.int64) % turns.positions
     angle = 2 * np.pi * slope[at] * off[nearest]
-    at += turn % every * turns.positions
-    count = np.bincount(at, minlength=every * turns.positions)
+    count = np.bincount(at, minlength=turns.positions)
     many = count > 1
     if not many.any():
-        return float(every == 1)
+        return 1.0
     parts = (np.bincount(at, one, count.size) for one in (np.cos(angle), np.sin(angle)))
     alike = (sum(part[many] ** 2 for part in parts) / count[many] - 1) / (count[many] - 1)
     return float(np.clip(np.mean(alike), 0.0, 1.0))
@@ -114,8 +102,7 @@ def covariance_of_steps(columns: Array, course: Array, left: LeftOfSteps) -> Arr
     from sample to sample, as it may beside its steepest places, the errors of many samples are alike. The mean is taken
     over all places in a step, for each harmonic of the wave by itself, and some of the first sample in a turn.
     """
-    size, turns = course.size, left.every
-    count, grid = round(left.samples * turns), np.arange(course.size * turns)
+    size, count, grid = course.size, round(left.samples), np.arange(course.size)
     powers = np.exp(-4 * (np.pi * left.noise * _K[:HARMONICS]) ** 2) / (_K[:HARMONICS] * np.pi) ** 2 / 2
     total = np.zeros((len(columns), len(columns)))
     for first in (np.arange(PLACES) + 0.5) / PLACES:
@@ -129,6 +116,6 @@ def covariance_of_steps(columns: Array, course: Array, left: LeftOfSteps) -> Arr
                 part = np.round(place).astype(np.int64) % grid.size
                 error = np.bincount(part, wave.real, grid.size) + 1j * np.bincount(part, wave.imag, grid.size)
                 error = error / np.bincount(part, minlength=grid.size)
-            moved = columns @ np.mean(error.reshape(turns, size), axis=0)
+            moved = columns @ error
             total += power / PLACES * np.real(np.outer(moved, moved.conj()))
     return total

@@ -210,32 +210,28 @@ def _seconds(cells: Sequence[Any]) -> Array:
     by more than half a day is midnight. ValueError, in words, where the dates do not show their order.
     """
     found = [_TIME.fullmatch(cell.strip()) if isinstance(cell, str) else None for cell in cells]
-    known = [place for place, time in enumerate(found) if time is not None and int(time["hour"]) < 24]
-    times = [time for time in found if time is not None and int(time["hour"]) < 24]
-    dates = list(dict.fromkeys(time["date"] or "" for time in times))
-    days = dict(zip(dates, _day_numbers(dates), strict=True))
-    when = np.array([days[time["date"] or ""] * DAY + _nanoseconds(time) for time in times], np.int64)
-    if dates == [""]:
+    stamps = {place: stamp for place, stamp in enumerate(found) if stamp is not None and int(stamp["hour"]) < 24}
+    days = _day_numbers(list(dict.fromkeys(stamp["date"] or "" for stamp in stamps.values())))
+    when = np.empty(len(stamps), np.int64)
+    for k, stamp in enumerate(stamps.values()):
+        hour, minute = int(stamp["hour"]), int(stamp["minute"])
+        if stamp["noon"]:
+            hour = hour % 12 + 12 * (stamp["noon"] in "Pp")
+        if stamp["zone"]:
+            hour, minute = hour - int(stamp["zone"]), minute - int(stamp["zone"][0] + stamp["off"])
+        part = int((stamp["part"] or "").ljust(9, "0")[:9])
+        when[k] = days[stamp["date"] or ""] * DAY + (3600 * hour + 60 * minute + int(stamp["second"])) * 10**9 + part
+    if list(days) == [""]:
         when += DAY * np.concatenate([[0], np.cumsum(np.diff(when) < -DAY // 2)])
     values = np.full(len(cells), np.nan)
-    values[known] = (when - when[:1]) * 1e-9
+    values[list(stamps)] = (when - when[:1]) * 1e-9
     return values
 
 
-def _nanoseconds(time: re.Match[str]) -> int:
-    """Since midnight, of world time where the zone is stated."""
-    hour, minute = int(time["hour"]), int(time["minute"])
-    if time["noon"]:
-        hour = hour % 12 + 12 * (time["noon"] in "Pp")
-    if time["zone"]:
-        hour, minute = hour - int(time["zone"]), minute - int(time["zone"][0] + time["off"])
-    return (3600 * hour + 60 * minute + int(time["second"])) * 10**9 + int((time["part"] or "").ljust(9, "0")[:9])
-
-
-def _day_numbers(dates: Sequence[str]) -> list[int]:
+def _day_numbers(dates: Sequence[str]) -> dict[str, int]:
     """Number of the day of every date; 0 where there is none. ValueError if they may be read in two ways."""
     if dates == [""]:
-        return [0]
+        return {"": 0}
     sign = next((one for one in "./-" if one in dates[0]), "-")
     read: list[list[int]] = []
     for order in ("%Y-%m-%d", "%d-%m-%Y", "%m-%d-%Y", "%d-%m-%y", "%m-%d-%y"):
@@ -245,7 +241,7 @@ def _day_numbers(dates: Sequence[str]) -> list[int]:
         raise ValueError(f"the dates, such as {dates[0] or dates[-1]}, are not all dates of one form")
     if sign != "." and len({tuple(np.subtract(days, days[0])) for days in read}) > 1:
         raise ValueError(f"the dates, such as {dates[0]}, may begin with the day or with the month")
-    return [day - read[0][0] for day in read[0]]
+    return {date: day - read[0][0] for date, day in zip(dates, read[0], strict=True)}
 
 
 # ---- text -----------------------------------------------------------------------------------------------------

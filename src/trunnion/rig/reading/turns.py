@@ -227,24 +227,15 @@ def _interpolated(turns: Turns, values: Array) -> Array:
     four = np.clip(after[:, None] + np.arange(-2, 2), 0, x.size - 1)
     apart = np.diff(seconds[four], axis=1)
     smooth = np.all(np.isfinite(y[four]), axis=1) & np.all(apart > 0, axis=1) & np.all(apart < 3 * line.step, axis=1)
-    found[smooth] = _cubic(x[four[smooth]], y[four[smooth]], wanted[smooth])
+    near, at = x[four[smooth]], wanted[smooth]
+    for i in range(4):  # Lagrange's form
+        weight = np.prod([(at - near[:, j]) / (near[:, i] - near[:, j]) for j in range(4) if j != i], axis=0)
+        found[smooth] = (found[smooth] if i else 0.0) + weight * y[four[smooth]][:, i]
     at_end = np.abs(part - np.clip(part, 0, 1)) > 1.01  # no sample beyond: up to one step is extrapolated
     usual = float(np.median(np.diff(seconds)))
     gap = seconds[after] - seconds[after - 1] > GAP * line.step * np.maximum(1, np.rint(usual / line.step))
     found[at_end | gap] = np.nan
     return np.asarray(found.reshape(-1, turns.positions))
-
-
-def _cubic(x: Array, y: Array, at: Array) -> Array:
-    """The polynomial through four points, each row; Lagrange's form."""
-    total = np.zeros(at.size)
-    for i in range(4):
-        weight = np.ones(at.size)
-        for j in range(4):
-            if j != i:
-                weight *= (at - x[:, j]) / (x[:, i] - x[:, j])
-        total += weight * y[:, i]
-    return total
 
 
 def turn_means(course: Array) -> Array:

@@ -10,11 +10,9 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import core_schema
+from pydantic import AfterValidator, PlainSerializer, PlainValidator, WithJsonSchema
 
 from trunnion.model.entry import problem
 from trunnion.model.measure_table import MEASURES
@@ -115,48 +113,42 @@ def unit_name(exponents: Dimensions) -> str:
 # ---- entries of a file ----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Read:
-    """Annotation that makes pydantic read a text or number as an entry of a kind."""
-
-    kind: str
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        """Validation by the function of its kind."""
-        return core_schema.no_info_plain_validator_function(lambda value: _stated(value, self.kind))
-
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        """A number or a text; a unit is a text."""
-        types = ["string"] if self.kind == "unit" else ["number", "string"]
-        return {"type": types, "examples": [{"unit": "mV", "frequency": "2 kHz"}.get(self.kind, "12 mV")]}
+def _unit(value: object) -> str:
+    """A unit; a finding's error if it is none."""
+    if not isinstance(value, str):
+        raise problem("is not a unit", "write a unit such as mV or N m")
+    try:
+        dimensions(value)
+    except UnitError as error:
+        raise problem(error.what, error.remedy) from None
+    return value
 
 
-def _stated(value: object, kind: str) -> Any:
-    """The value of a kind; a finding's error if it is none."""
+def _amount(value: object) -> Amount:
+    """A number with its unit; a finding's error if it is none."""
     if isinstance(value, Amount):
         return value
+    if isinstance(value, str) and re.search(r"\d:\d\d:\d\d", value):
+        what = f"'{value}' is a time stamp; times are counted in seconds from the first row of the file"
+        raise problem(what, "write a time in seconds, such as [0 s, 0.5 s]")
     try:
-        if kind == "unit":
-            if not isinstance(value, str):
-                raise UnitError("is not a unit", "write a unit such as mV or N m")
-            dimensions(value)
-            return value
-        if isinstance(value, str) and re.search(r"\d:\d\d:\d\d", value):
-            what = f"'{value}' is a time stamp; times are counted in seconds from the first row of the file"
-            raise UnitError(what, "write a time in seconds, such as [0 s, 0.5 s]")
-        amount = read_amount(value)
-        if kind == "frequency" and not (amount.value > 0 and (amount.plain or amount.dimensions == HERTZ)):
-            raise UnitError(f"'{value}' is not a frequency above zero", "write it as 2 kHz or 500 Hz")
+        return read_amount(value)
     except UnitError as error:
         raise problem(error.what, error.remedy or "write a number with its unit such as 12 mV") from None
+
+
+def _frequency(value: object) -> Amount:
+    """A frequency above zero, plain numbers in Hz."""
+    amount = _amount(value)
+    if not (amount.value > 0 and (amount.plain or amount.dimensions == HERTZ)):
+        raise problem(f"'{amount.source}' is not a frequency above zero", "write it as 2 kHz or 500 Hz")
     return amount
 
 
-UnitText = Annotated[str, _Read("unit")]
-Number = Annotated[Amount, _Read("amount")]
-Frequency = Annotated[Amount, _Read("frequency")]
+_WRITTEN, _SOURCE = {"type": ["number", "string"]}, PlainSerializer(lambda amount: amount.source)
+UnitText = Annotated[str, PlainValidator(_unit), WithJsonSchema({"type": ["string"], "examples": ["mV"]})]
+Number = Annotated[Amount, PlainValidator(_amount), _SOURCE, WithJsonSchema({**_WRITTEN, "examples": ["12 mV"]})]
+Frequency = Annotated[Amount, PlainValidator(_frequency), _SOURCE, WithJsonSchema({**_WRITTEN, "examples": ["2 kHz"]})]
 
 
 # ---- from readings to quantities ------------------------------------------------------------------------------

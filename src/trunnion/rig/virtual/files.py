@@ -11,8 +11,9 @@ import math
 import os
 import tempfile
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from ruamel.yaml import YAML
@@ -22,9 +23,6 @@ from trunnion.files import guard
 from trunnion.rig.reading.rig_file import FORMATS, Rig
 from trunnion.rig.virtual.observation import Case, Record, Recorded, case_names, speed_differs
 from trunnion.version import __version__
-
-if TYPE_CHECKING:
-    from trunnion.rig.virtual.sensors import SensorChannel
 
 __all__ = [
     "MAPPING", "TRUTH", "check_folder", "check_form", "mapping_of", "truth_of", "write",
@@ -49,29 +47,19 @@ def check_form(form: str) -> None:
 def check_folder(rig: Rig, folder: str | os.PathLike[str], form: str) -> None:
     """MechanismError if a file of a rig would be written over one that is read, or over one that no rig has written.
 
-    A folder in which mapping and truth, as far as they are there, are those of a rig, and the truth is there, is a
-    rig's: its files are written anew.
+    What is in a folder with a truth that a rig has written is a rig's: its files are written anew.
     """
     folder = Path(folder)
-    files = [f"{name}.{form or rig.format}" for name in case_names(len(rig.schedule.rows()))]
-    for name in (*files, MAPPING, TRUTH):
+    names = [*(f"{name}.{form or rig.format}" for name in case_names(len(rig.schedule.rows()))), MAPPING, TRUTH]
+    for name in names:
         guard(folder / name)
-    strange = [name for name in (MAPPING, TRUTH) if (folder / name).exists() and not _of_a_rig(folder / name)]
-    if not (folder / TRUTH).exists():
-        strange += [name for name in files if (folder / name).exists()]
+    strange = [name for name in names if (folder / name).exists()]
+    with suppress(OSError):
+        if (folder / TRUTH).read_bytes().startswith(HEADS[TRUTH].encode()):
+            return
     if strange:
         what = f"{', '.join(strange[:3])}{' …' * (len(strange) > 3)} would be written over, and is of no virtual rig"
         raise MechanismError(Finding(what, str(folder), "name another folder, or move away what is there"))
-
-
-def _of_a_rig(path: Path) -> bool:
-    """Whether a mapping or truth begins as those do that are written here."""
-    head = HEADS[path.name].encode()
-    try:
-        with path.open("rb") as stream:
-            return stream.read(len(head)) == head
-    except OSError:
-        return False
 
 
 def write(
@@ -199,42 +187,40 @@ def _file(observation: Recorded, case: Case, form: str, timed: bool) -> dict[str
 
 def _angle(observation: Recorded) -> dict[str, Any]:
     """Where the coordinate of the driver comes from, and what a cycle is."""
-    run = observation.cases[0].run
-    driver = next(iter(observation.mechanism.drivers))
-    turns = run.system.turns(driver) and run.system.span(run.values, driver).one_way
+    case = observation.cases[0]
+    run, driver = case.run, case.driver
     duration = run.cycle.duration
-    if not turns:
+    if not case.named:
         return {"cycle": f"{duration:.15g} s"}
-    drives = [float(np.ravel(run.system.drive(run.values, driver, time)[0])[0]) for time in (0.0, duration)]
-    found: dict[str, Any] = {"angle": _source(observation, driver)}
-    extent = math.degrees(abs(drives[1] - drives[0]))
+    first, last = (float(np.ravel(run.system.drive(run.values, driver, time)[0])[0]) for time in (0.0, duration))
+    found: dict[str, Any] = {"angle": _source(observation, case)}
+    extent = math.degrees(abs(last - first))
     if abs(extent - 360) > 1e-9:
         found["cycle"] = f"{extent:.12g} deg"
-    if drives[0]:
-        found["start"] = f"{math.degrees(drives[0]):.12g} deg"
+    if first:
+        found["start"] = f"{math.degrees(first):.12g} deg"
     return found
 
 
-def _source(observation: Recorded, driver: str) -> dict[str, Any]:
+def _source(observation: Recorded, case: Case) -> dict[str, Any]:
     """The encoder if there is one, else a constant speed, else a measured one."""
-    case = observation.cases[0]
-    encoder = observation.rig.encoder
+    rate, encoder = observation.rate, observation.rig.encoder
     if encoder:
         found: dict[str, Any] = {"from": "pulses", "column": encoder.column, "per_turn": encoder.per_turn}
         found["kind"] = encoder.kind
-        if encoder.kind == "level" and case.drive(observation.rate)[1] < 0:
+        if encoder.kind == "level" and case.drive(rate)[1] < 0:
             found["sign"] = -1
-        zero = _counted_from(observation)
-        if zero:
+        if zero := _counted_from(observation):
             found["zero"] = f"{math.degrees(zero):.12g} deg"
         if encoder.index:
             found["index"] = {"column": encoder.index}
         return found
     if speed_differs(observation.cases):
-        measured = next(name for name, one in observation.channels.items() if one.measures == f"rate:{driver}")
-        start = math.degrees(case.drive(observation.rate)[0])
+        channels = observation.channels.items()
+        measured = next(name for name, one in channels if one.measures == f"rate:{case.driver}")
+        start = math.degrees(case.drive(rate)[0])
         return {"from": "speed", "channel": measured} | ({"zero": f"{start:.12g} deg"} if start else {})
-    start, speed = case.drive(observation.rate, -case.before)
+    start, speed = case.drive(rate, -case.before)
     return {"from": "time", "speed": f"{speed:.15g} rad/s", "zero": f"{math.degrees(start):.12g} deg"}
 
 
@@ -269,15 +255,12 @@ def _channel(observation: Recorded, name: str) -> dict[str, Any]:
     accuracy: dict[str, Any] = {}
     if channel.gain:
         accuracy["gain"] = stated.accuracy.gain.source
-    zero = _stated_zero(channel, observation.zero_uncertainty(name))
+    zero = observation.zero_uncertainty(name)
+    if channel.noise <= channel.step / 2:  # which does not carry readings over the steps of the converter
+        zero = math.hypot(zero, channel.step / math.sqrt(12))  # GUM F.2.2.1
     if zero:
         accuracy["zero"] = f"{zero:.4g} {channel.unit}"
     return found | ({"accuracy": accuracy} if accuracy else {})
-
-
-def _stated_zero(channel: SensorChannel, zero: float) -> float:
-    """Uncertainty of the zero with the steps of a converter that noise does not carry over (GUM F.2.2.1)."""
-    return zero if channel.noise > channel.step / 2 else math.hypot(zero, channel.step / math.sqrt(12))
 
 
 # ---- the truth ------------------------------------------------------------------------------------------------
@@ -292,48 +275,32 @@ def truth_of(observation: Recorded) -> dict[str, Any]:
         "model": mechanism.name,
         "model_hash": mechanism.digest,
         "seed": observation.seed,
-        "sensors": {
-            name: {
-                "measures": channel.measures,
-                "unit": channel.unit,
-                "gain_error": observation.drawn[name].gain,
-                "zero_error": observation.drawn[name].zero,
-                "offset": observation.drawn[name].offset,
-                "drift_per_second": _short(channel.drift),
-                "noise": _short(channel.noise),
-                "step": _short(channel.step),
-            }
-            for name, channel in observation.channels.items()
-        },
-        "conditions": [
-            {
-                "name": case.name,
-                "set": dict(case.settings),
-                "efficiency": case.efficiency if math.isfinite(case.efficiency) else None,
-                "cycle_seconds": case.run.cycle.duration,
-                "samples": "solved at each" if case.true.exact else f"between {len(case.true.time)} solved a cycle",
-                "mean": {name: _mean(observation, case, i) for i, name in enumerate(observation.channels)},
-            }
-            for case in observation.cases
-        ],
+        "sensors": {},
+        "conditions": [],
     }
+    for name, channel in observation.channels.items():
+        errors = observation.drawn[name]
+        found["sensors"][name] = {
+            "measures": channel.measures, "unit": channel.unit, "gain_error": errors.gain, "zero_error": errors.zero,
+            "offset": errors.offset, "drift_per_second": float(f"{channel.drift:.12g}"),
+            "noise": float(f"{channel.noise:.12g}"), "step": float(f"{channel.step:.12g}"),
+        }  # fmt: skip
+    for case in observation.cases:
+        whole = round(observation.rig.schedule.turns * case.run.cycle.duration * observation.rate)
+        part = slice(case.first, case.first + whole)
+        found["conditions"].append({
+            "name": case.name, "set": dict(case.settings),
+            "efficiency": case.efficiency if math.isfinite(case.efficiency) else None,
+            "cycle_seconds": case.run.cycle.duration,
+            "mean": {name: float(np.mean(case.true.at_samples(i)[part]))
+                     for i, name in enumerate(observation.channels)},
+        })  # fmt: skip
     if observation.skipped:
         found["left_out"] = list(observation.skipped)
     found["parameters"] = {
         path: float(np.ravel(value)[0]) for path, value in mechanism.parameters().items() if np.size(value) == 1
     }
     return found
-
-
-def _short(value: float) -> float:
-    """Without the rounding of a unit that was taken out."""
-    return float(f"{value:.12g}")
-
-
-def _mean(observation: Recorded, case: Case, i: int) -> float:
-    """Mean of a true course over the recorded cycles."""
-    whole = round(observation.rig.schedule.turns * case.run.cycle.duration * observation.rate)
-    return float(np.mean(case.true.at_samples(i)[case.first : case.first + whole]))
 
 
 HEADS = {

@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError, Severity, Status, counted
-from trunnion.measures.measures import Measure, named
+from trunnion.measures.measures import Measure
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
-from trunnion.rig.modelled import without_course
+from trunnion.rig.modelled import measure_of
 from trunnion.rig.reading.rig_file import Rig, Value
 from trunnion.rig.virtual import files
 from trunnion.rig.virtual.observation import Case, Recorded, case_names, check_seed, speed_differs
@@ -137,17 +137,10 @@ def _measures(rig: Rig, run: Run) -> list[Measure]:
     measures: list[Measure] = []
     findings: list[Finding] = []
     for name, sensor in rig.sensors.items():
-        where = f"sensors.{name}.measures"
         try:
-            measure = named(run.system.mechanism, [sensor.measures], run.values)[0]
+            measures.append(measure_of(run.system.mechanism, run, name, sensor.measures, "sensors"))
         except MechanismError as error:
-            findings += [replace(one, where=where) for one in error.findings]
-            continue
-        if not measure.everywhere or not measure.single(run.system):
-            what = f"'{sensor.measures}' is no number that a sensor shows at every instant{without_course(measure)}"
-            remedy = "write effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT, slide:JOINT or link.point.x"
-            findings.append(Finding(what, where, remedy))
-        measures.append(measure)
+            findings += error.findings
     if findings:
         raise MechanismError(findings)
     if run.determinacy is not None and not all(one.of_motion for one in measures):
@@ -203,8 +196,7 @@ def _case(
     if running < 3:
         what = f"a cycle of condition {number} takes {cycle.duration:.4g} s, no three samples"
         raise MechanismError(Finding(what, "rate", "sample faster"))
-    tolerances = {i: max(one.step, one.noise) / 10 for i, one in enumerate(channels.values())}
-    true = sampled(run, measures, rate, running, lead, tolerances)
+    true = sampled(run, measures, rate, running, lead)
     case = Case(number, name, row, run, before, running, after, lead, true)
     if not case.worst.solved:
         return case
@@ -238,11 +230,6 @@ def _findings(cases: Sequence[Case], channels: Mapping[str, SensorChannel], rig:
     sound = [case for case in cases if case.worst.solved]
     if not sound:
         return
-    if mended := [case for case in sound if case.true.mended]:
-        most = counted(max(case.true.mended for case in mended), "position")
-        what = f"{_which(mended)}: a load has no unique value at up to {most}, because its joint is at rest; sensors "
-        what += "read 0 during a rest, and the mean of the neighbours at a single position"
-        yield Finding(what, where, "", Severity.NOTE, code="rig.load_at_rest")
     yield from _of_encoder(sound, channels, rig)
     for i, (name, channel) in enumerate(channels.items()):
         peaks = {case.number: float(np.max(np.abs(case.true.values[i]))) for case in sound}
@@ -257,27 +244,23 @@ def _findings(cases: Sequence[Case], channels: Mapping[str, SensorChannel], rig:
 def _of_encoder(cases: Sequence[Case], channels: Mapping[str, SensorChannel], rig: Rig) -> Iterator[Finding]:
     """Whether the angle of the driver can be known from what is recorded."""
     driver, encoder, rate = cases[0].driver, rig.encoder, rig.rate.value
-    if encoder is not None and encoder.kind == "level":
-        spans = {case.number: float(case.run.system.span(case.run.values, driver).peak) / (2 * np.pi) for case in cases}
-        lost = [case for case in cases if 4 * spans[case.number] * encoder.per_turn > rate * (1 + 1e-9)]
-        if lost:
-            most = max(spans.values()) * encoder.per_turn
-            what = f"{_which(lost)}: some encoder pulses are lost: up to {most:.4g} pulses per second, sampled at "
+    level, both = encoder is not None and encoder.kind == "level", "the conditions turn in both directions"
+    if encoder is not None and level:
+        pulses = {case.number: encoder.per_turn * float(case.run.system.span(case.run.values, driver).peak)
+                  for case in cases}  # fmt: skip
+        if lost := [case for case in cases if 4 * pulses[case.number] / (2 * np.pi) > rate * (1 + 1e-9)]:
+            what = f"{_which(lost)}: some encoder pulses are lost: up to {max(pulses.values()) / (2 * np.pi):.4g} "
+            what += f"pulses per second, sampled at {rate:.4g} Hz"
             remedy = "use a sampling rate of four times the pulse rate, or record kind: count"
-            yield Finding(f"{what}{rate:.4g} Hz", "encoder.kind", remedy, Severity.WARNING, code="rig.pulses_lost")
-    both = "the conditions turn in both directions"
-    if len({case.drive(rate)[1] > 0 for case in cases if case.named}) > 1:
-        if encoder is None:
-            remedy = "state an encoder of kind: count, or one rig for each direction"
-            what = f"{both}, and no channel measures the angle of the driver"
-            yield Finding(what, "encoder", remedy, code="rig.both_ways")
-        elif encoder.kind == "level":
-            what = f"{both}, which the level of an encoder does not distinguish"
-            yield Finding(what, "encoder.kind", "record kind: count", code="rig.both_ways_level")
-    known = encoder or any(one.measures == f"rate:{driver}" for one in channels.values())
-    if not known and speed_differs(cases):
+            yield Finding.warning("rig.pulses_lost", "encoder.kind", what, remedy)
+    if len({case.drive(rate)[1] > 0 for case in cases if case.named}) > 1 and (encoder is None or level):
+        remedy = "state an encoder of kind: count, or one rig for each direction"
+        what = f"{both}, which the level of an encoder does not distinguish" if level else both
+        what += "" if level else ", and no channel measures the angle of the driver"
+        yield Finding.error("rig.both_ways", "encoder.kind" if level else "encoder", what, remedy)
+    if not encoder and speed_differs(cases) and f"rate:{driver}" not in {one.measures for one in channels.values()}:
         what = f"the conditions differ in speed, and no channel measures the angle of {driver}"
-        yield Finding(what, "encoder", f"state an encoder, or a sensor of rate:{driver}", code="rig.no_angle")
+        yield Finding.error("rig.no_angle", "encoder", what, f"state an encoder, or a sensor of rate:{driver}")
 
 
 def _which(cases: Sequence[Case]) -> str:

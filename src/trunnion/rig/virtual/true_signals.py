@@ -1,13 +1,12 @@
 """True courses of a working condition: what the model does at the instants at which a rig samples.
 
-Where sampling rate and cycle are commensurate within the recorded cycles, samples fall on the same phases again and
-again: the model is solved at exactly these. Where that is not so, or there are more than MOST_EXACT, it is solved on a
-fine grid of the cycle and interpolated between, if that is finer than the sensors tell; else at every sample.
+Where sampling rate and cycle are commensurate, samples fall on the same phases again and again: the model is solved
+once at each of these.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,59 +14,38 @@ from numpy.typing import NDArray
 
 from trunnion.cycle.positions import positions
 from trunnion.errors import Status
+from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
-from trunnion.solve.seating import seating_of
-from trunnion.solve.status import status_of
 
-__all__ = ["MOST_EXACT", "SampledSignals", "cycle_efficiency", "phases", "sampled"]
+__all__ = ["SampledSignals", "cycle_efficiency", "phases", "sampled"]
 
 Array = NDArray[np.float64]
-MOST_EXACT = 20_000  # instants at which a model is solved without asking
-GRID, FINEST = 8_192, 131_072  # positions of the cycle to interpolate between
-CHUNK = 8_192
 EFFICIENCY_STEPS = 720
+CHUNK = 8_192  # instants at once: memory and cache
 DIGITS = 12  # of a share of the cycle, in which instants that are one agree
-WORST = 0.999  # share of the positions that the error of interpolation is told of: it has no bound at a jump
 
 
 @dataclass(frozen=True)
 class SampledSignals:
-    """The courses of one condition at the samples of its run, SI.
+    """The courses of one condition, SI.
 
-    values: (measure, instant) at `time`; mended: instants where a course has no single value; place: of each sample
-    among the instants, None to interpolate at `phase`.
+    time: ascending instants of the cycle, s; values: (measure, instant); status: of the instants; place: of each sample
+    of the run among them.
     """
 
     time: Array
     values: Array
     status: NDArray[np.int8]
-    mended: int
-    place: NDArray[np.intp] | None
-    phase: Array
-    period: float | None
-
-    @property
-    def exact(self) -> bool:
-        """Whether every sample is an instant that was solved."""
-        return self.place is not None
+    place: NDArray[np.intp]
 
     def at_samples(self, i: int) -> Array:
         """The course of one measure at every sample."""
-        if self.place is not None:
-            return np.asarray(self.values[i][self.place])
-        return np.asarray(np.interp(self.phase, self.time, self.values[i], period=self.period))
+        return np.asarray(self.values[i][self.place])
 
 
-def sampled(
-    run: Run,
-    measures: Sequence[Measure],
-    rate: float,
-    count: int,
-    lead: float = 0.0,
-    tolerances: Mapping[int, float] | None = None,
-) -> SampledSignals:
+def sampled(run: Run, measures: Sequence[Measure], rate: float, count: int, lead: float = 0.0) -> SampledSignals:
     """Solve the model at the samples of a rig.
 
     Parameters
@@ -76,25 +54,12 @@ def sampled(
     measures : what its sensors measure.
     rate, count : of the samples, Hz.
     lead : sampling intervals that the first of them lies before the start of the cycle.
-    tolerances : of each measure by its place, SI: how far interpolation may be off.
     """
-    duration, periodic = run.cycle.duration, run.cycle.periodic
-    time: Array = np.asarray((np.arange(count) - lead) / rate, float)
-    if not periodic:
-        instants, place = np.minimum(time, duration), np.arange(count)
+    if run.cycle.periodic:
+        time, place = phases(run.cycle.duration, rate, count, lead)
     else:
-        instants, place = phases(duration, rate, count, lead)
-    if periodic and len(instants) > MOST_EXACT:
-        grid = GRID
-        while grid <= FINEST:
-            at = np.linspace(0.0, duration, grid, endpoint=False)
-            values, status, mended = _solved(run, measures, at)
-            limits = {i: limit for i, limit in (tolerances or {}).items() if limit > 0}
-            fine = all(not _error(values[i], at, duration) > limit for i, limit in limits.items())
-            if fine or np.any(status >= Status.NOT_CONVERGED):
-                return SampledSignals(at, values, status, mended, None, np.mod(time, duration), duration)
-            grid *= 4
-    return SampledSignals(instants, *_solved(run, measures, instants), place, time, duration if periodic else None)
+        time, place = np.minimum((np.arange(count) - lead) / rate, run.cycle.duration), np.arange(count)
+    return SampledSignals(time, *_solved(run, measures, time), place)
 
 
 def phases(duration: float, rate: float, count: int, lead: float = 0.0) -> tuple[Array, NDArray[np.intp]]:
@@ -107,33 +72,26 @@ def phases(duration: float, rate: float, count: int, lead: float = 0.0) -> tuple
     return distinct * duration, place
 
 
-def _error(row: Array, time: Array, duration: float) -> float:
-    """Error of straight lines between the positions: a quarter of that between every other one, at its middle."""
-    middle = np.interp(time[1::2], time[::2], row[::2], period=duration)
-    return float(np.quantile(np.abs(middle - row[1::2]), WORST)) / 4
-
-
-def _solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, NDArray[np.int8], int]:
-    """Courses of measures at ascending times (s) of the cycle, with pins in their seats; status; how many are mended.
+def _solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, NDArray[np.int8]]:
+    """Courses of measures at ascending times (s) of the cycle, with pins in their seats; status.
 
     Where a load or friction is an interval, at a speed of zero, a course is the mean of its neighbours; a load whose
     joint rests at several positions on end is 0 there: nothing moves against it.
     """
-    values, status = np.empty((len(measures), len(time))), np.empty(len(time), np.int8)
-    method = FrictionMethod()
-    for low in range(0, len(time), CHUNK):
-        window = slice(low, min(low + CHUNK, len(time)))
-        part = time[window]
-        back = seating_of(run, method).at(part, method).back if run.seats else run.solve(part)
-        status[window] = status_of(back, part.shape)
-        with np.errstate(all="ignore"):
-            for i, measure in enumerate(measures):
-                values[i, window] = np.broadcast_to(measure.curve(back)[0], part.shape)
+    alike, parts = list({one.name: one for one in measures}.values()), np.array_split(time, -(-len(time) // CHUNK))
+    solved = [courses_of(run, alike, part, FrictionMethod()) for part in parts]
+    status = np.concatenate([codes for _, codes in solved])
+    rows = [
+        [np.broadcast_to(np.asarray(curves[one.name][0], float), part.shape)
+         for (curves, _), part in zip(solved, parts, strict=True)]
+        for one in measures
+    ]  # fmt: skip
+    values = np.array([np.concatenate(row) for row in rows])
     lost = status >= Status.NOT_CONVERGED
     values[:, lost] = np.nan
     gaps = ~np.isfinite(values)
     if lost.any() or not gaps.any():
-        return values, status, 0
+        return values, status
     for row in np.flatnonzero(gaps.any(axis=1)).tolist():
         if measures[row].kind == "load":
             before, after = np.roll(gaps[row], 1), np.roll(gaps[row], -1)
@@ -144,7 +102,7 @@ def _solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, 
         if known.any():
             period = run.cycle.duration if run.cycle.periodic else None
             values[row, ~known] = np.interp(time[~known], time[known], values[row, known], period=period)
-    return values, status, int(np.count_nonzero(gaps.any(axis=0)))
+    return values, status
 
 
 def cycle_efficiency(run: Run) -> float:

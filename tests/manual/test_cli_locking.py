@@ -97,6 +97,6 @@ def test_a_weight_that_is_a_mass_has_the_ranges_of_the_same_load(program: Run, t
         assert locked.code == 0
         told[name] = locked.out.partition("ranges of A")[2]
         for out in (locked.out, program("analyse", f"{name}.json", "--steps", 41).out):
-            assert ("undefined" in out and "state what it lifts" in out) == (name == "mass")
+            assert ("undefined" in out and "of what it lifts" in out) == (name == "mass")
     assert told["mass"] == told["load"]
     assert "self-locking │  72.54°" in told["mass"]

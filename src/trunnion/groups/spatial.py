@@ -7,7 +7,7 @@ row: it does not spin about the line of its joints.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -103,7 +103,7 @@ class SpatialGroup(Tree):
         return scaled(1 / xp.sqrt(xp.where(stretched, square, 1.0)), apart)
 
     def further_rows(
-        self, placed: Sequence[Element], screws: Sequence[list[Screw]], drive: Sequence[Number]
+        self, placed: Sequence[Element], screws: Sequence[list[Screw]], drive: Sequence[Number], size: Number
     ) -> list[list[Number]]:
         """Rates of the free spins."""
         rows = []
@@ -112,7 +112,7 @@ class SpatialGroup(Tree):
             rows.append([path.get(k, 0) * dot(axis, screws[k][i].u) for k, i in self.free])
         return rows
 
-    def further_rates(self, pose: Pose, twists: Sequence[Screw], outer: Sequence[Any]) -> list[Number]:
+    def further_rates(self, pose: Pose, twists: Sequence[Screw], relative: Callable[[int], Any]) -> list[Number]:
         """ω · u = 0, and u̇ = ω × u: the second derivative has no further term."""
         return [dot(self.spin_axis(pose.elements, a, b), twists[link].u) for link, a, b in self.spinning]
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import functools
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
@@ -271,13 +271,16 @@ class Tree(ABC):
         """The wrench on the second side of a chord that the multipliers of its rows stand for."""
 
     def further_rows(
-        self, placed: Sequence[Element], screws: Sequence[list[Any]], drive: Sequence[Number]
+        self, placed: Sequence[Element], screws: Sequence[list[Any]], drive: Sequence[Number], size: Number
     ) -> list[list[Number]]:
         """Rows of J beyond those of the chords: of gear pairs, of links that must not spin."""
         return []
 
-    def further_rates(self, pose: Pose, twists: Sequence[Any], outer: Sequence[Any]) -> list[Number]:
-        """Rates of these rows, or second derivatives from those of the twists."""
+    def further_rates(self, pose: Pose, twists: Sequence[Any], relative: Callable[[int], Any]) -> list[Number]:
+        """Rates of these rows, or second derivatives from those of the twists.
+
+        relative: twist of the second link of a joint against the first; of second derivatives those of its freedoms.
+        """
         return []
 
     def further_loads(self, pose: Pose, multipliers: Sequence[Number]) -> list[tuple[int, Any]]:
@@ -454,7 +457,7 @@ class Tree(ABC):
                     column = column if weight == 1 else [weight * entry for entry in column]
                 columns.append(column)
             matrix += [[column[row] if column else 0.0 for column in columns] for row in range(self.count(chord))]
-        return matrix + self.further_rows(placed, screws, drive)
+        return matrix + self.further_rows(placed, screws, drive, size)
 
     # ---- velocity and acceleration ----------------------------------------------------------------------------
 
@@ -480,7 +483,9 @@ class Tree(ABC):
         for k in self.chords:
             relative = self.algebra.minus(self.across(k, found, outer_seconds), carried[k])
             rows += self._opened(pose, k, relative, driven[k])
-        rows += self.further_rates(pose, found, outer_seconds)
+        rows += self.further_rates(
+            pose, found, lambda k: self.algebra.minus(self.across(k, found, outer_seconds), carried[k])
+        )
         return twists, self._accelerations(pose, outer_seconds, self._closing(pose, driven, rows), carried)
 
     def rates(self, pose: Pose, outer: Sequence[Any], drive: Sequence[Number] = ()) -> Coordinates:
@@ -492,7 +497,9 @@ class Tree(ABC):
         rows: list[Number] = []
         for k in self.chords:
             rows += self._opened(pose, k, self.across(k, twists, outer), rates[k])
-        return self._closing(pose, rates, rows + self.further_rates(pose, twists, outer))
+        return self._closing(
+            pose, rates, rows + self.further_rates(pose, twists, lambda k: self.across(k, twists, outer))
+        )
 
     def _opened(self, pose: Pose, chord: int, relative: Any, rates: Sequence[Number]) -> Sequence[Number]:
         """Rates of the rows of a chord that moves like that, of which its own freedoms take a part."""

@@ -129,7 +129,7 @@ def rack_on_rocker() -> Data:
         },
         "gears": {"mesh": {"joints": ["S", "B"], "radius": 0.06, "phase": 0.02, "pressure_angle": 0.3}},
         "drivers": {"A": {"speed": 3.0, "start": 0.4}},
-        "loads": {"work": {"joint": "B", "resisting_torque": 4.0}},
+        "loads": {"work": {"link": "pinion", "moment": 4.0}},
         "assembly": {"S": [0.7, 0.15]},
     }
 
@@ -139,7 +139,7 @@ def rack_in_loop() -> Data:
     return {
         "links": {
             "ground": {"points": {"A": [0, 0], "E": [1.0, 0.0], "U": [-0.6, 0.0]}},
-            "crank": body({"A": [0, 0], "B": [0.15, 0]}, 1, 0.15),
+            "crank": body({"A": [0, 0], "B": [0.09, 0]}, 1, 0.09),
             "left": body({"B": [0, 0], "C": [0.9, 0], "S": slide(0.5, 0.1)}, 2, 0.8),
             "right": body({"C": [0, 0], "D": [0.7, 0]}, 3, 0.7),
             "wheel": body({"D": [0, 0], "E": [0.5, 0]}, 4, 0.5),
@@ -157,7 +157,7 @@ def rack_in_loop() -> Data:
             "U": revolute("rod", "ground"),
         },
         "gears": {"mesh": {"joints": ["C", "S"], "radius": 0.1, "phase": 0.05}},
-        "drivers": {"A": {"speed": 4.0, "start": 0.35}},
+        "drivers": {"A": {"speed": 4.0, "start": 0.2}},
         "loads": {"work": {"link": "left", "at": "S", "force": [4.0, -9.0]}},
         "assembly": {"C": [0.65, 0.8], "T": [0.07, 0.2]},
     }

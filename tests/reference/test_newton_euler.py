@@ -119,6 +119,8 @@ def tooth_contact(run: Run, back: Any, name: str, i: int) -> newton_euler.Joint:
     (carrier,) = pairs[0] & pairs[1]
     one, two = (next(iter(pair - {carrier})) for pair in pairs)
     a, d = (walk.element(carrier, joint) for joint in run.system.mechanism.gears[name].joints)
+    if run.system.mechanism.gears[name].slides:
+        return rack_contact(run, back, name, i)
     centre, line = np.array([here(a.x), here(a.y)]), np.array([here(d.x - a.x), here(d.y - a.y)])
     spin = [here(walk.motions[link].twist.w - walk.motions[carrier].twist.w) for link in (one, two)]
     point = centre + line * spin[1] / (spin[1] - spin[0])
@@ -130,9 +132,38 @@ def tooth_contact(run: Run, back: Any, name: str, i: int) -> newton_euler.Joint:
     return newton_euler.Joint("contact", first, second, point, tangent, found)
 
 
+def rack_contact(run: Run, back: Any, name: str, i: int) -> newton_euler.Joint:
+    """The teeth of a rack: they touch where the pinion has the rack's velocity, as the link that carries both sees it."""
+
+    def here(number: Any) -> float:
+        return float(np.broadcast_to(number, (STEPS,))[i])
+
+    walk, pair = back.walk, run.system.mechanism.gears[name].joints
+    turning, sliding = sorted(pair, key=lambda joint: run.system.joints[joint][0] == "prismatic")
+    sides = [set(run.system.joints[joint][1]) for joint in (turning, sliding)]
+    (carrier,) = sides[0] & sides[1]
+    pinion, rack = (next(iter(side - {carrier})) for side in sides)
+    centre = walk.element(carrier, turning)
+    against = {
+        link: walk.algebra.minus(walk.motions[link].twist, walk.motions[carrier].twist) for link in (pinion, rack)
+    }
+    at, spin = np.array([here(centre.x), here(centre.y)]), here(against[pinion].w)
+    velocity = np.array([here(against[rack].x), here(against[rack].y)])  # the rack does not turn against the carrier
+    towards = np.array([velocity[1], -velocity[0]]) / spin
+    tangent = velocity / np.hypot(*velocity)
+    across = np.array([-tangent[1], tangent[0]])
+    push = across @ [here(part) for part in back.gears[name].force]  # on the rack
+    ground = run.system.mechanism.fixed_link
+    first, second = (None if link == ground else link for link in (pinion, rack))
+    return newton_euler.Joint("contact", first, second, at + towards, tangent, push)
+
+
+NO_CONTACT = ("rocker train", "screwed strut")  # torques alone; a screw against a driven slide in `test_racks`
+
+
 @pytest.mark.spread(12)
 @pytest.mark.parametrize("friction", [None, 0.15])
-@pytest.mark.parametrize("name", [name for name in MODELS if name != "rocker train"])  # a train has no contact
+@pytest.mark.parametrize("name", [name for name in MODELS if name not in NO_CONTACT])
 def test_reactions_and_efforts(name: str, friction: float | None) -> None:
     """Same reactions and efforts to 1e-8: eighth-order differences are good to about 1e-10 of the accelerations."""
     data = model(MODELS[name](), friction=friction)

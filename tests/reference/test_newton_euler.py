@@ -133,7 +133,7 @@ def tooth_contact(run: Run, back: Any, name: str, i: int) -> newton_euler.Joint:
 
 
 def rack_contact(run: Run, back: Any, name: str, i: int) -> newton_euler.Joint:
-    """The teeth of a rack: they touch where the pinion has the rack's velocity, as the link that carries both sees it."""
+    """The teeth of a rack: they touch where the pinion has the rack's velocity, as their carrier sees it."""
 
     def here(number: Any) -> float:
         return float(np.broadcast_to(number, (STEPS,))[i])

@@ -18,7 +18,19 @@ from trunnion.algebra.literal import is_zero
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Frame, Vector2, Wrench, about, times
 
-__all__ = ["NUMBERS", "GearPair", "Mesh", "ToothForce", "actions", "apart", "mesh", "rotation", "slide_of", "turn_from"]
+__all__ = [
+    "NUMBERS",
+    "GearPair",
+    "Mesh",
+    "ToothForce",
+    "actions",
+    "apart",
+    "mesh",
+    "rotation",
+    "slide_of",
+    "thread_forces",
+    "turn_from",
+]
 
 NUMBERS = (
     3  # that a module is given for each gear pair, after its drive: ratio, phase, coordinate φ₁ to the nearest turn
@@ -145,6 +157,15 @@ def _effort(pair: Sequence[Frame], slides: bool, size: Number) -> Wrench:
         return Wrench(0.0, 0.0, size)
     first, second = pair[:2]
     return about((size * first.c, size * first.s), 0.0, (second.x, second.y))
+
+
+def thread_forces(gear: GearPair, elements: Sequence[Any], torque: Number, force: Number) -> list[ToothForce]:
+    """What a torque, N m, in the joint of a screw that turns and a force, N, in that which slides do to the links."""
+    return [
+        ToothForce(joint, side, _effort(elements[joint], slides, sign * (force if slides else torque)))
+        for joint, slides in gear.joints
+        for side, sign in ((1, 1.0), (0, -1.0))
+    ]
 
 
 def apart(gear: GearPair, touch: Mesh, size: Number) -> list[ToothForce]:

@@ -270,6 +270,22 @@ class System:
             return values[f"{where}.lead"] / (2 * np.pi)
         return values[f"{where}.{'ratio' if gear.radius is None else 'radius'}"]
 
+    @cached_property
+    def screws(self) -> dict[str, list[str]]:
+        """Gear pairs that are screws, by the joint that turns: its friction is that of their threads."""
+        screws: dict[str, list[str]] = {}
+        for name, gear in self.mechanism.gears.items():
+            if gear.lead is not None:
+                screws.setdefault(self.mechanism.coupled(name)[0], []).append(name)
+        return screws
+
+    def rubbing_joint(self, number: int, place: int) -> str:
+        """The joint whose friction acts at a place of a module: of its joints, then of its gear pairs."""
+        places = self.places[number]
+        if place < len(places):
+            return places[place].joint
+        return self.mechanism.coupled(self.plan.modules[number].gears[place - len(places)])[0]
+
     def elements(self, values: Values) -> dict[tuple[str, str], Any]:
         """Local frame of every joint's element, by (link, joint): errors of joints are in the second ones.
 
@@ -337,7 +353,10 @@ class System:
         return elements
 
     def lead(self, values: Values, joint: str) -> Number:
-        """Slide for one radian of a helical pair, m; 0 of others."""
+        """Slide for one radian of a helical pair, m; 0 of others.
+
+        The joints of a screw in the plane are two, and neither is helical.
+        """
         return values[f"joints.{joint}.pitch"] / (2 * np.pi) if PAIRS[self.joints[joint][0]].threaded else 0.0
 
     def support(self, values: Values, joint: str) -> Support:

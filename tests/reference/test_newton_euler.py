@@ -188,7 +188,10 @@ def test_reactions_and_efforts(name: str, friction: float | None) -> None:
 
 @pytest.mark.parametrize("name", MODELS)
 def test_friction_obeys_its_law(name: str) -> None:
-    """|M| = f r |F| at a pin, |F_t| = f (|F_n/2 + M/L| + |F_n/2 − M/L|) in a guide, against the slip."""
+    """|M| = f r |F| at a pin, |F_t| = f (|F_n/2 + M/L| + |F_n/2 − M/L|) in a guide, against the slip.
+
+    In a thread |M| = f r N cos λ, N being the part of the force between screw and nut that is square to its flank.
+    """
     coefficient, radius, guide = 0.15, 0.01, 0.4
     run = prepare(build(MODELS[name](), friction=coefficient, radius=radius, guide=guide))
     back = run.solve(times(run))
@@ -200,9 +203,16 @@ def test_friction_obeys_its_law(name: str) -> None:
             axis = back.walk.element(first, joint)
             across = axis.c * reaction.y - axis.s * reaction.x
             normals[joint] = np.abs(across / 2 + reaction.m / guide) + np.abs(across / 2 - reaction.m / guide)
+    levers = {joint: radius if kind == "revolute" else 1.0 for joint, (kind, _) in run.system.joints.items()}
+    for name, gear in run.system.mechanism.gears.items():
+        if gear.lead is not None:
+            turning, sliding = gear.joints
+            axis, slope = back.walk.ends(sliding)[0], np.arctan2(run.values[f"gears.{name}.lead"] / (2 * np.pi), radius)
+            x, y = back.gears[name].force
+            square = (axis.c * x + axis.s * y) * np.cos(slope) - back.gears[name].torque / radius * np.sin(slope)
+            normals[turning], levers[turning] = np.abs(square), radius * np.cos(slope)
     largest = max(float(np.max(normal)) for normal in normals.values())
-    for joint, (kind, _) in run.system.joints.items():
-        lever = radius if kind == "revolute" else 1.0
+    for joint, lever in levers.items():
         expected = -np.sign(back.walk.speed(joint)) * coefficient * lever * normals[joint]
         # the iteration rests where no normal load changes by more than 1e-8 of the largest
         np.testing.assert_allclose(

@@ -6,7 +6,7 @@ stay on the axis and two directions to agree; a driven one also prescribes its c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -156,11 +156,13 @@ class General(Tree):
             rows.append(row)
         return rows
 
-    def further_rates(self, pose: Pose, twists: Sequence[Twist], relative: Callable[[int], Twist]) -> list[Number]:
-        """Of each gear pair, from the turns and slides of its joints."""
+    def further_rates(self, pose: Pose, twists: Sequence[Twist], outer: Sequence[Any]) -> list[Number]:
+        """Of each gear pair, from the turns and slides of its joints; what carries a slide along lies across it."""
         rates = []
         for gear, ratio in zip(self.gears, pose.ratios, strict=True):
-            first, second = (_rate(pose.elements[k], relative(k), slides) for k, slides in gear.joints)
+            first, second = (
+                _rate(pose.elements[k], self.across(k, twists, outer), slides) for k, slides in gear.joints
+            )
             rate = second - ratio * first
             rates.append(rate / pose.size if gear.slide == 1 else rate)
         return rates

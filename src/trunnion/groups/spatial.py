@@ -7,7 +7,7 @@ row: it does not spin about the line of its joints.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -112,7 +112,7 @@ class SpatialGroup(Tree):
             rows.append([path.get(k, 0) * dot(axis, screws[k][i].u) for k, i in self.free])
         return rows
 
-    def further_rates(self, pose: Pose, twists: Sequence[Screw], relative: Callable[[int], Any]) -> list[Number]:
+    def further_rates(self, pose: Pose, twists: Sequence[Screw], outer: Sequence[Any]) -> list[Number]:
         """ω · u = 0, and u̇ = ω × u: the second derivative has no further term."""
         return [dot(self.spin_axis(pose.elements, a, b), twists[link].u) for link, a, b in self.spinning]
 

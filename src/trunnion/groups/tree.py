@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import functools
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
@@ -276,11 +276,8 @@ class Tree(ABC):
         """Rows of J beyond those of the chords: of gear pairs, of links that must not spin."""
         return []
 
-    def further_rates(self, pose: Pose, twists: Sequence[Any], relative: Callable[[int], Any]) -> list[Number]:
-        """Rates of these rows, or second derivatives from those of the twists.
-
-        relative: twist of the second link of a joint against the first; of second derivatives those of its freedoms.
-        """
+    def further_rates(self, pose: Pose, twists: Sequence[Any], outer: Sequence[Any]) -> list[Number]:
+        """Rates of these rows, or second derivatives from those of the twists."""
         return []
 
     def further_loads(self, pose: Pose, multipliers: Sequence[Number]) -> list[tuple[int, Any]]:
@@ -483,9 +480,7 @@ class Tree(ABC):
         for k in self.chords:
             relative = self.algebra.minus(self.across(k, found, outer_seconds), carried[k])
             rows += self._opened(pose, k, relative, driven[k])
-        rows += self.further_rates(
-            pose, found, lambda k: self.algebra.minus(self.across(k, found, outer_seconds), carried[k])
-        )
+        rows += self.further_rates(pose, found, outer_seconds)
         return twists, self._accelerations(pose, outer_seconds, self._closing(pose, driven, rows), carried)
 
     def rates(self, pose: Pose, outer: Sequence[Any], drive: Sequence[Number] = ()) -> Coordinates:
@@ -497,9 +492,7 @@ class Tree(ABC):
         rows: list[Number] = []
         for k in self.chords:
             rows += self._opened(pose, k, self.across(k, twists, outer), rates[k])
-        return self._closing(
-            pose, rates, rows + self.further_rates(pose, twists, lambda k: self.across(k, twists, outer))
-        )
+        return self._closing(pose, rates, rows + self.further_rates(pose, twists, outer))
 
     def _opened(self, pose: Pose, chord: int, relative: Any, rates: Sequence[Number]) -> Sequence[Number]:
         """Rates of the rows of a chord that moves like that, of which its own freedoms take a part."""

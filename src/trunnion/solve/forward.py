@@ -194,16 +194,13 @@ class Forward:
         ]
 
     def outside(self, place: Place) -> tuple[Any, Any]:
-        """Motion of the known link of a module's joint; of a witness that of its second link against its first, as the
-        first sees it."""
+        """Motion of the known link of a module's joint; of a witness that of its second link against its first."""
         outer = [self.motions[link] for link, is_outer in zip(place.links, place.outer, strict=True) if is_outer]
         if len(outer) < 2:
             return (outer[0].twist, outer[0].acceleration) if outer else (None, None)
         first, second = outer
         minus = self.algebra.minus
-        twist = minus(second.twist, first.twist)
-        carried = self.algebra.bracket(first.twist, twist)
-        return twist, minus(minus(second.acceleration, first.acceleration), carried)
+        return minus(second.twist, first.twist), minus(second.acceleration, first.acceleration)
 
     def unspun(self, number: int, pose: Any, twists: Mapping[str, Any]) -> dict[str, Any]:
         """Twists of a module's links with a free spin, without what they spin; none have one in the plane."""

@@ -82,14 +82,19 @@ def test_rack_steering(order: tuple[str, str], angle: float) -> None:
     np.testing.assert_allclose(at(result, "reaction_force", "y", joint="S"), force * tilt + rod, rtol=1e-9, atol=1e-6)
 
 
-def test_driven_rack_turns_the_pinion() -> None:
-    """The pair the other way round: the rack drives, a torque on the pinion asks for T/r on the rack."""
-    data = steering({"S": {"speed": 0.02, "range": [-0.1, 0.1]}})
+def wheel_and_rack(driver: Data) -> Data:
+    data = steering(driver)
     data["loads"] = {"wind": {"joint": "P", "resisting_torque": 3.0}}
     data["links"] = {name: data["links"][name] for name in ("frame", "pinion", "rack")}
     data["joints"] = {name: data["joints"][name] for name in ("P", "S")}
     data["links"]["frame"]["points"].pop("K")
     data["assembly"] = {}
+    return data
+
+
+def test_driven_rack_turns_the_pinion() -> None:
+    """The pair the other way round: the rack drives, a torque on the pinion asks for T/r on the rack."""
+    data = wheel_and_rack({"S": {"speed": 0.02, "range": [-0.1, 0.1]}})
     result = trunnion.analyse(Mechanism(**data), 9)
     np.testing.assert_allclose(at(result, "drive_effort", driver="S"), 3.0 / RADIUS, rtol=1e-12)
     np.testing.assert_allclose(at(result, "gear_torque", gear="mesh"), 3.0, rtol=1e-12)
@@ -97,6 +102,33 @@ def test_driven_rack_turns_the_pinion() -> None:
     # two turns and more to either side, not taken back to one
     turned = at(result, "link_angle", link="pinion")
     np.testing.assert_allclose(turned - turned[4], np.linspace(-0.1, 0.1, 9) / RADIUS, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("joint", ["P", "S"])
+@pytest.mark.parametrize("ends", [(0.0, 1000.0), (200.0, 210.0), (-900.0, -1000.0)])
+def test_many_turns_away(joint: str, ends: tuple[float, float]) -> None:
+    """Thousands of radii from where the rack is drawn, and turns by hundreds from one position to the next."""
+    rotation = 2 * np.pi * np.linspace(*ends, 90)
+    coordinate = rotation if joint == "P" else RADIUS * rotation
+    driver = {"speed": float(np.sign(ends[1] - ends[0])), "range": [float(coordinate[0]), float(coordinate[-1])]}
+    result = trunnion.analyse(Mechanism(**wheel_and_rack({joint: driver})), 90)
+    np.testing.assert_allclose(at(result, "joint_slide", joint="S"), RADIUS * rotation, rtol=1e-12, atol=1e-12)
+    off = at(result, "joint_rotation", joint="P") - rotation
+    np.testing.assert_allclose(np.exp(1j * off), 1.0, atol=1e-9)
+
+
+def test_motion_of_the_knuckle_stated() -> None:
+    """The pinion is driven by what the knuckle is to do, turns of its own included; the efforts are the same."""
+    law = {"moves": "K", "speed": 0.5, "range": [-0.25, 0.25]}
+    data = steering({"P": law})
+    data["assembly"] = {"A": [0.58, 0.01], "T": [0.3, 0.0]}
+    result = trunnion.analyse(Mechanism(**data), 9)
+    rack = at(result, "joint_slide", joint="S")
+    np.testing.assert_allclose(knuckle_by_hand(rack), np.linspace(-0.25, 0.25, 9), atol=1e-9)
+    assert np.abs(rack[0] / RADIUS) > np.pi
+    h = 1e-5
+    rate = (knuckle_by_hand(rack + h) - knuckle_by_hand(rack - h)) / (2 * h)
+    np.testing.assert_allclose(at(result, "drive_effort", driver="P"), TORQUE * RADIUS * np.abs(rate), rtol=1e-7)
 
 
 def hoist(**wheel: Any) -> Data:
@@ -219,6 +251,19 @@ def test_jack_with_two_threads(friction: float | None) -> None:
     pull = LOAD * width / np.sqrt(4 * ARM**2 - width**2)
     torque = 2 * pull * MEAN * np.tan(SLOPE + np.arctan(friction or 0.0))
     np.testing.assert_allclose(at(result, "drive_effort", driver="W"), torque, rtol=1e-12)
+
+
+def test_jack_by_the_height_it_lifts_to() -> None:
+    """The saddle's motion is stated: the screw makes P r tan(λ + φ) at each height, P = F w/h."""
+    data = jack(0.15, 10.0)
+    data["drivers"] = {"W": {"moves": "G", "speed": 0.005, "range": [0.2, 0.24]}}
+    data["assembly"]["S"] = 0.2
+    result = trunnion.analyse(Mechanism(**data), 9)
+    height = np.linspace(0.2, 0.24, 9)
+    np.testing.assert_allclose(at(result, "joint_slide", joint="G"), height, rtol=1e-9)
+    pull = LOAD * np.sqrt(4 * ARM**2 - height**2) / height
+    torque = pull * MEAN * np.tan(SLOPE + np.arctan(0.15))
+    np.testing.assert_allclose(at(result, "drive_effort", driver="W"), torque, rtol=1e-9)
 
 
 def press(friction: float, driver: Data, lead: float = 0.02, **more: Any) -> Data:

@@ -138,6 +138,22 @@ class General(Tree):
         pose = super()._posed(elements, q, size, drive)
         return pose._replace(ratios=tuple(drive[len(self.driven) :: NUMBERS]))
 
+    def _newton(
+        self, elements: Sequence[Any], q: Coordinates, size: Number, drive: Sequence[Number], rounds: int
+    ) -> Coordinates:
+        """From where a known wheel tells its rack to be, or the reverse: that may be many sizes and turns away."""
+        inside = {step.joint for step in self.steps}
+        q = [list(values) for values in q]
+        for i, gear in enumerate(self.gears):
+            if gear.slide is None or gear.second not in inside or gear.second in self.driven:
+                continue
+            ratio, phase, near = drive[len(self.driven) + NUMBERS * i :][:NUMBERS]
+            if gear.first in self.driven:
+                q[gear.second] = [ratio * q[gear.first][0] + phase]
+            elif gear.first not in inside:
+                q[gear.second] = [ratio * (slide_of(elements[gear.first]) if gear.slide == 0 else near) + phase]
+        return super()._newton(elements, q, size, drive, rounds)
+
     def further_rows(
         self, placed: Sequence[Element], screws: Sequence[list[Twist]], drive: Sequence[Number], size: Number
     ) -> list[list[Number]]:

@@ -516,8 +516,12 @@ class System:
         count = next((n for n in range(1, COMMON_TURNS + 1) if all(_is_whole(n * period) for period in periods)), 0)
         periodic = bool(count and not ending)
         duration = count * longest if periodic else longest
-        # turns that a driver would make at its largest rate; of a slide, how often it would travel
+        # turns that a driver would make at its largest rate; of a slide, how often it would travel or turn its wheel
         ways = {name: 2 * np.pi if self.turns(name) else span.travel for name, span in spans.items()}
+        for name, gear in self.mechanism.gears.items():
+            if gear.slides and (slide := self.mechanism.coupled(name)[1]) in ways:
+                around = 2 * np.pi * abs(float(np.ravel(primal(self.ratio(values, name)))[0]))
+                ways[slide] = min(ways[slide], around)
         return Cycle(duration, periodic, max(float(spans[name].peak * duration / way) for name, way in ways.items()))
 
     def _backward_ranges(self, nominal: Values, spans: Mapping[str, Span]) -> Iterator[Finding]:

@@ -367,6 +367,16 @@ def test_impossible_racks(change: Data, where: str, what: str) -> None:
     assert what in error.value.findings[0].what
 
 
+def test_a_thread_with_the_friction_of_pins() -> None:
+    """What defaults say of pins is told of a thread; with its own mean radius and friction it is not."""
+    defaults = {"friction": 0.2, "pin": {"radius": 0.02}, "guide": {"length": 0.1}}
+    data = press(0.1, {"W": {"speed": 1.0, "range": [0, 1]}}, joint_defaults=defaults)
+    assert not [finding for finding in Mechanism(**data).checked if finding.where == "gears.screw"]
+    del data["joints"]["W"]["pin"]
+    (warning,) = (finding for finding in Mechanism(**data).checked if finding.where == "gears.screw")
+    assert "by joint_defaults" in warning.what
+
+
 def test_two_slides() -> None:
     data = press(0.1, {"S": {"speed": 1.0, "range": [0, 1]}})
     data["links"]["ground"]["points"]["R"] = data["links"]["wheel"]["points"]["R"] = slide(0, 0)

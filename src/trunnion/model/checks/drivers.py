@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from trunnion.algebra.namespace import Number
-from trunnion.errors import Finding, counted
+from trunnion.errors import Finding, Severity, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.checks.loads import unread
 from trunnion.model.names import nearest
@@ -119,7 +119,9 @@ def gears(mechanism: Numbers) -> Iterator[Finding]:
             yield Finding("a joint has this name too", where, "rename the gear pair")
         if gear.joints[0] != gear.joints[1] and all(joint in joints for joint in gear.joints):
             faults = list(_coupling(mechanism, name, where))
-            yield from faults or _teeth(mechanism, name, where)
+            yield from faults
+            if all(fault.severity is not Severity.ERROR for fault in faults):
+                yield from _teeth(mechanism, name, where)
 
 
 def _coupling(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
@@ -138,8 +140,20 @@ def _coupling(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
         )
         yield Finding(f"both joints turn, and {_states(stated)}", where, remedy)
     elif gear.lead is not None:
+        yield from _thread(mechanism, mechanism.coupled(name)[0], where)
         for key in sorted({"teeth", "pressure_angle"} & gear.model_fields_set):
             yield Finding("has no effect: a screw has no pitch point", f"{where}.{key}", "remove it")
+
+
+def _thread(mechanism: Numbers, joint: str, where: str) -> Iterator[Finding]:
+    """Whether the friction of a thread was meant: the defaults are those of pins."""
+    stated = mechanism.joints.get(joint)
+    if stated is None or mechanism.effective_joints[joint].friction is None:
+        return
+    if stated.friction is None or stated.pin is None or stated.pin.radius is None:
+        what = f"its thread rubs as the pin of {joint} does by joint_defaults"
+        remedy = f"state friction and pin.radius of {joint}, the mean radius of the thread, or friction: 0"
+        yield Finding(what, where, remedy, Severity.WARNING)
 
 
 def _states(keys: list[str]) -> str:

@@ -105,3 +105,83 @@ def rocker_train() -> Data:
         "loads": {"work": {"link": "slider", "at": "G", "force": [-10.0, -20.0]}},
         "assembly": {"C": [0.8, 0.7], "G": [2.3, 0.7]},
     }
+
+
+def rack_on_rocker() -> Data:
+    """A crank pushes a bar through a swivel that carries a pinion: the slide is determined before the pinion.
+
+    The pair lists the slide first, and the bar is the first link of its joint. It passes the pinion on the far side.
+    """
+    return {
+        "links": {
+            "ground": {"points": {"A": [0, 0], "D": [0.7, 0.1]}},
+            "crank": body({"A": [0, 0], "T": [0.2, 0]}, 1, 0.2),
+            "bar": body({"T": [0, 0], "S": slide(0.4, 0.03)}, 2, 0.8),
+            "swivel": body({"D": [0, 0], "S": slide(0.0, 0.05), "B": [0.02, -0.04]}, 1, 0.2),
+            "pinion": body({"B": [0, 0]}, 3, 0.1),
+        },
+        "joints": {
+            "A": revolute("ground", "crank"),
+            "T": revolute("crank", "bar"),
+            "S": prismatic("bar", "swivel"),
+            "D": revolute("ground", "swivel"),
+            "B": revolute("swivel", "pinion"),
+        },
+        "gears": {"mesh": {"joints": ["S", "B"], "radius": 0.06, "phase": 0.02, "pressure_angle": 0.3}},
+        "drivers": {"A": {"speed": 3.0, "start": 0.4}},
+        "loads": {"work": {"link": "pinion", "moment": 4.0}},
+        "assembly": {"S": [0.7, 0.15]},
+    }
+
+
+def rack_in_loop() -> Data:
+    """A five-bar whose coupler guides a rack that meshes with the next link: one module of five links."""
+    return {
+        "links": {
+            "ground": {"points": {"A": [0, 0], "E": [1.0, 0.0], "U": [-0.6, 0.0]}},
+            "crank": body({"A": [0, 0], "B": [0.09, 0]}, 1, 0.09),
+            "left": body({"B": [0, 0], "C": [0.9, 0], "S": slide(0.5, 0.1)}, 2, 0.8),
+            "right": body({"C": [0, 0], "D": [0.7, 0]}, 3, 0.7),
+            "wheel": body({"D": [0, 0], "E": [0.5, 0]}, 4, 0.5),
+            "rack": body({"S": slide(0.0, 0.0), "T": [-0.3, 0.05]}, 2, 0.4),
+            "rod": body({"T": [0, 0], "U": [0.7, 0]}, 1, 0.7),
+        },
+        "joints": {
+            "A": revolute("ground", "crank"),
+            "B": revolute("crank", "left"),
+            "C": revolute("left", "right"),
+            "D": revolute("right", "wheel"),
+            "E": revolute("wheel", "ground"),
+            "S": prismatic("left", "rack"),
+            "T": revolute("rack", "rod"),
+            "U": revolute("rod", "ground"),
+        },
+        "gears": {"mesh": {"joints": ["C", "S"], "radius": 0.1, "phase": 0.05}},
+        "drivers": {"A": {"speed": 4.0, "start": 0.2}},
+        "loads": {"work": {"link": "left", "at": "S", "force": [4.0, -9.0]}},
+        "assembly": {"C": [0.65, 0.8], "T": [0.07, 0.2]},
+    }
+
+
+def screwed_strut() -> Data:
+    """A strut of two parts, screwed in and out by a wheel on one of them, lifts an arm."""
+    return {
+        "links": {
+            "ground": {"points": {"A": [0, 0], "D": [0.1, -0.4]}},
+            "arm": body({"A": [0, 0], "C": [0.8, 0]}, 2, 0.8),
+            "tube": body({"D": [0, 0], "S": slide(0.0, 0.0), "W": [0.05, 0.02]}, 1, 0.3),
+            "spindle": body({"S": slide(-0.3, 0.0), "C": [0.2, 0]}, 3, 0.4),
+            "wheel": body({"W": [0, 0]}, 1, 0.05),
+        },
+        "joints": {
+            "A": revolute("ground", "arm"),
+            "C": revolute("arm", "spindle"),
+            "D": revolute("ground", "tube"),
+            "S": prismatic("tube", "spindle"),
+            "W": revolute("tube", "wheel"),
+        },
+        "gears": {"screw": {"joints": ["W", "S"], "lead": 0.006, "phase": 0.3}},
+        "drivers": {"W": {"speed": 20.0, "range": [0.0, 120.0]}},
+        "loads": {"work": {"link": "arm", "at": "C", "force": [30.0, -200.0]}},
+        "assembly": {"C": [0.75, 0.2]},
+    }

@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import trunnion
-from geared import geared_five_bar, geared_loop, planet_drive, rocker_train
+from geared import (
+    geared_five_bar,
+    geared_loop,
+    planet_drive,
+    rack_in_loop,
+    rack_on_rocker,
+    rocker_train,
+    screwed_strut,
+)
 from mechanisms_parts import Data, body, prismatic, revolute, slide
 from trunnion import Mechanism
 from trunnion.groups.general import General
@@ -320,6 +328,9 @@ MODELS: Mapping[str, Callable[[], Data]] = {
     "planet drive": planet_drive,
     "geared loop": geared_loop,
     "rocker train": rocker_train,
+    "rack on a rocker": rack_on_rocker,
+    "rack in a loop": rack_in_loop,
+    "screwed strut": screwed_strut,
 }
 
 
@@ -381,8 +392,21 @@ def transformed(data: Data, turn: float = 0.0, shift: Sequence[float] = (0.0, 0.
 def _turn_gears(data: Data, turn: float, sign: float) -> None:
     """Rotations against the ground count from the frame's x axis, which has turned."""
     for gear in data.get("gears", {}).values():
-        first, second = (_offset(data["joints"][joint]["links"], turn) for joint in gear["joints"])
-        gear["phase"] = sign * gear["phase"] + second - gear["ratio"] * first
+        joints, key = _coupled(data, gear)
+        first, second = (_offset(data["joints"][joint]["links"], turn) for joint in joints)
+        if key == "ratio":
+            gear["phase"] = sign * gear["phase"] + second - gear["ratio"] * first
+        else:  # a slide is the same in a mirror
+            gear[key] *= sign
+            gear["phase"] -= gear[key] / (1.0 if key == "radius" else 2 * np.pi) * first
+
+
+def _coupled(data: Data, gear: Data) -> tuple[list[str], str]:
+    """Joints of a gear pair, that which turns first, and what states its ratio."""
+    key = next(key for key in ("ratio", "radius", "lead") if key in gear)
+    return sorted(
+        gear["joints"], key=lambda joint: key != "ratio" and data["joints"][joint]["type"] == "prismatic"
+    ), key
 
 
 def reverse_links(data: Data, joints: Sequence[str]) -> None:
@@ -390,8 +414,9 @@ def reverse_links(data: Data, joints: Sequence[str]) -> None:
     for joint in joints:
         data["joints"][joint]["links"].reverse()
     for gear in data.get("gears", {}).values():
-        first, second = (-1.0 if joint in joints else 1.0 for joint in gear["joints"])
-        gear["ratio"] *= first * second
+        coupled, key = _coupled(data, gear)
+        first, second = (-1.0 if joint in joints else 1.0 for joint in coupled)
+        gear[key] *= first * second
         gear["phase"] *= second
 
 

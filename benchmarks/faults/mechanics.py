@@ -128,9 +128,23 @@ _GROUPS = (
     Fault(
         "gear-phase-sign",
         "groups/general.py",
-        "ratio * turn + phase",
-        "ratio * turn - phase",
+        "ratio * start + phase",
+        "ratio * start - phase",
         ("tests/reference/test_gears.py",),
+    ),
+    Fault(
+        "rack-on-the-other-side",
+        "groups/gear.py",
+        "towards = radius * axis.s, -radius * axis.c",
+        "towards = -radius * axis.s, radius * axis.c",
+        ("tests/reference/test_racks.py",),
+    ),
+    Fault(
+        "thread-friction-across-the-screw-alone",
+        "solve/gears.py",
+        "friction * lead / helix",
+        "0.0 * friction",
+        ("tests/reference/test_racks.py",),
     ),
     Fault(
         "spin-carried-the-wrong-way",

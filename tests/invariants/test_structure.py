@@ -33,6 +33,9 @@ FORMULAS = {
     "planet drive": "I(0,1)R → II(2)RG → II(3,4)RRP",
     "geared loop": "I(0,1)R → II(2,3,4)RRRRG",
     "rocker train": "I(0,1)R → II(2,3)RRR → II(4)RG → II(5,6)RRP",
+    "rack on a rocker": "I(0,1)R → II(2,3)RPR → II(4)RG",
+    "rack in a loop": "I(0,1)R → III(2,3,4,5,6)RRRRPRRG",
+    "screwed strut": "III(1,2,3,4)RRRP[R]G",
 }
 
 

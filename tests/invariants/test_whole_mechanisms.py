@@ -157,6 +157,9 @@ def scaled(data: Data, length: float, mass: float, time: float) -> Data:
         if "range" in driver:
             driver["range"] = _times(driver["range"], unit)
     data["assembly"] = {key: _times(value, length) for key, value in data.get("assembly", {}).items()}
+    for gear in data.get("gears", {}).values():
+        for key in {"radius", "lead", "phase"} & gear.keys() if "ratio" not in gear else ():
+            gear[key] *= length
     data["joint_defaults"]["pin"]["radius"] *= length
     if "guide" in data["joint_defaults"]:
         data["joint_defaults"]["guide"]["length"] *= length

@@ -119,6 +119,8 @@ def tooth_contact(run: Run, back: Any, name: str, i: int) -> newton_euler.Joint:
     (carrier,) = pairs[0] & pairs[1]
     one, two = (next(iter(pair - {carrier})) for pair in pairs)
     a, d = (walk.element(carrier, joint) for joint in run.system.mechanism.gears[name].joints)
+    if run.system.mechanism.gears[name].slides:
+        return rack_contact(run, back, name, i)
     centre, line = np.array([here(a.x), here(a.y)]), np.array([here(d.x - a.x), here(d.y - a.y)])
     spin = [here(walk.motions[link].twist.w - walk.motions[carrier].twist.w) for link in (one, two)]
     point = centre + line * spin[1] / (spin[1] - spin[0])
@@ -130,9 +132,38 @@ def tooth_contact(run: Run, back: Any, name: str, i: int) -> newton_euler.Joint:
     return newton_euler.Joint("contact", first, second, point, tangent, found)
 
 
+def rack_contact(run: Run, back: Any, name: str, i: int) -> newton_euler.Joint:
+    """The teeth of a rack: they touch where the pinion has the rack's velocity, as their carrier sees it."""
+
+    def here(number: Any) -> float:
+        return float(np.broadcast_to(number, (STEPS,))[i])
+
+    walk, pair = back.walk, run.system.mechanism.gears[name].joints
+    turning, sliding = sorted(pair, key=lambda joint: run.system.joints[joint][0] == "prismatic")
+    sides = [set(run.system.joints[joint][1]) for joint in (turning, sliding)]
+    (carrier,) = sides[0] & sides[1]
+    pinion, rack = (next(iter(side - {carrier})) for side in sides)
+    centre = walk.element(carrier, turning)
+    against = {
+        link: walk.algebra.minus(walk.motions[link].twist, walk.motions[carrier].twist) for link in (pinion, rack)
+    }
+    at, spin = np.array([here(centre.x), here(centre.y)]), here(against[pinion].w)
+    velocity = np.array([here(against[rack].x), here(against[rack].y)])  # the rack does not turn against the carrier
+    towards = np.array([velocity[1], -velocity[0]]) / spin
+    tangent = velocity / np.hypot(*velocity)
+    across = np.array([-tangent[1], tangent[0]])
+    push = across @ [here(part) for part in back.gears[name].force]  # on the rack
+    ground = run.system.mechanism.fixed_link
+    first, second = (None if link == ground else link for link in (pinion, rack))
+    return newton_euler.Joint("contact", first, second, at + towards, tangent, push)
+
+
+NO_CONTACT = ("rocker train", "screwed strut")  # torques alone; a screw against a driven slide in `test_racks`
+
+
 @pytest.mark.spread(12)
 @pytest.mark.parametrize("friction", [None, 0.15])
-@pytest.mark.parametrize("name", [name for name in MODELS if name != "rocker train"])  # a train has no contact
+@pytest.mark.parametrize("name", [name for name in MODELS if name not in NO_CONTACT])
 def test_reactions_and_efforts(name: str, friction: float | None) -> None:
     """Same reactions and efforts to 1e-8: eighth-order differences are good to about 1e-10 of the accelerations."""
     data = model(MODELS[name](), friction=friction)
@@ -157,7 +188,10 @@ def test_reactions_and_efforts(name: str, friction: float | None) -> None:
 
 @pytest.mark.parametrize("name", MODELS)
 def test_friction_obeys_its_law(name: str) -> None:
-    """|M| = f r |F| at a pin, |F_t| = f (|F_n/2 + M/L| + |F_n/2 − M/L|) in a guide, against the slip."""
+    """|M| = f r |F| at a pin, |F_t| = f (|F_n/2 + M/L| + |F_n/2 − M/L|) in a guide, against the slip.
+
+    In a thread |M| = f r N cos λ, N being the part of the force between screw and nut that is square to its flank.
+    """
     coefficient, radius, guide = 0.15, 0.01, 0.4
     run = prepare(build(MODELS[name](), friction=coefficient, radius=radius, guide=guide))
     back = run.solve(times(run))
@@ -169,9 +203,16 @@ def test_friction_obeys_its_law(name: str) -> None:
             axis = back.walk.element(first, joint)
             across = axis.c * reaction.y - axis.s * reaction.x
             normals[joint] = np.abs(across / 2 + reaction.m / guide) + np.abs(across / 2 - reaction.m / guide)
+    levers = {joint: radius if kind == "revolute" else 1.0 for joint, (kind, _) in run.system.joints.items()}
+    for name, gear in run.system.mechanism.gears.items():
+        if gear.lead is not None:
+            turning, sliding = gear.joints
+            axis, slope = back.walk.ends(sliding)[0], np.arctan2(run.values[f"gears.{name}.lead"] / (2 * np.pi), radius)
+            x, y = back.gears[name].force
+            square = (axis.c * x + axis.s * y) * np.cos(slope) - back.gears[name].torque / radius * np.sin(slope)
+            normals[turning], levers[turning] = np.abs(square), radius * np.cos(slope)
     largest = max(float(np.max(normal)) for normal in normals.values())
-    for joint, (kind, _) in run.system.joints.items():
-        lever = radius if kind == "revolute" else 1.0
+    for joint, lever in levers.items():
         expected = -np.sign(back.walk.speed(joint)) * coefficient * lever * normals[joint]
         # the iteration rests where no normal load changes by more than 1e-8 of the largest
         np.testing.assert_allclose(

@@ -26,7 +26,10 @@ __all__ = ["Check", "GearPair", "check"]
 
 
 class GearPair(NamedTuple):
-    """A gear pair with teeth: whether one gear turns inside the other, and the pitch radii by link, m."""
+    """A gear pair with teeth: whether one gear turns inside the other, and the pitch radii by link, m.
+
+    Of a rack, chain or rope the one radius of its wheel.
+    """
 
     name: str
     internal: bool
@@ -98,13 +101,14 @@ def _unplaced(run: Run) -> Iterator[Finding]:
 def _gears(run: Run) -> tuple[GearPair, ...]:
     found = []
     for name, gear in run.system.mechanism.gears.items():
-        if not gear.teeth:
+        if not gear.touches:
             continue
         circles = pitch_circles(run.system, run.values, name)
         carriers = run.system.mechanism.carriers(name) or (0, 0)
         sign = 1.0 if carriers[0] == carriers[1] else -1.0
         radii = tuple((str(circle["at"]).rpartition(".")[0], float(circle["radius"])) for circle in circles)
-        found.append(GearPair(name, sign * float(run.values[f"gears.{name}.ratio"]) > 0, radii))
+        internal = not gear.slides and sign * float(run.system.ratio(run.values, name)) > 0
+        found.append(GearPair(name, internal, radii))
     return tuple(found)
 
 
@@ -122,8 +126,8 @@ def _rank(walk: Forward) -> int | None:
         return None
     at = {name: tuple(place[:, np.argmax(solved)].tolist()) for name, place in places.items()}
     gears = {
-        name: (gear.joints, float(np.ravel(primal(walk.values[f"gears.{name}.ratio"]))[0]))
-        for name, gear in system.mechanism.gears.items()
+        name: (system.mechanism.coupled(name), float(np.ravel(primal(system.ratio(walk.values, name)))[0]))
+        for name in system.mechanism.gears
     }
     links = [link for module in system.plan.modules for link in module.links]
     return mobility_by_rank(links, system.mechanism.fixed_link, system.joints, at, gears, system.plan.modules)

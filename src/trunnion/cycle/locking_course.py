@@ -171,7 +171,7 @@ def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
         loads = largest(settled.problem.state([0.0] * len(contacts)).normals)
         for place, multiple in zip(places, _alone(settled.problem, masks, most), strict=True):
             multiple = np.where(np.isfinite(loads), multiple, np.nan)
-            multiples[system.places[number][place].joint] = np.broadcast_to(multiple, positions)
+            multiples[system.rubbing_joint(number, place)] = np.broadcast_to(multiple, positions)
     return {joint: multiples[joint] for joint in system.joints if joint in multiples}
 
 

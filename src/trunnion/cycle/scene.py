@@ -42,7 +42,7 @@ def scene_of(run: Run) -> dict[str, Any]:
         elif "planar" in PAIRS[kind].needs_axis:
             axis = elements[links[0], name]
             joints[name]["axis"] = [float(axis.c), float(axis.s)]
-    teeth = [name for name, gear in mechanism.gears.items() if gear.teeth and not spatial]
+    teeth = [name for name, gear in mechanism.gears.items() if gear.touches and not spatial]
     spinning = [spin for module in system.plan.modules for spin in module.spinning]
     return {
         "space": mechanism.space,
@@ -98,19 +98,22 @@ def _float(number: Number | None) -> float | None:
 
 
 def pitch_circles(system: System, values: Values, name: str) -> list[dict[str, Any]]:
-    """Pitch circles of a gear pair with teeth: the point each turns about, and its radius, m."""
-    gear = system.mechanism.gears[name]
+    """Pitch circles of a gear pair with teeth, or of the wheel of a rack, chain or rope: their centres and radii, m."""
+    gear, joints = system.mechanism.gears[name], system.mechanism.coupled(name)
     carriers = system.mechanism.carriers(name) or (0, 0)
-    links = [system.joints[joint][1] for joint in gear.joints]
+    links = [system.joints[joint][1] for joint in joints]
+    if gear.slides:
+        own = links[0][1 - carriers[0]]
+        return [{"at": f"{own}.{joints[0]}", "radius": abs(float(system.ratio(values, name)))}]
     elements = system.elements(values)
-    first, second = (elements[links[0][carriers[0]], joint] for joint in gear.joints)
+    first, second = (elements[links[0][carriers[0]], joint] for joint in joints)
     sign = 1.0 if carriers[0] == carriers[1] else -1.0
     ratio = sign * float(values[f"gears.{name}.ratio"])
     centres = float(np.hypot(second.x - first.x, second.y - first.y))
     radii = abs(ratio / (ratio - 1)) * centres, abs(1 / (ratio - 1)) * centres
     return [
         {"at": f"{pair[1 - side]}.{joint}", "radius": radius}
-        for pair, side, joint, radius in zip(links, carriers, gear.joints, radii, strict=True)
+        for pair, side, joint, radius in zip(links, carriers, joints, radii, strict=True)
     ]
 
 

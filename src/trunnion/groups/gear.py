@@ -1,9 +1,12 @@
-"""Gear pairs: a constant ratio between the rotations of two joints, φ₂ = i φ₁ + φ₀.
+"""Gear pairs: a constant ratio between the coordinates of two joints, φ₂ = i φ₁ + φ₀.
 
 Where the two joints share a link, the carrier, the other two links are the gears. They touch at the pitch point,
 where their velocities agree, and press on each other there: F = f n across the line of centres, and a force |f| tan α
 along it that the inclined flanks (pressure angle α) add, which pushes the gears apart and does no work. Without a
 common link the pair stands for a whole train, which passes torques alone.
+
+One of the joints may slide: i is then a length for one radian, or its inverse. A rack, chain or rope pulls along its
+slide at the pitch point of the wheel; a screw passes a torque in the joint that turns, a force along that which slides.
 """
 
 from __future__ import annotations
@@ -15,17 +18,38 @@ from trunnion.algebra.literal import is_zero
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Frame, Vector2, Wrench, about, times
 
-__all__ = ["NUMBERS", "GearPair", "Mesh", "ToothForce", "actions", "apart", "mesh", "rotation", "turn_from"]
+__all__ = [
+    "NUMBERS",
+    "GearPair",
+    "Mesh",
+    "ToothForce",
+    "actions",
+    "apart",
+    "mesh",
+    "rotation",
+    "slide_of",
+    "thread_forces",
+    "turn_from",
+]
 
-NUMBERS = 3  # that a module is given for each gear pair, after its drive: ratio, phase, rotation φ₁ to the nearest turn
+NUMBERS = (
+    3  # that a module is given for each gear pair, after its drive: ratio, phase, coordinate φ₁ to the nearest turn
+)
 
 
 class GearPair(NamedTuple):
-    """A gear pair of a module: its two joints, and for each the side of its carrier (0, 1), if they share one."""
+    """A gear pair of a module: its two joints, for each the side of its carrier (0, 1) if they touch on one, and which
+    of the two (0, 1) slides, None if both turn."""
 
     first: int
     second: int
     carriers: tuple[int, int] | None = None
+    slide: int | None = None
+
+    @property
+    def joints(self) -> tuple[tuple[int, bool], tuple[int, bool]]:
+        """Both joints, each with whether it slides."""
+        return (self.first, self.slide == 0), (self.second, self.slide == 1)
 
 
 class ToothForce(NamedTuple):
@@ -52,6 +76,12 @@ def rotation(pair: Sequence[Frame]) -> Number:
     return turn_from(pair[0], pair[1], 0.0)
 
 
+def slide_of(pair: Sequence[Frame]) -> Number:
+    """Slide of the second element along the axis of the first, m."""
+    first, second = pair[:2]
+    return first.c * (second.x - first.x) + first.s * (second.y - first.y)
+
+
 def _direction(first: Frame, second: Frame) -> Vector2:
     """Cosine and sine of the rotation of the second element against the first."""
     return first.c * second.c + first.s * second.s, first.c * second.s - first.s * second.c
@@ -76,6 +106,8 @@ def mesh(gear: GearPair, elements: Sequence[Any], ratio: Number) -> Mesh:
     if gear.carriers is None:
         raise ValueError("a gear pair without a common link has no pitch point")
     one, two = (1.0 if side == 0 else -1.0 for side in gear.carriers)
+    if gear.slide is not None:
+        return _mesh_with_rack(gear, elements, one * two * (ratio if gear.slide == 1 else 1 / ratio), ratio)
     relative = one * two * ratio
     a, d = elements[gear.first][gear.carriers[0]], elements[gear.second][gear.carriers[1]]
     dx, dy = d.x - a.x, d.y - a.y
@@ -88,16 +120,50 @@ def mesh(gear: GearPair, elements: Sequence[Any], ratio: Number) -> Mesh:
     return Mesh(pitch, along, (-along[1], along[0]), factor, -namespace(relative).sign(relative))
 
 
-def actions(gear: GearPair, elements: Sequence[Any], ratio: Number, torque: Number) -> list[ToothForce]:
-    """What the pair does to the links when it puts `torque` (N m) into its second joint, separating force apart."""
+def _mesh_with_rack(gear: GearPair, elements: Sequence[Any], radius: Number, ratio: Number) -> Mesh:
+    """Where a wheel touches a rack that slides by `radius` for one radian, both as the carrier sees them.
+
+    Turned by ω, the point at r (u_y, −u_x) from the wheel's centre moves with r ω u along the slide u.
+    """
+    sides = gear.carriers or (0, 0)
+    wheel, rack = (gear.first, gear.second) if gear.slide == 1 else (gear.second, gear.first)
+    centre, axis = elements[wheel][sides[0 if gear.slide == 1 else 1]], elements[rack][0]
+    towards = radius * axis.s, -radius * axis.c
+    pitch = centre.x + towards[0], centre.y + towards[1]
+    # from the first gear to the second
+    from_wheel = namespace(radius).sign(radius) * (1.0 if gear.slide == 1 else -1.0)
+    sense = 1.0 if sides[gear.slide or 0] == 0 else -1.0
+    factor = sense if gear.slide == 1 else sense * ratio
+    return Mesh(pitch, (from_wheel * axis.s, -from_wheel * axis.c), (axis.c, axis.s), factor, 1.0)
+
+
+def actions(gear: GearPair, elements: Sequence[Any], ratio: Number, effort: Number) -> list[ToothForce]:
+    """What the pair does to the links with an `effort` (N m or N) in its second joint, separating force apart."""
     if gear.carriers is not None:
         touch = mesh(gear, elements, ratio)
-        force = torque * touch.factor
+        force = effort * touch.factor
         return _on_gears(gear, about((force * touch.across[0], force * touch.across[1]), 0.0, touch.pitch))
-    turns = ((gear.second, torque), (gear.first, -ratio * torque))
+    first, second = gear.joints
     return [
-        ToothForce(joint, side, Wrench(0.0, 0.0, sign * moment))
-        for joint, moment in turns
+        ToothForce(joint, side, _effort(elements[joint], slides, sign * size))
+        for (joint, slides), size in ((second, effort), (first, -ratio * effort))
+        for side, sign in ((1, 1.0), (0, -1.0))
+    ]
+
+
+def _effort(pair: Sequence[Frame], slides: bool, size: Number) -> Wrench:
+    """A torque, N m, or a force along the slide of a joint, N."""
+    if not slides:
+        return Wrench(0.0, 0.0, size)
+    first, second = pair[:2]
+    return about((size * first.c, size * first.s), 0.0, (second.x, second.y))
+
+
+def thread_forces(gear: GearPair, elements: Sequence[Any], torque: Number, force: Number) -> list[ToothForce]:
+    """What a torque, N m, in the joint of a screw that turns and a force, N, in that which slides do to the links."""
+    return [
+        ToothForce(joint, side, _effort(elements[joint], slides, sign * (force if slides else torque)))
+        for joint, slides in gear.joints
         for side, sign in ((1, 1.0), (0, -1.0))
     ]
 

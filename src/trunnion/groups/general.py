@@ -17,7 +17,7 @@ from trunnion.algebra import plane
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.plane import Frame, Twist, Wrench, about, moment_at, place_of, velocity_at
-from trunnion.groups.gear import NUMBERS, GearPair, actions, turn_from
+from trunnion.groups.gear import NUMBERS, GearPair, actions, slide_of, turn_from
 from trunnion.groups.redundant import Support
 from trunnion.groups.tree import OUTER, Coordinates, Element, Pose, Tree
 from trunnion.joints.planar import MOTIONS
@@ -32,8 +32,8 @@ class General(Tree):
 
     A joint between known links that a gear pair speaks of is listed too, at the end, with both sides OUTER. After the
     driven coordinates the drive holds three numbers for each gear pair (see `gear.NUMBERS`). Its reactions are about
-    the joint's point on the second link; after the joints come the gear pairs, each with the torque it puts into its
-    second joint.
+    the joint's point on the second link; after the joints come the gear pairs, each with the torque, or force along the
+    slide, that it puts into its second joint, as a moment.
     """
 
     gears: tuple[GearPair, ...] = ()
@@ -68,12 +68,17 @@ class General(Tree):
             aim = self.motion(k).place(first, q[k]) if k in self.driven else first
             way = Twist(second.x - aim.x, second.y - aim.y, turn_from(aim, second, 0.0) if self._aligned(k) else 0.0)
             rows += self._components(k, first, way, size)
-        for i, gear in enumerate(self.gears):  # φ₂ − i φ₁ − φ₀, within half a turn
+        for i, gear in enumerate(self.gears):  # φ₂ − i φ₁ − φ₀, of a turn within half a turn
             slot = len(self.driven) + NUMBERS * i
             ratio, phase, near = drive[slot : slot + NUMBERS]
-            turns_counted = any(step.joint == gear.first for step in self.steps)
-            turn = q[gear.first][0] if turns_counted else near + turn_from(*placed[gear.first][:2], near)
-            rows.append(turn_from(*placed[gear.second][:2], ratio * turn + phase))
+            if any(step.joint == gear.first for step in self.steps):
+                start = q[gear.first][0]
+            elif gear.slide == 0:
+                start = slide_of(placed[gear.first])
+            else:
+                start = near + turn_from(*placed[gear.first][:2], near)
+            aim, second = ratio * start + phase, placed[gear.second][:2]
+            rows.append((slide_of(second) - aim) / size if gear.slide == 1 else turn_from(*second, aim))
         return rows
 
     def _aligned(self, chord: int) -> bool:
@@ -133,41 +138,70 @@ class General(Tree):
         pose = super()._posed(elements, q, size, drive)
         return pose._replace(ratios=tuple(drive[len(self.driven) :: NUMBERS]))
 
+    def _newton(
+        self, elements: Sequence[Any], q: Coordinates, size: Number, drive: Sequence[Number], rounds: int
+    ) -> Coordinates:
+        """From where a known wheel tells its rack to be, or the reverse: that may be many sizes and turns away."""
+        inside = {step.joint for step in self.steps}
+        q = [list(values) for values in q]
+        for i, gear in enumerate(self.gears):
+            if gear.slide is None or gear.second not in inside or gear.second in self.driven:
+                continue
+            ratio, phase, near = drive[len(self.driven) + NUMBERS * i :][:NUMBERS]
+            if gear.first in self.driven:
+                q[gear.second] = [ratio * q[gear.first][0] + phase]
+            elif gear.first not in inside:
+                q[gear.second] = [ratio * (slide_of(elements[gear.first]) if gear.slide == 0 else near) + phase]
+        return super()._newton(elements, q, size, drive, rounds)
+
     def further_rows(
-        self, placed: Sequence[Element], screws: Sequence[list[Twist]], drive: Sequence[Number]
+        self, placed: Sequence[Element], screws: Sequence[list[Twist]], drive: Sequence[Number], size: Number
     ) -> list[list[Number]]:
-        """Rate of φ₂ − i φ₁ of each gear pair."""
+        """Rate of φ₂ − i φ₁ of each gear pair, lengths over the size."""
         rows = []
         for gear, ratio in zip(self.gears, drive[len(self.driven) :: NUMBERS], strict=True):
             row: list[Number] = []
             for k, i in self.free:
                 entry: Number = 0.0
-                for joint, factor in ((gear.second, 1.0), (gear.first, -ratio)):
+                for (joint, slides), factor in zip(gear.joints, (-ratio, 1.0), strict=True):
                     if weight := self.weight(k, joint):
-                        entry = entry + weight * factor * screws[k][i].w
+                        entry = entry + weight * factor * _rate(placed[joint], screws[k][i], slides)
+                if gear.slide is not None:
+                    entry = entry * (size if self.slides(k, i) else 1.0) / (size if gear.slide == 1 else 1.0)
                 row.append(entry)
             rows.append(row)
         return rows
 
     def further_rates(self, pose: Pose, twists: Sequence[Twist], outer: Sequence[Any]) -> list[Number]:
-        """Of each gear pair, from the spins across its joints."""
+        """Of each gear pair, from the turns and slides of its joints; what carries a slide along lies across it."""
+        rates = []
+        for gear, ratio in zip(self.gears, pose.ratios, strict=True):
+            first, second = (
+                _rate(pose.elements[k], self.across(k, twists, outer), slides) for k, slides in gear.joints
+            )
+            rate = second - ratio * first
+            rates.append(rate / pose.size if gear.slide == 1 else rate)
+        return rates
+
+    def _efforts(self, pose: Pose, multipliers: Sequence[Number]) -> list[Number]:
+        """Torque, N m, or force, N, that each gear pair puts into its second joint."""
+        last = multipliers[len(multipliers) - len(self.gears) :]
         return [
-            self.across(gear.second, twists, outer).w - ratio * self.across(gear.first, twists, outer).w
-            for gear, ratio in zip(self.gears, pose.ratios, strict=True)
+            effort / pose.size if gear.slide == 1 else effort for gear, effort in zip(self.gears, last, strict=True)
         ]
 
     def further_loads(self, pose: Pose, multipliers: Sequence[Number]) -> list[tuple[int, Wrench]]:
         """Tooth forces, or torques alone."""
         return [
             (self.joints[force.joint].sides[force.side], force.wrench)
-            for gear, ratio, torque in zip(self.gears, pose.ratios, multipliers, strict=True)
-            for force in actions(gear, pose.elements, ratio, torque)
+            for gear, ratio, effort in zip(self.gears, pose.ratios, self._efforts(pose, multipliers), strict=True)
+            for force in actions(gear, pose.elements, ratio, effort)
         ]
 
     def link_by_link(self, pose: Pose, loads: Sequence[Wrench], multipliers: Sequence[Number]) -> list[Wrench]:
-        """Of the joints, then the torque that each gear pair puts into its second joint."""
-        torques = multipliers[len(multipliers) - len(self.gears) :]
-        return super().link_by_link(pose, loads, multipliers) + [Wrench(0.0, 0.0, torque) for torque in torques]
+        """Of the joints, then what each gear pair puts into its second joint."""
+        efforts = self._efforts(pose, multipliers)
+        return super().link_by_link(pose, loads, multipliers) + [Wrench(0.0, 0.0, effort) for effort in efforts]
 
     def reactions(self, pose: Pose, loads: Sequence[Wrench], supports: Sequence[Support] = ()) -> list[Wrench]:
         """See `General`."""
@@ -185,3 +219,11 @@ class General(Tree):
     def signature(self, pose: Pose, spread: float) -> list[Number]:
         """Places and directions of the links."""
         return [n for frame in pose.frames for n in (frame.x / spread, frame.y / spread, frame.c, frame.s)]
+
+
+def _rate(pair: Element, relative: Twist, slides: bool) -> Number:
+    """Rate of the turn or slide of a joint whose second link moves like that against its first."""
+    if not slides:
+        return relative.w
+    x, y = velocity_at(relative, place_of(pair.second))
+    return pair.first.c * x + pair.first.s * y

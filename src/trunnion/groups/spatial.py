@@ -112,7 +112,7 @@ class SpatialGroup(Tree):
         return scaled(1 / xp.sqrt(xp.where(stretched, square, 1.0)), apart)
 
     def further_rows(
-        self, placed: Sequence[Element], screws: Sequence[list[Screw]], drive: Sequence[Number]
+        self, placed: Sequence[Element], screws: Sequence[list[Screw]], drive: Sequence[Number], size: Number
     ) -> list[list[Number]]:
         """Rates of the free spins."""
         rows = []

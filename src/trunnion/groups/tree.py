@@ -271,7 +271,7 @@ class Tree(ABC):
         """The wrench on the second side of a chord that the multipliers of its rows stand for."""
 
     def further_rows(
-        self, placed: Sequence[Element], screws: Sequence[list[Any]], drive: Sequence[Number]
+        self, placed: Sequence[Element], screws: Sequence[list[Any]], drive: Sequence[Number], size: Number
     ) -> list[list[Number]]:
         """Rows of J beyond those of the chords: of gear pairs, of links that must not spin."""
         return []
@@ -454,7 +454,7 @@ class Tree(ABC):
                     column = column if weight == 1 else [weight * entry for entry in column]
                 columns.append(column)
             matrix += [[column[row] if column else 0.0 for column in columns] for row in range(self.count(chord))]
-        return matrix + self.further_rows(placed, screws, drive)
+        return matrix + self.further_rows(placed, screws, drive, size)
 
     # ---- velocity and acceleration ----------------------------------------------------------------------------
 

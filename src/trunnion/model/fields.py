@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from trunnion.model.entry import ReadOnlyDict
-from trunnion.model.joint_parts import motions
+from trunnion.model.joint_parts import freedoms, motions
 from trunnion.model.merge import FitChoice, merge_joint
 from trunnion.model.parts import (
     Correlation,
@@ -146,9 +146,15 @@ class Fields(Part):
         sections = {"link": self.effective_links, "any joint": joints, "driver": drivers, "spring": self.springs}
         return list({**sections, "process": self.processes}[noun])
 
+    def coupled(self, gear: str) -> tuple[str, str]:
+        """The joints of a gear pair, of a rack or screw that which turns first."""
+        first, second = self.gears[gear].joints
+        slides = self.gears[gear].slides and "rotation" not in freedoms(self.effective_joints[first].type)
+        return (second, first) if slides else (first, second)
+
     def carriers(self, gear: str) -> tuple[int, int] | None:
         """On which side (0, 1) of each of its joints a gear pair has the link common to both; None without one."""
-        one, two = (self.effective_joints[joint].links for joint in self.gears[gear].joints)
+        one, two = (self.effective_joints[joint].links for joint in self.coupled(gear))
         shared = next((link for link in one if link in two), None)
         return None if shared is None else (one.index(shared), two.index(shared))
 

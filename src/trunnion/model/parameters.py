@@ -269,6 +269,8 @@ def _narrow(mechanism: Fields, section: str, name: str, entry: Entry) -> Kind:
         in_time = mechanism.tables[name].over == "time"
         place = entry.location[-1] in (0, "period")
         return (KINDS["time"] if in_time else drive_kind(mechanism)) if place else ANY
+    if section == "gears":
+        return entry.kind.of(turns=not mechanism.gears[name].slides)
     spring = mechanism.springs[name] if section == "springs" else None
     moved = mechanism.drivers[name].moves if section == "drivers" else None
     joint = mechanism.effective_joints.get((spring.joint or "") if spring else moved or name)

@@ -400,19 +400,33 @@ class Gear(Part):
     """A gear pair: the rotation of the second joint is ratio · rotation of the first + phase.
 
     With teeth the joints share a link, the carrier, and the tooth force acts at the pitch point, inclined by the
-    pressure angle (20 deg if not stated); without, a train, belt or chain passes torques alone.
+    pressure angle (20 deg if not stated); without, a train, belt or chain passes torques alone. Where one of the joints
+    slides, its slide is radius · rotation + phase (a rack; without teeth a chain or rope) or lead · turns + phase (a
+    screw).
     """
 
     joints: Annotated[tuple[str, str], Refers("any joint", distinct=True)]
-    ratio: Annotated[Dimensionless, NotZero("the second joint would not turn at all")]
-    phase: Angle = Quantity(0, KINDS["angle"])
+    ratio: Annotated[Dimensionless | None, NotZero("the second joint would not turn at all")] = None
+    radius: Annotated[Length | None, NotZero("the rack would not move at all")] = None
+    lead: Annotated[Length | None, NotZero("the nut would not move at all")] = None
+    phase: AngleOrLength = Quantity(0, KINDS["angle"])
     teeth: bool = True
     pressure_angle: Annotated[Angle | None, Within(0, math.pi / 2, "[)", "20 deg is usual"), _TEETH] = None
 
     def complete(self) -> Gear:
         """With the usual pressure angle if it has teeth and states none."""
-        usual = USUAL_PRESSURE_ANGLE if self.teeth else None
+        usual = USUAL_PRESSURE_ANGLE if self.teeth and self.lead is None else None
         return self if self.pressure_angle else self.model_copy(update={"pressure_angle": usual})
+
+    @property
+    def slides(self) -> bool:
+        """Whether one of its joints slides."""
+        return self.radius is not None or self.lead is not None
+
+    @property
+    def touches(self) -> bool:
+        """Whether it acts at a pitch point on a link that both joints share."""
+        return self.radius is not None or (self.teeth and self.lead is None)
 
 
 FOLDS = "folds"  # at a change point a group stays on its side of it

@@ -64,8 +64,14 @@ VARIABLES: dict[str, Variable] = {
     ),
     "spring_power": Variable(("spring",), "W", "power of the spring and its damper, positive into the mechanism"),
     "damping_power": Variable(("spring",), "W", "power lost in the spring's damper"),
-    "gear_torque": Variable(("gear",), "N m", "torque of the gear pair in its second joint, on its second link"),
-    "gear_force": Variable(("gear", "axis"), "N", "tooth force on the gear of the second joint by that of the first"),
+    "gear_torque": Variable(
+        ("gear",),
+        "N m",
+        "torque of the gear pair in its second joint, on its second link; of a rack or screw in what turns",
+    ),
+    "gear_force": Variable(
+        ("gear", "axis"), "N", "tooth force on the gear of the second joint by that of the first; on the rack or nut"
+    ),
     "useful_power": Variable((), "W", "power delivered to the useful loads"),
     "efficiency_instant": Variable((), "1", "useful power over drive power"),
     "closure_residual": Variable((), "m", "largest opening of a closed loop"),

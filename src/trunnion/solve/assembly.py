@@ -402,7 +402,7 @@ def _turns(walk: Forward, module: Module, group: Any, elements: Sequence[Any], t
     turns = {}
     for i, (name, gear) in enumerate(zip(module.gears, getattr(group, "gears", ()), strict=True)):
         driven = walk.system.gear_joints(name)[0] in walk.system.mechanism.drivers
-        if not driven and group.joints[gear.first].sides == (OUTER, OUTER):
+        if not driven and gear.slide != 0 and group.joints[gear.first].sides == (OUTER, OUTER):
             angle = np.broadcast_to(primal(rotation(elements[gear.first])), times.shape)
             solved = np.isfinite(angle)
             unwrapped = np.full(times.shape, np.nan)

@@ -21,7 +21,7 @@ from trunnion.solve.forward import Assembly, Forward, Travel, forward
 from trunnion.solve.friction import Contact, Settled, settle
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.friction_problem import Rubbing
-from trunnion.solve.gears import GearLoad, acting, gear_load, power_of, teeth
+from trunnion.solve.gears import GearLoad, acting, gear_load, on_thread, power_of, teeth, units
 from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs, stated_loads
 from trunnion.solve.system import Place, System, Values, law_of, rubbing
 
@@ -74,7 +74,8 @@ class Backward:
     where each load or spring (by path) has no value; turning: of joints that rub and turn, the friction force about
     the axis for each newton of normal load, and the slip; spins: torque that each link with a free spin would need
     to keep from spinning, N m; travels: whether seats do; gear_power: of all gear pairs, whose wheels then move
-    apart; module_reactions: reactions as their modules see them. stated: loads before any joint was passed; rubbed:
+    apart; threads: friction torque and power lost in the threads of screws, by the joint that turns;
+    module_reactions: reactions as their modules see them. stated: loads before any joint was passed; rubbed:
     contacts per module as `settled`, those of gear pairs last; margin_up_to: as in the method; margin: that of
     `locking_margin`, once it was asked for.
     """
@@ -99,6 +100,7 @@ class Backward:
     spins: dict[str, Number] = field(default_factory=dict)
     travels: bool = False
     gear_power: Number = 0.0
+    threads: dict[str, tuple[Number, Number]] = field(default_factory=dict)
     module_reactions: dict[str, Any] = field(default_factory=dict)
     stated: dict[str, Any] = field(default_factory=dict)
     rubbed: list[list[tuple[Contact, Rubbing | None]]] = field(default_factory=list)
@@ -213,13 +215,18 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, given: G
     rubbed: list[tuple[Contact, Rubbing | None]] = []
     for k, place in enumerate(places):
         joint = place.joint
-        for i, rub in enumerate(() if place.witness else back.contacts.get(joint, ())):
-            slope, slip = _slope(back, joint, rub, given, i)
-            # power goes by the speed itself where the law is told on which side of rest it is
-            felt = rub if joint in given.rests else rub._replace(slip=slip)
+        for i, rub in enumerate(() if place.witness or joint in system.screws else back.contacts.get(joint, ())):
+            slope, felt = _felt(back, joint, rub, given, i)
             rubbed.append((_contact(walk, module.links, k, joint, rub, slope), felt))
             if rub.turning is not None:
-                back.turning[joint] = literal.times(slope, rub.turning), slip
+                back.turning[joint] = literal.times(slope, rub.turning), felt.slip
+    for i, name in enumerate(module.gears):
+        joint = system.mechanism.coupled(name)[0]
+        if name in system.screws.get(joint, ()) and joint in back.contacts:
+            rub = back.contacts[joint][system.screws[joint].index(name)]
+            slope, felt = _felt(back, joint, rub, given, 0)
+            unit_loads = units(walk, number, on_thread(walk, number, i, 1.0))
+            rubbed.append((Contact(len(places) + i, unit_loads, rub.load, slope), felt))
     rubbed += [(contact, None) for contact in teeth(walk, number)]
     settled = settle(partial(walk.reactions, number), loads, [contact for contact, _ in rubbed], method)
     back.settled.append(settled)
@@ -244,23 +251,37 @@ def pass_on(
     """
     walk, module, places = back.walk, back.walk.system.plan.modules[number], back.walk.system.places[number]
     parts = [(*both, force) for both, force in zip(rubbed, forces, strict=True)]
-    for k, place in enumerate(places):
-        if not place.witness:
-            back.module_reactions[place.joint] = reactions[k]
-            own, driven = [part for part in parts if part[0].joint == k], place.joint in module.driven
-            _record(back, place, walk.wrench(place, reactions[k]), own, driven)
-    parting = {contact.joint: force for contact, _, force in parts}
+    along = {contact.joint: force for contact, _, force in parts}
+    for contact, rub, force in parts:
+        if contact.joint >= len(places) and rub is not None:
+            screw = walk.system.rubbing_joint(number, contact.joint)
+            amount, loss = back.threads.get(screw, (0.0, 0.0))
+            back.threads[screw] = amount + force * rub.amount, loss - force * rub.slip
     for i, name in enumerate(module.gears):
-        k = len(places) + i
+        effort, force = reactions[len(places) + i][-1], along.get(len(places) + i, 0.0)
         if toothed:
-            back.gears[name], done = gear_load(walk, number, i, reactions[k][-1], parting.get(k, 0.0))
+            back.gears[name], done = gear_load(walk, number, i, effort, force)
         else:
-            done = acting(walk, number, i, reactions[k][-1], parting=False)
+            done = acting(walk, number, i, effort, force, parting=False)
         if back.travels:
             back.gear_power = back.gear_power + power_of(walk, number, done)
         for joint, side, wrench in done:
             if places[joint].outer[side]:
                 back.add(places[joint].links[side], wrench)
+    for k, place in enumerate(places):
+        if not place.witness:
+            back.module_reactions[place.joint] = reactions[k]
+            own, driven = [part for part in parts if part[0].joint == k], place.joint in module.driven
+            _record(back, place, walk.wrench(place, reactions[k]), own, driven)
+
+
+def _felt(back: Backward, joint: str, rub: Rubbing, given: Given, i: int) -> tuple[Number, Rubbing]:
+    """Friction force of a contact for each newton of its normal load, and the contact with the slip that goes with it.
+
+    Power goes by the speed itself where the law is told on which side of rest it is.
+    """
+    slope, slip = _slope(back, joint, rub, given, i)
+    return slope, rub if joint in given.rests else rub._replace(slip=slip)
 
 
 def _slope(back: Backward, joint: str, rub: Rubbing, given: Given, i: int) -> tuple[Number, Number]:
@@ -303,7 +324,7 @@ def _record(
     """Keep a joint's reaction, friction and drive effort; load its known link with all three."""
     walk, algebra, joint = back.walk, back.walk.algebra, place.joint
     turns, second = walk.system.turns(joint), walk.system.joints[joint][1][1]
-    friction, amount, loss = algebra.ZERO_LOAD, 0.0, 0.0
+    friction, (amount, loss) = algebra.ZERO_LOAD, back.threads.get(joint, (0.0, 0.0))
     for contact, rub, force in parts:
         if rub is not None:
             part = algebra.times(force, rub.unit)
@@ -325,6 +346,7 @@ def _record(
     if back.travels:  # what the joint takes out and its driver does not put in
         put_in = back.efforts[joint] * walk.rate(joint) if driven else 0.0
         loss = put_in - algebra.power(walk.on_link(second, total, joint), walk.against(joint))
+        loss = loss + back.threads[joint][1] if joint in back.threads else loss
         loss = loss + back.drags[joint][1] if joint in back.drags else loss
     back.reactions[joint], back.friction_wrenches[joint] = reaction, friction
     back.friction[joint], back.losses[joint] = amount, loss

@@ -41,12 +41,18 @@ def contacts_of(walk: Forward, joint: str) -> Iterator[Rubbing]:
 
 
 def _in_plane(walk: Forward, joint: str) -> Iterator[Rubbing]:
-    """The one contact of a joint: a pin in its hole, or a guide, whose middle is at its point on the second link."""
+    """The one contact of a joint: a pin in its hole, or a guide, whose middle is at its point on the second link.
+
+    The joint in which a screw turns stands for its thread.
+    """
     turns, path = walk.system.turns(joint), f"joints.{joint}"
     speed = walk.speed(joint)
     zero = np.abs(primal(speed)) <= walk.noise(joint, turns)
     if turns:
         lever = walk.values[f"{path}.pin.radius"]
+        if joint in walk.system.screws:
+            yield from (_thread(walk, name, lever, speed, zero) for name in walk.system.screws[joint])
+            return
         yield Rubbing(PlanarContactLoad(), lever * speed, Wrench(0.0, 0.0, lever), zero, amount=lever, turning=1.0)
         return
     axis, middle = walk.ends(joint)
@@ -54,6 +60,21 @@ def _in_plane(walk: Forward, joint: str) -> Iterator[Rubbing]:
     arm = None if at is middle else (middle.x - at.x, middle.y - at.y)
     load = PlanarContactLoad((-axis.s, axis.c), walk.values[f"{path}.guide.length"], arm)
     yield Rubbing(load, speed, Wrench(axis.c, axis.s, 0.0), zero)
+
+
+def _thread(walk: Forward, name: str, lever: Number, speed: Number, zero: Number) -> Rubbing:
+    """A square thread at its mean radius r: F sec λ presses, friction acts along it, tan λ = lead/(2 π r).
+
+    The load is of what the gear pair puts into its second joint: the force F along the screw, or its torque.
+    """
+    lead = walk.system.ratio(walk.values, name)
+    xp = namespace(lead, lever)
+    helix = xp.sqrt(lever * lever + lead * lead)
+    secant = helix / lever / (xp.abs(lead) if name in walk.system.turned_round else 1.0)
+    # a guide of length 2/s under a moment M alone presses with |M| s
+    load = PlanarContactLoad((1.0, 0.0), 2.0 / secant)
+    moment = lever * lever / helix
+    return Rubbing(load, helix * speed, Wrench(0.0, 0.0, moment), zero, amount=moment)
 
 
 def _in_space(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:

@@ -266,6 +266,8 @@ class Forward:
         if not turns:
             return rate, second
         lever, lead = self.values[f"joints.{joint}.pin.radius"], self.system.lead(self.values, joint)
+        if joint in self.system.screws:
+            lead = self.system.ratio(self.values, self.system.screws[joint][0])
         if not is_zero(lead):
             lever = namespace(lever, lead).sqrt(lever * lever + lead * lead)
         return lever * rate, lever * second

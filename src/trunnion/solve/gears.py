@@ -5,19 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from trunnion.algebra.literal import is_zero
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.plane import ZERO_LOAD, added, power
-from trunnion.groups.gear import GearPair, Mesh, ToothForce, actions, apart, mesh
+from trunnion.algebra.plane import ZERO_LOAD, Wrench, added, power
+from trunnion.groups.gear import GearPair, Mesh, ToothForce, actions, apart, mesh, thread_forces
 from trunnion.groups.general import General
 from trunnion.joints.pairs import PlanarContactLoad
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction_problem import Contact
 
-__all__ = ["GearLoad", "acting", "gear_load", "gears_of", "power_of", "teeth"]
+__all__ = ["GearLoad", "acting", "gear_load", "gears_of", "on_thread", "power_of", "teeth", "units"]
 
 
 class GearLoad(NamedTuple):
-    """What a gear pair does: torque in its second joint, on the second link, N m; tooth force on the second gear, N."""
+    """What a gear pair does: torque in its second joint, on the second link, N m; tooth force on the second gear, N.
+
+    Of a rack or screw the torque is in the joint that turns, the force on the link that slides.
+    """
 
     torque: Number
     force: tuple[Number, Number]
@@ -41,42 +45,80 @@ def teeth(walk: Forward, number: int) -> Iterator[Contact]:
         if not gears_of(walk.system.groups[number])[i].carriers:
             continue
         gear, touch = _mesh(walk, number, i)
-        units = dict.fromkeys(module.links, ZERO_LOAD)
-        for joint, side, wrench in apart(gear, touch, 1.0):
-            link = places[joint].links[side]
-            if link in units:
-                units[link] = added(units[link], wrench)
-        angle = walk.values[f"gears.{name}.pressure_angle"]
+        unit_loads = units(walk, number, apart(gear, touch, 1.0))
+        angle = walk.values.get(f"gears.{name}.pressure_angle")
+        if angle is None:  # a chain or rope
+            continue
         # a guide of length 2/|f/λ| under the moment λ alone presses with |f|
         load = PlanarContactLoad((1.0, 0.0), 2 / namespace(touch.factor).abs(touch.factor))
         slope = namespace(angle).sin(angle) / namespace(angle).cos(angle)
-        yield Contact(len(places) + i, list(units.values()), load, slope, rubs=False)
+        yield Contact(len(places) + i, unit_loads, load, slope, rubs=False)
 
 
-def acting(walk: Forward, number: int, i: int, torque: Number, parting: bool = True) -> list[ToothForce]:
-    """What a gear pair of a module does with a torque in its second joint; parting: by tooth forces, not torques alone.
+def units(walk: Forward, number: int, forces: Sequence[ToothForce]) -> list[Wrench]:
+    """What forces do to each link of a module."""
+    loads = dict.fromkeys(walk.system.plan.modules[number].links, ZERO_LOAD)
+    for joint, side, wrench in forces:
+        link = walk.system.places[number][joint].links[side]
+        if link in loads:
+            loads[link] = added(loads[link], wrench)
+    return list(loads.values())
 
-    Torques alone are what moves with the play of joints: the ratio holds between rotations, which no offset of a pin
-    changes.
+
+def on_thread(walk: Forward, number: int, i: int, friction: Number) -> list[ToothForce]:
+    """What friction along the thread of a screw, N, does to the links."""
+    gear, name = gears_of(walk.system.groups[number])[i], walk.system.plan.modules[number].gears[i]
+    lead = walk.system.ratio(walk.values, name)
+    lever = walk.values[f"joints.{walk.system.mechanism.coupled(name)[0]}.pin.radius"]
+    helix = namespace(lead, lever).sqrt(lever * lever + lead * lead)
+    torque, force = friction * lever * lever / helix, friction * lead / helix
+    return thread_forces(gear, walk.poses[number].elements, torque, force)
+
+
+def acting(
+    walk: Forward, number: int, i: int, effort: Number, along: Number = 0.0, parting: bool = True
+) -> list[ToothForce]:
+    """What a gear pair of a module does with an effort in its second joint, and with friction along its thread, N.
+
+    parting: by tooth forces, not efforts alone. Efforts alone are what moves with the play of joints: the ratio holds
+    between coordinates, which no offset of a pin changes.
     """
     pose, gear = walk.poses[number], gears_of(walk.system.groups[number])[i]
-    return actions(gear if parting else gear._replace(carriers=None), pose.elements, pose.ratios[i], torque)
+    done = actions(gear if parting else gear._replace(carriers=None), pose.elements, pose.ratios[i], effort)
+    if gear.slide is not None and not gear.carriers and not is_zero(along):
+        done += on_thread(walk, number, i, along)
+    return done
 
 
-def gear_load(
-    walk: Forward, number: int, i: int, torque: Number, separation: Number
-) -> tuple[GearLoad, list[ToothForce]]:
-    """What a gear pair does in the file's sense, and to which links. separation: the force that parts its gears, N."""
-    done = acting(walk, number, i, torque)
+def gear_load(walk: Forward, number: int, i: int, effort: Number, along: Number) -> tuple[GearLoad, list[ToothForce]]:
+    """What a gear pair does in the file's sense, and to which links.
+
+    along: the force that parts its gears, or friction along its thread, N.
+    """
+    done, gear = acting(walk, number, i, effort, along), gears_of(walk.system.groups[number])[i]
+    turned_round = walk.system.plan.modules[number].gears[i] in walk.system.turned_round
     force: tuple[Number, Number] = (0.0, 0.0)
-    if gears_of(walk.system.groups[number])[i].carriers:
-        pushes = apart(*_mesh(walk, number, i), separation)
+    if gear.carriers:
+        pushes = apart(*_mesh(walk, number, i), along)
         force = done[0].wrench.x + pushes[0].wrench.x, done[0].wrench.y + pushes[0].wrench.y
         done += pushes
-    if walk.system.plan.modules[number].gears[i] not in walk.system.turned_round:
-        return GearLoad(torque, force), done
-    # found in the joint and on the gear that the file names first
-    return GearLoad(-torque * walk.poses[number].ratios[i], (-force[0], -force[1])), done
+        if turned_round:  # on the gear that the file names first
+            force = -force[0], -force[1]
+    elif gear.slide is not None:
+        total = _on_second(done)
+        x, y, _ = total[gear.joints[gear.slide][0]]
+        return GearLoad(total[gear.joints[1 - gear.slide][0]].m, (x, y)), done
+    in_first = turned_round if gear.slide is None else gear.slide == 1
+    return GearLoad(-effort * walk.poses[number].ratios[i] if in_first else effort, force), done
+
+
+def _on_second(done: Sequence[ToothForce]) -> dict[int, Wrench]:
+    """All that a gear pair does to the second link of each of its joints."""
+    total: dict[int, Wrench] = {}
+    for joint, side, wrench in done:
+        if side == 1:
+            total[joint] = added(total.get(joint, ZERO_LOAD), wrench)
+    return total
 
 
 def power_of(walk: Forward, number: int, done: Sequence[ToothForce]) -> Number:

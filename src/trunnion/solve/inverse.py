@@ -46,13 +46,15 @@ def driven_at_outputs(mechanism: Mechanism) -> Mechanism | None:
 
 @dataclass(frozen=True)
 class Inverse:
-    """moves: driver and the joint that it moves; system, values, cycle, assembly: of the links driven at those."""
+    """moves: driver and the joint that it moves; system, values, cycle, assembly: of the links driven at those;
+    findings: of the choice of that assembly."""
 
     moves: Mapping[str, str]
     system: System
     values: Values
     cycle: Cycle
     assembly: Any
+    findings: tuple[Finding, ...] = ()
 
     def drive(self, values: Values, name: str, time: Number) -> tuple[Number, Number, Number]:
         """Coordinate, rate and second derivative of a driver at times, s; NaN past a dead centre of the drivers."""
@@ -137,9 +139,18 @@ class Inverse:
         for row, name in enumerate(names):
             time, angle = rates.integral(row)
             start = int(np.argmax(np.isfinite(rates.at(time)[row])))
-            first = float(np.ravel(primal(self._walk(time[start : start + 1]).coordinates(name)[0]))[0])
+            first = float(np.ravel(primal(self._turned(self._walk(time[start : start + 1]), name)))[0])
             found[name] = (time, angle - angle[start] + np.nan_to_num(first))
         return found
+
+    def _turned(self, walk: Forward, name: str) -> Number:
+        """Angle of a driver; with its whole turns where it moves a rack or screw, whose slide tells them."""
+        for gear, stated in self.system.mechanism.gears.items():
+            turning, sliding = self.system.mechanism.coupled(gear)
+            if stated.slides and turning == name:
+                slide = walk.coordinates(sliding)[1] - self.values[f"gears.{gear}.phase"]
+                return slide / self.system.ratio(self.values, gear)
+        return walk.coordinates(name)[0]
 
     def check(self, system: System, values: Values, assembly: Any) -> None:
         """MechanismError where the drivers do not hold the stated joints at the start where their laws say."""

@@ -196,7 +196,11 @@ def _prepared(mechanism: Mechanism, free: bool) -> Run:
     system, values = built(mechanism), mechanism.parameters()
 
     def over(cycle: Cycle) -> Run:
-        return Run(system, values, cycle, choose(system, values, cycle))
+        chosen, inverse = choose(system, values, cycle), system.inverse
+        if isinstance(inverse, Inverse):
+            more = tuple(finding for finding in inverse.findings if finding not in chosen.findings)
+            chosen = replace(chosen, findings=(*chosen.findings, *more))
+        return Run(system, values, cycle, chosen)
 
     run = over(system.cycle(values, None, free))
     if any((turns := _unknown_turns(run)).values()):
@@ -222,17 +226,21 @@ def _inverse(mechanism: Mechanism, own: Mechanism) -> Inverse:
         name, joint = next(iter(moves.items()))
         what = f"the mechanism is not moved by {joint}: {error.findings[0].what}"
         raise MechanismError(Finding(what, f"drivers.{name}.moves", error.findings[0].remedy)) from None
-    return Inverse(moves, run.system, run.values, run.cycle, run.chosen.assembly)
+    return Inverse(moves, run.system, run.values, run.cycle, run.chosen.assembly, run.chosen.findings)
 
 
 def _comes_back(run: Run) -> bool:
-    """Whether the links are after a period of the drivers where they were, as they are not where a nut goes on."""
-    if not (run.cycle.periodic and any(PAIRS[kind].threaded for kind, _ in run.system.joints.values())):
+    """Whether the links are after a period of the drivers where they were, which a nut or rack that goes on is not."""
+    threaded = any(PAIRS[kind].threaded for kind, _ in run.system.joints.values())
+    racks = any(gear.slides for gear in run.system.mechanism.gears.values())
+    if not (run.cycle.periodic and (threaded or racks)):
         return True
     # up to just before the end: there a track begins again
     walk = run.walk(run.cycle.duration * np.array([0.0, 1 - 1e-9]))
     size = float(np.max(primal(run.system.size(run.values))))
-    places = [np.broadcast_to(np.asarray(part, float), 2) for one in walk.motions.values() for part in one.frame.place]
+    origin = (0.0,) * run.system.mechanism.coordinates
+    origins = [walk.algebra.point_of(motion.frame, origin) for motion in walk.motions.values()]
+    places = [np.broadcast_to(np.asarray(part, float), 2) for place in origins for part in place]
     return not np.any(np.abs(np.diff(places)) > COMES_BACK * size)
 
 
@@ -245,7 +253,7 @@ def _unknown_turns(run: Run) -> dict[str, float]:
     duration = run.cycle.duration
     for gear in mechanism.gears.values():
         joint = gear.joints[0]
-        if joint in run.system.geared_turns(run.values, duration, turns_of):
+        if gear.slides or joint in run.system.geared_turns(run.values, duration, turns_of):
             continue
         # up to just before the end: there a track begins again
         time = np.linspace(0.0, duration * (1 - 1e-9), TURN_STEPS)

@@ -228,21 +228,25 @@ class System:
 
     def _gear(self, name: str, names: Sequence[str]) -> GearPair:
         first, second = (names.index(joint) for joint in self.gear_joints(name))
-        carriers = self.mechanism.carriers(name) if self.mechanism.gears[name].teeth else None
-        if carriers and name in self.turned_round:
+        carriers = self.mechanism.carriers(name) if self.mechanism.gears[name].touches else None
+        turned_round = name in self.turned_round
+        if carriers and turned_round:
             carriers = carriers[1], carriers[0]
-        return GearPair(first, second, carriers)
+        return GearPair(first, second, carriers, 1 - turned_round if self.mechanism.gears[name].slides else None)
 
     @cached_property
     def turned_round(self) -> frozenset[str]:
-        """Gear pairs whose second joint is the one whose turns are known: driven, or geared to such a joint.
+        """Gear pairs whose second joint is the one whose turns are known: driven, or geared to such a joint, or a slide
+        that an earlier module determines.
 
         φ₁ = (φ₂ − φ₀)/i then says what φ₂ = i φ₁ + φ₀ leaves open by whole turns of φ₂.
         """
         turned, reversed_ = set(self.mechanism.drivers), set()
+        for module in self.plan.modules:
+            turned |= {joint for joint in module.witnesses if not self.turns(joint)}
         for _ in self.mechanism.gears:
-            for name, gear in self.mechanism.gears.items():
-                first, second = gear.joints
+            for name in self.mechanism.gears:
+                first, second = self.mechanism.coupled(name)
                 if second in turned and first not in turned:
                     reversed_.add(name)
                 if first in turned or second in turned:
@@ -251,13 +255,36 @@ class System:
 
     def gear_joints(self, name: str) -> tuple[str, str]:
         """Joints of a gear pair, that whose turns are known first."""
-        first, second = self.mechanism.gears[name].joints
+        first, second = self.mechanism.coupled(name)
         return (second, first) if name in self.turned_round else (first, second)
 
     def gear_numbers(self, values: Values, name: str) -> tuple[Number, Number]:
         """Ratio and phase of a gear pair in the order of `gear_joints`."""
-        ratio, phase = values[f"gears.{name}.ratio"], values[f"gears.{name}.phase"]
+        ratio, phase = self.ratio(values, name), values[f"gears.{name}.phase"]
         return (1 / ratio, -phase / ratio) if name in self.turned_round else (ratio, phase)
+
+    def ratio(self, values: Values, name: str) -> Number:
+        """Ratio of a gear pair; of a rack or screw the slide for one radian, m."""
+        gear, where = self.mechanism.gears[name], f"gears.{name}"
+        if gear.lead is not None:
+            return values[f"{where}.lead"] / (2 * np.pi)
+        return values[f"{where}.{'ratio' if gear.radius is None else 'radius'}"]
+
+    @cached_property
+    def screws(self) -> dict[str, list[str]]:
+        """Gear pairs that are screws, by the joint that turns: its friction is that of their threads."""
+        screws: dict[str, list[str]] = {}
+        for name, gear in self.mechanism.gears.items():
+            if gear.lead is not None:
+                screws.setdefault(self.mechanism.coupled(name)[0], []).append(name)
+        return screws
+
+    def rubbing_joint(self, number: int, place: int) -> str:
+        """The joint whose friction acts at a place of a module: of its joints, then of its gear pairs."""
+        places = self.places[number]
+        if place < len(places):
+            return places[place].joint
+        return self.mechanism.coupled(self.plan.modules[number].gears[place - len(places)])[0]
 
     def elements(self, values: Values) -> dict[tuple[str, str], Any]:
         """Local frame of every joint's element, by (link, joint): errors of joints are in the second ones.
@@ -326,7 +353,10 @@ class System:
         return elements
 
     def lead(self, values: Values, joint: str) -> Number:
-        """Slide for one radian of a helical pair, m; 0 of others."""
+        """Slide for one radian of a helical pair, m; 0 of others.
+
+        The joints of a screw in the plane are two, and neither is helical.
+        """
         return values[f"joints.{joint}.pitch"] / (2 * np.pi) if PAIRS[self.joints[joint][0]].threaded else 0.0
 
     def support(self, values: Values, joint: str) -> Support:
@@ -487,8 +517,12 @@ class System:
         count = next((n for n in range(1, COMMON_TURNS + 1) if all(_is_whole(n * period) for period in periods)), 0)
         periodic = bool(count and not ending)
         duration = count * longest if periodic else longest
-        # turns that a driver would make at its largest rate; of a slide, how often it would travel
+        # turns that a driver would make at its largest rate; of a slide, how often it would travel or turn its wheel
         ways = {name: 2 * np.pi if self.turns(name) else span.travel for name, span in spans.items()}
+        for name, gear in self.mechanism.gears.items():
+            if gear.slides and (slide := self.mechanism.coupled(name)[1]) in ways:
+                around = 2 * np.pi * abs(float(np.ravel(primal(self.ratio(values, name)))[0]))
+                ways[slide] = min(ways[slide], around)
         return Cycle(duration, periodic, max(float(spans[name].peak * duration / way) for name, way in ways.items()))
 
     def _backward_ranges(self, nominal: Values, spans: Mapping[str, Span]) -> Iterator[Finding]:
@@ -511,8 +545,10 @@ class System:
                 turns.setdefault(name, (ends[1] - ends[0]) / (2 * np.pi))
         for _ in self.mechanism.gears:  # each round reaches one gear pair farther, whichever way it is stated
             for name, gear in self.mechanism.gears.items():
+                if gear.slides:
+                    continue
                 first, second = gear.joints
-                ratio = float(np.ravel(primal(values[f"gears.{name}.ratio"]))[0])
+                ratio = float(np.ravel(primal(self.ratio(values, name)))[0])
                 if first in turns:
                     turns.setdefault(second, ratio * turns[first])
                 elif second in turns:
@@ -559,8 +595,8 @@ def driven_coordinates(
 ) -> tuple[list[Number], list[Number], list[Number]]:
     """Coordinates, rates and second derivatives of a module's driven joints, in the module's sense.
 
-    Then come three numbers for each of its gear pairs: ratio, phase and rotation of the first joint, which is known
-    with its whole turns if it is driven and otherwise taken as the nearest to 0.
+    Then come three numbers for each of its gear pairs: ratio, phase and coordinate of the first joint. Its rotation is
+    known with its whole turns if it is driven and otherwise taken as the nearest to 0.
     """
     q: list[Number] = []
     rate: list[Number] = []

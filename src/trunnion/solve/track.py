@@ -78,7 +78,7 @@ def closed_at(
 def each_once(group: Tree, solved: Assemblies) -> list[int]:
     """Lanes that hold every assembly of one position once, in an order that does not depend on the guesses."""
     closed, key = solved.closed, solved.key
-    geared = {gear.first for gear in getattr(group, "gears", ())}
+    geared = {gear.first for gear in getattr(group, "gears", ()) if gear.slide != 0}
     for joint in group.order:
         if joint in geared - set(group.driven):  # whole turns more would be another tooth
             closed = closed & (np.abs(np.broadcast_to(solved.pose.q[group.starts[joint]], closed.shape)) <= np.pi)

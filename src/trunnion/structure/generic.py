@@ -23,7 +23,7 @@ __all__ = ["GEAR", "SPIN", "Constraint", "Gears", "Generic", "Joints", "Places",
 GEAR, SPIN = -1, -2
 Constraint = tuple[str, int]  # of a joint, the number of a freedom it takes; of a gear pair, GEAR; of a link, SPIN
 Joints = Mapping[str, tuple[str, tuple[str, str]]]  # kind and links, by name
-Gears = Mapping[str, tuple[tuple[str, str], float]]  # joints and ratio, by name
+Gears = Mapping[str, tuple[tuple[str, str], float]]  # joints and ratio by name; of a rack or screw m, what turns first
 Places = Mapping[str, tuple[float, float, float, float]]  # point and direction of the slide (x, y, c, s), by joint
 TURN = np.array([0.0, 0.0, 1.0])  # the constraint that a turn is held
 RANK_TOLERANCE = 1e-9  # of the largest singular value
@@ -63,16 +63,19 @@ def constraints(
         rows.append(row)
         owners.append(owner)
 
+    along_slides: dict[str, NDArray[np.float64]] = {}
     for name, (kind, sides) in joints.items():
         x, y = (np.asarray(places[name][:2]) - middle) / spread
         c, s = places[name][2:]
         at_x, at_y = np.array([1.0, 0.0, -y]), np.array([0.0, 1.0, x])
         across, along = c * at_y - s * at_x, c * at_x + s * at_y
         held = [at_x, at_y, TURN] if PAIRS[kind].turns else [across, TURN, along]
+        along_slides |= {} if PAIRS[kind].turns else {name: along}
         for constraint in held[: 3 if name in drivers else 2]:
             add(name, (sides, constraint))
-    for name, (pair, ratio) in (gears or {}).items():
-        add(name, (joints[pair[0]][1], -ratio * TURN), (joints[pair[1]][1], TURN))
+    for name, ((first, second), ratio) in (gears or {}).items():
+        scale = spread if second in along_slides else 1.0
+        add(name, (joints[first][1], -ratio / scale * TURN), (joints[second][1], along_slides.get(second, TURN)))
     return np.array(rows).reshape(len(rows), 3 * len(number)), owners
 
 
@@ -107,7 +110,7 @@ class Generic:
             name: (*rng.uniform(-1.0, 1.0, 2), float(np.cos(angle)), float(np.sin(angle)))
             for name, angle in zip(self.joints, angles, strict=True)
         }
-        self.gears = {name: (gear.joints, float(rng.uniform(0.3, 0.9))) for name, gear in mechanism.gears.items()}
+        self.gears = {name: (mechanism.coupled(name), float(rng.uniform(0.3, 0.9))) for name in mechanism.gears}
 
     def fault(
         self, left_over: list[Constraint], parts: Sequence[list[str]], before: Sequence[set[int]]

@@ -332,7 +332,7 @@ def _left_out(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
         remedy = f"play is modelled in {', '.join(models)} joints"
         yield Finding.warning("play.left_out", "joints", what, remedy, joints=stated)
     toothed = sorted({
-        joint for gear in mechanism.gears.values() if gear.teeth for joint in gear.joints if joint in loose
+        joint for gear in mechanism.gears.values() if gear.touches for joint in gear.joints if joint in loose
     })  # fmt: skip
     if toothed:
         what = f"gears turn in {', '.join(toothed)}: the effect of this play on the tooth contact is left out"

@@ -310,7 +310,8 @@ def _layers(asked: Asked) -> dict[str, Any]:
     if state.run.system.mechanism.space != "planar":
         return found
     if "circles" in wanted:
-        found["circles"] = circles(result, rubbing(state.run.system))
+        system = state.run.system
+        found["circles"] = circles(result, [joint for joint in rubbing(system) if joint not in system.screws])
     if wanted & {"centres", "transmission"}:
         walk = solved_with(state, {}, steps).walk
         found |= {name: tell(walk, steps) for name, tell in WALKED.items() if name in wanted}

@@ -71,7 +71,7 @@ def put_value(sketch: Sketch, given: Given) -> str:
     if way == ["dimensions"] and (users := list(_users(sketch.entries, str(last)))):
         what = f"is in use: by {', '.join(users[:3])}{' and others' if users[3:] else ''}"
         raise refused(what, path, "type another value, or change what uses it first")
-    if way[:1] == ["gears"] and last == "ratio":
+    if way[:1] == ["gears"] and last in ("ratio", "radius", "lead"):
         raise refused("is what makes a gear pair", path, "type another, or delete the gear pair")
     if isinstance(group, dict):
         group.pop(last, None)

@@ -42,6 +42,10 @@ assert.deepEqual(drawn.links.map((one) => one.ground), [true, false]);
 assert.deepEqual(geometry.spotsOf(drawn, 0).map((one) => one.name), ["A", "bar.B"]);
 assert.deepEqual(geometry.placesAt(drawn, 0)["bar.B"], [0.6, 0.8]);
 for (const odd of [null, {}, { links: 3, joints: [] }, { links: { a: null } }]) geometry.sketch(odd, {});
+const rack = { joints: { S: { type: "prismatic", links: ["ground", "bar"] }, A: entries.joints.A }, gears: { mesh: { joints: ["S", "A"] } } };
+const circle = geometry.sketch({ ...entries, ...rack }, { ...places, "bar.S": [1, 0] }, { "gears.mesh.radius": -0.02 }).gears;
+assert.deepEqual(circle, [{ name: "mesh", at: "bar.A", radius: 0.02 }]);
+assert.deepEqual(fields.rowsOf({ gears: { mesh: { joints: ["S", "A"], lead: "5 mm" } } }, "gears", "mesh").map(({ label }) => label).sort(), ["joints", "lead", "phase"]);
 
 // ---- the position that can be drawn
 const track = { count: 5, points: { "a.P": { x: [null, null, 1, 2, null], y: [0] } } };

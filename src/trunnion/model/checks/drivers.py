@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from trunnion.algebra.namespace import Number
-from trunnion.errors import Finding, counted
+from trunnion.errors import Finding, Severity, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.checks.loads import unread
 from trunnion.model.names import nearest
@@ -108,7 +108,7 @@ def _clutch_values(values: Mapping[str, float], where: str) -> Iterator[Finding]
 
 
 def gears(mechanism: Numbers) -> Iterator[Finding]:
-    """Whether each gear pair speaks of two joints that turn, and has teeth only where its gears can touch."""
+    """Whether each gear pair speaks of two joints that it can couple, and has teeth only where its gears can touch."""
     joints = mechanism.effective_joints
     for name, gear in mechanism.gears.items():
         where = f"gears.{name}"
@@ -117,21 +117,61 @@ def gears(mechanism: Numbers) -> Iterator[Finding]:
             continue
         if name in joints:
             yield Finding("a joint has this name too", where, "rename the gear pair")
-        for joint in gear.joints:
-            if joint in joints and "rotation" not in freedoms(joints[joint].type):
-                yield Finding(f"the joint '{joint}' does not turn", f"{where}.joints", "name a revolute joint")
         if gear.joints[0] != gear.joints[1] and all(joint in joints for joint in gear.joints):
-            yield from _teeth(mechanism, name, where)
+            faults = list(_coupling(mechanism, name, where))
+            yield from faults
+            if all(fault.severity is not Severity.ERROR for fault in faults):
+                yield from _teeth(mechanism, name, where)
+
+
+def _coupling(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
+    """Whether a gear pair states the one number that couples two rotations, or a rotation and a slide."""
+    gear = mechanism.gears[name]
+    sliding = [one for one in gear.joints if "rotation" not in freedoms(mechanism.effective_joints[one].type)]
+    stated = [key for key in ("ratio", "radius", "lead") if getattr(gear, key) is not None]
+    if len(sliding) == 2:
+        yield Finding("both joints slide", f"{where}.joints", "name a revolute joint, or two")
+    elif sliding and stated not in (["radius"], ["lead"]):
+        what = f"the joint '{sliding[0]}' slides, and {_states(stated)}"
+        yield Finding(what, where, "state radius: … of the wheel (rack, chain, rope), or lead: … (screw), not both")
+    elif not sliding and stated != ["ratio"]:
+        remedy = (
+            "state ratio: … alone" if "ratio" in stated or not stated else "state ratio: …, or name a prismatic joint"
+        )
+        yield Finding(f"both joints turn, and {_states(stated)}", where, remedy)
+    elif gear.lead is not None:
+        yield from _thread(mechanism, mechanism.coupled(name)[0], where)
+        for key in sorted({"teeth", "pressure_angle"} & gear.model_fields_set):
+            yield Finding("has no effect: a screw has no pitch point", f"{where}.{key}", "remove it")
+
+
+def _thread(mechanism: Numbers, joint: str, where: str) -> Iterator[Finding]:
+    """Whether the friction of a thread was meant: the defaults are those of pins."""
+    stated = mechanism.joints.get(joint)
+    if stated is None or mechanism.effective_joints[joint].friction is None:
+        return
+    if stated.friction is None or stated.pin is None or stated.pin.radius is None:
+        what = f"its thread rubs as the pin of {joint} does by joint_defaults"
+        remedy = f"state friction and pin.radius of {joint}, the mean radius of the thread, or friction: 0"
+        yield Finding(what, where, remedy, Severity.WARNING)
+
+
+def _states(keys: list[str]) -> str:
+    return f"{' and '.join(keys) or 'no ratio, radius or lead'} {'are' if len(keys) > 1 else 'is'} stated"
 
 
 def _teeth(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
     gear = mechanism.gears[name]
+    first, second = gear.joints
     one, two = (mechanism.effective_joints[joint].links for joint in gear.joints)
     shared = set(one) & set(two)
     if len(shared) == 2:
         yield Finding("both joints are between the same two links", f"{where}.joints", "name joints of three links")
-    elif gear.teeth and not shared:
-        what = f"'{gear.joints[0]}' and '{gear.joints[1]}' have no link in common that carries both gears"
+    elif gear.radius is not None and not shared:
+        what = f"'{first}' and '{second}' have no link in common that carries the wheel and guides the rack or rope"
+        yield Finding(what, where, "guide it on the link on which the wheel turns")
+    elif gear.touches and not shared:
+        what = f"'{first}' and '{second}' have no link in common that carries both gears"
         yield Finding(what, where, "state teeth: false for a train, belt or chain that passes torques alone")
 
 
@@ -139,6 +179,8 @@ def gear_values(mechanism: Numbers, values: Mapping[str, Number]) -> Iterator[Fi
     """Gears without a pitch point, or on one centre."""
     for name, gear in mechanism.gears.items():
         where = f"gears.{name}"
+        if gear.ratio is None:
+            continue
         ratio = values.get(f"{where}.ratio", np.nan)
         known = len({*gear.joints} & mechanism.effective_joints.keys()) == len(gear.joints)
         carriers = mechanism.carriers(name) if known else None

@@ -67,8 +67,8 @@ def check_values(
 
 def _weight(mechanism: Numbers, link: Link, values: Values, where: str) -> Iterator[Finding]:
     """Whether a link whose weight is useful has one."""
-    gravity = [values[f"gravity.{axis}"] for axis in "xyz"[: mechanism.coordinates]]
-    if link.useful and (values[f"{where}.mass"] == 0 or not any(gravity)):
+    gravity = [values.get(f"gravity.{axis}", np.nan) for axis in "xyz"[: mechanism.coordinates]]
+    if link.useful and (values.get(f"{where}.mass", np.nan) == 0 or not np.any(gravity)):
         yield Finding("has no weight that could be useful", f"{where}.useful", "state mass and gravity, or remove it")
 
 

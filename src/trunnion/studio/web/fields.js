@@ -56,6 +56,8 @@ function usualOf(kind, part, fixed) {
     const other = "resisting_force" in part ? "resisting_torque" : "resisting_force";
     return USUAL.resistances.filter(([way]) => way !== other);
   }
+  const slides = kind === "gears" && ["radius", "lead"].find((key) => key in dictionary(part));
+  if (slides) return [[slides, "20 mm"], ["phase", "0 mm"]];
   return USUAL[part?.type === "prismatic" ? "slides" : kind] ?? [];
 }
 

@@ -161,11 +161,14 @@ function angleOf(name, link, places, numbers) {
   return turn("at") - turn("own");
 }
 
-/** Pitch circles of gear pairs on one carrier: |r₁|/|r₂| is the ratio, and r₁ + r₂ (or their difference) the distance. */
+/** Pitch circles of gear pairs on one carrier: |r₁|/|r₂| is the ratio, and r₁ + r₂ (or their difference) the distance; of
+ * a rack, chain or rope that of its wheel. */
 function gearsOf(entries, numbers, places) {
   return Object.entries(dictionary(entries?.gears)).flatMap(([name, gear]) => {
     const pair = (Array.isArray(gear?.joints) ? gear.joints : []).map((joint) => `${entries.joints?.[joint]?.links?.[1]}.${joint}`);
-    const ratio = numbers[`gears.${name}.ratio`];
+    const [ratio, radius] = ["ratio", "radius"].map((key) => numbers[`gears.${name}.${key}`]);
+    const wheel = pair.find((key, order) => entries.joints?.[gear.joints[order]]?.type !== "prismatic" && places[key]);
+    if (radius && wheel) return [{ name, at: wheel, radius: Math.abs(radius) }];
     const [one, two] = pair.map((key) => places[key]);
     if (!one || !two || !ratio || ratio === 1) return [];
     const far = Math.hypot(two[0] - one[0], two[1] - one[1]);

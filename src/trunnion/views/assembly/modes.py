@@ -22,11 +22,13 @@ EQUAL = 1e-7  # of the largest number: nearer ones are one
 
 
 def gear_line(pair: GearPair) -> str:
-    """'mesh: external, pitch radii 40 mm of crank, 80 mm of wheel'."""
+    """'mesh: external, pitch radii 40 mm of crank, 80 mm of wheel', 'steering: pitch radius 8 mm of pinion'."""
     told = []
     for link, radius in pair.radii:
         factor, unit = prefixed(radius, "m")
         told.append(f"{radius * factor:.5g} {unit} of {link}")
+    if len(told) == 1:
+        return f"{pair.name}: pitch radius {told[0]}"
     return f"{pair.name}: {'internal' if pair.internal else 'external'}, pitch radii {', '.join(told)}"
 
 

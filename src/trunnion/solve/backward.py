@@ -216,15 +216,15 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, given: G
     for k, place in enumerate(places):
         joint = place.joint
         for i, rub in enumerate(() if place.witness or joint in system.screws else back.contacts.get(joint, ())):
-            slope, felt = _felt(back, joint, rub, given, i)
+            slope, slip, felt = _felt(back, joint, rub, given, i)
             rubbed.append((_contact(walk, module.links, k, joint, rub, slope), felt))
             if rub.turning is not None:
-                back.turning[joint] = literal.times(slope, rub.turning), felt.slip
+                back.turning[joint] = literal.times(slope, rub.turning), slip
     for i, name in enumerate(module.gears):
         joint = system.mechanism.coupled(name)[0]
         if name in system.screws.get(joint, ()) and joint in back.contacts:
             rub = back.contacts[joint][system.screws[joint].index(name)]
-            slope, felt = _felt(back, joint, rub, given, 0)
+            slope, _, felt = _felt(back, joint, rub, given, 0)
             unit_loads = units(walk, number, on_thread(walk, number, i, 1.0))
             rubbed.append((Contact(len(places) + i, unit_loads, rub.load, slope), felt))
     rubbed += [(contact, None) for contact in teeth(walk, number)]
@@ -275,13 +275,13 @@ def pass_on(
             _record(back, place, walk.wrench(place, reactions[k]), own, driven)
 
 
-def _felt(back: Backward, joint: str, rub: Rubbing, given: Given, i: int) -> tuple[Number, Rubbing]:
-    """Friction force of a contact for each newton of its normal load, and the contact with the slip that goes with it.
+def _felt(back: Backward, joint: str, rub: Rubbing, given: Given, i: int) -> tuple[Number, Number, Rubbing]:
+    """Friction force of a contact for each newton of its normal load, the slip that goes with it, and the contact.
 
     Power goes by the speed itself where the law is told on which side of rest it is.
     """
     slope, slip = _slope(back, joint, rub, given, i)
-    return slope, rub if joint in given.rests else rub._replace(slip=slip)
+    return slope, slip, rub if joint in given.rests else rub._replace(slip=slip)
 
 
 def _slope(back: Backward, joint: str, rub: Rubbing, given: Given, i: int) -> tuple[Number, Number]:

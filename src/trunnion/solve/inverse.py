@@ -15,22 +15,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.motion import Span
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.forward import Forward, forward
-from trunnion.solve.switches import accuracy_of, breaks_between
 from trunnion.solve.system import Cycle, System, Values, freed
+from trunnion.solve.turns import near, turned
 
 __all__ = ["Inverse", "driven_at_outputs"]
 
 Array = NDArray[np.float64]
 KEPT = ("trunnion", "space", "ground", "dimensions", "links", "joints", "joint_defaults", "gears", "loop", "assembly",
         "over_constraint", "fits")  # fmt: skip
-TURNING = Accuracy(1e-4, 1e-6, shortest=1e-6)  # of a rate whose integral tells the whole turns of a driver
 TURN, LOOKS = 2 * np.pi, 181
 
 
@@ -63,8 +61,7 @@ class Inverse:
         which = 0 if self.system.turns(name) else 1
         coordinate, rate, second = (of(name)[which] for of in (walk.coordinates, walk.rates, walk.second_rates))
         if which == 0 and self.cycle.duration > 0:
-            near = np.interp(primal(time), *self._turns[name])
-            coordinate = coordinate - TURN * np.rint((primal(coordinate) - near) / TURN)
+            coordinate = near(coordinate, np.interp(primal(time), *self._turns[name]))
         lost = np.where(self._sense(own, time) * self._sense_at_start < 0, np.nan, 0.0)
         return coordinate + lost, rate, second
 
@@ -133,15 +130,13 @@ class Inverse:
 
         drivers = self.system.mechanism.drivers
         knots = [float(np.ravel(primal(knot))[0]) for name in drivers for knot in self.system.knots(self.values, name)]
-        breaks = breaks_between(self.cycle, np.array(knots, float))
-        rates = Courses.of(look, breaks, None, accuracy_of(self.cycle, TURNING))
-        found = {}
-        for row, name in enumerate(names):
-            time, angle = rates.integral(row)
-            start = int(np.argmax(np.isfinite(rates.at(time)[row])))
-            first = float(np.ravel(primal(self._turned(self._walk(time[start : start + 1]), name)))[0])
-            found[name] = (time, angle - angle[start] + np.nan_to_num(first))
-        return found
+
+        def firsts(times: Array) -> list[Number]:
+            walk = self._walk(times)
+            return [self._turned(walk, name) for name in names]
+
+        span = (0.0, self.cycle.duration)
+        return dict(zip(names, turned(self.cycle, look, firsts, np.array(knots, float), span), strict=True))
 
     def _turned(self, walk: Forward, name: str) -> Number:
         """Angle of a driver; with its whole turns where it moves a rack or screw, whose slide tells them."""

@@ -20,6 +20,7 @@ from trunnion.cli.assemble import assemble
 from trunnion.cli.compare import compare
 from trunnion.cli.data import data
 from trunnion.cli.edge import status_of
+from trunnion.cli.exchange import export, import_
 from trunnion.cli.files import guarded, named_words
 from trunnion.cli.identify import identify
 from trunnion.cli.locking import locking
@@ -75,6 +76,7 @@ GROUPS = {
     "Many mechanisms": ("sweep",),
     "Measured data": ("rig", "data", "compare", "identify"),
     "Pictures": ("plot", "report"),
+    "Other programs": ("import", "export"),
 }
 # Each runs in a folder with the models that `trunnion examples NAME` copies; mapping.yaml is one of measured data.
 EXAMPLES = {
@@ -101,6 +103,8 @@ EXAMPLES = {
     "identify": ("pezzuti-cardan.yaml lab/mapping.yaml --parameter joint_defaults.friction.coefficient",),
     "plot": ("durango-fourbar.yaml --kind torque -o torque.png", "durango-fourbar.yaml -o plots"),
     "report": ("durango-fourbar.yaml -o durango.html",),
+    "import": ("crank.step -o crank.yaml --material aluminium", "robot.urdf -o robot.yaml --ground base"),
+    "export": ("durango-fourbar.yaml -o fourbar.xml --at 60deg", "durango-fourbar.yaml -o fourbar.dxf"),
 }
 
 
@@ -139,10 +143,10 @@ class FileKind(StrEnum):
 
 def verb(function: Callable[..., None]) -> Callable[..., None]:
     """Register a verb; what its options write is said to every reader before it begins."""
-    name = function.__name__
+    name = function.__name__.rstrip("_")  # `import` is a word of Python
     named_words(function)
     lines = "\n".join(f"  trunnion {name} {words}".rstrip() for words in EXAMPLES[name])
-    app.command(epilog=f"\b\nExamples:\n{lines}")(guarded(function))
+    app.command(name, epilog=f"\b\nExamples:\n{lines}")(guarded(function))
     return function
 
 
@@ -263,6 +267,8 @@ verb(compare)
 verb(identify)
 verb(sweep)
 verb(play)
+verb(import_)
+verb(export)
 
 
 @verb
@@ -415,7 +421,7 @@ def main() -> None:
     debug = "--debug" in words[:end]  # before or behind the verb
     words = [word for place, word in enumerate(words) if word != "--debug" or place > end]
     sys.argv[1:] = words
-    named = [one for one in VERBS if one.callback and one.callback.__name__ in words[:1]]
+    named = [one for one in VERBS if one.callback and one.name in words[:1]]
     app.registered_commands = named or VERBS  # Typer reads the options of all: those of one verb are a twentieth
     try:
         status = status_of(app, debug)

@@ -106,6 +106,7 @@ KINDS: dict[str, Kind] = {
         Kind("stiffness", "N/m", "2 N/mm", (_dimension(mass=1, time=-2),)),
         Kind("torsional stiffness", "N m/rad", "3 N m/rad", (_dimension(length=2, mass=1, time=-2, angle=-1),)),
         Kind("damping", "N s/m", "50 N s/m", (_dimension(mass=1, time=-1),)),
+        Kind("density", "kg/m^3", "7850 kg/m^3", (_dimension(length=-3, mass=1),)),
         Kind("pressure", "Pa", "210 GPa", (_dimension(length=-1, mass=1, time=-2),)),
         Kind("torsional damping", "N m s/rad", "0.1 N m s/rad", (_dimension(length=2, mass=1, time=-1, angle=-1),)),
     )

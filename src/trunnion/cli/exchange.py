@@ -1,0 +1,70 @@
+"""`trunnion import` and `trunnion export`: files of other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from trunnion.cli.model import exit_status, lines_of, placed, stated
+from trunnion.cli.options import File, Set
+from trunnion.cli.terminal import console, say, wrote
+from trunnion.errors import Finding, MechanismError, counted
+
+__all__ = ["export", "import_"]
+
+
+def import_(
+    file: Annotated[Path, typer.Argument(help="Drawing or model of another program, by extension.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The model file to write: .yaml.")],
+    ground: Annotated[str, typer.Option("--ground", help="The part that does not move.")] = "",
+    drive: Annotated[str, typer.Option("--drive", help="The joint that is driven.")] = "",
+    speed: Annotated[str, typer.Option("--speed", help="Speed of the driver: 60rpm, 0.1m/s.")] = "60rpm",
+    material: Annotated[
+        str, typer.Option("--material", help="Material of parts without one: steel, aluminium, …")
+    ] = "steel",
+    density: Annotated[str | None, typer.Option("--density", help="Density instead: 7850kg/m^3.")] = None,
+    gap: Annotated[
+        str, typer.Option("--gap", help="Greatest difference of the radii of a pin and its hole.")
+    ] = "0.5mm",
+    unit: Annotated[str, typer.Option("--unit", help="Length unit of a file that states none: mm, in, m.")] = "mm",
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the model file if it exists.")] = False,
+) -> None:
+    """Make a model file of a drawing or a model of another program."""
+    from trunnion.exchange import import_file, model_text
+    from trunnion.files import whole
+    from trunnion.model.mechanism import read_mechanism
+
+    if out.suffix.lower() not in (".yaml", ".yml"):
+        raise MechanismError(Finding(f"a model is not written as '{out.suffix}'", "--out", "write .yaml"))
+    if out.exists() and not force:
+        raise MechanismError(Finding(f"'{out}' exists", "--out", "name another file, or add --force"))
+    draft = import_file(file, ground, drive, speed, material, density, gap, unit)
+    text = model_text(draft)
+    with whole(out) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+    bodies, pairs = counted(len(draft.bodies), "link"), counted(len(draft.pairs), "joint")
+    console().print(f"{file.name}: {bodies}, {pairs}", markup=False)
+    wrote(out)
+    findings = [*draft.findings, *placed(read_mechanism(out).checked, out)]
+    say(findings, every=True)
+    raise typer.Exit(exit_status(findings))
+
+
+def export(
+    file: File,
+    out: Annotated[Path, typer.Option("--out", "-o", help="The file to write; its extension is the format.")],
+    at: Annotated[str | None, typer.Option("--at", help="Position of the mechanism: 60deg, 20mm, 0.1s.")] = None,
+    frames: Annotated[int, typer.Option("--frames", help="Number of positions in a file that moves.")] = 120,
+    set_: Set = None,
+) -> None:
+    """Write a mechanism for another program, at a position of its cycle."""
+    from trunnion.exchange import ExportOptions, export_model
+
+    mechanism = stated(file, set_)
+    with lines_of(file):
+        findings = export_model(mechanism, out, at, ExportOptions(frames=frames))
+    wrote(out)
+    say(placed(findings, file), every=True)
+    raise typer.Exit(exit_status(findings))

@@ -1,0 +1,215 @@
+"""The bodies and pairs of a mechanism at a position of its cycle, as writers of other formats take them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.algebra.dual import primal
+from trunnion.errors import Finding, MechanismError
+from trunnion.exchange.draft import Array, Body, Draft, Pair
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.parts import InertiaTensor
+from trunnion.solve.system import System, build
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = ["Positions", "positions_of"]
+
+CYCLE = 720  # positions at which the stroke of a driven slide is looked for
+
+
+@dataclass(frozen=True)
+class Positions:
+    """A mechanism with its solved positions.
+
+    Parameters
+    ----------
+    mechanism, result : the model, and the Dataset of `analyse`.
+    rotations : of every link, from its frame to the global one, (position, 3, 3) by name; NaN where unsolved.
+    origins : of every link's frame, m, (position, 3) by name.
+    """
+
+    mechanism: Mechanism
+    result: xr.Dataset
+    rotations: dict[str, Array]
+    origins: dict[str, Array]
+
+    def __len__(self) -> int:
+        return int(self.result.sizes["position"])
+
+    def draft(self, row: int = 0) -> Draft:
+        """The bodies and pairs at a position.
+
+        Raises MechanismError if it has no solution there.
+        """
+        if not all(np.isfinite(origin[row]).all() for origin in self.origins.values()):
+            what = f"has no solution at {self.drive(row)}"
+            raise MechanismError(Finding(what, "--at", "choose another position; `trunnion analyse` says why"))
+        mechanism, values = self.mechanism, self.mechanism.parameters()
+        system = build(mechanism)
+        draft = Draft(mechanism.name, ground=mechanism.fixed_link, plane=not system.spatial)
+        if mechanism.gravity is not None:
+            axes = "xyz"[: mechanism.coordinates]
+            draft.gravity = np.zeros(3)
+            draft.gravity[: len(axes)] = [_float(values[f"gravity.{axis}"]) for axis in axes]
+        for link in mechanism.effective_links:
+            draft.bodies[link] = self._body(system, values, link, row)
+        elements = system.elements(values)
+        for name, joint in mechanism.effective_joints.items():
+            first, second = (self._placed(elements[link, name], link, row) for link in joint.links)
+            draft.pairs[name] = _pair(name, joint.type, joint.links, first, second, values, system)
+        time = np.array([self.result["time"].values[row]])
+        for name, driver in mechanism.drivers.items():
+            draft.drives[name] = self.rate(name, row) if driver.moves else _float(system.drive(values, name, time)[1])
+            pair = draft.pairs[name]
+            if not PAIRS[pair.type].turns and not driver.moves:
+                places = primal(system.drive(values, name, system.cycle(values).times(CYCLE))[0])
+                here = _float(system.drive(values, name, time)[0])
+                pair.limits = float(np.min(places)) - here, float(np.max(places)) - here
+        if mechanism.gears:
+            what = f"gears, racks and screws are not written: {', '.join(mechanism.gears)}"
+            draft.warn("gears", "gears", what, "join their turns in the other program")
+        return draft
+
+    def drive(self, row: int) -> str:
+        """Where the driver is at a position, in words."""
+        value, unit = float(self.result["drive"].values[row]), str(self.result["drive"].attrs.get("units", "rad"))
+        return f"{math.degrees(value):.6g}°" if unit == "rad" else f"{value:.6g} {unit}"
+
+    def rate(self, joint: str, row: int) -> float:
+        """Rate of a joint's coordinate at a position, rad/s or m/s."""
+        kind = self.mechanism.effective_joints[joint].type
+        motion = "rotation" if PAIRS[kind].turns else "slide"
+        return float(self.result[f"joint_{motion}_velocity"].sel(joint=joint).values[row])
+
+    def _body(self, system: System, values: Any, link: str, row: int) -> Body:
+        rotation, origin = self.rotations[link][row], self.origins[link][row]
+        centre, inertia = _mass_properties(system, values, link)
+        body = Body(link, _float(values[f"links.{link}.mass"]), origin + rotation @ centre)
+        body.inertia = rotation @ inertia @ rotation.T
+        stated = self.mechanism.effective_links[link]
+        for name in stated.points:
+            if name not in self.mechanism.effective_joints:
+                body.points[name] = origin + rotation @ _in_space(system.vector(values, f"links.{link}.points.{name}"))
+        return body
+
+    def _placed(self, element: Any, link: str, row: int) -> tuple[Array, Array, Array]:
+        """Place, axis and x of a joint's element in the global frame."""
+        rotation, origin = self.rotations[link][row], self.origins[link][row]
+        if hasattr(element, "place"):
+            place, axis, across = (_in_space(part) for part in (element.place, element.z, element.x))
+        else:
+            place, axis, across = _in_space((element.x, element.y)), np.array([0.0, 0.0, 1.0]), _in_space(element[2:])
+        return origin + rotation @ place, rotation @ axis, rotation @ across
+
+
+def _pair(name: str, kind: str, links: Sequence[str], first: Any, second: Any, values: Any, system: System) -> Pair:
+    """The pair of a joint whose two elements lie so: its point is that on the second link."""
+    axis = first[1]
+    if kind == "prismatic" and not system.spatial:
+        axis = first[2]
+    pair = Pair(name, kind, (links[0], links[1]), second[0], axis)
+    if kind == "universal":
+        pair.second_axis = second[1]
+    path = f"joints.{name}"
+
+    def number(key: str) -> float | None:
+        value = values.get(f"{path}.{key}")
+        return None if value is None else _float(value)
+
+    pair.pin_radius = number("pin.radius")
+    play = number("pin.clearance")
+    if pair.pin_radius is not None and play is not None:
+        pair.hole_radius = pair.pin_radius + play
+    pair.length = number("pin.bearing") or number("pin.length") or number("guide.length")
+    pair.pitch = number("pitch")
+    return pair
+
+
+def _mass_properties(system: System, values: Any, link: str) -> tuple[Array, Array]:
+    """Mass centre, and inertia about it, in the link's frame.
+
+    A body that moves in a plane feels J_zz alone; J_xx = J_yy = J_zz / 2 are those of a thin plate.
+    """
+    centre = _in_space(system.centre(values, link))
+    stated, path = system.mechanism.effective_links[link], f"links.{link}.inertia"
+    mass = _float(values[f"links.{link}.mass"])
+    if isinstance(stated.inertia, InertiaTensor):
+        xx, yy, zz, xy, xz, yz = (_float(values[f"{path}.{key}"]) for key in ("xx", "yy", "zz", "xy", "xz", "yz"))
+        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if stated.inertia_about == "origin":
+            inertia = inertia - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+        return centre, inertia
+    zz = _float(values.get(path, 0.0))
+    if stated.inertia_about == "origin":
+        zz -= mass * float(centre @ centre)
+    return centre, np.diag([zz / 2, zz / 2, zz])
+
+
+def positions_of(
+    mechanism: Mechanism,
+    steps: int = 360,
+    at: float | str | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Positions:
+    """The mechanism at positions of its cycle, or at one.
+
+    Parameters
+    ----------
+    mechanism : of any kind, errors of its joints included.
+    steps : number of positions; at : one position instead, as for `analyse`.
+
+    Raises
+    ------
+    MechanismError : if its structure does not determine the motion.
+    """
+    from trunnion.cycle.analyse import analyse
+
+    variables = ["point_position", "joint_rotation_velocity", "joint_slide_velocity"]
+    variables += ["link_position", "link_rotation"] if mechanism.space == "spatial" else ["link_angle"]
+    result = analyse(mechanism, steps, progress=progress, variables=variables, at=at)
+    rotations, origins = {}, {}
+    for link in result["link"].values.astype(str):
+        rotations[link], origins[link] = _poses(mechanism, result, link)
+    return Positions(mechanism, result, rotations, origins)
+
+
+def _poses(mechanism: Mechanism, result: xr.Dataset, link: str) -> tuple[Array, Array]:
+    """Rotation matrices (position, 3, 3) and origins (position, 3) of a link's frame."""
+    if mechanism.space == "spatial":
+        w, x, y, z = result["link_rotation"].sel(link=link).values
+        matrix = np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+        return np.moveaxis(matrix, 2, 0), result["link_position"].sel(link=link).values.T
+    angle = result["link_angle"].sel(link=link).values
+    c, s, zero, unit = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
+    matrix = np.moveaxis(np.array([[c, -s, zero], [s, c, zero], [zero, zero, unit]]), 2, 0)
+    values, point = mechanism.parameters(), next(iter(mechanism.links[link].points))
+    local = _in_space([values[f"links.{link}.points.{point}.{axis}"] for axis in "xy"])
+    placed = result["point_position"].sel(point=f"{link}.{point}").values.T
+    origin = np.column_stack([placed, zero]) - matrix @ local
+    return matrix, origin
+
+
+def _in_space(vector: Sequence[Any]) -> Array:
+    """A vector of two or three numbers as one of three floats."""
+    numbers = [_float(part) for part in vector]
+    return np.array(numbers + [0.0] * (3 - len(numbers)))
+
+
+def _float(number: Any) -> float:
+    """The value of a number, its derivatives dropped."""
+    return float(np.ravel(primal(number))[0])

@@ -187,7 +187,7 @@ def _material(name: str) -> float:
     """The density of a material of the table, kg/m³."""
     if name in MATERIALS:
         return MATERIALS[name]
-    remedy = nearest(name, MATERIALS) or f"use one of {', '.join(MATERIALS)}, or state a density"
+    remedy = nearest(name, MATERIALS)
     raise MechanismError(Finding(f"{name!r} is no material of the table", "material", remedy))
 
 

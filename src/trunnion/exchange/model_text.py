@@ -56,7 +56,7 @@ def _existing(draft: Draft, name: str, names: list[str], noun: str, option: str)
         return name
     from trunnion.model.names import nearest
 
-    remedy = nearest(name, names) or f"it has {', '.join(names[:12])}{' …' * (len(names) > 12)}"
+    remedy = nearest(name, names)
     raise MechanismError(Finding(f"{name!r} is no {noun} of the file", option, remedy, file=draft.source))
 
 

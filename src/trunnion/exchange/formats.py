@@ -46,7 +46,12 @@ class Format:
     needs: str = ""
 
 
-FORMATS: dict[str, Format] = {}
+FORMATS: dict[str, Format] = {
+    ".dxf": Format("DXF", "dxf"),
+    ".stl": Format("STL", "mesh", writes=False),
+    ".3mf": Format("3MF", "mesh", writes=False),
+    ".glb": Format("glTF", "glb"),
+}
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,9 +21,6 @@ from trunnion.solve.gears import gear_load
 from trunnion.solve.loads import springs, stated_loads
 from trunnion.solve.run import prepare
 from trunnion.solve.seating import seating_of
-
-if TYPE_CHECKING:
-    from trunnion.solve.system import System
 
 __all__ = ["Polygon", "polygons_of"]
 

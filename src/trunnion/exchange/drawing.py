@@ -31,7 +31,7 @@ AUXILIARY = "~"
 FORBIDDEN = str.maketrans(dict.fromkeys('<>/\\":;?*|=`,', "_"))
 MM = 1e3  # of a metre
 CURVE = 360  # positions of the curve of a point
-RAIL, STUB = 3.0, 0.1  # length of a rail, of its slider; half of a guide of unknown length, of the drawing
+RAIL, STUB = 2.87, 0.1  # length of a rail, of its slider; half of a guide of unknown length, of the drawing
 LETTER = 0.02  # height, of the drawing
 ROUND = (1.0, 2.0, 5.0, 10.0)  # a scale is one of these times a power of ten
 SAME = 1e-9  # of the drawing: places that are one
@@ -100,9 +100,11 @@ def _links(space: Modelspace, draft: Draft, layers: dict[str, str], size: float)
                 space.add_circle(_mm(pair.at), radius=MM * radius, dxfattribs=here)
             else:
                 space.add_point(_mm(pair.at), dxfattribs=here)
-            if second:  # of a slider below that of its pin
-                lower = np.array([0.0, 1.5 * LETTER * size if len(places) > 1 else 0.0, 0.0])
-                _text(space, pair.name, pair.at - lower, size, here)
+            if second:  # of a slider on its pin the name lies below that of the pin
+                shared = len(places) > 1 and any(
+                    np.linalg.norm(pair.at - q.at) < SAME * size for q in pairs if q is not pair
+                )
+                _text(space, pair.name, pair.at - [0.0, 1.5 * LETTER * size * shared, 0.0], size, here)
         for name, place in draft.bodies[link].points.items():
             space.add_point(_mm(place), dxfattribs=here)
             _text(space, name, place, size, here)

@@ -321,9 +321,11 @@ class _Reader:
     def _pin(self, number: int) -> None:
         """The joints of a place where several layers lie: all turn on the link whose circle is smallest."""
         self.joined.add(number)
-        marks = {layer: [radius for radius in radii if radius] for layer, radii in self.marks[number].items()}
+        digits = 1 - math.floor(math.log10(TOUCH * self.size))
+        marks = {layer: sorted({round(radius, digits): radius for radius in radii if radius}.values())
+                 for layer, radii in self.marks[number].items()}  # fmt: skip
         layers = sorted(marks, key=self.rank.__getitem__)
-        hub = min(layers, key=lambda layer: min(marks[layer], default=math.inf))
+        hub = min(layers, key=lambda layer: (min(marks[layer], default=math.inf), -len(self.marks[number][layer])))
         if len(layers) > 2:
             what = f"is taken as the link that bears the pin of {', '.join(layers)}"
             self.draft.warn("shared-pin", f"links.{hub}", what, "mend the links of these joints if another does")
@@ -388,7 +390,8 @@ class _Reader:
             return
         middle = np.mean([(line.start + line.end) / 2 for line in lines[slider]], axis=0)
         pair = self._add("prismatic", (rail, slider), middle, f"lines of {slider} lie on lines of {rail}", along)
-        pair.length = length[slider] if length[rail] - length[slider] > TOUCH * self.size else None
+        equal = [line for line in lines[rail] if np.hypot(*line.span) - length[slider] <= TOUCH * self.size]
+        pair.length = None if equal else length[slider]
         what = f"is taken as a guide, for lines of {slider} lie on lines of {rail}"
         self.draft.note("guide", f"joints.{pair.name}", what, "if it is none, draw the links at another position")
 
@@ -465,7 +468,8 @@ class _Reader:
             for j, (_, _, links, at) in enumerate(targets):
                 distance = float(np.hypot(*(at[:2] - place)))
                 if distance <= NEAR * self.size and "\n" not in text.strip():
-                    choices.append((distance + (layer not in links) * NEAR * self.size, j, i))
+                    apart = 0.0 if layer == links[-1] else 0.5 if layer in links else 1.0
+                    choices.append((distance + apart * NEAR * self.size, j, i))
         names: dict[tuple[str, str], str] = {}
         used: set[int] = set()
         for _, j, i in sorted(choices):

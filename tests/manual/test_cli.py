@@ -354,8 +354,8 @@ def test_every_verb_is_found_with_the_options_of_one_read() -> None:
         app.main()
     assert stop.value.code == 2
     for verb in app.VERBS:
-        assert verb.callback is not None
-        words = ["trunnion", verb.callback.__name__, "--help"]
+        assert verb.name is not None
+        words = ["trunnion", verb.name, "--help"]
         with mock.patch.object(sys, "argv", words), pytest.raises(SystemExit) as stop:
             app.main()
         assert not stop.value.code

@@ -70,6 +70,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
             user.page.locator(".menu button", has_text=what).click()
         return Path(told.value.path()).read_bytes(), time.perf_counter() - begin
 
+    @pytest.mark.slow
     def test_the_first_picture_is_where_the_solved_one_is(user):
         page = user.page
         page.route("**/socket", lambda route: route.abort())  # it needs no answer over the socket
@@ -97,6 +98,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         assert user.state("s.text.value") == ""
         assert user.state("s.fileName.value") is None
 
+    @pytest.mark.slow
     def test_what_stands_on_one_spot_is_read_and_a_slot_is_its_links(user):
         user.of("actions", "m.openExample({ name: 'drawing-press' })")
         user.until("s.solved.value")
@@ -130,6 +132,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
                 )
                 assert min(wide, high) < 8, index  # a box is higher than its letters
 
+    @pytest.mark.slow
     def test_why_it_does_not_move_and_the_name_of_a_new_file(user):
         user.of("actions", "m.openExample({ name: 'drawing-press' })")
         user.until("s.solved.value")
@@ -149,6 +152,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
             user.idle()
             assert told in user.page.locator(".motion").inner_text()
 
+    @pytest.mark.slow
     def test_a_refused_name_is_told_in_the_dialog(user):
         choose(user, "File", "Save as")
         user.page.locator("dialog input").fill("../elsewhere.yaml")

@@ -7,20 +7,20 @@ layers, and whatever could be read in two ways is a finding.
 from __future__ import annotations
 
 import itertools
+import logging
 import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from logging.handlers import BufferingHandler
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from ezdxf import recover
-from ezdxf.enums import InsertUnits
 from ezdxf.filemanagement import readfile
 from ezdxf.lldxf.const import DXFError
-from ezdxf.units import conversion_factor
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import Array, Body, Draft, Pair, free_name
@@ -35,9 +35,10 @@ __all__ = ["read", "write"]
 
 GROUNDS = ("ground", "frame", "base", "fixed")  # words in the name of a layer that does not move; else it is layer 0
 SKIPPED = ("defpoints", AUXILIARY)  # how the names of layers begin that hold no link
-MOST_OBJECTS, MOST_MARKS = 40_000, 2_000  # in a file, and what of a skeleton it holds
-DEEPEST = 12  # blocks in blocks
+MOST_OBJECTS, MOST_PARTS, MOST_MARKS = 40_000, 20_000, 2_000  # in a file, blocks taken apart, and in a skeleton
+DEEPEST, FARTHEST = 12, 1e6  # blocks in blocks; m from the origin
 TOUCH = 1e-5  # of the drawing: what lies nearer is in one place; rad, what differs less is parallel
+UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 9: 2.54e-5, 10: 0.9144, 13: 1e-6, 14: 0.1}  # m, by $INSUNITS
 HALF = 1e-3  # rad, by which a half circle may differ from one
 NEAR = 0.05  # of the drawing: within it a text names what it lies at
 SPOILT = (DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
@@ -109,15 +110,16 @@ def read(path: Path, options: ImportOptions) -> Draft:
     what = "" if len(places) else "holds no circle, point or line"
     if count > MOST_MARKS:
         what = f"holds {count:,} lines and circles; a skeleton has at most {MOST_MARKS:,}"
-    elif len(places) and not np.isfinite(places).all():
-        what = "holds coordinates that are no numbers"
+    elif not np.abs(places).max(initial=0.0) < FARTHEST:
+        what = f"holds coordinates that are no numbers or beyond {FARTHEST:g} m"
     if what:
+        what = f"is damaged, and {what}" if any(f.code == "exchange.damaged" for f in draft.findings) else what
         remedy = "draw each link on a layer of its own: its pins as circles, lines between them"
         raise MechanismError(Finding(what, file=str(path), remedy=remedy))
     if sketch.left:
         left = ", ".join(f"{count} {kind}" for kind, count in sketch.left.most_common(6))
         draft.note("left", "file", f"is not read: {left}", "joints are circles, points, lines and slots")
-    size = float(np.ptp(places, axis=0).max()) or 1.0
+    size = max(float(np.ptp(places, axis=0).max()), 1e-6)
     if np.ptp(sketch.heights) > TOUCH * size:
         draft.warn("flat", "file", "is drawn in space; it is read as seen along z", "draw a plane mechanism at z = 0")
     _Reader(sketch, draft, options, size).read()
@@ -131,22 +133,25 @@ def _document(path: Path, draft: Draft) -> Drawing:
     if objects > MOST_OBJECTS:
         what = f"holds some {objects:,} objects; at most {MOST_OBJECTS:,} are read"
         raise MechanismError(Finding(what, file=str(path), remedy="export the skeleton alone"))
+    heard, logger = BufferingHandler(MOST_OBJECTS), logging.getLogger("ezdxf")
+    logger.addHandler(heard)
     try:
         return readfile(path)
     except SPOILT:
         document, _ = recover.readfile(path)
-        draft.warn("damaged", "file", "is damaged; what could be mended is read", "compare it with the drawing")
+        mended = "; ".join(record.getMessage() for record in heard.buffer[:3])
+        what = "is damaged; what could be mended is read" + (f": {mended}" if mended else "")
+        draft.warn("damaged", "file", what, "compare it with the drawing")
         return document
+    finally:
+        logger.removeHandler(heard)
 
 
 def _unit(document: Drawing, options: ImportOptions, draft: Draft) -> float:
     """The length unit of the drawing, m."""
-    try:
-        code = int(document.header.get("$INSUNITS", 0))
-        if code:
-            return float(conversion_factor(InsertUnits(code), InsertUnits.Meters))
-    except (IndexError, TypeError, ValueError):  # a code that is none, or a unit without a length
-        pass
+    stated = UNITS.get(document.header.get("$INSUNITS", 0))
+    if stated is not None:
+        return stated
     draft.warn("unit", "file", f"states no unit; {1e3 * options.unit:g} mm is taken for 1", "state it with --unit")
     return options.unit
 
@@ -177,8 +182,8 @@ def _entities(entities: Iterable[Any], inserted: str, depth: int, count: list[in
     """
     for entity in entities:
         count[0] += 1
-        if count[0] > MOST_OBJECTS or depth > DEEPEST:
-            what = f"holds blocks in blocks of over {MOST_OBJECTS:,} parts, or {DEEPEST} deep"
+        if count[0] > MOST_PARTS or depth > DEEPEST:
+            what = f"holds blocks of over {MOST_PARTS:,} parts, or {DEEPEST} deep"
             raise MechanismError(Finding(what, "file", "export the skeleton alone"))
         layer = entity.dxf.get("layer", "0")
         layer = inserted if inserted and layer == "0" else layer

@@ -63,8 +63,13 @@ def read(path: Path, options: ImportOptions) -> Draft:
         if isinstance(error, MechanismError):
             raise
         raise MechanismError(Finding("cannot be read as a mesh, or is damaged", file=str(path))) from None
-    if not meshes or len(meshes) > MOST_BODIES:
-        what = "holds no mesh" if not meshes else f"holds {len(meshes)} meshes; at most {MOST_BODIES} are read"
+    empty = not any(len(faces) for _, _, faces in meshes)
+    if empty or len(meshes) > MOST_BODIES:
+        what = (
+            "holds no triangles, or is cut off"
+            if empty
+            else f"holds {len(meshes)} meshes; at most {MOST_BODIES} are read"
+        )
         raise MechanismError(Finding(what, file=str(path)))
     draft.ground = "ground"
     draft.bodies["ground"] = Body("ground")

@@ -315,6 +315,30 @@ def test_layers_that_differ_by_case_are_one(tmp_path: Path) -> None:
     assert len(draft.bodies["Arm"].points) == 1
 
 
+def test_a_layer_without_a_joint_is_left_out_and_a_name_never_stands_for_two(tmp_path: Path) -> None:
+    frame = [("box", (-200, -100), (300, -100), (300, 200), (-200, 200))]
+    marks = four_bar()
+    marks["crank"][-1] = ("text", (1, 1), "J2")  # as a joint without a name would be called
+    marks["rocker"] = [*marks["rocker"][:3], ("text", (121, 1), "J2"), ("text", C, "a name\nof two lines.")]
+    marks["coupler"][-2] = ("text", (31, 41), "E")
+    draft = read(drawing(border=frame, **marks), tmp_path)
+    assert set(draft.bodies) == {"ground", "crank", "coupler", "rocker"}
+    assert "loose" in codes(draft)
+    assert len(draft.pairs) == 4
+    assert {"J2", "J2-2", "E"} < draft.pairs.keys()
+    assert list(draft.bodies["coupler"].points) == ["E-2"]
+    (tmp_path / "model.yaml").write_text(model_text(draft), "utf-8")
+    assert trunnion.check(trunnion.read(tmp_path / "model.yaml")).mobility == 1
+
+
+def test_layers_have_names_that_a_model_accepts(tmp_path: Path) -> None:
+    marks = {layer.replace("c", "part.", 1): drawn for layer, drawn in four_bar().items()}
+    draft = read(drawing(**marks), tmp_path)
+    assert set(draft.bodies) == {"ground", "part-rank", "part-oupler", "ropart-ker"}
+    (tmp_path / "model.yaml").write_text(model_text(draft), "utf-8")
+    assert trunnion.check(trunnion.read(tmp_path / "model.yaml")).mobility == 1
+
+
 # ---- hostile files ------------------------------------------------------------------------------------------------
 
 
@@ -371,6 +395,7 @@ HOSTILE: dict[str, Callable[[Path], bytes]] = {
     "nan": lambda _: text_of(2).replace(b"1.0", b"nan"),
     "huge": lambda _: text_of(1).replace(b"1.0", b"1e308") + text_of(1),
     "letters": lambda _: text_of(2).replace(b"1.0", b"one"),
+    "stack": lambda folder: saved(drawing(**{f"l{i}": [("line", (0, i * 1e-9), (9, 0))] for i in range(900)}), folder),
     "nothing": lambda folder: saved(drawing(), folder),
 }
 
@@ -398,6 +423,15 @@ def tried(path: Path) -> tuple[Draft | None, tuple[Finding, ...]]:
         return import_file(path), ()
     except trunnion.MechanismError as error:
         return None, error.findings
+
+
+def test_as_many_marks_as_are_read_take_seconds(tmp_path: Path) -> None:
+    """Marks that crowd in one place are the worst: 600 circles, and 1,300 texts near to them."""
+    marks = [("circle", (0, 0), 5.0)] * 300
+    texts = [("text", (0.01 * k, 0), f"T{k}") for k in range(1300)]
+    start = time.perf_counter()
+    read(drawing(a=[*marks, ("line", (0, 0), (100, 0))], ground=marks, names=texts), tmp_path)
+    assert time.perf_counter() - start < 10
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.8, 0.99])

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from logging.handlers import BufferingHandler
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ezdxf import recover
@@ -40,11 +40,12 @@ DEEPEST, FARTHEST = 12, 1e6  # blocks in blocks; m from the origin
 TOUCH = 1e-5  # of the drawing: what lies nearer is in one place; rad, what differs less is parallel
 UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 9: 2.54e-5, 10: 0.9144, 13: 1e-6, 14: 0.1}  # m, by $INSUNITS
 HALF = 1e-3  # rad, by which a half circle may differ from one
-NEAR = 0.05  # of the drawing: within it a text names what it lies at
+NEAR, CROWD = 0.05, 8  # of the drawing: within it a text names what it lies at, of so many that are nearest
 SPOILT = (DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
 
 
-class Line(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Line:
     """A line of a layer from one place to another, m."""
 
     layer: str
@@ -56,14 +57,22 @@ class Line(NamedTuple):
         """From start to end, m."""
         return self.end - self.start
 
+    @property
+    def length(self) -> float:
+        """Of the line, m."""
+        return float(np.hypot(*self.span))
 
-class Slot(NamedTuple):
-    """A slot of a layer: the centres of its ends, m, and half its width, m."""
 
-    layer: str
-    start: Array
-    end: Array
+@dataclass(frozen=True, eq=False)
+class Slot(Line):
+    """A slot of a layer between the centres of its ends, or a half circle between its ends; half its width, m."""
+
     half: float
+
+    def holds(self, at: Array, radius: float, near: float) -> bool:
+        """Whether a pin lies on the middle line and fits in."""
+        way, aside = (at - self.start) @ self.span / self.length, abs(_cross(self.span, at - self.start)) / self.length
+        return bool(-near <= way <= self.length + near and aside <= near and radius <= self.half + near)
 
 
 @dataclass
@@ -105,11 +114,13 @@ def read(path: Path, options: ImportOptions) -> Draft:
         if isinstance(error, MechanismError):
             raise
         raise MechanismError(Finding("is no DXF, or too damaged to be read", file=str(path))) from None
-    count = len(sketch.circles) + len(sketch.lines) + len(sketch.halves)
-    places = np.array([place for _, place, _ in sketch.circles] + [end for line in sketch.lines for end in line[1:]])
+    count = len(sketch.circles) + len(sketch.lines) + len(sketch.halves) + len(sketch.texts)
+    places = np.array(
+        [place for _, place, _ in sketch.circles] + [end for line in sketch.lines for end in (line.start, line.end)]
+    )
     what = "" if len(places) else "holds no circle, point or line"
     if count > MOST_MARKS:
-        what = f"holds {count:,} lines and circles; a skeleton has at most {MOST_MARKS:,}"
+        what = f"holds {count:,} lines, circles and texts; a skeleton has at most {MOST_MARKS:,}"
     elif not np.abs(places).max(initial=0.0) < FARTHEST:
         what = f"holds coordinates that are no numbers or beyond {FARTHEST:g} m"
     if what:
@@ -171,7 +182,9 @@ def _gathered(document: Drawing, unit: float) -> Sketch:
         if key in hidden:
             sketch.left[f"entity on the hidden layer {layer}"] += 1
             continue
-        _gather(sketch, names.setdefault(key, layer), entity, unit)
+        if key not in names:
+            names[key] = free_name(layer, names.values())
+        _gather(sketch, names[key], entity, unit)
     return sketch
 
 
@@ -232,51 +245,36 @@ def _gather(sketch: Sketch, layer: str, entity: Any, unit: float) -> None:
 # ---- what it means ------------------------------------------------------------------------------------------------
 
 
-class _Places:
-    """Places numbered as they come; those that touch are one."""
-
-    def __init__(self, touch: float) -> None:
-        self.touch = touch
-        self.at: list[Array] = []
-        self.cells: dict[tuple[int, int], list[int]] = {}
-
-    def number(self, place: Array) -> int:
-        """The number of a place, a new one if none is near."""
-        column, row = (math.floor(part / self.touch) for part in place)
-        for i, j in itertools.product((-1, 0, 1), repeat=2):
-            for number in self.cells.get((column + i, row + j), ()):
-                if np.hypot(*(self.at[number] - place)) <= self.touch:
-                    return number
-        self.cells.setdefault((column, row), []).append(len(self.at))
-        self.at.append(place)
-        return len(self.at) - 1
-
-
 class _Reader:
     """Links and joints of a sketch, written into a draft.
 
-    marks: at each place the radii of the circles of each layer, 0 of a point; none where only its lines end. joined:
-    the places that are joints.
+    places: where marks lie, m; what touches is in one place. marks: at each place the radii of the circles of each
+    layer, 0 of a point; none where only its lines end. joined: the places that are joints.
     """
 
     def __init__(self, sketch: Sketch, draft: Draft, options: ImportOptions, size: float) -> None:
         self.sketch, self.draft, self.gap, self.size = sketch, draft, options.gap, size
-        self.places = _Places(TOUCH * size)
-        self.marks: dict[int, dict[str, list[float]]] = {}
+        self.places = np.zeros((0, 2))
         self.joined: set[int] = set()
-        layers: dict[str, None] = {}
-        for mark in (*sketch.circles, *sketch.lines, *sketch.halves):
-            layers.setdefault(str(mark[0]))
-        draft.ground = self._ground(list(layers), options.ground)
-        self.rank = {layer: number for number, layer in enumerate(sorted(layers, key=lambda n: n != draft.ground))}
-        draft.bodies = {layer: Body(layer) for layer in self.rank}
+        self.marks: dict[int, dict[str, list[float]]] = {}
+        layers = list(dict.fromkeys([*(layer for layer, *_ in sketch.circles), *(line.layer for line in sketch.lines)]))
+        draft.ground = self._ground(layers, options.ground)
+        draft.bodies = {layer: Body(layer) for layer in sorted(layers, key=lambda layer: layer != draft.ground)}
         for layer, place, radius in sketch.circles:
-            self.marks.setdefault(self.places.number(place), {}).setdefault(layer, []).append(radius)
+            self.marks.setdefault(self._place(place), {}).setdefault(layer, []).append(radius)
         self.drawn = list(self.marks)
-        self.slots, lines = self._slots()
-        for line in lines:
-            for end in (line.start, line.end):
-                self.marks.setdefault(self.places.number(end), {}).setdefault(line.layer, [])
+        self.ends = {line: (self._place(line.start), self._place(line.end)) for line in sketch.lines}
+        self.slots, sides = self._slots()
+        for line in sketch.lines:
+            for number in () if line in sides else self.ends[line]:
+                self.marks.setdefault(number, {}).setdefault(line.layer, [])
+
+    def _place(self, point: Array) -> int:
+        """The number of a place, a new one if none is near."""
+        near = np.flatnonzero(np.hypot(*(self.places - point).T) <= TOUCH * self.size)
+        if not len(near):
+            self.places = np.vstack([self.places, point])
+        return int(near[0]) if len(near) else len(self.places) - 1
 
     def _ground(self, layers: list[str], stated: str) -> str:
         """The layer that does not move: that which is stated, or has such a name, or layer 0; empty if none."""
@@ -290,34 +288,30 @@ class _Reader:
         return named[0]
 
     def read(self) -> None:
-        """Pins, guides and names, in this order."""
-        single = []
+        """Pins, guides, points and names, in this order; what no joint holds is left out."""
+        draft = self.draft
         for number in self.drawn:
             if len(self.marks[number]) > 1:
                 self._pin(number)
-            else:
-                single.append(number)
         guided = self._guides()
         for number, layers in self.marks.items():
             if number not in self.joined and len(layers) > 1 and not any(pair <= layers.keys() for pair in guided):
                 self._pin(number)
-        for number in single:
-            layer, radii = next(iter(self.marks[number].items()))
-            self._single(layer, self.places.at[number], min(radii))
-            near = [k for k in self.drawn if k != number and self._apart(k, number) <= self.gap]
-            others = sorted({other for k in near for other in self.marks[k]} - {layer})
-            if others and max(radii) > 0:
-                what = f"has a circle almost about the centre of one of {', '.join(others)}, which is no joint"
-                self.draft.warn("near", f"links.{layer}", what, "draw both about one centre if they are a joint")
+        for number in self.drawn:
+            if number not in self.joined:
+                self._single(number)
+        loose = [layer for layer in draft.bodies if draft.pairs and not draft.pairs_of(layer)]
+        for layer in loose:
+            del draft.bodies[layer]
+            draft.ground = "" if layer == draft.ground else draft.ground
+            draft.warn("loose", f"links.{layer}", "has no joint with another layer and is left out", "draw its joints")
         self._names()
 
-    def _apart(self, one: int, other: int) -> float:
-        return float(np.hypot(*(self.places.at[one] - self.places.at[other])))
-
-    def _add(self, kind: str, links: tuple[str, str], at: Array, comment: str, axis: Array | None = None) -> Pair:
+    def _add(self, kind: str, links: tuple[str, str], number: int, comment: str, axis: Array | None = None) -> Pair:
         """A new pair that has no name yet, of two links of which the first bears the pin or rail; ground is first."""
         first, second = links[::-1] if links[1] == self.draft.ground else links
-        pair = Pair(f"J{len(self.draft.pairs) + 1}", kind, (first, second), np.array([*at, 0.0]), comments=[comment])
+        pair = Pair(f"J{len(self.draft.pairs) + 1}", kind, (first, second), np.array([*self.places[number], 0.0]))
+        pair.comments.append(comment)
         if axis is not None:  # as it would be drawn: to the right, or upwards
             pair.axis = np.array([*axis, 0.0]) / np.hypot(*axis) * np.sign(axis[int(np.argmax(np.abs(axis)))])
         self.draft.pairs[pair.name] = pair
@@ -326,188 +320,196 @@ class _Reader:
     def _pin(self, number: int) -> None:
         """The joints of a place where several layers lie: all turn on the link whose circle is smallest."""
         self.joined.add(number)
-        digits = 1 - math.floor(math.log10(TOUCH * self.size))
-        marks = {layer: sorted({round(radius, digits): radius for radius in radii if radius}.values())
-                 for layer, radii in self.marks[number].items()}  # fmt: skip
-        layers = sorted(marks, key=self.rank.__getitem__)
-        hub = min(layers, key=lambda layer: (min(marks[layer], default=math.inf), -len(self.marks[number][layer])))
+        drawn, marks = self.marks[number], dict[str, list[float]]()
+        for layer, radii in drawn.items():
+            sizes = sorted(radius for radius in radii if radius)
+            marks[layer] = [b for a, b in itertools.pairwise([0.0, *sizes]) if b - a > TOUCH * self.size]
+        layers = [layer for layer in self.draft.bodies if layer in marks]
+        hub = min(layers, key=lambda layer: (min(marks[layer], default=math.inf), -len(drawn[layer])))
         if len(layers) > 2:
             what = f"is taken as the link that bears the pin of {', '.join(layers)}"
             self.draft.warn("shared-pin", f"links.{hub}", what, "mend the links of these joints if another does")
         for other in layers:
             if other == hub:
                 continue
-            pair = self._add("revolute", (hub, other), self.places.at[number], "")
             one, two = marks[hub], marks[other]
             near = [sorted(both) for both in itertools.product(one, two) if abs(both[0] - both[1]) <= self.gap]
-            if len(near) == 1:
-                pair.pin_radius, pair.hole_radius = near[0]
-            elif not two and len(one) == 1:
-                pair.pin_radius = one[0]
-            elif one or two:
-                radii = ", ".join(f"{_mm(radius)} mm" for radius in sorted({*one, *two}))
-                what = f"has circles of {radii} radius, of which none are clearly its pin and hole"
+            fits = near[0] if len(near) == 1 else one if len(one) == 1 and not two else []
+            circles = ", ".join(f"{_mm(radius)} mm" for radius in sorted({*one, *two}))
+            pair = self._add(
+                "revolute", (hub, other), number, f"{hub} and {other} share a place; radii: {circles or 'none'}"
+            )
+            pair.pin_radius, pair.hole_radius = [*fits, None, None][:2]
+            if circles and not fits:
+                what = f"has circles of {circles} radius, of which none are clearly its pin and hole"
                 self.draft.warn("radius", f"joints.{pair.name}", what, "state its pin, or draw pin and hole alone")
-            if not any(self.marks[number].values()):
+            if not any(drawn.values()):
                 what = f"is read where lines of {hub} and {other} end; no circle or point marks it"
                 self.draft.note("bare-end", f"joints.{pair.name}", what, "draw its pin as a circle")
-            circles = [f"{_mm(radius)} mm" for radius in (pair.pin_radius, pair.hole_radius) if radius]
-            pair.comments = [f"circles of radius {' and '.join(circles)}" if circles else f"{hub} and {other} meet"]
 
     def _guides(self) -> set[frozenset[str]]:
         """Prismatic pairs where lines of two layers lie on each other; the layers that they join.
 
         A line between two joints is the body of a link, which may lie on another by chance.
         """
-        guided: dict[frozenset[str], list[tuple[Line, Line]]] = {}
-        chance: dict[frozenset[str], list[tuple[Line, Line]]] = {}
+        guided: dict[frozenset[str], dict[str, dict[Line, None]]] = {}
+        chance: set[frozenset[str]] = set()
         for both in _lying(self.sketch.lines, self.gap):
             layers = frozenset(line.layer for line in both)
-            bodies = []
-            for line in both:
-                ends = [self.places.number(end) for end in (line.start, line.end)]
-                bodies.append(all(k in self.joined or self.marks.get(k, {}).keys() - layers for k in ends))
-            pinned = any(layers <= self.marks[k].keys() for k in self.joined)
-            if pinned or all(bodies):
+            bodies = [
+                all(k in self.joined or self.marks.get(k, {}).keys() - layers for k in self.ends[line]) for line in both
+            ]
+            if all(bodies) or any(layers <= self.marks[k].keys() for k in self.joined):
                 continue
-            (chance if any(bodies) else guided).setdefault(layers, []).append(both)
-        for layers in chance.keys() - guided.keys():
-            names = " and ".join(sorted(layers))
-            what = f"lines of {names} lie on each other, but one ends at joints; no guide is read"
+            if any(bodies):
+                chance.add(layers)
+                continue
+            for line in both:
+                guided.setdefault(layers, {}).setdefault(line.layer, {})[line] = None
+        for layers in sorted(chance - guided.keys(), key=sorted):
+            what = (
+                f"lines of {' and '.join(sorted(layers))} lie on each other, but one ends at joints; no guide is read"
+            )
             self.draft.note("line", f"links.{min(layers)}", what, "let its lines end elsewhere if it is a guide")
-        for layers, pairs in guided.items():
-            lines = {layer: list({id(line): line for both in pairs for line in both if line.layer == layer}.values())
-                     for layer in layers}  # fmt: skip
-            self._guide({layer: [line for line in own if not self._bears(line)] or own for layer, own in lines.items()})
+        for lines in guided.values():
+            free = {
+                layer: [line for line in own if not self.joined & {*self.ends[line]}] for layer, own in lines.items()
+            }
+            self._guide({layer: own or list(lines[layer]) for layer, own in free.items()})
         return set(guided)
 
     def _guide(self, lines: dict[str, list[Line]]) -> None:
         """The prismatic pair of two layers with lines that lie on each other: the shorter ones are the slider's."""
-        length = {layer: max(float(np.hypot(*line.span)) for line in lines[layer]) for layer in lines}
-        slider, rail = sorted(lines, key=lambda layer: (length[layer], -self.rank[layer]))
-        along = lines[slider][0].span / np.hypot(*lines[slider][0].span)
+        length = {layer: max(line.length for line in lines[layer]) for layer in lines}
+        order = list(self.draft.bodies)
+        slider, rail = sorted(lines, key=lambda layer: (length[layer], -order.index(layer)))
+        along = lines[slider][0].span / lines[slider][0].length
         ways = np.array([sorted(end @ along for end in (line.start, line.end)) for line in lines[slider]])
-        same = all(abs(_cross(along, line.span)) <= 3 * TOUCH * np.hypot(*line.span) for line in lines[slider])
+        same = all(abs(_cross(along, line.span)) <= 3 * TOUCH * line.length for line in lines[slider])
         if not same or np.ptp(ways, axis=0).max() > TOUCH * self.size:
             what = f"has lines of several {'lengths' if same else 'directions'} on those of {rail}; no guide is read"
-            remedy = "draw the slider as lines of one length along its guide"
-            self.draft.warn("line", f"links.{slider}", what, remedy)
+            self.draft.warn("line", f"links.{slider}", what, "draw the slider as lines of one length along its guide")
             return
-        middle = np.mean([(line.start + line.end) / 2 for line in lines[slider]], axis=0)
+        middle = self._place(np.mean([(line.start + line.end) / 2 for line in lines[slider]], axis=0))
         pair = self._add("prismatic", (rail, slider), middle, f"lines of {slider} lie on lines of {rail}", along)
-        equal = [line for line in lines[rail] if np.hypot(*line.span) - length[slider] <= TOUCH * self.size]
-        pair.length = None if equal else length[slider]
+        longer = all(line.length - length[slider] > TOUCH * self.size for line in lines[rail])
+        pair.length = length[slider] if longer else None
         what = f"is taken as a guide, for lines of {slider} lie on lines of {rail}"
         self.draft.note("guide", f"joints.{pair.name}", what, "if it is none, draw the links at another position")
 
-    def _bears(self, line: Line) -> bool:
-        """Whether a line ends at a joint."""
-        return any(self.places.number(end) in self.joined for end in (line.start, line.end))
-
-    def _slots(self) -> tuple[list[Slot], list[Line]]:
-        """What two half circles and two lines of a layer enclose, and the lines that are of no slot."""
-        sides: dict[tuple[str, int], dict[int, int]] = {}  # at an end of a half circle: where a line leads, and which
-        for i, line in enumerate(self.sketch.lines):
-            start, end = self.places.number(line.start), self.places.number(line.end)
-            sides.setdefault((line.layer, start), {})[end] = i
-            sides.setdefault((line.layer, end), {})[start] = i
-        numbers = [tuple(self.places.number(end) for end in half[1:3]) for half in self.sketch.halves]
-        chords = {(half.layer, *chord): half for half, both in zip(self.sketch.halves, numbers, strict=True)
-                  for chord in (both, both[::-1])}  # fmt: skip
-        slots, used = [], set[int]()
-        for half, (a, b) in zip(self.sketch.halves, numbers, strict=True):
-            for c, d in itertools.product(sides.get((half.layer, a), ()), sides.get((half.layer, b), ())):
-                other = chords.get((half.layer, c, d))
-                lines = {sides[half.layer, a][c], sides[half.layer, b][d]}
-                if other is not None and other is not half and not lines & used:
+    def _slots(self) -> tuple[list[Slot], set[Line]]:
+        """What two half circles and two lines of a layer enclose, and these lines."""
+        leads: dict[tuple[str, int], list[tuple[int, Line]]] = {}  # where the lines of a layer lead from a place
+        for line, (start, end) in self.ends.items():
+            leads.setdefault((line.layer, start), []).append((end, line))
+            leads.setdefault((line.layer, end), []).append((start, line))
+        halves = [(half, self._place(half.start), self._place(half.end)) for half in self.sketch.halves]
+        chords = {(half.layer, *chord): half for half, a, b in halves for chord in ((a, b), (b, a))}
+        slots, sides = [], set[Line]()
+        for half, a, b in halves:
+            for (c, one), (d, two) in itertools.product(*(leads.get((half.layer, k), ()) for k in (a, b))):
+                other = chords.get((half.layer, c, d), half)
+                if other is not half and not {one, two} & sides:
                     ends = [(part.start + part.end) / 2 for part in (half, other)]
                     slots.append(Slot(half.layer, ends[0], ends[1], (half.half + other.half) / 2))
-                    used |= lines
-        return slots, [line for i, line in enumerate(self.sketch.lines) if i not in used]
+                    sides |= {one, two}
+        return slots, sides
 
-    def _single(self, layer: str, at: Array, radius: float) -> None:
+    def _single(self, number: int) -> None:
         """A circle or point that no other layer meets: a pin in a slot of another layer, else a point of the link.
 
         Between pin and slot lies a block without mass, which turns on the one and slides in the other.
         """
-        slots = [slot for slot in self.slots if slot.layer != layer and self._inside(at, radius, slot)]
-        if len(slots) != 1:
-            points = self.draft.bodies[layer].points
-            points[free_name(f"P{len(points) + 1}", points)] = np.array([*at, 0.0])
-            if slots:
-                self.draft.warn("slot", f"links.{layer}", "has a pin in several slots; none is read", "draw one slot")
+        draft, at = self.draft, self.places[number]
+        layer, radii = next(iter(self.marks[number].items()))
+        slots = [
+            slot for slot in self.slots if slot.layer != layer and slot.holds(at, min(radii), 10 * TOUCH * self.size)
+        ]
+        if len(slots) == 1:
+            slot, radius = slots[0], min(radii)
+            comment = (
+                f"a pin of {layer}, radius {_mm(radius)} mm, in a slot of {slot.layer}, {_mm(2 * slot.half)} mm wide"
+            )
+            block = free_name(f"block in {slot.layer}", draft.bodies, "block")
+            draft.bodies[block] = Body(block, comments=[f"{comment}: a block without mass lies between them"])
+            self._add("revolute", (layer, block), number, comment).pin_radius = radius or None
+            guide = self._add("prismatic", (slot.layer, block), number, comment, slot.end - slot.start)
+            ways = sorted(float((end - at) @ guide.axis[:2]) for end in (slot.start, slot.end))
+            guide.limits = ways[0], ways[1]
+            if radius and slot.half - radius > self.gap:
+                what = f"has {_mm(slot.half - radius)} mm of play in the slot of {slot.layer}, which is taken as none"
+                draft.warn("slot", f"joints.{guide.name}", what, "draw the pin as wide as the slot if it guides")
             return
-        slot = slots[0]
-        comment = (
-            f"a pin of {layer} of radius {_mm(radius)} mm in a slot of {slot.layer} of half width {_mm(slot.half)} mm"
-        )
-        block = free_name(f"block in {slot.layer}", self.draft.bodies, "block")
-        self.draft.bodies[block] = Body(block, comments=[f"{comment}: a block without mass lies between them"])
-        self.rank[block] = len(self.rank)
-        self._add("revolute", (layer, block), at, comment).pin_radius = radius or None
-        guide = self._add("prismatic", (slot.layer, block), at, comment, slot.end - slot.start)
-        ways = [float((end - at) @ guide.axis[:2]) for end in (slot.start, slot.end)]
-        guide.limits = min(ways), max(ways)
-        if radius and slot.half - radius > self.gap:
-            what = f"has {_mm(slot.half - radius)} mm of play in the slot of {slot.layer}, which is taken as none"
-            self.draft.warn("slot", f"joints.{guide.name}", what, "draw the pin as wide as the slot if it guides")
-
-    def _inside(self, at: Array, radius: float, slot: Slot) -> bool:
-        """Whether a pin lies on the middle line of a slot and fits into it."""
-        span, small = slot.end - slot.start, 10 * TOUCH * self.size
-        length = float(np.hypot(*span))
-        way, aside = (at - slot.start) @ span / length, abs(_cross(span, at - slot.start)) / length
-        return bool(-small <= way <= length + small and aside <= small and radius <= slot.half + small)
+        if slots:
+            draft.warn("slot", f"links.{layer}", "has a pin in several slots; none is read", "draw one slot")
+        points = draft.bodies[layer].points
+        points[f"P{len(points) + 1}"] = np.array([*at, 0.0])
+        near = [k for k in self.drawn if k != number and np.hypot(*(self.places[k] - at)) <= self.gap]
+        others = sorted({other for k in near for other in self.marks[k]} - {layer})
+        if others and max(radii) > 0:
+            what = f"has a circle almost about the centre of one of {', '.join(others)}, which is no joint"
+            draft.warn("near", f"links.{layer}", what, "draw both about one centre if they are a joint")
 
     def _names(self) -> None:
         """Texts name the joint or point nearest to them, those on a layer of its links first.
 
         A name on the layer of a link that moves makes it the second link of the joint.
         """
-        pairs, bodies = self.draft.pairs, self.draft.bodies
-        targets: list[tuple[str, str, tuple[str, ...], Array]] = []
-        targets += [("", pair.name, pair.links, pair.at) for pair in pairs.values()]
-        targets += [(layer, name, (layer,), at) for layer, body in bodies.items() for name, at in body.points.items()]
+        draft, near = self.draft, NEAR * self.size
+        targets: list[tuple[str, str, tuple[str, ...], Array]] = []  # layer of a point, old name, links, place
+        targets += [("", pair.name, pair.links, pair.at) for pair in draft.pairs.values()]
+        targets += [
+            (link, name, (link,), at) for link, body in draft.bodies.items() for name, at in body.points.items()
+        ]
         choices = []
-        for i, (layer, place, text) in enumerate(self.sketch.texts):
-            for j, (_, _, links, at) in enumerate(targets):
-                distance = float(np.hypot(*(at[:2] - place)))
-                if distance <= NEAR * self.size and "\n" not in text.strip():
-                    apart = 0.0 if layer == links[-1] else 0.5 if layer in links else 1.0
-                    choices.append((distance + apart * NEAR * self.size, j, i))
-        names: dict[tuple[str, str], str] = {}
-        used: set[int] = set()
+        places = np.array([at[:2] for *_, at in targets]).reshape(-1, 2)
+        for i, (layer, place, _) in enumerate(self.sketch.texts):
+            apart = np.hypot(*(places - place).T)
+            for j in (int(j) for j in np.argsort(apart, kind="stable")[:CROWD] if apart[j] <= near):
+                links = targets[j][2]
+                strange = 0.0 if layer == links[-1] else 0.5 if layer in links else 1.0
+                choices.append((float(apart[j]) + near * strange, j, i))
+        texts: dict[int, int] = {}
         for _, j, i in sorted(choices):
-            body, old, links, _ = targets[j]
-            if (body, old) not in names and i not in used:
-                names[body, old] = free_name(self.sketch.texts[i][2], names.values())
-                used.add(i)
-                if not body and self.sketch.texts[i][0] == links[0] != self.draft.ground:
-                    pairs[old].links = links[1], links[0]
-        for name, pair in pairs.items():
-            pair.name = names.get(("", name), name)
-        self.draft.pairs = {pair.name: pair for pair in pairs.values()}
-        for layer, link in bodies.items():
-            link.points = {names.get((layer, name), name): at for name, at in link.points.items()}
-        places = {f"joints.{old}": f"joints.{new}" for (layer, old), new in names.items() if not layer}
-        findings = self.draft.findings
-        self.draft.findings = [replace(finding, where=places.get(finding.where, finding.where)) for finding in findings]
+            if j not in texts and i not in texts.values():
+                texts[j] = i
+        taken: dict[str, list[str]] = {link: [] for link in ("", *draft.bodies)}  # "": by joints
+        pairs, draft.pairs = draft.pairs, {}
+        renamed: dict[str, str] = {}
+        for body in draft.bodies.values():
+            body.points = {}
+        for j, (link, old, links, at) in sorted(
+            enumerate(targets), key=lambda item: (item[1][0] != "", item[0] not in texts)
+        ):
+            layer, _, text = self.sketch.texts[texts[j]] if j in texts else ("", at, old)
+            name = free_name(text.strip(), [*taken[""], *taken[link]])
+            taken[link].append(name)
+            if link:
+                draft.bodies[link].points[name] = at
+                continue
+            turned = layer == links[0] != draft.ground
+            draft.pairs[name] = replace(pairs[old], name=name, links=(links[turned], links[not turned]))
+            renamed[f"joints.{old}"] = f"joints.{name}"
+        draft.findings = [replace(note, where=renamed.get(note.where, note.where)) for note in draft.findings]
 
 
 def _lying(lines: list[Line], gap: float) -> Iterator[tuple[Line, Line]]:
     """Lines of different layers that are parallel, nearer to each other than the gap, and overlap."""
-    lines = [line for line in lines if np.hypot(*line.span) > 0]
-    starts, ends = (np.array([line[k] for line in lines]).reshape(-1, 2) for k in (1, 2))
-    lengths = np.hypot(*(ends - starts).T)
-    for i, line in enumerate(lines[:-1]):
-        along = line.span / lengths[i]
+    lines = [line for line in lines if line.length > 0]
+    starts, ends = (np.array([getattr(n, end) for n in lines]).reshape(-1, 2) for end in ("start", "end"))
+    lengths, count = np.array([line.length for line in lines]), 0
+    for i, line in enumerate(lines):
+        along = line.span / line.length
         ways = np.stack([(places[i + 1 :] - line.start) @ along for places in (starts, ends)])
         aside = np.stack([_cross(along, places[i + 1 :] - line.start) for places in (starts, ends)])
-        shorter = np.minimum(lengths[i + 1 :], lengths[i])
-        overlap = np.minimum(ways.max(axis=0), lengths[i]) - np.maximum(ways.min(axis=0), 0.0)
+        overlap = np.minimum(ways.max(axis=0), line.length) - np.maximum(ways.min(axis=0), 0.0)
         lies = (np.ptp(aside, axis=0) <= TOUCH * lengths[i + 1 :]) & (np.abs(aside).max(axis=0) <= gap)
-        for j in np.flatnonzero(lies & (overlap > 0.01 * shorter)):
+        for j in np.flatnonzero(lies & (overlap > 0.01 * np.minimum(lengths[i + 1 :], line.length))):
             if lines[i + 1 + j].layer != line.layer:
+                count += 1
+                if count > 5 * MOST_MARKS:
+                    what = f"holds more than {5 * MOST_MARKS:,} lines that lie on lines of other layers"
+                    raise MechanismError(Finding(what, "file", "export the skeleton alone"))
                 yield line, lines[i + 1 + j]
 
 

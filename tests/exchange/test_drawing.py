@@ -29,6 +29,7 @@ FORCED = (
     "andrews-squeezer",
     "landing-gear",
 )
+QUICK = ("durango-fourbar", "geared-five-bar", "fourbar-with-play")
 AB, BC, CD, AD = 2.0, 6.0, 3.0, 5.5  # of the four-bar of [D], Table 1
 
 
@@ -41,6 +42,7 @@ def lines(path: Path) -> dict[str, list[Any]]:
     return drawn
 
 
+@pytest.mark.spread(1, *QUICK)
 @pytest.mark.parametrize("name", ROUND)
 def test_what_is_drawn_comes_back(name: str, tmp_path: Path) -> None:
     mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
@@ -68,6 +70,7 @@ def test_what_is_drawn_comes_back(name: str, tmp_path: Path) -> None:
             np.testing.assert_allclose(again.bodies[link].points[point], place, atol=1e-12)
 
 
+@pytest.mark.spread(1, *QUICK)
 @pytest.mark.parametrize("name", ["durango-fourbar", "scotch-yoke", "jansen"])
 def test_with_the_masses_that_a_drawing_lacks_the_torque_is_the_same(name: str, tmp_path: Path) -> None:
     mechanism = trunnion.read(EXAMPLES / f"{name}.yaml").with_friction("off").model_copy(update={"loads": {}})
@@ -82,6 +85,7 @@ def test_with_the_masses_that_a_drawing_lacks_the_torque_is_the_same(name: str, 
     np.testing.assert_allclose(effort, expected, atol=1e-9 * abs(expected).max())
 
 
+@pytest.mark.spread(1, *QUICK)
 @pytest.mark.parametrize("name", FORCED)
 def test_every_force_polygon_of_the_file_closes_head_to_tail(name: str, tmp_path: Path) -> None:
     mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
@@ -162,6 +166,7 @@ def reactions(angle: float, speed: float = 10.0) -> dict[str, np.ndarray]:
     }  # fmt: skip
 
 
+@pytest.mark.spread(1, *QUICK)
 @pytest.mark.parametrize("degrees", [0, 36, 72, 144, 252, 324])
 def test_forces_of_the_drawing_are_those_of_the_papers_equations(degrees: int, tmp_path: Path) -> None:
     export_model(durango("off"), tmp_path / "out.dxf", f"{degrees}deg")
@@ -173,6 +178,7 @@ def test_forces_of_the_drawing_are_those_of_the_papers_equations(degrees: int, t
         assert size == pytest.approx(np.hypot(*vector), rel=1e-5)
 
 
+@pytest.mark.spread(1, *QUICK)
 @pytest.mark.parametrize("degrees", range(0, 360, 36))
 def test_three_rounds_of_approximation_end_at_the_settled_polygon(degrees: int, tmp_path: Path) -> None:
     """[D], graphical validation: three iterations differ by less than 0.1 % at ten positions of the crank."""

@@ -64,6 +64,7 @@ def example(name: str) -> Mechanism:
     return trunnion.read(Path("examples") / f"{name}.yaml")
 
 
+@pytest.mark.spread(1, "rssr")
 @pytest.mark.parametrize(
     "name", ["durango-fourbar", "scotch-yoke", "jansen", "rssr", "double-cardan", "swash-plate-pump"]
 )

@@ -199,3 +199,17 @@ if CHROMIUM:
         rows = page.locator(".of-joints tbody tr")
         assert rows.count() == 4
         assert rows.first.inner_text().split("\t")[0] == "A"
+
+    def test_the_panel_is_made_wider_by_keys_and_by_the_mouse(user):
+        panel, divider = user.page.locator("aside.panel"), user.page.get_by_role("separator", name="Width of the panel")
+        before = panel.bounding_box()["width"]
+        divider.focus()
+        user.page.keyboard.press("ArrowLeft")
+        user.page.keyboard.press("ArrowLeft")
+        assert panel.bounding_box()["width"] == pytest.approx(before + 48, abs=1)
+        box = divider.bounding_box()
+        user.page.mouse.move(box["x"] + 2, box["y"] + 200)
+        user.page.mouse.down()
+        user.page.mouse.move(box["x"] - 98, box["y"] + 200)
+        user.page.mouse.up()
+        assert panel.bounding_box()["width"] == pytest.approx(before + 148, abs=4)

@@ -27,7 +27,7 @@ function inStores(act) {
 }
 
 /** Whether the page stands in a cell of a notebook, whose kernel answers in place of a server. */
-const CELL = document.querySelector("meta[name=cell]") !== null;
+const inCell = () => document.querySelector("meta[name=cell]") !== null;
 /** A name that no other tab or frame has; a page that came by http from another machine has no randomUUID. */
 export const unique = () => crypto.randomUUID?.() ?? Array.from(crypto.getRandomValues(new Uint32Array(4)), (one) => one.toString(36)).join("-");
 const FRAME = unique();
@@ -49,7 +49,7 @@ function received({ source, data }) {
 
 /** Fetch what only the page may have. */
 export async function request(/** @type {string} */ path, /** @type {RequestInit} */ how = {}) {
-  if (CELL) {
+  if (inCell()) {
     const { status, body } = await post({ path, method: how.method ?? "GET", body: how.body ?? null });
     return new Response(body, { status });
   }
@@ -87,7 +87,7 @@ export function connection(/** @type {(open: boolean) => void} */ onState) {
   let ready;
 
   const open = () => {
-    if (CELL) return void (ready = Promise.resolve().then(() => onState(true)));
+    if (inCell()) return void (ready = Promise.resolve().then(() => onState(true)));
     socket = new WebSocket(`ws://${location.host}/socket`, ["trunnion", token]);
     socket.binaryType = "arraybuffer";
     ready = new Promise((resolve) => socket.addEventListener("open", resolve));
@@ -116,7 +116,7 @@ export function connection(/** @type {(open: boolean) => void} */ onState) {
   const settle = (/** @type {Answer} */ answer) => {
     if (waiting[answer.ask]?.revision === answer.revision) finish(answer.ask, answer);
   };
-  const send = (question) => (CELL ? post({ question }).then(({ body }) => settle(decode(body))) : socket.send(question));
+  const send = (question) => (inCell() ? post({ question }).then(({ body }) => settle(decode(body))) : socket.send(question));
   open();
   return {
     /** @returns {Promise<Answer | null>} */

@@ -46,7 +46,12 @@ class Format:
     needs: str = ""
 
 
-FORMATS: dict[str, Format] = {}
+FORMATS: dict[str, Format] = {
+    ".fcstd": Format("FreeCAD", "freecad", writes=False),
+    ".pmks": Format("PMKS+", "pmks", writes=False),
+    ".json": Format("pylinkage", "pylinkage", writes=False),
+    ".fmu": Format("FMU", "fmu", reads=False),
+}
 
 
 @dataclass(frozen=True)

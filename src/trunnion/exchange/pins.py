@@ -10,7 +10,7 @@ import numpy as np
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import Array, Body, Draft, Pair, free_name
 
-__all__ = ["GROUND", "Pin", "few", "meet", "space"]
+__all__ = ["GROUND", "PlanarPin", "few", "meet", "space"]
 
 GROUND = "ground"
 MOST = 2000  # pins and bars of a linkage
@@ -24,7 +24,7 @@ def few(count: int, file: str) -> None:
 
 
 @dataclass
-class Pin:
+class PlanarPin:
     """A place where bodies of a plane meet.
 
     Parameters
@@ -53,7 +53,7 @@ def space(place: Sequence[float]) -> Array:
     return np.array([place[0], place[1], 0.0])
 
 
-def meet(draft: Draft, pins: Sequence[Pin]) -> None:
+def meet(draft: Draft, pins: Sequence[PlanarPin]) -> None:
     """Add the pairs of pins to a draft that has their bodies.
 
     A pin of n bodies becomes n − 1 revolute pairs, with the ground first; that of a single body a point of it. On a
@@ -81,7 +81,7 @@ def meet(draft: Draft, pins: Sequence[Pin]) -> None:
             draft.drives[driven] = pin.drive
 
 
-def _pair(draft: Draft, pin: Pin, kind: str, first: str, second: str) -> str:
+def _pair(draft: Draft, pin: PlanarPin, kind: str, first: str, second: str) -> str:
     """Add one pair of a pin; its name."""
     name = free_name(f"{pin.name} slide" if kind == "prismatic" else pin.name, draft.pairs)
     axis = space(pin.direction) if kind == "prismatic" else np.array([0.0, 0.0, 1.0])

@@ -19,7 +19,7 @@ import numpy as np
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import Body, Draft, free_name
 from trunnion.exchange.formats import ImportOptions
-from trunnion.exchange.pins import GROUND, Pin, few, meet, space
+from trunnion.exchange.pins import GROUND, PlanarPin, few, meet, space
 
 __all__ = ["read", "read_link"]
 
@@ -184,7 +184,7 @@ def _draft(text: str, file: str) -> Draft:
 
 def _pins(
     joints: Mapping[str, Record], links: Mapping[str, Record], bodies: Mapping[str, str], scale: tuple[float, ...]
-) -> Iterator[Pin]:
+) -> Iterator[PlanarPin]:
     """The pins of a drawing. A slider is a joint of its links, or a block between such a joint and a pin."""
     length, mass, turning, sliding = scale
     blocks = [link for link in links.values() if link["block"]]
@@ -195,7 +195,7 @@ def _pins(
             continue
         slider = joints[pinned.get(name, name)]
         members = [bodies[key] for key, link in links.items() if key in bodies and name in link["joints"]]
-        pin = Pin(joint["name"] or name, (joint["x"] * length, joint["y"] * length), members)
+        pin = PlanarPin(joint["name"] or name, (joint["x"] * length, joint["y"] * length), members)
         flags, (carrier, first, second) = joint["flags"] | slider["flags"], slider["slot"]
         if slider["flags"] & SLIDES:
             block = sliders.get(slider["id"], slider)

@@ -11,7 +11,7 @@ from typing import Any
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import Body, Draft, free_name
 from trunnion.exchange.formats import ImportOptions
-from trunnion.exchange.pins import GROUND, Pin, few, meet
+from trunnion.exchange.pins import GROUND, PlanarPin, few, meet
 from trunnion.model.names import nearest
 
 __all__ = ["read"]
@@ -82,11 +82,11 @@ def _one_of(name: Any, names: Mapping[str, Any]) -> str:
     raise MechanismError(Finding(f"{name!r} is no joint of the file", "joints", nearest(str(name), names)))
 
 
-def _mechanism(draft: Draft, data: Item, unit: float) -> dict[str, Pin]:
+def _mechanism(draft: Draft, data: Item, unit: float) -> dict[str, PlanarPin]:
     """The pins of a mechanism: links name their joints, a tracker is a point of the link that has both its joints."""
-    pins, trackers = dict[str, Pin](), []
+    pins, trackers = dict[str, PlanarPin](), []
     for joint in data["joints"]:
-        pin = Pin(str(joint.get("name") or joint["id"]), _place(joint["id"], joint["position"], unit))
+        pin = PlanarPin(str(joint.get("name") or joint["id"]), _place(joint["id"], joint["position"], unit))
         pins[joint["id"]] = pin
         if joint.get("type") == "prismatic":
             pin.carrier, pin.direction = GROUND, [float(part) for part in joint["axis"]]
@@ -114,23 +114,23 @@ class _Bars:
     """The pins of a linkage, each of which hangs by bars on others."""
 
     def __init__(self, draft: Draft, unit: float) -> None:
-        self.draft, self.unit, self.pins = draft, unit, dict[str, Pin]()
+        self.draft, self.unit, self.pins = draft, unit, dict[str, PlanarPin]()
 
-    def pin(self, joint: Item) -> Pin:
+    def pin(self, joint: Item) -> PlanarPin:
         """The pin of a joint, or of a fixed one that another joint holds."""
         name = str(joint["name"] or f"{joint['x']} {joint['y']}")
         if name not in self.pins:
-            self.pins[name] = Pin(name, _place(name, (joint["x"], joint["y"]), self.unit))
+            self.pins[name] = PlanarPin(name, _place(name, (joint["x"], joint["y"]), self.unit))
             if joint.get("type") == "Static":
                 self.pins[name].bodies.append(GROUND)
         return self.pins[name]
 
-    def of(self, joint: Item, key: str) -> Pin:
+    def of(self, joint: Item, key: str) -> PlanarPin:
         """The pin that a joint refers to."""
         other = joint[key]
         return self.pin(other) if other.get("inline") else self.pins[_one_of(other["ref"], self.pins)]
 
-    def bar(self, *ends: Pin) -> str:
+    def bar(self, *ends: PlanarPin) -> str:
         """The body of some pins: of three that which has the first two, if there is one, else a new one."""
         shared = [body for body in ends[0].bodies if body in ends[1].bodies]
         name = shared[0] if len(ends) > 2 and shared else ""
@@ -142,7 +142,7 @@ class _Bars:
         return name
 
 
-def _linkage(draft: Draft, joints: Sequence[Item], unit: float) -> dict[str, Pin]:
+def _linkage(draft: Draft, joints: Sequence[Item], unit: float) -> dict[str, PlanarPin]:
     """The pins of a linkage, joint by joint."""
     bars = _Bars(draft, unit)
     pins = [bars.pin(joint) for joint in joints]

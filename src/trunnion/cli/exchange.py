@@ -59,12 +59,12 @@ def export(
     frames: Annotated[int, typer.Option("--frames", help="Number of positions in a file that moves.")] = 120,
     set_: Set = None,
 ) -> None:
-    """Write a mechanism for another program, at a position of its cycle."""
-    from trunnion.exchange import ExportOptions, export_model
+    """Write a mechanism for another program, at a position."""
+    from trunnion.exchange import export_model
 
     mechanism = stated(file, set_)
     with lines_of(file):
-        findings = export_model(mechanism, out, at, ExportOptions(frames=frames))
+        findings = export_model(mechanism, out, at, frames)
     wrote(out)
     say(placed(findings, file), every=True)
     raise typer.Exit(exit_status(findings))

@@ -19,7 +19,7 @@ import numpy as np
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import Draft
 from trunnion.exchange.model_text import complete
-from trunnion.exchange.skeleton import Positions, positions_of
+from trunnion.exchange.skeleton import positions_of
 from trunnion.files import reading, whole
 from trunnion.model.names import nearest
 from trunnion.model.quantity import Quantity
@@ -33,6 +33,7 @@ __all__ = ["FORMATS", "MATERIALS", "ExportOptions", "Format", "ImportOptions", "
 MATERIALS = {"steel": 7850.0, "stainless": 7900.0, "aluminium": 2700.0, "brass": 8500.0, "cast-iron": 7200.0,
              "titanium": 4430.0, "nylon": 1140.0, "pom": 1410.0, "abs": 1050.0, "pla": 1240.0}  # fmt: skip
 LINKS = "http:/", "https:/"  # how a path begins that is a link: its text is read, nothing is fetched
+FEWEST = 4  # positions of a cycle of which the first is written
 LARGEST = 200_000_000  # bytes of a file that is read
 
 
@@ -211,8 +212,7 @@ def export_model(
     mechanism: Mechanism,
     path: str | os.PathLike[str],
     at: float | str | None = None,
-    options: ExportOptions | None = None,
-    positions: Positions | None = None,
+    frames: int = 120,
 ) -> list[Finding]:
     """Write a mechanism in the format of another program.
 
@@ -221,7 +221,7 @@ def export_model(
     mechanism : the model.
     path : the file; its extension decides the format.
     at : the position, as for `analyse`; the first of the cycle if not given. Formats that move take the whole cycle.
-    options : see ExportOptions; positions : where the mechanism is, if they are known already.
+    frames : number of positions in a format that moves.
 
     Returns
     -------
@@ -231,12 +231,11 @@ def export_model(
     ------
     MechanismError : if the mechanism has no solution there or the format cannot hold it.
     """
-    path, options = Path(path), options or ExportOptions()
+    path, options = Path(path), ExportOptions(frames=frames)
     entry = _format_of(path, reads=False)
     module = _module(entry, path)
-    if positions is None:
-        moves = getattr(module, "MOVES", False)
-        positions = positions_of(mechanism, options.frames) if moves else positions_of(mechanism, 360, at)
+    moves = getattr(module, "MOVES", False)
+    positions = positions_of(mechanism, frames) if moves else positions_of(mechanism, FEWEST, at)
     with whole(path) as temporary:
         findings: list[Finding] = module.write(positions, temporary, options)
     return findings

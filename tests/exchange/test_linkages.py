@@ -126,7 +126,11 @@ def test_every_template_runs_for_its_whole_cycle(name: str, tmp_path: Path) -> N
 def test_a_saved_file_and_a_shortcut_are_the_link(tmp_path: Path) -> None:
     wanted = model_text(import_file(SITE + PMKS["four-bar"])).splitlines()[3:]
     shortcut = f"[InternetShortcut]\nURL={SITE}{PMKS['four-bar']}\n"
-    for name, text in (("one.pmks", PMKS["four-bar"]), ("one.url", shortcut)):
+    for name, text in (
+        ("one.pmks", PMKS["four-bar"]),
+        ("one.txt", "\n" + SITE + PMKS["four-bar"]),
+        ("one.url", shortcut),
+    ):
         assert model_text(import_file(written(text, tmp_path, name))).splitlines()[3:] == wanted
 
 

@@ -72,10 +72,10 @@ class Continued:
         for path, entry in mechanism.parameter_set.entries.items():
             if path.startswith("loads.") and ".resisting" not in path and not entry.varies:
                 self.inputs[path] = float(np.ravel(np.asarray(self.run.values[path]))[0])
-        self._varied, self._given = frozenset(self.inputs), dict[str, float]()
+        self._varied, self._applied = frozenset(self.inputs), dict[str, float]()
         self._codes: Codes = {}
-        self._known, self._row, self._senses = places(self.motion), initial_row(self.motion), tuple[int, ...]()
-        check_start(self.motion, self._row, ranges(self.motion, self.motion.names, self._known))
+        self._places, self._row, self._senses = places(self.motion), initial_row(self.motion), tuple[int, ...]()
+        check_start(self.motion, self._row, ranges(self.motion, self.motion.names, self._places))
         self._snapshot: Snapshot | None = None
         self._rates: CompiledRates | Walks = Walks(self.motion)
         self._end: Books | None = None
@@ -106,18 +106,19 @@ class Continued:
     @np.errstate(all="ignore")
     def _moved(self, until: float) -> Integration:
         """The integration from now to a time, s."""
-        if self._given != self.inputs:
+        if self._applied != self.inputs:
             values = {**self.run.values, **self.inputs}
             run = replace(self.run, values=values)
             self.motion = replace(self.motion, run=run, drives=drives(run.system, values))
-            self._rates, self._given = rates_of(self.motion, self._codes, self._varied), dict(self.inputs)
+            self._rates, self._applied = rates_of(self.motion, self._codes, self._varied), dict(self.inputs)
         self.motion.begin(self._snapshot)
         integration = integration_of(
-            self.motion, self._rates, self._known, until, self.tolerance, start=self.time, senses=self._senses
+            self.motion, self._rates, self._places, until, self.tolerance, start=self.time, senses=self._senses
         )
         integration.run(self._row.copy())
         return integration
 
+    @np.errstate(all="ignore")
     def _books(self, solution: Solution, time: float) -> Books:
         """Every variable at a time, s."""
         return Filling(self.motion, solution, np.array([time])).books()

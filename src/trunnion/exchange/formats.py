@@ -52,6 +52,7 @@ FORMATS: dict[str, Format] = {
     ".fcstd": Format("FreeCAD", "freecad", writes=False),
     ".pmks": Format("PMKS+", "pmks", writes=False),
     ".url": Format("PMKS+", "pmks", writes=False),
+    ".txt": Format("PMKS+", "pmks", writes=False),
     ".json": Format("pylinkage", "pylinkage", writes=False),
     ".fmu": Format("FMU", "fmu", reads=False),
 }

@@ -40,7 +40,7 @@ GROUPS = ("App::DocumentObjectGroup", "Assembly::JointGroup", "Assembly::ViewGro
 INERT = (*GROUPS, "App::Origin", "App::FeaturePython")  # what is no part
 IN_BODIES = ("Sketcher::SketchObject", "PartDesign::Point", "PartDesign::Line", "PartDesign::Plane",
              "PartDesign::CoordinateSystem", "Part::LocalCoordinateSystem")  # fmt: skip
-WANTED = {
+PROPERTIES = {
     "Label", "Placement", "LinkPlacement", "LinkTransform", "LinkedObject", "Group", "Rigid", "ObjectToGround",
     "JointType", "Reference1", "Reference2", "Placement1", "Placement2", "Activated", "Suppressed",
     *(f"{enable}{key}{end}" for enable in ("", "Enable") for key in ("Length", "Angle") for end in ("Min", "Max")),
@@ -146,7 +146,7 @@ def _objects(stream: Any) -> tuple[dict[str, DocumentObject], list[str]]:
         if count > MOST:
             raise OverflowError
         name = element.get("name", "")
-        if element.tag == "Property" and name not in WANTED:
+        if element.tag == "Property" and name not in PROPERTIES:
             others |= dict.fromkeys([OTHERS[name]] if name in OTHERS else [])
             element.clear()
         elif element.tag == "Object" and element.get("type"):
@@ -186,14 +186,14 @@ class _Assembly:
         for name, (first, second) in self.frames.items():
             self._compare(draft.pairs[name], first, second, APART * size)
 
-    def _members(self, group: DocumentObject, seen: set[str]) -> Iterator[DocumentObject]:
+    def _members(self, group: DocumentObject, visited: set[str]) -> Iterator[DocumentObject]:
         """What an assembly or group holds, groups resolved."""
         for name in group.links("Group"):
-            if name in self.objects and name not in seen:
-                seen.add(name)
+            if name in self.objects and name not in visited:
+                visited.add(name)
                 yield self.objects[name]
                 if self.objects[name].type in GROUPS:
-                    yield from self._members(self.objects[name], seen)
+                    yield from self._members(self.objects[name], visited)
 
     def _body(self, name: str) -> str:
         """The body of a part that moves."""
@@ -228,9 +228,9 @@ class _Assembly:
 
     def _target(self, part: DocumentObject) -> DocumentObject:
         """What a link stands for, in the same file."""
-        seen = {part.name}
-        while (link := part.links("LinkedObject")) and link[0] in self.objects and link[0] not in seen:
-            seen.add(link[0])
+        visited = {part.name}
+        while (link := part.links("LinkedObject")) and link[0] in self.objects and link[0] not in visited:
+            visited.add(link[0])
             part = self.objects[link[0]]
         return part
 
@@ -239,17 +239,17 @@ class _Assembly:
         draft, where = self.draft, f"joints.{joint.label}"
         kinds = [text.get("value", "") for text in joint.properties["JointType"].iter("Enum")] or TYPES
         kind = kinds[int(joint.value("JointType", "0"))]
-        (one, first), (other, second) = self._connector(joint, "1"), self._connector(joint, "2")
+        (part, first), (mate, second) = self._connector(joint, "1"), self._connector(joint, "2")
         if not joint.on("Activated", "true") or joint.on("Suppressed"):
             draft.note("inactive", where, "is not active, and left out", "activate it in FreeCAD if it is meant")
         elif kind not in PAIRS:
             what = f"is of the kind {kind}, which is no pair, and is left out"
             draft.warn("joint", where, what, "add what it holds to the model, a gear, rack or screw under gears")
-        elif not one or not other or one == other:
+        elif not part or not mate or part == mate:
             draft.warn("open", where, "does not join two parts, and is left out", "give it two connectors")
         else:
             name = free_name(joint.label, draft.pairs)
-            pair = Pair(name, PAIRS[kind], (self._body(one), self._body(other)), second[:3, 3], first[:3, 2])
+            pair = Pair(name, PAIRS[kind], (self._body(part), self._body(mate)), second[:3, 3], first[:3, 2])
             paths = (".".join(joint.links(f"Reference{which}")[1:]) for which in "12")
             pair.comments.append(f"{kind} joint of {' and '.join(paths)}")
             pair.limits = _limits(joint, kind, np.linalg.inv(first) @ second)

@@ -208,6 +208,6 @@ def _pins(
         elif flags & GROUNDED:
             pin.bodies.append(GROUND)
         if flags & DRIVEN:
-            own = slider["speed"] or joint["speed"]
-            pin.drive = (own * length or sliding) if pin.carrier else (own * math.pi / 30 or turning)
+            speed = slider["speed"] or joint["speed"]
+            pin.drive = (speed * length or sliding) if pin.carrier else (speed * math.pi / 30 or turning)
         yield pin

@@ -106,7 +106,12 @@ def read(path: Path, options: ImportOptions) -> Draft:
         raise MechanismError(Finding(what, file=str(path), remedy="join the parts in FreeCAD's Assembly workbench"))
     draft = Draft(outer[0].label)
     if len(outer) > 1:
-        draft.warn("assemblies", "", f"{outer[0].label} is read of {len(outer)} assemblies", "keep the others in files")
+        draft.warn(
+            "exchange.assemblies",
+            "",
+            f"{outer[0].label} is read of {len(outer)} assemblies",
+            "keep the others in files",
+        )
     try:
         _Assembly(objects, outer[0], draft).read()
     except (ValueError, KeyError, IndexError):
@@ -114,7 +119,9 @@ def read(path: Path, options: ImportOptions) -> Draft:
     if not draft.pairs:
         raise MechanismError(Finding("has no joint between two parts that is read", file=str(path)))
     what = f"masses of {len(draft.bodies)} parts are not read: they follow from shapes that only FreeCAD knows"
-    draft.note("masses", "links", what, "write mass, centre and inertia of each link, or import the parts as STEP too")
+    draft.note(
+        "exchange.masses", "links", what, "write mass, centre and inertia of each link, or import the parts as STEP too"
+    )
     return draft
 
 
@@ -180,7 +187,7 @@ class _Assembly:
                 self._joint(each)
         loose = [each.label for each in members if each.name not in self.bodies and each.type not in INERT]
         if loose:
-            draft.note("loose", "links", f"{', '.join(loose[:9])} have no joint and are left out", "join them")
+            draft.note("exchange.loose", "links", f"{', '.join(loose[:9])} have no joint and are left out", "join them")
         places = np.array([frame[:3, 3] for both in self.frames.values() for frame in both])
         size = float(np.ptp(places, axis=0).max()) if len(places) else 0.0
         for name, (first, second) in self.frames.items():
@@ -218,7 +225,9 @@ class _Assembly:
                 frame = frame @ target.frame("LinkPlacement", "Placement")
             if part.first("LinkedObject").get("file") and len(path) > k + 2:
                 what = f"joins a part in another file, {'.'.join(path)}: where it lies in that is not known"
-                self.draft.warn("outside", f"joints.{joint.label}", what, "look at its place, or join the part itself")
+                self.draft.warn(
+                    "exchange.outside", f"joints.{joint.label}", what, "look at its place, or join the part itself"
+                )
             inside = self.objects.get(path[k + 1]) if len(path) > k + 1 else None
             if target.type == BODY and inside is not None and inside.type in IN_BODIES:
                 frame = frame @ inside.frame("Placement")
@@ -241,12 +250,16 @@ class _Assembly:
         kind = kinds[int(joint.value("JointType", "0"))]
         (part, first), (mate, second) = self._connector(joint, "1"), self._connector(joint, "2")
         if not joint.on("Activated", "true") or joint.on("Suppressed"):
-            draft.note("inactive", where, "is not active, and left out", "activate it in FreeCAD if it is meant")
+            draft.note(
+                "exchange.inactive", where, "is not active, and left out", "activate it in FreeCAD if it is meant"
+            )
         elif kind not in PAIRS:
             what = f"is of the kind {kind}, which is no pair, and is left out"
-            draft.warn("joint", where, what, "add what it holds to the model, a gear, rack or screw under gears")
+            draft.warn(
+                "exchange.joint", where, what, "add what it holds to the model, a gear, rack or screw under gears"
+            )
         elif not part or not mate or part == mate:
-            draft.warn("open", where, "does not join two parts, and is left out", "give it two connectors")
+            draft.warn("exchange.open", where, "does not join two parts, and is left out", "give it two connectors")
         else:
             name = free_name(joint.label, draft.pairs)
             pair = Pair(name, PAIRS[kind], (self._body(part), self._body(mate)), second[:3, 3], first[:3, 2])
@@ -263,7 +276,7 @@ class _Assembly:
         tilt = 0.0 if pair.type == "spherical" else float(np.linalg.norm(np.cross(axis, second[:3, 2])))
         if np.linalg.norm(gap) > most or tilt > PARALLEL:
             what = f"its connectors are {1e3 * np.linalg.norm(gap):.3g} mm and {math.degrees(tilt):.3g}° apart"
-            self.draft.warn("apart", f"joints.{pair.name}", what, "solve the assembly in FreeCAD and save it")
+            self.draft.warn("exchange.apart", f"joints.{pair.name}", what, "solve the assembly in FreeCAD and save it")
 
 
 def _limits(joint: DocumentObject, kind: str, between: Array) -> tuple[float, float] | None:

@@ -45,7 +45,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
     if len(set(map(str, names))) < len(names):
         raise _wrong("has two joints of the same name", str(path))
     draft = Draft(str(data.get("name") or ""), {GROUND: Body(GROUND)}, ground=GROUND, plane=True)
-    draft.note("unit", "", f"lengths are taken in units of {options.unit:g} m", "state another with --unit")
+    draft.note("exchange.unit", "", f"lengths are taken in units of {options.unit:g} m", "state another with --unit")
     try:
         old = any(joint.get("type") in OLD for joint in joints)
         pins = _linkage(draft, joints, options.unit) if old else _mechanism(draft, data, options.unit)
@@ -56,7 +56,12 @@ def read(path: Path, options: ImportOptions) -> Draft:
     meet(draft, list(pins.values()))
     if draft.drives:
         what = "turns by radians a step in the file, which is no speed"
-        draft.note("speed", f"joints.{next(iter(draft.drives))}", what, "state one with --speed; below 0 it turns back")
+        draft.note(
+            "exchange.speed",
+            f"joints.{next(iter(draft.drives))}",
+            what,
+            "state one with --speed; below 0 it turns back",
+        )
     return draft
 
 

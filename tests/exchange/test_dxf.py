@@ -157,7 +157,7 @@ def test_lines_alone_make_joints_and_say_so(tmp_path: Path) -> None:
     lines = {layer: [mark for mark in marks if mark[0] == "line"] for layer, marks in four_bar().items()}
     draft = read(drawing(**lines), tmp_path)
     assert {frozenset(pair.links) for pair in draft.pairs.values()} == {frozenset(two) for two in FOUR_BAR.values()}
-    assert codes(draft).count("bare-end") == 4
+    assert codes(draft).count("bare_end") == 4
     assert all(pair.pin_radius is None for pair in draft.pairs.values())
 
 
@@ -194,7 +194,7 @@ def test_three_links_on_one_pin_turn_on_that_with_the_smallest_circle(tmp_path: 
     }
     draft = read(drawing(**marks), tmp_path)
     assert [pair.links for pair in draft.pairs.values()] == [("b", "a"), ("b", "c")]
-    assert "shared-pin" in codes(draft)
+    assert "shared_pin" in codes(draft)
     assert [pair.pin_radius for pair in draft.pairs.values()] == pytest.approx([5e-3, 5e-3])
 
 

@@ -144,7 +144,7 @@ def test_a_3mf_without_a_unit_is_in_millimetres_as_its_standard_says(tmp_path: P
 def test_an_open_mesh_has_no_mass_and_says_so(faces: Any, tmp_path: Path) -> None:
     draft = import_file(written(tmp_path, stl(BOX * CORNERS, faces)))
     assert draft.bodies["part"].mass == 0
-    assert "open-mesh" in codes(draft)
+    assert "open_mesh" in codes(draft)
 
 
 def test_two_shells_in_one_mesh_are_one_body_and_noted(tmp_path: Path) -> None:
@@ -249,4 +249,4 @@ def test_numbers_that_are_none_leave_a_body_without_mass(tmp_path: Path) -> None
     corners[3] = np.nan
     draft = import_file(written(tmp_path, stl(corners, FACES)))
     assert draft.bodies["part"].mass == 0
-    assert {"mesh", "open-mesh"} & set(codes(draft))
+    assert {"mesh", "open_mesh"} & set(codes(draft))

@@ -52,12 +52,14 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
     size = float(np.ptp(corners, axis=0).max()) or 1.0
     _links(space, draft, layers, size)
     curves = _curves(space, positions, layers, size)
-    draft.note("lost", "file", "a DXF holds no masses, friction, loads or drivers", "keep the model file")
+    draft.note("exchange.lost", "file", "a DXF holds no masses, friction, loads or drivers", "keep the model file")
     if draft.plane:
         right = float(max(corners[:, 0].max(), *(curve[:, 0].max() for curve in curves), -math.inf))
         _polygons(space, positions, options.row, draft, np.array([right + 0.5 * size, corners[:, 1].min()]), size)
     else:
-        draft.note("spatial", "file", "force polygons are drawn of planar mechanisms only; the lines are in space")
+        draft.note(
+            "exchange.spatial", "file", "force polygons are drawn of planar mechanisms only; the lines are in space"
+        )
     document.saveas(path)
     return draft.findings
 
@@ -75,7 +77,7 @@ def _layers(draft: Draft) -> dict[str, str]:
         used.add(layer.casefold())
         layers[link] = layer
         if layer != link:
-            draft.note("name", f"links.{link}", f"lies on the layer {layer!r}, for DXF allows no other name")
+            draft.note("exchange.name", f"links.{link}", f"lies on the layer {layer!r}, for DXF allows no other name")
     return layers
 
 
@@ -168,7 +170,7 @@ def _polygons(space: Modelspace, positions: Positions, row: int, draft: Draft, c
     """The polygons in rows from a corner upwards, each group with its links, approximations in grey below them."""
     drawn = polygons_of(positions, row)
     if not drawn or not any(len(polygon.forces) for polygon in drawn[0]):
-        draft.note("forces", "file", f"there are no forces to draw at {positions.drive(row)}")
+        draft.note("exchange.forces", "file", f"there are no forces to draw at {positions.drive(row)}")
         return
     settled = [polygon for polygon in drawn[0] if len(polygon.forces)]
     largest = max(float(np.ptp(polygon.corners, axis=0).max()) for polygon in settled)
@@ -177,7 +179,11 @@ def _polygons(space: Modelspace, positions: Positions, row: int, draft: Draft, c
         if not polygon.gap <= CLOSED:
             what = f"the polygon of {polygon.name} does not close, by {polygon.gap:.2g} of its perimeter"
             draft.warn(
-                "polygon", "file", what, "see the status of this position in `trunnion analyse`", gap=polygon.gap
+                "exchange.polygon",
+                "file",
+                what,
+                "see the status of this position in `trunnion analyse`",
+                gap=polygon.gap,
             )
         layer = f"{AUXILIARY}forces {polygon.name}".translate(FORBIDDEN)
         space.doc.layers.add(layer, color=BLUE)

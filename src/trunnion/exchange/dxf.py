@@ -129,12 +129,14 @@ def read(path: Path, options: ImportOptions) -> Draft:
         raise MechanismError(Finding(what, file=str(path), remedy=remedy))
     if sketch.left:
         left = ", ".join(f"{count} {kind}" for kind, count in sketch.left.most_common(6))
-        draft.note("left", "file", f"is not read: {left}", "joints are circles, points, lines and slots")
+        draft.note("exchange.left", "file", f"is not read: {left}", "joints are circles, points, lines and slots")
     size = max(float(np.ptp(places, axis=0).max()), 1e-6)
     if np.ptp(sketch.heights) > TOUCH * size:
-        draft.warn("flat", "file", "is drawn in space; it is read as seen along z", "draw a plane mechanism at z = 0")
+        draft.warn(
+            "exchange.flat", "file", "is drawn in space; it is read as seen along z", "draw a plane mechanism at z = 0"
+        )
     _Reader(sketch, draft, options, size).read()
-    draft.note("mass", "file", "a DXF holds no masses", "add mass, centre and inertia to the links")
+    draft.note("exchange.mass", "file", "a DXF holds no masses", "add mass, centre and inertia to the links")
     return draft
 
 
@@ -152,7 +154,7 @@ def _document(path: Path, draft: Draft) -> Drawing:
         document, _ = recover.readfile(path)
         mended = "; ".join(record.getMessage() for record in heard.buffer[:3])
         what = "is damaged; what could be mended is read" + (f": {mended}" if mended else "")
-        draft.warn("damaged", "file", what, "compare it with the drawing")
+        draft.warn("exchange.damaged", "file", what, "compare it with the drawing")
         return document
     finally:
         logger.removeHandler(heard)
@@ -163,7 +165,9 @@ def _unit(document: Drawing, options: ImportOptions, draft: Draft) -> float:
     stated = UNITS.get(document.header.get("$INSUNITS", 0))
     if stated is not None:
         return stated
-    draft.warn("unit", "file", f"states no unit; {1e3 * options.unit:g} mm is taken for 1", "state it with --unit")
+    draft.warn(
+        "exchange.unit", "file", f"states no unit; {1e3 * options.unit:g} mm is taken for 1", "state it with --unit"
+    )
     return options.unit
 
 
@@ -278,13 +282,14 @@ class _Reader:
 
     def _ground(self, layers: list[str], stated: str) -> str:
         """The layer that does not move: that which is stated, or has such a name, or layer 0; empty if none."""
+        draft = self.draft
         named = [layer for layer in layers if any(word in layer.casefold() for word in GROUNDS)]
         named += [layer for layer in layers if layer == "0"]
         if stated or not named:
             return stated if stated in layers else ""
         if len(named) > 1:
             what = f"is taken as what does not move, and {', '.join(named[1:])} as links that may"
-            self.draft.warn("ground", f"links.{named[0]}", what, "draw all of it on one layer, or state --ground")
+            draft.warn("exchange.ground", f"links.{named[0]}", what, "draw all of it on one layer, or state --ground")
         return named[0]
 
     def read(self) -> None:
@@ -304,7 +309,9 @@ class _Reader:
         for layer in loose:
             del draft.bodies[layer]
             draft.ground = "" if layer == draft.ground else draft.ground
-            draft.warn("loose", f"links.{layer}", "has no joint with another layer and is left out", "draw its joints")
+            draft.warn(
+                "exchange.loose", f"links.{layer}", "has no joint with another layer and is left out", "draw its joints"
+            )
         self._names()
 
     def _add(self, kind: str, links: tuple[str, str], number: int, comment: str, axis: Array | None = None) -> Pair:
@@ -319,16 +326,17 @@ class _Reader:
 
     def _pin(self, number: int) -> None:
         """The joints of a place where several layers lie: all turn on the link whose circle is smallest."""
+        draft = self.draft
         self.joined.add(number)
         drawn, marks = self.marks[number], dict[str, list[float]]()
         for layer, radii in drawn.items():
             sizes = sorted(radius for radius in radii if radius)
             marks[layer] = [b for a, b in itertools.pairwise([0.0, *sizes]) if b - a > TOUCH * self.size]
-        layers = [layer for layer in self.draft.bodies if layer in marks]
+        layers = [layer for layer in draft.bodies if layer in marks]
         hub = min(layers, key=lambda layer: (min(marks[layer], default=math.inf), -len(drawn[layer])))
         if len(layers) > 2:
             what = f"is taken as the link that bears the pin of {', '.join(layers)}"
-            self.draft.warn("shared-pin", f"links.{hub}", what, "mend the links of these joints if another does")
+            draft.warn("exchange.shared_pin", f"links.{hub}", what, "mend the links of these joints if another does")
         for other in layers:
             if other == hub:
                 continue
@@ -342,16 +350,17 @@ class _Reader:
             pair.pin_radius, pair.hole_radius = [*fits, None, None][:2]
             if circles and not fits:
                 what = f"has circles of {circles} radius, of which none are clearly its pin and hole"
-                self.draft.warn("radius", f"joints.{pair.name}", what, "state its pin, or draw pin and hole alone")
+                draft.warn("exchange.radius", f"joints.{pair.name}", what, "state its pin, or draw pin and hole alone")
             if not any(drawn.values()):
                 what = f"is read where lines of {hub} and {other} end; no circle or point marks it"
-                self.draft.note("bare-end", f"joints.{pair.name}", what, "draw its pin as a circle")
+                draft.note("exchange.bare_end", f"joints.{pair.name}", what, "draw its pin as a circle")
 
     def _guides(self) -> set[frozenset[str]]:
         """Prismatic pairs where lines of two layers lie on each other; the layers that they join.
 
         A line between two joints is the body of a link, which may lie on another by chance.
         """
+        draft = self.draft
         guided: dict[frozenset[str], dict[str, dict[Line, None]]] = {}
         chance: set[frozenset[str]] = set()
         for both in _lying(self.sketch.lines, self.gap):
@@ -370,7 +379,7 @@ class _Reader:
             what = (
                 f"lines of {' and '.join(sorted(layers))} lie on each other, but one ends at joints; no guide is read"
             )
-            self.draft.note("line", f"links.{min(layers)}", what, "let its lines end elsewhere if it is a guide")
+            draft.note("exchange.line", f"links.{min(layers)}", what, "let its lines end elsewhere if it is a guide")
         for lines in guided.values():
             free = {
                 layer: [line for line in own if not self.joined & {*self.ends[line]}] for layer, own in lines.items()
@@ -380,22 +389,25 @@ class _Reader:
 
     def _guide(self, lines: dict[str, list[Line]]) -> None:
         """The prismatic pair of two layers with lines that lie on each other: the shorter ones are the slider's."""
+        draft = self.draft
         length = {layer: max(line.length for line in lines[layer]) for layer in lines}
-        order = list(self.draft.bodies)
+        order = list(draft.bodies)
         slider, rail = sorted(lines, key=lambda layer: (length[layer], -order.index(layer)))
         along = lines[slider][0].span / lines[slider][0].length
         ways = np.array([sorted(end @ along for end in (line.start, line.end)) for line in lines[slider]])
         same = all(abs(_cross(along, line.span)) <= 3 * TOUCH * line.length for line in lines[slider])
         if not same or np.ptp(ways, axis=0).max() > TOUCH * self.size:
             what = f"has lines of several {'lengths' if same else 'directions'} on those of {rail}; no guide is read"
-            self.draft.warn("line", f"links.{slider}", what, "draw the slider as lines of one length along its guide")
+            draft.warn(
+                "exchange.line", f"links.{slider}", what, "draw the slider as lines of one length along its guide"
+            )
             return
         middle = self._place(np.mean([(line.start + line.end) / 2 for line in lines[slider]], axis=0))
         pair = self._add("prismatic", (rail, slider), middle, f"lines of {slider} lie on lines of {rail}", along)
         longer = all(line.length - length[slider] > TOUCH * self.size for line in lines[rail])
         pair.length = length[slider] if longer else None
         what = f"is taken as a guide, for lines of {slider} lie on lines of {rail}"
-        self.draft.note("guide", f"joints.{pair.name}", what, "if it is none, draw the links at another position")
+        draft.note("exchange.guide", f"joints.{pair.name}", what, "if it is none, draw the links at another position")
 
     def _slots(self) -> tuple[list[Slot], set[Line]]:
         """What two half circles and two lines of a layer enclose, and these lines."""
@@ -438,17 +450,19 @@ class _Reader:
             guide.limits = ways[0], ways[1]
             if radius and slot.half - radius > self.gap:
                 what = f"has {_mm(slot.half - radius)} mm of play in the slot of {slot.layer}, which is taken as none"
-                draft.warn("slot", f"joints.{guide.name}", what, "draw the pin as wide as the slot if it guides")
+                draft.warn(
+                    "exchange.slot", f"joints.{guide.name}", what, "draw the pin as wide as the slot if it guides"
+                )
             return
         if slots:
-            draft.warn("slot", f"links.{layer}", "has a pin in several slots; none is read", "draw one slot")
+            draft.warn("exchange.slot", f"links.{layer}", "has a pin in several slots; none is read", "draw one slot")
         points = draft.bodies[layer].points
         points[f"P{len(points) + 1}"] = np.array([*at, 0.0])
         near = [k for k in self.drawn if k != number and np.hypot(*(self.places[k] - at)) <= self.gap]
         others = sorted({other for k in near for other in self.marks[k]} - {layer})
         if others and max(radii) > 0:
             what = f"has a circle almost about the centre of one of {', '.join(others)}, which is no joint"
-            draft.warn("near", f"links.{layer}", what, "draw both about one centre if they are a joint")
+            draft.warn("exchange.near", f"links.{layer}", what, "draw both about one centre if they are a joint")
 
     def _names(self) -> None:
         """Texts name the joint or point nearest to them, those on a layer of its links first.

@@ -51,7 +51,7 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
     draft = positions.draft(first)
     if not solved.all():
         what = f"{np.count_nonzero(~solved)} of {len(solved)} positions have no solution; the motion jumps over them"
-        draft.warn("unsolved", "file", what, "`trunnion analyse` says why")
+        draft.warn("exchange.unsolved", "file", what, "`trunnion analyse` says why")
     places = [pair.at for pair in draft.pairs.values()] + [p for b in draft.bodies.values() for p in b.points.values()]
     size = float(np.ptp(places, axis=0).max()) or 0.1
     scene = _Scene()
@@ -78,7 +78,10 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
     scene.nodes.insert(0, root)
     path.write_bytes(scene.glb(draft.name or "mechanism", keys, channels))
     draft.note(
-        "lost", "file", "a GLB shows the motion; it holds no masses, friction, loads or drivers", "keep the model"
+        "exchange.lost",
+        "file",
+        "a GLB shows the motion; it holds no masses, friction, loads or drivers",
+        "keep the model",
     )
     return draft.findings
 

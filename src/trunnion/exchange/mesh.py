@@ -54,7 +54,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
             meshes = list(_of_3mf(path))
         elif suffix == ".stl":
             what = f"an STL states no unit; {1e3 * options.unit:g} mm is taken for 1"
-            draft.warn("unit", "file", what, "state it with --unit")
+            draft.warn("exchange.unit", "file", what, "state it with --unit")
             meshes = [(path.stem, *_triangles(trimesh.load_mesh(path, file_type="stl"), options.unit))]
         else:
             scene = trimesh.load_scene(path, file_type="glb")
@@ -76,7 +76,9 @@ def read(path: Path, options: ImportOptions) -> Draft:
     for name, vertices, faces in meshes:
         body = _weighed(draft, free_name(name, draft.bodies), vertices, faces, options.density)
         draft.bodies[body.name] = body
-    draft.note("joints", "file", "a mesh holds no joints", "copy the links into a model, or import a STEP assembly")
+    draft.note(
+        "exchange.joints", "file", "a mesh holds no joints", "copy the links into a model, or import a STEP assembly"
+    )
     return draft
 
 
@@ -89,22 +91,24 @@ def _weighed(draft: Draft, name: str, vertices: Array, faces: Array, density: fl
     body = Body(name)
     mesh = trimesh.Trimesh(vertices, faces, process=True)
     if not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
-        draft.warn("mesh", f"links.{name}", "has no triangles, or corners that are no numbers", "export it again")
+        draft.warn(
+            "exchange.mesh", f"links.{name}", "has no triangles, or corners that are no numbers", "export it again"
+        )
         return body
     size = ", ".join(f"{1e3 * extent:.6g}" for extent in mesh.extents)
     body.comments.append(f"a mesh of {len(mesh.faces):,} triangles, {size} mm large")
     if not mesh.is_watertight or not mesh.is_winding_consistent:
         what = "is not closed, or its triangles do not all face outwards; it has no mass here"
-        draft.warn("open-mesh", f"links.{name}", what, "mend the mesh, or state mass, centre and inertia")
+        draft.warn("exchange.open_mesh", f"links.{name}", what, "mend the mesh, or state mass, centre and inertia")
         return body
     mesh.density = density
     properties = mesh.mass_properties
     if mesh.body_count > 1:
         what = f"holds {mesh.body_count} separate shells; they are weighed as one body"
-        draft.note("shells", f"links.{name}", what, "export parts that move against each other apart")
+        draft.note("exchange.shells", f"links.{name}", what, "export parts that move against each other apart")
     sign = -1.0 if properties.volume < 0 else 1.0  # inside out throughout
     if not sign * properties.volume > 0:
-        draft.warn("open-mesh", f"links.{name}", "encloses no volume; it has no mass here", "mend the mesh")
+        draft.warn("exchange.open_mesh", f"links.{name}", "encloses no volume; it has no mass here", "mend the mesh")
         return body
     body.mass, body.centre = float(sign * properties.mass), np.array(properties.center_mass)
     body.inertia = sign * np.array(properties.inertia)

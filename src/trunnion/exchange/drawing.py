@@ -57,9 +57,7 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
         right = float(max(corners[:, 0].max(), *(curve[:, 0].max() for curve in curves), -math.inf))
         _polygons(space, positions, options.row, draft, np.array([right + 0.5 * size, corners[:, 1].min()]), size)
     else:
-        draft.note(
-            "exchange.spatial", "file", "force polygons are drawn of planar mechanisms only; the lines are in space"
-        )
+        draft.note("exchange.spatial", "file", "lines are drawn in space; only planar mechanisms have force polygons")
     document.saveas(path)
     return draft.findings
 
@@ -178,13 +176,7 @@ def _polygons(space: Modelspace, positions: Positions, row: int, draft: Draft, c
     for polygon in settled:
         if not polygon.gap <= CLOSED:
             what = f"the polygon of {polygon.name} does not close, by {polygon.gap:.2g} of its perimeter"
-            draft.warn(
-                "exchange.polygon",
-                "file",
-                what,
-                "see the status of this position in `trunnion analyse`",
-                gap=polygon.gap,
-            )
+            draft.warn("exchange.polygon", "file", what, "`trunnion analyse` says how well it is solved")
         layer = f"{AUXILIARY}forces {polygon.name}".translate(FORBIDDEN)
         space.doc.layers.add(layer, color=BLUE)
         rounds = [others for approximation in drawn[1:] for others in approximation if others.name == polygon.name]
@@ -210,8 +202,8 @@ def _sides(
             attributes = {**here, "rotation": math.degrees(math.atan2(force[1], force[0]))}
             attributes |= {"xscale": MM * height, "yscale": MM * height}
             space.add_blockref("arrow", _mm(end), dxfattribs=attributes)
-            middle = np.array([*((start + end) / 2), 0.0])
-            _text(space, f"{label}: {np.hypot(*force):.6g} N", middle, height / (2 * LETTER), here)
+            third = np.array([*(2 * start + end) / 3, 0.0])  # where two long sides lie apart
+            _text(space, f"{label}: {np.hypot(*force):.6g} N", third, height / (2 * LETTER), here)
 
 
 def _arrow_block(document: Drawing) -> None:

@@ -132,9 +132,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
         draft.note("exchange.left", "file", f"is not read: {left}", "joints are circles, points, lines and slots")
     size = max(float(np.ptp(places, axis=0).max()), 1e-6)
     if np.ptp(sketch.heights) > TOUCH * size:
-        draft.warn(
-            "exchange.flat", "file", "is drawn in space; it is read as seen along z", "draw a plane mechanism at z = 0"
-        )
+        draft.warn("exchange.flat", "file", "is drawn in space; it is read as seen along z", "draw all at z = 0")
     _Reader(sketch, draft, options, size).read()
     draft.note("exchange.mass", "file", "a DXF holds no masses", "add mass, centre and inertia to the links")
     return draft
@@ -165,9 +163,8 @@ def _unit(document: Drawing, options: ImportOptions, draft: Draft) -> float:
     stated = UNITS.get(document.header.get("$INSUNITS", 0))
     if stated is not None:
         return stated
-    draft.warn(
-        "exchange.unit", "file", f"states no unit; {1e3 * options.unit:g} mm is taken for 1", "state it with --unit"
-    )
+    what = f"states no unit; {1e3 * options.unit:g} mm is taken for 1"
+    draft.warn("exchange.unit", "file", what, "state it with --unit")
     return options.unit
 
 
@@ -240,7 +237,7 @@ def _gather(sketch: Sketch, layer: str, entity: Any, unit: float) -> None:
         sketch.circles.append((layer, place(dxf.center), unit * dxf.major_axis.magnitude))  # of a scaled block
     elif kind in ("TEXT", "ATTRIB"):
         sketch.texts.append((layer, place(entity.get_placement()[1]), entity.plain_text()))
-    elif kind == "MTEXT":
+    elif kind == "MTEXT" and "\n" not in entity.plain_text().strip():
         sketch.texts.append((layer, place(dxf.insert), entity.plain_text()))
     else:
         sketch.left[kind] += 1
@@ -309,9 +306,8 @@ class _Reader:
         for layer in loose:
             del draft.bodies[layer]
             draft.ground = "" if layer == draft.ground else draft.ground
-            draft.warn(
-                "exchange.loose", f"links.{layer}", "has no joint with another layer and is left out", "draw its joints"
-            )
+            what = "has no joint with another layer and is left out"
+            draft.warn("exchange.loose", f"links.{layer}", what, "draw its joints")
         self._names()
 
     def _add(self, kind: str, links: tuple[str, str], number: int, comment: str, axis: Array | None = None) -> Pair:
@@ -398,9 +394,7 @@ class _Reader:
         same = all(abs(_cross(along, line.span)) <= 3 * TOUCH * line.length for line in lines[slider])
         if not same or np.ptp(ways, axis=0).max() > TOUCH * self.size:
             what = f"has lines of several {'lengths' if same else 'directions'} on those of {rail}; no guide is read"
-            draft.warn(
-                "exchange.line", f"links.{slider}", what, "draw the slider as lines of one length along its guide"
-            )
+            draft.warn("exchange.line", f"links.{slider}", what, "draw the slider as lines of one length")
             return
         middle = self._place(np.mean([(line.start + line.end) / 2 for line in lines[slider]], axis=0))
         pair = self._add("prismatic", (rail, slider), middle, f"lines of {slider} lie on lines of {rail}", along)
@@ -450,9 +444,7 @@ class _Reader:
             guide.limits = ways[0], ways[1]
             if radius and slot.half - radius > self.gap:
                 what = f"has {_mm(slot.half - radius)} mm of play in the slot of {slot.layer}, which is taken as none"
-                draft.warn(
-                    "exchange.slot", f"joints.{guide.name}", what, "draw the pin as wide as the slot if it guides"
-                )
+                draft.warn("exchange.slot", f"joints.{guide.name}", what, "draw the pin as wide as the slot")
             return
         if slots:
             draft.warn("exchange.slot", f"links.{layer}", "has a pin in several slots; none is read", "draw one slot")
@@ -472,9 +464,9 @@ class _Reader:
         draft, near = self.draft, NEAR * self.size
         targets: list[tuple[str, str, tuple[str, ...], Array]] = []  # layer of a point, old name, links, place
         targets += [("", pair.name, pair.links, pair.at) for pair in draft.pairs.values()]
-        targets += [
-            (link, name, (link,), at) for link, body in draft.bodies.items() for name, at in body.points.items()
-        ]
+        for link, body in draft.bodies.items():
+            targets += [(link, name, (link,), at) for name, at in body.points.items()]
+            body.points = {}
         choices = []
         places = np.array([at[:2] for *_, at in targets]).reshape(-1, 2)
         for i, (layer, place, _) in enumerate(self.sketch.texts):
@@ -490,11 +482,8 @@ class _Reader:
         taken: dict[str, list[str]] = {link: [] for link in ("", *draft.bodies)}  # "": by joints
         pairs, draft.pairs = draft.pairs, {}
         renamed: dict[str, str] = {}
-        for body in draft.bodies.values():
-            body.points = {}
-        for j, (link, old, links, at) in sorted(
-            enumerate(targets), key=lambda item: (item[1][0] != "", item[0] not in texts)
-        ):
+        for j in sorted(range(len(targets)), key=lambda j: (targets[j][0] != "", j not in texts)):
+            link, old, links, at = targets[j]
             layer, _, text = self.sketch.texts[texts[j]] if j in texts else ("", at, old)
             name = free_name(text.strip(), [*taken[""], *taken[link]])
             taken[link].append(name)

@@ -77,12 +77,7 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
         root["rotation"] = Z_UP
     scene.nodes.insert(0, root)
     path.write_bytes(scene.glb(draft.name or "mechanism", keys, channels))
-    draft.note(
-        "exchange.lost",
-        "file",
-        "a GLB shows the motion; it holds no masses, friction, loads or drivers",
-        "keep the model",
-    )
+    draft.note("exchange.lost", "file", "a GLB holds no masses, friction, loads or drivers", "keep the model file")
     return draft.findings
 
 

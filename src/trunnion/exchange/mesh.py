@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["read"]
 
-MOST_BYTES = 40_000_000  # of a file, unpacked
+MOST_BYTES = 30_000_000  # of a file, unpacked
 MOST_BODIES = 500
 DEEPEST = 8  # components of components in a 3MF
 UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
@@ -55,9 +56,14 @@ def read(path: Path, options: ImportOptions) -> Draft:
         elif suffix == ".stl":
             what = f"an STL states no unit; {1e3 * options.unit:g} mm is taken for 1"
             draft.warn("exchange.unit", "file", what, "state it with --unit")
-            meshes = [(path.stem, *_triangles(trimesh.load_mesh(path, file_type="stl"), options.unit))]
+            meshes = [
+                (
+                    path.stem,
+                    *_triangles(trimesh.load_mesh(io.BytesIO(path.read_bytes()), file_type="stl"), options.unit),
+                )
+            ]
         else:
-            scene = trimesh.load_scene(path, file_type="glb")
+            scene = trimesh.load_scene(io.BytesIO(path.read_bytes()), file_type="glb")
             meshes = [(mesh.metadata.get("name", "part"), *_triangles(mesh, 1.0)) for mesh in scene.dump()]
     except TROUBLE as error:
         if isinstance(error, MechanismError):
@@ -77,7 +83,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
         body = _weighed(draft, free_name(name, draft.bodies), vertices, faces, options.density)
         draft.bodies[body.name] = body
     draft.note(
-        "exchange.joints", "file", "a mesh holds no joints", "copy the links into a model, or import a STEP assembly"
+        "exchange.joints", "file", "a mesh holds no joints", "copy the links into a model, or import a STEP file"
     )
     return draft
 
@@ -91,9 +97,8 @@ def _weighed(draft: Draft, name: str, vertices: Array, faces: Array, density: fl
     body = Body(name)
     mesh = trimesh.Trimesh(vertices, faces, process=True)
     if not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
-        draft.warn(
-            "exchange.mesh", f"links.{name}", "has no triangles, or corners that are no numbers", "export it again"
-        )
+        what = "has no triangles, or corners that are no numbers"
+        draft.warn("exchange.mesh", f"links.{name}", what, "export it again")
         return body
     size = ", ".join(f"{1e3 * extent:.6g}" for extent in mesh.extents)
     body.comments.append(f"a mesh of {len(mesh.faces):,} triangles, {size} mm large")

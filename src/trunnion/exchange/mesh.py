@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["read"]
 
-MOST_BYTES = 30_000_000  # of a file, unpacked
+MOST_BYTES, MOST_XML = 30_000_000, 20_000_000  # of a file; of the model of a 3MF, unpacked
 MOST_BODIES = 500
 DEEPEST = 8  # components of components in a 3MF
 UNITS = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
@@ -131,10 +131,10 @@ def _of_3mf(path: Path) -> Iterator[Mesh]:
         main = next((name for name in names if "3dmodel" in name.lower()), None)
         if main is None:
             raise ValueError("no model")
-        if archive.getinfo(main).file_size > MOST_BYTES:
-            raise MechanismError(Finding(f"unpacks to more than {MOST_BYTES:,} bytes", file=str(path)))
+        if archive.getinfo(main).file_size > MOST_XML:
+            raise MechanismError(Finding(f"unpacks to more than {MOST_XML:,} bytes", file=str(path)))
         with archive.open(main) as stream:
-            root = ElementTree.fromstring(stream.read(MOST_BYTES), forbid_dtd=True)
+            root = ElementTree.fromstring(stream.read(MOST_XML), forbid_dtd=True)
     unit = UNITS[root.get("unit", "millimeter")]
     objects = {part.get("id", ""): part for part in root.iterfind("{*}resources/{*}object")}
     count = [0]

@@ -85,11 +85,13 @@ def _links(space: Modelspace, draft: Draft, layers: dict[str, str], size: float)
         here = {"layer": layer}
         pairs = draft.pairs_of(link)
         ends = [_ends(pair, link, draft.plane, size) for pair in pairs]
-        for one, other in zip(ends, ends[1:] + (ends[:1] if len(ends) > 2 else []), strict=False):
-            touching = [np.linalg.norm(a - _nearest(a, other)) for a in one]
-            touching += [np.linalg.norm(b - _nearest(b, one)) for b in other]
+        for first, last in zip(ends, ends[1:] + (ends[:1] if len(ends) > 2 else []), strict=False):
+            touching = [np.linalg.norm(a - _nearest(a, last)) for a in first]
+            touching += [np.linalg.norm(b - _nearest(b, first)) for b in last]
             if min(touching) > SAME * size:
-                start, end = min(((a, b) for a in one for b in other), key=lambda way: np.linalg.norm(way[1] - way[0]))
+                start, end = min(
+                    ((a, b) for a in first for b in last), key=lambda both: np.linalg.norm(both[1] - both[0])
+                )
                 space.add_line(_mm(start), _mm(end), dxfattribs=here)
         for pair, places in zip(pairs, ends, strict=True):
             second = link == pair.links[1]

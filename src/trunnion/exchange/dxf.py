@@ -71,8 +71,11 @@ class Slot(Line):
 
     def holds(self, at: Array, radius: float, near: float) -> bool:
         """Whether a pin lies on the middle line and fits in."""
-        way, aside = (at - self.start) @ self.span / self.length, abs(_cross(self.span, at - self.start)) / self.length
-        return bool(-near <= way <= self.length + near and aside <= near and radius <= self.half + near)
+        along, aside = (
+            (at - self.start) @ self.span / self.length,
+            abs(_cross(self.span, at - self.start)) / self.length,
+        )
+        return bool(-near <= along <= self.length + near and aside <= near and radius <= self.half + near)
 
 
 @dataclass
@@ -160,9 +163,9 @@ def _document(path: Path, draft: Draft) -> Drawing:
 
 def _unit(document: Drawing, options: ImportOptions, draft: Draft) -> float:
     """The length unit of the drawing, m."""
-    stated = UNITS.get(document.header.get("$INSUNITS", 0))
-    if stated is not None:
-        return stated
+    unit = UNITS.get(document.header.get("$INSUNITS", 0))
+    if unit is not None:
+        return unit
     what = f"states no unit; {1e3 * options.unit:g} mm is taken for 1"
     draft.warn("exchange.unit", "file", what, "state it with --unit")
     return options.unit
@@ -277,13 +280,13 @@ class _Reader:
             self.places = np.vstack([self.places, point])
         return int(near[0]) if len(near) else len(self.places) - 1
 
-    def _ground(self, layers: list[str], stated: str) -> str:
+    def _ground(self, layers: list[str], option: str) -> str:
         """The layer that does not move: that which is stated, or has such a name, or layer 0; empty if none."""
         draft = self.draft
         named = [layer for layer in layers if any(word in layer.casefold() for word in GROUNDS)]
         named += [layer for layer in layers if layer == "0"]
-        if stated or not named:
-            return stated if stated in layers else ""
+        if option or not named:
+            return option if option in layers else ""
         if len(named) > 1:
             what = f"is taken as what does not move, and {', '.join(named[1:])} as links that may"
             draft.warn("exchange.ground", f"links.{named[0]}", what, "draw all of it on one layer, or state --ground")
@@ -336,10 +339,10 @@ class _Reader:
         for other in layers:
             if other == hub:
                 continue
-            one, two = marks[hub], marks[other]
-            near = [sorted(both) for both in itertools.product(one, two) if abs(both[0] - both[1]) <= self.gap]
-            fits = near[0] if len(near) == 1 else one if len(one) == 1 and not two else []
-            circles = ", ".join(f"{_mm(radius)} mm" for radius in sorted({*one, *two}))
+            pins, holes = marks[hub], marks[other]
+            near = [sorted(both) for both in itertools.product(pins, holes) if abs(both[0] - both[1]) <= self.gap]
+            fits = near[0] if len(near) == 1 else pins if len(pins) == 1 and not holes else []
+            circles = ", ".join(f"{_mm(radius)} mm" for radius in sorted({*pins, *holes}))
             pair = self._add(
                 "revolute", (hub, other), number, f"{hub} and {other} share a place; radii: {circles or 'none'}"
             )
@@ -378,9 +381,10 @@ class _Reader:
             draft.note("exchange.line", f"links.{min(layers)}", what, "let its lines end elsewhere if it is a guide")
         for lines in guided.values():
             free = {
-                layer: [line for line in own if not self.joined & {*self.ends[line]}] for layer, own in lines.items()
+                layer: [line for line in drawn if not self.joined & {*self.ends[line]}]
+                for layer, drawn in lines.items()
             }
-            self._guide({layer: own or list(lines[layer]) for layer, own in free.items()})
+            self._guide({layer: free[layer] or list(lines[layer]) for layer in lines})
         return set(guided)
 
     def _guide(self, lines: dict[str, list[Line]]) -> None:
@@ -413,12 +417,12 @@ class _Reader:
         chords = {(half.layer, *chord): half for half, a, b in halves for chord in ((a, b), (b, a))}
         slots, sides = [], set[Line]()
         for half, a, b in halves:
-            for (c, one), (d, two) in itertools.product(*(leads.get((half.layer, k), ()) for k in (a, b))):
+            for (c, left), (d, right) in itertools.product(*(leads.get((half.layer, k), ()) for k in (a, b))):
                 other = chords.get((half.layer, c, d), half)
-                if other is not half and not {one, two} & sides:
+                if other is not half and not {left, right} & sides:
                     ends = [(part.start + part.end) / 2 for part in (half, other)]
                     slots.append(Slot(half.layer, ends[0], ends[1], (half.half + other.half) / 2))
-                    sides |= {one, two}
+                    sides |= {left, right}
         return slots, sides
 
     def _single(self, number: int) -> None:
@@ -479,14 +483,14 @@ class _Reader:
         for _, j, i in sorted(choices):
             if j not in texts and i not in texts.values():
                 texts[j] = i
-        taken: dict[str, list[str]] = {link: [] for link in ("", *draft.bodies)}  # "": by joints
+        used: dict[str, list[str]] = {link: [] for link in ("", *draft.bodies)}  # "": by joints
         pairs, draft.pairs = draft.pairs, {}
         renamed: dict[str, str] = {}
         for j in sorted(range(len(targets)), key=lambda j: (targets[j][0] != "", j not in texts)):
             link, old, links, at = targets[j]
             layer, _, text = self.sketch.texts[texts[j]] if j in texts else ("", at, old)
-            name = free_name(text.strip(), [*taken[""], *taken[link]])
-            taken[link].append(name)
+            name = free_name(text.strip(), [*used[""], *used[link]])
+            used[link].append(name)
             if link:
                 draft.bodies[link].points[name] = at
                 continue

@@ -173,7 +173,7 @@ function Values({ found }) {
   const amount = (part, unit) => (part === undefined ? "—" : Array.isArray(part) ? quantity(part[index], unit, undefined, units) : vector(part, unit));
   const goes = (wire) => (order === null ? `${wire.links[0]} → ${wire.links[1]}` : wire.to === order ? `from ${wire.links[0]}` : `to ${wire.links[1]}`);
   const backs = ({ type, back }) => [
-    ...(type === "revolute" && !Array.isArray(back.moment) ? [] : [["moment", amount(back.moment, "N m")]]),
+    ...(type === "revolute" && Array.isArray(back.moment) ? [] : [["moment", amount(back.moment, "N m")]]),
     ["friction", amount(back.friction, type === "prismatic" ? "N" : "N m")],
   ];
   return html`<section class="passing" aria-label="What passes the wires">

@@ -241,10 +241,10 @@ def _check_level(pulses: Pulses, line: Timeline, indexed: bool, say: Say) -> flo
     if usual < 2.5:
         what, remedy = f"a pulse of the encoder has {usual:.3g} samples", "sample at least 4 times a pulse"
         say(warning("pulses.few_samples", "angle", f"{what}: edges are missed", f"{remedy}, or record a count"))
-    gaps = line.breaks[line.seconds[line.breaks] < pulses.times[-1]]
+    gaps = np.flatnonzero(np.diff(line.seconds[line.seconds < pulses.times[-1]]) > GAP * line.step)
     if indexed or not gaps.size:
         return np.inf
-    until = float(line.seconds[gaps[0] - 1])
+    until = float(line.seconds[gaps[0]])
     what = f"no pulses are counted in gaps of time: the angle is not known after {until:.5g} s"
     say(warning("pulses.gap", "angle", f"{what}; the turns from there on are left out", "record a count or an index"))
     return until

@@ -89,11 +89,12 @@ class FileAngle(Part):
 
 
 class TimeBase(Part):
-    """Where time comes from: a column with its unit, or a sampling rate."""
+    """Where time comes from: a column with its unit, or a sampling rate. dayfirst: 3/4/2026 is the third of April."""
 
     column: str | None = None
     unit: UnitText | None = None
     rate: Frequency | None = None
+    dayfirst: bool = True
 
     @model_validator(mode="after")
     def _one(self) -> TimeBase:

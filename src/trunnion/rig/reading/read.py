@@ -206,7 +206,7 @@ class _Recording:
             say(checks.missing(where, column, values, self.line.seconds))
             if sensor.limit is not None:
                 say(checks.clipped(where, values, sensor.limit, sensor.unit, self.line.seconds))
-            self.zeros[name] = zeroed(name, channel, sensor, values, self.line, mapping.drift == "remove", say)
+            self.zeros[name] = zeroed(name, channel, sensor, values, self.line, say)
         self.used = np.ones(self.line.seconds.size, dtype=np.bool_)
         if self.entry.over is not None:
             begin, end = (one.value for one in self.entry.over)
@@ -242,7 +242,7 @@ class _Recording:
                 what = f"the channel '{name}' is a speed in {sensor.scale.unit}, not of a turning driver"
                 raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s"))
             sign = mapping.channels[name].sign
-            speed = sensor.quantity(self.readings[name], self.zeros[name], sign, self.line.seconds)
+            speed = sensor.quantity(self.readings[name], self.zeros[name], sign)
         angle = coordinate(mapping.angle, self.table, self.line, speed, self.say)
         self.lag, self.cut = angle.lag, angle.cut
         known = np.flatnonzero(np.isfinite(angle.values) & self.used)
@@ -379,12 +379,11 @@ class _Recording:
         readings = self.readings.pop(name)
         step = sensor.resolution or steps[name, sensor.unit, sensor.scale.factor]
         noise = noise_of(readings[self.running])
-        values = sensor.quantity(readings, zero, channel.sign, line.seconds)
+        values = sensor.quantity(readings, zero, channel.sign)
         angle = values if sensor.scale.unit == "rad" else None
         values = values if angle is None else joined(angle)
         if self.mapping.filter is not None:
-            values, finding = filtered(values, line, self.mapping.filter, where)
-            self.say(finding)
+            values = filtered(values, line, self.mapping.filter)
         for part in self.parts:
             part.courses[name] = resampled(part.turns, values, angle)
         if self.mapping.filter is None:  # the scatter of turns may show less noise than neighbouring readings do
@@ -499,7 +498,7 @@ def _of_text(where: str, table: DataTable, name: str) -> Finding | None:
     """A column most of whose cells are text, and no times; where: the entry that names it."""
     column = table.columns[name]
     numbers = int(np.count_nonzero(~np.isnan(column.values)))
-    if column.stamp or column.texts <= numbers:
+    if column.stamps or column.texts <= numbers:
         return None
     what = f"'{name}' has text in {column.texts:,} cells and a number in {numbers:,}; the first text is "
     remedy, figures = (

@@ -311,18 +311,13 @@ def test_a_clearance_by_the_seat_it_is_given(four_bar: trunnion.Mechanism) -> No
     assert found["standard_uncertainty"].values[0] < 0.1e-3
 
 
-@pytest.mark.slow
-def test_a_clearance_by_pins_that_lie_as_they_are_loaded() -> None:
+def test_pins_that_lie_as_they_are_loaded_are_refused() -> None:
     model = read_mechanism("examples/fourbar-with-play.yaml")
-    joint = next(iter(model.seated))
-    path = model.path_of(f"joints.{joint}.pin.clearance")
-    true, output = float(model.parameters()[path]), next(iter(model.drivers))
-    course = trunnion.analyse(model, steps=24)["drive_effort"].sel(driver=output).values
-    noise = np.random.default_rng(1).normal(size=(6, 24)) * 1e-7 * np.max(np.abs(course))
-    data = Signal("torque", f"effort:{output}", "N m", course + noise)
+    joint, output = next(iter(model.seated)), next(iter(model.drivers))
+    data = Signal("torque", f"effort:{output}", "N m", np.ones((3, 24)))
     measured = Measurement("play", (Condition("one", {}, np.arange(24) / 24, {"torque": data}),))
-    found = identify(model, measured, [path], start={path: 0.7 * true})
-    assert found["estimate"].values[0] == pytest.approx(true, rel=0.02)
+    with pytest.raises(MechanismError, match="pins lie as their loads press them"):
+        identify(model, measured, [f"joints.{joint}.pin.clearance"])
 
 
 def test_terms_of_a_law_with_speed(four_bar: trunnion.Mechanism) -> None:

@@ -65,7 +65,6 @@ Sensors = Annotated[
     str, typer.Option("--sensors", help="Zero and gain errors are common to a channel, or to each condition.")
 ]
 Guard = Annotated[int | None, typer.Option("--guard", help="Positions left out on each side of a friction reversal.")]
-Starts = Annotated[int, typer.Option("--starts", help="Number of start points.")]
 Kind = Annotated[str | None, typer.Option("--kind", help="Which figure: intervals, correlation or residuals.")]
 
 
@@ -79,7 +78,6 @@ def identify(
     hold_out: HeldOut = None,
     sensors: Sensors = "channel",
     guard: Guard = None,
-    starts: Starts = 1,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
@@ -107,7 +105,7 @@ def identify(
         held = held_out(hold_out or [])
         measurement = read_measured(mapping, [str(path) for path in data] if data else None)
         with bar("models evaluated", None) as progress:
-            result = run(mechanism, measurement, wanted, channel, begin, held, sensors, guard, starts,  # type: ignore[arg-type]
+            result = run(mechanism, measurement, wanted, channel, begin, held, sensors, guard,  # type: ignore[arg-type]
                          progress=progress)  # fmt: skip
     found = gathered(  # of the notes those that tell what was set, and why intervals may be too narrow
         one for one in measurement.findings if one.severity is not Severity.NOTE or one.where == "files"

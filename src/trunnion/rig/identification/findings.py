@@ -46,7 +46,7 @@ def _speeds(identified: Identified) -> Iterator[Finding]:
 
 def _search(identified: Identified) -> Iterator[Finding]:
     """How the search went."""
-    unknowns, solution = identified.fit.model.unknowns, identified.solution
+    solution = identified.solution
     if not solution.converged:
         what = f"the search did not converge within {solution.evaluations} evaluations"
         remedy = "give start values closer to the solution, or fewer parameters"
@@ -54,11 +54,6 @@ def _search(identified: Identified) -> Iterator[Finding]:
     elif not solution.settled:
         what = "the search did not converge: the set of usable positions changes with the estimates"
         yield Finding.warning("search.unsettled", "search", what, "use a guard of 2 or more")
-    if identified.other is not None and not np.any(identified.lost[: len(unknowns)]):
-        values = {one.name: float(value) for one, value in zip(unknowns, identified.other, strict=False)}
-        text = ", ".join(f"{one.name} = {with_uncertainty(values[one.name], None, one.unit)}" for one in unknowns)
-        remedy = "hold out a condition, or measure more conditions"
-        yield Finding.warning("search.other", "search", f"other values fit equally well: {text}", remedy, values=values)
 
 
 def _fit(identified: Identified) -> Iterator[Finding]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,8 +19,8 @@ from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import decimals
 from trunnion.results.tables.studies import CURVES
 from trunnion.rig.comparison import data_findings, hashed_files, written_unit
-from trunnion.rig.identification.fit import FAR, Fit, Solution
-from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, InseparableUnknowns, LackOfFit, quantile
+from trunnion.rig.identification.fit import FAR, Fit, Solution, solved
+from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, InseparableUnknowns, quantile
 from trunnion.rig.reading.measurement import Measurement, rms
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ SOURCES = (
     "G. A. F. Seber, C. J. Wild, Nonlinear Regression, Wiley, 1989, doi:10.1002/0471725315",
     "JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in measurement",
 )
+NEAR_LIMIT = 0.98  # of the most that a stated error may come to
 AT_LIMIT = 0.05  # of the standard uncertainty: nearer than this to a limit is on it
 
 
@@ -97,8 +98,7 @@ class MisfitCause(NamedTuple):
 
     kind: zero, gain or angle; channel: empty of the angle; size: in the unit of the channel, relative, or rad by which
     the readings are ahead of the model; expanded: U of it, 95 %; explains: share of the part of χ² above what scatter
-    leads to expect; estimates, halves: of the unknowns with it, and U of each, 95 %, (unknown,); left: how well the
-    model fits with it.
+    leads to expect; estimates, halves: of the unknowns with it, and U of each, 95 %, (unknown,).
     """
 
     kind: str
@@ -108,28 +108,23 @@ class MisfitCause(NamedTuple):
     explains: float
     estimates: Array
     halves: Array
-    left: LackOfFit
 
 
 @dataclass(frozen=True)
 class Identified:
     """An identification, with the figures of it, (unknown,) unless said.
 
-    starts: places that the search began at; other: another that fits as well; groups: what the data do not tell apart;
-    causes: what would explain a misfit, best first; beyond: errors of sensors that are no stated ones, by their place;
-    unused: channels that no unknown acts on.
+    groups: what the data do not tell apart; causes: what would explain a misfit, best first; unused: channels that no
+    unknown acts on.
     """
 
     mechanism: Mechanism
     measurement: Measurement
     fit: Fit
     solution: Solution
-    starts: int
-    other: Array | None
     spread: Covariances
     groups: Sequence[InseparableUnknowns]
     causes: Sequence[MisfitCause]
-    beyond: dict[int, float]
     unused: Sequence[str]
 
     @property
@@ -151,6 +146,17 @@ class Identified:
     def refuted(self) -> bool:
         """Whether the estimates stand for something else: a gross misfit, or an error beyond what is stated of it."""
         return self.spread.test.gross or bool(self.beyond) or self.times_stated > FAR
+
+    @cached_property
+    def beyond(self) -> dict[int, float]:
+        """What errors of sensors at their limit come to with nothing stated of them, by place; no stated one is so."""
+        fit, beyond = self.fit, {}
+        for s, (error, size) in enumerate(zip(fit.sensors, self.x[fit.count :], strict=True)):
+            if error.stated and abs(size) > NEAR_LIMIT * error.most:
+                free = [*fit.sensors[:s], replace(error, stated=False), *fit.sensors[s + 1 :]]
+                found = float(solved(replace(fit, sensors=free), self.x).x[fit.count + s])
+                beyond |= {s: found} if abs(found) >= FAR else {}
+        return beyond
 
     @cached_property
     def lost(self) -> NDArray[np.bool_]:
@@ -295,7 +301,6 @@ def dataset(identified: Identified, findings: Sequence[Finding]) -> xr.Dataset:
         "done": list(measurement.done),
         "inputs": inputs(mechanism),
         "evaluations": fit.courses_at.count,
-        "starts": identified.starts,
         "converged": int(identified.solution.converged),
         "references": "\n".join([*SOURCES, *references(mechanism)]),
         "findings": finding_rows(findings),

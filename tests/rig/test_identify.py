@@ -241,6 +241,17 @@ def test_a_model_that_does_not_fit_is_said_and_its_intervals_are_wider(
     assert float(heavy["reduced_chi_squared"]) > 2
 
 
+def test_an_estimate_that_is_wider_than_itself_is_not_written(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    """With much noise the coefficient may be anything up to twice itself: the model stays as it was."""
+    one = replace(torque, conditions=torque.conditions[:1], courses=torque.courses[:1])
+    found = identify(four_bar, one.measured(1, 3, Sensors(noise=0.6)), [FRICTION])
+    half = 2 * found["standard_uncertainty"].values[0]
+    assert half > found["estimate"].values[0]
+    assert found["told"].values[0] == 0
+    assert "is wider than the value itself" in said(found, "warning")
+    assert with_estimates(four_bar, found).data() == four_bar.data()
+
+
 def test_what_is_held_out_is_predicted(four_bar: trunnion.Mechanism, torque: True_) -> None:
     data = torque.measured(4)
     found = identify(four_bar, data, [FRICTION], hold_out=["run-2", "A.speed=8"])

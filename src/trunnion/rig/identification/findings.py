@@ -22,7 +22,7 @@ OFF = 3.0  # standard uncertainties from what was stated of a sensor
 
 def findings_of(identified: Identified) -> list[Finding]:
     """Errors and warnings first."""
-    parts = (_speeds, _search, _fit, _repetitions, _sensors, _groups, _limits, _data)
+    parts = (_speeds, _search, _fit, _repetitions, _sensors, _groups, _vague, _limits, _data)
     rows = [finding for part in parts for finding in part(identified)]
     return sorted(rows, key=lambda finding: list(Severity).index(finding.severity))
 
@@ -170,6 +170,16 @@ def _groups(identified: Identified) -> Iterator[Finding]:
         what += f"effect on {channels}; {_determined(identified, group, names)}"
         remedy = "fix one or more of them, or measure a quantity that separates them"
         yield Finding.warning("parameter.not_told_apart", where, what, remedy, names=names)
+
+
+def _vague(identified: Identified) -> Iterator[Finding]:
+    """Unknowns that the data hardly determine."""
+    for p in np.flatnonzero(identified.vague):
+        unknown = identified.fit.model.unknowns[p]
+        about = with_uncertainty(float(identified.x[p]), float(identified.half[p]), unknown.unit)
+        what = f"{unknown.name} is not identifiable: its 95 % interval, {about}, is wider than the value itself"
+        remedy = "fix it, or measure a quantity that depends on it more"
+        yield Finding.warning("parameter.vague", f"parameter {unknown.name}", what, remedy)
 
 
 def _determined(identified: Identified, group: InseparableUnknowns, names: Sequence[str]) -> str:

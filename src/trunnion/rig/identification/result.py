@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,7 +18,7 @@ from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import decimals
 from trunnion.results.tables.studies import CURVES
 from trunnion.rig.comparison import data_findings, hashed_files, written_unit
-from trunnion.rig.identification.fit import FAR, Fit, Solution, solved
+from trunnion.rig.identification.fit import FAR, Fit, Solution, sizes_of, solved
 from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, InseparableUnknowns, quantile
 from trunnion.rig.reading.measurement import Measurement, rms
 
@@ -47,7 +46,7 @@ VARIABLES = {
     "upper": Variable(PARAMETER, "of the parameter", "upper end of the 95 % interval"),
     "degrees_of_freedom": Variable(PARAMETER, "1", "effective degrees of freedom of the standard uncertainty"),
     "limit": Variable(PARAMETER, "1", "−1 on the lower limit, 1 on the upper: the interval is one-sided"),
-    "told": Variable(PARAMETER, "1", "1 if identifiable, 0 if not"),
+    "told": Variable(PARAMETER, "1", "1 if identifiable, 0 if not, or if the interval is wider than the value itself"),
     "correlation": Variable(("parameter", "parameter_2"), "1", "correlation of the estimates"),
     "share": Variable(("parameter", "source"), "1", "share of a source in the variance of an estimate"),
     "singular_value": Variable(
@@ -157,6 +156,18 @@ class Identified:
                 found = float(solved(replace(fit, sensors=free), self.x).x[fit.count + s])
                 beyond |= {s: found} if abs(found) >= FAR else {}
         return beyond
+
+    @cached_property
+    def vague(self) -> NDArray[np.bool_]:
+        """Unknowns whose 95 % interval is wider than twice themselves, or than their limits are apart, (unknown,)."""
+        n, (low, high) = self.fit.count, self.fit.bounds
+        widest = np.minimum(sizes_of(self.fit, self.x), (high - low) / 2)[:n]
+        return np.asarray((self.half > widest) & ~self.lost[:n])
+
+    @cached_property
+    def half(self) -> Array:
+        """Half of a two-sided interval, (unknown,), whether the data tell the unknown or not."""
+        return np.asarray((quantile(self.spread.freedom) * self.spread.deviation)[: self.fit.count])
 
     @cached_property
     def lost(self) -> NDArray[np.bool_]:
@@ -329,7 +340,7 @@ def _parameters(identified: Identified) -> dict[str, NDArray[Any]]:
         "upper": upper,
         "degrees_of_freedom": spread.freedom[:n],
         "limit": identified.limit,
-        "told": (~lost[:n]).astype(np.int8),
+        "told": (~lost[:n] & ~identified.vague).astype(np.int8),
         "correlation": correlation,
         "share": np.where(lost[:n, None], np.nan, share),
         "singular_value": np.append(singular, np.zeros(n - len(singular))),  # fewer data than unknowns
@@ -357,13 +368,13 @@ def with_estimates(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
 
     Returns
     -------
-    The mechanism with the estimates, in the units that were written there; what was not told apart stays as it is.
+    The mechanism with the estimates, in the units that were written there; what is not identifiable stays as it is.
     """
     values: dict[str, float | str] = {}
     units = attribute(result, "parameter_units")
     for p, paths in enumerate(attribute(result, "parameter_paths")):
         estimate, u = (float(result[name].values[p]) for name in ("estimate", "standard_uncertainty"))
-        if math.isfinite(estimate):
+        if result["told"].values[p]:
             values |= {path: _text(mechanism, path, estimate, u, units[p]) for path in paths}
     return mechanism.with_values(values)
 

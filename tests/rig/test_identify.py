@@ -105,12 +105,9 @@ def test_more_turns_make_it_narrower_but_not_beyond_the_sensor(cardan: trunnion.
     assert float(many["share"].sel(source="zero of torque-out")[0]) > 0.99
 
 
-@pytest.mark.parametrize("sensors", ["channel", "condition"])
-def test_the_zero_of_each_file_counts_however_the_sensors_are_grouped(
-    cardan: trunnion.Mechanism, shaft: True_, sensors: Any
-) -> None:
+def test_the_zero_of_each_file_counts(cardan: trunnion.Mechanism, shaft: True_) -> None:
     data = own_zeros(replace(shaft, conditions=shaft.conditions[:2], courses=shaft.courses[:2]).measured(2), 0.1)
-    found = identify(cardan, data, ["brake.resisting_torque"], channels=["torque-out"], sensors=sensors)
+    found = identify(cardan, data, ["brake.resisting_torque"], channels=["torque-out"])
     assert found["standard_uncertainty"].values[0] == pytest.approx(0.1 / np.sqrt(2), rel=0.05)
     assert found["share"].sel(source="zero of each file of torque-out").values[0] > 0.9
 

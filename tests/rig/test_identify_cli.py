@@ -163,7 +163,6 @@ def test_results_are_not_written_over_what_is_read(  # type: ignore[no-untyped-d
         (["--parameter", FRICTION, "--write", MODEL], "is the model itself"),
         (["--parameter", FRICTION, "--write", "x.toml"], "write .yaml or .json"),
         (["--parameter", FRICTION, "--report", "x.pdf"], "a report is HTML"),
-        (["--parameter", FRICTION, "--sensors", "file"], "channel or condition"),
         (["--parameter", FRICTION, "--guard", "-1"], "guard"),
     ],
 )

@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +74,6 @@ def identify(
     channels: Sequence[str] | None = None,
     start: Mapping[str, float | str] | None = None,
     hold_out: HoldOut = None,
-    sensors: Literal["channel", "condition"] = "channel",
     guard: int | None = None,
     friction_method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
@@ -94,7 +93,6 @@ def identify(
     start : where the search begins, by name, SI or texts with units; the model's values if not given.
     hold_out : conditions by name, file or setting, or the share of the turns of each (the last), that are not fitted
         but predicted.
-    sensors : whether zero and gain of a channel are off by the same in all conditions, or in each by its own.
     guard : positions left out on each side where the sense of a friction changes; one for every 90 of a cycle if not
         given.
     friction_method : how friction and reactions are settled; Newton's method if not given.
@@ -132,7 +130,7 @@ def identify(
     at = np.array([one.start for one in sought])
     speeds = iter([model.driven(k, at)[2] for k in range(len(conditions))])
     each(conditions, lambda one: refuse_backwards(mechanism, one, next(speeds)))
-    errors = sensor_errors(model, conditions, blocks, sensors == "condition")
+    errors = sensor_errors(model, conditions, blocks)
     fit = Fit(Evaluations(model, progress), blocks, errors, guard)
     begin = _runnable(fit)
     fit, best = refined(fit, begin)

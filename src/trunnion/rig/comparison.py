@@ -301,7 +301,7 @@ def _frictionless(
         free = stated.with_friction("off")
         if free.data() == stated.data():
             return {}
-        return modelled(free, replace(condition, values={}, dimensions={}), channels, method).courses
+        return modelled(free, replace(condition, values={}, units={}), channels, method).courses
     except MechanismError:
         return {}
 

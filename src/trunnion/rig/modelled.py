@@ -15,7 +15,6 @@ from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
-from trunnion.model.units import si_unit
 from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Condition, Signal
 from trunnion.solve.friction_method import FrictionMethod
@@ -136,8 +135,7 @@ def modelled(
 def in_condition(mechanism: Mechanism, condition: Condition) -> Mechanism:
     """The mechanism with the values of a condition, each in the unit it was stated in."""
     stated: dict[str, float | str] = dict(condition.values)
-    for name, dimension in condition.dimensions.items():
-        unit = si_unit(dimension)
+    for name, unit in condition.units.items():
         if unit != "1" and np.isfinite(condition.values.get(name, np.nan)):
             stated[name] = f"{condition.values[name]} {unit}"
     with _told_of(condition):

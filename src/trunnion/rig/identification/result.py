@@ -149,7 +149,7 @@ class Identified:
     @cached_property
     def beyond(self) -> dict[int, float]:
         """What errors of sensors at their limit come to with nothing stated of them, by place; no stated one is so."""
-        fit, beyond = self.fit, {}
+        fit, beyond = self.fit, dict[int, float]()
         for s, (error, size) in enumerate(zip(fit.sensors, self.x[fit.count :], strict=True)):
             if error.stated and abs(size) > NEAR_LIMIT * error.most:
                 free = [*fit.sensors[:s], replace(error, stated=False), *fit.sensors[s + 1 :]]

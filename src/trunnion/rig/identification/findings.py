@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from trunnion.errors import Finding, Severity, agreeing, counted
+from trunnion.errors import Finding, Severity, counted
 from trunnion.results.quantities import with_uncertainty
 from trunnion.rig.comparison import other_speed
 from trunnion.rig.identification.fit import FAR, shared_zero
@@ -22,7 +22,7 @@ OFF = 3.0  # standard uncertainties from what was stated of a sensor
 
 def findings_of(identified: Identified) -> list[Finding]:
     """Errors and warnings first."""
-    parts = (_speeds, _search, _fit, _repetitions, _sensors, _groups, _vague, _limits, _data)
+    parts = (_speeds, _search, _fit, _repetitions, _sensors, _groups, _vague, _held_out)
     rows = [finding for part in parts for finding in part(identified)]
     return sorted(rows, key=lambda finding: list(Severity).index(finding.severity))
 
@@ -115,9 +115,6 @@ def _repetitions(identified: Identified) -> Iterator[Finding]:
         what = f"successive turns are correlated ({spread.follows:.2f}): the intervals are widened accordingly"
         remedy = "look for a drift; warm the rig up"
         yield Finding.warning("fit.turns_alike", "data", what, remedy, correlation=spread.follows)
-    if identified.unused:
-        what = f"no parameter acts on {', '.join(identified.unused)}: not used in the fit"
-        yield Finding.note("fit.unused", "channels", what)
 
 
 def _sensors(identified: Identified) -> Iterator[Finding]:
@@ -198,26 +195,8 @@ def _determined(identified: Identified, group: InseparableUnknowns, names: Seque
     return f"{subject} is determined, {with_uncertainty(one.value, one.uncertainty, unit)}, neither alone"
 
 
-def _limits(identified: Identified) -> Iterator[Finding]:
-    """Estimates on a limit, whose interval is one-sided."""
-    low, high = identified.interval
-    for p, unknown in enumerate(identified.fit.model.unknowns):
-        if identified.limit[p]:
-            far, side = (high[p], "at most") if identified.limit[p] < 0 else (low[p], "at least")
-            limit, end = (with_uncertainty(value, None, unknown.unit) for value in (identified.estimate[p], far))
-            what = f"is at its bound {limit}: {side} {end} (95 %, one-sided)"
-            figures = {"limit": identified.estimate[p], "far": far}
-            yield Finding.note("parameter.limit", f"parameter {unknown.name}", what, **figures)
-
-
-def _data(identified: Identified) -> Iterator[Finding]:
-    """How many positions are left out, and held-out data that are not predicted."""
-    used, out = identified.positions
-    if out:
-        what = f"{out:,} of {counted(used + out, 'position')} {agreeing(out, 'is', 'are')} left out: friction "
-        what += "reverses, a joint is at rest, a load has a corner or a jump, the position is close to singular, or "
-        what += "the model has no solution"
-        yield Finding.note("data.left_out", "data", what, count=out, positions=used + out)
+def _held_out(identified: Identified) -> Iterator[Finding]:
+    """Held-out data that are not predicted."""
     ratio, conditions = identified.hold_out_ratio, identified.measurement.conditions
     if ratio > POOR:
         names = dict.fromkeys(conditions[one.condition].name for one in identified.fit.blocks if len(one.held))

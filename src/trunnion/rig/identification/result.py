@@ -113,8 +113,7 @@ class MisfitCause(NamedTuple):
 class Identified:
     """An identification, with the figures of it, (unknown,) unless said.
 
-    groups: what the data do not tell apart; causes: what would explain a misfit, best first; unused: channels that no
-    unknown acts on.
+    groups: what the data do not tell apart; causes: what would explain a misfit, best first.
     """
 
     mechanism: Mechanism
@@ -124,7 +123,6 @@ class Identified:
     spread: Covariances
     groups: Sequence[InseparableUnknowns]
     causes: Sequence[MisfitCause]
-    unused: Sequence[str]
 
     @property
     def x(self) -> Array:

@@ -141,9 +141,8 @@ def identify(
         spread = spread_of(fit, best.x)
     other_speeds = [apart(one.speed, model.driven(k, best.x[: fit.count])[2]) for k, one in enumerate(conditions)]
     causes = _causes(fit, begin, spread.test) if spread.test.misfit and not any(other_speeds) else []
-    unused = [name for name in measures if name not in model.measures]
     groups = inseparable(fit, best.x, spread)
-    identified = Identified(mechanism, measurement, fit, best, spread, groups, causes, unused)
+    identified = Identified(mechanism, measurement, fit, best, spread, groups, causes)
     return dataset(identified, findings_of(identified))
 
 

@@ -65,15 +65,11 @@ VARIABLES = {
     "turns": Variable(BLOCK, "1", "turns used", np.int32),
     "held_out_turns": Variable(BLOCK, "1", "held-out turns", np.int32),
     "held_out_before": Variable(
-        BLOCK,
-        "of the channel",
-        "root mean square of the residual of the held-out data, at the start values",
+        BLOCK, "of the channel", "root mean square of the residual of the held-out data, at the start values"
     ),
     "held_out_after": Variable(BLOCK, "of the channel", "the same with the estimates"),
     "held_out_expected": Variable(
-        BLOCK,
-        "of the channel",
-        "its expected value from the scatter and the uncertainty of the prediction",
+        BLOCK, "of the channel", "its expected value from the scatter and the uncertainty of the prediction"
     ),
     "reduced_chi_squared": Variable((), "1", "χ² of the residuals relative to the scatter between turns"),
     "chi_squared_freedom": Variable((), "1", "degrees of freedom of that χ²"),
@@ -83,11 +79,7 @@ VARIABLES = {
     "phase": Variable(("condition", "position"), "1", "share of the cycle"),
     "measured": Variable(COURSE, "of the channel", "mean over the turns"),
     "residual_before": Variable(COURSE, "of the channel", "measured minus model, at the start"),
-    "residual_after": Variable(
-        COURSE,
-        "of the channel",
-        "measured value minus predicted reading of the sensor",
-    ),
+    "residual_after": Variable(COURSE, "of the channel", "measured value minus predicted reading of the sensor"),
     "residual_uncertainty": Variable(COURSE, "of the channel", "standard uncertainty of the mean over the turns"),
 }
 

@@ -35,13 +35,7 @@ from trunnion.rig.identification.fit import (
 )
 from trunnion.rig.identification.result import Identified, MisfitCause, dataset
 from trunnion.rig.identification.signals import Model
-from trunnion.rig.identification.uncertainty import (
-    LackOfFit,
-    excess,
-    inseparable,
-    quantile,
-    spread_of,
-)
+from trunnion.rig.identification.uncertainty import LackOfFit, excess, inseparable, quantile, spread_of
 from trunnion.rig.identification.unknowns import Parameters, described, unknowns
 from trunnion.rig.modelled import apart, each, in_condition, measure_of, refuse_backwards, refuse_unit
 from trunnion.rig.reading.efficiency import efficiency_of, load_joints, pairs_of
@@ -252,10 +246,7 @@ def _with_setting(mechanism: Mechanism, conditions: Sequence[Condition], text: s
 
 
 def _with_settings(
-    mechanism: Mechanism,
-    measurement: Measurement,
-    paths: Mapping[str, Sequence[str]],
-    start: Mapping[str, float | str],
+    mechanism: Mechanism, measurement: Measurement, paths: Mapping[str, Sequence[str]], start: Mapping[str, float | str]
 ) -> tuple[Mechanism, tuple[dict[str, float], ...]]:
     """The mechanism with all numbers stated that conditions set or that are looked for, and what each sets, by path.
 

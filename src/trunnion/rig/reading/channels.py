@@ -16,16 +16,7 @@ from trunnion.rig.reading.log import at_times, counted, note, warning
 from trunnion.rig.reading.mapping import Channel, Filter, Zero
 from trunnion.rig.reading.tables import Column
 from trunnion.rig.reading.timebase import Timeline
-from trunnion.rig.reading.units import (
-    HERTZ,
-    OTHER_COLUMN,
-    Amount,
-    SensorScale,
-    alike,
-    default_unit,
-    dimensions,
-    scale,
-)
+from trunnion.rig.reading.units import HERTZ, OTHER_COLUMN, Amount, SensorScale, alike, default_unit, dimensions, scale
 
 __all__ = [
     "LOOKED_AT", "ChannelReading", "Zeroed", "check_filter", "filtered", "mean_uncertainty", "noise_of", "reading",

@@ -212,7 +212,7 @@ def test_what_comes_back_every_turn_is_the_signals_own(run: Columns, tmp_path: P
             "torque-in",
             "turns (-1257 W): the sign of torque-in is wrong, unless the load drives the motor",
         ),
-        ("n1", "speed-in", "the angle has the wrong sign"),
+        ("n1", "speed-in", "sign: the angle turns at 600 rpm, 'speed-in' reads -600 rpm"),
         ("T2", "brake", "power delivered to brake is negative in all 19 turns"),
     ],
 )

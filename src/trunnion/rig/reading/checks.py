@@ -224,15 +224,12 @@ def signs(
         against = courses[rate] if rate else np.full_like(courses[effort], turning)
         power, below = _power(courses[effort], against, zeros[effort])
         gives = gives or bool(below or (power.size and np.mean(power > 0) > NEARLY_ALL))
-        if below:
-            opposed = rate is not None and len(drivers) == 1 and float(np.nanmean(courses[rate])) * turning < 0
-            suspect = str(rate) if opposed else effort
-            cause = f"the sign of {suspect} is wrong, unless the load drives the motor"
-            cause = "the angle has the wrong sign" if opposed else cause
-            what = f"sign: the power into {driver} is negative in {below} ({power.mean():.4g} W): {cause}"
+        opposed = rate is not None and len(drivers) == 1 and float(np.nanmean(courses[rate])) * turning < 0
+        if below and not opposed:  # else the speed is at fault, see `speeds`
+            what = f"sign: the power into {driver} is negative in {below} ({power.mean():.4g} W): the sign of {effort} "
+            what += "is wrong, unless the load drives the motor"
             other = "" if rate else "; or sign: in angle:, if that runs backwards"
-            remedy = f"write sign: {-channels[suspect].sign}{other}"
-            yield warning("power.sign", f"channels.{suspect}", what, remedy)
+            yield warning("power.sign", f"channels.{effort}", what, f"write sign: {-channels[effort].sign}{other}")
     free = [key for joint, key in rates.items() if joint not in drivers]
     for load, key in loads.items():
         rate = rates.get(load) or (free[0] if len(free) == 1 else None)

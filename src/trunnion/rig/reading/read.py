@@ -362,10 +362,9 @@ class _Recording:
         if not self.mapping.timed:
             turning = self._speed(self.parts)
             zeros = {name: accuracy.zero for name, accuracy in accuracies.items()}
-            wrong = list(checks.signs(channels, together, zeros, turning))
             units = {name: sensor.shown for name, sensor in self.sensors.items()}
-            speed = checks.speeds(channels, together, units, turning)
-            for finding in [*wrong, *([speed] if speed and speed.where not in {one.where for one in wrong} else [])]:
+            self.say(checks.speeds(channels, together, units, turning))
+            for finding in checks.signs(channels, together, zeros, turning):
                 self.say(finding)
         return [self._condition(part, accuracies) for part in self.parts]
 

@@ -67,6 +67,8 @@ class Signal:
     channel: its name in the mapping; measures: what it measures, as `measures.measures.named` reads it (`effort:input`,
     `rate:output`, `load:brake`); unit: SI; turns: (turn, position), NaN where there is nothing to be had.
     read_in: unit of the readings for people, factor to SI, where they are in a unit of what is measured: U/min.
+    per_turn: pulses of a speed that is worked out from them, 0 of others; local: standard uncertainty of each position
+    by itself, beside that of the accuracy.
     """
 
     channel: str
@@ -75,6 +77,8 @@ class Signal:
     turns: Array
     accuracy: Accuracy = Accuracy()
     read_in: tuple[str, float] = ("", 1.0)
+    per_turn: int = 0
+    local: Array | float = 0.0
 
     @property
     def shown(self) -> tuple[str, float]:

@@ -419,7 +419,8 @@ class _Recording:
         mapping, courses = self.mapping, dict[str, Signal]()
         for name, channel in mapping.channels.items():
             sensor, accuracy = self.sensors[name], accuracies[name]
-            course = Signal(name, channel.measures, sensor.scale.unit, part.courses[name], accuracy, sensor.read_in)
+            course = Signal(name, channel.measures, sensor.scale.unit, part.courses[name], accuracy, sensor.read_in,
+                            channel.per_turn or 0)  # fmt: skip
             cut_off = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
             courses[name] = replace(course, accuracy=replace(accuracy, cut=cut_off, left=part.left.get(name)))
         speed = np.nan if mapping.timed else self._speed([part])

@@ -193,7 +193,8 @@ class Observation:
                 channel, values = self.channels[name], values / self.channels[name].per
                 zero = float(np.mean(values[: case.before])) if channel.zeroed and case.before else 0.0
                 by_turn = np.interp(at.ravel(), np.arange(case.rows), values - zero).reshape(at.shape)
-                courses[name] = Signal(name, channel.measures, channel.unit, by_turn, self.accuracy(name))
+                courses[name] = Signal(name, channel.measures, channel.unit, by_turn, self.accuracy(name),
+                                       per_turn=channel.per_turn)  # fmt: skip
             stated = {**self.rig.set_, **case.settings}
             changed = self.mechanism.with_values(stated)
             settings = {name: float(np.ravel(changed.parameters()[changed.path_of(name)])[0]) for name in stated}
@@ -343,6 +344,8 @@ def _channel(observation: Observation, name: str) -> dict[str, Any]:
         found["zero"] = {"over": [f"{one / observation.rate + 0.0:.6g} s" for one in rest]}
     if stated.range:
         found["range"] = stated.range.source
+    if channel.per_turn:
+        found["per_turn"] = channel.per_turn
     accuracy: dict[str, Any] = {}
     if channel.gain:
         accuracy["gain"] = stated.accuracy.gain.source

@@ -166,7 +166,7 @@ GROUPED = {  # thousands with a sign between them; of a point or a comma only wh
 _BETWEEN = re.compile(r"[.,\u00a0\u202f ](?=\d{3}(?:\D|$))")
 _COMMA = re.compile(r"[-+]?(?:\d{1,3}(?:[.\u00a0\u202f ]\d{3})+|\d*),\d+(?:[eE][-+]?\d+)?")
 _POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
-_WHOLE = re.compile(r":\d\d(?=\s?(?:[AaPpZ+-].*)?$)")  # seconds without a fraction
+_WHOLE = re.compile(r"\d:\d\d:\d\d(?![\d.])", re.ASCII)  # seconds without a fraction
 _DAYTIME, _YEAR = re.compile(r"\d{1,2}:", re.ASCII), re.compile(r"\d{4}-", re.ASCII)
 _TIME = re.compile(r"(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[ T]\s*)?\d{1,2}:[0-5]\d:[0-5]\d.*", re.ASCII)
 

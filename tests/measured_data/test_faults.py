@@ -82,6 +82,13 @@ FAULTS: list[tuple[Any, str, tuple[str, ...], str]] = [
 ]
 
 
+def test_a_narrow_peak_of_the_signal_is_no_spike(run: Columns, tmp_path: Path) -> None:
+    """Narrower than the samples lie apart, so that few turns have a reading on it, in the same place of each."""
+    run["T1"][[4000, 5001, 7000, 8001]] += 5
+    found = read(run, tmp_path)
+    assert not [one for one in found.findings if "spikes" in one.what]
+
+
 @pytest.mark.spread(7)
 @pytest.mark.parametrize(("spoil", "where", "told", "remedy"), FAULTS, ids=[one[0].__name__ for one in FAULTS])
 def test_faults_are_named(

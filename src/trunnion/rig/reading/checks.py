@@ -31,6 +31,7 @@ STUCK = 30  # equal readings in a row at least
 WIDTH = 7  # samples of the median that spikes are told from: up to three in a row are found
 FAR = 12.0  # robust standard deviations from it
 SEEN = 0.1  # of the span from the 1st to the 99th percentile, that a spike exceeds
+CHANCE = 0.005  # that a fault comes as near as that to the place of another
 FEW = 4  # turns from which what comes back in them can be told from faults
 STEADY = 0.03  # of the mean speed, between the slowest and the fastest turn
 CERTAIN = 6.0  # standard errors from which a slope is one
@@ -79,7 +80,7 @@ def outliers(readings: Array) -> Mask:
 def faults(
     where: str, readings: Array, seconds: Array, turns: tuple[Array, Array], beside: int, moves: bool = True
 ) -> Iterator[Finding]:
-    """Stuck readings and spikes while the drive runs, which become NaN; what half of the turns have is the signal's.
+    """Stuck readings and spikes while the drive runs, which become NaN; what comes back in the turns is the signal's.
 
     Parameters
     ----------
@@ -109,6 +110,7 @@ def faults(
         yield warning("readings.stuck", where, what, "check sensor and logger")
     near = slice(max(running.start - beside, 0), running.stop + beside)
     far, off = _spikes(readings[near], wide)
+    far[np.flatnonzero(far)[_returning(seconds[near][far], begin, end)]] = False
     if 0 < runs(far)[0].size < rare:
         what = (
             f"spikes: {counted(int(far.sum()), 'reading')} of {finite.size:,} up to {off[far].max() / wide:.2g} times "
@@ -116,6 +118,17 @@ def faults(
         what += f"the usual span off their neighbours, {places(far, seconds[near])}; left out"
         readings[near][far] = np.nan
         yield warning("readings.spikes", where, what, "check shielding and earth")
+
+
+def _returning(time: Array, begin: Array, end: Array) -> Mask:
+    """What another turn has in the same place: of places at random 0.5 % lie so near to the next."""
+    turn = np.clip(np.searchsorted(begin, time, side="right") - 1, 0, begin.size - 1)
+    phase = ((time - begin[turn]) / (end - begin)[turn]) % 1.0
+    order, returns = np.argsort(phase), np.zeros(time.size, dtype=np.bool_)
+    after = np.roll(order, -1)
+    near = ((phase[after] - phase[order]) % 1.0 < CHANCE / max(time.size, 1)) & (turn[after] != turn[order])
+    returns[order[near]] = returns[after[near]] = True
+    return returns
 
 
 def _stuck(part: Array) -> Mask:

@@ -110,8 +110,9 @@ def faults(
         yield warning("readings.stuck", where, what, "check sensor and logger")
     near = slice(max(running.start - beside, 0), running.stop + beside)
     far, off = _spikes(readings[near], wide)
+    often = runs(far)[0].size >= rare
     far[np.flatnonzero(far)[_returning(seconds[near][far], begin, end)]] = False
-    if 0 < runs(far)[0].size < rare:
+    if far.any() and not often:
         what = (
             f"spikes: {counted(int(far.sum()), 'reading')} of {finite.size:,} up to {off[far].max() / wide:.2g} times "
         )

@@ -37,7 +37,10 @@ def rig(
     friction: FrictionLaw = None,
     seat: Seats = None,
 ) -> None:
-    """Virtual test rig: write simulated data files; without --out only check the rig file."""
+    """Virtual test rig: write simulated data files.
+
+    Without --out the rig file is only checked.
+    """
     from trunnion.rig.reading.rig_file import Rig, placed_in_rig
     from trunnion.rig.virtual.files import check_folder, check_form
     from trunnion.rig.virtual.observe import observe

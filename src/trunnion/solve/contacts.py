@@ -93,17 +93,25 @@ def _in_plane(walk: Forward, joint: str) -> Iterator[Rubbing]:
     speed = walk.speed(joint)
     zero = np.abs(primal(speed)) <= walk.noise(joint, turns)
     if turns:
-        lever = walk.values[f"{path}.pin.radius"]
         if joint in walk.system.screws:
+            lever = walk.values[f"{path}.pin.radius"]
             yield from (_thread(walk, name, lever, speed, zero) for name in walk.system.screws[joint])
             return
-        yield Rubbing(PlanarContactLoad(), lever * speed, Wrench(0.0, 0.0, lever), zero, amount=lever, turning=1.0)
+        lever, turning = _lever(walk, joint)
+        yield Rubbing(PlanarContactLoad(), lever * speed, Wrench(0.0, 0.0, lever), zero, amount=lever, turning=turning)
         return
     axis, middle = walk.ends(joint)
     at = axis if joint in walk.system.reversed else middle  # what the module's reaction is about
     arm = None if at is middle else (middle.x - at.x, middle.y - at.y)
     load = PlanarContactLoad((-axis.s, axis.c), walk.values[f"{path}.guide.length"], arm)
     yield Rubbing(load, speed, Wrench(axis.c, axis.s, 0.0), zero)
+
+
+def _lever(walk: Forward, joint: str) -> tuple[Number, Number | None]:
+    """The lever of friction in a pin, m, and how it turns the seat: a rolling one has its arm, and does not."""
+    path = f"joints.{joint}"
+    arm = walk.values.get(f"{path}.friction.arm")
+    return (walk.values[f"{path}.pin.radius"], 1.0) if arm is None else (arm, None)
 
 
 def _thread(walk: Forward, name: str, lever: Number, speed: Number, zero: Number) -> Rubbing:
@@ -138,7 +146,7 @@ def _in_space(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
     if pair.guided:
         yield Rubbing(load, slide, about(axis, NULL, middle), slid)
         return
-    lever = walk.values[f"joints.{joint}.pin.radius"]
+    lever, turning = _lever(walk, joint)
     moment = Screw(NULL, scaled(lever, axis))
     if pair.threaded:
         lead = walk.system.lead(walk.values, joint)
@@ -148,7 +156,7 @@ def _in_space(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
     elif pair.slides and not walk.system.summed(joint):
         yield _resultant(load, axis, middle, lever, (lever * turn, slide), turned & slid)
     else:
-        yield Rubbing(load, lever * turn, moment, turned, amount=lever, turning=1.0)
+        yield Rubbing(load, lever * turn, moment, turned, amount=lever, turning=turning)
         if pair.slides:
             yield Rubbing(load, slide, about(axis, NULL, middle), slid, amount=0.0)
 

@@ -43,7 +43,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 POWERS = ("drive_power", "useful_power", "friction_power", "power_residual")
-FORCES = ("drive_effort", "reaction_force", "reaction_moment", "end_load", "drive_effort_change")
+FORCES = ("drive_effort", "reaction_force", "reaction_moment", "end_load", "gear_torque", "drive_effort_change")
 FOLLOWED = ("drive_effort", *POWERS, "reaction_force")
 COMPARED_ROWS = ("point_error", "joint_rotation_error", "joint_slide_error", "drive_effort_change")
 SIDE = 1e-7  # of the cycle: beside a break
@@ -430,7 +430,7 @@ def like(run: Run, shapes: Mapping[str, tuple[int, ...]], sizes: Array) -> Array
     scales = scales_of(run)
     names = np.repeat(list(shapes), [int(np.prod(shape)) for shape in shapes.values()])
     units, turning = np.ones(len(names)), [run.system.turns(name) for name in run.system.mechanism.drivers]
-    units[names == "reaction_moment"] = scales.length
+    units[np.isin(names, ("reaction_moment", "gear_torque"))] = scales.length
     for name in ("drive_effort", "drive_effort_change"):
         units[names == name] = np.where(turning, scales.length, 1.0)[: np.count_nonzero(names == name)]
     forces, powers = np.isin(names, FORCES), np.isin(names, (*POWERS, SUPPOSED))

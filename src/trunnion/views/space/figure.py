@@ -198,8 +198,8 @@ def _key(axes: Axes, look: Scenery, most: float) -> None:
     """A triad of the global axes, bars of a round length and, where reactions reach `most` N, of a round force."""
     (x0, x1), y0 = axes.get_xlim(), axes.get_ylim()[0]
     if most > 0:
-        size = _round(0.6 * most)
-        factor, unit = prefixed(size, "N")
+        factor, unit = prefixed(0.6 * most, "N")
+        size = _round(0.6 * most * factor) / factor
         y, long = y0 + 0.025 * look.diagonal, size / most * LENGTH * look.diagonal
         start = np.array([x1 - long - 0.01 * look.diagonal, y])
         _arrow(axes, start, start + np.array([long, 0.0]), REACTION)
@@ -219,8 +219,8 @@ def _key(axes: Axes, look: Scenery, most: float) -> None:
         axes.text(origin[0] + 1.8 * arm, y0 + 0.025 * look.diagonal, "all axes meet in one point: drawn on a sphere",
                   fontsize=8, color=MUTED, va="center")  # fmt: skip
         return
-    length = _round(0.18 * (x1 - x0))
-    factor, unit = prefixed(length, "m")
+    factor, unit = prefixed(0.18 * (x1 - x0), "m")
+    length = _round(0.18 * (x1 - x0) * factor) / factor
     left, y, tick = origin[0] + 2.1 * arm, y0 + 0.025 * look.diagonal, 0.006 * look.diagonal
     axes.plot([left, left, left, left + length, left + length, left + length],
               [y - tick, y + tick, y, y, y - tick, y + tick], color=MUTED, linewidth=1.1, zorder=6)  # fmt: skip

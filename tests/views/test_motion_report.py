@@ -228,9 +228,9 @@ if NODE:
         seen = page(result, tmp_path)
         told = seen["motion"]
         wanted = {
-            "start": ["Speed", "Drive torque O", "Works and energies", "Joint reactions, magnitude",
+            "start": ["Speed", "Drive torque O", "Works and energies", "Joint reactions, magnitude", ENDS,
                       "Friction power by joint", "Power", "Slide of joints"],
-            "run-down": ["Speed", "Works and energies", "Joint reactions, magnitude", "Friction power by joint",
+            "run-down": ["Speed", "Works and energies", "Joint reactions, magnitude", ENDS, "Friction power by joint",
                          "Power", "Slide of joints"],
             "stays": ["Speed", "Drive torque A", "Joint reactions, magnitude"],
             "swing": ["Speed", "Works and energies", "Joint reactions, magnitude"],

@@ -180,3 +180,18 @@ def test_a_coefficient_of_its_own_is_of_both_directions() -> None:
     assert set(stated["B"].friction.parameters) == {"coefficient", "pair_factor"}
     assert set(stated["A"].friction.parameters) == {"coefficient", "backward", "pair_factor"}
     assert stated["C"].friction is None or float(stated["C"].friction.parameters["coefficient"].evaluate()) == 0
+
+
+def test_tolerances_know_the_backward_coefficient() -> None:
+    """Its exact sensitivity against a central difference."""
+    data = trunnion.read("examples/durango-fourbar.yaml").data()
+    data["measures"] = {"least": {"effort": "A", "as": "minimum"}}
+
+    def least(backward: float, **more: Any) -> Mechanism:
+        return with_friction({**data, **more}, "D", {"coefficient": 0.1, "backward": backward})
+
+    tolerances = {"joints.D.friction.backward": 0.05}
+    found = float(trunnion.tolerance(least(0.3, tolerances=tolerances))["sensitivity"].values.ravel()[0])
+    ends = [float(trunnion.analyse(least(0.3 + step), steps=4)["measure_figure"][0]) for step in (-1e-5, 1e-5)]
+    assert found == pytest.approx((ends[1] - ends[0]) / 2e-5, rel=1e-6)
+    assert abs(found) > 1

@@ -500,9 +500,16 @@ def _slack(cycle: Cycle) -> Iterator[Finding]:
         if not low < -scales_of(cycle.run).floor("N") or not high > scales_of(cycle.run).floor("N"):
             continue
         places = " and ".join(course.told(top) for top in ends if top is not None)
-        what = f"the force in {name} changes its sign: {between(low, high, 'N')}, {places}; a rope goes slack where it would "
+        what = f"the force in {name} changes its sign: {between(low, high, 'N')}, {places}; "
         remedy = "a closed chain or belt bears both ways; a rope needs a load or a speed that keep it taut"
-        yield Finding.note("gears.slack", f"gears.{name}", f"{what}push", remedy, lower=low, upper=high)
+        yield Finding.note(
+            "gears.slack",
+            f"gears.{name}",
+            f"{what}a rope goes slack where it would push",
+            remedy,
+            lower=low,
+            upper=high,
+        )
 
 
 def _idle_loads(cycle: Cycle) -> Iterator[Finding]:

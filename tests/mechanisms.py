@@ -40,7 +40,8 @@ def law_named(name: str) -> Data:
         wanted = {"stiffness": 3e3, "static": 0.2}.get(parameter, 0.01 if "speed" in parameter else 0.15)
         return min(max(wanted, declared.minimum), declared.maximum)
 
-    return {"law": name, **{key: value(key, declared) for key, declared in FRICTION_LAWS[name].parameters.items()}}
+    parameters = {key: one for key, one in FRICTION_LAWS[name].parameters.items() if not one.optional}
+    return {"law": name, **{key: value(key, declared) for key, declared in parameters.items()}}
 
 
 def model(data: Data, friction: float | Data | None = 0.12, radius: float = 0.01, guide: float = 0.4) -> Data:

@@ -276,10 +276,24 @@ _MEASURES = (
     ),
     Fault(
         "ends-share-no-moment",
-        "measures/curves.py",
-        "squares += [(0.5 * fx + sign * gx) ** 2 + (0.5 * fy + sign * gy) ** 2 for sign in (-1.0, 1.0)]",
-        "squares += [(0.5 * fx) ** 2 + (0.5 * fy) ** 2 for sign in (-1.0, 1.0)]",
+        "solve/contacts.py",
+        "loads += [minus(half, couple), plus(half, couple)]",
+        "loads += [half, half]",
         ("tests/reference/test_end_loads_of_bearings.py",),
+    ),
+    Fault(
+        "friction-of-a-cross-bears-on-nothing",
+        "solve/contacts.py",
+        "walk.algebra.added(reaction, friction) if pair.crossed else reaction",
+        "reaction",
+        ("tests/reference/test_end_loads_of_bearings.py",),
+    ),
+    Fault(
+        "friction-forward-is-backward",
+        "joints/friction.py",
+        "xp.where(primal(slip) < 0, backward, forward)",
+        "xp.where(primal(slip) > 0, backward, forward)",
+        ("tests/reference/test_friction_by_direction.py",),
     ),
     Fault(
         "peak-to-peak-of-one-side",

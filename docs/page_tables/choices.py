@@ -76,7 +76,7 @@ def laws_table() -> str:
             (
                 code(key),
                 unit(one.unit) or "1",
-                "must be given" if one.default is None else f"{one.default:g}",
+                "none" if one.optional else "must be given" if one.default is None else f"{one.default:g}",
                 f"{one.minimum:g} … {one.maximum:g}".replace("inf", "∞"),
                 one.meaning,
             )

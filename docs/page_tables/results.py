@@ -18,7 +18,7 @@ UNITS = {
     "drive": "deg, mm, s", "saving": "1 by that of the measure", "curve": "of the curve",
     "curve ratio": "curve by parameter",
 }  # fmt: skip
-PARTS = {"": "", "seats": "with a seat", "errors": "with an error"}
+PARTS = {"": "", "bearings": "where sizes are stated", "seats": "with a seat", "errors": "with an error"}
 
 
 def results_table() -> str:

@@ -107,7 +107,15 @@ def figures(mechanism: trunnion.Mechanism) -> np.ndarray[Any, Any]:
     """At each position: what holds over the cycle, as its findings, takes far longer."""
     with np.errstate(all="ignore"):
         arrays = positions(prepare(mechanism), STEPS, margin=False, averaged=False).arrays
-    names = ("drive_effort", "friction_power", "reaction_force", "joint_rotation", "joint_slide", "link_error")
+    names = (
+        "drive_effort",
+        "friction_power",
+        "reaction_force",
+        "joint_rotation",
+        "joint_slide",
+        "link_error",
+        "pin_pressure",
+    )
     return np.concatenate([arrays[name].ravel() for name in names if name in arrays])
 
 

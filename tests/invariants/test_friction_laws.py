@@ -18,6 +18,7 @@ NUMBERS = {
     "stiffness": 2e4,
     "damping": 30.0,
     "pair_factor": 4 / 3,
+    "arm": 5e-4,
 }
 CURVE = 0.12 + 0.08 * exp(-4.0)  # f + (f_s − f) exp(−(v/v_s)²), v = 2 v_s
 FORCES = {
@@ -29,12 +30,13 @@ FORCES = {
     "dahl": -0.12 * N,
     "lugre": -(CURVE + 0.5 * V) * N,
     "rolling-bearing": -0.12 * N,
+    "rolling": -N,
 }
 
 
 def force(law: str, slip: float, **more: float) -> float:
     known = FRICTION_LAWS[law]
-    numbers = {name: NUMBERS[name] for name in known.parameters}
+    numbers = {name: NUMBERS[name] for name, declared in known.parameters.items() if not declared.optional}
     return float(known.function(N, slip, **numbers, **more))
 
 

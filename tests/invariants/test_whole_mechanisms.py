@@ -301,7 +301,7 @@ def test_samples_are_independent(name: str) -> None:
 
 
 @pytest.mark.spread(2)
-@pytest.mark.parametrize("law", FRICTION_LAWS)
+@pytest.mark.parametrize("law", [law for law in FRICTION_LAWS if law != "rolling"])  # which is of pins alone
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank", "class III"])
 def test_every_law_in_a_mechanism(name: str, law: str) -> None:
     """Friction is what the law says of load and slip, it only takes power, and both methods find it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 import trunnion
 from trunnion import Mechanism, MechanismError
+from trunnion.results.tables.cycle import positions
 
 G = 9.81
 
@@ -84,3 +86,87 @@ def test_what_has_no_ends_is_a_finding() -> None:
     data["joints"]["A"].pop("pin")
     with pytest.raises(MechanismError, match="has no ends"):
         Mechanism(**data)
+
+
+def sizes(found: Any, joint: str) -> Any:
+    """The load on every end of a joint, (end, position), N."""
+    return np.linalg.norm(found["end_load"].sel(joint=joint), axis=1)
+
+
+def test_the_table_has_both_ends_and_the_pressure() -> None:
+    """Levers: m g (1/2 ± a/L); the end that bears more, over half of the projected area, is the pressure."""
+    found = trunnion.analyse(overhung(0.1), steps=4)
+    both = 2 * G * np.array([3.5, 2.5])
+    assert np.sort(sizes(found, "A")[:, 0])[::-1] == pytest.approx(both, rel=1e-12)
+    assert found["pin_pressure"].values == pytest.approx(np.full((1, 4), both[0] / (0.02 * 0.05)), rel=1e-12)
+    summary = {row["name"]: row for row in json.loads(found.attrs["summary"])}
+    assert summary["A.end_load_max"]["value"] == pytest.approx(both[0], rel=1e-12)
+    assert summary["A.pin_pressure_max"]["value"] == pytest.approx(both[0] / (0.02 * 0.05), rel=1e-12)
+
+
+def test_the_pressure_of_a_pin_in_the_plane() -> None:
+    """F/(d b) of the reaction; of pins whose length is not stated there is none."""
+    data = trunnion.read("examples/durango-fourbar.yaml").data()
+    data["joints"]["C"]["pin"] = {"radius": "0.1 m", "length": "50 mm"}
+    found = trunnion.analyse(Mechanism(**data), steps=12)
+    force = np.linalg.norm(found["reaction_force"].sel(joint="C"), axis=0)
+    assert found["pin_pressure"].sel(joint="C").values == pytest.approx(force / (0.2 * 0.05), rel=1e-12)
+    assert np.all(np.isnan(found["pin_pressure"].sel(joint="B")))
+    columns = [column.name for column in positions(found)]
+    assert "C.pin_pressure" in columns
+    assert not any(name.startswith(("B.pin", "C.end")) for name in columns)
+
+
+def pins_of_the_first_cross(found: Any) -> tuple[Any, Any]:
+    """Directions of the two pins of joint B of the double Cardan shaft, (axis, position), by its geometry."""
+    turn = found["joint_rotation"].sel(joint="A").values
+    first = np.array([-np.sin(turn), np.cos(turn), 0 * turn])
+    second = np.cross([0.2, 0, np.sqrt(0.6**2 - 0.2**2)], first.T).T
+    return first, second / np.linalg.norm(second, axis=0)
+
+
+def test_a_massless_cross_by_its_normal() -> None:
+    """Without mass and friction it passes on M along its normal n; the input has T = M n·e, each end M/L."""
+    data = trunnion.read("examples/double-cardan.yaml").data()
+    data.pop("gravity")
+    for link in ("input", "middle", "output"):
+        for key in ("mass", "inertia", "centre"):
+            data["links"][link].pop(key)
+    found = trunnion.analyse(Mechanism(**data).with_friction("off"), steps=24)
+    first, second = pins_of_the_first_cross(found)
+    moment = found["drive_effort"].values[0] / np.cross(first.T, second.T)[:, 2]
+    assert sizes(found, "B") == pytest.approx(np.tile(np.abs(moment) / 0.07, (4, 1)), rel=1e-9)
+    assert np.ptp(moment) > 5.0
+
+
+@pytest.mark.parametrize("engine", ["numpy", "compiled"])
+def test_friction_of_a_cross_counts_these_loads(engine: Any) -> None:
+    """μ r Σ|Q| ω of each pin: the friction of one bears on the other."""
+    found = trunnion.analyse(trunnion.read("examples/double-cardan.yaml"), steps=40, engine=engine)
+    spin = [found["link_angular_velocity"].sel(link=link).values for link in ("input", "middle")]
+    rates = [np.abs(np.sum((spin[1] - spin[0]) * pin, axis=0)) for pin in pins_of_the_first_cross(found)]
+    load = sizes(found, "B")
+    lost = 0.05 * 0.008 * (load[:2].sum(axis=0) * rates[0] + load[2:].sum(axis=0) * rates[1])
+    assert found["friction_power"].sel(joint="B").values == pytest.approx(lost, rel=1e-7)
+
+
+@pytest.mark.parametrize("engine", ["numpy", "compiled"])
+@pytest.mark.parametrize(("name", "joint"), [("double-cardan", "A"), ("rssr", "D"), ("offset-slider-crank", "S")])
+def test_friction_counts_these_loads(name: str, joint: str, engine: Any) -> None:
+    """μ r Σ|Q| ω of a bearing, μ Σ|Q| v of a guide."""
+    model = trunnion.read(f"examples/{name}.yaml")
+    found, numbers = trunnion.analyse(model, steps=40, engine=engine), model.parameters()
+    motion, lever = ("slide", 1.0) if joint == "S" else ("rotation", numbers[f"joints.{joint}.pin.radius"])
+    slip = lever * np.abs(found[f"joint_{motion}_velocity"].sel(joint=joint).values)
+    lost = numbers[f"joints.{joint}.friction.coefficient"] * np.nansum(sizes(found, joint), axis=0) * slip
+    assert found["friction_power"].sel(joint=joint).values == pytest.approx(lost, rel=1e-7, abs=1e-9)
+
+
+def test_loads_of_both_signs_are_followed() -> None:
+    """The largest of the summary does not depend on the rows; at a place of rest it is that beside it."""
+    model = trunnion.read("examples/double-cardan.yaml")
+    coarse, fine = (trunnion.analyse(model, steps=steps) for steps in (7, 3600))
+    summary = {row["name"]: row["value"] for row in json.loads(coarse.attrs["summary"])}
+    for joint in "ABCD":
+        most = np.nanmax(sizes(fine, joint))
+        assert most * (1 - 1e-12) <= summary[f"{joint}.end_load_max"] <= most * (1 + 1e-3)

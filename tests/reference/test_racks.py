@@ -158,6 +158,22 @@ def test_chain_hoist() -> None:
     assert float(rough["efficiency"]) == pytest.approx(0.06 / 0.061, rel=1e-12)
 
 
+@pytest.mark.parametrize(("peak", "slack"), [(0.5, False), (1.5, True)])
+def test_a_rope_that_would_push(peak: float, slack: bool) -> None:
+    """A load that swings with A ω² = 0.5 g and 1.5 g pulls with m (g ∓ A ω²): the second would push with m g/2."""
+    data = hoist()
+    rate = 2 * np.pi
+    data["drivers"]["A"] = {
+        "law": "harmonic", "mean": 1.0, "amplitude": peak * 9.81 / (0.06 * rate**2), "period": 1.0, "phase": 0.0
+    }  # fmt: skip
+    notes = [one for one in findings(trunnion.analyse(Mechanism(**data), 5)) if one["code"] == "gears.slack"]
+    assert len(notes) == int(slack)
+    for note in notes:
+        weight = 100.0 * 9.81
+        forces = sorted(abs(note["figures"][key]) for key in ("lower", "upper"))
+        assert forces == pytest.approx([0.5 * weight, 2.5 * weight], rel=1e-9)
+
+
 def test_a_falling_load_turns_its_wheel() -> None:
     """s̈ = g m r²/(m r² + J), the wheel's motion free."""
     data = hoist()

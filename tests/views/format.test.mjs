@@ -128,6 +128,12 @@ test("a page has one unit for a quantity", () => {
   assert.deepEqual(shown, ["0.1136\u00a0W", "4.000\u00a0mW", "20.00\u00a0kW", "−0.9500\u00a0kN", "3.000\u00a0N\u00a0m"].map((text) => text.replace("N\u00a0m", "N m")));
 });
 
+test("feet and pounds have no prefix", () => {
+  const units = { N: [1 / 4.4482216152605, "lbf"] };
+  assert.equal(quantity(0.0044482216152605, "N", undefined, units), "0.001000\u00a0lbf");
+  assert.equal(quantity(44482.216152605, "N", undefined, units), "10\u202f000\u00a0lbf");
+});
+
 test("places of the drive in words", () => {
   assert.equal(say({ abscissa: { values: [32], unit: "°" } }, 0), "32°");
   assert.equal(say({ abscissa: { values: [12.5], unit: "mm" } }, 0), "12.5\u00a0mm");

@@ -227,10 +227,11 @@ if NODE:
         name, result = motion
         seen = page(result, tmp_path)
         told = seen["motion"]
+        ends = "Larger load on an end of bearing or guide"
         wanted = {
-            "start": ["Speed", "Drive torque O", "Works and energies", "Joint reactions, magnitude",
+            "start": ["Speed", "Drive torque O", "Works and energies", "Joint reactions, magnitude", ends,
                       "Friction power by joint", "Power", "Slide of joints"],
-            "run-down": ["Speed", "Works and energies", "Joint reactions, magnitude", "Friction power by joint",
+            "run-down": ["Speed", "Works and energies", "Joint reactions, magnitude", ends, "Friction power by joint",
                          "Power", "Slide of joints"],
             "stays": ["Speed", "Drive torque A", "Joint reactions, magnitude"],
             "swing": ["Speed", "Works and energies", "Joint reactions, magnitude"],

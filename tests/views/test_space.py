@@ -64,8 +64,8 @@ def test_motion_tells_rotations_slides_and_links():
 def test_the_figure_says_where_how_long_and_how_strong():
     figure = mechanism(rssr())
     words = _texts(figure)
-    assert {"O", "A", "B", "C", "E", "tip", "x", "y", "z", "20 mm", "reaction 200 N"} <= set(words)
-    assert "where the reaction is largest" in figure.axes[0].get_title(loc="left")
+    assert {"O", "A", "B", "C", "E", "tip", "x", "y", "z", "20 mm", "load 200 N"} <= set(words)
+    assert "where the load of a joint is largest" in figure.axes[0].get_title(loc="left")
     assert "drive angle O = 90°" in mechanism(rssr(), index=30).axes[0].get_title(loc="left")
 
 

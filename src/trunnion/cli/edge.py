@@ -15,6 +15,7 @@ import threading
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import copy_context
 from typing import Any
 
 from trunnion.errors import MechanismError
@@ -41,7 +42,7 @@ def status_of(run: Callable[[], Any], debug: bool = False) -> int:
     code: Any = 0
     try:
         with _raised_by_signals(interrupt):
-            run()
+            copy_context().run(run)  # units that a model is shown in end with it
     except SystemExit as stop:  # typer's own end, of a usage error or of Ctrl-C too
         code = stop.code
         if code == STOPPED or interrupt.number:

@@ -30,6 +30,7 @@ def stated(
     swept: a value of each number that the verb replaces, which may be such a one too.
     """
     from trunnion.model.mechanism import read_mechanism
+    from trunnion.model.screen import follow, stated_units
 
     mechanism = read_mechanism(file, dict(named_file(text) for text in tables or ()))
     values = dict(setting(text) for text in settings or ())
@@ -41,6 +42,7 @@ def stated(
     elif values:
         mechanism = mechanism.with_values(values)
     mechanism.checked[:] = [*(one for one in mechanism.checked if one.where not in {own.where for own in bare}), *bare]
+    follow(stated_units(mechanism))
     return mechanism
 
 

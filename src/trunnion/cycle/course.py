@@ -26,6 +26,7 @@ from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.figure import Figure
 from trunnion.solve.backward import Backward
+from trunnion.solve.contacts import bearing_ends
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import has_useful_work
 from trunnion.solve.margin import locking_margin
@@ -42,7 +43,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 POWERS = ("drive_power", "useful_power", "friction_power", "power_residual")
-FORCES = ("drive_effort", "reaction_force", "reaction_moment", "drive_effort_change")
+FORCES = ("drive_effort", "reaction_force", "reaction_moment", "end_load", "gear_torque", "drive_effort_change")
 FOLLOWED = ("drive_effort", *POWERS, "reaction_force")
 COMPARED_ROWS = ("point_error", "joint_rotation_error", "joint_slide_error", "drive_effort_change")
 SIDE = 1e-7  # of the cycle: beside a break
@@ -314,7 +315,8 @@ def followed(system: System, errs: bool) -> tuple[str, ...]:
     """The variables that the summary of a cycle is made of."""
     in_space = ("reaction_moment",) * (system.mechanism.space == "spatial")
     slides = ("joint_slide",) * any(PAIRS[kind].guided for kind, _ in system.joints.values())
-    return (*FOLLOWED, *in_space, *slides, *(COMPARED_ROWS if errs else ()))
+    ends = ("end_load",) * any(bearing_ends(system.mechanism, joint) for joint in system.joints)
+    return (*FOLLOWED, *in_space, *slides, *ends, *(COMPARED_ROWS if errs else ()))
 
 
 def course_of(
@@ -397,6 +399,9 @@ class _Looking:
         wanted = {*self._names, "status", *(COMPARED if self.errs else ())}
         arrays = allocate(self.run.system, len(time), ["errors"] if self.errs else [], wanted)
         fill_chunk(arrays, back, time, slice(None))
+        if "end_load" in self._names:  # what a joint does not have is no gap in a course
+            for i, joint in enumerate(self.run.system.joints):
+                arrays["end_load"][i, bearing_ends(self.run.system.mechanism, joint) :] = 0.0
         return arrays
 
     def _stand_in(self, arrays: Arrays, meant: Arrays, valid: NDArray[np.bool_]) -> None:
@@ -425,7 +430,7 @@ def like(run: Run, shapes: Mapping[str, tuple[int, ...]], sizes: Array) -> Array
     scales = scales_of(run)
     names = np.repeat(list(shapes), [int(np.prod(shape)) for shape in shapes.values()])
     units, turning = np.ones(len(names)), [run.system.turns(name) for name in run.system.mechanism.drivers]
-    units[names == "reaction_moment"] = scales.length
+    units[np.isin(names, ("reaction_moment", "gear_torque"))] = scales.length
     for name in ("drive_effort", "drive_effort_change"):
         units[names == name] = np.where(turning, scales.length, 1.0)[: np.count_nonzero(names == name)]
     forces, powers = np.isin(names, FORCES), np.isin(names, (*POWERS, SUPPOSED))

@@ -28,7 +28,7 @@ from trunnion.cycle.fill import (
 )
 from trunnion.engines.kernel import Lanes, lanes_of, literals, time_of
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.results.variables import VARIABLES
+from trunnion.results.variables import OF_SOME_JOINTS, VARIABLES
 from trunnion.solve.backward import Backward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.memory import CHUNK
@@ -119,7 +119,7 @@ class CycleKernel:
 
     def _wanted(self, cell: Cell, number: Number) -> bool:
         """Whether a cell is read, and not 0 whatever the values are, as most arrays are before."""
-        none = isinstance(number, (int, float)) and number == 0 and VARIABLES[cell[0]].part != "seats"
+        none = isinstance(number, (int, float)) and number == 0 and VARIABLES[cell[0]].part not in OF_SOME_JOINTS
         return self._read[cell[0]] and not none
 
     def _cells(self, back: Backward) -> Mapping[Cell, Number]:

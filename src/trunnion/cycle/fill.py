@@ -21,7 +21,7 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.joint_parts import clearance
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
-from trunnion.solve.contacts import bearing_middle
+from trunnion.solve.contacts import bearing_ends, bearing_middle, has_pressure, loads_on_ends
 from trunnion.solve.end_loads import loads_of
 from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.loads import has_useful_work, useful_powers
@@ -31,8 +31,8 @@ from trunnion.solve.status import status_of
 from trunnion.solve.system import System, Values
 
 __all__ = [
-    "COMPARED", "CONDITIONS", "Arrays", "Into", "allocate", "blank", "fill_chunk", "fill_errors", "fill_joint",
-    "fill_lanes", "labels", "put", "unwrap", "write",
+    "COMPARED", "CONDITIONS", "Arrays", "Into", "allocate", "blank", "fill_bearing", "fill_chunk", "fill_errors",
+    "fill_joint", "fill_lanes", "labels", "pin_area", "put", "unwrap", "write",
 ]  # fmt: skip
 
 Arrays = dict[str, NDArray[np.float64]]
@@ -62,7 +62,12 @@ COMPARED = {*DIFFERENCES.values(), "link_angle", "link_rotation", "joint_rotatio
 def labels(system: System) -> dict[str, list[str]]:
     """Names along the dims."""
     mechanism, spatial = system.mechanism, system.mechanism.space == "spatial"
-    members = {"spring": list(mechanism.springs), "gear": list(mechanism.gears)}
+    ends = max((bearing_ends(mechanism, joint) for joint in system.joints), default=0)
+    members = {
+        "spring": list(mechanism.springs),
+        "gear": list(mechanism.gears),
+        "bearing_end": [str(end + 1) for end in range(ends)],
+    }
     return {
         **{dim: names for dim, names in members.items() if names},
         "joint": list(system.joints),
@@ -79,6 +84,8 @@ def allocate(
 ) -> Arrays:
     """Arrays for the variables of a system, see `results.variables.allocate`."""
     names = labels(system) | ({"end": ["1", "2"]} if "seats" in parts else {})
+    if "bearing_end" in names or any(has_pressure(system.mechanism, joint) for joint in system.joints):
+        parts = [*parts, "bearings"]
     return results.allocate(names, positions, parts, wanted)
 
 
@@ -156,6 +163,7 @@ def fill_forces(arrays: Into, back: Backward, window: slice) -> None:
     walk, mechanism = back.walk, back.walk.system.mechanism
     for i, joint in enumerate(walk.system.joints):
         turns = walk.system.turns(joint)
+        fill_bearing(arrays, walk, i, joint, back.reactions[joint], back.friction_wrenches[joint], window)
         if turns:
             arrays["friction_torque"][i, window] = back.friction[joint]
         if isinstance(walk, SpatialWalk):
@@ -177,6 +185,31 @@ def fill_forces(arrays: Into, back: Backward, window: slice) -> None:
     for i, name in enumerate(mechanism.gears):
         arrays["gear_torque"][i, window] = back.gears[name].torque
         put(arrays["gear_force"], i, back.gears[name].force, window)
+
+
+def fill_bearing(arrays: Into, walk: Forward, i: int, joint: str, reaction: Any, friction: Any, window: slice) -> None:
+    """Loads on the ends of one joint's bearing or guide, and the pressure of its pin, where somebody reads them."""
+    mechanism = walk.system.mechanism
+    ends, pressed = bearing_ends(mechanism, joint) > 0, has_pressure(mechanism, joint)
+    if not ((ends and _is_read(arrays["end_load"])) or (pressed and _is_read(arrays["pin_pressure"]))):
+        return
+    loads = loads_on_ends(walk, joint, reaction, friction) if ends else [(0.5 * reaction.x, 0.5 * reaction.y, 0.0)]
+    for end, load in enumerate(loads if ends else ()):
+        for axis in range(mechanism.coordinates):
+            arrays["end_load"][i, end, axis, window] = load[axis]
+    if pressed:
+        most = functools.reduce(np.maximum, (np.sqrt(dot(load, load)) for load in loads))
+        arrays["pin_pressure"][i, window] = 2 * most / pin_area(walk.values, joint)
+
+
+def pin_area(values: Values, joint: str) -> Number:
+    """Projected area of a pin, its diameter times the length of its bearing, m²."""
+    return 2 * values[f"joints.{joint}.pin.radius"] * values[f"joints.{joint}.pin.bearing"]
+
+
+def _is_read(array: Any) -> bool:
+    """Whether what is written into an array of `allocate` is read, as is all that stands for one."""
+    return bool(getattr(array, "strides", (1,))[-1])
 
 
 def fill_power(arrays: Into, back: Backward, time: Number, window: slice) -> None:

@@ -7,7 +7,7 @@ positions without an answer are those of the positions (`causes`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.course import Courses, Place
 from trunnion.algebra.dual import primal
 from trunnion.cycle import contact_loss
-from trunnion.cycle.course import CycleCourse, Means, magnitude
+from trunnion.cycle.course import CycleCourse, Means, course_of, magnitude
 from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import scales_of
@@ -30,7 +30,7 @@ from trunnion.model.tolerances import tolerated
 from trunnion.model.units import KINDS
 from trunnion.results.quantities import between, quantity, readable
 from trunnion.solve import loads
-from trunnion.solve.end_loads import NO_LOAD, EndLoads
+from trunnion.solve.end_loads import NO_LOAD, EndLoads, plain
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
 from trunnion.solve.seating import ROUNDS as SEAT_ROUNDS
 from trunnion.solve.seating import UNSETTLED, Seating, seating_of
@@ -487,6 +487,31 @@ def _springs(cycle: Cycle) -> Iterator[Finding]:
                 yield Finding.warning("spring.turned_round", where, what, remedy, at=cycle.place(least.time))
 
 
+def _slack(cycle: Cycle) -> Iterator[Finding]:
+    """Ropes and chains whose force turns round: which way they pull is not stated, but a rope pulls one way alone."""
+    ropes = [name for name, gear in cycle.mechanism.gears.items() if gear.radius is not None and not gear.teeth]
+    if not ropes or cycle.course is None:
+        return
+    course = course_of(cycle.run, replace(cycle.at.method, margin_up_to=0.0), names=("gear_torque",))
+    for name in ropes:
+        row, key = list(cycle.mechanism.gears).index(name), f"gears.{name}.radius"
+        ends = [course.extreme("gear_torque", row, sign=sign, unit="N m") for sign in (-1.0, 1.0)]
+        low, high = (0.0 if top is None else top.value / abs(plain(cycle.run.values[key])) for top in ends)
+        if not low < -scales_of(cycle.run).floor("N") or not high > scales_of(cycle.run).floor("N"):
+            continue
+        places = " and ".join(course.told(top) for top in ends if top is not None)
+        what = f"the force in {name} changes its sign: {between(low, high, 'N')}, {places}; "
+        remedy = "a closed chain or belt bears both ways; a rope needs a load or a speed that keep it taut"
+        yield Finding.note(
+            "gears.slack",
+            f"gears.{name}",
+            f"{what}a rope goes slack where it would push",
+            remedy,
+            lower=low,
+            upper=high,
+        )
+
+
 def _idle_loads(cycle: Cycle) -> Iterator[Finding]:
     """Useful loads that take no power anywhere; where there is no answer, that is why."""
     marked = [name for name, load in cycle.mechanism.loads.items() if load.useful]
@@ -742,6 +767,6 @@ def _between(one: int, other: int, count: int) -> NDArray[np.intp]:
 
 QUESTIONS: tuple[Callable[[Cycle], Iterable[Finding]], ...] = (
     _of_the_model, _not_assembled, _undecided_senses, _singular, _undefined, _locked, _badly_solved, _resting,
-    _ranges, _no_common_period, _driving_resistances, _springs, _idle_loads, _beside_gaps, _moved_jumps,
+    _ranges, _no_common_period, _driving_resistances, _springs, _slack, _idle_loads, _beside_gaps, _moved_jumps,
     _uncounted_work, _lost_contacts,
 )  # fmt: skip

@@ -35,7 +35,7 @@ from trunnion.solve.friction_problem import largest
 from trunnion.solve.loads import has_useful_work, useful_loads, useful_powers, useful_springs
 from trunnion.solve.status import status_of
 from trunnion.solve.switches import MARGINS
-from trunnion.solve.system import felt, law_of
+from trunnion.solve.system import felt, law_of, scale_of
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
@@ -551,7 +551,9 @@ class LockingCourse:
         note = "below it the loads drive it on, onto a stop there" * bool(forward and not run.cycle.periodic)
         more = ("1", aspect, place, note)
         figures = [Figure("holding_multiple", f"multiple of all friction {subject}", multiple, *more)]
-        paths = {f"joints.{joint}.friction.{law_of(run.system, joint).scale}" for joint in felt(run.system, run.values)}
+        rubbing = {joint: scale_of(run.system, run.values, joint) for joint in felt(run.system, run.values)}
+        alike = set(rubbing.values()) == {"coefficient"}
+        paths = {f"joints.{joint}.friction.{scale}" for joint, scale in rubbing.items() if alike}
         same = {float(np.ravel(primal(run.values[path]))[0]) if path in run.values else np.nan for path in paths}
         if len(same) == 1 and np.isfinite(value := same.pop()):
             subject = f"friction coefficient {subject}"
@@ -564,7 +566,7 @@ class LockingCourse:
 
 def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure:
     """The critical friction of a joint alone: its coefficient if its law is proportional to one, else the multiple."""
-    parameter = law_of(run.system, joint).scale
+    parameter = scale_of(run.system, run.values, joint)
     if not multiple > 0 or not parameter:
         subject = f"critical multiple of the friction of {joint} alone" + " (it locks even without)" * (
             not multiple > 0
@@ -572,7 +574,8 @@ def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure
         return Figure(f"{joint}.critical_multiple", subject, multiple, place=place)
     value = float(np.ravel(primal(run.values[f"joints.{joint}.friction.{parameter}"]))[0])
     subject = f"critical friction {parameter} of {joint} alone"
-    return Figure(f"{joint}.critical_{parameter}", subject, multiple * value, place=place)
+    unit = law_of(run.system, joint).parameters[parameter].unit or "1"
+    return Figure(f"{joint}.critical_{parameter}", subject, multiple * value, unit, place=place)
 
 
 def centred(run: Run, after: str = "") -> str:

@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from trunnion.algebra.dual import primal
 from trunnion.cycle.fill import allocate, fill_chunk
 from trunnion.errors import Status
-from trunnion.results.scales import Scales
+from trunnion.results.scales import Scales, powers_of
 from trunnion.solve.run import Run
 
 __all__ = ["largest", "peak", "scales_of"]
 
+CANCELLED = 1e-4  # of what masses and springs may exert: the least that counts as a force beside their rounding
 LOOKED = 24  # positions: the scales are orders of magnitude
 
 
@@ -58,7 +59,19 @@ def largest(run: Run, arrays: Mapping[str, NDArray[np.float64]]) -> Scales:
     torques.append(peak(arrays["reaction_moment"]))
     for driver, efforts in zip(mechanism.drivers, arrays["drive_effort"], strict=True):
         (torques if system.turns(driver) else forces).append(peak(efforts))
-    return Scales(length, rate, max(*forces, max(torques) / length))
+    return Scales(length, rate, max(*forces, max(torques) / length, CANCELLED * _sources(run, length, rate)))
+
+
+def _sources(run: Run, length: float, rate: float) -> float:
+    """The largest force, N, that masses and springs have at the scales of the motion: of such all forces are
+    differences, whose rounding is there where they cancel."""
+    sizes = [0.0]
+    for path, entry in run.system.mechanism.parameter_set.entries.items():
+        if entry.location[0] in ("links", "springs") and path in run.values:
+            lengths, rates, forces = powers_of(entry.kind.unit)
+            if forces == 1.0 and (lengths or rates):
+                sizes.append(peak(primal(run.values[path])) / (length**lengths * rate**rates))
+    return max(sizes)
 
 
 def _stated_forces(run: Run) -> tuple[list[float], list[float]]:

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Place
+from trunnion.algebra.dual import primal
 from trunnion.cycle.course import MOST_SUPPOSED, CycleCourse, Means, magnitude
+from trunnion.cycle.fill import pin_area
 from trunnion.cycle.findings import Cycle, effort_units, findings
 from trunnion.cycle.locking_course import critical_figure
 from trunnion.cycle.model_measures import watched
@@ -26,6 +28,7 @@ from trunnion.results.attributes import KEPT, cited, encoded, finding_rows, orig
 from trunnion.results.dataset import MemberUnits, driven
 from trunnion.results.figure import Figure
 from trunnion.results.result import Result
+from trunnion.solve.contacts import bearing_ends, has_pressure
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL
 from trunnion.solve.system import System, rubbing
 
@@ -148,11 +151,30 @@ def _reactions(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
             if planar or top.value > scales.floor(unit):
                 key = f"{name}.{what.replace(' ', '_')}_max"
                 yield course.figure(key, f"{what} of {name}", top, unit, "maximum")
+        yield from _bearing(cycle, course, i, name)
         if PAIRS[kind].guided:
             ends = [course.extreme("joint_slide", i, sign=sign, panels=course.valid) for sign in (1.0, -1.0)]
             if ends[0] is not None and ends[1] is not None:
                 stroke, note = ends[0].value - ends[1].value, course.note
                 yield Figure(f"{name}.stroke", f"stroke of {name}", stroke, "m", note=note)
+
+
+def _bearing(cycle: Cycle, course: CycleCourse, i: int, joint: str) -> Iterator[Figure]:
+    """Largest load on an end of a joint's bearing or guide, and largest pressure of its pin."""
+    mechanism, axes = cycle.mechanism, cycle.mechanism.coordinates
+
+    def larger(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The size of the largest of the vectors."""
+        return np.asarray(np.max([magnitude(rows[k : k + axes]) for k in range(0, len(rows), axes)], axis=0))
+
+    ends = bearing_ends(mechanism, joint)
+    top = course.extreme("end_load" if ends else "reaction_force", i, of=larger, unit="N")
+    if top is not None and ends:
+        yield course.figure(f"{joint}.end_load_max", f"load on an end of {joint}", top, "N", "maximum")
+    if top is not None and has_pressure(mechanism, joint):
+        share = (2.0 if ends else 1.0) / float(np.ravel(primal(pin_area(cycle.run.values, joint)))[0])
+        pressure = top._replace(value=top.value * share)
+        yield course.figure(f"{joint}.pin_pressure_max", f"pin pressure of {joint}", pressure, "Pa", "maximum")
 
 
 def _friction(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:

@@ -13,7 +13,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.dynamics.state import FreeMotion, Linear, Moment
 from trunnion.dynamics.touching import Contacts, ContactState, Onset, Push
 from trunnion.solve.backward import Backward
-from trunnion.solve.system import law_of
+from trunnion.solve.system import law_of, law_parameters
 
 __all__ = [
     "CLUTCH",
@@ -240,7 +240,7 @@ def bristle_rates(motion: FreeMotion, at: Moment, back: Backward) -> list[Number
     rates = list[Number]()
     for joint, deflection in zip(motion.bristles, at.bristles, strict=True):
         law, slip = law_of(motion.system, joint), primal(back.contacts[joint][0].slip)
-        parameters = {key: motion.values[f"joints.{joint}.friction.{key}"] for key in law.parameters}
         assert law.relaxation is not None  # or it would have no bristles
-        rates.append(slip - law.relaxation(slip, **parameters) * deflection)
+        decay = law.relaxation(slip, **law_parameters(law, motion.values, joint))
+        rates.append(slip - decay * deflection)
     return rates

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.plane import Wrench
 from trunnion.algebra.space import Screw, moment_at
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.algebra.vector import dot
@@ -165,6 +166,7 @@ class PlayedJoints:
         fill.put(self.arrays["friction_moment"], row, moment_at(rubbing, middle), window)
         self.arrays["friction_torque"][row, window] = dot(moment_at(rubbing, middle), axis)
         self.arrays["friction_force"][row, window] = dot(rubbing.u, axis)
+        fill.fill_bearing(self.arrays, walk, row, joint, reaction, rubbing, window)
 
     def _fill_in_plane(self, walk: Forward, joint: str, row: int, window: slice, reaction: Any) -> None:
         point = walk.point(walk.system.joints[joint][1][1], joint).place
@@ -173,6 +175,7 @@ class PlayedJoints:
         for name in ("reaction_moment", "friction_torque", "friction_force"):
             self.arrays[name][row, window] = 0.0
         self.arrays["friction_torque" if turns else "reaction_moment"][row, window] = moment
+        fill.fill_bearing(self.arrays, walk, row, joint, Wrench(reaction.x, reaction.y, moment), None, window)
         motion = walk.coordinates(joint), walk.rates(joint), walk.second_rates(joint)
         for suffix, numbers in zip(("", "_velocity", "_acceleration"), motion, strict=True):
             self.arrays[f"joint_slide{suffix}"][row, window] = numbers[1]

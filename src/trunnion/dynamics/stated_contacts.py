@@ -17,6 +17,7 @@ from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
 from trunnion.solve import shifts
 from trunnion.solve.run import Run
+from trunnion.solve.system import law_parameters
 
 __all__ = ["contacts_of"]
 
@@ -43,7 +44,7 @@ def _of_joint(run: Run, name: str) -> Iterator[Contact]:
     common: dict[str, Any] = {
         "joint": name, "clearance": clearance, "stiffness": stiffness, "exponent": known.get("exponent", 1.0),
         "factor": contact.of.factor(restitution), "restitution": restitution, "law": law,
-        "parameters": {key: _number(values[f"joints.{name}.friction.{key}"]) for key in law.parameters} if law else {},
+        "parameters": {key: _number(one) for key, one in law_parameters(law, values, name).items()} if law else {},
     }  # fmt: skip
     if run.system.mechanism.space == "spatial":
         yield from _in_space(run, name, play, radius + clearance, common)

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 
 __all__ = [
@@ -20,7 +21,9 @@ __all__ = [
     "brown_mcphee",
     "coulomb",
     "dahl",
+    "directed",
     "lugre",
+    "rolling",
     "rolling_bearing",
     "stiction",
     "stiction_at_rest",
@@ -33,13 +36,14 @@ GONE = -700.0  # of which e^x leaves nothing of a coefficient, and which machine
 
 @dataclass(frozen=True)
 class LawParameter:
-    """One parameter of a law: its unit (empty if none), default (None: must be given), range."""
+    """One parameter of a law: its unit (empty if none), default (None: must be given unless it is optional), range."""
 
     unit: str = ""
     default: float | None = None
     minimum: float = 0.0
     maximum: float = float("inf")
     meaning: str = ""
+    optional: bool = False
 
 
 class LawFunction(Protocol):
@@ -203,7 +207,26 @@ def rolling_bearing(normal: Number, slip: Number, **parameters: Number) -> Numbe
     return -xp.sign(slip) * parameters["coefficient"] * normal
 
 
+def rolling(normal: Number, slip: Number, **parameters: Number) -> Number:
+    """Rolling friction with a lever arm f: a moment f N against the rate; −sgn(v) N at the lever f.
+
+    Source: C. A. Coulomb, Théorie des machines simples, 1785. Handbooks state f in mm, some 0.5 of wheels on rails.
+    """
+    xp = namespace(normal, slip)
+    return -xp.sign(slip) * normal
+
+
+def directed(parameters: Mapping[str, Number], slip: Number) -> Mapping[str, Number]:
+    """The parameters of a law for a slip: where that is negative `backward` stands for the coefficient, if stated."""
+    if "backward" not in parameters:
+        return parameters
+    forward, backward = parameters["coefficient"], parameters["backward"]
+    xp = namespace(slip, forward, backward)
+    return {**parameters, "coefficient": xp.where(primal(slip) < 0, backward, forward)}
+
+
 _COEFFICIENT = LawParameter(meaning="friction coefficient of sliding")
+_BACKWARD = LawParameter(meaning="coefficient of negative rates; that of positive ones if not stated", optional=True)
 _STATIC = LawParameter(meaning="friction coefficient at rest, not below that of sliding")
 _VISCOUS = LawParameter("s/m", default=0.0, meaning="growth of the coefficient with the slip speed")
 
@@ -212,6 +235,7 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
         coulomb,
         {
             "coefficient": LawParameter(meaning="friction coefficient of the material pairing"),
+            "backward": _BACKWARD,
             "pair_factor": LawParameter(
                 default=1.0, meaning="factor from the material's coefficient to the pair's (4/3 when worn in)"
             ),
@@ -224,6 +248,7 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
         viscous,
         {
             "coefficient": _COEFFICIENT,
+            "backward": _BACKWARD,
             "pair_factor": LawParameter(default=1.0, meaning="factor from the material's coefficient to the pair's"),
             "viscous": LawParameter("s/m", meaning="growth of the coefficient with the slip speed"),
         },
@@ -296,5 +321,12 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
         source="SKF, Rolling bearings, estimating the frictional moment: M = 0.5 μ P d",
         validity="load about 0.1 of the dynamic rating, good lubrication, normal speed",
         scale="coefficient",
+    ),
+    "rolling": FrictionLaw(
+        rolling,
+        {"arm": LawParameter("m", meaning="lever arm of rolling friction: moment over normal load")},
+        source="C. A. Coulomb, Théorie des machines simples, 1785",
+        validity="wheels and rollers in revolute joints; a pin of the radius r with the coefficient arm/r is the same",
+        scale="arm",
     ),
 }

@@ -17,15 +17,13 @@ import numpy as np
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.nested import flat
 from trunnion.algebra.plane import Wrench
 from trunnion.algebra.space import Screw
 from trunnion.algebra.vector import Vector3, cross, dot
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups.dyad import DyadPose
-from trunnion.joints.spatial_load import BearingLoad
 from trunnion.solve.backward import Backward
-from trunnion.solve.contacts import bearing_middle
+from trunnion.solve.contacts import loads_on_ends
 from trunnion.solve.forward import Forward, PointMotion, SpatialWalk
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.loads import SpringState, has_useful_work, springs, useful_powers
@@ -229,19 +227,9 @@ def _end_load(measure: MotionRequest, back: Backward) -> Number:
 
     It is the load that friction with two contacts counts, see `joints.spatial_load`.
     """
-    walk, joint, reaction = back.walk, measure.subject, back.reactions[measure.subject]
-    path = f"joints.{joint}"
-    length = walk.values.get(f"{path}.guide.length", walk.values.get(f"{path}.pin.bearing"))
-    if not isinstance(walk, SpatialWalk):
-        axis, _ = walk.ends(joint)
-        across, couple = -axis.s * reaction.x + axis.c * reaction.y, reaction.m / length
-        squares = [(0.5 * across - couple) ** 2, (0.5 * across + couple) ** 2]
-    else:
-        middle, second = bearing_middle(walk, joint), walk.ends(joint)[1]
-        squares = []
-        for pin in walk.ends(joint) if walk.pair(joint).crossed else (second,):
-            fx, fy, gx, gy = BearingLoad(pin._replace(place=middle), length).felt(tuple(flat(reaction)))
-            squares += [(0.5 * fx + sign * gx) ** 2 + (0.5 * fy + sign * gy) ** 2 for sign in (-1.0, 1.0)]
+    joint = measure.subject
+    loads = loads_on_ends(back.walk, joint, back.reactions[joint], back.friction_wrenches[joint])
+    squares = [dot(load, load) for load in loads]
     largest = functools.reduce(namespace(*squares).maximum, squares)
     loaded = primal(largest) > 0
     xp = namespace(largest)

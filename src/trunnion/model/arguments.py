@@ -6,6 +6,7 @@ import functools
 import inspect
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from numbers import Integral, Real
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
@@ -14,6 +15,7 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.names import nearest
+from trunnion.model.screen import shown_as, stated_by
 
 __all__ = ["check_keywords", "held", "strict_arguments"]
 
@@ -67,7 +69,15 @@ def strict_arguments(public: Public) -> Public:
             elif isinstance(member, classmethod):
                 setattr(public, name, classmethod(_strict(member.__func__, call)))
         return public
-    return _strict(public, public.__name__)  # type: ignore[return-value]
+    strict = _strict(public, public.__name__)
+
+    @functools.wraps(public)
+    def in_units_of_the_model(*args: Any, **keywords: Any) -> Any:
+        stated = stated_by([*args, *keywords.values()])
+        with nullcontext() if stated is None else shown_as(stated):
+            return strict(*args, **keywords)
+
+    return in_units_of_the_model  # type: ignore[return-value]
 
 
 def _strict(function: Callable[..., Any], call: str) -> Callable[..., Any]:

@@ -44,7 +44,7 @@ def with_law(data: dict[str, Any], law: str, complete: bool = False) -> dict[str
     is not stated.
     """
     declared = {} if law == "off" else FRICTION_LAWS[law].parameters
-    needed = {key: 1.0 for key, one in declared.items() if complete and one.default is None}
+    needed = {key: 1.0 for key, one in declared.items() if complete and one.default is None and not one.optional}
     shared = _kept(data.get("joint_defaults", {}).get("friction"), declared)
     holders = [data.get("joint_defaults", {}), *data.get("joints", {}).values(), *data.get("loop", [])]
     for holder in (one for one in holders if "friction" in one):

@@ -381,7 +381,8 @@ def contact_lacks(joint: Joint, spatial: bool) -> tuple[str, ...]:
     """Sizes of pin or guide that friction in this joint needs and that are not stated, such as ("radius",)."""
     if has_guide(joint.type):
         return () if joint.guide and joint.guide.length else ("length",)
-    radius = () if joint.pin and joint.pin.radius else ("radius",)
+    rolls = joint.friction is not None and joint.friction.law == "rolling"
+    radius = () if rolls or (joint.pin and joint.pin.radius) else ("radius",)
     if not spatial or PAIRS[joint.type].ball:
         return radius
     return radius if joint.pin and (joint.pin.bearing or joint.pin.length) else (*radius, "bearing")

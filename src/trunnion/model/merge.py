@@ -62,7 +62,8 @@ def merge_joint(
     merged = merged.model_copy(
         update={"misalignment": _misalignment(joint, spatial), "seat": _seat(merged, defaults.seat)}
     )
-    if friction and friction.parameters.get("coefficient") == NO_FRICTION:
+    stated_of_law = friction.parameters if friction else {}
+    if stated_of_law.get("coefficient") == NO_FRICTION and stated_of_law.get("backward") in (None, NO_FRICTION):
         touches = has_pin(joint.type) or has_guide(joint.type)
         if not touches or contact_lacks(merged, spatial):
             return merged.model_copy(update={"friction": None})  # friction: 0 asks for no radius or length
@@ -155,8 +156,10 @@ def _friction(default: Mapping[str, Any], own: Mapping[str, Any]) -> Friction | 
         return None
     law = own.get("law") or default.get("law") or DEFAULT_LAW
     declared = FRICTION_LAWS[law].parameters
-    if default.get("law", law) != law:
-        default = {key: value for key, value in default.items() if key in declared}
+    if (default.get("law") or DEFAULT_LAW) != law:
+        default = {key: value for key, value in default.items() if key in (*declared, "model")}
+    if "coefficient" in own:  # of both directions, unless it says otherwise
+        default = {key: value for key, value in default.items() if key != "backward"}
     filled = {key: one.default for key, one in declared.items() if one.default is not None}
     model = own.get("model") or default.get("model") or "two-contact"
     return Friction.model_validate({**filled, **default, **own, "law": law, "model": model})

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-import re
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from enum import IntEnum
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Protocol
 
 from trunnion.errors import Finding, MechanismError, Severity, Status
-from trunnion.model.units import UnitError, si_unit, unit
+from trunnion.model.screen import shown_as, stated_units
 from trunnion.results.figure import Figure
 from trunnion.results.quantities import Units, common
 from trunnion.version import __version__
@@ -30,7 +28,6 @@ __all__ = [
     "finding_rows",
     "findings_of",
     "origin",
-    "stated_units",
     "summary_of",
     "units_of",
     "whole",
@@ -127,34 +124,7 @@ def summary_of(result: Described) -> list[Figure]:
 
 
 def units_of(result: Described) -> Units:
-    """The units in which a report shows forces, moments, powers and lengths: those of its first figures."""
+    """The units in which a report shows forces, moments, powers and lengths: those of its model, or of its figures."""
     rows = [row for row in summary_of(result) if not row.numerical]
-    return common((row.value, row.unit) for row in rows if isinstance(row.value, float))
-
-
-STATED = re.compile(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*([A-Za-zµ°][^±(]*?)\s*(?:[±+(-].*)?")  # "60 mm ± 0.05 mm"
-ANGLES = {"rad": "deg"}  # where no angle is stated; nobody reads radians
-
-
-def stated_units(mechanism: Mechanism) -> dict[str, str]:
-    """The unit that the model states most often, for each unit of SI: {"m": "mm", "rad": "deg"}."""
-    if "stated_units" not in mechanism.worked_out:
-        mechanism.worked_out["stated_units"] = _stated_units(mechanism)
-    return dict(mechanism.worked_out["stated_units"])
-
-
-def _stated_units(mechanism: Mechanism) -> dict[str, str]:
-    counts: Counter[tuple[str, str]] = Counter()
-    for entry in mechanism.parameter_set.entries.values():
-        text = str(entry.quantity.source)
-        match = STATED.fullmatch(text)
-        if entry.alias or not match:
-            continue
-        try:
-            counts[si_unit(unit(match[1])[1]), match[1]] += 1
-        except UnitError:  # of a formula: "2 e", "40 N * x"
-            continue
-    stated: dict[str, str] = {}
-    for (si, unit_text), _ in counts.most_common():
-        stated.setdefault(si, unit_text)
-    return {si: unit_text for si, unit_text in (ANGLES | stated).items() if si != unit_text}
+    with shown_as(attribute(result, "model_units", "{}")):
+        return common((row.value, row.unit) for row in rows if isinstance(row.value, float))

@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from trunnion.model.screen import in_use
+
 __all__ = [
     "Units",
     "between",
@@ -37,8 +39,11 @@ WORDS = {"rad/s^2": "rad/s²", "m/s^2": "m/s²", "kg m^2": "kg m²"}
 def prefixed(peak: float, unit: str) -> tuple[float, str]:
     """The factor and the unit that bring `peak` between 1 and 1000: (0.001, "kN m") for 18 750 N m.
 
-    Units without a use for prefixes (rad, 1, kg m²) come back as they are; so does a peak of zero or NaN.
+    Units without a use for prefixes (rad, 1, kg m²) come back as they are; so does a peak of zero or NaN. Of a model in
+    feet and pounds it is that which the model has.
     """
+    if unit in in_use():
+        return in_use()[unit]
     if unit == "rad":
         return 180.0 / math.pi, "°"
     if unit not in SCALABLE or not math.isfinite(peak) or peak == 0:
@@ -71,7 +76,7 @@ def common(sizes: Iterable[tuple[float, str]]) -> Units:
     for size, unit in sizes:
         if unit in SCALABLE and math.isfinite(size):
             most[unit] = max(most.get(unit, 0.0), abs(size))
-    return {unit: prefixed(size, unit) for unit, size in most.items() if size > 0}
+    return {**{unit: prefixed(size, unit) for unit, size in most.items() if size > 0}, **in_use()}
 
 
 def quantity(value: object, unit: str = "", units: Units | None = None) -> str:
@@ -99,7 +104,7 @@ def parts(value: float, unit: str, digits: int = 6) -> tuple[str, str]:
 
     No thin spaces and no zeros at the end, so that it can be searched for and copied.
     """
-    if unit == "mm" and abs(value) < 0.01:
+    if unit == "mm" and (abs(value) < 0.01 or "m" in in_use()):
         value, unit = value * 1e-3, "m"
     factor, shown = prefixed(value, unit)
     text = number(value * factor, digits).replace("\u202f", "")
@@ -116,12 +121,13 @@ def readable(value: float, unit: str = "", digits: int = 4) -> str:
 
 def drawn_in(peak: float, unit: str) -> tuple[float, str]:
     """The factor and the unit of what has limits: lengths in mm as on a drawing, others as `prefixed` has them."""
-    return (1e3, "mm") if unit == "m" else prefixed(peak, unit)
+    return (1e3, "mm") if unit == "m" and unit not in in_use() else prefixed(peak, unit)
 
 
 def scaled(peak: float, unit: str) -> tuple[float, str]:
     """Factor and unit for a size: degrees, millimetres (below 10 µm micrometres), others by a prefix that fits."""
-    return (1e3, "mm") if unit == "m" and (peak >= SMALL or not peak > 0) else prefixed(peak, unit)
+    millimetres = unit == "m" and unit not in in_use() and (peak >= SMALL or not peak > 0)
+    return (1e3, "mm") if millimetres else prefixed(peak, unit)
 
 
 def scale_of(nominal: float, parts_of: Iterable[float], unit: str) -> tuple[float, str]:
@@ -141,7 +147,7 @@ def decimals_of(small: float) -> int:
 
 def read_in(unit: str) -> tuple[float, str]:
     """Factor and unit of a figure that is compared with others of its kind: degrees, millimetres, else SI."""
-    return {"rad": (180 / math.pi, "°"), "m": (1e3, "mm"), "1": (1.0, "")}.get(unit, (1.0, unit))
+    return {"rad": (180 / math.pi, "°"), "m": (1e3, "mm"), "1": (1.0, ""), **in_use()}.get(unit, (1.0, unit))
 
 
 def decimals(uncertainty: float) -> int:

@@ -24,7 +24,7 @@ from trunnion.results.figure import Figure
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["EVERYWHERE", "Scales", "extreme_place", "scales_in", "without_noise"]
+__all__ = ["EVERYWHERE", "Scales", "extreme_place", "powers_of", "scales_in", "without_noise"]
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-10  # of the largest of its kind: what is less is no more than rounding, and how well a break is located
@@ -79,6 +79,11 @@ class Scales(NamedTuple):
             else figure
             for figure in figures
         ]
+
+
+def powers_of(unit: str) -> tuple[float, float, float]:
+    """The powers of length, rate and force in a unit; 0 of what is no unit of mechanics."""
+    return _powers(unit)[0]
 
 
 @cache

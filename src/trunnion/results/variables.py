@@ -1,7 +1,7 @@
 """What the result of a cycle consists of.
 
 `VARIABLES` is the whole vocabulary. Dims, before `position`: joint, link, point ("link.point"), axis (x, y, in space
-z), component (of a quaternion: w, x, y, z), driver, spring (only of a mechanism that has any).
+z), component (of a quaternion: w, x, y, z), driver, spring, bearing_end (only of a mechanism that has any).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from trunnion.results.dataset import MemberUnits, Variable, dataset_of, describe
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CYCLE", "VARIABLES", "allocate", "dataset", "variables"]
+__all__ = ["CYCLE", "OF_SOME_JOINTS", "VARIABLES", "allocate", "dataset", "variables"]
 
 
 def _rates(name: str, dims: tuple[str, ...], unit: str, long_name: str, space: str = "") -> dict[str, Variable]:
@@ -52,6 +52,18 @@ VARIABLES: dict[str, Variable] = {
         ("joint", "axis"), "N m", "friction moment on the second link, about the middle of the bearing", space="spatial"
     ),
     "friction_power": Variable(("joint",), "W", "power lost to friction"),
+    "end_load": Variable(
+        ("joint", "bearing_end", "axis"),
+        "N",
+        "load on each end of the bearing or guide, global axes; of a cross 3 and 4 on the pin of the second link",
+        part="bearings",
+    ),
+    "pin_pressure": Variable(
+        ("joint",),
+        "Pa",
+        "load over projected area of the pin, F/(d b), in space of the end that bears more",
+        part="bearings",
+    ),
     "drive_effort": Variable(("driver",), "effort", "drive effort on the second link by the first"),
     "drive_effort_lower": Variable(("driver",), "effort", "least drive effort where a friction is an interval"),
     "drive_effort_upper": Variable(("driver",), "effort", "largest drive effort where a friction is an interval"),
@@ -136,6 +148,7 @@ IN_SPACE = {
         ("link", "axis"), "rad", "rotation vector of the link against the ideal mechanism", part="errors"
     ),
 }
+OF_SOME_JOINTS = ("seats", "bearings")  # parts whose numbers not every joint has
 # the same array until something sets them apart
 SAME_AS = {"drive_effort_lower": "drive_effort", "drive_effort_upper": "drive_effort"}
 
@@ -198,7 +211,7 @@ def allocate(
         else:
             # zeroed pages take no memory until something is written: rows of the ground and slides of pins never are
             arrays[name] = np.zeros(shape, variable.dtype)
-            if variable.part == "seats" and variable.dtype is np.float64:
+            if variable.part in OF_SOME_JOINTS and variable.dtype is np.float64:
                 arrays[name][:] = np.nan  # of joints and ends that have none
     for name, other in SAME_AS.items():
         arrays[name] = arrays[other]

@@ -16,6 +16,7 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import flat
 from trunnion.groups.spatial import SpatialGroup
+from trunnion.joints.friction import directed
 from trunnion.solve.contacts import contacts_of
 from trunnion.solve.forward import Assembly, Forward, Travel, forward
 from trunnion.solve.friction import Contact, Settled, settle
@@ -23,7 +24,7 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.friction_problem import Rubbing
 from trunnion.solve.gears import GearLoad, acting, gear_load, on_thread, power_of, teeth, units
 from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs, stated_loads
-from trunnion.solve.system import Place, System, Values, law_of, rubbing
+from trunnion.solve.system import Place, System, Values, law_of, law_parameters, rubbing
 
 __all__ = [
     "Backward", "Given", "Sense", "backward", "pass_on", "sense_of", "solve", "unloaded",
@@ -290,7 +291,7 @@ def _slope(back: Backward, joint: str, rub: Rubbing, given: Given, i: int) -> tu
     Where there is no slip it is that which is about to begin.
     """
     law = law_of(back.walk.system, joint)
-    parameters = {name: back.walk.values[f"joints.{joint}.friction.{name}"] for name in law.parameters}
+    parameters = law_parameters(law, back.walk.values, joint)
     if joint in given.deflections:
         parameters["deflection"] = given.deflections[joint]
     sense, slip, zero, sliding = sense_of(given.zero_slip, joint, i), rub.slip, rub.zero, given.sliding
@@ -299,9 +300,9 @@ def _slope(back: Backward, joint: str, rub: Rubbing, given: Given, i: int) -> tu
         if not zero:
             slip = namespace(slip).where(primal(slip) * sense > 0.0, slip, 1e-300 * sense)
     if not np.any(zero):
-        return law.function(1.0, slip, **parameters), slip
+        return law.function(1.0, slip, **directed(parameters, slip)), slip
     slip = namespace(slip).where(zero, np.sign(sense) * np.maximum(np.abs(primal(slip)), 1e-300), slip)
-    slope = law.function(1.0, slip, **parameters)
+    slope = law.function(1.0, slip, **directed(parameters, slip))
     if law.at_rest is not None and not sliding:
         slope = namespace(slope).where(zero, law.at_rest(1.0, slip, **parameters), slope)
     if law.interval_at_rest and np.any(np.abs(sense) != 1.0) and np.any(sense):

@@ -10,20 +10,24 @@ ball has that bears on its great circle across that velocity, and the most for a
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Wrench
-from trunnion.algebra.space import Frame, Screw, about
-from trunnion.algebra.vector import Vector3, dot, plus, scaled
-from trunnion.joints.pairs import ContactLoad, PlanarContactLoad
+from trunnion.algebra.space import Frame, Screw, about, moment_at
+from trunnion.algebra.vector import Vector3, cross, dot, minus, plus, scaled
+from trunnion.joints.pairs import PAIRS, ContactLoad, PlanarContactLoad
 from trunnion.joints.spatial_load import BallLoad, BearingLoad
 from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.friction_problem import Rubbing
 
-__all__ = ["bearing_middle", "contacts_of"]
+if TYPE_CHECKING:
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = ["bearing_ends", "bearing_middle", "contacts_of", "has_pressure", "loads_on_ends"]
 
 NULL: Vector3 = (0.0, 0.0, 0.0)
 
@@ -33,6 +37,46 @@ def bearing_middle(walk: SpatialWalk, joint: str) -> Vector3:
     second = walk.ends(joint)[1]
     offset = walk.values.get(f"joints.{joint}.pin.offset")
     return second.place if offset is None else plus(second.place, scaled(offset, second.z))
+
+
+def bearing_ends(mechanism: Mechanism, joint: str) -> int:
+    """How many ends of bearings a joint has: two of a bearing or guide whose length is stated, four of a cross; in the
+    plane a pin bears its load in its middle."""
+    stated = mechanism.effective_joints[joint]
+    pair, spatial = PAIRS[stated.type], mechanism.space == "spatial"
+    if pair.guided:
+        return 2 if stated.guide and stated.guide.length is not None else 0
+    has_length = stated.pin is not None and (stated.pin.bearing is not None or stated.pin.length is not None)
+    return (4 if pair.crossed else 2) if has_length and spatial and (pair.one_axis or pair.crossed) else 0
+
+
+def has_pressure(mechanism: Mechanism, joint: str) -> bool:
+    """Whether the projected area of a joint's pin is stated."""
+    pin, pair = mechanism.effective_joints[joint].pin, PAIRS[mechanism.effective_joints[joint].type]
+    sized = pin is not None and pin.radius is not None and (pin.bearing is not None or pin.length is not None)
+    return sized and pair.turns and not pair.ball and not pair.threaded
+
+
+def loads_on_ends(walk: Forward, joint: str, reaction: Any, friction: Any) -> list[Vector3]:
+    """Load on each end of a joint's bearing or guide of length L along u, N: F⊥/2 ∓ M⊥ × u/L, global axes.
+
+    Friction with two contacts counts these. End 1 is that at −u. On the pins of a cross, that of the first link before
+    that of the second, the friction of each bears on the other.
+    """
+    path, pair = f"joints.{joint}", PAIRS[walk.system.joints[joint][0]]
+    length = walk.values[f"{path}.guide.length" if pair.guided else f"{path}.pin.bearing"]
+    if not isinstance(walk, SpatialWalk):
+        axis = walk.ends(joint)[0]
+        half, couple = 0.5 * (axis.c * reaction.y - axis.s * reaction.x), reaction.m / length
+        return [scaled(load, (-axis.s, axis.c, 0.0)) for load in (half - couple, half + couple)]
+    wrench = walk.algebra.added(reaction, friction) if pair.crossed else reaction
+    force, moment = wrench.u, moment_at(wrench, bearing_middle(walk, joint))
+    loads: list[Vector3] = []
+    for pin in walk.ends(joint) if pair.crossed else walk.ends(joint)[1:]:
+        half = scaled(0.5, minus(force, scaled(dot(force, pin.z), pin.z)))
+        couple = scaled(1 / length, cross(moment, pin.z))
+        loads += [minus(half, couple), plus(half, couple)]
+    return loads
 
 
 def contacts_of(walk: Forward, joint: str) -> Iterator[Rubbing]:
@@ -49,17 +93,25 @@ def _in_plane(walk: Forward, joint: str) -> Iterator[Rubbing]:
     speed = walk.speed(joint)
     zero = np.abs(primal(speed)) <= walk.noise(joint, turns)
     if turns:
-        lever = walk.values[f"{path}.pin.radius"]
         if joint in walk.system.screws:
+            lever = walk.values[f"{path}.pin.radius"]
             yield from (_thread(walk, name, lever, speed, zero) for name in walk.system.screws[joint])
             return
-        yield Rubbing(PlanarContactLoad(), lever * speed, Wrench(0.0, 0.0, lever), zero, amount=lever, turning=1.0)
+        lever, turning = _lever(walk, joint)
+        yield Rubbing(PlanarContactLoad(), lever * speed, Wrench(0.0, 0.0, lever), zero, amount=lever, turning=turning)
         return
     axis, middle = walk.ends(joint)
     at = axis if joint in walk.system.reversed else middle  # what the module's reaction is about
     arm = None if at is middle else (middle.x - at.x, middle.y - at.y)
     load = PlanarContactLoad((-axis.s, axis.c), walk.values[f"{path}.guide.length"], arm)
     yield Rubbing(load, speed, Wrench(axis.c, axis.s, 0.0), zero)
+
+
+def _lever(walk: Forward, joint: str) -> tuple[Number, Number | None]:
+    """The lever of friction in a pin, m, and how it turns the seat: a rolling one has its arm, and does not."""
+    path = f"joints.{joint}"
+    arm = walk.values.get(f"{path}.friction.arm")
+    return (walk.values[f"{path}.pin.radius"], 1.0) if arm is None else (arm, None)
 
 
 def _thread(walk: Forward, name: str, lever: Number, speed: Number, zero: Number) -> Rubbing:
@@ -94,7 +146,7 @@ def _in_space(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
     if pair.guided:
         yield Rubbing(load, slide, about(axis, NULL, middle), slid)
         return
-    lever = walk.values[f"joints.{joint}.pin.radius"]
+    lever, turning = _lever(walk, joint)
     moment = Screw(NULL, scaled(lever, axis))
     if pair.threaded:
         lead = walk.system.lead(walk.values, joint)
@@ -104,7 +156,7 @@ def _in_space(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
     elif pair.slides and not walk.system.summed(joint):
         yield _resultant(load, axis, middle, lever, (lever * turn, slide), turned & slid)
     else:
-        yield Rubbing(load, lever * turn, moment, turned, amount=lever, turning=1.0)
+        yield Rubbing(load, lever * turn, moment, turned, amount=lever, turning=turning)
         if pair.slides:
             yield Rubbing(load, slide, about(axis, NULL, middle), slid, amount=0.0)
 

@@ -629,10 +629,21 @@ def felt(system: System, values: Values) -> list[str]:
     """Joints with friction whose coefficient is not 0, as far as their law is proportional to one."""
     joints = []
     for joint in rubbing(system):
-        path = f"joints.{joint}.friction.{law_of(system, joint).scale}"
+        path = f"joints.{joint}.friction.{scale_of(system, values, joint)}"
         if path not in values or np.any(np.asarray(primal(values[path])) != 0):
             joints.append(joint)
     return joints
+
+
+def law_parameters(law: FrictionLaw, values: Values, joint: str) -> dict[str, Number]:
+    """The stated parameters of the friction law of a joint."""
+    paths = {key: f"joints.{joint}.friction.{key}" for key in law.parameters}
+    return {key: values[path] for key, path in paths.items() if path in values}
+
+
+def scale_of(system: System, values: Values, joint: str) -> str:
+    """The parameter that the friction of a joint is proportional to; "" of none, or where directions differ."""
+    return "" if f"joints.{joint}.friction.backward" in values else law_of(system, joint).scale
 
 
 def law_of(system: System, joint: str) -> FrictionLaw:

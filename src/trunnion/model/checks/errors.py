@@ -79,7 +79,8 @@ def joint_errors(mechanism: Numbers) -> Iterator[Finding]:
             yield from _misalignment(own, f"{where}.misalignment", mechanism.space == "spatial")
         if has_pin(joint.type):
             yield from _pin(mechanism, name, own.pin, where)
-        yield from _unused(joint.type, own.pin, own.friction, where, mechanism.space == "spatial")
+        sized = joint.pin is not None and joint.pin.radius is not None
+        yield from _unused(joint.type, own.pin, own.friction, where, mechanism.space == "spatial", sized)
         if own.seat_on is not None:
             yield from _seat_on(joint, f"{where}.seat_on")
         if joint.seat not in (None, "free"):
@@ -189,14 +190,20 @@ def _empty_seat(seat: object, where: str) -> Iterator[Finding]:
         yield Finding("states no position", f"{where}.seat", "write {xi: 30 deg}, or of a ball {direction: [0, 0, 1]}")
 
 
-def _unused(kind: str, pin: Pin | None, friction: Friction | None, where: str, spatial: bool) -> Iterator[Finding]:
-    """Sizes of a pin, and a model of friction, that change nothing in a joint of a kind; "" of all in the plane."""
+def _unused(
+    kind: str, pin: Pin | None, friction: Friction | None, where: str, spatial: bool, sized: bool
+) -> Iterator[Finding]:
+    """Sizes of a pin, and a model of friction, that change nothing in a joint of a kind; "" of all in the plane.
+
+    sized: whether the radius is stated, with which the length of a pin in the plane tells its pressure.
+    """
     if spatial and not PAIRS[kind].ball:
         return
     body = "a ball" if spatial else "a pin in the plane"
     for key in ("length", "bearing"):
-        if pin and getattr(pin, key) is not None:
-            what = f"{body} has no {key}: it is not used"
+        if pin and getattr(pin, key) is not None and not (sized and not spatial):
+            what = f"{body} has no {key}" if spatial else f"{body} without a radius has no use for its {key}"
+            what += ": it is not used"
             yield Finding(what, f"{where}.pin.{key}", "keep it as a remark, or remove it", Severity.NOTE)
     if pin and pin.offset is not None and not spatial:
         yield Finding("there is no axis in the plane to offset a bearing along", f"{where}.pin.offset", "remove it")
@@ -209,7 +216,9 @@ def _defaults(mechanism: Numbers) -> Iterator[Finding]:
     """Defaults that mean no joint."""
     pin, seat = mechanism.joint_defaults.pin, mechanism.joint_defaults.seat
     if mechanism.space == "planar":
-        yield from _unused("", pin, mechanism.joint_defaults.friction, "joint_defaults", spatial=False)
+        pins = [joint.pin for joint in mechanism.effective_joints.values()]
+        sized = any(one is not None and one.radius is not None for one in pins)
+        yield from _unused("", pin, mechanism.joint_defaults.friction, "joint_defaults", False, sized)
     joints = mechanism.effective_joints.values()
     yield from _empty_seat(seat, "joint_defaults")
     if pin and pin.end_float is not None and mechanism.space == "planar":

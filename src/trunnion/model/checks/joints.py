@@ -45,9 +45,9 @@ def joint_findings(mechanism: Numbers) -> Iterator[Finding]:
         yield from _losses(joint, f"{where}.losses")
         if joint.friction is not None:
             own = mechanism.stated_joints[name].friction
-            yield from _parameters_of_law(
-                joint.friction, "joint_defaults.friction" if own is None else f"{where}.friction"
-            )
+            stated_at = "joint_defaults.friction" if own is None else f"{where}.friction"
+            yield from _parameters_of_law(joint.friction, stated_at)
+            yield from _suits(joint, joint.friction, f"{where}.friction")
 
 
 def _ends(mechanism: Numbers, name: str, joint: Joint) -> Iterator[Finding]:
@@ -77,9 +77,21 @@ def _parameters_of_law(friction: Friction, where: str) -> Iterator[Finding]:
             what = f"the key '{parameter}' is unknown to the friction law {law}"
             yield Finding(what, f"{where}.{parameter}", nearest(parameter, ["law", "model", *declared]))
     for parameter, one in declared.items():
-        if one.default is None and parameter not in friction.parameters:
+        if one.default is None and not one.optional and parameter not in friction.parameters:
             remedy = f"add {parameter}" + f" ({one.meaning})" * bool(one.meaning)
             yield Finding(f"the friction law {law} needs '{parameter}'", where, remedy)
+
+
+def _suits(joint: Joint, friction: Friction, where: str) -> Iterator[Finding]:
+    """Whether friction by direction has a direction, and rolling friction something that rolls."""
+    if "backward" in friction.parameters and (PAIRS[joint.type].count != 1 or joint.contact is not None):
+        what = "in play" if joint.contact is not None else f"of the type {joint.type}"
+        remedy = "state the coefficient alone; joints of one freedom have a forward and a backward"
+        yield Finding(f"friction by direction in a joint {what} is not modelled", f"{where}.backward", remedy)
+    if friction.law == "rolling" and (not PAIRS[joint.type].pivot or joint.contact is not None):
+        what = "in play" if joint.contact is not None else f"of the type {joint.type}"
+        remedy = "use it in revolute joints; of a slide on rollers state the coefficient arm over radius"
+        yield Finding(f"rolling friction in a joint {what} is not modelled", f"{where}.law", remedy)
 
 
 def _stiffness(mechanism: Numbers, joint: Joint, where: str) -> Iterator[Finding]:
@@ -236,11 +248,13 @@ def joint_values(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterat
 
     yield from _contact_values(joint, numbers.nominal, where)
     if joint.friction and joint.friction.law:
-        if (number := value("friction.coefficient")) > 1:
-            what, remedy = f"is {number:g}, above 1", "check it: dry metals have 0.1 to 0.6"
-            yield Finding(what, stated("friction.coefficient"), remedy, Severity.WARNING)
+        for path in ("friction.coefficient", "friction.backward"):
+            if (number := value(path)) > 1:
+                what, remedy = f"is {number:g}, above 1", "check it: dry metals have 0.1 to 0.6"
+                yield Finding(what, stated(path), remedy, Severity.WARNING)
         across = ("pin.bearing", "guide.width") if mechanism.space == "spatial" else ()
-        for size in ("pin.radius", "guide.length", *across):
+        sizes = ("pin.radius",) * (joint.friction.law != "rolling") + ("guide.length", *across)
+        for size in sizes:
             if value(size) == 0:
                 yield Finding("is 0, where friction needs it", stated(size), "give a value above 0")
     for part, size in (("pin", "radius"), ("guide", "length")):

@@ -52,7 +52,7 @@ def _has_ends(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
     """Whether a joint has a bearing or a guide of a stated length; a pin in the plane bears its load in its middle."""
     joint = mechanism.effective_joints[name]
     guide = joint.guide.length if joint.guide else None
-    bearing = joint.pin.bearing if joint.pin and mechanism.space == "spatial" else None
+    bearing = (joint.pin.bearing or joint.pin.length) if joint.pin and mechanism.space == "spatial" else None
     if guide is None and bearing is None:
         what = f"the joint '{name}' has no ends: it states no length of a bearing or guide"
         plane = "in the plane only guides have ends; " if mechanism.space == "planar" else ""

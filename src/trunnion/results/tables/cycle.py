@@ -55,6 +55,7 @@ SEATS: Stems = {
     "seat_xi_pin": "seat_xi_pin",
     "contact_lost": "contact_lost",
 }
+BEARINGS: Stems = {"end_load": "end_load", "pin_pressure": "pin_pressure"}
 # by dimension
 POSITIONS: dict[str, Stems] = {
     "joint": {
@@ -64,6 +65,7 @@ POSITIONS: dict[str, Stems] = {
         "joint_slide_velocity": "slide_velocity",
         "reaction_force": "reaction",
         "reaction_moment": "reaction_moment",
+        **BEARINGS,
         "friction_torque": "friction_torque",
         "friction_force": "friction_force",
         "friction_power": "friction_power",
@@ -184,6 +186,8 @@ def _members(result: xr.Dataset, stems: Mapping[str, Stems]) -> Iterator[Column]
     def moves(i: int, variable: str, index: tuple[int, ...]) -> bool:
         if variable in SEATS:  # of joints and ends that have one
             return bool(np.any(np.isfinite(result["seat_offset"].values[(i, *index[:1])])))
+        if variable in BEARINGS:  # of joints with ends, or with a pin whose size is stated
+            return bool(np.any(np.isfinite(result[variable].values[(i, *index)])))
         return _has(kinds[i], variable, spatial)
 
     for dim, stems_of in stems.items():

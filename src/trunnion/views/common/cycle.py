@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "Abscissa", "Interval", "abscissa", "course", "intervals", "layout", "mean_friction", "numbers", "series",
-    "status_text", "thin", "valid",
+    "Abscissa", "Interval", "abscissa", "course", "intervals", "larger_end", "layout", "mean_friction", "numbers",
+    "series", "status_text", "thin", "valid",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -105,6 +105,13 @@ def column(result: xr.Dataset, name: str, **where: str) -> Array | None:
     variable = result[name]
     place = tuple(variable.indexes[dim].get_loc(where[dim]) if dim in where else slice(None) for dim in variable.dims)
     return np.asarray(variable.values[place], dtype=float)
+
+
+def larger_end(result: xr.Dataset, joint: str) -> Array | None:
+    """The larger load on the ends of a joint's bearing or guide, N; None where it has none."""
+    ends = column(result, "end_load", joint=joint)
+    size = None if ends is None else np.fmax.reduce(np.linalg.norm(ends, axis=1))
+    return size if size is not None and np.any(np.isfinite(size)) else None
 
 
 def abscissa(result: xr.Dataset) -> Abscissa:

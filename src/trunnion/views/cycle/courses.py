@@ -38,7 +38,7 @@ from trunnion.views.charts import (
     over_drive,
     silent,
 )
-from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, layout, mean_friction, names
+from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, larger_end, layout, mean_friction, names
 from trunnion.views.common.peaks import ease, peak, usual_peak
 from trunnion.views.cycle.deviations import losses, need, outputs, point_errors, worst_points
 from trunnion.views.space.bodies import is_spatial
@@ -158,23 +158,29 @@ def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 
 
 def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
-    """Magnitude of the reaction in each joint, in space also of its moment; without friction thin, dotted."""
+    """Magnitude of the reaction in each joint, in space also of its moment, and the larger load on the ends of each
+    bearing; without friction thin, dotted."""
     over, joints = abscissa(result), names(result, "joint")
     parts = [("force of the reaction", "reaction_force", "N"), ("moment of the reaction", "reaction_moment", "N m")]
     if not is_spatial(result):
         parts = [("magnitude of the reaction", "reaction_force", "N")]
 
-    def sizes(of: xr.Dataset, variable: str) -> list[Array]:
-        each = (column(of, variable, joint=joint) for joint in joints)
-        return [np.linalg.norm(values, axis=0) for values in each if values is not None]
+    if "end_load" in result:
+        parts.append(("larger load on an end", "end_load", "N"))
+
+    def sizes(of: xr.Dataset, variable: str) -> dict[str, Array]:
+        if variable == "end_load":
+            return {joint: size for joint in joints if (size := larger_end(of, joint)) is not None}
+        each = {joint: column(of, variable, joint=joint) for joint in joints}
+        return {joint: np.linalg.norm(values, axis=0) for joint, values in each.items() if values is not None}
 
     charts = []
     for title, variable, unit in parts:
-        lines = [Line(over.values, size, joint, nth(k), close=True)
-                 for k, (joint, size) in enumerate(zip(joints, sizes(result, variable), strict=True))]  # fmt: skip
-        free = [] if ideal is None else sizes(ideal, variable)
+        lines = [Line(over.values, size, joint, nth(joints.index(joint)), close=True)
+                 for joint, size in sizes(result, variable).items()]  # fmt: skip
+        free = {} if ideal is None else sizes(ideal, variable)
         dashed = [Line(over.values, size, None if k else "without friction", FREE, close=True)
-                  for k, size in enumerate(free)]  # fmt: skip
+                  for k, size in enumerate(free.values())]  # fmt: skip
         charts.append(over_drive(result, over, title, unit, [*lines, *dashed]))
     return _stack("Joint reactions", charts)
 

@@ -15,7 +15,7 @@ from trunnion.joints.pairs import GUIDED
 from trunnion.results.attributes import units_of
 from trunnion.results.dataset import units_along
 from trunnion.results.scales import without_noise
-from trunnion.views.common.cycle import abscissa, column, course, intervals, layout, names, numbers, series
+from trunnion.views.common.cycle import abscissa, column, course, intervals, larger_end, layout, names, numbers, series
 from trunnion.views.common.peaks import ease
 from trunnion.views.cycle.courses import varying
 from trunnion.views.cycle.deviations import losses
@@ -142,6 +142,7 @@ def _joints(stated: dict[str, Any], result: xr.Dataset, ideal: xr.Dataset | None
                 "reaction": _reaction(result, name),
                 "ideal": None if ideal is None else _reaction(ideal, name),
                 "moment": _moment(result, name),
+                "end_load": series(larger_end(result, name)),
                 "friction_power": series(column(result, "friction_power", joint=name)),
                 "slide": series(column(result, "joint_slide", joint=name)) if slides else [],
                 "friction": series(column(result, "friction_force", joint=name)) if slides else [],

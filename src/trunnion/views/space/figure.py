@@ -64,7 +64,7 @@ def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
     over = abscissa(result)
     facts = [f"{over.label} = {over.say(index)}", str(result.attrs.get("formula", ""))]
     if arrows and not told:
-        facts[0] += ", where the reaction is largest"
+        facts[0] += ", where the load of a joint is largest"
     status = int(result["status"].values[index])
     if status >= Status.NOT_CONVERGED:
         facts.append(status_text(status).split(":")[0])
@@ -89,11 +89,11 @@ def _limits(look: Scenery, arrows: list[tuple[Array, Array]]) -> tuple[Array, Ar
 
 
 def _telling(result: xr.Dataset, shown: Space) -> int:
-    """The position of the largest usual reaction, or one in the first eighth where there is none."""
+    """The position of the largest usual force in a joint, or one in the first eighth where there is none."""
     known = np.flatnonzero(shown.drawable)
-    forces = column(result, "reaction_force")
-    if forces is not None and forces.size:
-        sizes = np.linalg.norm(forces, axis=1)
+    forces = _forces(result)
+    if forces:
+        sizes = np.array([np.fmax.reduce(np.linalg.norm(of, axis=1)) for of in forces.values()])
         most = usual_peak(ease(result), sizes)
         each = np.where(np.isfinite(sizes) & (sizes <= most * (1 + 1e-12)), sizes, -1.0).max(axis=0)[known]
         if most > 0 and each.max() > 0 and np.ptp(each) > 1e-6 * most:
@@ -154,21 +154,32 @@ def _dashed(track: Array, dash: float) -> Array:
 
 
 def _reactions(look: Scenery, result: xr.Dataset, index: int) -> tuple[list[tuple[Array, Array]], float]:
-    """Start and end of the arrow of each joint's reaction that can be seen, and the largest of them, N."""
-    forces = column(result, "reaction_force")
-    if forces is None or not np.isfinite(forces[..., index]).any():
-        return [], 0.0
-    here = {str(name): forces[row, :, index] for row, name in enumerate(result["joint"].values)}
-    most = max((float(np.linalg.norm(force)) for force in here.values() if np.isfinite(force).all()), default=0.0)
+    """Start and end of the arrows of each joint's forces that can be seen, and the largest of all, N."""
+    here = {name: of[..., index] for name, of in _forces(result).items()}
+    sizes = {name: np.linalg.norm(of, axis=1) for name, of in here.items()}
+    most = max((float(size) for of in sizes.values() for size in of if np.isfinite(size)), default=0.0)
     found = []
-    for name, force in here.items():
-        if name not in look.shown.joints or not np.isfinite(force).all() or np.linalg.norm(force) <= 0.01 * most:
-            continue
-        start = look.camera.seen(look.shown.seated(name)[:, index])[:2]
-        end = start + look.camera.seen(force)[:2] * LENGTH * look.diagonal / most
-        if np.hypot(*(end - start)) > 0.01 * look.diagonal:
-            found.append((start, end))
+    for name, forces in here.items():
+        for force, size in zip(forces, sizes[name], strict=True):
+            if name not in look.shown.joints or not size > 0.01 * most:
+                continue
+            start = look.camera.seen(look.shown.seated(name)[:, index])[:2]
+            end = start + look.camera.seen(force)[:2] * LENGTH * look.diagonal / most
+            if np.hypot(*(end - start)) > 0.01 * look.diagonal:
+                found.append((start, end))
     return found, most
+
+
+def _forces(result: xr.Dataset) -> dict[str, Array]:
+    """Of each joint the loads on the ends of its bearing or guide, its reaction where it has none, (force, axis,
+    position), N: a small reaction may bear on both ends of a pin with large forces."""
+    found = {}
+    for joint in map(str, result["joint"].values):
+        force, ends = column(result, "reaction_force", joint=joint), column(result, "end_load", joint=joint)
+        if force is not None:
+            solid = np.empty(0) if ends is None else ends[np.any(np.isfinite(ends), axis=(1, 2))]
+            found[joint] = solid if len(solid) else force[None]
+    return found
 
 
 def _arrow(axes: Axes, start: Array, end: Array, colour: str) -> None:
@@ -187,12 +198,12 @@ def _key(axes: Axes, look: Scenery, most: float) -> None:
     """A triad of the global axes, bars of a round length and, where reactions reach `most` N, of a round force."""
     (x0, x1), y0 = axes.get_xlim(), axes.get_ylim()[0]
     if most > 0:
-        size = _round(0.6 * most)
-        factor, unit = prefixed(size, "N")
+        factor, unit = prefixed(0.6 * most, "N")
+        size = _round(0.6 * most * factor) / factor
         y, long = y0 + 0.025 * look.diagonal, size / most * LENGTH * look.diagonal
         start = np.array([x1 - long - 0.01 * look.diagonal, y])
         _arrow(axes, start, start + np.array([long, 0.0]), REACTION)
-        axes.annotate(f"reaction {size * factor:g} {unit}", (start[0], y), xytext=(-5, 0), textcoords="offset points",
+        axes.annotate(f"load {size * factor:g} {unit}", (start[0], y), xytext=(-5, 0), textcoords="offset points",
                       ha="right", va="center", fontsize=8, color=MUTED)  # fmt: skip
     arm = 0.05 * look.diagonal
     origin = np.array([x0 + 1.6 * arm, y0 + 1.6 * arm])
@@ -208,8 +219,8 @@ def _key(axes: Axes, look: Scenery, most: float) -> None:
         axes.text(origin[0] + 1.8 * arm, y0 + 0.025 * look.diagonal, "all axes meet in one point: drawn on a sphere",
                   fontsize=8, color=MUTED, va="center")  # fmt: skip
         return
-    length = _round(0.18 * (x1 - x0))
-    factor, unit = prefixed(length, "m")
+    factor, unit = prefixed(0.18 * (x1 - x0), "m")
+    length = _round(0.18 * (x1 - x0) * factor) / factor
     left, y, tick = origin[0] + 2.1 * arm, y0 + 0.025 * look.diagonal, 0.006 * look.diagonal
     axes.plot([left, left, left, left + length, left + length, left + length],
               [y - tick, y + tick, y, y, y - tick, y + tick], color=MUTED, linewidth=1.1, zorder=6)  # fmt: skip

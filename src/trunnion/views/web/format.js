@@ -11,6 +11,7 @@ const SCALABLE = new Set(["N m", "N", "W", "m", "s", "J", "Pa"]);
  */
 export function prefixed(peak, unit, units = {}) {
   const [common, name] = units[unit] ?? [0, ""];
+  if (name && !name.endsWith(unit)) return { factor: common, unit: name }; // of feet and pounds
   if (Math.abs(peak) * common >= SMALLEST && Math.abs(peak) * common < LARGEST) return { factor: common, unit: name };
   if (unit === "rad") return { factor: 180 / Math.PI, unit: "°" };
   if (!SCALABLE.has(unit) || !Number.isFinite(peak) || peak === 0) {

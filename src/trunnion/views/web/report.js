@@ -29,6 +29,7 @@ export function charts(scene, kinds) {
   const losses = lossChart(scene, kinds, lost);
   const reactions = [reactionChart(scene, kinds)];
   if (scene.space === "spatial") reactions.push(momentChart(scene, kinds));
+  reactions.push(...endChart(scene, kinds));
   const power = motion && !moved(scene, lost) ? [] : [powerChart(scene, lost)];
   const list = motion
     ? [...speedCharts(scene), ...efforts, ...energyChart(scene), ...contactCharts(scene), ...reactions, ...losses, ...power]
@@ -148,6 +149,13 @@ function momentChart(scene, kinds) {
     .filter((one) => peak(one.values) > 0);
   const note = "About the middle of the bearing; without drive and friction.";
   return { title: "Reaction moments, magnitude", unit: "N m", series, note };
+}
+
+function endChart(scene, kinds) {
+  const series = scene.joints
+    .filter(({ end_load }) => end_load?.length)
+    .map(({ name, end_load }) => ({ label: name, values: full(end_load, scene.count), kind: kinds.get(name) }));
+  return series.length ? [{ title: "Larger load on an end of bearing or guide", unit: "N", series }] : [];
 }
 
 function powerChart(scene, lost) {

@@ -153,6 +153,13 @@ _GROUPS = (
         "sense = 1.0 if group.joints[k].sides[1] in members else -1.0",
         ("tests/invariants/test_spatial_groups.py", "tests/reference/test_space_values.py", "-k", "spin"),
     ),
+    Fault(
+        "line-of-a-knee-fixed-in-its-link",
+        "groups/spatial.py",
+        "dot(twists[link].u, self._axis_rate(",
+        "0.0 * dot(twists[link].u, self._axis_rate(",
+        ("tests/reference/test_passive_freedoms.py", "-k", "does_not_spin"),
+    ),
 )
 
 _SOLVE = (

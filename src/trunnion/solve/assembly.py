@@ -9,7 +9,7 @@ assemblies are apart. `assembly_modes` lists them at that same position, so that
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -23,7 +23,7 @@ from trunnion.errors import Finding, MechanismError, agreeing
 from trunnion.groups.gear import NUMBERS, rotation
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.spins import unspun
-from trunnion.groups.tree import OUTER
+from trunnion.groups.tree import OUTER, Element
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import as_key
 from trunnion.model.parts import FOLDS
@@ -177,16 +177,17 @@ def _closed_form(walk: Forward, number: int, times: Array, drawn: int | None) ->
 
 def _off_drawing(walk: Forward, number: int, pose: Any, lane: int | NDArray[np.intp]) -> Array:
     """How far a module is from where it is drawn in a pose at a position, or in a lane of many, m²."""
-    module, group = walk.system.plan.modules[number], walk.system.groups[number]
+    group = walk.system.groups[number]
     frames = each(pose.frames, lambda part: lane_of(primal(part), lane))
     spun = sorted({link for spin in getattr(group, "spinning", ()) for link in group.spun(*spin)})
-    points = [
-        (link, walk.local[module.links[link], joint].place)
-        for link in spun
-        for joint in module.joints
-        if module.links[link] in walk.system.joints[joint][1]
-    ]
-    return off_drawing(walk, frames, spun, points)
+    lengths: Iterator[tuple[Number, Number]] = iter(())
+    if spun:
+        places = each(pose.elements, lambda part: lane_of(primal(part), lane))
+        drawn = [
+            Element(*(walk.local[link, place.joint] for link in place.links)) for place in walk.system.places[number]
+        ]
+        lengths = zip(group.unturned(places), group.unturned(drawn), strict=True)
+    return off_drawing(walk, frames, spun, list(lengths))
 
 
 def ways_of(walk: Forward, number: int, times: Array) -> tuple[int | None, Any]:
@@ -641,7 +642,7 @@ def _never(system: System, module: Module) -> Finding:
         remedy = "they need play to fit together: see `trunnion assemble FILE` for how much"
         return Finding.warning("assembly.never_rigid", "links", what, remedy, links=links)
     plan, drivers = system.plan, len(system.mechanism.drivers)
-    spinning = f" ({len(plan.passive)} of them spins of a single link)" if plan.passive else ""
+    spinning = f" ({len(plan.passive)} of them passive)" if plan.passive else ""
     what = f"links {', '.join(links)} cannot be assembled at any position of the cycle; the mobility is "
     what += f"{plan.mobility} by Grübler's formula{spinning} and the number of drivers {drivers}"
     remedy = "check the lengths, or give a better assembly hint; so many constraints are consistent with special "

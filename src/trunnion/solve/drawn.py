@@ -36,11 +36,11 @@ def drawn_at(walk: Forward, times: Array) -> int | None:
     return int(np.argmin(away))
 
 
-def off_drawing(walk: Forward, frames: Sequence[Any], spun: Sequence[int], points: Sequence[Any]) -> Array:
+def off_drawing(walk: Forward, frames: Sequence[Any], spun: Sequence[int], unturned: Sequence[Any]) -> Array:
     """Sum of the squared distances of links from where they are drawn, m².
 
-    frames: of the links of a module; spun: those that spin freely, of which only points count; points: (link, local
-    place) of these.
+    frames: of the links of a module; spun: those that spin freely, of which only what a spin leaves alone counts;
+    unturned: its lengths, and those that are drawn.
     """
     size, total = float(np.max(primal(walk.size))), np.zeros(())
     for link, frame in enumerate(frames):
@@ -56,9 +56,8 @@ def off_drawing(walk: Forward, frames: Sequence[Any], spun: Sequence[int], point
         else:
             x, y, c, s = (primal(part) for part in frame)
             total = total + x**2 + y**2 + (size * (c - 1.0)) ** 2 + (size * s) ** 2
-    for link, place in points:
-        here = walk.algebra.point_of(each(frames[link], primal), place)
-        total = total + sum((is_ - was) ** 2 for is_, was in zip(here, place, strict=True))
+    for is_, was in unturned:
+        total = total + (is_ - was) ** 2
     return np.asarray(total, float)
 
 

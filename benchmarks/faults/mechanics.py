@@ -192,6 +192,20 @@ _SOLVE = (
         ("tests/reference/test_change_points.py", "-m", "not slow", "-x"),
     ),
     Fault(
+        "ends-where-a-track-turns-over",
+        "solve/assembly.py",
+        "for moment in follower.broken(track.coordinates, times)]",
+        "for moment in follower.broken(track.coordinates, times)[:0]]",
+        ("tests/reference/test_change_points.py", "-k", "in_space and deltoid"),
+    ),
+    Fault(
+        "turns-over-where-the-start-is-met",
+        "solve/assembly.py",
+        "return bool(np.max(np.abs(ends[:, 1] - ends[:, 0])) < SAME)",
+        "return False",
+        ("tests/reference/test_change_points.py", "-k", "have_no_forces"),
+    ),
+    Fault(
         "spin-friction-sign",
         "solve/space/determinacy.py",
         "sign = 1.0 if walk.system.joints[name][1][1] in members else -1.0",

@@ -202,14 +202,94 @@ def test_a_slider_crank_with_a_rod_like_its_crank() -> None:
     np.testing.assert_allclose(x, 0.6 * np.cos(0.2 + result["time"].values), atol=1e-12)
 
 
-@pytest.mark.parametrize("kind", ["parallelogram", "antiparallelogram"])
+@pytest.mark.parametrize("kind", LINKAGES)
 def test_in_space(kind: str) -> None:
     """A general group, which is followed by Newton's method, goes on as the closed form does."""
-    sides, at = PARALLELOGRAM if kind == "parallelogram" else ANTIPARALLELOGRAM
-    result = analyse(driven_four_bar("spatial", sides, at), 101)
-    where = LINKAGES[kind][1](1.0 + result["time"].values)
-    place = result["point_position"].sel(point="rocker.C").values[:2]
-    np.testing.assert_allclose(place, [where.real, where.imag], atol=1e-8)
+    sides, place = LINKAGES[kind]
+    result = analyse(driven_four_bar("spatial", sides, hinted(place, 1.0)["C"]), 101)
+    where = place(1.0 + result["time"].values)
+    at = result["point_position"].sel(point="rocker.C").values[:2]
+    np.testing.assert_allclose(at, [where.real, where.imag], atol=1e-10)
+    (finding,) = [finding for finding in result.trunnion.findings if finding.code == "assembly.change_point"]
+    assert finding.figures["places"] == (["360°", "720°"] if kind == "deltoid" else ["180°", "360°"])
+
+
+CRANK, HEIGHT, ROCKER, BRAKED = 0.3, 0.25, 0.9, 7.0
+TANGENT = np.array([0.9, 0.3, 0.35]) / np.linalg.norm([0.9, 0.3, 0.35])
+OUTWARD = np.cross(TANGENT, [0.2, -0.5, 1.0]) / np.linalg.norm(np.cross(TANGENT, [0.2, -0.5, 1.0]))
+PIVOT = np.array([0.0, 0.0, HEIGHT]) - ROCKER * OUTWARD
+
+
+def rocked(theta: Array) -> Array:
+    """Turn of the rocker from where its ball lies on the crank's axis, where it may also stay: twice the mean of both
+    roots of p cos ψ + q sin ψ = const."""
+    away = np.array([CRANK * np.cos(theta), CRANK * np.sin(theta), 0.0 * theta]) - PIVOT[:, None]
+    return np.asarray(np.unwrap(2 * np.arctan2(TANGENT @ away, OUTWARD @ away)))
+
+
+def spatial_kite(moves: bool, **drive: Any) -> Mechanism:
+    """RSSR whose bar is as long as the ball of the crank is from a point on the crank's axis, where that of the rocker
+    can be: twice a turn the rocker that stays there may as well move."""
+    upright = {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}
+    axis = np.cross(OUTWARD, TANGENT)
+    pivot = {"at": PIVOT.tolist(), "axis": axis.tolist(), "x": OUTWARD.tolist()}
+    angle = rocked(np.array([drive["start"]]))[0] if moves else 0.0
+    ball = PIVOT + ROCKER * (np.cos(angle) * OUTWARD + np.sin(angle) * TANGENT)
+    ends = {"A": ["ground", "crank"], "B": ["crank", "bar"], "C": ["bar", "rocker"], "D": ["ground", "rocker"]}
+    return Mechanism(
+        space="spatial",
+        links={
+            "ground": {"points": {"A": upright, "D": pivot}},
+            "crank": {"points": {"A": upright, "B": [CRANK, 0, 0]}},
+            "bar": {"points": {"B": [0, 0, 0], "C": [float(np.hypot(CRANK, HEIGHT)), 0, 0]}},
+            "rocker": {"points": {"D": upright, "C": [ROCKER, 0, 0]}},
+        },
+        joints={name: {"type": "spherical" if name in "BC" else "revolute", "links": ends[name]} for name in ends},
+        drivers={"A": {"speed": 1.0, **drive}},
+        loads={"brake": {"link": "rocker", "moment": (-BRAKED * axis).tolist()}},
+        assembly={"C": ball.tolist()},
+    )
+
+
+@pytest.mark.parametrize("moves", [True, False])
+def test_a_kite_in_space_goes_on_smoothly(moves: bool) -> None:
+    """Moving or at rest, all round: places by both roots, torque by virtual work; the bar does not spin."""
+    result = analyse(spatial_kite(moves, start=0.5), 401)
+    theta = 0.5 + result["time"].values
+    angle = rocked(theta) * moves
+    ball = PIVOT[:, None] + ROCKER * (np.cos(angle) * OUTWARD[:, None] + np.sin(angle) * TANGENT[:, None])
+    places = result["point_position"]
+    np.testing.assert_allclose(places.sel(point="rocker.C").values, ball, atol=1e-11)
+    rate = (rocked(theta + 1e-5) - rocked(theta - 1e-5)) / 2e-5 * moves
+    np.testing.assert_allclose(result["drive_effort"].values[0], BRAKED * rate, atol=1e-8)
+    (finding,) = [finding for finding in result.trunnion.findings if finding.code == "assembly.change_point"]
+    assert (finding.severity, len(finding.figures["places"])) == ("warning", 2)
+    w, x, y, z = result["link_rotation"].sel(link="bar").values
+    wrong = result["link_angular_velocity"].sel(link="bar").values[:, 1:-1] - angular_velocity(
+        np.array([w, x, y, z]), float(np.diff(result["time"].values[:2])[0])
+    )
+    np.testing.assert_allclose(wrong, 0.0, atol=2e-3)
+
+
+def angular_velocity(turns: Array, step: float) -> Array:
+    """ω = 2 q̇ q* by central differences of quaternions, whose signs may change; (3, time − 2)."""
+    before, here, after = turns[:, :-2], turns[:, 1:-1], turns[:, 2:]
+    before, after = (other * np.sign(np.sum(other * here, axis=0)) for other in (before, after))
+    rate = (after - before) / (2 * step)
+    return np.asarray(2 * (here[0] * rate[1:] - rate[0] * here[1:] - np.cross(rate[1:], here[1:], axis=0)))
+
+
+def test_positions_of_a_general_group_where_assemblies_meet_have_no_forces() -> None:
+    """With the status that says so; the motion through them is one."""
+    sides, place = LINKAGES["kite"]
+    data = driven_four_bar("spatial", sides, hinted(place, 0.5)["C"]).data()
+    data["drivers"]["A"] |= {"start": 0.0}
+    data["assembly"]["C"] = [*hinted(place, 0.1)["C"], 0]
+    result = analyse(Mechanism(**data), 36)
+    status, effort = result["status"].values, result["drive_effort"].values[0]
+    assert np.flatnonzero(status == 7).tolist() == [0, 18]
+    assert np.flatnonzero(np.isnan(effort)).tolist() == [0, 18]
+    assert "assembly.ranges" not in [finding.code for finding in result.trunnion.findings]
 
 
 def test_three_wheels_on_one_rod() -> None:
@@ -239,12 +319,16 @@ def test_three_wheels_on_one_rod() -> None:
     ("kind", "place"),
     [(PARALLELOGRAM, parallel(0.3, 1.0)), (ANTIPARALLELOGRAM, crossed(0.3, 1.0)), (DELTOID, swung(0.4, 1.0))],
 )
-@pytest.mark.parametrize("sense", [1.0, -1.0])
-def test_motions_in_time_go_on_as_smoothly(kind: Any, place: Callable[[Array], Array], sense: float) -> None:
+@pytest.mark.parametrize(
+    ("space", "sense"), [("planar", 1.0), ("planar", -1.0), pytest.param("spatial", 1.0, marks=pytest.mark.slow)]
+)
+def test_motions_in_time_go_on_as_smoothly(
+    kind: Any, place: Callable[[Array], Array], space: str, sense: float
+) -> None:
     """From rest under 2 N m: ½ J(θ) θ̇² = T (θ − θ₀), J from the closed form of the place of C."""
     (a, b, c, d), hint = kind
     motor = {"kind": "constant", "effort": sense * 2.0}
-    mechanism = driven_four_bar("planar", (a, b, c, d), hint, motor=motor)
+    mechanism = driven_four_bar(space, (a, b, c, d), hint, motor=motor)
     data = mechanism.data()
     data["drivers"]["A"]["initial"] = {"coordinate": 1.0, "speed": 0.0}
     result = simulate(Mechanism(**data), 1.6, 40, 1e-11)

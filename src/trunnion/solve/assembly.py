@@ -66,6 +66,7 @@ LOOKED = 2  # of the grid every which position the assemblies are compared at
 TRIED = 64  # guesses at each place where it is tried whether there is an assembly at all
 SPREAD = 25  # such places
 BEFORE = 4  # positions before a change point that lead over it
+SMOOTH = 0.1  # of the last change: by how much the way on beyond the end of an assembly misses where it led
 NEARBY = 0.3  # of an interval of the grid: nearer to a change point Newton may take one assembly for the other
 
 
@@ -126,20 +127,19 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             counts.append(count)
             if isinstance(assembly, Track) and count == 0:
                 findings.append(_never(system, module))
-            if isinstance(assembly, Track) and len(assembly.again):
-                findings.append(_anew(module, system.dial(values, times), assembly.again))
             assembled = module.rank > 1 and (group.BRANCHES or (isinstance(assembly, Track) and count > 0))
             if not assembled and number == len(system.plan.modules) - 1:  # nothing stands on it
                 continue
             pose = pose_of(walk, number, assembly, times)
-            if assembled and (at := change_points.find(walk, number, assembly, times, pose, cycle)):
-                if group.BRANCHES:
-                    chosen[number], meetings[number] = _through(walk, number, assembly, lane, at, times, cycle)
-                else:
-                    chosen[number], meetings[number] = _followed_through(walk, number, assembly, at, times, cycle)
-                walk.assembly[number] = chosen[number]
-                findings.append(change_points.finding(system, values, module, meetings[number]))
-                pose = pose_of(walk, number, chosen[number], times)
+            if assembled:
+                through = _through if group.BRANCHES else _followed_through
+                chosen[number], met, remarks = through(walk, number, assembly, lane, times, pose, cycle)
+                findings += remarks
+                if met.at:
+                    meetings[number] = met
+                if chosen[number] is not assembly:
+                    walk.assembly[number] = chosen[number]
+                    pose = pose_of(walk, number, chosen[number], times)
             walk.stand(number, pose)  # an assembly is a matter of places
     mirrored = any(len(met.crossed) % 2 and not met.folds for met in meetings.values()) and cycle.periodic
     return Chosen(tuple(chosen), tuple(counts), tuple(findings), meetings, mirrored)
@@ -233,11 +233,12 @@ def folds(system: System, module: Module) -> bool:
 
 
 def _through(
-    walk: Forward, number: int, branch: int, lane: int, at: Sequence[change_points.Meeting], times: Array, cycle: Cycle
-) -> tuple[Any, change_points.Meetings]:
+    walk: Forward, number: int, branch: int, lane: int, times: Array, pose: Any, cycle: Cycle
+) -> tuple[Any, change_points.Meetings, list[Finding]]:
     """A closed form through its change points: in the branch that it has at a position of the grid, and from there on,
-    unless it folds, in the other one wherever that goes on smoothly."""
+    unless it folds, in the other one wherever that goes on smoothly. With what there is to say of them."""
     system, module, group = walk.system, walk.system.plan.modules[number], walk.system.groups[number]
+    at = change_points.find(walk, number, branch, times, pose, cycle)
     size = float(np.max(primal(walk.size)))
 
     def numbers(which: int, moments: Array) -> Array:
@@ -253,62 +254,101 @@ def _through(
     folding = folds(system, module)
     smooth = not (crossed and folding) and all(first == last for first, last in at)
     met = change_points.Meetings(tuple(places), tuple(crossed), folding, smooth)
+    remarks = [change_points.finding(system, walk.values, module, met)] if at else []
     if folding or not crossed:
-        return branch, met
+        return branch, met, remarks
     clock, duration = TrackClock.of(system, walk.values), cycle.duration if cycle.periodic else None
     first = branch * int(alternating(crossed, times[lane]))
-    return Passing(first, tuple(crossed), duration, clock), met
+    return Passing(first, tuple(crossed), duration, clock), met, remarks
 
 
 def _followed_through(
-    walk: Forward, number: int, track: Track, at: Sequence[change_points.Meeting], times: Array, cycle: Cycle
-) -> tuple[Any, change_points.Meetings]:
-    """A general group through its change points, onward from where it was put together: beyond one it is followed from
-    where the coordinates before it lead, there with the other sign of det J."""
-    module, group = walk.system.plan.modules[number], walk.system.groups[number]
-    folding, passed, kinks = folds(walk.system, module), list[float](), False
-    if group.redundant or folding:  # the least-squares way on is smooth by itself
-        return track, change_points.Meetings(tuple(at), (), folding, bool(group.redundant))
-    drive, _, _ = driven_coordinates(walk.system, module, walk.system.places[number], walk.values, times)
-    elements = walk.pairs(walk.system.places[number])
-    drive = [track.turns.get(slot, one) for slot, one in enumerate(drive)]
-    last, begin = track.begin, int(np.searchsorted(times, track.begin))
-    while ahead := [first for first, end in at if first == end and first > last + NEARBY * times[1]]:
-        last = ahead[0]
-        before = np.flatnonzero(times < last - NEARBY * times[1])[-BEFORE:]
-        beyond = np.flatnonzero(times > last + NEARBY * times[1])
-        if len(before) < BEFORE or before[0] < begin or not len(beyond):
-            continue
-        rows, place = track.coordinates.copy(), beyond[0]
-        guess = change_points.carried_on(times[before], rows[:, before], float(times[place]))
-        follower = Follower(group, elements, drive, -float(track.sense(times[before[-1]])), STRIDE)
-        fresh = follower.solved_from(place, guess)
-        kink = np.max(np.abs(rows[:, place] - guess))
-        if fresh is None or not np.max(np.abs(fresh - guess)) < kink:
-            kinks = kinks or fresh is None
-            continue
-        for between in range(before[-1] + 1, place):
-            rows[:, between] = change_points.carried_on(times[before], rows[:, before], float(times[between]))
-        rows[:, place:] = np.nan
-        rows[:, place] = fresh
-        follower.run(rows, np.arange(place, len(times)))
-        passed.append(last)
-        track = replace(track, coordinates=rows, passed=tuple(passed))
-        pose = pose_of(walk, number, track, times)
-        at = change_points.find(walk, number, track, times, pose, cycle)
-    smooth = not kinks and all(first == end for first, end in at)
-    return track, change_points.Meetings(tuple(at), tuple(passed), False, smooth)
+    walk: Forward, number: int, track: Track, lane: int, times: Array, pose: Any, cycle: Cycle
+) -> tuple[Track, change_points.Meetings, list[Finding]]:
+    """A general group through its change points, onward from where it was put together, with what there is to say.
+
+    Beyond one it is followed from where the coordinates before it lead, there with the other sign of det J. Without any
+    it is put together anew where it can be, in the same sense, nearest to what was left; free spins are taken out.
+    """
+    system, module, group = walk.system, walk.system.plan.modules[number], walk.system.groups[number]
+    drive, _, _ = driven_coordinates(system, module, system.places[number], walk.values, times)
+    drive = [track.turns.get(slot, coordinate) for slot, coordinate in enumerate(drive)]
+    follower = Follower(group, walk.pairs(system.places[number]), drive, track.orientation, STRIDE)
+    at, folding = change_points.find(walk, number, track, times, pose, cycle), folds(system, module)
+    last, kinks = track.begin, False
+    while not (group.redundant or folding):  # the least-squares way on is smooth by itself
+        places = [(moment, False) for moment in follower.broken(track.coordinates, times)]
+        places += [(first, True) for first, end in at if first == end]
+        places = [place for place in places if place[0] > last + NEARBY * times[1]]
+        if not places:
+            break
+        last, met = min(places)
+        beyond, ends = _beyond(follower, track, times, last, met)
+        kinks = kinks or (met and ends)
+        if beyond is not None:
+            track, last = beyond, max(last, beyond.passed[-1])
+            at = change_points.find(walk, number, track, times, pose_of(walk, number, track, times), cycle)
+    if track.passed and cycle.periodic and (0.0, 0.0) in at and _comes_round(follower, track, times):
+        track = replace(track, passed=(*track.passed, cycle.duration))
+    rows = track.coordinates.copy()
+    if not track.passed and len(again := follower.revisit(rows, cycle.periodic)):
+        track = replace(track, coordinates=rows, again=again)
+        at = change_points.find(walk, number, track, times, pose_of(walk, number, track, times), cycle)
+    if isinstance(group, SpatialGroup):
+        track = replace(track, coordinates=unspun(group, follower.elements, track.coordinates, drive))
+    smooth = bool(group.redundant) or not (folding or kinks or any(first != end for first, end in at))
+    met_at = change_points.Meetings(tuple(at), track.passed, folding, smooth)
+    remarks = [_anew(module, system.dial(walk.values, times), track.again)] if len(track.again) else []
+    if at:
+        remarks.append(change_points.finding(system, walk.values, module, met_at))
+    return track, met_at, remarks
+
+
+def _beyond(follower: Follower, track: Track, times: Array, moment: float, met: bool) -> tuple[Track | None, bool]:
+    """The track on over a change point near a time, s, if it is smoother there, and whether no assembly leads on so.
+
+    met: whether the assemblies meet there; else the old one ends, maybe for good, and a new one is as smooth as it was.
+    """
+    before = np.flatnonzero(times < moment - NEARBY * times[1])[-BEFORE:]
+    beyond = np.flatnonzero(times > moment + NEARBY * times[1])
+    if len(before) < BEFORE or times[before[0]] < track.begin or not len(beyond):
+        return None, False
+    rows, place = track.coordinates.copy(), beyond[0]
+    guess = change_points.carried_on(times[before], rows[:, before], float(times[place]))
+    follower = replace(follower, orientation=-float(track.sense(times[before[-1]])))
+    fresh = follower.solved_from(place, guess)
+    kink = np.max(np.abs(rows[:, place] - guess))
+    if not met or not np.isfinite(kink):
+        kink = SMOOTH * np.max(np.abs(guess - rows[:, before[-1]]))
+    if fresh is None or not np.max(np.abs(fresh - guess)) < kink:
+        return None, fresh is None
+    for between in range(before[-1] + 1, place):
+        rows[:, between] = change_points.carried_on(times[before], rows[:, before], float(times[between]))
+    rows[:, place:] = np.nan
+    rows[:, place] = fresh
+    follower.run(rows, np.arange(place, len(times)))
+    exact = follower.turned_over(rows, np.append(before, beyond[:BEFORE]), times, moment)
+    return replace(track, coordinates=rows, passed=(*track.passed, exact)), False
+
+
+def _comes_round(follower: Follower, track: Track, times: Array) -> bool:
+    """Whether a track goes over a change point at the end of the cycle to where it began, with the other sign there."""
+    before = np.flatnonzero(times < times[-1] - NEARBY * times[1])[-BEFORE:]
+    guess = change_points.carried_on(times[before], track.coordinates[:, before], float(times[-1] + times[1]))
+    follower = replace(follower, orientation=-float(track.sense(times[before[-1]])))
+    fresh = follower.solved_from(1, guess)
+    smooth = SMOOTH * np.max(np.abs(guess - track.coordinates[:, before[-1]]))
+    if fresh is None or not np.max(np.abs(fresh - guess)) < smooth:
+        return False
+    ends = follower.keys(np.array([fresh, track.coordinates[:, 1]]).T, np.array([1, 1]))
+    return bool(np.max(np.abs(ends[:, 1] - ends[:, 0])) < SAME)
 
 
 # ---- general groups -------------------------------------------------------------------------------------------
 
 
 def _general(walk: Forward, number: int, times: Array, periodic: bool, drawn: int | None) -> Decision:
-    """The assembly that is named, nearest the hints or drawn, followed both ways from the first position with any.
-
-    Where it ends and the links can be assembled again farther on, in the same sense, the assembly nearest to what
-    was left is taken there and followed too.
-    """
+    """The assembly that is named, nearest the hints or drawn, followed both ways from the first position with any."""
     system, module = walk.system, walk.system.plan.modules[number]
     group, places, grid = system.groups[number], system.places[number], len(times)
     drive, _, _ = driven_coordinates(system, module, places, walk.values, times)
@@ -339,10 +379,7 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool, drawn: in
         follower = replace(follower, stride=1)
         rows[:, np.arange(grid) != begin] = np.nan
         follower.both_ways(rows, begin, periodic)
-    again = follower.revisit(rows, periodic)
-    if isinstance(group, SpatialGroup):
-        rows = unspun(group, elements, rows, drive)
-    track = Track(times, rows, orientation, periodic, clock, turns, again, float(times[begin]), frames, best)
+    track = Track(times, rows, orientation, periodic, clock, turns, nowhere, float(times[begin]), frames, best)
     return Decision(track, ways, _said(walk, module, ways, frames, begin, named, tied))
 
 

@@ -29,7 +29,7 @@ from trunnion.model.names import as_key
 from trunnion.model.parts import FOLDS
 from trunnion.results.quantities import quantity
 from trunnion.solve import change_points
-from trunnion.solve.drawn import drawn_at, off_drawing
+from trunnion.solve.drawn import drawn_at, hinted_at, off_drawing
 from trunnion.solve.forward import Forward, pose_of, posed, start
 from trunnion.solve.system import Cycle, Dial, Positions, System, Values, driven_coordinates
 from trunnion.solve.track import (
@@ -193,21 +193,16 @@ def _off_drawing(walk: Forward, number: int, pose: Any, lane: int | NDArray[np.i
 def ways_of(walk: Forward, number: int, times: Array) -> tuple[int | None, Any]:
     """Where the links of a closed form lie in all of its assemblies, and the position at which that is.
 
-    It is the first at which all assemblies exist and are apart; where they meet all along, the first at which they
-    exist; None if there is none.
+    It is the first, or nearest to where the hints hold, at which all assemblies exist and are apart; where they meet
+    all along, at which they exist; None if there is none.
     """
     poses = [pose_of(walk, number, branch, times) for branch in walk.system.groups[number].BRANCHES]
-    lane = _first_apart(walk, number, poses, times)
+    exist, differ = _apart(walk, number, poses, times)
+    apart = np.flatnonzero(differ[::LOOKED]) * LOOKED
+    lanes = apart if len(apart) else np.flatnonzero(exist)
+    lane = int(lanes[np.argmin(np.abs(lanes - hinted_at(walk, times)))]) if len(lanes) else None
     frames = [each(pose.frames, lambda part: lane_of(primal(part), lane or 0)) for pose in poses]
     return lane, zipped(lambda *numbers: np.array(numbers), *frames)
-
-
-def _first_apart(walk: Forward, number: int, poses: Sequence[Any], times: Array) -> int | None:
-    exist, differ = _apart(walk, number, poses, times)
-    for lanes in (np.flatnonzero(differ[::LOOKED]) * LOOKED, np.flatnonzero(exist)):
-        if len(lanes):
-            return int(lanes[0])
-    return None
 
 
 def _apart(
@@ -265,7 +260,7 @@ def _through(
 def _followed_through(
     walk: Forward, number: int, track: Track, lane: int, times: Array, pose: Any, cycle: Cycle
 ) -> tuple[Track, change_points.Meetings, list[Finding]]:
-    """A general group through its change points, onward from where it was put together, with what there is to say.
+    """A general group through its change points, both ways from where it was put together, with what there is to say.
 
     Beyond one it is followed from where the coordinates before it lead, there with the other sign of det J. Without any
     it is put together anew where it can be, in the same sense, nearest to what was left; free spins are taken out.
@@ -275,19 +270,22 @@ def _followed_through(
     drive = [track.turns.get(slot, coordinate) for slot, coordinate in enumerate(drive)]
     follower = Follower(group, walk.pairs(system.places[number]), drive, track.orientation, STRIDE)
     at, folding = change_points.find(walk, number, track, times, pose, cycle), folds(system, module)
-    last, kinks = track.begin, False
-    while not (group.redundant or folding):  # the least-squares way on is smooth by itself
-        places = [(moment, False) for moment in follower.broken(track.coordinates, times)]
-        places += [(first, True) for first, end in at if first == end]
-        places = [place for place in places if place[0] > last + NEARBY * times[1]]
-        if not places:
-            break
-        last, met = min(places)
-        beyond, ends = _beyond(follower, track, times, last, met)
-        kinks = kinks or (met and ends)
-        if beyond is not None:
-            track, last = beyond, max(last, beyond.passed[-1])
-            at = change_points.find(walk, number, track, times, pose_of(walk, number, track, times), cycle)
+    kinks = False
+    for way in () if group.redundant or folding else (1, -1):  # the least-squares way on is smooth by itself
+        last = track.begin
+        while True:
+            places = [(way * moment, False) for moment in follower.broken(track.coordinates, times)]
+            places += [(way * first, True) for first, end in at if first == end]
+            places = [place for place in places if place[0] > way * last + NEARBY * times[1]]
+            if not places:
+                break
+            ahead, met = min(places)
+            last = way * ahead
+            beyond, ends = _beyond(follower, track, times, last, met, way)
+            kinks = kinks or (met and ends)
+            if beyond is not None:
+                track, last = beyond, way * max(ahead, way * beyond.passed[-1 if way > 0 else 0])
+                at = change_points.find(walk, number, track, times, pose_of(walk, number, track, times), cycle)
     if track.passed and cycle.periodic and (0.0, 0.0) in at and _comes_round(follower, track, times):
         track = replace(track, passed=(*track.passed, cycle.duration))
     rows = track.coordinates.copy()
@@ -304,14 +302,18 @@ def _followed_through(
     return track, met_at, remarks
 
 
-def _beyond(follower: Follower, track: Track, times: Array, moment: float, met: bool) -> tuple[Track | None, bool]:
+def _beyond(
+    follower: Follower, track: Track, times: Array, moment: float, met: bool, way: int
+) -> tuple[Track | None, bool]:
     """The track on over a change point near a time, s, if it is smoother there, and whether no assembly leads on so.
 
     met: whether the assemblies meet there; else the old one ends, maybe for good, and a new one is as smooth as it was.
+    way: 1 onward from where it was put together, -1 back.
     """
-    before = np.flatnonzero(times < moment - NEARBY * times[1])[-BEFORE:]
-    beyond = np.flatnonzero(times > moment + NEARBY * times[1])
-    if len(before) < BEFORE or times[before[0]] < track.begin or not len(beyond):
+    order = np.arange(len(times))[::way]
+    before = order[way * times[order] < way * moment - NEARBY * times[1]][-BEFORE:]
+    beyond = order[way * times[order] > way * moment + NEARBY * times[1]]
+    if len(before) < BEFORE or way * times[before[0]] < way * track.begin or not len(beyond):
         return None, False
     rows, place = track.coordinates.copy(), beyond[0]
     guess = change_points.carried_on(times[before], rows[:, before], float(times[place]))
@@ -322,13 +324,13 @@ def _beyond(follower: Follower, track: Track, times: Array, moment: float, met: 
         kink = SMOOTH * np.max(np.abs(guess - rows[:, before[-1]]))
     if fresh is None or not np.max(np.abs(fresh - guess)) < kink:
         return None, fresh is None
-    for between in range(before[-1] + 1, place):
+    for between in range(before[-1] + way, place, way):
         rows[:, between] = change_points.carried_on(times[before], rows[:, before], float(times[between]))
-    rows[:, place:] = np.nan
+    rows[:, beyond] = np.nan
     rows[:, place] = fresh
-    follower.run(rows, np.arange(place, len(times)))
+    follower.run(rows, beyond)
     exact = follower.turned_over(rows, np.append(before, beyond[:BEFORE]), times, moment)
-    return replace(track, coordinates=rows, passed=(*track.passed, exact)), False
+    return replace(track, coordinates=rows, passed=tuple(sorted((*track.passed, exact)))), False
 
 
 def _comes_round(follower: Follower, track: Track, times: Array) -> bool:
@@ -357,7 +359,7 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool, drawn: in
     drive = [turns.get(slot, number) for slot, number in enumerate(drive)]
     rows = np.full((len(group.kept), grid), np.nan)
     clock, nowhere = TrackClock.of(system, walk.values), np.array([], np.intp)
-    begin, solved = _first_closed(group, elements, drive, grid)
+    begin, solved = _first_closed(group, elements, drive, grid, hinted_at(walk, times))
     lanes = each_once(group, solved)
     ways = len(lanes)
     if not ways:
@@ -421,18 +423,21 @@ def _drawn(
     return []
 
 
-def _first_closed(group: Any, elements: Sequence[Any], drive: Sequence[Number], grid: int) -> tuple[int, Assemblies]:
-    """The start of the cycle, else the first of some positions spread over it at which the group has an assembly."""
-    solved = closed_at(group, elements, drive, [0], GUESSES)
+def _first_closed(
+    group: Any, elements: Sequence[Any], drive: Sequence[Number], grid: int, first: int
+) -> tuple[int, Assemblies]:
+    """A position, else the nearest of some spread over the cycle at which the group has an assembly."""
+    solved = closed_at(group, elements, drive, [first], GUESSES)
     if each_once(group, solved) or grid == 1:
-        return 0, solved
-    places = np.unique(np.linspace(0, grid - 1, SPREAD).astype(np.intp))[1:]
+        return first, solved
+    places = np.unique(np.linspace(0, grid - 1, SPREAD).astype(np.intp))
+    places = places[np.argsort(np.abs(places - first), kind="stable")]
     tried = closed_at(group, elements, drive, places, TRIED).closed.reshape(-1, TRIED)
     for place in places[tried.any(axis=1)]:
         solved = closed_at(group, elements, drive, [int(place)], GUESSES)
         if each_once(group, solved):
             return int(place), solved
-    return 0, solved
+    return first, solved
 
 
 def _turns(walk: Forward, module: Module, group: Any, elements: Sequence[Any], times: Array) -> dict[int, Array]:

@@ -235,9 +235,10 @@ class Follower:
         return solved[:, 0] if good[0] else None
 
     def broken(self, rows: Array, times: Array) -> list[float]:
-        """Times, s, midway between two positions of which rows hold one that does not lead to the other."""
+        """Times, s, midway between two positions of which one does not lead to the other."""
         steps = np.abs(np.diff(rows, axis=1)) <= limits(self.group, extent(self.group, self.elements))[:, None]
-        ends = np.flatnonzero(np.isfinite(rows[0, :-1]) & ~np.all(steps, axis=0))
+        exist = np.isfinite(rows[0])
+        ends = np.flatnonzero((exist[:-1] | exist[1:]) & ~np.all(steps, axis=0))
         return [float(moment) for moment in (times[ends] + times[ends + 1]) / 2]
 
     def turned_over(self, rows: Array, places: Places, times: Array, near: float) -> float:

@@ -29,6 +29,7 @@ from trunnion.model.names import as_key
 from trunnion.model.parts import FOLDS
 from trunnion.results.quantities import quantity
 from trunnion.solve import change_points
+from trunnion.solve.alike import alike
 from trunnion.solve.drawn import drawn_at, hinted_at, off_drawing
 from trunnion.solve.forward import Forward, pose_of, posed, start
 from trunnion.solve.system import Cycle, Dial, Positions, System, Values, driven_coordinates
@@ -361,17 +362,21 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool, drawn: in
     clock, nowhere = TrackClock.of(system, walk.values), np.array([], np.intp)
     begin, solved = _first_closed(group, elements, drive, grid, hinted_at(walk, times))
     lanes = each_once(group, solved)
-    ways = len(lanes)
+    sets = alike(walk, number, solved, lanes)
+    ways, set_of = len(sets), {place: k for k, places in enumerate(sets) for place in places}
     if not ways:
         return Decision(Track(times, rows, 0.0, periodic, clock, turns, nowhere), 0)
     shape = solved.closed.shape
     frames = each(solved.pose.frames, lambda n: np.broadcast_to(n, shape)[lanes])
     named = named_way(system, module, ways)
-    tied = _tied(walk, np.broadcast_to(distance(walk, module, frames, begin), (ways,)))
+    nearest = _tied(walk, np.broadcast_to(distance(walk, module, frames, begin), (len(lanes),)))
     if drawn is not None and named is None and not hints(walk, module):
         follower = Follower(group, elements, drive, 0.0, STRIDE)
-        tied = _drawn(walk, number, follower, solved, lanes, begin, drawn, grid, periodic) or tied
-    best = tied[0] if named is None else named
+        nearest = _drawn(walk, number, follower, solved, lanes, begin, drawn, grid, periodic) or nearest
+    best = nearest[0] if named is None else sets[named][0]
+    taken, tied = set_of[best], sorted({set_of[place] for place in nearest})
+    shows = [best if k == taken else places[0] for k, places in enumerate(sets)]
+    frames = each(frames, lambda n: n[shows])
     orientation = float(np.broadcast_to(solved.pose.orientation, shape)[lanes[best]])
     rows[:, begin] = solved.q[:, lanes[best]]
     follower = Follower(group, elements, drive, orientation, STRIDE)
@@ -381,7 +386,7 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool, drawn: in
         follower = replace(follower, stride=1)
         rows[:, np.arange(grid) != begin] = np.nan
         follower.both_ways(rows, begin, periodic)
-    track = Track(times, rows, orientation, periodic, clock, turns, nowhere, float(times[begin]), frames, best)
+    track = Track(times, rows, orientation, periodic, clock, turns, nowhere, float(times[begin]), frames, taken)
     return Decision(track, ways, _said(walk, module, ways, frames, begin, named, tied))
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from trunnion import Mechanism, MechanismError, analyse, check, simulate
+from trunnion.solve.run import prepare
 
 Array = NDArray[np.float64]
 UPPER, LOWER = [0.1, 0.3, 0.8], [0.5, 0.05, 0.1]
@@ -250,6 +251,23 @@ def test_a_leg_changes_no_motion_in_time() -> None:
         data["drivers"] = {"H": {"speed": 1.0, "range": [-0.9, 0.9], "free": True, "initial": {"coordinate": 0.0}}}
         moved.append(simulate(Mechanism(**data), 0.12, 10, 1e-10))
     np.testing.assert_allclose(moved[1]["drive_coordinate"], moved[0]["drive_coordinate"], rtol=1e-8, atol=1e-10)
+
+
+@pytest.mark.parametrize(("kind", "driven"), [("revolute", True), ("prismatic", True), ("prismatic", False)])
+def test_what_is_printed_of_a_leg_selects_its_assembly(kind: str, driven: bool) -> None:
+    """Places and turns that a spin leaves alone; a place of the knee does so wherever it spins."""
+    data = leg(kind, 1, JACKS[kind] if driven else None).data()
+    (choice,) = check(Mechanism(**data), 4).choices
+    for way in choice.ways:
+        printed: dict[str, Any] = {
+            name: list(place) if len(place) > 1 else place[0] for name, place in way.joints.items()
+        }
+        run = prepare(Mechanism(**{**data, "assembly": {choice.link: way.name}}))
+        knee = [float(np.ravel(part)[0]) for part in run.solve(np.zeros(1)).walk.point("rod", "T").place]
+        for name, hint in [*printed.items(), *way.turns.items(), ("T", knee)]:
+            checked = check(Mechanism(**{**data, "assembly": {name: hint}}), 4)
+            assert [other.name for other in checked.choices[0].ways if other.taken] == [way.name]
+            assert not [finding for finding in checked.findings if finding.code.startswith("assembly")]
 
 
 def test_a_mass_beside_the_line_of_a_leg_is_refused() -> None:

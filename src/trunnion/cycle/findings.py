@@ -38,6 +38,7 @@ from trunnion.solve.forward import start
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
 from trunnion.solve.seating import ROUNDS as SEAT_ROUNDS
 from trunnion.solve.seating import UNSETTLED, Seating, seating_of
+from trunnion.solve.space.determinacy import spins_of
 from trunnion.solve.system import System, felt, rubbing
 
 if TYPE_CHECKING:
@@ -134,11 +135,14 @@ def _far_hints(run: Run) -> Iterator[Finding]:
     times = grid(run.cycle)
     lane = hinted_at(start(run.system, run.values), times)
     walk, when = run.walk(times[lane : lane + 1]), f"with {AT} at its place" if lane else "at the start"
+    spins = [(members, ends) for _, (_, *ends), members in spins_of(run.system)]
     for name, hint in run.system.mechanism.assembly.items():
         if not isinstance(hint, tuple):
             continue
         link, _, point = name.rpartition(".")
         link = link or run.system.joints[name][1][1]
+        if any(link in members and point not in ends for members, ends in spins):
+            continue  # it may be anywhere about the line
         place = [float(np.ravel(primal(part))[0]) for part in walk.point(link, point).place]
         stated = [float(run.values[f"assembly.{name}.{axis}"]) for axis in "xyz"[: len(place)]]
         distance = float(np.linalg.norm(np.subtract(place, stated)))

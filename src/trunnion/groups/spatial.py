@@ -99,7 +99,7 @@ class SpatialGroup(Tree):
                     together += [other for other in joint.sides if other not in (OUTER, *together)]
         return tuple(together)
 
-    def spin_axis(self, placed: Sequence[Element], a: int, b: int) -> Vector3:
+    def spin_axis(self, placed: Mapping[int, Element] | Sequence[Element], a: int, b: int) -> Vector3:
         """Unit vector of the line about which a link can spin: from ball to ball, or the axis of its other joint."""
         for k in (a, b):
             if not self.joints[k].pair.ball:
@@ -152,6 +152,15 @@ class SpatialGroup(Tree):
         """Torque about its line that each link with a free spin would need to keep from spinning, N m."""
         return self.multipliers(pose, loads)[6 * len(self.chords) :]
 
+    def from_line(
+        self, placed: Mapping[int, Element] | Sequence[Element], a: int, b: int, place: Vector3
+    ) -> tuple[Number, Number]:
+        """How far a place is along the line of a spin and from it, m; from the ball at its end."""
+        axis = self.spin_axis(placed, a, b)
+        away = vector_minus(place, placed[a if self.joints[a].pair.ball else b].second.place)
+        across = cross(away, axis)
+        return dot(away, axis), np.sqrt(dot(across, across))
+
     def signature(self, pose: Pose, spread: float) -> list[Number]:
         """Axes and places of the links; of those that spin what a spin leaves alone."""
         spun = {member for spin in self.spinning for member in self.spun(*spin)}
@@ -169,10 +178,7 @@ class SpatialGroup(Tree):
             place = placed[k].second.place
             spins = [(len(members), a, b) for members, a, b in sets if members.issuperset(joint.sides)]
             if spins:
-                _, a, b = min(spins)
-                away = vector_minus(place, placed[a if self.joints[a].pair.ball else b].second.place)
-                across = cross(away, self.spin_axis(placed, a, b))
-                numbers += [dot(away, self.spin_axis(placed, a, b)), np.sqrt(dot(across, across))]
+                numbers += self.from_line(placed, *min(spins)[1:], place)
             elif joint.kind != "planar" and any(members.intersection(joint.sides) for members, *_ in sets):
                 numbers += place
         return numbers

@@ -544,12 +544,30 @@ def distance(walk: Forward, module: Module, frames: Sequence[Any], lane: int | N
     total: Any = 0.0
     for link, name, place in hints(walk, module):
         if link:
-            point = walk.placed(frames[module.links.index(link)], link, name)
-            total = total + sum((is_ - hinted) ** 2 for is_, hinted in zip(point, place, strict=True))
+            i = module.links.index(link)
+            total = total + _away(walk, module, frames, i, walk.placed(frames[i], link, name), place)
             continue
         away = coordinate(walk, module, frames, name, lane) - place[0]
         total = total + (np.arctan2(np.sin(away), np.cos(away)) if walk.system.turns(name) else away) ** 2
     return np.asarray(total, float)
+
+
+def _away(
+    walk: Forward, module: Module, frames: Sequence[Any], link: int, point: Sequence[Number], place: Sequence[Number]
+) -> Number:
+    """Squared distance of a point of a link from a place, m²; of a link that spins freely the least while it spins."""
+    group = walk.system.groups[walk.system.plan.modules.index(module)]
+    spins = [(group.spun(*spin), spin[1:]) for spin in getattr(group, "spinning", ())]
+    of_link = [spin for spin in spins if link in spin[0]]
+    if of_link:
+        members, ends = min(of_link, key=lambda spin: len(spin[0]))
+        elements = {}
+        for k in ends:
+            i = next(side for side in group.joints[k].sides if side in members)
+            element = walk.algebra.compose(frames[i], walk.local[module.links[i], module.joints[k]])
+            elements[k] = Element(element, element)
+        point, place = (group.from_line(elements, *ends, at) for at in (point, place))
+    return sum((is_ - hinted) ** 2 for is_, hinted in zip(point, place, strict=True))
 
 
 def coordinate(walk: Forward, module: Module, frames: Sequence[Any], joint: str, lane: int | None) -> Number:
@@ -607,12 +625,17 @@ def joint_rows(walk: Forward, module: Module, count: int, frames: Sequence[Any],
     module by the place of their point, or their slide.
     """
     spatial = walk.system.mechanism.space == "spatial"
+    group = walk.system.groups[walk.system.plan.modules.index(module)]
+    spins = [({module.links[i] for i in group.spun(*spin)}, spin[1:]) for spin in getattr(group, "spinning", ())]
     rows: Rows = {}
     for name in sorted(set(module.joints).difference(module.driven), key=walk.system.order.__getitem__):
         kind, links = walk.system.joints[name]
         turned = spatial and PAIRS[kind].turns and not PAIRS[kind].ball
         if not turned and not set(links).issubset(module.links):
             continue
+        turns_with = [members.issuperset(links) and not turned and not PAIRS[kind].guided for members, _ in spins]
+        if any(turns_with) or any(module.joints.index(name) in ends and not PAIRS[kind].ball for _, ends in spins):
+            continue  # where a spin has taken it tells nothing
         if turned or PAIRS[kind].guided:
             numbers = [coordinate(walk, module, frames, name, lane)]
         else:

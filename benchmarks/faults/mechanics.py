@@ -193,14 +193,14 @@ _SOLVE = (
     ),
     Fault(
         "ends-where-a-track-turns-over",
-        "solve/assembly.py",
+        "solve/onward.py",
         "for moment in follower.broken(track.coordinates, times)]",
         "for moment in follower.broken(track.coordinates, times)[:0]]",
         ("tests/reference/test_change_points.py", "-k", "in_space and deltoid"),
     ),
     Fault(
         "turns-over-where-the-start-is-met",
-        "solve/assembly.py",
+        "solve/onward.py",
         "return bool(np.max(np.abs(ends[:, 1] - ends[:, 0])) < SAME)",
         "return False",
         ("tests/reference/test_change_points.py", "-k", "have_no_forces"),

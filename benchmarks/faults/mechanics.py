@@ -153,6 +153,13 @@ _GROUPS = (
         "sense = 1.0 if group.joints[k].sides[1] in members else -1.0",
         ("tests/invariants/test_spatial_groups.py", "tests/reference/test_space_values.py", "-k", "spin"),
     ),
+    Fault(
+        "line-of-a-knee-fixed-in-its-link",
+        "groups/spatial.py",
+        "dot(twists[link].u, self._axis_rate(",
+        "0.0 * dot(twists[link].u, self._axis_rate(",
+        ("tests/reference/test_passive_freedoms.py", "-k", "does_not_spin"),
+    ),
 )
 
 _SOLVE = (
@@ -183,6 +190,41 @@ _SOLVE = (
         "before, after = np.max(np.abs(others - ours)[:, 5:], axis=0)",
         "return None\n    before, after = np.max(np.abs(others - ours)[:, 5:], axis=0)",
         ("tests/reference/test_change_points.py", "-m", "not slow", "-x"),
+    ),
+    Fault(
+        "ends-where-a-track-turns-over",
+        "solve/onward.py",
+        "for moment in follower.broken(track.coordinates, times)]",
+        "for moment in follower.broken(track.coordinates, times)[:0]]",
+        ("tests/reference/test_change_points.py", "-k", "in_space and deltoid"),
+    ),
+    Fault(
+        "turns-over-where-the-start-is-met",
+        "solve/onward.py",
+        "return bool(np.max(np.abs(ends[:, 1] - ends[:, 0])) < SAME)",
+        "return False",
+        ("tests/reference/test_change_points.py", "-k", "have_no_forces"),
+    ),
+    Fault(
+        "half-turns-told-apart",
+        "solve/alike.py",
+        "numbers += [element.z[i] * element.z[j] for i in range(3) for j in range(i, 3)]",
+        "numbers += [*element.z]",
+        ("tests/reference/test_assemblies.py", "-k", "half_turns"),
+    ),
+    Fault(
+        "massive-links-half-round-alike",
+        "solve/alike.py",
+        "bare = link.mass.source == 0 and",
+        "bare =",
+        ("tests/reference/test_assemblies.py", "-k", "half_turns"),
+    ),
+    Fault(
+        "hints-hold-at-the-start-alone",
+        "solve/drawn.py",
+        "if stated is None or not drivers",
+        "if stated is not None or not drivers",
+        ("tests/reference/test_assemblies.py", "-k", "hint_holds"),
     ),
     Fault(
         "spin-friction-sign",

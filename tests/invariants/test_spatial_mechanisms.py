@@ -326,7 +326,6 @@ def test_a_driver_too_many_is_named() -> None:
     data["drivers"]["D"] = {"speed": 1.0}
     said = prepare(Mechanism(**data)).chosen.findings
     assert any(
-        "the mobility is 2 by Grübler's formula (1 of them spins of a single link) and the number of drivers 2"
-        in one.what
+        "the mobility is 2 by Grübler's formula (1 of them passive) and the number of drivers 2" in one.what
         for one in said
     )

@@ -23,6 +23,7 @@ from geared import geared_loop
 from mechanisms import MODELS, analyse, build, class_three, excavator, findings, four_bar, stephenson_six_bar
 from mechanisms_parts import Data
 from trunnion import Mechanism, MechanismError
+from trunnion.algebra.nested import flat
 from trunnion.errors import Severity
 from trunnion.solve.assembly import hints
 from trunnion.solve.assembly_modes import GroupModes, choices, put_together
@@ -391,3 +392,123 @@ def test_the_finding_tells_the_range_that_was_found_again(islands: Any) -> None:
     solved = np.flatnonzero(np.isfinite(islands.closure_residual.values))
     second = solved[(solved > 60) & (solved < 240)]
     assert (low, high) == pytest.approx((second[0], second[-1]), abs=1.0)
+
+
+# ---- where the driver is when a hint holds ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["four-bar", "class III", "in space"])
+@pytest.mark.parametrize("share", [0.2, 0.7])
+def test_a_hint_holds_where_its_driver_is(name: str, share: float) -> None:
+    """Of every assembly the places at a position of the driver select it, though at the start others are nearer."""
+    data = SAID_AT[name]()
+    data.pop("assembly", None)
+    (choice,) = trunnion.check(Mechanism(**data), 12).choices
+    joint = next((joint for joint, place in choice.ways[0].joints.items() if len(place) > 1), "C")
+    driver = next(iter(data["drivers"]))
+    for way in choice.ways:
+        run = prepare(Mechanism(**{**data, "assembly": {choice.link: way.name}}))
+        time = np.array([share * run.cycle.duration])
+        walk = run.solve(time).walk
+        place = walk.point(run.system.joints[joint][1][1], joint).place
+        stated = [float(np.ravel(part)[0]) for part in place]
+        at = float(np.ravel(run.system.drive(run.values, driver, time)[0])[0])
+        hinted = prepare(Mechanism(**{**data, "assembly": {joint: stated, "at": at}}))
+        times = np.linspace(0.0, run.cycle.duration, 7)[:-1] + 0.01
+        for link in choice.links:
+            ours, theirs = (each.solve(times).walk.motions[link].frame for each in (run, hinted))
+            for is_, was in zip(flat(theirs), flat(ours), strict=True):
+                np.testing.assert_allclose(is_, was, atol=1e-9)
+
+
+def in_space_at() -> Data:
+    from timed import PARALLELOGRAM, driven_four_bar
+
+    (a, b, c, d), at = PARALLELOGRAM
+    return driven_four_bar("spatial", (a, b, c + 0.1, d), at).data()
+
+
+SAID_AT: dict[str, Any] = {
+    "four-bar": lambda: build(four_bar()).data(),
+    "class III": lambda: build(class_three()).data(),
+    "in space": in_space_at,
+}
+
+
+@pytest.mark.parametrize("at", [[0.1, 0.2], "way-1"])
+def test_the_place_of_the_driver_is_one_number(at: Any) -> None:
+    with pytest.raises(MechanismError, match=r"assembly\.at"):
+        build({**four_bar(), "assembly": {"C": [1.0, 0.5], "at": at}})
+
+
+# ---- assemblies that move alike ----------------------------------------------------------------------------------
+
+
+def jacked(first: str, **tube: Any) -> Mechanism:
+    """An arm on a hinge that a driven strut holds: universal or ball, slide, ball."""
+    hinge, slide = {"at": [0, 0, 0], "axis": [0, 1, 0]}, {"at": [0, 0, 0], "axis": [1, 0, 0]}
+    cross = first == "universal"
+    return Mechanism(
+        space="spatial",
+        links={
+            "ground": {"points": {"H": hinge, "U": {"at": [0.1, 0.3, 0.8], **({"axis": [0, 1, 0]} if cross else {})}}},
+            "arm": {"points": {"H": hinge, "L": [0.5, 0.05, 0.1], "W": [0.6, 0, 0.05]}},
+            "tube": {"points": {"U": {"at": [0, 0, 0], **({"axis": [0, 0, 1]} if cross else {})}, "T": slide}, **tube},
+            "rod": {"points": {"T": slide, "L": [0.1, 0, 0]}},
+        },
+        joints={
+            "H": {"type": "revolute", "links": ["ground", "arm"]}, "U": {"type": first, "links": ["ground", "tube"]},
+            "T": {"type": "prismatic", "links": ["tube", "rod"]}, "L": {"type": "spherical", "links": ["arm", "rod"]},
+        },
+        drivers={"T": {"speed": 0.1, "range": [0.65, 0.75]}},
+        loads={"w": {"link": "arm", "at": "W", "force": [10, 20, -300]}},
+    )  # fmt: skip
+
+
+def test_half_turns_of_a_strut_are_no_assemblies_of_their_own() -> None:
+    """The ball of the arm meets a sphere about U on two places; a cross holds the tube in two turns at each."""
+    (choice,) = trunnion.check(jacked("universal"), 12).choices
+    (spins,) = trunnion.check(jacked("spherical"), 12).choices
+    balls = [np.array([way.joints["L"] for way in of.ways]) for of in (choice, spins)]
+    np.testing.assert_allclose(balls[0], balls[1], atol=1e-9)
+    assert len(balls[0]) == 2
+    heavy = jacked("universal", mass=1.0, centre=[0.1, 0, 0])
+    assert len(trunnion.check(heavy, 12).choices[0].ways) == 4
+    for way in choice.ways:
+        held, spun = (
+            trunnion.analyse(put_together(jacked(first), of, way), 5)
+            for first, of in (("universal", choice), ("spherical", spins))
+        )
+        np.testing.assert_allclose(held["drive_effort"], spun["drive_effort"], rtol=1e-9)
+
+
+def test_a_hexapod_has_the_assemblies_of_its_plate() -> None:
+    """Of 194 that are found with its legs half round and not, those whose plates lie apart."""
+    corners = [(1.0, 10), (1.0, 50), (1.0, 130), (1.0, 170), (1.0, 250), (1.0, 290)]
+    tops = [(0.6, 10), (0.6, 60), (0.6, 120), (0.6, 175), (0.6, 235), (0.6, 305)]
+    links: dict[str, Any] = {"ground": {"points": {}}, "plate": {"points": {}, "mass": 10.0, "centre": [0, 0, 0]}}
+    joints: dict[str, Any] = {}
+    drivers: dict[str, Any] = {}
+    slide = {"at": [0, 0, 0], "axis": [1, 0, 0]}
+    for i in range(6):
+        (below, above) = (
+            np.array([radius * np.cos(np.radians(angle)), radius * np.sin(np.radians(angle)), 0.0])
+            for radius, angle in (corners[i], tops[i])
+        )
+        leg = above - below + np.array([0.05, 0.02, 1.0])
+        across = np.cross(leg, [0, 0, 1.0])
+        links["ground"]["points"][f"U{i}"] = {"at": below.tolist(), "axis": across.tolist()}
+        links["plate"]["points"][f"S{i}"] = above.tolist()
+        links[f"tube{i}"] = {"points": {f"U{i}": {"at": [0, 0, 0], "axis": [0, 1, 0]}, f"P{i}": slide}}
+        links[f"rod{i}"] = {"points": {f"P{i}": slide, f"S{i}": [0, 0, 0]}}
+        joints[f"U{i}"] = {"type": "universal", "links": ["ground", f"tube{i}"]}
+        joints[f"P{i}"] = {"type": "prismatic", "links": [f"tube{i}", f"rod{i}"]}
+        joints[f"S{i}"] = {"type": "spherical", "links": [f"rod{i}", "plate"]}
+        length = float(np.linalg.norm(leg))
+        drivers[f"P{i}"] = {"speed": 0.01 * (1 + i), "range": [length, length + 0.01 * (1 + i)]}
+    mechanism = Mechanism(space="spatial", links=links, joints=joints, drivers=drivers, gravity=[0, 0, -9.81])
+    (choice,) = trunnion.check(mechanism, 1).choices
+    plates = [np.array([way.joints[f"S{i}"] for i in range(6)]) for way in choice.ways]
+    apart = [np.max(np.abs(one - other)) for k, one in enumerate(plates) for other in plates[:k]]
+    assert len(plates) <= 40
+    assert min(apart) > 1e-3

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from trunnion import Mechanism, MechanismError, analyse, check, simulate
+from trunnion.solve.run import prepare
 
 Array = NDArray[np.float64]
 UPPER, LOWER = [0.1, 0.3, 0.8], [0.5, 0.05, 0.1]
@@ -98,14 +99,188 @@ def test_a_strut_changes_no_motion_in_time() -> None:
 
 
 def test_a_strut_whose_spin_matters_is_refused() -> None:
-    with pytest.raises(MechanismError, match=r"the links tube, rod together may spin about L-U.*L a universal joint"):
+    with pytest.raises(MechanismError, match=r"the links tube, rod together may spin about U-L.*U a universal joint"):
         analyse(arm("prismatic", rod={"mass": 1.0, "centre": [0.0, 0.02, 0.0]}), 5)
 
 
-def test_a_slide_beside_the_line_is_no_strut() -> None:
+# ---- any leg between two balls -----------------------------------------------------------------------------------
+
+
+def leg(kind: str, seed: int, driver: dict[str, Any] | None = None) -> Mechanism:
+    """The arm with a leg whose inner joint stands anywhere between its balls; driven, it is a jack."""
+    rng = np.random.default_rng(seed)
     data = arm("prismatic").data()
-    data["links"]["rod"]["points"]["L"] = [0.15, 0.01, 0]
-    with pytest.raises(MechanismError, match="mobility is 2"):
+    lower, upper = {"revolute": (0.5, 0.6), "prismatic": (0.2, 0.15)}[kind]
+    off = rng.uniform(-0.04, 0.04, (4, 3))
+    axes = np.array([0.0, 0.0, 1.0]) + rng.uniform(-0.4, 0.4, (2, 3)) if kind == "revolute" else [[1.0, 0, 0]] * 2
+    points = [off[0], off[1] + [lower, 0, 0], off[2], off[3] + [upper, 0, 0]]
+    for link, first, second, axis in (("tube", "U", "T", axes[0]), ("rod", "T", "L", axes[1])):
+        places = {first: points[0 if link == "tube" else 2], second: points[1 if link == "tube" else 3]}
+        data["links"][link]["points"] = {name: place.tolist() for name, place in places.items()}
+        data["links"][link]["points"]["T"] = {"at": places["T"].tolist(), "axis": list(map(float, axis))}
+    data["joints"]["T"]["type"] = kind
+    if driver:
+        data["drivers"], data["springs"] = {"T": driver}, {}
+    return Mechanism(**data)
+
+
+JACKS: dict[str, dict[str, Any]] = {
+    "revolute": {"speed": 0.3, "range": [1.8, 2.0]}, "prismatic": {"speed": 0.1, "range": [0.3, 0.4]},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", JACKS)
+def test_an_idle_leg_changes_nothing(kind: str) -> None:
+    bare = analyse(arm(None), 9)
+    for seed in range(4):
+        result = analyse(leg(kind, seed), 9)
+        assert codes(result).count("mobility.spin") == 1
+        assert check(leg(kind, seed)).mobility == 2
+        np.testing.assert_allclose(result["drive_effort"], bare["drive_effort"], rtol=1e-12)
+        np.testing.assert_allclose(result["reaction_force"].sel(joint=["U", "T", "L"]), 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", JACKS)
+def test_a_driven_leg_is_a_force_between_its_balls(kind: str) -> None:
+    """Whatever its shape: F along the line holds the arm, by virtual work effort · q̇ = F · l̇."""
+    for seed in range(6):
+        result = analyse(leg(kind, seed, JACKS[kind]), 9)
+        lower, wheel = (result["point_position"].sel(point=point).values for point in ("arm.L", "arm.W"))
+        along = (lower - np.array(UPPER)[:, None]) / np.linalg.norm(lower - np.array(UPPER)[:, None], axis=0)
+        axis = np.array([0.0, 1.0, 0.0])
+        force = -(axis @ np.cross(wheel, [10.0, 20.0, -300.0], axis=0)) / (axis @ np.cross(lower, along, axis=0))
+        carried = result["reaction_force"].sel(joint="L").values  # on the rod
+        np.testing.assert_allclose(carried, -force * along, rtol=1e-9, atol=1e-9 * np.max(np.abs(force)))
+        rate = np.sum(along * result["point_velocity"].sel(point="arm.L").values, axis=0)
+        power = result["drive_effort"].values[0] * JACKS[kind]["speed"]
+        np.testing.assert_allclose(power, force * rate, rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", JACKS)
+def test_a_leg_of_any_shape_does_not_spin(kind: str) -> None:
+    """Its first link has no part of ω along the line; velocities and accelerations are those of its poses."""
+    result = analyse(leg(kind, 1, JACKS[kind]), 401)
+    step = float(np.diff(result["time"].values[:2])[0])
+    line = result["point_position"].sel(point="arm.L").values - np.array(UPPER)[:, None]
+    spun = np.sum(result["link_angular_velocity"].sel(link="tube").values * line, axis=0)
+    np.testing.assert_allclose(spun, 0.0, atol=1e-12)
+    for link in ("tube", "rod"):
+        omega = result["link_angular_velocity"].sel(link=link).values
+        change = (omega[:, 2:] - omega[:, :-2]) / (2 * step)
+        stated = result["link_angular_acceleration"].sel(link=link).values[:, 1:-1]
+        np.testing.assert_allclose(stated, change, atol=1e-5)
+    place, speed = (result[f"point_{what}"].sel(point="tube.T").values for what in ("position", "velocity"))
+    np.testing.assert_allclose((place[:, 2:] - place[:, :-2]) / (2 * step), speed[:, 1:-1], atol=1e-5)
+
+
+def coupled(welded: bool) -> Mechanism:
+    """An RSSR with a massless coupler, of one link or of two that are welded together off the line of its balls."""
+    upright = {"at": [0, 0, 0], "axis": [0, 0, 1]}
+    links: dict[str, Any] = {
+        "ground": {"points": {"A": upright, "D": {"at": [0.1, 0, 0], "axis": [0, -0.87, 0.5]}}},
+        "crank": {"points": {"A": upright, "B": [0.03, 0, 0.01]}},
+        "rocker": {
+            "points": {"D": upright, "C": [0.07, 0, 0.02]},
+            "mass": 0.4, "centre": [0.03, 0, 0], "inertia": {"xx": 1e-4, "yy": 2e-4, "zz": 2e-4},
+        },
+        "bar": {"points": {"B": [0, 0, 0], "C": [0.12, 0, 0]}},
+    }  # fmt: skip
+    joints: dict[str, Any] = {
+        "A": {"type": "revolute", "links": ["ground", "crank"]},
+        "B": {"type": "spherical", "links": ["crank", "bar"]},
+        "C": {"type": "spherical", "links": ["bar", "rocker"]},
+        "D": {"type": "revolute", "links": ["ground", "rocker"]},
+    }
+    if welded:
+        weld = {"at": [0.05, 0.03, -0.02], "axis": [0.3, 0.1, 1.0], "x": [1, 0, -0.3]}
+        links["bar"] = {"points": {"B": [0, 0, 0], "W": weld}}
+        links["half"] = {"points": {"C": [0.12, 0, 0], "W": weld}}
+        joints["C"]["links"] = ["half", "rocker"]
+        joints["W"] = {"type": "fixed", "links": ["bar", "half"]}
+    return Mechanism(
+        space="spatial", links=links, joints=joints, drivers={"A": {"speed": 3.0}}, gravity=[0, 0, -9.81],
+        loads={"turn": {"link": "rocker", "moment": [0, 0, 1.0]}}, assembly={"C": [0.1, 0.06, 0.05]},
+    )  # fmt: skip
+
+
+def test_a_welded_coupler_is_the_bar() -> None:
+    bar, welded = analyse(coupled(False), 24), analyse(coupled(True), 24)
+    assert codes(bar).count("mobility.spin") == codes(welded).count("mobility.spin") == 1
+    for key in ("drive_effort", "efficiency_instant"):
+        np.testing.assert_allclose(welded[key], bar[key], rtol=1e-9)
+    for joint in "ABCD":
+        for key in ("reaction_force", "reaction_moment"):
+            np.testing.assert_allclose(welded[key].sel(joint=joint), bar[key].sel(joint=joint), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        welded["link_rotation"].sel(link="rocker"), bar["link_rotation"].sel(link="rocker"), atol=1e-9
+    )
+
+
+def test_a_spin_within_a_spin() -> None:
+    """A knee that a jack opens, which hangs on two balls between its links: both spins are told and told apart."""
+    data = leg("revolute", 3).data()
+    data["links"]["tube"]["points"]["P"], data["links"]["rod"]["points"]["Q"] = [0.2, 0.1, 0.05], [0.3, -0.1, 0.02]
+    data["links"]["jack"] = {"points": {"P": [0, 0.01, 0], "S": {"at": [0.2, 0, 0], "axis": [1, 0, 0]}}}
+    data["links"]["piston"] = {"points": {"S": {"at": [-0.1, 0, 0], "axis": [1, 0, 0]}, "Q": [0.1, 0.02, 0]}}
+    data["joints"] |= {
+        "P": {"type": "spherical", "links": ["tube", "jack"]}, "S": {"type": "prismatic", "links": ["jack", "piston"]},
+        "Q": {"type": "spherical", "links": ["piston", "rod"]},
+    }  # fmt: skip
+    data["drivers"], data["springs"] = {"S": {"speed": 0.1, "range": [-0.1, 0.0]}}, {}
+    result = analyse(Mechanism(**data), 9)
+    assert codes(result).count("mobility.spin") == 2
+    places = {point: result["point_position"].sel(point=point).values for point in ("arm.L", "tube.P", "rod.Q")}
+    lines = {"tube": places["arm.L"] - np.array(UPPER)[:, None], "jack": places["rod.Q"] - places["tube.P"]}
+    for link, line in lines.items():
+        spun = np.sum(result["link_angular_velocity"].sel(link=link).values * line, axis=0)
+        np.testing.assert_allclose(spun, 0.0, atol=1e-12)
+    force = result["reaction_force"].sel(joint="L").values
+    np.testing.assert_allclose(np.cross(force, lines["tube"], axis=0), 0.0, atol=1e-8)
+    rate = np.sum(
+        lines["tube"] / np.linalg.norm(lines["tube"], axis=0) * result["point_velocity"].sel(point="arm.L"), axis=0
+    )
+    power = -np.sum(force * lines["tube"] / np.linalg.norm(lines["tube"], axis=0), axis=0) * rate
+    np.testing.assert_allclose(result["drive_effort"].values[0] * 0.1, power, rtol=1e-9)
+
+
+def test_a_leg_changes_no_motion_in_time() -> None:
+    moved = []
+    for mechanism in (arm(None), leg("revolute", 2)):
+        data = mechanism.data()
+        data["links"]["arm"] |= {"mass": 20.0, "centre": [0.3, 0, 0], "inertia": {"xx": 1.0, "yy": 1.5, "zz": 1.5}}
+        data["drivers"] = {"H": {"speed": 1.0, "range": [-0.9, 0.9], "free": True, "initial": {"coordinate": 0.0}}}
+        moved.append(simulate(Mechanism(**data), 0.12, 10, 1e-10))
+    np.testing.assert_allclose(moved[1]["drive_coordinate"], moved[0]["drive_coordinate"], rtol=1e-8, atol=1e-10)
+
+
+@pytest.mark.parametrize(("kind", "driven"), [("revolute", True), ("prismatic", True), ("prismatic", False)])
+def test_what_is_printed_of_a_leg_selects_its_assembly(kind: str, driven: bool) -> None:
+    """Places and turns that a spin leaves alone; a place of the knee does so wherever it spins."""
+    data = leg(kind, 1, JACKS[kind] if driven else None).data()
+    (choice,) = check(Mechanism(**data), 4).choices
+    for way in choice.ways:
+        printed: dict[str, Any] = {
+            name: list(place) if len(place) > 1 else place[0] for name, place in way.joints.items()
+        }
+        run = prepare(Mechanism(**{**data, "assembly": {choice.link: way.name}}))
+        knee = [float(np.ravel(part)[0]) for part in run.solve(np.zeros(1)).walk.point("rod", "T").place]
+        for name, hint in [*printed.items(), *way.turns.items(), ("T", knee)]:
+            checked = check(Mechanism(**{**data, "assembly": {name: hint}}), 4)
+            assert [other.name for other in checked.choices[0].ways if other.taken] == [way.name]
+            assert not [finding for finding in checked.findings if finding.code.startswith("assembly")]
+
+
+def test_a_mass_beside_the_line_of_a_leg_is_refused() -> None:
+    data = leg("revolute", 0).data()
+    data["links"]["rod"] |= {"mass": 1.0, "centre": [0.3, 0, 0]}
+    with pytest.raises(MechanismError, match=r"the links tube, rod together may spin about U-L.*U a universal joint"):
+        analyse(Mechanism(**data), 5)
+
+
+def test_a_slide_that_turns_beside_the_line_leaves_its_turn_open() -> None:
+    data = leg("prismatic", 0).data()
+    data["joints"]["T"]["type"] = "cylindrical"
+    with pytest.raises(MechanismError, match=r"mobility is 2 by Grübler's formula beside 1 passive spin, .*one driver"):
         analyse(Mechanism(**data), 3)
 
 

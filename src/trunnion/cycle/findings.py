@@ -25,15 +25,20 @@ from trunnion.errors import Finding, Status, agreeing
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.joint_parts import clearance
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.parts import AT
 from trunnion.model.quantity import Quantity
 from trunnion.model.tolerances import tolerated
 from trunnion.model.units import KINDS
 from trunnion.results.quantities import between, quantity, readable
 from trunnion.solve import loads
+from trunnion.solve.assembly import grid
+from trunnion.solve.drawn import hinted_at
 from trunnion.solve.end_loads import NO_LOAD, EndLoads, plain
+from trunnion.solve.forward import start
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
 from trunnion.solve.seating import ROUNDS as SEAT_ROUNDS
 from trunnion.solve.seating import UNSETTLED, Seating, seating_of
+from trunnion.solve.space.determinacy import spins_of
 from trunnion.solve.system import System, felt, rubbing
 
 if TYPE_CHECKING:
@@ -125,21 +130,26 @@ def _of_the_model(cycle: Cycle) -> list[Finding]:
 
 
 def _far_hints(run: Run) -> Iterator[Finding]:
-    """Hints of places that are far from where their points are at the start: they choose an assembly by chance."""
+    """Hints of places that are far from where their points are then: they choose an assembly by chance."""
     size = float(np.ravel(primal(run.system.size(run.values)))[0])
-    walk = run.walk(np.zeros(1))
+    times = grid(run.cycle)
+    lane = hinted_at(start(run.system, run.values), times)
+    walk, when = run.walk(times[lane : lane + 1]), f"with {AT} at its place" if lane else "at the start"
+    spins = [(members, ends) for _, (_, *ends), members in spins_of(run.system)]
     for name, hint in run.system.mechanism.assembly.items():
         if not isinstance(hint, tuple):
             continue
         link, _, point = name.rpartition(".")
         link = link or run.system.joints[name][1][1]
+        if any(link in members and point not in ends for members, ends in spins):
+            continue  # it may be anywhere about the line
         place = [float(np.ravel(primal(part))[0]) for part in walk.point(link, point).place]
         stated = [float(run.values[f"assembly.{name}.{axis}"]) for axis in "xyz"[: len(place)]]
         distance = float(np.linalg.norm(np.subtract(place, stated)))
         if distance > FAR * size:
             words = ", ".join(quantity(part, "m") for part in place)
-            what = f"the hint for {name} is {readable(distance, 'm')} from where {name} is at the start"
-            remedy = f"check the hint or the lengths; at the start it is at {words}"
+            what = f"the hint for {name} is {readable(distance, 'm')} from where {name} is {when}"
+            remedy = f"check the hint or the lengths; {when} it is at {words}"
             figures = {"point": name, "distance": distance, "place": words}
             yield Finding.warning("assembly.far_hint", f"assembly.{name}", what, remedy, **figures)
 

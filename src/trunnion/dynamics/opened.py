@@ -31,7 +31,8 @@ from trunnion.model.parameters import Numbers
 from trunnion.model.parts import Driver
 from trunnion.solve.forward import Forward
 from trunnion.solve.run import Run
-from trunnion.structure.decompose import decompose, mobility_by_formula, passive
+from trunnion.structure.decompose import decompose, mobility_by_formula
+from trunnion.structure.passive import passive
 
 __all__ = ["Opened", "in_play", "is_rigid", "of_several", "opened"]
 

@@ -99,7 +99,7 @@ class SpatialGroup(Tree):
                     together += [other for other in joint.sides if other not in (OUTER, *together)]
         return tuple(together)
 
-    def spin_axis(self, placed: Sequence[Element], a: int, b: int) -> Vector3:
+    def spin_axis(self, placed: Mapping[int, Element] | Sequence[Element], a: int, b: int) -> Vector3:
         """Unit vector of the line about which a link can spin: from ball to ball, or the axis of its other joint."""
         for k in (a, b):
             if not self.joints[k].pair.ball:
@@ -122,8 +122,24 @@ class SpatialGroup(Tree):
         return rows
 
     def further_rates(self, pose: Pose, twists: Sequence[Screw], outer: Sequence[Any]) -> list[Number]:
-        """ω · u = 0, and u̇ = ω × u: the second derivative has no further term."""
+        """ω · u of the free spins; of accelerations ω̇ · u, to which `further_carried` adds."""
         return [dot(self.spin_axis(pose.elements, a, b), twists[link].u) for link, a, b in self.spinning]
+
+    def further_carried(self, pose: Pose, twists: Sequence[Screw], outer: Sequence[Any]) -> list[Number]:
+        """ω · u̇ of the free spins: the line turns against links that change their shape."""
+        return [dot(twists[link].u, self._axis_rate(pose, twists, outer, a, b)) for link, a, b in self.spinning]
+
+    def _axis_rate(self, pose: Pose, twists: Sequence[Screw], outer: Sequence[Any], a: int, b: int) -> Vector3:
+        """u̇: of an axis with its joint, else of the line across the links by how the balls at its ends move apart."""
+        axis = self.spin_axis(pose.elements, a, b)
+        for k in (a, b):
+            if not self.joints[k].pair.ball:
+                return cross(self.of(k, 1, twists, outer).u, axis)
+        ends = [pose.elements[k].second.place for k in (a, b)]
+        speeds = [moment_at(self.of(k, 1, twists, outer), place) for k, place in zip((a, b), ends, strict=True)]
+        away, along = vector_minus(speeds[1], speeds[0]), dot(vector_minus(ends[1], ends[0]), axis)
+        stretched = namespace(along).where(primal(along) > 0, along, 1.0)
+        return scaled(1 / stretched, vector_minus(away, scaled(dot(away, axis), axis)))
 
     def further_loads(self, pose: Pose, multipliers: Sequence[Number]) -> list[tuple[int, Screw]]:
         """The torque about its line that keeps each link from spinning."""
@@ -136,14 +152,33 @@ class SpatialGroup(Tree):
         """Torque about its line that each link with a free spin would need to keep from spinning, N m."""
         return self.multipliers(pose, loads)[6 * len(self.chords) :]
 
+    def from_line(
+        self, placed: Mapping[int, Element] | Sequence[Element], a: int, b: int, place: Vector3
+    ) -> tuple[Number, Number]:
+        """How far a place is along the line of a spin and from it, m; from the ball at its end."""
+        axis = self.spin_axis(placed, a, b)
+        away = vector_minus(place, placed[a if self.joints[a].pair.ball else b].second.place)
+        across = cross(away, axis)
+        return dot(away, axis), np.sqrt(dot(across, across))
+
     def signature(self, pose: Pose, spread: float) -> list[Number]:
-        """Axes and places of the links; of those that spin their joints, which lie on the line."""
+        """Axes and places of the links; of those that spin what a spin leaves alone."""
         spun = {member for spin in self.spinning for member in self.spun(*spin)}
         numbers: list[Number] = []
         for link, frame in enumerate(pose.frames):
             if link not in spun:
                 numbers += [*frame.x, *frame.y, *frame.z, *(n / spread for n in frame.place)]
+        return numbers + [n / spread for n in self.unturned(pose.elements)]
+
+    def unturned(self, placed: Sequence[Element]) -> list[Number]:
+        """Places of the joints of links that spin, m: of those between two such links, along the line and from it."""
+        sets = sorted(({*self.spun(*spin)}, *spin[1:]) for spin in self.spinning)
+        numbers: list[Number] = []
         for k, joint in enumerate(self.joints):
-            if spun.intersection(joint.sides) and joint.kind != "planar":
-                numbers += [n / spread for n in pose.elements[k].second.place]
+            place = placed[k].second.place
+            spins = [(len(members), a, b) for members, a, b in sets if members.issuperset(joint.sides)]
+            if spins:
+                numbers += self.from_line(placed, *min(spins)[1:], place)
+            elif joint.kind != "planar" and any(members.intersection(joint.sides) for members, *_ in sets):
+                numbers += place
         return numbers

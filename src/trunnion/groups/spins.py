@@ -1,9 +1,8 @@
 """Links whose spin is free, carried along a track of poses without spinning.
 
-Which way such a link has turned about its line moves nothing else, so position by Newton's method leaves it as it was
-guessed. The velocity is that of no spin, ω · u = 0; a track on which the link does so as well is had by turning it, at
-each of its poses, by what it has spun since the start: from one pose to the next the link should turn by the shortest
-way from one direction of its line to the other.
+Which way such links have turned about their line moves nothing else, so position by Newton's method leaves it as it was
+guessed. The velocity is that of no spin, ω · u = 0; a track on which a link does so as well is had by turning it, with
+those that spin with it, at each of its poses by what it has spun since the start.
 """
 
 from __future__ import annotations
@@ -22,21 +21,26 @@ if TYPE_CHECKING:
 __all__ = ["unspun"]
 
 Array = NDArray[np.float64]
+ROUNDS = 4  # each of which leaves the third power
+BEFORE, AFTER = slice(None, -1), slice(1, None)
 
 
 def unspun(group: SpatialGroup, elements: Sequence[Element], rows: Array, drive: Sequence[Any]) -> Array:
     """Coordinates (kept, grid) of a track with the same poses but for the spins, which are taken out."""
     if not group.spinning or rows.shape[1] < 2:
         return rows
-    pose = group.position(elements, list(rows), drive)
     grid = rows.shape[1]
     place = {i: n for n, i in enumerate(group.kept)}
     rows = rows.copy()
-    for link, a, b in group.spinning:
-        members = group.spun(link, a, b)
+    sets = sorted(((group.spun(*spin), *spin) for spin in group.spinning), key=lambda spin: -len(spin[0]))
+    pose, stale = group.position(elements, list(rows), drive), set[int]()
+    for members, link, a, b in sets:
+        if stale.intersection(members):  # of links that another spin has turned
+            pose, stale = group.position(elements, list(rows), drive), set()
+        stale.update(members)
         axis = _full(group.spin_axis(pose.elements, a, b), grid)
         centre = _full(pose.elements[a if group.joints[a].pair.ball else b].second.place, grid)
-        spun = _spun(axis, _full(pose.frames[link].x, grid), _full(pose.frames[link].y, grid))
+        spun = _spun(axis, np.array([_full(side, grid) for side in pose.frames[link][:3]]))
         for k in (a, b):
             first, second, _ = pose.elements[k]
             sense = -1.0 if group.joints[k].sides[1] in members else 1.0  # back by what it has spun
@@ -86,19 +90,20 @@ def _full(vector: Sequence[Any], grid: int) -> Array:
     return np.array([np.broadcast_to(n, (grid,)) for n in vector], float)
 
 
-def _spun(axis: Array, x: Array, y: Array) -> Array:
-    """Angle by which a link has spun since the first pose of a run without gaps, rad; axis, x, y: (3, grid)."""
-    before, after = axis[:, :-1], axis[:, 1:]
-    turn, cosine = np.cross(before, after, axis=0), np.sum(before * after, axis=0)
-    # of its axes that at right angles to the line: one of the two is far enough from it
-    side = np.where(np.abs(np.sum(x * axis, axis=0)) < 0.9, x, y)
-    old, new = side[:, :-1], np.where(np.abs(np.sum(x * axis, axis=0))[:-1] < 0.9, x[:, 1:], y[:, 1:])
-    # Rodrigues: the shortest turn from one direction to the other, sin about `turn`, cos between them
-    scale = np.sum(turn * old, axis=0) / (1 + cosine)
-    carried = cosine * old + np.cross(turn, old, axis=0) + scale * turn
-    carried, new = (one - np.sum(one * after, axis=0) * after for one in (carried, new))
-    step = np.arctan2(np.sum(np.cross(carried, new, axis=0) * after, axis=0), np.sum(carried * new, axis=0))
-    return np.concatenate([[0.0], np.cumsum(np.nan_to_num(step))])
+def _spun(axis: Array, sides: Array) -> Array:
+    """Angle by which a link has spun since the first pose of a run without gaps, rad; (3, grid), sides: (3, 3, grid).
+
+    Each step of what is left is a turn about the line midway: u · the turn from one pose to the next, by sin and cos.
+    """
+    midway = axis[:, :-1] + axis[:, 1:]
+    midway = midway / np.linalg.norm(midway, axis=0)
+    spun = np.zeros(axis.shape[1])
+    for _ in range(ROUNDS):
+        before, after = (np.array([_about(side, axis, -spun)[:, part] for side in sides]) for part in (BEFORE, AFTER))
+        sine = np.sum(midway * np.sum(np.cross(before, after, axis=1), axis=0), axis=0)
+        cosine = np.sum(before * after, axis=(0, 1)) - 1.0
+        spun += np.concatenate([[0.0], np.cumsum(np.nan_to_num(np.arctan2(sine, cosine)))])
+    return spun
 
 
 def _turned(q: Array, axis: Array, angle: Array) -> Array:

@@ -280,6 +280,10 @@ class Tree(ABC):
         """Rates of these rows, or second derivatives from those of the twists."""
         return []
 
+    def further_carried(self, pose: Pose, twists: Sequence[Any], outer: Sequence[Any]) -> list[Number]:
+        """What their second derivatives have beside, by the twists alone; none if nothing."""
+        return []
+
     def further_loads(self, pose: Pose, multipliers: Sequence[Number]) -> list[tuple[int, Any]]:
         """What the multipliers of these rows do to the links."""
         return []
@@ -480,7 +484,8 @@ class Tree(ABC):
         for k in self.chords:
             relative = self.algebra.minus(self.across(k, found, outer_seconds), carried[k])
             rows += self._opened(pose, k, relative, driven[k])
-        rows += self.further_rates(pose, found, outer_seconds)
+        further, more = self.further_rates(pose, found, outer_seconds), self.further_carried(pose, twists, outer)
+        rows += [rate + change for rate, change in zip(further, more, strict=True)] if more else further
         return twists, self._accelerations(pose, outer_seconds, self._closing(pose, driven, rows), carried)
 
     def rates(self, pose: Pose, outer: Sequence[Any], drive: Sequence[Number] = ()) -> Coordinates:

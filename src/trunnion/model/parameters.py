@@ -27,7 +27,7 @@ from trunnion.model.measure_kinds import course_kind, dimension_kinds, drive_kin
 from trunnion.model.measure_table import Measure
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import ERRORS, ParameterNames
-from trunnion.model.parts import Contact, Driver, Friction, Gear, Joint, Losses, Point, freedoms
+from trunnion.model.parts import AT, Contact, Driver, Friction, Gear, Joint, Losses, Point, freedoms
 from trunnion.model.quantity import Quantity, evaluation_order
 from trunnion.model.rules import Within, markers
 from trunnion.model.units import ANY, KINDS, Kind, unit
@@ -271,6 +271,8 @@ def _narrow(mechanism: Fields, section: str, name: str, entry: Entry) -> Kind:
         return (KINDS["time"] if in_time else drive_kind(mechanism)) if place else ANY
     if section == "gears":
         return entry.kind.of(turns=not mechanism.gears[name].slides)
+    if section == "assembly" and name == AT and name not in mechanism.effective_joints:
+        return drive_kind(mechanism)
     spring = mechanism.springs[name] if section == "springs" else None
     moved = mechanism.drivers[name].moves if section == "drivers" else None
     joint = mechanism.effective_joints.get((spring.joint or "") if spring else moved or name)

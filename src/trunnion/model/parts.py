@@ -67,6 +67,7 @@ from trunnion.model.tolerance_parts import Correlation, Cost, CostOption, Variat
 from trunnion.model.units import KINDS
 
 __all__ = [
+    "AT",
     "FOLDS",
     "FORMS",
     "FRICTION_MODELS",
@@ -429,6 +430,7 @@ class Gear(Part):
         return self.radius is not None or (self.teeth and self.lead is None)
 
 
+AT = "at"  # in an assembly, where the first driver is when points are where it says
 FOLDS = "folds"  # at a change point a group stays on its side of it
 _WAY = re.compile(rf"^(way-[1-9][0-9]{{0,3}}|{FOLDS})$")
 _LIKE_A_WAY = re.compile(r"(?i)^(way[-_ ]\w*|folds?)$")  # meant as a name, whatever is wrong with it

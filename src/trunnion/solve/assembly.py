@@ -9,7 +9,7 @@ assemblies are apart. `assembly_modes` lists them at that same position, so that
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -21,27 +21,25 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import each, zipped
 from trunnion.errors import Finding, MechanismError, agreeing
 from trunnion.groups.gear import NUMBERS, rotation
-from trunnion.groups.spatial import SpatialGroup
-from trunnion.groups.spins import unspun
-from trunnion.groups.tree import OUTER
+from trunnion.groups.tree import OUTER, Element
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import as_key
 from trunnion.model.parts import FOLDS
 from trunnion.results.quantities import quantity
 from trunnion.solve import change_points
-from trunnion.solve.drawn import drawn_at, off_drawing
-from trunnion.solve.forward import Forward, pose_of, posed, start
-from trunnion.solve.system import Cycle, Dial, Positions, System, Values, driven_coordinates
+from trunnion.solve.alike import alike
+from trunnion.solve.drawn import drawn_at, hinted_at, off_drawing
+from trunnion.solve.forward import Forward, pose_of, start
+from trunnion.solve.onward import followed_through, through
+from trunnion.solve.system import Cycle, System, Values, driven_coordinates
 from trunnion.solve.track import (
     GUESSES,
     SAME,
     STRIDE,
     Assemblies,
     Follower,
-    Passing,
     Track,
     TrackClock,
-    alternating,
     closed_at,
     each_once,
     extent,
@@ -52,7 +50,7 @@ from trunnion.solve.track import at as elements_at
 from trunnion.structure.decompose import Module
 
 __all__ = [
-    "Chosen", "choose", "coordinate", "distance", "folds", "grid", "hints", "joint_rows", "named_way", "way_name",
+    "Chosen", "choose", "coordinate", "distance", "grid", "hints", "joint_rows", "named_way", "way_name",
     "ways_of",
 ]  # fmt: skip
 
@@ -65,8 +63,6 @@ NEARER = 1e-9  # of how far it is from a hint, and of the size: an assembly that
 LOOKED = 2  # of the grid every which position the assemblies are compared at
 TRIED = 64  # guesses at each place where it is tried whether there is an assembly at all
 SPREAD = 25  # such places
-BEFORE = 4  # positions before a change point that lead over it
-NEARBY = 0.3  # of an interval of the grid: nearer to a change point Newton may take one assembly for the other
 
 
 @dataclass(frozen=True)
@@ -126,20 +122,19 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             counts.append(count)
             if isinstance(assembly, Track) and count == 0:
                 findings.append(_never(system, module))
-            if isinstance(assembly, Track) and len(assembly.again):
-                findings.append(_anew(module, system.dial(values, times), assembly.again))
             assembled = module.rank > 1 and (group.BRANCHES or (isinstance(assembly, Track) and count > 0))
             if not assembled and number == len(system.plan.modules) - 1:  # nothing stands on it
                 continue
             pose = pose_of(walk, number, assembly, times)
-            if assembled and (at := change_points.find(walk, number, assembly, times, pose, cycle)):
-                if group.BRANCHES:
-                    chosen[number], meetings[number] = _through(walk, number, assembly, lane, at, times, cycle)
-                else:
-                    chosen[number], meetings[number] = _followed_through(walk, number, assembly, at, times, cycle)
-                walk.assembly[number] = chosen[number]
-                findings.append(change_points.finding(system, values, module, meetings[number]))
-                pose = pose_of(walk, number, chosen[number], times)
+            if assembled:
+                go = through if group.BRANCHES else followed_through
+                chosen[number], met, remarks = go(walk, number, assembly, lane, times, pose, cycle)
+                findings += remarks
+                if met.at:
+                    meetings[number] = met
+                if chosen[number] is not assembly:
+                    walk.assembly[number] = chosen[number]
+                    pose = pose_of(walk, number, chosen[number], times)
             walk.stand(number, pose)  # an assembly is a matter of places
     mirrored = any(len(met.crossed) % 2 and not met.folds for met in meetings.values()) and cycle.periodic
     return Chosen(tuple(chosen), tuple(counts), tuple(findings), meetings, mirrored)
@@ -177,36 +172,32 @@ def _closed_form(walk: Forward, number: int, times: Array, drawn: int | None) ->
 
 def _off_drawing(walk: Forward, number: int, pose: Any, lane: int | NDArray[np.intp]) -> Array:
     """How far a module is from where it is drawn in a pose at a position, or in a lane of many, m²."""
-    module, group = walk.system.plan.modules[number], walk.system.groups[number]
+    group = walk.system.groups[number]
     frames = each(pose.frames, lambda part: lane_of(primal(part), lane))
     spun = sorted({link for spin in getattr(group, "spinning", ()) for link in group.spun(*spin)})
-    points = [
-        (link, walk.local[module.links[link], joint].place)
-        for link in spun
-        for joint in module.joints
-        if module.links[link] in walk.system.joints[joint][1]
-    ]
-    return off_drawing(walk, frames, spun, points)
+    lengths: Iterator[tuple[Number, Number]] = iter(())
+    if spun:
+        places = each(pose.elements, lambda part: lane_of(primal(part), lane))
+        drawn = [
+            Element(*(walk.local[link, place.joint] for link in place.links)) for place in walk.system.places[number]
+        ]
+        lengths = zip(group.unturned(places), group.unturned(drawn), strict=True)
+    return off_drawing(walk, frames, spun, list(lengths))
 
 
 def ways_of(walk: Forward, number: int, times: Array) -> tuple[int | None, Any]:
     """Where the links of a closed form lie in all of its assemblies, and the position at which that is.
 
-    It is the first at which all assemblies exist and are apart; where they meet all along, the first at which they
-    exist; None if there is none.
+    It is the first, or nearest to where the hints hold, at which all assemblies exist and are apart; where they meet
+    all along, at which they exist; None if there is none.
     """
     poses = [pose_of(walk, number, branch, times) for branch in walk.system.groups[number].BRANCHES]
-    lane = _first_apart(walk, number, poses, times)
+    exist, differ = _apart(walk, number, poses, times)
+    apart = np.flatnonzero(differ[::LOOKED]) * LOOKED
+    lanes = apart if len(apart) else np.flatnonzero(exist)
+    lane = int(lanes[np.argmin(np.abs(lanes - hinted_at(walk, times)))]) if len(lanes) else None
     frames = [each(pose.frames, lambda part: lane_of(primal(part), lane or 0)) for pose in poses]
     return lane, zipped(lambda *numbers: np.array(numbers), *frames)
-
-
-def _first_apart(walk: Forward, number: int, poses: Sequence[Any], times: Array) -> int | None:
-    exist, differ = _apart(walk, number, poses, times)
-    for lanes in (np.flatnonzero(differ[::LOOKED]) * LOOKED, np.flatnonzero(exist)):
-        if len(lanes):
-            return int(lanes[0])
-    return None
 
 
 def _apart(
@@ -223,91 +214,11 @@ def _apart(
     return exist, exist & (np.ptp(keys, axis=0).max(axis=0) > SAME)
 
 
-# ---- change points --------------------------------------------------------------------------------------------
-
-
-def folds(system: System, module: Module) -> bool:
-    """Whether a module is stated to stay on its side of its change points."""
-    return any(system.mechanism.assembly.get(link) == FOLDS for link in module.links)
-
-
-def _through(
-    walk: Forward, number: int, branch: int, lane: int, at: Sequence[change_points.Meeting], times: Array, cycle: Cycle
-) -> tuple[Any, change_points.Meetings]:
-    """A closed form through its change points: in the branch that it has at a position of the grid, and from there on,
-    unless it folds, in the other one wherever that goes on smoothly."""
-    system, module, group = walk.system, walk.system.plan.modules[number], walk.system.groups[number]
-    size = float(np.max(primal(walk.size)))
-
-    def numbers(which: int, moments: Array) -> Array:
-        trial = posed(system, walk.values, walk.assembly[:number], moments)
-        pose = pose_of(trial, number, group.BRANCHES[which], moments)
-        return np.array([np.broadcast_to(primal(n), moments.shape) for n in key_of(group, pose, size)])
-
-    places, crossed = list[change_points.Meeting](), list[float]()
-    for first, last in at:
-        exact = change_points.crosses(numbers, first, times[1], cycle) if first == last else None
-        crossed += [] if exact is None else [exact]
-        places.append((first, last) if exact is None else (exact, exact))
-    folding = folds(system, module)
-    smooth = not (crossed and folding) and all(first == last for first, last in at)
-    met = change_points.Meetings(tuple(places), tuple(crossed), folding, smooth)
-    if folding or not crossed:
-        return branch, met
-    clock, duration = TrackClock.of(system, walk.values), cycle.duration if cycle.periodic else None
-    first = branch * int(alternating(crossed, times[lane]))
-    return Passing(first, tuple(crossed), duration, clock), met
-
-
-def _followed_through(
-    walk: Forward, number: int, track: Track, at: Sequence[change_points.Meeting], times: Array, cycle: Cycle
-) -> tuple[Any, change_points.Meetings]:
-    """A general group through its change points, onward from where it was put together: beyond one it is followed from
-    where the coordinates before it lead, there with the other sign of det J."""
-    module, group = walk.system.plan.modules[number], walk.system.groups[number]
-    folding, passed, kinks = folds(walk.system, module), list[float](), False
-    if group.redundant or folding:  # the least-squares way on is smooth by itself
-        return track, change_points.Meetings(tuple(at), (), folding, bool(group.redundant))
-    drive, _, _ = driven_coordinates(walk.system, module, walk.system.places[number], walk.values, times)
-    elements = walk.pairs(walk.system.places[number])
-    drive = [track.turns.get(slot, one) for slot, one in enumerate(drive)]
-    last, begin = track.begin, int(np.searchsorted(times, track.begin))
-    while ahead := [first for first, end in at if first == end and first > last + NEARBY * times[1]]:
-        last = ahead[0]
-        before = np.flatnonzero(times < last - NEARBY * times[1])[-BEFORE:]
-        beyond = np.flatnonzero(times > last + NEARBY * times[1])
-        if len(before) < BEFORE or before[0] < begin or not len(beyond):
-            continue
-        rows, place = track.coordinates.copy(), beyond[0]
-        guess = change_points.carried_on(times[before], rows[:, before], float(times[place]))
-        follower = Follower(group, elements, drive, -float(track.sense(times[before[-1]])), STRIDE)
-        fresh = follower.solved_from(place, guess)
-        kink = np.max(np.abs(rows[:, place] - guess))
-        if fresh is None or not np.max(np.abs(fresh - guess)) < kink:
-            kinks = kinks or fresh is None
-            continue
-        for between in range(before[-1] + 1, place):
-            rows[:, between] = change_points.carried_on(times[before], rows[:, before], float(times[between]))
-        rows[:, place:] = np.nan
-        rows[:, place] = fresh
-        follower.run(rows, np.arange(place, len(times)))
-        passed.append(last)
-        track = replace(track, coordinates=rows, passed=tuple(passed))
-        pose = pose_of(walk, number, track, times)
-        at = change_points.find(walk, number, track, times, pose, cycle)
-    smooth = not kinks and all(first == end for first, end in at)
-    return track, change_points.Meetings(tuple(at), tuple(passed), False, smooth)
-
-
 # ---- general groups -------------------------------------------------------------------------------------------
 
 
 def _general(walk: Forward, number: int, times: Array, periodic: bool, drawn: int | None) -> Decision:
-    """The assembly that is named, nearest the hints or drawn, followed both ways from the first position with any.
-
-    Where it ends and the links can be assembled again farther on, in the same sense, the assembly nearest to what
-    was left is taken there and followed too.
-    """
+    """The assembly that is named, nearest the hints or drawn, followed both ways from the first position with any."""
     system, module = walk.system, walk.system.plan.modules[number]
     group, places, grid = system.groups[number], system.places[number], len(times)
     drive, _, _ = driven_coordinates(system, module, places, walk.values, times)
@@ -316,19 +227,23 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool, drawn: in
     drive = [turns.get(slot, number) for slot, number in enumerate(drive)]
     rows = np.full((len(group.kept), grid), np.nan)
     clock, nowhere = TrackClock.of(system, walk.values), np.array([], np.intp)
-    begin, solved = _first_closed(group, elements, drive, grid)
+    begin, solved = _first_closed(group, elements, drive, grid, hinted_at(walk, times))
     lanes = each_once(group, solved)
-    ways = len(lanes)
+    sets = alike(walk, number, solved, lanes)
+    ways, set_of = len(sets), {place: k for k, places in enumerate(sets) for place in places}
     if not ways:
         return Decision(Track(times, rows, 0.0, periodic, clock, turns, nowhere), 0)
     shape = solved.closed.shape
     frames = each(solved.pose.frames, lambda n: np.broadcast_to(n, shape)[lanes])
     named = named_way(system, module, ways)
-    tied = _tied(walk, np.broadcast_to(distance(walk, module, frames, begin), (ways,)))
+    nearest = _tied(walk, np.broadcast_to(distance(walk, module, frames, begin), (len(lanes),)))
     if drawn is not None and named is None and not hints(walk, module):
         follower = Follower(group, elements, drive, 0.0, STRIDE)
-        tied = _drawn(walk, number, follower, solved, lanes, begin, drawn, grid, periodic) or tied
-    best = tied[0] if named is None else named
+        nearest = _drawn(walk, number, follower, solved, lanes, begin, drawn, grid, periodic) or nearest
+    best = nearest[0] if named is None else sets[named][0]
+    taken, tied = set_of[best], sorted({set_of[place] for place in nearest})
+    shows = [best if k == taken else places[0] for k, places in enumerate(sets)]
+    frames = each(frames, lambda n: n[shows])
     orientation = float(np.broadcast_to(solved.pose.orientation, shape)[lanes[best]])
     rows[:, begin] = solved.q[:, lanes[best]]
     follower = Follower(group, elements, drive, orientation, STRIDE)
@@ -338,10 +253,7 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool, drawn: in
         follower = replace(follower, stride=1)
         rows[:, np.arange(grid) != begin] = np.nan
         follower.both_ways(rows, begin, periodic)
-    again = follower.revisit(rows, periodic)
-    if isinstance(group, SpatialGroup):
-        rows = unspun(group, elements, rows, drive)
-    track = Track(times, rows, orientation, periodic, clock, turns, again, float(times[begin]), frames, best)
+    track = Track(times, rows, orientation, periodic, clock, turns, nowhere, float(times[begin]), frames, taken)
     return Decision(track, ways, _said(walk, module, ways, frames, begin, named, tied))
 
 
@@ -383,18 +295,21 @@ def _drawn(
     return []
 
 
-def _first_closed(group: Any, elements: Sequence[Any], drive: Sequence[Number], grid: int) -> tuple[int, Assemblies]:
-    """The start of the cycle, else the first of some positions spread over it at which the group has an assembly."""
-    solved = closed_at(group, elements, drive, [0], GUESSES)
+def _first_closed(
+    group: Any, elements: Sequence[Any], drive: Sequence[Number], grid: int, first: int
+) -> tuple[int, Assemblies]:
+    """A position, else the nearest of some spread over the cycle at which the group has an assembly."""
+    solved = closed_at(group, elements, drive, [first], GUESSES)
     if each_once(group, solved) or grid == 1:
-        return 0, solved
-    places = np.unique(np.linspace(0, grid - 1, SPREAD).astype(np.intp))[1:]
+        return first, solved
+    places = np.unique(np.linspace(0, grid - 1, SPREAD).astype(np.intp))
+    places = places[np.argsort(np.abs(places - first), kind="stable")]
     tried = closed_at(group, elements, drive, places, TRIED).closed.reshape(-1, TRIED)
     for place in places[tried.any(axis=1)]:
         solved = closed_at(group, elements, drive, [int(place)], GUESSES)
         if each_once(group, solved):
             return int(place), solved
-    return 0, solved
+    return first, solved
 
 
 def _turns(walk: Forward, module: Module, group: Any, elements: Sequence[Any], times: Array) -> dict[int, Array]:
@@ -496,12 +411,30 @@ def distance(walk: Forward, module: Module, frames: Sequence[Any], lane: int | N
     total: Any = 0.0
     for link, name, place in hints(walk, module):
         if link:
-            point = walk.placed(frames[module.links.index(link)], link, name)
-            total = total + sum((is_ - hinted) ** 2 for is_, hinted in zip(point, place, strict=True))
+            i = module.links.index(link)
+            total = total + _away(walk, module, frames, i, walk.placed(frames[i], link, name), place)
             continue
         away = coordinate(walk, module, frames, name, lane) - place[0]
         total = total + (np.arctan2(np.sin(away), np.cos(away)) if walk.system.turns(name) else away) ** 2
     return np.asarray(total, float)
+
+
+def _away(
+    walk: Forward, module: Module, frames: Sequence[Any], link: int, point: Sequence[Number], place: Sequence[Number]
+) -> Number:
+    """Squared distance of a point of a link from a place, m²; of a link that spins freely the least while it spins."""
+    group = walk.system.groups[walk.system.plan.modules.index(module)]
+    spins = [(group.spun(*spin), spin[1:]) for spin in getattr(group, "spinning", ())]
+    of_link = [spin for spin in spins if link in spin[0]]
+    if of_link:
+        members, ends = min(of_link, key=lambda spin: len(spin[0]))
+        elements = {}
+        for k in ends:
+            i = next(side for side in group.joints[k].sides if side in members)
+            element = walk.algebra.compose(frames[i], walk.local[module.links[i], module.joints[k]])
+            elements[k] = Element(element, element)
+        point, place = (group.from_line(elements, *ends, at) for at in (point, place))
+    return sum((is_ - hinted) ** 2 for is_, hinted in zip(point, place, strict=True))
 
 
 def coordinate(walk: Forward, module: Module, frames: Sequence[Any], joint: str, lane: int | None) -> Number:
@@ -559,12 +492,17 @@ def joint_rows(walk: Forward, module: Module, count: int, frames: Sequence[Any],
     module by the place of their point, or their slide.
     """
     spatial = walk.system.mechanism.space == "spatial"
+    group = walk.system.groups[walk.system.plan.modules.index(module)]
+    spins = [({module.links[i] for i in group.spun(*spin)}, spin[1:]) for spin in getattr(group, "spinning", ())]
     rows: Rows = {}
     for name in sorted(set(module.joints).difference(module.driven), key=walk.system.order.__getitem__):
         kind, links = walk.system.joints[name]
         turned = spatial and PAIRS[kind].turns and not PAIRS[kind].ball
         if not turned and not set(links).issubset(module.links):
             continue
+        turns_with = [members.issuperset(links) and not turned and not PAIRS[kind].guided for members, _ in spins]
+        if any(turns_with) or any(module.joints.index(name) in ends and not PAIRS[kind].ball for _, ends in spins):
+            continue  # where a spin has taken it tells nothing
         if turned or PAIRS[kind].guided:
             numbers = [coordinate(walk, module, frames, name, lane)]
         else:
@@ -621,15 +559,6 @@ def _undecided(walk: Forward, module: Module, count: int, tied: Sequence[int] = 
     return Finding.warning("assembly.choice", "assembly", what, remedy, links=links, ways=count)
 
 
-def _anew(module: Module, dial: Dial, positions: Positions) -> Finding:
-    what = f"links {', '.join(module.links)} cannot stay assembled throughout the cycle and are assembled again "
-    what += f"{dial.intervals(positions)}"
-    remedy = "the assembly mode of the same sense nearest to the last one is used there; limit the range of the "
-    remedy += "driver"
-    figures = {"links": list(module.links), "at": dial.intervals(positions)}
-    return Finding.warning("assembly.anew", "links", what, remedy, **figures)
-
-
 def _never(system: System, module: Module) -> Finding:
     links = list(module.links)
     if not module.redundant:
@@ -641,7 +570,7 @@ def _never(system: System, module: Module) -> Finding:
         remedy = "they need play to fit together: see `trunnion assemble FILE` for how much"
         return Finding.warning("assembly.never_rigid", "links", what, remedy, links=links)
     plan, drivers = system.plan, len(system.mechanism.drivers)
-    spinning = f" ({len(plan.passive)} of them spins of a single link)" if plan.passive else ""
+    spinning = f" ({len(plan.passive)} of them passive)" if plan.passive else ""
     what = f"links {', '.join(links)} cannot be assembled at any position of the cycle; the mobility is "
     what += f"{plan.mobility} by Grübler's formula{spinning} and the number of drivers {drivers}"
     remedy = "check the lengths, or give a better assembly hint; so many constraints are consistent with special "

@@ -1,8 +1,11 @@
-"""Links that are all given in one frame, with their joints where they meet: that assembly is meant, as it is drawn."""
+"""Where in the cycle an assembly is told: where its hints hold, or where its links are drawn.
+
+Links that are all given in one frame, with their joints where they meet, are meant to be assembled as drawn.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,12 +16,14 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.nested import each
 from trunnion.algebra.space import ORIGIN
 from trunnion.joints.pairs import PAIRS
+from trunnion.model.parts import AT
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import System, Values
 
-__all__ = ["drawn_at", "off_drawing"]
+__all__ = ["drawn_at", "hinted_at", "off_drawing"]
 
 Array = NDArray[np.float64]
+ALIKE = 1e-6  # rad, or of the size, and of how far off: positions as near as the nearest
 MEETS = 1e-6  # of the size, and of unit vectors: elements that coincide as drawn
 
 
@@ -27,20 +32,36 @@ def drawn_at(walk: Forward, times: Array) -> int | None:
     system, values = walk.system, walk.values
     if not _in_one_frame(system, values, float(np.max(primal(walk.size)))):
         return None
-    away, elements = np.zeros(len(times)), system.stated_elements(values)
+    elements, driven = system.stated_elements(values), dict[str, float]()
     for name in system.mechanism.drivers:
         first, second = (elements[link, name] for link in system.joints[name][1])
-        apart = primal(system.drive(values, name, times)[0]) - float(np.ravel(walk.coordinate(name, first, second))[0])
+        driven[name] = float(np.ravel(walk.coordinate(name, first, second))[0])
+    return _nearest(walk, times, driven)
+
+
+def hinted_at(walk: Forward, times: Array) -> int:
+    """The position of some at which the first driver is nearest to where the hints hold; the start if that is open."""
+    stated, drivers = walk.values.get(f"assembly.{AT}"), list(walk.system.mechanism.drivers)
+    if stated is None or not drivers or AT in walk.system.joints:
+        return 0
+    return _nearest(walk, times, {drivers[0]: float(np.ravel(primal(stated))[0])})
+
+
+def _nearest(walk: Forward, times: Array, driven: Mapping[str, float]) -> int:
+    """The first position of some at which drivers are nearest to these coordinates."""
+    system, away = walk.system, np.zeros(len(times))
+    for name, coordinate in driven.items():
+        apart = np.ravel(primal(system.drive(walk.values, name, times)[0])) - coordinate
         size = 1.0 if system.turns(name) else float(np.max(primal(walk.size)))
         away = away + (np.arctan2(np.sin(apart), np.cos(apart)) if system.turns(name) else apart / size) ** 2
-    return int(np.argmin(away))
+    return int(np.argmax(away <= (1 + ALIKE) * np.min(away) + ALIKE**2))  # of the turns of a cycle the first
 
 
-def off_drawing(walk: Forward, frames: Sequence[Any], spun: Sequence[int], points: Sequence[Any]) -> Array:
+def off_drawing(walk: Forward, frames: Sequence[Any], spun: Sequence[int], unturned: Sequence[Any]) -> Array:
     """Sum of the squared distances of links from where they are drawn, m².
 
-    frames: of the links of a module; spun: those that spin freely, of which only points count; points: (link, local
-    place) of these.
+    frames: of the links of a module; spun: those that spin freely, of which only what a spin leaves alone counts;
+    unturned: its lengths, and those that are drawn.
     """
     size, total = float(np.max(primal(walk.size))), np.zeros(())
     for link, frame in enumerate(frames):
@@ -56,9 +77,8 @@ def off_drawing(walk: Forward, frames: Sequence[Any], spun: Sequence[int], point
         else:
             x, y, c, s = (primal(part) for part in frame)
             total = total + x**2 + y**2 + (size * (c - 1.0)) ** 2 + (size * s) ** 2
-    for link, place in points:
-        here = walk.algebra.point_of(each(frames[link], primal), place)
-        total = total + sum((is_ - was) ** 2 for is_, was in zip(here, place, strict=True))
+    for is_, was in unturned:
+        total = total + (is_ - was) ** 2
     return np.asarray(total, float)
 
 

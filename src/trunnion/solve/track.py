@@ -17,6 +17,7 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import each
 from trunnion.groups.tree import Tree
+from trunnion.solve.change_points import TOUCHING, carried_on
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import System, Values
 
@@ -32,7 +33,7 @@ Elements = Sequence[Any]  # per joint: both its elements, as nested tuples of nu
 GUESSES = 512
 FEW = 16  # guesses at each place where an assembly is looked for again
 PROBES = 96  # such places in the gaps of a track
-MOST_CONDITION = 1e8  # of an assembly that counts
+MOST_CONDITION = 1e6  # of an assembly that counts: in those above, two may meet
 SAME = 1e-6  # of what tells assemblies apart: nearer ones are one
 SEED = 20060704  # of the guesses: the same assemblies every time
 TURN_JUMP = 0.35  # rad between neighbours of the grid: more is another branch
@@ -233,6 +234,23 @@ class Follower:
         solved, good = self._solved(at(self.elements, index), drive, guess[:, None], NEAR_LIMIT)
         return solved[:, 0] if good[0] else None
 
+    def broken(self, rows: Array, times: Array) -> list[float]:
+        """Times, s, midway between two positions of which one does not lead to the other."""
+        steps = np.abs(np.diff(rows, axis=1)) <= limits(self.group, extent(self.group, self.elements))[:, None]
+        exist = np.isfinite(rows[0])
+        ends = np.flatnonzero((exist[:-1] | exist[1:]) & ~np.all(steps, axis=0))
+        return [float(moment) for moment in (times[ends] + times[ends + 1]) / 2]
+
+    def turned_over(self, rows: Array, places: Places, times: Array, near: float) -> float:
+        """The time at which det J passes zero between some positions, s, by their 1/condition; else that near by."""
+        drive = [lane_of(n, places) for n in self.drive]
+        pose = self.group.position(at(self.elements, places), list(rows[:, places]), drive)
+        signed: Array = np.broadcast_to(pose.orientation / pose.condition, places.shape)
+        rising = signed * np.sign(signed[-1])
+        if not np.all(np.diff(rising) > 0.0):
+            return near
+        return near + float(carried_on(rising, (times[places] - near)[None], 0.0)[0])
+
     def _solved(
         self, elements: Elements, drive: Sequence[Number], guess: Array, late: int
     ) -> tuple[Array, NDArray[np.bool_]]:
@@ -269,12 +287,12 @@ class Follower:
             self.both_ways(fresh, int(probe), periodic)
             filled = np.isfinite(fresh[0])
             if np.any(filled & np.isfinite(rows[0])):
-                left_out.append(self._keys(fresh[:, probes], probes))
+                left_out.append(self.keys(fresh[:, probes], probes))
             else:
                 rows[:, filled] = fresh[:, filled]
         return np.flatnonzero(gaps & np.isfinite(rows[0]))
 
-    def _keys(self, rows: Array, places: Places) -> Array:
+    def keys(self, rows: Array, places: Places) -> Array:
         """What tells the assembly from others at some positions, (entry, place)."""
         pose = self.group.position(at(self.elements, places), list(rows), [lane_of(n, places) for n in self.drive])
         numbers = key_of(self.group, pose, extent(self.group, self.elements))
@@ -373,6 +391,8 @@ class Track:
             drive[slot] = _interpolated(self.times, row, moment, near)
         pose = group.position(elements, guess, drive)
         stays = pose.orientation == self.sense(moment)
+        if self.passed:  # where assemblies meet, rounding tells the sign: the position is singular, and not open
+            stays = stays | (primal(pose.condition) > 1 / TOUCHING)
         size = group.size(elements)
         reach = 4 * limits(group, 1.0)
         for i, kind, most, from_ in zip(group.kept, group.kept_kinds, reach, guess, strict=True):

@@ -12,22 +12,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
-import numpy as np
-
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.generic import GEAR, SPIN, Constraint, Gears, Generic, Joints, Places, constraints, rank
 from trunnion.structure.graph import components, longest_loop, matching, ordered
+from trunnion.structure.passive import passive
 
-__all__ = ["FREEDOMS", "Module", "Plan", "decompose", "mobility_by_formula", "mobility_by_rank", "passive"]
+__all__ = ["FREEDOMS", "Module", "Plan", "decompose", "mobility_by_formula", "mobility_by_rank"]
 
 FREEDOMS = {"planar": 3, "spatial": 6}  # of a free link
 # outer, inner, outer joint of the dyads in closed form, in the plane and in space
 CLOSED_FORMS = {"planar": ("RRR", "RRP", "RPR", "PRP", "RPP"), "spatial": ("CCC",)}
-IN_LINE = 1e-9  # of the distance: a point that lies on an axis
 ROMAN = {1: "I", 2: "II", 3: "III", 4: "IV", 5: "V", 6: "VI", 7: "VII", 8: "VIII", 9: "IX", 10: "X"}
 
 
@@ -39,8 +36,8 @@ class Module:
     joints: in the order of the group; `reversed_` tells which of them name their links in the file the other way
     round than the group does. driven: joints whose coordinate is prescribed. rank: the class (1 for a driver).
     gears: gear pairs that it holds; witnesses: joints between known links that these speak of. spinning: links whose
-    spin is free, with the two joints between which it is, see `passive`; redundant: its joints constrain more than the
-    links have freedoms.
+    spin is free, with the two joints between which it is, see `structure.passive`; redundant: its joints constrain
+    more than the links have freedoms.
     """
 
     kind: str
@@ -123,74 +120,6 @@ def mobility_by_rank(
     return firm + int(matrix.shape[1]) - rank(matrix)
 
 
-def passive(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
-    """Links whose spin is free, with the two joints between which it is: it moves nothing else.
-
-    A link between two joints, or several in a row that slide along one line or screw on it, such as a strut between two
-    balls, turns about that line as one: it is named by the first. One of both joints is spherical; the other is, too,
-    or its own turn, which no driver holds, is about the line.
-    """
-    spinning: dict[str, tuple[str, str]] = {}
-    if mechanism.space == "planar" or mechanism.loop:
-        return spinning
-    of_link: dict[str, list[str]] = {link: [] for link in mechanism.links}
-    for name, joint in mechanism.joints.items():
-        for link in joint.links:
-            of_link[link].append(name)
-    order, values = list(mechanism.links), mechanism.parameters()
-    for ball, joint in mechanism.joints.items():
-        for link in joint.links if PAIRS[joint.type].ball else ():
-            row, ends = _row_from(mechanism, of_link, ball, link)
-            if ends and all(_in_line(mechanism, values, *part) for part in row):
-                links = sorted((part[0] for part in row), key=order.index)
-                spinning[links[0]] = (ends[0], ends[1])
-    return {link: spinning[link] for link in order if link in spinning}
-
-
-def _row_from(
-    mechanism: Mechanism, of_link: Mapping[str, Sequence[str]], ball: str, link: str
-) -> tuple[list[tuple[str, str, str]], list[str]]:
-    """Links in a row from a ball, each with its two joints, up to one that lets them turn together, and both its ends.
-
-    No ends where the row branches, or ends at the ground or at a joint that holds the turn.
-    """
-    row: list[tuple[str, str, str]] = []
-    before = ball
-    while link != mechanism.fixed_link and len(of_link[link]) == 2 and link not in (part[0] for part in row):
-        after = next((name for name in of_link[link] if name != before), before)
-        row.append((link, before, after))
-        pair = PAIRS[mechanism.joints[after].type]
-        if pair.ball or ((pair.bored or pair.name == "planar") and after not in mechanism.drivers):
-            inner = len(row) > 1
-            return row, [ball, after] if inner else list(of_link[link])
-        if not (pair.guided or pair.threaded):
-            break
-        before, link = after, next(other for other in mechanism.joints[after].links if other != link)
-    return row, []
-
-
-def _in_line(mechanism: Mechanism, values: Mapping[str, Any], link: str, first: str, second: str) -> bool:
-    """Whether two joints of a link, as far as they have one, have one axis, and it goes through the centre of a ball.
-
-    The normal of a planar joint is an axis wherever it stands.
-    """
-
-    def vector(path: str) -> np.ndarray:
-        return np.array([float(np.ravel(values[f"links.{link}.points.{path}.{letter}"])[0]) for letter in "xyz"])
-
-    apart = vector(second) - vector(first)
-    axes = []
-    for name in (first, second):
-        pair = PAIRS[mechanism.joints[name].type]
-        if pair.ball:
-            continue
-        axis = vector(f"{name}.axis") / np.linalg.norm(vector(f"{name}.axis"))
-        axes.append(axis)
-        if pair.name != "planar" and np.linalg.norm(np.cross(apart, axis)) > IN_LINE * np.linalg.norm(apart):
-            return False
-    return len(axes) < 2 or bool(np.linalg.norm(np.cross(*axes)) <= IN_LINE)
-
-
 def decompose(mechanism: Mechanism) -> Plan:
     """The modules in order.
 
@@ -210,7 +139,7 @@ def decompose(mechanism: Mechanism) -> Plan:
         return _as_one(table, mobility, spinning)
     after: list[set[int]] = [set() for _ in bodies]
     for constraint, body in determines.items():
-        for link in set(table.links_of[constraint]) - {body}:
+        for link in {*table.links_of[constraint], *table.about(constraint)} - {body}:
             after[table.numbers[link] - 1].add(table.numbers[body] - 1)
     part_of = components(after)
     parts: list[list[str]] = [[] for _ in set(part_of)]
@@ -248,7 +177,7 @@ def _undriven(mobility: int, drivers: int, spins: int) -> Finding:
         else "remove a driver, or a joint or link that constrains twice; if it moves all the same, as a parallelogram "
         "with a third crank does, state over_constraint: minimum-norm"
     )
-    beside = f" beside {spins} that spin a link alone" if spins else ""
+    beside = f" beside {counted(spins, 'passive spin')}" if spins else ""
     what = f"the mobility is {mobility} by Grübler's formula{beside}, but there {has}"
     return Finding(what, "drivers", remedy)
 
@@ -278,6 +207,11 @@ class LinkTable:
             related = self.links_of.setdefault(constraint, [])
             related += [link for link in dict.fromkeys(self.joints[name].links) if link not in (ground, *related)]
         self.links_of |= {(link, SPIN): [link] for link in spinning}
+
+    def about(self, constraint: Constraint) -> list[str]:
+        """The moving links that the line of a spin goes through."""
+        ends = self.spinning[constraint[0]] if constraint[1] == SPIN else ()
+        return [link for name in ends for link in self.joints[name].links if self.numbers[link]]
 
     def matched(self) -> tuple[dict[Constraint, str], list[Constraint]]:
         """Constraints with the link each determines, matched onto the links' freedoms; those left over."""

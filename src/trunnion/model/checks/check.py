@@ -25,6 +25,7 @@ from trunnion.model.checks.values import check_values
 from trunnion.model.joint_parts import motions
 from trunnion.model.names import ERRORS, nearest
 from trunnion.model.parameters import Numbers, ParameterSet, dimension_errors
+from trunnion.model.parts import AT
 from trunnion.model.quantity import UNREADABLE, evaluation_order
 from trunnion.model.rules import InSpace, Refers, key_findings
 from trunnion.model.units import ANY, Dimension, UnitError
@@ -186,6 +187,11 @@ def _others(mechanism: Numbers) -> Iterator[Finding]:
                 moving = [one for one in points if one != mechanism.fixed_link]
                 what = f"'{hint}' chooses an assembly of a moving link, and '{name}' is none"
                 yield Finding(what, where, nearest(name, moving))
+            continue
+        if name == AT and name not in joints:
+            if isinstance(hint, tuple) or not mechanism.drivers:
+                what = "it says where the driver is when points are where the hints say"
+                yield Finding(what, where, "write its coordinate, as at: 30 deg" if mechanism.drivers else "remove it")
             continue
         if point and point not in points.get(link, ()):
             yield from Refers("point").missing(name, where, mechanism)

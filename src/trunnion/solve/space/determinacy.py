@@ -274,7 +274,7 @@ class Determinacy:
         for part in self.parts:
             joints, links = list(part.joints), list(part.links)
             if part.surplus:
-                beside = f", {spins} of them spins of a single link" if spins else ""
+                beside = f", {spins} of them passive" if spins else ""
                 what = f"{mobility}{beside}, but there {agreeing(drivers, 'is', 'are')} {counted(drivers, 'driver')}"
                 figures = {**counts, "spins": spins, "drivers": drivers}
                 findings.append(Finding.error("mobility.overdriven", "drivers", what, "remove a driver", **figures))

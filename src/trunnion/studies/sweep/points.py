@@ -31,7 +31,8 @@ from trunnion.model.checks.values import check_values
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import ParameterSet
 from trunnion.solve import change_points
-from trunnion.solve.assembly import distance, hints, named_way
+from trunnion.solve.assembly import distance, grid, hints, named_way
+from trunnion.solve.drawn import hinted_at
 from trunnion.solve.forward import pose_of, start
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import Run, prepare
@@ -321,8 +322,9 @@ def _differ(values: Mapping[str, Number], others: Mapping[str, Number], count: i
 
 def _as_chosen(run: Run, values: Mapping[str, Number], count: int) -> NDArray[np.bool_]:
     """Which mechanisms of a batch go together as the first does: nearest to the hints at the start, as in `choose`."""
-    system, time = run.system, np.zeros(1)
-    walk = start(system, values)
+    system, times = run.system, grid(run.cycle)
+    lane = hinted_at(start(system, run.values), times)
+    walk, time = start(system, values), times[lane : lane + 1]
     ours = np.ones(count, bool)
     for number, module in enumerate(system.plan.modules):
         branches, assembly = system.groups[number].BRANCHES, run.chosen.assembly[number]

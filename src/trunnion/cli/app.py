@@ -345,16 +345,17 @@ def examples(
     to: Annotated[Path, typer.Option("--to", help="Folder to copy it into.")] = Path(),
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file of that name.")] = False,
 ) -> None:
-    """List the example models and rig files, or copy one."""
+    """List the example models, rigs and drawings, or copy one."""
     found = _examples()
     if name is None:
         for path in found.values():
             title = next(
-                (line[5:].strip() for line in path.read_text("utf-8").splitlines() if line.startswith("name:")), ""
+                (line[5:].strip() for line in path.read_text("utf-8").splitlines() if line.startswith("name:")),
+                "a drawing for `trunnion import`" if path.suffix == ".step" else "",
             )
             console().print(f"{path.stem:<28} {title}", markup=False, highlight=False, soft_wrap=True)
         return
-    source = found.get(name.removesuffix(".yaml"))
+    source = found.get(name.removesuffix(".yaml").removesuffix(".step"))
     if source is None:
         raise MechanismError(Finding(f"there is no example '{name}'", remedy=f"use one of {', '.join(found)}"))
     from trunnion.files import whole
@@ -489,7 +490,14 @@ def _examples() -> dict[str, Path]:
     """Example models and rigs by name: beside the installed package, or in the source tree."""
     here = Path(__file__).resolve().parent.parent
     folder = here / "examples" if (here / "examples").is_dir() else here.parents[1] / "examples"
-    return {path.stem: path for path in (*sorted(folder.glob("*.yaml")), *sorted(folder.glob("rig/*-rig.yaml")))}
+    return {
+        path.stem: path
+        for path in (
+            *sorted(folder.glob("*.yaml")),
+            *sorted(folder.glob("rig/*-rig.yaml")),
+            *sorted(folder.glob("*.step")),
+        )
+    }
 
 
 if __name__ == "__main__":

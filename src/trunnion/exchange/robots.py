@@ -1,0 +1,350 @@
+"""What MJCF, SDF and URDF have in common: XML, frames, trees of bodies, and pairs written as chains of simple joints."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree.ElementTree import Element, ElementTree, ParseError, indent
+
+import numpy as np
+from defusedxml import DefusedXmlException
+from defusedxml.ElementTree import iterparse
+from scipy.spatial.transform import Rotation
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, Pair, free_name, perpendicular
+from trunnion.exchange.skeleton import Positions
+
+__all__ = [
+    "Frame",
+    "joined",
+    "loose",
+    "numbers",
+    "opening",
+    "parsed",
+    "refused",
+    "settled",
+    "spanning",
+    "steps",
+    "text_of",
+    "turned",
+    "unit",
+    "written",
+]
+
+MOST_ELEMENTS, DEEPEST, MOST_PARTS = 100_000, 200, 2_000
+LONGEST = 1000  # characters of a row of numbers
+MEETING = 1e-8  # m, between the axes of joints that count as crossing
+APART = 1e-5  # m, between points of two bodies that a loop holds together, as a program writes their places
+WORLD = "world"
+LOST = ("loads", "springs", "measures", "variations", "errors")  # sections of a model that no robot format holds
+
+
+class Frame(NamedTuple):
+    """A frame in the global one: rotation matrix and place of its origin, m."""
+
+    rotation: Array = np.eye(3)
+    place: Array = np.zeros(3)
+
+    def at(self, point: Array) -> Array:
+        """A point of the frame in global coordinates."""
+        return np.asarray(self.rotation @ point + self.place)
+
+    def then(self, inner: Frame) -> Frame:
+        """The frame that lies as `inner` in this one."""
+        return Frame(self.rotation @ inner.rotation, self.at(inner.place))
+
+    def inertia(self, matrix: Array) -> Array:
+        """A tensor of the frame in global axes."""
+        return np.asarray(self.rotation @ matrix @ self.rotation.T)
+
+
+def refused(what: str, where: str = "", remedy: str = "mend the file") -> MechanismError:
+    """What cannot be read."""
+    return MechanismError(Finding(what, where, remedy, code="exchange.xml"))
+
+
+def parsed(path: Path, name: str) -> Element:
+    """The root of an XML file; MechanismError if it is none, or its root has another name.
+
+    Entities of its own and references to other files are refused, and so is a file that would fill the memory.
+    """
+    root, count, depth = None, 0, 0
+    try:
+        for event, element in iterparse(path, ("start", "end")):
+            root = element if root is None else root
+            count, depth = count + (event == "start"), depth + (1 if event == "start" else -1)
+            if count > MOST_ELEMENTS or depth > DEEPEST:
+                limits = f"more than {MOST_ELEMENTS:,} elements, or nests them deeper than {DEEPEST}"
+                raise refused(f"has {limits}", remedy="export the mechanism alone")
+    except DefusedXmlException:
+        raise refused("declares entities of its own, which are not read", remedy="remove the DOCTYPE") from None
+    except ParseError as error:
+        raise refused(f"is no sound XML: {error}", remedy="export it again") from None
+    except (LookupError, ValueError):
+        raise refused("has an unknown encoding", remedy="save it as UTF-8") from None
+    if root is None or root.tag != name:
+        raise refused(f"begins with <{root.tag if root is not None else ''}>, not with <{name}>", remedy="")
+    return root
+
+
+def numbers(text: str | None, where: str, count: int, default: Sequence[float] | None = None) -> Array:
+    """The numbers of a text, (count,), or of any count if it is 0; MechanismError if they are none or too few."""
+    if text is None or not text[:LONGEST].strip():
+        if default is None:
+            raise refused("is not stated", where)
+        return np.array(default, dtype=float)
+    try:
+        values = np.array(text[:LONGEST].split(), dtype=float)
+    except ValueError:
+        raise refused(f"is {text[:40]!r}, which is no row of numbers", where) from None
+    if count and len(values) != count:
+        raise refused(f"has {len(values)} numbers instead of {count}", where)
+    if not np.isfinite(values).all():
+        raise refused(f"is {text[:40]!r}, which is not finite", where)
+    return values
+
+
+def unit(vector: Array, where: str) -> Array:
+    """A direction of length 1."""
+    length = np.linalg.norm(vector)
+    if not length > 0:
+        raise refused("has no direction", where)
+    return np.asarray(vector / length)
+
+
+def roll_pitch_yaw(angles: Array) -> Array:
+    """The rotation matrix of turns about the fixed axes x, y, z, rad."""
+    return np.asarray(Rotation.from_euler("xyz", angles).as_matrix())
+
+
+def text_of(values: float | Sequence[float] | Array) -> str:
+    """Numbers as they are written: every digit, no sign of a zero."""
+    return " ".join(repr(float(value) + 0.0) for value in np.ravel(np.asarray(values)))
+
+
+def written(root: Element, path: Path) -> None:
+    """Write an element and all in it as a file."""
+    indent(root)
+    ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+
+
+# Out: a tree of bodies, with pairs as chains of simple joints
+
+
+def spanning(draft: Draft) -> tuple[list[Pair], list[Pair]]:
+    """The pairs of a tree from the ground, outwards, each with the inner body first, and the pairs that close loops.
+
+    Loops are cut at a ball if they have one, else at a pin: those are what formats can close. A driven pair is the last
+    to be cut, since an actuator acts in the tree.
+    """
+    weights = {"spherical": 3, "revolute": 2, "fixed": 0}
+    rest = sorted(draft.pairs.values(), key=lambda pair: 0 if pair.name in draft.drives else weights.get(pair.type, 1))
+    tree: list[Pair] = []
+    inside = {draft.ground}
+    while next_pairs := [pair for pair in rest if len(inside & set(pair.links)) == 1]:
+        pair = next_pairs[0]  # the one of least weight: Prim's tree
+        tree.append(pair if pair.links[0] in inside else turned(pair))
+        inside |= set(pair.links)
+    names = {pair.name for pair in tree}
+    return tree, [pair for name, pair in draft.pairs.items() if name not in names]
+
+
+def turned(pair: Pair) -> Pair:
+    """The same pair with its bodies in the other order: its coordinate stays."""
+    axis, second = -pair.axis, pair.second_axis
+    if second is not None:
+        axis, second = second, pair.axis
+    return replace(pair, links=pair.links[::-1], axis=axis, second_axis=second)
+
+
+def steps(pair: Pair) -> list[Pair]:
+    """A pair as a chain of hinges and slides, the first on its first body; the bodies between are `name.1`, `name.2`."""
+    axis, across = pair.axis / np.linalg.norm(pair.axis), perpendicular(pair.axis)
+    second = pair.second_axis if pair.second_axis is not None else across
+    chains = {
+        "cylindrical": (("slide", axis), ("turn", axis)),
+        "helical": (("slide", axis), ("turn", axis)),
+        "universal": (("turn1", axis), ("turn2", second)),
+        "spherical": (("turn1", across), ("turn2", np.cross(axis, across)), ("turn3", axis)),
+        "planar": (("slide1", across), ("slide2", np.cross(axis, across)), ("turn", axis)),
+    }
+    chain = chains.get(pair.type)
+    if chain is None:
+        return [pair]
+    ends = [pair.links[0], *(f"{pair.name}.{number + 1}" for number in range(len(chain) - 1)), pair.links[1]]
+    return [
+        Pair(
+            f"{pair.name}.{step}",
+            "prismatic" if step.startswith("slide") else "revolute",
+            (ends[place], ends[place + 1]),
+            pair.at,
+            direction,
+            pitch=pair.pitch,
+            limits=pair.limits if step == "turn" else None,
+        )
+        for place, (step, direction) in enumerate(chain)
+    ]
+
+
+def opening(positions: Positions, row: int, also: str = "") -> Draft:
+    """The draft to write, with notes on what the format cannot hold."""
+    draft, mechanism = positions.draft(row), positions.mechanism
+    lost = [name for name in LOST if getattr(mechanism, name)]
+    lost += ["friction", "sizes and play of pins"] if mechanism.effective_joints else []
+    lost += (
+        ["laws of motion"]
+        if any(driver.moves or driver.law != "constant" for driver in mechanism.drivers.values())
+        else []
+    )
+    draft.note("lost", "", f"is written without {', '.join([*lost, *([also] if also else [])])}")
+    massless = [name for name, body in draft.bodies.items() if name != draft.ground and not body.mass > 0]
+    if massless:
+        what = f"have no mass, which engines in time refuse: {', '.join(massless)}"
+        draft.note("massless", "links", what, "state masses in the model")
+    return draft
+
+
+# In: chains made pairs again, and names and grounds as a model has them
+
+
+def joined(draft: Draft, between: set[str]) -> None:
+    """Make one pair of joints in a row, through bodies that are only there to hold them, where such a pair exists."""
+    outward: dict[str, Pair] = {pair.links[0]: pair for pair in draft.pairs.values() if pair.links[0] in between}
+    pairs: dict[str, Pair] = {}
+    inner = {pair.links[1] for pair in draft.pairs.values()} & outward.keys()
+    for name, pair in draft.pairs.items():
+        if pair.links[0] in inner:
+            continue
+        chain = [pair]
+        while chain[-1].links[1] in between and chain[-1].links[1] in outward and len(chain) < 4:
+            chain.append(outward[chain[-1].links[1]])
+        united = _pair_of(chain, draft.drives) if len(chain) > 1 else None
+        if united is None:
+            pairs |= {step.name: step for step in chain}
+            continue
+        for step in chain:
+            draft.drives |= {united.name: draft.drives.pop(step.name)} if step.name in draft.drives else {}
+        for body in (step.links[1] for step in chain[:-1]):
+            draft.bodies.pop(body)
+        pairs[united.name if united.name not in draft.pairs else name] = united
+    draft.pairs = pairs
+
+
+def stem(names: Sequence[str]) -> str:
+    """What names of parts of a joint begin with, such as B of B.turn1 and B.turn2; the first if that is nothing."""
+    stems = {name.rpartition(".")[0] for name in names}
+    return (stems.pop() if len(stems) == 1 else os.path.commonprefix(names)).rstrip("._-: ") or names[0]
+
+
+def coupled(draft: Draft, names: tuple[str | None, str | None], ratio: float, between: set[str]) -> None:
+    """Read that a joint moves by ratio times another: a thread if they turn and slide one body, else a gear."""
+    first, second = (draft.pairs.get(name or "") for name in names)
+    if first is not None and second is not None and ratio:
+        if first.type == "revolute":
+            first, second, ratio = second, first, 1 / ratio
+        along = float(first.axis @ second.axis) / float(np.linalg.norm(first.axis) * np.linalg.norm(second.axis))
+        common = set(first.links) & set(second.links) & between
+        if (first.type, second.type) == ("prismatic", "revolute") and common and abs(along) > 1 - PARALLEL:
+            second.pitch = 2 * math.pi * ratio * along
+            return
+    what = f"are coupled, which is not read: {names[0]} moves by {ratio:.6g} of {names[1]}"
+    draft.warn("gears", "joints", what, "state it under gears in the model")
+
+
+def _pair_of(chain: list[Pair], drives: Mapping[str, float]) -> Pair | None:
+    """The pair that joints in a row are; None if they are none."""
+    turns = [step for step in chain if step.type == "revolute"]
+    slides = [step for step in chain if step.type == "prismatic"]
+    name = stem([step.name for step in chain])
+    links = (chain[0].links[0], chain[-1].links[1])
+    driven = [step for step in chain if step.name in drives]
+    if len(turns) + len(slides) < len(chain) or (driven and driven != turns):
+        return None
+    axes = [step.axis / np.linalg.norm(step.axis) for step in [*turns, *slides]]
+    counts = len(turns), len(slides)
+    if counts == (1, 1) and np.linalg.norm(np.cross(*axes)) < PARALLEL:
+        kind = "cylindrical" if turns[0].pitch is None else "helical"
+        return replace(turns[0], name=name, type=kind, links=links)
+    if counts == (1, 2) and max(abs(axes[0] @ axes[1]), abs(axes[0] @ axes[2])) < PARALLEL < np.linalg.norm(
+        np.cross(*axes[1:])
+    ):
+        return None if driven else Pair(name, "planar", links, turns[0].at, axes[0])
+    if slides or driven or len(turns) not in (2, 3):
+        return None
+    normal = [np.eye(3) - np.outer(axis, axis) for axis in axes]
+    place, _, rank, _ = np.linalg.lstsq(
+        np.concatenate(normal), np.concatenate([n @ step.at for n, step in zip(normal, turns, strict=True)]), rcond=1e-9
+    )
+    gaps = [float(np.linalg.norm(n @ (place - step.at))) for n, step in zip(normal, turns, strict=True)]
+    if rank < 3 or max(gaps) > MEETING:
+        return None
+    if counts == (2, 0):
+        return Pair(name, "universal", links, place, axes[0], axes[1]) if abs(axes[0] @ axes[1]) < PARALLEL else None
+    return Pair(name, "spherical", links, place) if abs(np.linalg.det(axes)) > PARALLEL else None
+
+
+def loose(draft: Draft, start: str) -> None:
+    """Leave out the bodies that no chain of pairs joins to the one that is fixed."""
+    held, front = {start}, [start]
+    neighbours: dict[str, set[str]] = {}
+    for pair in draft.pairs.values():
+        for link, other in (pair.links, pair.links[::-1]):
+            neighbours.setdefault(link, set()).add(other)
+    while front:
+        new = neighbours.get(front.pop(), set()) - held
+        held |= new
+        front += new
+    free = [name for name in draft.bodies if name not in held]
+    if free:
+        what = f"are joined to nothing that is fixed, and left out: {', '.join(free[:10])}{' …' * (len(free) > 10)}"
+        draft.warn("free", "links", what, "join them to the ground, or state another one with --ground")
+    draft.bodies = {name: body for name, body in draft.bodies.items() if name in held}
+    draft.pairs = {name: pair for name, pair in draft.pairs.items() if set(pair.links) <= held}
+
+
+def settled(draft: Draft, between: set[str], world: str, ground: str) -> Draft:
+    """The draft of a file that is read: its chains joined, its ground named, its names as a model has them.
+
+    The world has the name of the body that is fixed to it if it carries nothing else. ground: of the options.
+    """
+    if not draft.pairs:
+        raise refused("has no joints", remedy="export a mechanism")
+    if max(len(draft.bodies), len(draft.pairs)) > MOST_PARTS:
+        what = f"has {len(draft.bodies):,} bodies and {len(draft.pairs):,} joints; at most {MOST_PARTS:,} are read"
+        raise refused(what, remedy="export the mechanism alone")
+    joined(draft, between)
+    busiest = max(draft.bodies, key=lambda name: len(draft.pairs_of(name)))
+    start = next(name for name in (ground, world, busiest) if name in draft.bodies)
+    loose(draft, start)
+    draft.ground = start if start in (ground, world) else ""
+    base = draft.pairs_of(WORLD)
+    if draft.ground == WORLD and base and all(pair.type == "fixed" for pair in base):
+        draft.ground = next(link for link in base[0].links if link != WORLD)
+    names: dict[str, str] = {}
+    for name in draft.bodies:
+        names[name] = free_name(name, names.values(), "body")
+    pairs: dict[str, str] = {}
+    for name in draft.pairs:
+        pairs[name] = free_name(name, pairs.values(), "joint")
+    bodies = dict(_renamed(draft, names))
+    draft.pairs = {
+        pairs[name]: replace(pair, name=pairs[name], links=(names[pair.links[0]], names[pair.links[1]]))
+        for name, pair in draft.pairs.items()
+    }
+    draft.drives = {pairs[name]: rate for name, rate in draft.drives.items() if name in pairs}
+    draft.bodies, draft.ground = bodies, names.get(draft.ground, "")
+    return draft
+
+
+def _renamed(draft: Draft, names: Mapping[str, str]) -> Iterator[tuple[str, Body]]:
+    """The bodies by their new names; their points without the name of the body, which they have in a file."""
+    for name, body in draft.bodies.items():
+        points: dict[str, Array] = {}
+        for key, place in body.points.items():
+            points[free_name(key.removeprefix(f"{name}."), [*points, *draft.pairs], "point")] = place
+        yield names[name], replace(body, name=names[name], points=points)

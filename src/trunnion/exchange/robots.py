@@ -85,6 +85,8 @@ def parsed(path: Path, name: str) -> Element:
         raise refused("declares entities of its own, which are not read", remedy="remove the DOCTYPE") from None
     except ParseError as error:
         raise refused(f"is no sound XML: {error}", remedy="export it again") from None
+    except MechanismError:
+        raise
     except (LookupError, ValueError):
         raise refused("has an unknown encoding", remedy="save it as UTF-8") from None
     if root is None or root.tag != name:

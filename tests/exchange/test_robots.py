@@ -68,6 +68,15 @@ def same_power(one: Mechanism, other: Mechanism, steps: int = 12, tolerance: flo
     np.testing.assert_allclose(powers[0][both], powers[1][both], atol=tolerance * max(1e-4, abs(powers[0][both]).max()))
 
 
+def same_start(one: Mechanism, other: Mechanism) -> None:
+    """The drive power is the same over the first 3° of the drive."""
+    rate = next(iter(positions_of(one, 4).draft().drives.values())) or math.inf
+    for turned in (0.0, 1.0, 3.0):
+        at = f"{math.radians(turned) / abs(rate)!r} s"
+        powers = [trunnion.analyse(mechanism, 4, at=at)["drive_power"].values.sum() for mechanism in (one, other)]
+        assert powers[1] == pytest.approx(powers[0], rel=1e-8, abs=1e-8)
+
+
 @pytest.mark.spread(10, "rssr-.mjcf", "slider-crank-.urdf", "universal-joint-.sdf")
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize("name", MOVING)
@@ -93,7 +102,14 @@ def test_out_and_in_again_is_the_same_mechanism(name: str, suffix: str, tmp_path
         np.testing.assert_allclose(after.pairs[key].at, pair.at, atol=1e-9)
         if PAIRS[pair.type].needs_axis:
             assert abs(after.pairs[key].axis @ pair.axis) == pytest.approx(1, abs=1e-9) or pair.type == "universal"
-    same_power(stated, again)
+    original = trunnion.read(Path("examples") / f"{name}.yaml")
+    if all(set(driver.model_fields_set) <= {"speed", "start", "range"} for driver in original.drivers.values()) and all(
+        driver.range is None or not PAIRS[original.effective_joints[joint].type].turns
+        for joint, driver in original.drivers.items()
+    ):
+        same_power(stated, again)
+    else:  # it need not turn beyond the range of its law
+        same_start(stated, again)
 
 
 def test_a_screw_is_a_screw_again(tmp_path: Path) -> None:
@@ -331,7 +347,8 @@ def link_sdf(name: str, pose: str, mass: float, centre: str, inertia: float) -> 
   <visual name="v"><geometry><box><size>1 1 1</size></box></geometry></visual></link>"""
 
 
-DRIVE = '<plugin name="x::JointController" filename="y"><joint_name>A</joint_name><initial_velocity>10</initial_velocity></plugin>'
+DRIVE = """<plugin name="x::JointController" filename="y"><joint_name>A</joint_name>
+<initial_velocity>10</initial_velocity></plugin>"""
 SDF = f"""<?xml version="1.0"?><sdf version="1.9"><world name="w"><gravity>0 0 -9.81</gravity>
 <model name="four-bar"><pose degrees="true">0.5 -0.2 0.3 90 0 0</pose>
 <frame name="right" attached_to="bench"><pose>0.2 0 0 0 0 0</pose></frame>
@@ -344,7 +361,8 @@ SDF = f"""<?xml version="1.0"?><sdf version="1.9"><world name="w"><gravity>0 0 -
 <joint name="B" type="revolute"><parent>crank</parent><child>coupler</child>
   <axis><xyz expressed_in="right">0 0 1</xyz><limit><lower>-2</lower><upper>2</upper></limit></axis></joint>
 <joint name="C" type="revolute"><pose relative_to="rocker">{DC!r} 0 0.04 1.2 0 0</pose><parent>coupler</parent>
-  <child>rocker</child><axis><xyz expressed_in="__model__">0 0 1</xyz><dynamics><damping>0.2</damping></dynamics></axis></joint>
+  <child>rocker</child><axis><xyz expressed_in="__model__">0 0 1</xyz>
+  <dynamics><damping>0.2</damping></dynamics></axis></joint>
 <joint name="D" type="continuous"><parent>right</parent><child>rocker</child><axis><xyz>0 0 1</xyz></axis></joint>
 {DRIVE}</model></world></sdf>"""
 B, C = (0.0, 0.06), (0.17, 0.115)
@@ -372,12 +390,17 @@ def link_urdf(name: str, mass: float, centre: str, inertia: float) -> str:
 URDF = f"""<robot name="four-bar"><material name="grey"/><link name="world"/>{link_urdf("bench", 3, "0 0", 1)}
 {link_urdf("crank", 0.4, "0.03 0", 3e-4)}{link_urdf("coupler", 0.9, "0.08 0.01", 2e-3)}
 {link_urdf("rocker", 0.7, "0.05 0", 1e-3)}<link name="C"/><link name="end"/>
-<joint name="floor" type="fixed"><origin xyz="0.5 -0.2 0.3" rpy="{math.pi / 2!r} 0 0"/><parent link="world"/><child link="bench"/></joint>
-<joint name="A" type="continuous"><origin rpy="0 0 {CRANK!r}"/><parent link="bench"/><child link="crank"/><axis xyz="0 0 1"/></joint>
-<joint name="B" type="revolute"><origin xyz="{AB!r} 0 0" rpy="0 0 {COUPLER - CRANK!r}"/><parent link="crank"/><child link="coupler"/>
+<joint name="floor" type="fixed"><origin xyz="0.5 -0.2 0.3" rpy="{math.pi / 2!r} 0 0"/>
+  <parent link="world"/><child link="bench"/></joint>
+<joint name="A" type="continuous"><origin rpy="0 0 {CRANK!r}"/>
+  <parent link="bench"/><child link="crank"/><axis xyz="0 0 1"/></joint>
+<joint name="B" type="revolute"><origin xyz="{AB!r} 0 0" rpy="0 0 {COUPLER - CRANK!r}"/>
+  <parent link="crank"/><child link="coupler"/>
   <axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="10" velocity="9"/><dynamics damping="0.3"/></joint>
-<joint name="D" type="continuous"><origin xyz="0.2 0 0" rpy="0 0 {ROCKER!r}"/><parent link="bench"/><child link="rocker"/><axis xyz="0 0 1"/></joint>
-<joint name="f1" type="fixed"><origin xyz="{BC!r} 0 0" rpy="0.2 0.1 0"/><parent link="coupler"/><child link="end"/></joint>
+<joint name="D" type="continuous"><origin xyz="0.2 0 0" rpy="0 0 {ROCKER!r}"/>
+  <parent link="bench"/><child link="rocker"/><axis xyz="0 0 1"/></joint>
+<joint name="f1" type="fixed"><origin xyz="{BC!r} 0 0" rpy="0.2 0.1 0"/>
+  <parent link="coupler"/><child link="end"/></joint>
 <joint name="f2" type="fixed"><origin xyz="{DC!r} 0 0"/><parent link="rocker"/><child link="C"/></joint>
 <transmission name="t"><type>simple</type><joint name="A"/><actuator name="m"/></transmission></robot>"""
 
@@ -408,7 +431,9 @@ def test_files_with_nested_frames_are_the_mechanism_written_by_hand(text: str, n
 
 @settings(deadline=None, max_examples=5)
 @given(seed=st.integers(0, 2**31 - 1), suffix=st.sampled_from(SUFFIXES))
-def test_the_frame_of_the_file_changes_nothing(seed: int, suffix: str, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_the_frame_of_the_file_changes_nothing(
+    seed: int, suffix: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     folder = tmp_path_factory.mktemp("turned")
     rotation, place = Rotation.random(random_state=seed), np.random.default_rng(seed).normal(size=3)
     stated = bare("rssr")
@@ -420,7 +445,11 @@ def test_the_frame_of_the_file_changes_nothing(seed: int, suffix: str, tmp_path_
     turn = row(np.degrees(rotation.as_euler("XYZ")))
     text = text.replace('<body name="ground"', f'<body name="ground" pos="{xyz}" euler="{turn}"')
     text = text.replace('angle="radian"', "")
-    text = text.replace('name="Spatial crank-rocker RSSR">', f'name="RSSR"><pose>{xyz} {rpy}</pose>') if suffix == ".sdf" else text
+    text = (
+        text.replace('name="Spatial crank-rocker RSSR">', f'name="RSSR"><pose>{xyz} {rpy}</pose>')
+        if suffix == ".sdf"
+        else text
+    )
     if suffix == ".urdf":
         joint = f'<link name="world"/><joint name="w" type="fixed"><origin xyz="{xyz}" rpy="{rpy}"/>'
         text = text.replace("<link", f'{joint}<parent link="world"/><child link="ground"/></joint><link', 1)
@@ -470,7 +499,7 @@ def test_hostile_files_are_one_sentence(suffix: str, root: str, tmp_path: Path) 
         (('mass="0.9"', 'mass="nan"'), "is not finite"),
         (('mass="0.9"', ""), "is not stated"),
         (('pos="0.05 0 0"', 'pos="0.05 0"'), "has 2 numbers instead of 3"),
-        (('pos="0.05 0 0"', f'pos="{"1 " * 10**6}"'), "numbers instead of 3"),
+        (('pos="0.05 0 0"', f'pos="{"1 " * 10**6}"'), "which is no row of numbers"),
         (('class="free pin"/>', 'class="ball"/>'), "of the class 'ball', which the file does not have"),
         (('name="rocker"', 'name="crank"'), "'crank' stands in it twice"),
         (('name="D"/>', 'name="A"/>'), "'A' stands in it twice"),
@@ -520,7 +549,9 @@ def codes(draft: Draft) -> set[str]:
 
 def test_what_is_lost_or_guessed_is_told(tmp_path: Path) -> None:
     mesh = MJCF.replace("</mujoco>", "<tendon><spatial name='rope'/></tendon><sensor/></mujoco>")
-    mesh = mesh.replace('<inertial pos="0.03 0 0" mass="0.4" diaginertia="1e-4 2.5e-4 3e-4"/>', '<geom type="mesh" mesh="m"/>')
+    mesh = mesh.replace(
+        '<inertial pos="0.03 0 0" mass="0.4" diaginertia="1e-4 2.5e-4 3e-4"/>', '<geom type="mesh" mesh="m"/>'
+    )
     mesh = mesh.replace("</worldbody>", '<include file="more.xml"/><body name="loose"><freejoint/></body></worldbody>')
     (tmp_path / "lost.mjcf").write_text(mesh)
     draft = import_file(tmp_path / "lost.mjcf")
@@ -565,4 +596,6 @@ def test_the_commands_read_and_write(tmp_path: Path) -> None:
         assert out.exit_code == 0, out.output
         back = run(app, ["import", str(tmp_path / f"s{suffix}"), "-o", str(tmp_path / f"{suffix}.yaml")])
         assert back.exit_code == 0, back.output
-        assert set(trunnion.read(tmp_path / f"{suffix}.yaml").joints) == set(trunnion.read("examples/slider-crank.yaml").joints)
+        assert set(trunnion.read(tmp_path / f"{suffix}.yaml").joints) == set(
+            trunnion.read("examples/slider-crank.yaml").joints
+        )

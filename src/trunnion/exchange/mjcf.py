@@ -1,4 +1,4 @@
-"""MJCF, the files of MuJoCo: read with its defaults and frames, and written as a tree with loops closed by equalities."""
+"""MJCF, the files of MuJoCo: read with defaults and frames, and written as a tree whose loops equalities close."""
 
 from __future__ import annotations
 
@@ -19,24 +19,25 @@ from trunnion.exchange.robots import (
     APART,
     WORLD,
     Frame,
-    coupled,
+    Scene,
     numbers,
     opening,
     parsed,
     refused,
-    settled,
     spanning,
     stem,
     steps,
+    tensor,
     text_of,
     turned,
     unit,
     written,
-)
+)  # fmt: skip
 from trunnion.exchange.skeleton import Positions
 
 __all__ = ["read", "write"]
 
+KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "spherical"}
 BRINGS = ("include", "attach", "replicate", "composite", "flexcomp", "extension")  # elements that stand for bodies
 IGNORED = {  # attributes that change the motion and are not read, by element
     "joint": ("damping", "frictionloss", "stiffness", "armature"),
@@ -46,51 +47,42 @@ IGNORED = {  # attributes that change the motion and are not read, by element
 
 def read(path: Path, options: ImportOptions) -> Draft:
     """Read the mechanism of an MJCF file where it is drawn, at qpos0."""
-    return _Reader(parsed(path, "mujoco")).draft_of(options)
+    root = parsed(path, "mujoco")
+    reader = _Reader(root)
+    for part in root.findall("worldbody"):
+        reader.contents(part, WORLD, Frame(), part.get("childclass", "main"))
+    reader.weigh()
+    reader.close_loops()
+    reader.find_drives()
+    for tag in ("contact", "tendon"):
+        for part in root.iterfind(f"{tag}/*"):
+            reader.lost[tag].append(part.get("name", part.tag))
+    for tag in BRINGS:
+        if count := sum(1 for _ in root.iter(tag)):
+            what = f"{count} of <{tag}> and the bodies in it are not read"
+            reader.draft.warn("brings", "", what, "save the model by MuJoCo, which writes it in full")
+    return reader.settled(WORLD, options.ground)
 
 
-class _Reader:
+class _Reader(Scene):
     """What the compiler of MuJoCo knows while it walks through the bodies."""
 
     def __init__(self, root: Element) -> None:
-        self.root, self.draft = root, Draft(root.get("model", ""), ground=WORLD)
+        super().__init__(root.get("model", ""))
+        self.root = root
         self.compiler = {key: value for part in root.findall("compiler") for key, value in part.items()}
+        option = {key: value for part in root.findall("option") for key, value in part.items()}
+        gravity = numbers(option.get("gravity"), "option.gravity", 3, (0, 0, -9.81))
+        self.draft.gravity = gravity if gravity.any() else None
         self.angle = 1.0 if self.compiler.get("angle") == "radian" else math.pi / 180
         self.defaults: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         for part in root.findall("default"):
             self._defaults(part, "main", "main")
+        self.frames: dict[str, Frame] = {WORLD: Frame()}
         self.sites: dict[str, tuple[str, Array]] = {}
-        self.frames: dict[str, Frame] = {}
         self.geoms: dict[str, list[tuple[Frame, Mapping[str, str]]]] = defaultdict(list)
-        self.between: set[str] = set()
         self.weighed: set[str] = set()
-        self.lost: dict[str, list[str]] = defaultdict(list)
-
-    def draft_of(self, options: ImportOptions) -> Draft:
-        """The draft of the file."""
-        option = {key: value for part in self.root.findall("option") for key, value in part.items()}
-        gravity = numbers(option.get("gravity"), "option.gravity", 3, (0, 0, -9.81))
-        self.draft.gravity = gravity if gravity.any() else None
-        self.draft.bodies[WORLD], self.frames[WORLD] = Body(WORLD), Frame()
-        for part in self.root.findall("worldbody"):
-            self._contents(part, WORLD, Frame(), part.get("childclass", "main"))
-        for brings in BRINGS:
-            count = sum(1 for _ in self.root.iter(brings))
-            if count:
-                what = f"{count} of <{brings}> and the bodies in it are not read"
-                self.draft.warn("brings", "", what, "save the model by MuJoCo, which writes it in full")
-        self._weights()
-        self._equalities()
-        self._actuators()
-        self.lost["contact and tendon"] += [
-            part.get("name", part.tag) for tag in ("contact", "tendon") for part in self.root.iterfind(f"{tag}/*")
-        ]
-        lost = [
-            f"{key} of {', '.join(names[:8])}{' …' * (len(names) > 8)}" for key, names in self.lost.items() if names
-        ]
-        if lost:
-            self.draft.note("lost", "", f"is read without {'; '.join(lost)}")
-        return settled(self.draft, self.between, WORLD, options.ground)
+        self.add_body(WORLD)
 
     def _defaults(self, part: Element, name: str, parent: str) -> None:
         """Read a class of defaults: what it inherits and what it states, by element."""
@@ -109,82 +101,74 @@ class _Reader:
             raise refused(f"<{element.tag}> is of the class {chosen!r}, which the file does not have")
         return {**self.defaults[chosen].get(element.tag, {}), **element.attrib}
 
-    def _contents(self, element: Element, body: str, frame: Frame, style: str) -> None:
+    def contents(self, element: Element, body: str, frame: Frame, style: str) -> None:
         """Read what lies in a body, or in a frame of it."""
         for child in element:
-            inner_style = child.get("childclass", style)
             if child.tag == "frame":
-                self._contents(child, body, frame.then(self._frame(child.attrib, "frame")), inner_style)
+                inner = frame.then(self._frame(child.attrib, "frame"))
+                self.contents(child, body, inner, child.get("childclass", style))
             elif child.tag == "body":
-                self._body(child, body, frame, inner_style)
-            elif child.tag == "geom":
+                self._body(child, body, frame, child.get("childclass", style))
+            elif child.tag in ("geom", "site"):
                 values = self._with_defaults(child, style)
-                self.geoms[body].append((frame.then(self._shape_frame(values)), values))
-            elif child.tag == "site":
-                values = self._with_defaults(child, style)
-                place = frame.then(self._frame(values, "site")).place
-                name = values.get("name", "")
-                self.sites[name] = body, place
-                if name:
-                    self.draft.bodies[body].points[name] = place
+                placed = frame.then(self._frame(values, child.tag))
+                if child.tag == "geom":
+                    self.geoms[body].append((placed, values))
+                elif "name" in values:
+                    self.sites[values["name"]] = body, placed.place
+                    self.draft.bodies[body].points[values["name"]] = placed.place
 
     def _body(self, element: Element, parent: str, outer: Frame, style: str) -> None:
         """Read a body with its joints: several are a row of bodies, the first joint next to the parent."""
         name = element.get("name") or f"body{len(self.draft.bodies)}"
-        if name in self.draft.bodies:
-            raise refused(f"the body {name!r} stands in it twice")
-        frame = outer.then(self._frame(element.attrib, f"body {name}"))
-        self.frames[name] = frame
-        self.draft.bodies[name] = Body(name)
+        body = self.add_body(name)
+        self.frames[name] = frame = outer.then(self._frame(element.attrib, f"body {name}"))
         self._note_lost("body", element.attrib, name)
         joints = [part for part in element if part.tag in ("joint", "freejoint")]
         links = [parent, *(f"{name}.{number + 1}" for number in range(len(joints) - 1)), name]
         for between in links[1:-1]:
-            self.draft.bodies[between] = Body(between)
+            self.add_body(between)
             self.between.add(between)
         for number, part in enumerate(joints):
             self._joint(part, (links[number], links[number + 1]), frame, style)
         if not joints:
-            self._add(Pair(f"{name}.fixed", "fixed", (parent, name), frame.place))
-        self._contents(element, name, frame, style)
+            self.add_pair(Pair(f"{name}.fixed", "fixed", (parent, name), frame.place))
         inertial = element.find("inertial")
         if inertial is not None and self.compiler.get("inertiafromgeom") != "true":
-            body = self._inertial(inertial, name, frame)
-            self.draft.bodies[name] = replace(body, points=self.draft.bodies[name].points)
+            where = f"inertial of body {name}"
+            placed = frame.then(self._frame(inertial.attrib, where))
+            body.mass, body.centre = float(numbers(inertial.get("mass"), f"mass of {where}", 1)[0]), placed.place
+            if "fullinertia" in inertial.attrib:
+                matrix = tensor(*numbers(inertial.get("fullinertia"), f"fullinertia of {where}", 6))
+            else:
+                matrix = np.diag(numbers(inertial.get("diaginertia"), f"diaginertia of {where}", 3, (0, 0, 0)))
+            body.inertia = placed.inertia(matrix)
             self.weighed.add(name)
+        self.contents(element, name, frame, style)
 
     def _joint(self, part: Element, links: tuple[str, str], frame: Frame, style: str) -> None:
+        """Read a joint; a free one is none."""
         values = self._with_defaults(part, style)
         kind = "free" if part.tag == "freejoint" else values.get("type", "hinge")
+        name = values.get("name") or f"{links[1]}.joint{len(self.draft.pairs) + 1}"
+        where = f"joint {name}"
         if kind == "free":
             return
-        types = {"hinge": "revolute", "slide": "prismatic", "ball": "spherical"}
-        name = values.get("name") or f"{links[1]}.joint{len(self.draft.pairs) + 1}"
-        if kind not in types:
-            raise refused(f"has the type {kind!r}, which is no joint of MuJoCo", f"joint {name}")
-        axis = unit(numbers(values.get("axis"), f"axis of joint {name}", 3, (0, 0, 1)), f"axis of joint {name}")
-        place = numbers(values.get("pos"), f"pos of joint {name}", 3, (0, 0, 0))
-        pair = Pair(name, types[kind], links, frame.at(place), frame.rotation @ axis)
-        scale = self.angle if kind == "hinge" else 1.0
+        if kind not in KINDS:
+            raise refused(f"has the type {kind!r}, which is no joint of MuJoCo", where)
+        axis = unit(numbers(values.get("axis"), f"axis of {where}", 3, (0, 0, 1)), f"axis of {where}")
+        place = numbers(values.get("pos"), f"pos of {where}", 3, (0, 0, 0))
+        pair = Pair(name, KINDS[kind], links, frame.at(place), frame.rotation @ axis)
         limited = values.get("limited", "auto")
-        if (
-            "range" in values
-            and kind != "ball"
-            and limited != "false"
-            and (limited == "true" or self.compiler.get("autolimits") != "false")
-        ):
-            low, high = scale * (
-                numbers(values["range"], f"range of joint {name}", 2)
-                - float(numbers(values.get("ref"), f"ref of joint {name}", 1, (0,))[0])
+        automatic = limited == "auto" and self.compiler.get("autolimits") != "false"
+        if "range" in values and kind != "ball" and (limited == "true" or automatic):
+            ends = numbers(values["range"], f"range of {where}", 2) - numbers(
+                values.get("ref"), f"ref of {where}", 1, (0,)
             )
+            low, high = ends * (self.angle if kind == "hinge" else 1.0)
             pair.limits = float(low), float(high)
         self._note_lost("joint", values, name)
-        self._add(pair)
-
-    def _add(self, pair: Pair) -> None:
-        if pair.name in self.draft.pairs:
-            raise refused(f"the joint {pair.name!r} stands in it twice")
-        self.draft.pairs[pair.name] = pair
+        self.add_pair(pair)
 
     def _note_lost(self, tag: str, values: Mapping[str, str], name: str) -> None:
         for key in IGNORED[tag]:
@@ -195,6 +179,9 @@ class _Reader:
 
     def _frame(self, values: Mapping[str, str], where: str) -> Frame:
         """The frame that attributes state."""
+        if "fromto" in values:
+            start, end = numbers(values["fromto"], f"fromto of {where}", 6).reshape(2, 3)
+            return Frame(_onto(start - end, f"fromto of {where}"), (start + end) / 2)
 
         def part(key: str, count: int, default: tuple[float, ...] | None = None) -> Array:
             return numbers(values.get(key), f"{key} of {where}", count, default)
@@ -220,133 +207,97 @@ class _Reader:
             rotation = Rotation.from_quat(unit(part("quat", 4), where), scalar_first=True).as_matrix()
         return Frame(rotation, place)
 
-    def _shape_frame(self, values: Mapping[str, str]) -> Frame:
-        """The frame of a geom, in that of its body."""
-        if "fromto" not in values:
-            return self._frame(values, "geom")
-        start, end = numbers(values["fromto"], "fromto of geom", 6).reshape(2, 3)
-        return Frame(_onto(start - end, "fromto of geom"), (start + end) / 2)
-
-    def _inertial(self, part: Element, name: str, outer: Frame) -> Body:
-        where = f"inertial of body {name}"
-        frame = outer.then(self._frame(part.attrib, where))
-        mass = float(numbers(part.get("mass"), f"mass of {where}", 1)[0])
-        if "fullinertia" in part.attrib:
-            xx, yy, zz, xy, xz, yz = numbers(part.get("fullinertia"), f"fullinertia of {where}", 6)
-            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        else:
-            inertia = np.diag(numbers(part.get("diaginertia"), f"diaginertia of {where}", 3, (0, 0, 0)))
-        return Body(name, mass, frame.place, frame.inertia(inertia))
-
-    def _weights(self) -> None:
+    def weigh(self) -> None:
         """Give bodies that state no mass the masses of their geoms; scale all if the file says so."""
-        source = self.compiler.get("inertiafromgeom", "auto")
+        source, bodies = self.compiler.get("inertiafromgeom", "auto"), self.draft.bodies
         low, high = numbers(self.compiler.get("inertiagrouprange"), "inertiagrouprange", 2, (0, 5))
-        guessed = []
-        for name, geoms in self.geoms.items():
-            if source == "false" or name in self.weighed or name == WORLD:
-                continue
-            solids = [
-                _solid(frame, values, name)
-                for frame, values in geoms
-                if low <= float(numbers(values.get("group"), "group of geom", 1, (0,))[0]) <= high
-            ]
-            if any(solid is None for solid in solids):
-                guessed.append(name)
-            for solid in solids:
-                if solid is not None:
-                    self.draft.bodies[name] = united(self.draft.bodies[name], solid, name)
-        if guessed:
-            what = f"have geoms of a shape whose mass is not found here, a mesh for one: {', '.join(guessed[:10])}"
-            self.draft.warn(
-                "shape", "links", what, "state <inertial> for these bodies, or mass and inertia in the model"
-            )
+        unknown = []
+        for name, geoms in self.geoms.items() if source != "false" else ():
+            for frame, values in geoms if name not in {*self.weighed, WORLD} else ():
+                solid = _solid(frame, values, name)
+                if solid is None:
+                    unknown.append(name)
+                elif low <= numbers(values.get("group"), "group of geom", 1, (0,))[0] <= high:
+                    bodies[name] = united(bodies[name], solid, name)
+        if unknown:
+            what = f"have geoms of a shape whose mass is not found here, a mesh for one: {', '.join(unknown[:10])}"
+            self.draft.warn("shape", "links", what, "state <inertial> for them, or mass and inertia in the model")
         total = float(numbers(self.compiler.get("settotalmass"), "settotalmass", 1, (-1,))[0])
-        mass = sum(body.mass for body in self.draft.bodies.values())
-        if total > 0 and mass > 0:
-            for name, body in self.draft.bodies.items():
-                share = total / mass
-                self.draft.bodies[name] = replace(body, mass=body.mass * share, inertia=body.inertia * share)
+        mass = sum(body.mass for body in bodies.values())
+        for body in bodies.values() if total > 0 and mass > 0 else ():
+            body.mass, body.inertia = body.mass * total / mass, body.inertia * total / mass
 
     # Loops and drives
 
-    def _equalities(self) -> None:
-        """Read what closes loops; points that two bodies share are a ball, on one line a pin, else a weld."""
+    def close_loops(self) -> None:
+        """Read equalities; points that two bodies share are a ball, on one line a pin, else a weld."""
         shared: dict[tuple[str, str], list[tuple[str, Array]]] = defaultdict(list)
-        for part in self.root.iterfind("equality/*"):
+        for number, part in enumerate(self.root.iterfind("equality/*")):
             values = self._with_defaults(part, "main")
-            name = values.get("name") or f"loop{len(self.draft.pairs) + len(shared) + 1}"
+            name = values.get("name") or f"loop{number + 1}"
             if values.get("active") == "false":
                 self.lost["equality that is not active"].append(name)
             elif part.tag in ("connect", "weld"):
-                links, point = self._ends(part.tag, values, name)
+                links, place = self._ends(values, f"equality {name}")
                 if part.tag == "weld":
-                    self._add(Pair(name, "fixed", links, point))
+                    self.add_pair(Pair(name, "fixed", links, place))
                 else:
-                    shared[links if links[::-1] not in shared else links[::-1]].append((name, point))
-            elif part.tag == "joint" and "joint2" in values:
+                    shared[links if links[::-1] not in shared else links[::-1]].append((name, place))
+            elif part.tag == "joint" and {"joint1", "joint2"} <= values.keys():
                 _, ratio, *higher = numbers(values.get("polycoef"), f"polycoef of {name}", 5, (0, 1, 0, 0, 0))
-                joints = values.get("joint1"), values["joint2"]
-                coupled(self.draft, joints, 0.0 if any(higher) else float(ratio), self.between)
+                self.couplings.append((values["joint1"], values["joint2"], 0.0 if any(higher) else float(ratio)))
             else:
                 self.draft.warn("equality", name, f"is an equality of the kind {part.tag!r}, which is not read")
         for links, points in shared.items():
-            places = np.array([place for _, place in points])
-            _, spread, axes = np.linalg.svd(places - places.mean(axis=0))
-            rank = int((spread > APART).sum())
-            names = [name for name, _ in points]
-            name = names[0] if len(names) == 1 else stem(names)
-            kind = ("spherical", "revolute")[rank] if rank < 2 else "fixed"
-            comment = f"closes a loop by {len(points)} connect of the file" + (" on its axis" if rank == 1 else "")
-            self._add(Pair(name, kind, links, places.mean(axis=0), _signed(axes[0], places), comments=[comment]))
+            offsets = np.array([place for _, place in points]) - points[0][1]
+            rank = int((np.linalg.svd(offsets, compute_uv=False) > APART).sum())
+            axis = offsets[int(np.argmax(np.linalg.norm(offsets, axis=1)))] if rank else np.array([0.0, 0.0, 1.0])
+            name = points[0][0] if len(points) == 1 else stem([name for name, _ in points])
+            comment = f"closes a loop by {len(points)} connect of the file"
+            pair = Pair(name, ("spherical", "revolute", "fixed", "fixed")[rank], links, points[0][1], axis)
+            pair.at, pair.comments = points[0][1] + offsets.mean(axis=0), [comment]
+            self.add_pair(pair)
 
-    def _ends(self, tag: str, values: Mapping[str, str], name: str) -> tuple[tuple[str, str], Array]:
+    def _ends(self, values: Mapping[str, str], where: str) -> tuple[tuple[str, str], Array]:
         """The two bodies that an equality holds together, and where; MechanismError if they are apart as drawn."""
         if "site1" in values:
             ends = [self.sites.get(values.get(key, "")) for key in ("site1", "site2")]
             if ends[0] is None or ends[1] is None:
-                raise refused("names a site that the file does not have", f"equality {name}")
+                raise refused("names a site that the file does not have", where)
             (first, place), (second, other) = ends[0], ends[1]
         else:
             first, second = values.get("body1", ""), values.get("body2", WORLD)
             for body in (first, second):
                 if body not in self.frames:
-                    raise refused(f"names the body {body!r}, which the file does not have", f"equality {name}")
-            place = other = self.frames[first].at(numbers(values.get("anchor"), f"anchor of {name}", 3, (0, 0, 0)))
-        relative = numbers(values.get("relpose"), f"relpose of {name}", 7, (0,) * 7)
-        if tag == "weld" and relative[3:].any():
-            stated = self.frames[first].then(
-                self._frame({"pos": text_of(relative[:3]), "quat": text_of(relative[3:])}, name)
-            )
-            other = place + stated.place - self.frames[second].place
-            if np.abs(stated.rotation - self.frames[second].rotation).max() > APART:
-                raise refused("holds two bodies at another angle than the file draws them", f"equality {name}")
+                    raise refused(f"names the body {body!r}, which the file does not have", where)
+            place = other = self.frames[first].at(numbers(values.get("anchor"), f"anchor of {where}", 3, (0, 0, 0)))
+            pose = numbers(values.get("relpose"), f"relpose of {where}", 7, (0,) * 7)
+            if pose[3:].any():
+                relative = self._frame({"pos": text_of(pose[:3]), "quat": text_of(pose[3:])}, where)
+                stated, drawn = self.frames[first].then(relative), self.frames[second]
+                other = place + stated.place - drawn.place
+                if np.abs(stated.rotation - drawn.rotation).max() > APART:
+                    raise refused("holds two bodies at another angle than the file draws them", where)
         gap = float(np.linalg.norm(place - other))
         if gap > APART:
             what = f"holds points together that are {1e3 * gap:.4g} mm apart as the file draws them"
-            raise refused(what, f"equality {name}", "draw it assembled: poses of the bodies at which the loops close")
+            raise refused(what, where, "draw it assembled: poses of the bodies at which the loops close")
         return (first, second), place
 
-    def _actuators(self) -> None:
+    def find_drives(self) -> None:
         """Read driven joints; the speed is that of the first key for an actuator of velocity."""
         key = self.root.find("keyframe/key")
         control = (key.get("ctrl", "") if key is not None else "").split()
         for number, part in enumerate(self.root.iterfind("actuator/*")):
             values = self._with_defaults(part, "main")
-            joint = values.get("joint", values.get("jointinparent"))
+            joint, rate = values.get("joint", values.get("jointinparent")), 0.0
             if joint not in self.draft.pairs:
                 self.lost["actuator"].append(values.get("name", part.tag))
                 continue
-            rate = 0.0
             if part.tag == "velocity" and number < len(control):
                 gear = numbers(values.get("gear"), f"gear of {joint}", 0, (1,))[0]
                 rate = float(numbers(control[number], "ctrl of key", 1)[0] / (gear or 1.0))
             self.draft.drives[joint] = rate
-
-
-def _signed(axis: Array, places: Array) -> Array:
-    """An axis through places, from the first towards the last."""
-    return axis if axis @ (places[-1] - places[0]) >= 0 else -axis
 
 
 def _onto(direction: Array, where: str) -> Array:
@@ -366,18 +317,14 @@ def _solid(frame: Frame, values: Mapping[str, str], name: str) -> Body | None:
     density = float(numbers(values.get("density"), f"density of a geom of body {name}", 1, (1000,))[0])
     if kind in ("plane", "hfield") or stated == 0 or (stated is None and density == 0):
         return Body(name)
-    if (
-        kind not in ("sphere", "capsule", "cylinder", "ellipsoid", "box")
-        or "mesh" in values
-        or values.get("shellinertia") == "true"
-    ):
+    count = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}.get(kind, 0)
+    if not count or "mesh" in values or values.get("shellinertia") == "true":
         return None
     size = numbers(values.get("size"), where, 0)
     if "fromto" in values:
         ends = numbers(values["fromto"], "fromto of geom", 6)
         half = float(np.linalg.norm(ends[3:] - ends[:3])) / 2
-        size = np.array([size[0], half] if kind in ("capsule", "cylinder") else [size[0], size[0], half])
-    count = {"sphere": 1, "capsule": 2, "cylinder": 2}.get(kind, 3)
+        size = np.array([size[0], half] if count == 2 else [size[0], size[0], half])
     if len(size) < count or not (size[:count] > 0).all():
         raise refused(f"has not {count} lengths above 0", where)
     a, b, c = (*size[:count], 0.0, 0.0)[:3]
@@ -430,18 +377,7 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
                 compiler.attrib.update(boundmass="1e-9", boundinertia="1e-12")
         for point, place in body.points.items():
             SubElement(element, "site", name=f"{name}.{point}", pos=text_of(place - origins[name]))
-    size = max([1e-3, *(float(np.linalg.norm(pair.at - origins[pair.links[0]])) for pair in tree)])
-    for pair in cuts:
-        if pair.type in ("spherical", "revolute"):
-            half = (pair.length or size / 10) / 2 * pair.axis / np.linalg.norm(pair.axis)
-            anchors = {"": pair.at} if pair.type == "spherical" else {".1": pair.at - half, ".2": pair.at + half}
-            ends = dict(zip(("body1", "body2"), pair.links, strict=True))
-            for key, anchor in anchors.items():
-                values = {**ends, "anchor": text_of(anchor - origins[pair.links[0]])}
-                SubElement(equality, "connect", values, name=f"{pair.name}{key}")
-    for name, body in draft.bodies.items():
-        if "." in name:
-            SubElement(equality, "weld", name=name, body1=name.partition(".")[0], body2=name)
+    _write_loops(draft, cuts, origins, equality)
     if len(equality):
         root.append(equality)
     if draft.drives:
@@ -452,6 +388,20 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
         SubElement(SubElement(root, "keyframe"), "key", name="drive", ctrl=text_of(list(draft.drives.values())))
     written(root, path)
     return draft.findings
+
+
+def _write_loops(draft: Draft, cuts: list[Pair], origins: Mapping[str, Array], equality: Element) -> None:
+    """Write what closes the loops: connects at balls and on the axes of pins, welds of halved bodies."""
+    size = np.ptp([*origins.values()], axis=0).max() or 1.0
+    for pair in cuts:
+        half = (pair.length or size / 10) / 2 * pair.axis / np.linalg.norm(pair.axis)
+        anchors = {"spherical": {"": pair.at}, "revolute": {".1": pair.at - half, ".2": pair.at + half}}
+        for number, anchor in anchors.get(pair.type, {}).items():
+            ends = {"body1": pair.links[0], "body2": pair.links[1], "anchor": text_of(anchor - origins[pair.links[0]])}
+            SubElement(equality, "connect", ends, name=f"{pair.name}{number}")
+    for name in draft.bodies:
+        if "." in name:
+            SubElement(equality, "weld", name=name, body1=name.partition(".")[0], body2=name)
 
 
 def _halved(draft: Draft, cuts: list[Pair]) -> Iterator[Pair]:

@@ -1,10 +1,11 @@
-"""What MJCF, SDF and URDF have in common: XML, frames, trees of bodies, and pairs written as chains of simple joints."""
+"""What MJCF, SDF and URDF have in common: XML, frames, trees of bodies, and pairs as chains of simple joints."""
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -13,28 +14,13 @@ from xml.etree.ElementTree import Element, ElementTree, ParseError, indent
 import numpy as np
 from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import iterparse
-from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, Pair, free_name, perpendicular
 from trunnion.exchange.skeleton import Positions
 
-__all__ = [
-    "Frame",
-    "joined",
-    "loose",
-    "numbers",
-    "opening",
-    "parsed",
-    "refused",
-    "settled",
-    "spanning",
-    "steps",
-    "text_of",
-    "turned",
-    "unit",
-    "written",
-]
+__all__ = ["Frame", "Scene", "laid_out", "numbers", "opening", "parsed", "refused", "spanning", "stem", "steps",
+           "tensor", "text_of", "turned", "unit", "written"]  # fmt: skip
 
 MOST_ELEMENTS, DEEPEST, MOST_PARTS = 100_000, 200, 2_000
 LONGEST = 1000  # characters of a row of numbers
@@ -73,7 +59,8 @@ def parsed(path: Path, name: str) -> Element:
 
     Entities of its own and references to other files are refused, and so is a file that would fill the memory.
     """
-    root, count, depth = None, 0, 0
+    root: Element | None = None
+    count, depth = 0, 0
     try:
         for event, element in iterparse(path, ("start", "end")):
             root = element if root is None else root
@@ -96,12 +83,12 @@ def parsed(path: Path, name: str) -> Element:
 
 def numbers(text: str | None, where: str, count: int, default: Sequence[float] | None = None) -> Array:
     """The numbers of a text, (count,), or of any count if it is 0; MechanismError if they are none or too few."""
-    if text is None or not text[:LONGEST].strip():
+    if not text or text.isspace():
         if default is None:
             raise refused("is not stated", where)
         return np.array(default, dtype=float)
     try:
-        values = np.array(text[:LONGEST].split(), dtype=float)
+        values = np.array(text.split() if len(text) < LONGEST else "", dtype=float)
     except ValueError:
         raise refused(f"is {text[:40]!r}, which is no row of numbers", where) from None
     if count and len(values) != count:
@@ -119,9 +106,9 @@ def unit(vector: Array, where: str) -> Array:
     return np.asarray(vector / length)
 
 
-def roll_pitch_yaw(angles: Array) -> Array:
-    """The rotation matrix of turns about the fixed axes x, y, z, rad."""
-    return np.asarray(Rotation.from_euler("xyz", angles).as_matrix())
+def tensor(xx: float, yy: float, zz: float, xy: float, xz: float, yz: float) -> Array:
+    """A symmetric matrix of its entries."""
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def text_of(values: float | Sequence[float] | Array) -> str:
@@ -165,7 +152,7 @@ def turned(pair: Pair) -> Pair:
 
 
 def steps(pair: Pair) -> list[Pair]:
-    """A pair as a chain of hinges and slides, the first on its first body; the bodies between are `name.1`, `name.2`."""
+    """A pair as a chain of hinges and slides, the first on its first body; those between are `name.1`, `name.2`."""
     axis, across = pair.axis / np.linalg.norm(pair.axis), perpendicular(pair.axis)
     second = pair.second_axis if pair.second_axis is not None else across
     chains = {
@@ -193,16 +180,31 @@ def steps(pair: Pair) -> list[Pair]:
     ]
 
 
+def laid_out(
+    draft: Draft, lacking: tuple[str, ...]
+) -> tuple[dict[str, Array], list[Pair], list[Pair], dict[str, float]]:
+    """How a format without pairs of the lacking types holds a draft, all bodies with the global axes.
+
+    Returns the origin of every body, at the joint that carries it, the joints of the tree, those that close its loops,
+    and the rates of the driven joints by name. Bodies that the draft has not only hold two joints.
+    """
+    tree, cuts = spanning(draft)
+    origins, inner, closing = {draft.ground: np.zeros(3)}, list[Pair](), list[Pair]()
+    for pair in [*tree, *cuts]:
+        for step in steps(pair) if pair.type in lacking else [pair]:
+            (closing if step.links[1] in origins else inner).append(step)
+            origins.setdefault(step.links[1], pair.at)
+    rates = {f"{name}.turn" if draft.pairs[name].type in lacking else name: rate for name, rate in draft.drives.items()}
+    return origins, inner, closing, rates
+
+
 def opening(positions: Positions, row: int, also: str = "") -> Draft:
     """The draft to write, with notes on what the format cannot hold."""
     draft, mechanism = positions.draft(row), positions.mechanism
     lost = [name for name in LOST if getattr(mechanism, name)]
     lost += ["friction", "sizes and play of pins"] if mechanism.effective_joints else []
-    lost += (
-        ["laws of motion"]
-        if any(driver.moves or driver.law != "constant" for driver in mechanism.drivers.values())
-        else []
-    )
+    if any(driver.moves or driver.law != "constant" for driver in mechanism.drivers.values()):
+        lost.append("laws of motion")
     draft.note("lost", "", f"is written without {', '.join([*lost, *([also] if also else [])])}")
     massless = [name for name, body in draft.bodies.items() if name != draft.ground and not body.mass > 0]
     if massless:
@@ -214,48 +216,109 @@ def opening(positions: Positions, row: int, also: str = "") -> Draft:
 # In: chains made pairs again, and names and grounds as a model has them
 
 
-def joined(draft: Draft, between: set[str]) -> None:
-    """Make one pair of joints in a row, through bodies that are only there to hold them, where such a pair exists."""
-    outward: dict[str, Pair] = {pair.links[0]: pair for pair in draft.pairs.values() if pair.links[0] in between}
-    pairs: dict[str, Pair] = {}
-    inner = {pair.links[1] for pair in draft.pairs.values()} & outward.keys()
-    for name, pair in draft.pairs.items():
-        if pair.links[0] in inner:
-            continue
-        chain = [pair]
-        while chain[-1].links[1] in between and chain[-1].links[1] in outward and len(chain) < 4:
-            chain.append(outward[chain[-1].links[1]])
-        united = _pair_of(chain, draft.drives) if len(chain) > 1 else None
-        if united is None:
-            pairs |= {step.name: step for step in chain}
-            continue
-        for step in chain:
-            draft.drives |= {united.name: draft.drives.pop(step.name)} if step.name in draft.drives else {}
-        for body in (step.links[1] for step in chain[:-1]):
-            draft.bodies.pop(body)
-        pairs[united.name if united.name not in draft.pairs else name] = united
-    draft.pairs = pairs
+class Scene:
+    """What a file holds, as it is read.
+
+    Parameters
+    ----------
+    name : of the model.
+    draft : bodies, pairs and drives by their names in the file.
+    between : bodies that are only there to hold two joints of a row.
+    couplings : pairs of joints of which the first moves by a ratio of the second.
+    lost : names of the parts of which something is not read, by what that is.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.draft = Draft(name)
+        self.between: set[str] = set()
+        self.couplings: list[tuple[str, str, float]] = []
+        self.lost: dict[str, list[str]] = defaultdict(list)
+
+    def add_body(self, name: str) -> Body:
+        """A new body."""
+        if name in self.draft.bodies:
+            raise refused(f"the body {name!r} stands in it twice")
+        self.draft.bodies[name] = Body(name)
+        return self.draft.bodies[name]
+
+    def add_pair(self, pair: Pair) -> None:
+        """A new pair."""
+        if pair.name in self.draft.pairs:
+            raise refused(f"the joint {pair.name!r} stands in it twice")
+        self.draft.pairs[pair.name] = pair
+
+    def settled(self, world: str, ground: str) -> Draft:
+        """The draft: its chains joined, its ground named, its names as a model has them.
+
+        world: the body that does not move, if the draft has it; it has the name of a body that is fixed to it if it
+        carries nothing else. ground: of the options, which goes before it.
+        """
+        draft = self.draft
+        if not draft.pairs:
+            raise refused("has no joints", remedy="export a mechanism")
+        if max(len(draft.bodies), len(draft.pairs)) > MOST_PARTS:
+            what = f"has {len(draft.bodies):,} bodies and {len(draft.pairs):,} joints; at most {MOST_PARTS:,} are read"
+            raise refused(what, remedy="export the mechanism alone")
+        if lost := [f"{key} of {_listed(names)}" for key, names in self.lost.items()]:
+            draft.note("lost", "", f"is read without {'; '.join(lost)}")
+        for first, second, ratio in self.couplings:
+            self._couple(first, second, ratio)
+        self._join()
+        busiest = max(draft.bodies, key=lambda name: len(draft.pairs_of(name)))
+        start = next(name for name in (ground, world, busiest) if name in draft.bodies)
+        _leave_loose(draft, start)
+        draft.ground = start if start in (ground, world) else ""
+        base = draft.pairs_of(WORLD)
+        if draft.ground == WORLD and base and all(pair.type == "fixed" for pair in base):
+            draft.ground = next(link for link in base[0].links if link != WORLD)
+        _rename(draft)
+        return draft
+
+    def _couple(self, name: str, other: str, ratio: float) -> None:
+        """Make a thread of two joints that turn and slide one body; others are gears, which are not read."""
+        slide, turn = self.draft.pairs.get(name), self.draft.pairs.get(other)
+        if slide is not None and turn is not None and ratio:
+            if slide.type == "revolute":
+                slide, turn, ratio = turn, slide, 1 / ratio
+            along = float(slide.axis @ turn.axis) / float(np.linalg.norm(slide.axis) * np.linalg.norm(turn.axis))
+            common = set(slide.links) & set(turn.links) & self.between
+            if (slide.type, turn.type) == ("prismatic", "revolute") and common and abs(along) > 1 - PARALLEL:
+                turn.pitch = 2 * math.pi * ratio * along
+                return
+        what = f"are coupled, which is not read: {name} moves by {ratio:.6g} of {other}"
+        self.draft.warn("gears", "joints", what, "state it under gears in the model")
+
+    def _join(self) -> None:
+        """Make one pair of joints in a row, where there is such a pair."""
+        draft = self.draft
+        outward = {pair.links[0]: pair for pair in draft.pairs.values() if pair.links[0] in self.between}
+        inner = {pair.links[1] for pair in draft.pairs.values()} & outward.keys()
+        pairs: dict[str, Pair] = {}
+        for name, pair in draft.pairs.items():
+            if pair.links[0] in inner:
+                continue
+            chain = [pair]
+            while chain[-1].links[1] in inner and len(chain) < 4:
+                chain.append(outward[chain[-1].links[1]])
+            made = _pair_of(chain, draft.drives) if len(chain) > 1 else None
+            if made is None:
+                pairs |= {step.name: step for step in chain}
+                continue
+            made.name = made.name if made.name not in draft.pairs else name
+            pairs[made.name] = made
+            for step in chain:
+                if step.name in draft.drives:
+                    draft.drives[made.name] = draft.drives.pop(step.name)
+                if step.links[1] in inner:
+                    del draft.bodies[step.links[1]]
+        draft.pairs = pairs
 
 
 def stem(names: Sequence[str]) -> str:
     """What names of parts of a joint begin with, such as B of B.turn1 and B.turn2; the first if that is nothing."""
     stems = {name.rpartition(".")[0] for name in names}
-    return (stems.pop() if len(stems) == 1 else os.path.commonprefix(names)).rstrip("._-: ") or names[0]
-
-
-def coupled(draft: Draft, names: tuple[str | None, str | None], ratio: float, between: set[str]) -> None:
-    """Read that a joint moves by ratio times another: a thread if they turn and slide one body, else a gear."""
-    first, second = (draft.pairs.get(name or "") for name in names)
-    if first is not None and second is not None and ratio:
-        if first.type == "revolute":
-            first, second, ratio = second, first, 1 / ratio
-        along = float(first.axis @ second.axis) / float(np.linalg.norm(first.axis) * np.linalg.norm(second.axis))
-        common = set(first.links) & set(second.links) & between
-        if (first.type, second.type) == ("prismatic", "revolute") and common and abs(along) > 1 - PARALLEL:
-            second.pitch = 2 * math.pi * ratio * along
-            return
-    what = f"are coupled, which is not read: {names[0]} moves by {ratio:.6g} of {names[1]}"
-    draft.warn("gears", "joints", what, "state it under gears in the model")
+    begin = stems.pop() if len(stems) == 1 else os.path.commonprefix(names)  # noqa: RUF071, of letters
+    return begin.rstrip("._-: ") or names[0]
 
 
 def _pair_of(chain: list[Pair], drives: Mapping[str, float]) -> Pair | None:
@@ -269,13 +332,12 @@ def _pair_of(chain: list[Pair], drives: Mapping[str, float]) -> Pair | None:
         return None
     axes = [step.axis / np.linalg.norm(step.axis) for step in [*turns, *slides]]
     counts = len(turns), len(slides)
-    if counts == (1, 1) and np.linalg.norm(np.cross(*axes)) < PARALLEL:
+    if counts == (1, 1) and np.linalg.norm(np.cross(axes[0], axes[1])) < PARALLEL:
         kind = "cylindrical" if turns[0].pitch is None else "helical"
         return replace(turns[0], name=name, type=kind, links=links)
-    if counts == (1, 2) and max(abs(axes[0] @ axes[1]), abs(axes[0] @ axes[2])) < PARALLEL < np.linalg.norm(
-        np.cross(*axes[1:])
-    ):
-        return None if driven else Pair(name, "planar", links, turns[0].at, axes[0])
+    if counts == (1, 2) and not driven and np.linalg.norm(np.cross(axes[1], axes[2])) > PARALLEL:
+        square = max(abs(axes[0] @ axes[1]), abs(axes[0] @ axes[2])) < PARALLEL
+        return Pair(name, "planar", links, turns[0].at, axes[0]) if square else None
     if slides or driven or len(turns) not in (2, 3):
         return None
     normal = [np.eye(3) - np.outer(axis, axis) for axis in axes]
@@ -290,7 +352,7 @@ def _pair_of(chain: list[Pair], drives: Mapping[str, float]) -> Pair | None:
     return Pair(name, "spherical", links, place) if abs(np.linalg.det(axes)) > PARALLEL else None
 
 
-def loose(draft: Draft, start: str) -> None:
+def _leave_loose(draft: Draft, start: str) -> None:
     """Leave out the bodies that no chain of pairs joins to the one that is fixed."""
     held, front = {start}, [start]
     neighbours: dict[str, set[str]] = {}
@@ -303,50 +365,34 @@ def loose(draft: Draft, start: str) -> None:
         front += new
     free = [name for name in draft.bodies if name not in held]
     if free:
-        what = f"are joined to nothing that is fixed, and left out: {', '.join(free[:10])}{' …' * (len(free) > 10)}"
+        what = f"are joined to nothing that is fixed, and left out: {_listed(free)}"
         draft.warn("free", "links", what, "join them to the ground, or state another one with --ground")
     draft.bodies = {name: body for name, body in draft.bodies.items() if name in held}
     draft.pairs = {name: pair for name, pair in draft.pairs.items() if set(pair.links) <= held}
 
 
-def settled(draft: Draft, between: set[str], world: str, ground: str) -> Draft:
-    """The draft of a file that is read: its chains joined, its ground named, its names as a model has them.
+def _listed(names: Sequence[str]) -> str:
+    """Names in a sentence, the first ten of many."""
+    return ", ".join(names[:10]) + " …" * (len(names) > 10)
 
-    The world has the name of the body that is fixed to it if it carries nothing else. ground: of the options.
-    """
-    if not draft.pairs:
-        raise refused("has no joints", remedy="export a mechanism")
-    if max(len(draft.bodies), len(draft.pairs)) > MOST_PARTS:
-        what = f"has {len(draft.bodies):,} bodies and {len(draft.pairs):,} joints; at most {MOST_PARTS:,} are read"
-        raise refused(what, remedy="export the mechanism alone")
-    joined(draft, between)
-    busiest = max(draft.bodies, key=lambda name: len(draft.pairs_of(name)))
-    start = next(name for name in (ground, world, busiest) if name in draft.bodies)
-    loose(draft, start)
-    draft.ground = start if start in (ground, world) else ""
-    base = draft.pairs_of(WORLD)
-    if draft.ground == WORLD and base and all(pair.type == "fixed" for pair in base):
-        draft.ground = next(link for link in base[0].links if link != WORLD)
+
+def _rename(draft: Draft) -> None:
+    """Give all parts names that a model accepts; points without the name of the body, which they have in a file."""
     names: dict[str, str] = {}
     for name in draft.bodies:
         names[name] = free_name(name, names.values(), "body")
-    pairs: dict[str, str] = {}
+    joints: dict[str, str] = {}
     for name in draft.pairs:
-        pairs[name] = free_name(name, pairs.values(), "joint")
-    bodies = dict(_renamed(draft, names))
-    draft.pairs = {
-        pairs[name]: replace(pair, name=pairs[name], links=(names[pair.links[0]], names[pair.links[1]]))
-        for name, pair in draft.pairs.items()
-    }
-    draft.drives = {pairs[name]: rate for name, rate in draft.drives.items() if name in pairs}
-    draft.bodies, draft.ground = bodies, names.get(draft.ground, "")
-    return draft
-
-
-def _renamed(draft: Draft, names: Mapping[str, str]) -> Iterator[tuple[str, Body]]:
-    """The bodies by their new names; their points without the name of the body, which they have in a file."""
+        joints[name] = free_name(name, joints.values(), "joint")
+    bodies = {}
     for name, body in draft.bodies.items():
         points: dict[str, Array] = {}
         for key, place in body.points.items():
-            points[free_name(key.removeprefix(f"{name}."), [*points, *draft.pairs], "point")] = place
-        yield names[name], replace(body, name=names[name], points=points)
+            points[free_name(key.removeprefix(f"{name}."), [*points, *joints.values()], "point")] = place
+        bodies[names[name]] = replace(body, name=names[name], points=points)
+    draft.pairs = {
+        joints[name]: replace(pair, name=joints[name], links=(names[pair.links[0]], names[pair.links[1]]))
+        for name, pair in draft.pairs.items()
+    }
+    draft.drives = {joints[name]: rate for name, rate in draft.drives.items() if name in joints}
+    draft.bodies, draft.ground = bodies, names.get(draft.ground, "")

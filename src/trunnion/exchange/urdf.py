@@ -9,15 +9,14 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from trunnion.errors import Finding
-from trunnion.exchange.draft import Array, Draft, Pair
+from trunnion.exchange.draft import Array, Body, Draft, Pair
 from trunnion.exchange.formats import ExportOptions, ImportOptions
-from trunnion.exchange.robots import APART, WORLD, opening, parsed, refused, spanning, steps, text_of, written
-from trunnion.exchange.sdf import Reader, add_driver, add_joint
+from trunnion.exchange.robots import APART, WORLD, laid_out, opening, parsed, refused, text_of, written
+from trunnion.exchange.sdf import Reader, add_driver, add_joint, end_of
 from trunnion.exchange.skeleton import Positions
 
 __all__ = ["read", "write"]
 
-NATIVE = ("revolute", "prismatic", "fixed", "planar")
 MOST = {"effort": "1e6", "velocity": "1e3"}  # N m or N, rad/s or m/s: limits that a joint must state and never meets
 FAR = 1e3  # m, limit of a slide without one
 
@@ -31,45 +30,40 @@ def read(path: Path, options: ImportOptions) -> Draft:
     if any("xacro" in element.tag for element in root.iter()):
         raise refused("has elements of xacro", remedy="expand it: xacro FILE > FILE.urdf")
     model, world = _model_of(root)
-    reader = Reader("1.9", root.get("name", ""))
+    reader = Reader(root.get("name", ""), "1.9")
     draft = reader.draft
-    reader.model(model, "", WORLD)
+    reader.add_model(model, "", WORLD)
     for part in root.iterfind("transmission/joint"):
         draft.drives.setdefault(part.get("name", ""), 0.0)
     draft.note("gravity", "", "is read without gravity, which URDF does not state", "add gravity: to the model")
-    reader.pairs()
+    reader.add_joints()
     _frames(draft, closes=root.find("gazebo/joint") is None)
-    return reader.draft_of(options, world)
+    return reader.settled(world, options.ground)
 
 
 def _model_of(root: Element) -> tuple[Element, str]:
     """The SDF model of a robot, and the name of the link that carries all others."""
-    model = Element("model", name=root.get("name", ""))
+    model = Element("model")
     links: dict[str, Element] = {}
     for link in root.findall("link"):
-        name = link.get("name", "")
-        if name in links:
-            raise refused(f"the link {name!r} stands in it twice")
-        links[name] = SubElement(model, "link", name=name)
-        inertial = SubElement(links[name], "inertial")
-        stated, mass = link.find("inertial"), link.find("inertial/mass")
+        links[link.get("name", "")] = made = SubElement(model, "link", name=link.get("name", ""))
+        inertial, stated = SubElement(made, "inertial"), link.find("inertial")
+        mass, inertia = link.find("inertial/mass"), link.find("inertial/inertia")
         SubElement(inertial, "mass").text = "0" if mass is None else mass.get("value", "")
-        inertia = SubElement(inertial, "inertia")
-        tensor = link.find("inertial/inertia")
+        entries = SubElement(inertial, "inertia")
         for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"):
-            SubElement(inertia, key).text = "0" if tensor is None else tensor.get(key, "0")
+            SubElement(entries, key).text = "0" if inertia is None else inertia.get(key)
         if stated is not None:
             _add_pose(inertial, stated)
     inner: set[str] = set()
     for part in root.findall("joint"):
-        name = part.get("name", "")
-        parent, child = (_name(part, tag, name) for tag in ("parent", "child"))
+        child = end_of(part, "child")
         if child not in links or child in inner:
             what = f"has the child {child!r}, which is no link of the file or already has a parent"
-            raise refused(what, f"joint {name}", "state what closes a loop as an SDF joint under <gazebo>")
+            raise refused(what, f"joint {part.get('name')}", "state what closes a loop as an SDF joint under <gazebo>")
         inner.add(child)
-        _add_pose(links[child], part, parent)
-        model.append(_joint_of(part, parent, child))
+        _add_pose(links[child], part, end_of(part, "parent"))
+        model.append(_joint_of(part))
     model.extend(child for part in root.findall("gazebo") if part.get("reference") is None for child in part)
     outer = [name for name in links if name not in inner]
     if len(outer) != 1:
@@ -77,31 +71,23 @@ def _model_of(root: Element) -> tuple[Element, str]:
     return model, outer[0]
 
 
-def _joint_of(part: Element, parent: str, child: str) -> Element:
+def _joint_of(part: Element) -> Element:
     """The SDF joint of a joint of URDF: its frame is that of its child."""
     joint = Element("joint", name=part.get("name", ""), type=part.get("type", ""))
-    SubElement(joint, "parent").text, SubElement(joint, "child").text = parent, child
+    joint.extend([*part.findall("parent"), *part.findall("child")])
     axis, limit, mimic, dynamics = (part.find(tag) for tag in ("axis", "limit", "mimic", "dynamics"))
     made = SubElement(joint, "axis")
     SubElement(made, "xyz").text = "1 0 0" if axis is None else axis.get("xyz", "")
-    if limit is not None and part.get("type") != "continuous" and "lower" in limit.attrib and "upper" in limit.attrib:
+    if limit is not None and part.get("type") != "continuous" and {"lower", "upper"} <= limit.attrib.keys():
         stated = SubElement(made, "limit")
         for end in ("lower", "upper"):
             SubElement(stated, end).text = limit.get(end)
     if mimic is not None:
         coupling = SubElement(made, "mimic", joint=mimic.get("joint", ""))
         SubElement(coupling, "multiplier").text = mimic.get("multiplier", "1")
-    for key, value in ({} if dynamics is None else dynamics.attrib).items():
+    for key, value in [] if dynamics is None else dynamics.items():
         SubElement(made, key).text = value
     return joint
-
-
-def _name(part: Element, tag: str, joint: str) -> str:
-    end = part.find(tag)
-    name = "" if end is None else end.get("link", "")
-    if not name:
-        raise refused(f"has no {tag}", f"joint {joint}")
-    return name
 
 
 def _add_pose(made: Element, stated: Element, relative: str = "") -> None:
@@ -140,33 +126,26 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
     Pairs that URDF lacks are rows of joints with links without mass between.
     """
     draft = opening(positions, options.row, "gravity")
-    root = Element("robot", name=draft.name or "mechanism")
-    tree, cuts = spanning(draft)
-    origins = {draft.ground: np.zeros(3)} | {pair.links[1]: pair.at for pair in tree}
-    for name, body in draft.bodies.items():
-        link = SubElement(root, "link", name=name)
+    root, gazebo = Element("robot", name=draft.name or "mechanism"), Element("gazebo")
+    origins, inner, closing, rates = laid_out(draft, ("cylindrical", "helical", "universal", "spherical"))
+    for name, origin in origins.items():
+        link, body = SubElement(root, "link", name=name), draft.bodies.get(name, Body(name))
         if body.mass > 0:
             inertial = SubElement(link, "inertial")
-            SubElement(inertial, "origin", xyz=text_of(body.centre - origins[name]))
+            SubElement(inertial, "origin", xyz=text_of(body.centre - origin))
             SubElement(inertial, "mass", value=text_of(body.mass))
             entries = {f"i{'xyz'[i]}{'xyz'[j]}": text_of(body.inertia[i, j]) for i in range(3) for j in range(i, 3)}
             SubElement(inertial, "inertia", entries)
         for point, place in body.points.items():
-            SubElement(root, "link", name=f"{name}.{point}")
-            origins[f"{name}.{point}"] = place
-            _write_joint(root, Pair(f"{name}.{point}", "fixed", (name, f"{name}.{point}"), place), origins)
-    gazebo, closing = Element("gazebo"), {pair.name for pair in cuts}
-    for pair in [*tree, *cuts]:
-        for step in [pair] if pair.type in NATIVE else steps(pair):
-            if step.links[1] not in origins:
-                SubElement(root, "link", name=step.links[1])
-                origins[step.links[1]] = pair.at
-            if pair.name in closing and step.links[1] == pair.links[1]:
-                add_joint(gazebo, step, origins)
-            else:
-                _write_joint(root, step, origins)
-    for name, rate in draft.drives.items():
-        add_driver(gazebo, f"{name}.turn" if draft.pairs[name].type in ("cylindrical", "helical") else name, rate)
+            frame = f"{name}.{point}"
+            SubElement(root, "link", name=frame)
+            _write_joint(root, Pair(frame, "fixed", (name, frame), place), {name: origin, frame: place})
+    for pair in inner:
+        _write_joint(root, pair, origins)
+    for pair in closing:
+        add_joint(gazebo, pair, origins)
+    for name, rate in rates.items():
+        add_driver(gazebo, name, rate)
     root.append(gazebo)
     written(root, path)
     return draft.findings

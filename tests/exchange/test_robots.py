@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import random
 import time
+from contextlib import suppress
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -245,19 +248,19 @@ def row(values: np.ndarray) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def placed(random: np.random.Generator) -> str:
+def placed(draw: np.random.Generator) -> str:
     """Place and orientation of something, in one of the ways of MJCF."""
-    turn = ORIENTATIONS[random.integers(5)](random)
-    return f'pos="{row(random.normal(size=3))}" {turn}'
+    turn = ORIENTATIONS[draw.integers(5)](draw)
+    return f'pos="{row(draw.normal(size=3))}" {turn}'
 
 
-def shape(random: np.random.Generator) -> str:
-    kind = SHAPES[random.integers(5)]
-    size = row(random.uniform(0.01, 0.3, 3))
-    place = placed(random)
-    if kind != "sphere" and random.integers(2):
-        place = f'fromto="{row(random.normal(size=6))}"'
-    weight = ("", 'mass="0.7"', 'class="light"')[random.integers(3)]
+def shape(draw: np.random.Generator) -> str:
+    kind = SHAPES[draw.integers(5)]
+    size = row(draw.uniform(0.01, 0.3, 3))
+    place = placed(draw)
+    if kind != "sphere" and draw.integers(2):
+        place = f'fromto="{row(draw.normal(size=6))}"'
+    weight = ("", 'mass="0.7"', 'class="light"')[draw.integers(3)]
     return f'<geom type="{kind}" size="{size}" {place} {weight}/>'
 
 
@@ -267,16 +270,16 @@ def test_any_frame_and_shape_is_where_mujoco_has_it(
     seed: int, order: str, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     mujoco = pytest.importorskip("mujoco")
-    random = np.random.default_rng(seed)
-    axes = [row(random.normal(size=3)) for _ in range(4)]
+    draw = np.random.default_rng(seed)
+    axes = [row(draw.normal(size=3)) for _ in range(4)]
     text = f"""<mujoco><compiler eulerseq="{order}"/>
 <default><geom density="500"/><default class="light"><geom density="20"/></default></default>
-<worldbody><body name="a" {placed(random)}>
-  <joint name="A" axis="{axes[0]}" pos="0.1 0.2 0.3" range="-10 30" ref="5"/>{shape(random)}{shape(random)}
-  <frame {placed(random)}><frame {placed(random)}>{shape(random)}
-    <body name="b" {placed(random)}><joint name="B" type="slide" axis="{axes[1]}"/>{shape(random)}
-      <body name="c" {placed(random)}><inertial {placed(random)} mass="2" diaginertia="1 2 2.5"/>
-        <joint name="C" axis="{axes[2]}"/>{shape(random)}</body></body></frame></frame></body></worldbody></mujoco>"""
+<worldbody><body name="a" {placed(draw)}>
+  <joint name="A" axis="{axes[0]}" pos="0.1 0.2 0.3" range="-10 30" ref="5"/>{shape(draw)}{shape(draw)}
+  <frame {placed(draw)}><frame {placed(draw)}>{shape(draw)}
+    <body name="b" {placed(draw)}><joint name="B" type="slide" axis="{axes[1]}"/>{shape(draw)}
+      <body name="c" {placed(draw)}><inertial {placed(draw)} mass="2" diaginertia="1 2 2.5"/>
+        <joint name="C" axis="{axes[2]}"/>{shape(draw)}</body></body></frame></frame></body></worldbody></mujoco>"""
     path = tmp_path_factory.mktemp("frames") / "frames.xml"
     path.write_text(text)
     draft = import_file(path)
@@ -429,7 +432,7 @@ def test_files_with_nested_frames_are_the_mechanism_written_by_hand(text: str, n
         assert "damping" in " ".join(lost)
 
 
-@settings(deadline=None, max_examples=5)
+@settings(deadline=None, max_examples=3)
 @given(seed=st.integers(0, 2**31 - 1), suffix=st.sampled_from(SUFFIXES))
 def test_the_frame_of_the_file_changes_nothing(
     seed: int, suffix: str, tmp_path_factory: pytest.TempPathFactory
@@ -484,6 +487,8 @@ def test_hostile_files_are_one_sentence(suffix: str, root: str, tmp_path: Path) 
     for text in (BOMB, OUTSIDE):
         assert "entities of its own" in finding_of(text.format(root), name, tmp_path)
     assert "more than 100,000 elements" in finding_of(f"<{root}>{'<link/>' * 10**6}</{root}>", name, tmp_path)
+    assert "more than 10,000,000 bytes" in finding_of(f"<{root}>{'<link />' * 2 * 10**6}</{root}>", name, tmp_path)
+    assert finding_of(f'<{root} name="{"1 " * 4 * 10**6}"/>', name, tmp_path)
     assert "deeper than 200" in finding_of("<a>" * 10**5, name, tmp_path)
     assert "no sound XML" in finding_of(f"<{root}><link name='a'>", name, tmp_path)
     assert "no sound XML" in finding_of(b"\x00\xff\x13PK\x03\x04" * 999, name, tmp_path)
@@ -541,6 +546,33 @@ def test_an_sdf_that_cannot_be_read_says_where(change: tuple[str, str], sentence
 )
 def test_a_urdf_that_cannot_be_read_says_where(change: tuple[str, str], sentence: str, tmp_path: Path) -> None:
     assert sentence in finding_of(URDF.replace(*change), "bad.urdf", tmp_path)
+
+
+SUFFIX = {"mujoco": ".xml", "sdf": ".sdf", "robot": ".urdf"}
+VALUES = ("", "0", "-1", "nan", "1e308", "x", "0 0 0", "1 2 3", "world", "A", "crank", "true", "__model__", "..", "a.1")
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=st.integers(0, 2**31 - 1), text=st.sampled_from([MJCF, SDF, OLD_SDF, URDF]))
+def test_a_damaged_file_is_read_or_refused(seed: int, text: str, tmp_path_factory: pytest.TempPathFactory) -> None:
+    choose, root = random.Random(seed), ElementTree.fromstring(text)
+    for _ in range(choose.randint(1, 3)):
+        elements = list(root.iter())
+        element = choose.choice(elements)
+        if element.attrib and choose.random() < 0.5:
+            element.set(choose.choice(list(element.attrib)), choose.choice(VALUES))
+        elif element.attrib and choose.random() < 0.5:
+            del element.attrib[choose.choice(list(element.attrib))]
+        elif len(element) and choose.random() < 0.5:
+            element.remove(choose.choice(list(element)))
+        elif len(element) and choose.random() < 0.5:
+            element.append(choose.choice(list(element)))
+        else:
+            element.text = choose.choice(VALUES)
+    path = tmp_path_factory.mktemp("damaged") / f"damaged{SUFFIX[root.tag]}"
+    ElementTree.ElementTree(root).write(path)
+    with suppress(trunnion.MechanismError):
+        model_text(import_file(path))
 
 
 def codes(draft: Draft) -> set[str]:

@@ -9,11 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
-from xml.etree.ElementTree import Element, ElementTree, ParseError, indent
+from xml.etree.ElementTree import Element, ElementTree, ParseError, TreeBuilder, indent
 
 import numpy as np
 from defusedxml import DefusedXmlException
-from defusedxml.ElementTree import iterparse
+from defusedxml.ElementTree import DefusedXMLParser
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, Pair, free_name, perpendicular
@@ -22,7 +22,7 @@ from trunnion.exchange.skeleton import Positions
 __all__ = ["Frame", "Scene", "laid_out", "numbers", "opening", "parsed", "refused", "spanning", "stem", "steps",
            "tensor", "text_of", "turned", "unit", "written"]  # fmt: skip
 
-MOST_ELEMENTS, DEEPEST, MOST_PARTS = 100_000, 200, 2_000
+MOST_BYTES, MOST_ELEMENTS, DEEPEST, MOST_PARTS = 10_000_000, 100_000, 200, 2_000
 LONGEST = 1000  # characters of a row of numbers
 MEETING = 1e-8  # m, between the axes of joints that count as crossing
 APART = 1e-5  # m, between points of two bodies that a loop holds together, as a program writes their places
@@ -54,20 +54,36 @@ def refused(what: str, where: str = "", remedy: str = "mend the file") -> Mechan
     return MechanismError(Finding(what, where, remedy, code="exchange.xml"))
 
 
+class _Builder(TreeBuilder):
+    """A tree of elements; MechanismError if it would fill the memory, or be too deep to walk through."""
+
+    count = depth = 0
+
+    def start(self, tag: str, attrs: dict[str, str], /) -> Element:
+        """Count an element that begins."""
+        self.count, self.depth = self.count + 1, self.depth + 1
+        if self.count > MOST_ELEMENTS or self.depth > DEEPEST:
+            what = f"has more than {MOST_ELEMENTS:,} elements, or nests them deeper than {DEEPEST}"
+            raise refused(what, remedy="export the mechanism alone")
+        return super().start(tag, attrs)
+
+    def end(self, tag: str, /) -> Element:
+        """Count an element that ends."""
+        self.depth -= 1
+        return super().end(tag)
+
+
 def parsed(path: Path, name: str) -> Element:
     """The root of an XML file; MechanismError if it is none, or its root has another name.
 
     Entities of its own and references to other files are refused, and so is a file that would fill the memory.
     """
-    root: Element | None = None
-    count, depth = 0, 0
+    if path.stat().st_size > MOST_BYTES:
+        raise refused(f"has more than {MOST_BYTES:,} bytes", remedy="export the mechanism alone, with meshes apart")
+    parser = DefusedXMLParser(target=_Builder())
     try:
-        for event, element in iterparse(path, ("start", "end")):
-            root = element if root is None else root
-            count, depth = count + (event == "start"), depth + (1 if event == "start" else -1)
-            if count > MOST_ELEMENTS or depth > DEEPEST:
-                limits = f"more than {MOST_ELEMENTS:,} elements, or nests them deeper than {DEEPEST}"
-                raise refused(f"has {limits}", remedy="export the mechanism alone")
+        parser.feed(path.read_bytes())  # in pieces, a huge token would be read again for each
+        root: Element = parser.close()
     except DefusedXmlException:
         raise refused("declares entities of its own, which are not read", remedy="remove the DOCTYPE") from None
     except ParseError as error:
@@ -76,8 +92,8 @@ def parsed(path: Path, name: str) -> Element:
         raise
     except (LookupError, ValueError):
         raise refused("has an unknown encoding", remedy="save it as UTF-8") from None
-    if root is None or root.tag != name:
-        raise refused(f"begins with <{root.tag if root is not None else ''}>, not with <{name}>", remedy="")
+    if root.tag != name:
+        raise refused(f"begins with <{root.tag}>, not with <{name}>", remedy="")
     return root
 
 
@@ -245,6 +261,8 @@ class Scene:
         """A new pair."""
         if pair.name in self.draft.pairs:
             raise refused(f"the joint {pair.name!r} stands in it twice")
+        if pair.links[0] == pair.links[1]:
+            raise refused(f"joins {pair.links[0]!r} to itself", f"joint {pair.name}")
         self.draft.pairs[pair.name] = pair
 
     def settled(self, world: str, ground: str) -> Draft:

@@ -72,10 +72,10 @@ def same_power(one: Mechanism, other: Mechanism, steps: int = 12, tolerance: flo
 
 
 def same_start(one: Mechanism, other: Mechanism) -> None:
-    """The drive power is the same over the first 3° of the drive."""
-    rate = next(iter(positions_of(one, 4).draft().drives.values())) or math.inf
-    for turned in (0.0, 1.0, 3.0):
-        at = f"{math.radians(turned) / abs(rate)!r} s"
+    """The drive power is the same over the first positions."""
+    duration = min(float(trunnion.analyse(mechanism, 4)["time"].values[-1]) for mechanism in (one, other))
+    for share in (0.0, 0.003, 0.01):
+        at = f"{share * duration!r} s"
         powers = [trunnion.analyse(mechanism, 4, at=at)["drive_power"].values.sum() for mechanism in (one, other)]
         assert powers[1] == pytest.approx(powers[0], rel=1e-8, abs=1e-8)
 
@@ -149,6 +149,41 @@ drivers:
         assert again.effective_joints["B"].type == "helical"
         assert again.parameters()["joints.B.pitch"] == pytest.approx(-6e-3, rel=1e-12)
         same_power(stated, again)
+
+
+JOINTS = {
+    "cylindrical": '<joint name="j.a" axis="1 0 0"/><joint name="j.b" type="slide" axis="-1 0 0"/>',
+    "universal": '<joint name="j.a" axis="1 0 0"/><joint name="j.b" axis="0 1 0" pos="0 0.3 0"/>',
+    "spherical": '<joint name="j.a" axis="1 0 0"/><joint name="j.b" axis="0 1 0"/><joint name="j.c" axis="0 1 1"/>',
+    "planar": '<joint name="j.a" type="slide" axis="1 1 0"/><joint name="j.b"/><joint name="j.c" type="slide"/>',
+}
+
+
+@pytest.mark.parametrize("kind", JOINTS)
+def test_joints_of_one_body_are_the_pair_that_they_make(kind: str, tmp_path: Path) -> None:
+    joints = JOINTS[kind].replace('name="j.c" type="slide"', 'name="j.c" type="slide" axis="1 0 0"')
+    body = f'<body name="a" pos="1 2 3">{joints}<geom size="1"/></body>'
+    path = tmp_path / "joints.mjcf"
+    path.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    draft = import_file(path)
+    assert {name: pair.type for name, pair in draft.pairs.items()} == {"j": kind}
+    assert set(draft.bodies) == {"world", "a"}
+    assert draft.pairs["j"].links == ("world", "a")
+    if kind == "universal":
+        np.testing.assert_allclose([draft.pairs["j"].axis, draft.pairs["j"].second_axis], [[1, 0, 0], [0, 1, 0]])
+    if kind == "planar":
+        np.testing.assert_allclose(draft.pairs["j"].axis, [0, 0, 1])
+
+
+def test_joints_that_make_no_pair_stay_a_row(tmp_path: Path) -> None:
+    path = tmp_path / "row.mjcf"
+    rows = "".join(f'<joint type="slide" axis="{axis}"/><joint axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1"))
+    skew = '<joint axis="1 0 0"/><joint axis="0 1 0" pos="0 0 0.1"/>'
+    bodies = f'<body name="a">{rows}<body name="b">{skew}</body></body>'
+    path.write_text(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
+    draft = import_file(path)
+    assert [pair.type for pair in draft.pairs.values()] == ["prismatic", "revolute"] * 3 + ["revolute"] * 2
+    assert len(draft.bodies) == 9
 
 
 # MuJoCo as the reference

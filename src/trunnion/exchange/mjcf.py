@@ -210,6 +210,7 @@ class _Reader(Scene):
     def weigh(self) -> None:
         """Give bodies that state no mass the masses of their geoms; scale all if the file says so."""
         source, bodies = self.compiler.get("inertiafromgeom", "auto"), self.draft.bodies
+        self.lost["shape"] += [name for name in self.geoms if name != WORLD]
         low, high = numbers(self.compiler.get("inertiagrouprange"), "inertiagrouprange", 2, (0, 5))
         unknown = []
         for name, geoms in self.geoms.items() if source != "false" else ():

@@ -27,7 +27,8 @@ LONGEST = 1000  # characters of a row of numbers
 MEETING = 1e-8  # m, between the axes of joints that count as crossing
 APART = 1e-5  # m, between points of two bodies that a loop holds together, as a program writes their places
 WORLD = "world"
-LOST = ("loads", "springs", "measures", "variations", "errors")  # sections of a model that no robot format holds
+LOST = ("loads", "springs", "measures", "variations", "errors")  # sections of a model that no robot format holds,
+LOST_OF_JOINTS = ("friction", "pin", "guide", "contact", "losses", "stiffness", "misalignment")  # and of its joints
 
 
 class Frame(NamedTuple):
@@ -217,11 +218,12 @@ def laid_out(
 def opening(positions: Positions, row: int, also: str = "") -> Draft:
     """The draft to write, with notes on what the format cannot hold."""
     draft, mechanism = positions.draft(row), positions.mechanism
-    lost = [name for name in LOST if getattr(mechanism, name)]
-    lost += ["friction", "sizes and play of pins"] if mechanism.effective_joints else []
+    stated = {key for joint in mechanism.effective_joints.values() for key in joint.model_fields_set}
+    lost = [name for name in LOST if getattr(mechanism, name)] + [key for key in LOST_OF_JOINTS if key in stated]
     if any(driver.moves or driver.law != "constant" for driver in mechanism.drivers.values()):
         lost.append("laws of motion")
-    draft.note("lost", "", f"is written without {', '.join([*lost, *([also] if also else [])])}")
+    if lost := [*lost, *([also] if also else [])]:
+        draft.note("lost", "", f"is written without {', '.join(lost)}")
     massless = [name for name, body in draft.bodies.items() if name != draft.ground and not body.mass > 0]
     if massless:
         what = f"have no mass, which engines in time refuse: {', '.join(massless)}"
@@ -277,7 +279,7 @@ class Scene:
         if max(len(draft.bodies), len(draft.pairs)) > MOST_PARTS:
             what = f"has {len(draft.bodies):,} bodies and {len(draft.pairs):,} joints; at most {MOST_PARTS:,} are read"
             raise refused(what, remedy="export the mechanism alone")
-        if lost := [f"{key} of {_listed(names)}" for key, names in self.lost.items()]:
+        if lost := [f"{key} of {_listed(names)}" for key, names in self.lost.items() if names]:
             draft.note("lost", "", f"is read without {'; '.join(lost)}")
         for first, second, ratio in self.couplings:
             self._couple(first, second, ratio)
@@ -316,7 +318,7 @@ class Scene:
             if pair.links[0] in inner:
                 continue
             chain = [pair]
-            while chain[-1].links[1] in inner and len(chain) < 4:
+            while chain[-1].links[1] in inner:
                 chain.append(outward[chain[-1].links[1]])
             made = _pair_of(chain, draft.drives) if len(chain) > 1 else None
             if made is None:

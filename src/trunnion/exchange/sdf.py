@@ -92,12 +92,16 @@ class Reader(Scene):
             elif part.tag == "plugin" and part.findtext("joint_name"):
                 rate = numbers(part.findtext("initial_velocity"), f"initial_velocity of {name}", 1, (0,))
                 self.draft.drives[prefix + part.findtext("joint_name", "").strip()] = float(rate[0])
+            elif part.tag == "plugin":
+                self.lost["plugin"].append(part.get("name", ""))
         for part in model.findall("joint"):  # its name may also be that of a link, in URDF and old files
             name = prefix + part.get("name", "joint")
             self.poses.setdefault(name, (Frame(), f"joint {name}"))
         for link in model.findall("link"):
             name = prefix + link.get("name", "link")
             self._weigh(link, name)
+            if link.find("visual") is not None or link.find("collision") is not None:
+                self.lost["shape"].append(name)
             if (model.findtext("static") or "").strip() in YES:
                 self.add_pair(Pair(f"{name}.static", "fixed", (WORLD, name), np.zeros(3)))
 
@@ -175,7 +179,7 @@ class Reader(Scene):
             if not ends[-1]:
                 raise refused(f"joins {end!r}, which is no link of the file", where)
         for key in ("damping", "friction", "spring_stiffness"):
-            if any(numbers(value.text, f"{key} of {where}", 1)[0] for value in part.iter(key)):
+            if any(numbers(value.text, f"{key} of {where}", 1, (0,))[0] for value in part.iter(key)):
                 self.lost[key].append(name)
         pair = Pair(name, TYPES[kind], (ends[0], ends[1]), self.frame(where).place)
         if pair.type not in ("spherical", "fixed"):

@@ -55,6 +55,7 @@ def _model_of(root: Element) -> tuple[Element, str]:
             SubElement(entries, key).text = "0" if inertia is None else inertia.get(key)
         if stated is not None:
             _add_pose(inertial, stated)
+        made.extend([*link.findall("visual"), *link.findall("collision")])
     inner: set[str] = set()
     for part in root.findall("joint"):
         child = end_of(part, "child")

@@ -370,6 +370,7 @@ def test_help_needs_no_heavy_imports() -> None:
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_an_analysis_on_the_terminal_needs_few_libraries() -> None:
     """What takes as long to load as the analysis itself is loaded for files, figures and reports only.
 
@@ -394,6 +395,7 @@ for model in {models}:
     assert [line for line in done.stdout.splitlines() if line.startswith("loaded")] == ["loaded []"] * len(models)
 
 
+@pytest.mark.slow
 def test_a_study_on_the_terminal_draws_nothing() -> None:
     """Matplotlib is loaded for figures and reports only."""
     studies = [

@@ -38,6 +38,7 @@ def test_a_slotted_lever_points_at_the_crank_pin():
     assert list(entries_of(text)[0]["joints"]) == ["A", "C", "E", "B", "D", "G", "F"]
 
 
+@pytest.mark.slow
 def test_the_forces_on_a_block_balance_with_the_friction_of_its_guide():
     rubbing = {"pin": {"radius": "5 mm"}, "guide": {"length": "30 mm"}, "friction": 0.2}
     text, _ = edited(
@@ -123,6 +124,7 @@ def test_gears_mesh_as_they_are_drawn(typed, written, ratio):
     np.testing.assert_allclose(two - two[0], ratio * (one - one[0]), atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "gesture",
     [
@@ -349,3 +351,20 @@ def test_a_load_against_the_motion_takes_power_from_a_slide_whichever_way_it_goe
     text, _ = edited(text, places, {"do": "set", "path": ["loads", "load1", "only"], "value": "negative"})
     (acts,) = (load["acts"] for load in solved(text)["scene"]["loads"] if load["name"] == "load1")
     np.testing.assert_array_equal(np.array(acts)[clear], np.where(ahead < 0, 1, 0)[clear])
+
+
+def test_the_mass_of_a_flat_bar_is_that_of_its_section() -> None:
+    """m = ρ l b t, J = m (l² + b²)/12 about the middle: 7850 · 0.1 · 0.02 · 0.01 = 0.157 kg, 1.36067e-4 kg m²."""
+    text, places = edited("", {}, {"do": "link", "from": {"ground": [0, 0]}, "to": [0.06, 0.08]})
+    bar = {"do": "bar-mass", "link": "link1", "width": "20 mm", "thickness": "10 mm"}
+    link = Mechanism(**entries_of(edited(text, places, bar | {"density": "7850 kg/m^3"})[0])[0]).parameters()
+    assert link["links.link1.mass"] == pytest.approx(0.157, rel=1e-6)
+    assert link["links.link1.inertia"] == pytest.approx(0.157 * (0.1**2 + 0.02**2) / 12, rel=1e-5)
+    assert (link["links.link1.centre.x"], link["links.link1.centre.y"]) == pytest.approx((0.05, 0))
+    for wrong, words in (
+        ({"width": "-1 mm"}, "not above 0"),
+        ({"density": "7 kg"}, "no density"),
+        ({"link": "ground"}, "no bar"),
+    ):
+        question = {"places": places, "gestures": [bar | {"density": "7850 kg/m^3"} | wrong]}
+        assert words in ask(ask="edit", text=text, **question)["error"]

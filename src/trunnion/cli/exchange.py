@@ -47,7 +47,7 @@ def import_(
     with whole(out) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
     bodies, pairs = counted(len(draft.bodies), "link"), counted(len(draft.pairs), "joint")
-    console().print(f"{file.name}: {bodies}, {pairs}", markup=False)
+    console().print(f"{draft.source}: {bodies}, {pairs}", markup=False)
     wrote(out)
     data, lines = entries_of(text)
     try:

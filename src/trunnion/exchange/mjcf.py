@@ -49,6 +49,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
     """Read the mechanism of an MJCF file where it is drawn, at qpos0."""
     root = parsed(path, "mujoco")
     reader = _Reader(root)
+    draft = reader.draft
     for part in root.findall("worldbody"):
         reader.contents(part, WORLD, Frame(), part.get("childclass", "main"))
     reader.weigh()
@@ -60,7 +61,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
     for tag in BRINGS:
         if count := sum(1 for _ in root.iter(tag)):
             what = f"{count} of <{tag}> and the bodies in it are not read"
-            reader.draft.warn("brings", "", what, "save the model by MuJoCo, which writes it in full")
+            draft.warn("exchange.brings", "", what, "save the model by MuJoCo, which writes it in full")
     return reader.settled(WORLD, options.ground)
 
 
@@ -209,7 +210,8 @@ class _Reader(Scene):
 
     def weigh(self) -> None:
         """Give bodies that state no mass the masses of their geoms; scale all if the file says so."""
-        source, bodies = self.compiler.get("inertiafromgeom", "auto"), self.draft.bodies
+        draft, source = self.draft, self.compiler.get("inertiafromgeom", "auto")
+        bodies = draft.bodies
         self.lost["shape"] += [name for name in self.geoms if name != WORLD]
         low, high = numbers(self.compiler.get("inertiagrouprange"), "inertiagrouprange", 2, (0, 5))
         unknown = []
@@ -222,7 +224,7 @@ class _Reader(Scene):
                     bodies[name] = united(bodies[name], solid, name)
         if unknown:
             what = f"have geoms of a shape whose mass is not found here, a mesh for one: {', '.join(unknown[:10])}"
-            self.draft.warn("shape", "links", what, "state <inertial> for them, or mass and inertia in the model")
+            draft.warn("exchange.shape", "links", what, "state <inertial> for them, or mass and inertia in the model")
         total = float(numbers(self.compiler.get("settotalmass"), "settotalmass", 1, (-1,))[0])
         mass = sum(body.mass for body in bodies.values())
         for body in bodies.values() if total > 0 and mass > 0 else ():
@@ -232,6 +234,7 @@ class _Reader(Scene):
 
     def close_loops(self) -> None:
         """Read equalities; points that two bodies share are a ball, on one line a pin, else a weld."""
+        draft = self.draft
         shared: dict[tuple[str, str], list[tuple[str, Array]]] = defaultdict(list)
         for number, part in enumerate(self.root.iterfind("equality/*")):
             values = self._with_defaults(part, "main")
@@ -248,7 +251,7 @@ class _Reader(Scene):
                 _, ratio, *higher = numbers(values.get("polycoef"), f"polycoef of {name}", 5, (0, 1, 0, 0, 0))
                 self.couplings.append((values["joint1"], values["joint2"], 0.0 if any(higher) else float(ratio)))
             else:
-                self.draft.warn("equality", name, f"is an equality of the kind {part.tag!r}, which is not read")
+                draft.warn("exchange.equality", name, f"is an equality of the kind {part.tag!r}, which is not read")
         for links, points in shared.items():
             offsets = np.array([place for _, place in points]) - points[0][1]
             rank = int((np.linalg.svd(offsets, compute_uv=False) > APART).sum())

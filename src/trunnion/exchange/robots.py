@@ -223,11 +223,11 @@ def opening(positions: Positions, row: int, also: str = "") -> Draft:
     if any(driver.moves or driver.law != "constant" for driver in mechanism.drivers.values()):
         lost.append("laws of motion")
     if lost := [*lost, *([also] if also else [])]:
-        draft.note("lost", "", f"is written without {', '.join(lost)}")
+        draft.note("exchange.lost", "", f"is written without {', '.join(lost)}")
     massless = [name for name, body in draft.bodies.items() if name != draft.ground and not body.mass > 0]
     if massless:
         what = f"have no mass, which engines in time refuse: {', '.join(massless)}"
-        draft.note("massless", "links", what, "state masses in the model")
+        draft.note("exchange.massless", "links", what, "state masses in the model")
     return draft
 
 
@@ -280,7 +280,7 @@ class Scene:
             what = f"has {len(draft.bodies):,} bodies and {len(draft.pairs):,} joints; at most {MOST_PARTS:,} are read"
             raise refused(what, remedy="export the mechanism alone")
         if lost := [f"{key} of {_listed(names)}" for key, names in self.lost.items() if names]:
-            draft.note("lost", "", f"is read without {'; '.join(lost)}")
+            draft.note("exchange.lost", "", f"is read without {'; '.join(lost)}")
         for first, second, ratio in self.couplings:
             self._couple(first, second, ratio)
         self._join()
@@ -296,7 +296,8 @@ class Scene:
 
     def _couple(self, name: str, other: str, ratio: float) -> None:
         """Make a thread of two joints that turn and slide one body; others are gears, which are not read."""
-        slide, turn = self.draft.pairs.get(name), self.draft.pairs.get(other)
+        draft = self.draft
+        slide, turn = draft.pairs.get(name), draft.pairs.get(other)
         if slide is not None and turn is not None and ratio:
             if slide.type == "revolute":
                 slide, turn, ratio = turn, slide, 1 / ratio
@@ -306,7 +307,7 @@ class Scene:
                 turn.pitch = 2 * math.pi * ratio * along
                 return
         what = f"are coupled, which is not read: {name} moves by {ratio:.6g} of {other}"
-        self.draft.warn("gears", "joints", what, "state it under gears in the model")
+        draft.warn("exchange.gears", "joints", what, "state it under gears in the model")
 
     def _join(self) -> None:
         """Make one pair of joints in a row, where there is such a pair."""
@@ -386,7 +387,7 @@ def _leave_loose(draft: Draft, start: str) -> None:
     free = [name for name in draft.bodies if name not in held]
     if free:
         what = f"are joined to nothing that is fixed, and left out: {_listed(free)}"
-        draft.warn("free", "links", what, "join them to the ground, or state another one with --ground")
+        draft.warn("exchange.free", "links", what, "join them to the ground, or state another one with --ground")
     draft.bodies = {name: body for name, body in draft.bodies.items() if name in held}
     draft.pairs = {name: pair for name, pair in draft.pairs.items() if set(pair.links) <= held}
 

@@ -47,13 +47,14 @@ def read(path: Path, options: ImportOptions) -> Draft:
     if not models:
         raise refused("has no model", remedy="export a model")
     reader = Reader(models[0].get("name", ""), root.get("version", "1.6"))
+    draft = reader.draft
     if world is not None:
         gravity = numbers(world.findtext("gravity"), "gravity", 3, (0, 0, -9.8))
-        reader.draft.gravity = gravity if gravity.any() else None
+        draft.gravity = gravity if gravity.any() else None
     for number, model in enumerate(models):
         reader.add_model(model, f"{model.get('name', number)}::" if number else "", WORLD)
     if root.find(".//include") is not None:
-        reader.draft.warn("brings", "", "models that it includes are not read", "write it in full by `gz sdf -p`")
+        draft.warn("exchange.brings", "", "models that it includes are not read", "write it in full by `gz sdf -p`")
     reader.add_joints()
     return reader.settled(WORLD, options.ground)
 
@@ -127,10 +128,11 @@ class Reader(Scene):
 
     def _weigh(self, link: Element, name: str) -> None:
         """Read mass, centre and inertia of a link."""
-        inertial, body = link.find("inertial"), self.draft.bodies[name]
+        draft, inertial = self.draft, link.find("inertial")
+        body = draft.bodies[name]
         if inertial is None or inertial.find("mass") is None:
             what = "states no mass, which by the rules of SDF is 1 kg with 1 kg m² about each axis"
-            self.draft.warn("mass", f"links.{name}", what, "state its mass in the model")
+            draft.warn("exchange.mass", f"links.{name}", what, "state its mass in the model")
             inertial = Element("inertial") if inertial is None else inertial
         frame = self.frame(name).then(_pose(inertial.find("pose"), f"inertial of {name}"))
         body.mass = float(numbers(inertial.findtext("mass"), f"mass of {name}", 1, (1,))[0])

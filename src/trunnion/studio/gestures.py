@@ -6,11 +6,12 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.studio.acting import driver, gear, load, spring
+from trunnion.studio.acting import bar_mass, driver, gear, load, spring
 from trunnion.studio.changing import delete, lock, move, put_value
 from trunnion.studio.renaming import rename
 from trunnion.studio.sketch import Sketch
 from trunnion.studio.strokes import add_point, link, pinned, slide
+from trunnion.studio.wiring import block
 
 __all__ = ["GESTURES", "Gesture", "done"]
 
@@ -43,6 +44,8 @@ GESTURES: dict[str, Gesture] = {
     "load": load,
     "spring": spring,
     "gear": gear,
+    "block": block,
+    "bar-mass": bar_mass,
     "move": move,
     "lock": lock,
     "set": put_value,

@@ -2,6 +2,7 @@
 
 import { discard, save, takeWaiting } from "./actions.js";
 import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
+import { Blocks, Formula } from "./blocks.js";
 import { Bounded, Failures } from "./boundary.js";
 import { Dialogs } from "./dialogs.js";
 import { Findings } from "./findings.js";
@@ -17,7 +18,7 @@ import { choose } from "./tools.js";
 import { Button, focusOn, html } from "./ui.js";
 
 const TOP = 140; // px, where messages stand
-const TABS = { properties: ["Properties", Properties], plots: ["Plots", Plots], text: ["Text", Text], findings: ["Findings", Findings] };
+const TABS = { properties: ["Properties", Properties], plots: ["Plots", Plots], blocks: ["Blocks", Blocks], text: ["Text", Text], findings: ["Findings", Findings] };
 
 export function App() {
   const bounded = (...parts) => parts.map((Part) => html`<${Bounded} key=${Part.name}><${Part} /><//>`);
@@ -27,13 +28,35 @@ export function App() {
       <div class="middle-part">
         <div class="window">
           ${state.spatial.value ? bounded(Space) : bounded(Stage, ZoomBar, Welcome)}
+          ${bounded(Formula)}
           ${bounded(Messages)}
         </div>
         ${bounded(Motion)}
       </div>
-      ${bounded(Panel)}
+      ${bounded(Divider, Panel)}
     </main>
     ${bounded(BottomBar, Dialogs)}`;
+}
+
+const LEAST = 300; // px of the panel, and of the sheet beside it
+const STEP = 24; // px that an arrow key moves the divider
+
+/** Between sheet and panel: dragged, or moved by arrow keys. */
+function Divider() {
+  const set = (width) => {
+    const most = Math.max(window.innerWidth - LEAST, LEAST);
+    document.documentElement.style.setProperty("--panel-width", `${Math.round(Math.min(Math.max(width, LEAST), most))}px`);
+  };
+  const drag = (event) => event.buttons && set(window.innerWidth - event.clientX);
+  const key = (event) => {
+    const by = { ArrowLeft: STEP, ArrowRight: -STEP }[event.key];
+    if (!by) return;
+    event.preventDefault();
+    event.stopPropagation();
+    set(document.querySelector(".panel").getBoundingClientRect().width + by);
+  };
+  return html`<div class="divider" role="separator" tabindex="0" aria-orientation="vertical" aria-label="Width of the panel" title="Drag, or use the arrow keys"
+    onPointerDown=${(event) => event.currentTarget.setPointerCapture(event.pointerId)} onPointerMove=${drag} onKeyDown=${key}></div>`; // prettier-ignore
 }
 
 function Panel() {

@@ -3,6 +3,8 @@
 import { render } from "preact";
 import { start } from "./actions.js";
 import { App } from "./app.js";
+import { keepBlocks } from "./blocks.js";
+import { keepCurves } from "./curves.js";
 import { listenToFailures } from "./boundary.js";
 import { listenToDrops } from "./dialogs.js";
 import { keepOthers } from "./ghosts.js";
@@ -22,4 +24,6 @@ listenToDrops(document);
 start();
 keepOthers();
 keepLayers();
+keepBlocks();
+keepCurves();
 keepCompared();

@@ -269,6 +269,34 @@ def closures(mujoco, model, data) -> np.ndarray:
     return np.vstack(rows)
 
 
+@pytest.mark.parametrize("name", ["slider-crank", "rssr", "double-cardan"])
+def test_the_tree_of_a_urdf_is_what_mujoco_reads(name: str, tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    stated = bare(name)
+    export_model(stated, tmp_path / "tree.urdf")
+    text = (tmp_path / "tree.urdf").read_text()  # bodies without mass are welcome to no engine
+    specks = (
+        '<mujoco><compiler boundmass="1e-12" boundinertia="1e-14" fusestatic="false" balanceinertia="true"/></mujoco>'
+    )
+    model = mujoco.MjModel.from_xml_string(text.replace("<link", f"<mujoco><compiler {bounds}/></mujoco><link", 1))
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    draft = positions_of(stated, 4).draft()
+    for body in draft.bodies.values():
+        if body.name != draft.ground:
+            number = model.body(body.name).id
+            assert model.body_mass[number] == pytest.approx(body.mass, rel=1e-9)
+            np.testing.assert_allclose(data.xipos[number], body.centre, atol=1e-9)
+    compared = 0
+    for number in range(model.njnt):
+        pair = draft.pairs.get(model.joint(number).name)
+        if pair is not None:
+            compared += 1
+            np.testing.assert_allclose(data.xanchor[number], pair.at, atol=1e-9)
+            assert abs(data.xaxis[number] @ pair.axis) == pytest.approx(1, abs=1e-9)
+    assert compared
+
+
 ORIENTATIONS = (
     lambda r: f'quat="{row(r.normal(size=4))}"',
     lambda r: f'euler="{row(r.uniform(-180, 180, 3))}"',

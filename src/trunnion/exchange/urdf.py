@@ -35,9 +35,7 @@ def read(path: Path, options: ImportOptions) -> Draft:
     reader.add_model(model, "", WORLD)
     for part in root.iterfind("transmission/joint"):
         draft.drives.setdefault(part.get("name", ""), 0.0)
-    draft.note(
-        "exchange.gravity", "", "is read without gravity, which URDF does not state", "add gravity to the model"
-    )
+    draft.note("exchange.gravity", "", "is read without gravity, which URDF does not state", "add gravity to the model")
     reader.add_joints()
     _frames(draft, closes=root.find("gazebo/joint") is None)
     return reader.settled(world, options.ground)
@@ -120,9 +118,7 @@ def _frames(draft: Draft, closes: bool) -> None:
             if other != body and frozenset((body, other)) not in joined and np.linalg.norm(place - other_place) < APART:
                 draft.pairs[name] = Pair(name, "spherical", (other, body), place)
                 what = f"is taken as a ball that closes a loop: the frames {other_name} and {name} coincide"
-                draft.warn(
-                    "exchange.loop", f"joints.{name}", what, "if it is a pin, make it revolute about an axis"
-                )
+                draft.warn("exchange.loop", f"joints.{name}", what, "if it is a pin, make it revolute about an axis")
 
 
 def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:

@@ -38,7 +38,7 @@ def bare(name: str) -> Mechanism:
     mechanism = trunnion.read(Path("examples") / f"{name}.yaml").with_friction("off").with_seats("free")
     mechanism = mechanism.model_copy(update={"loads": {}, "springs": {}, "measures": {}})
     start = trunnion.analyse(mechanism, 4)
-    rates = positions_of(mechanism, 4).draft().drives
+    rates = {key: rate if abs(rate) > 1e-9 else 1.0 for key, rate in positions_of(mechanism, 4).draft().drives.items()}
     drivers = {
         name: {"speed": rates[name], "start": float(start["joint_rotation"].sel(joint=name).values[0])}
         for name, driver in mechanism.drivers.items()
@@ -275,9 +275,7 @@ def test_the_tree_of_a_urdf_is_what_mujoco_reads(name: str, tmp_path: Path) -> N
     stated = bare(name)
     export_model(stated, tmp_path / "tree.urdf")
     text = (tmp_path / "tree.urdf").read_text()  # bodies without mass are welcome to no engine
-    specks = (
-        '<mujoco><compiler boundmass="1e-12" boundinertia="1e-14" fusestatic="false" balanceinertia="true"/></mujoco>'
-    )
+    bounds = 'boundmass="1e-12" boundinertia="1e-14" fusestatic="false" balanceinertia="true"'
     model = mujoco.MjModel.from_xml_string(text.replace("<link", f"<mujoco><compiler {bounds}/></mujoco><link", 1))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

@@ -79,6 +79,7 @@ class _Reader(Scene):
         self.defaults: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         for part in root.findall("default"):
             self._defaults(part, "main", "main")
+            self.defaults[part.get("class", "main")] = self.defaults["main"]
         self.frames: dict[str, Frame] = {WORLD: Frame()}
         self.sites: dict[str, tuple[str, Array]] = {}
         self.geoms: dict[str, list[tuple[Frame, Mapping[str, str]]]] = defaultdict(list)

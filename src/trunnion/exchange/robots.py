@@ -15,6 +15,7 @@ import numpy as np
 from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser
 
+from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, Pair, free_name, perpendicular
 from trunnion.exchange.skeleton import Positions
@@ -27,8 +28,7 @@ LONGEST = 1000  # characters of a row of numbers
 MEETING = 1e-8  # m, between the axes of joints that count as crossing
 APART = 1e-5  # m, between points of two bodies that a loop holds together, as a program writes their places
 WORLD = "world"
-LOST = ("loads", "springs", "measures", "variations", "errors")  # sections of a model that no robot format holds,
-LOST_OF_JOINTS = ("friction", "pin", "guide", "contact", "losses", "stiffness", "misalignment")  # and of its joints
+LOST = ("loads", "springs", "measures", "variations", "errors")  # sections of a model that no robot format holds
 
 
 class Frame(NamedTuple):
@@ -218,8 +218,9 @@ def laid_out(
 def opening(positions: Positions, row: int, also: str = "") -> Draft:
     """The draft to write, with notes on what the format cannot hold."""
     draft, mechanism = positions.draft(row), positions.mechanism
-    stated = {key for joint in mechanism.effective_joints.values() for key in joint.model_fields_set}
-    lost = [name for name in LOST if getattr(mechanism, name)] + [key for key in LOST_OF_JOINTS if key in stated]
+    places = (path.split(".") for path, value in mechanism.parameters().items() if np.any(primal(value)))
+    stated = {place[2] for place in places if place[0] == "joints" and place[-1] != "pair_factor"}
+    lost = [name for name in LOST if getattr(mechanism, name)] + sorted(stated - {"pitch"})
     if any(driver.moves or driver.law != "constant" for driver in mechanism.drivers.values()):
         lost.append("laws of motion")
     if lost := [*lost, *([also] if also else [])]:

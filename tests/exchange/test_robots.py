@@ -663,6 +663,16 @@ def test_what_is_lost_or_guessed_is_told(tmp_path: Path) -> None:
     assert "without loads, friction, guide, pin" in " ".join(finding.what for finding in findings)
 
 
+def test_what_floats_has_its_busiest_body_as_ground(tmp_path: Path) -> None:
+    path = tmp_path / "floating.mjcf"
+    path.write_text(MJCF.replace('childclass="pin">', 'childclass="pin"><freejoint/>'))
+    draft = import_file(path)
+    assert draft.ground in {"bench", "crank", "coupler", "rocker"}  # all have two joints
+    assert set(draft.pairs) == set("ABCD")
+    assert "exchange.ground" in codes(draft)
+    assert import_file(path, ground="bench").ground == "bench"
+
+
 def test_a_loop_that_is_drawn_open_is_refused(tmp_path: Path) -> None:
     sites = MJCF.replace('body1="coupler" body2="rocker" anchor', 'site1="a" site2="b" x')
     sites = sites.replace('<joint name="B"/>', f'<joint name="B"/><site name="a" pos="{BC!r} 0 0"/>')

@@ -286,7 +286,7 @@ class Scene:
             self._couple(first, second, ratio)
         self._join()
         busiest = max(draft.bodies, key=lambda name: len(draft.pairs_of(name)))
-        start = next(name for name in (ground, world, busiest) if name in draft.bodies)
+        start = next(name for name in (ground, world, busiest) if draft.pairs_of(name))
         _leave_loose(draft, start)
         draft.ground = start if start in (ground, world) else ""
         base = draft.pairs_of(WORLD)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.pairs import PAIRS
 
-__all__ = ["Array", "Body", "Draft", "Pair", "about", "free_name", "moved", "perpendicular", "steiner"]
+__all__ = ["Array", "Body", "Draft", "Pair", "about", "free_name", "moved", "perpendicular", "steiner", "united"]
 
 Array = NDArray[np.float64]
 PARALLEL = 1e-6  # rad, between axes that count as parallel
@@ -144,7 +144,7 @@ class Draft:
         bodies: dict[str, Body] = {}
         for name, body in self.bodies.items():
             lead = first(name)
-            bodies[lead] = body if lead not in bodies else _united(bodies[lead], body, lead)
+            bodies[lead] = body if lead not in bodies else united(bodies[lead], body, lead)
             if lead != name or bodies[lead].name != lead:
                 bodies[lead] = replace(bodies[lead], name=lead)
         pairs = {}
@@ -209,7 +209,7 @@ class Draft:
         return self
 
 
-def _united(one: Body, other: Body, name: str) -> Body:
+def united(one: Body, other: Body, name: str) -> Body:
     """Two bodies as one."""
     mass = one.mass + other.mass
     centre = (one.mass * one.centre + other.mass * other.centre) / mass if mass else one.centre

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,6 +49,9 @@ class Format:
 
 
 FORMATS: dict[str, Format] = {
+    ".mjcf": Format("MJCF", "mjcf", needs="defusedxml"),
+    ".sdf": Format("SDF", "sdf", needs="defusedxml"),
+    ".urdf": Format("URDF", "urdf", needs="defusedxml"),
     ".dxf": Format("DXF", "dxf"),
     ".stl": Format("STL", "mesh", writes=False),
     ".3mf": Format("3MF", "mesh", writes=False),
@@ -189,6 +192,8 @@ def _read(path: Path, options: ImportOptions) -> Draft:
     try:
         with _readable(path):
             draft: Draft = module.read(path, options)
+    except MechanismError as error:
+        raise MechanismError([replace(finding, file=finding.file or str(path)) for finding in error.findings]) from None
     except (RecursionError, MemoryError):
         raise MechanismError(Finding("is nested too deeply or too large to be read", file=str(path))) from None
     return draft

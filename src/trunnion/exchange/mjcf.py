@@ -1,0 +1,448 @@
+"""MJCF, the files of MuJoCo: read with defaults and frames, and written as a tree whose loops equalities close."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from trunnion.errors import Finding
+from trunnion.exchange.draft import Array, Body, Draft, Pair, united
+from trunnion.exchange.formats import ExportOptions, ImportOptions
+from trunnion.exchange.robots import (
+    APART,
+    WORLD,
+    Frame,
+    Scene,
+    numbers,
+    opening,
+    parsed,
+    refused,
+    spanning,
+    stem,
+    steps,
+    tensor,
+    text_of,
+    turned,
+    unit,
+    written,
+)  # fmt: skip
+from trunnion.exchange.skeleton import Positions
+
+__all__ = ["read", "write"]
+
+KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "spherical"}
+BRINGS = ("include", "attach", "replicate", "composite", "flexcomp", "extension")  # elements that stand for bodies
+IGNORED = {  # attributes that change the motion and are not read, by element
+    "joint": ("damping", "frictionloss", "stiffness", "armature"),
+    "body": ("gravcomp", "mocap"),
+}
+
+
+def read(path: Path, options: ImportOptions) -> Draft:
+    """Read the mechanism of an MJCF file where it is drawn, at qpos0."""
+    root = parsed(path, "mujoco")
+    reader = _Reader(root)
+    draft = reader.draft
+    for part in root.findall("worldbody"):
+        reader.contents(part, WORLD, Frame(), part.get("childclass", "main"))
+    reader.weigh()
+    reader.close_loops()
+    reader.find_drives()
+    for tag in ("contact", "tendon"):
+        for part in root.iterfind(f"{tag}/*"):
+            reader.lost[tag].append(part.get("name", part.tag))
+    for tag in BRINGS:
+        if count := sum(1 for _ in root.iter(tag)):
+            what = f"{count} of <{tag}> and the bodies in it are not read"
+            draft.warn("exchange.brings", "", what, "save the model by MuJoCo, which writes it in full")
+    return reader.settled(WORLD, options.ground)
+
+
+class _Reader(Scene):
+    """What the compiler of MuJoCo knows while it walks through the bodies."""
+
+    def __init__(self, root: Element) -> None:
+        super().__init__(root.get("model", ""))
+        self.root = root
+        self.compiler = {key: value for part in root.findall("compiler") for key, value in part.items()}
+        option = {key: value for part in root.findall("option") for key, value in part.items()}
+        gravity = numbers(option.get("gravity"), "option.gravity", 3, (0, 0, -9.81))
+        self.draft.gravity = gravity if gravity.any() else None
+        self.angle = 1.0 if self.compiler.get("angle") == "radian" else math.pi / 180
+        self.defaults: dict[str, dict[str, dict[str, str]]] = {"main": {}}
+        for part in root.findall("default"):
+            self._defaults(part, "main", "main")
+            self.defaults[part.get("class", "main")] = self.defaults["main"]
+        self.frames: dict[str, Frame] = {WORLD: Frame()}
+        self.sites: dict[str, tuple[str, Array]] = {}
+        self.geoms: dict[str, list[tuple[Frame, Mapping[str, str]]]] = defaultdict(list)
+        self.weighed: set[str] = set()
+        self.add_body(WORLD)
+
+    def _defaults(self, part: Element, name: str, parent: str) -> None:
+        """Read a class of defaults: what it inherits and what it states, by element."""
+        classes = {tag: dict(values) for tag, values in self.defaults[parent].items()}
+        for child in part:
+            if child.tag != "default":
+                classes.setdefault(child.tag, {}).update(child.attrib)
+        self.defaults[name] = classes
+        for child in part.findall("default"):
+            self._defaults(child, child.get("class", ""), name)
+
+    def _with_defaults(self, element: Element, style: str) -> dict[str, str]:
+        """The attributes of an element with those of its class."""
+        chosen = element.get("class", style)
+        if chosen not in self.defaults:
+            raise refused(f"<{element.tag}> is of the class {chosen!r}, which the file does not have")
+        return {**self.defaults[chosen].get(element.tag, {}), **element.attrib}
+
+    def contents(self, element: Element, body: str, frame: Frame, style: str) -> None:
+        """Read what lies in a body, or in a frame of it."""
+        for child in element:
+            if child.tag == "frame":
+                inner = frame.then(self._frame(child.attrib, "frame"))
+                self.contents(child, body, inner, child.get("childclass", style))
+            elif child.tag == "body":
+                self._body(child, body, frame, child.get("childclass", style))
+            elif child.tag in ("geom", "site"):
+                values = self._with_defaults(child, style)
+                placed = frame.then(self._frame(values, child.tag))
+                if child.tag == "geom":
+                    self.geoms[body].append((placed, values))
+                elif "name" in values:
+                    self.sites[values["name"]] = body, placed.place
+                    self.draft.bodies[body].points[values["name"]] = placed.place
+
+    def _body(self, element: Element, parent: str, outer: Frame, style: str) -> None:
+        """Read a body with its joints: several are a row of bodies, the first joint next to the parent."""
+        name = element.get("name") or f"body{len(self.draft.bodies)}"
+        body = self.add_body(name)
+        self.frames[name] = frame = outer.then(self._frame(element.attrib, f"body {name}"))
+        self._note_lost("body", element.attrib, name)
+        joints = [part for part in element if part.tag in ("joint", "freejoint")]
+        links = [parent, *(f"{name}.{number + 1}" for number in range(len(joints) - 1)), name]
+        for between in links[1:-1]:
+            self.add_body(between)
+            self.between.add(between)
+        for number, part in enumerate(joints):
+            self._joint(part, (links[number], links[number + 1]), frame, style)
+        if not joints:
+            self.add_pair(Pair(f"{name}.fixed", "fixed", (parent, name), frame.place))
+        inertial = element.find("inertial")
+        if inertial is not None and self.compiler.get("inertiafromgeom") != "true":
+            where = f"inertial of body {name}"
+            placed = frame.then(self._frame(inertial.attrib, where))
+            body.mass, body.centre = float(numbers(inertial.get("mass"), f"mass of {where}", 1)[0]), placed.place
+            if "fullinertia" in inertial.attrib:
+                matrix = tensor(*numbers(inertial.get("fullinertia"), f"fullinertia of {where}", 6))
+            else:
+                matrix = np.diag(numbers(inertial.get("diaginertia"), f"diaginertia of {where}", 3, (0, 0, 0)))
+            body.inertia = placed.inertia(matrix)
+            self.weighed.add(name)
+        self.contents(element, name, frame, style)
+
+    def _joint(self, part: Element, links: tuple[str, str], frame: Frame, style: str) -> None:
+        """Read a joint; a free one is none."""
+        values = self._with_defaults(part, style)
+        kind = "free" if part.tag == "freejoint" else values.get("type", "hinge")
+        name = values.get("name") or f"{links[1]}.joint{len(self.draft.pairs) + 1}"
+        where = f"joint {name}"
+        if kind == "free":
+            return
+        if kind not in KINDS:
+            raise refused(f"has the type {kind!r}, which is no joint of MuJoCo", where)
+        axis = unit(numbers(values.get("axis"), f"axis of {where}", 3, (0, 0, 1)), f"axis of {where}")
+        place = numbers(values.get("pos"), f"pos of {where}", 3, (0, 0, 0))
+        pair = Pair(name, KINDS[kind], links, frame.at(place), frame.rotation @ axis)
+        limited = values.get("limited", "auto")
+        automatic = limited == "auto" and self.compiler.get("autolimits") != "false"
+        if "range" in values and kind != "ball" and (limited == "true" or automatic):
+            ends = numbers(values["range"], f"range of {where}", 2) - numbers(
+                values.get("ref"), f"ref of {where}", 1, (0,)
+            )
+            low, high = ends * (self.angle if kind == "hinge" else 1.0)
+            pair.limits = float(low), float(high)
+        self._note_lost("joint", values, name)
+        self.add_pair(pair)
+
+    def _note_lost(self, tag: str, values: Mapping[str, str], name: str) -> None:
+        for key in IGNORED[tag]:
+            if values.get(key, "0").strip() not in ("0", "false"):
+                self.lost[key].append(name)
+
+    # Frames and masses
+
+    def _frame(self, values: Mapping[str, str], where: str) -> Frame:
+        """The frame that attributes state."""
+        if "fromto" in values:
+            start, end = numbers(values["fromto"], f"fromto of {where}", 6).reshape(2, 3)
+            return Frame(_onto(start - end, f"fromto of {where}"), (start + end) / 2)
+
+        def part(key: str, count: int, default: tuple[float, ...] | None = None) -> Array:
+            return numbers(values.get(key), f"{key} of {where}", count, default)
+
+        place, rotation = part("pos", 3, (0, 0, 0)), np.eye(3)
+        if "euler" in values:
+            for sign, turn in zip(self.compiler.get("eulerseq", "xyz"), self.angle * part("euler", 3), strict=False):
+                if sign.lower() not in "xyz":
+                    raise refused(f"is {self.compiler['eulerseq']!r}, which is no row of axes", "eulerseq")
+                about = Rotation.from_euler(sign.lower(), turn).as_matrix()
+                rotation = rotation @ about if sign.islower() else about @ rotation  # moving axes, or fixed
+        elif "axisangle" in values:
+            *axis, turn = part("axisangle", 4)
+            rotation = Rotation.from_rotvec(unit(np.array(axis), where) * self.angle * turn).as_matrix()
+        elif "xyaxes" in values:
+            x, y = part("xyaxes", 6).reshape(2, 3)
+            x = unit(x, where)
+            y = unit(y - (x @ y) * x, where)
+            rotation = np.column_stack([x, y, np.cross(x, y)])
+        elif "zaxis" in values:
+            rotation = _onto(part("zaxis", 3), where)
+        elif "quat" in values:
+            rotation = Rotation.from_quat(unit(part("quat", 4), where), scalar_first=True).as_matrix()
+        return Frame(rotation, place)
+
+    def weigh(self) -> None:
+        """Give bodies that state no mass the masses of their geoms; scale all if the file says so."""
+        draft, source = self.draft, self.compiler.get("inertiafromgeom", "auto")
+        bodies = draft.bodies
+        self.lost["shape"] += [name for name in self.geoms if name != WORLD]
+        low, high = numbers(self.compiler.get("inertiagrouprange"), "inertiagrouprange", 2, (0, 5))
+        unknown = []
+        for name, geoms in self.geoms.items() if source != "false" else ():
+            for frame, values in geoms if name not in {*self.weighed, WORLD} else ():
+                solid = _solid(frame, values, name)
+                if solid is None:
+                    unknown.append(name)
+                elif low <= numbers(values.get("group"), "group of geom", 1, (0,))[0] <= high:
+                    bodies[name] = united(bodies[name], solid, name)
+        if unknown:
+            what = f"have geoms of a shape whose mass is not found here, a mesh for one: {', '.join(unknown[:10])}"
+            draft.warn("exchange.shape", "links", what, "state <inertial> for them, or mass and inertia in the model")
+        total = float(numbers(self.compiler.get("settotalmass"), "settotalmass", 1, (-1,))[0])
+        mass = sum(body.mass for body in bodies.values())
+        for body in bodies.values() if total > 0 and mass > 0 else ():
+            body.mass, body.inertia = body.mass * total / mass, body.inertia * total / mass
+
+    # Loops and drives
+
+    def close_loops(self) -> None:
+        """Read equalities; points that two bodies share are a ball, on one line a pin, else a weld."""
+        draft = self.draft
+        shared: dict[tuple[str, str], list[tuple[str, Array]]] = defaultdict(list)
+        for number, part in enumerate(self.root.iterfind("equality/*")):
+            values = self._with_defaults(part, "main")
+            name = values.get("name") or f"loop{number + 1}"
+            if values.get("active") == "false":
+                self.lost["equality that is not active"].append(name)
+            elif part.tag in ("connect", "weld"):
+                links, place = self._ends(values, f"equality {name}")
+                if part.tag == "weld":
+                    self.add_pair(Pair(name, "fixed", links, place))
+                else:
+                    shared[links if links[::-1] not in shared else links[::-1]].append((name, place))
+            elif part.tag == "joint" and {"joint1", "joint2"} <= values.keys():
+                _, ratio, *higher = numbers(values.get("polycoef"), f"polycoef of {name}", 5, (0, 1, 0, 0, 0))
+                self.couplings.append((values["joint1"], values["joint2"], 0.0 if any(higher) else float(ratio)))
+            else:
+                draft.warn("exchange.equality", name, f"is an equality of the kind {part.tag!r}, which is not read")
+        for links, points in shared.items():
+            offsets = np.array([place for _, place in points]) - points[0][1]
+            rank = int((np.linalg.svd(offsets, compute_uv=False) > APART).sum())
+            axis = offsets[int(np.argmax(np.linalg.norm(offsets, axis=1)))] if rank else np.array([0.0, 0.0, 1.0])
+            name = points[0][0] if len(points) == 1 else stem([name for name, _ in points])
+            comment = f"closes a loop by {len(points)} connect of the file"
+            pair = Pair(name, ("spherical", "revolute", "fixed", "fixed")[rank], links, points[0][1], axis)
+            pair.at, pair.comments = points[0][1] + offsets.mean(axis=0), [comment]
+            self.add_pair(pair)
+
+    def _ends(self, values: Mapping[str, str], where: str) -> tuple[tuple[str, str], Array]:
+        """The two bodies that an equality holds together, and where; MechanismError if they are apart as drawn."""
+        if "site1" in values:
+            ends = [self.sites.get(values.get(key, "")) for key in ("site1", "site2")]
+            if ends[0] is None or ends[1] is None:
+                raise refused("names a site that the file does not have", where)
+            (first, place), (second, other) = ends[0], ends[1]
+        else:
+            first, second = values.get("body1", ""), values.get("body2", WORLD)
+            for body in (first, second):
+                if body not in self.frames:
+                    raise refused(f"names the body {body!r}, which the file does not have", where)
+            place = other = self.frames[first].at(numbers(values.get("anchor"), f"anchor of {where}", 3, (0, 0, 0)))
+            pose = numbers(values.get("relpose"), f"relpose of {where}", 7, (0,) * 7)
+            if pose[3:].any():
+                relative = self._frame({"pos": text_of(pose[:3]), "quat": text_of(pose[3:])}, where)
+                stated, drawn = self.frames[first].then(relative), self.frames[second]
+                other = place + stated.place - drawn.place
+                if np.abs(stated.rotation - drawn.rotation).max() > APART:
+                    raise refused("holds two bodies at another angle than the file draws them", where)
+        gap = float(np.linalg.norm(place - other))
+        if gap > APART:
+            what = f"holds points together that are {1e3 * gap:.4g} mm apart as the file draws them"
+            raise refused(what, where, "draw it assembled: poses of the bodies at which the loops close")
+        return (first, second), place
+
+    def find_drives(self) -> None:
+        """Read driven joints; the speed is that of the first key for an actuator of velocity."""
+        key = self.root.find("keyframe/key")
+        control = (key.get("ctrl", "") if key is not None else "").split()
+        for number, part in enumerate(self.root.iterfind("actuator/*")):
+            values = self._with_defaults(part, "main")
+            joint, rate = values.get("joint", values.get("jointinparent")), 0.0
+            if joint not in self.draft.pairs:
+                self.lost["actuator"].append(values.get("name", part.tag))
+                continue
+            if part.tag == "velocity" and number < len(control):
+                gear = numbers(values.get("gear"), f"gear of {joint}", 0, (1,))[0]
+                rate = float(numbers(control[number], "ctrl of key", 1)[0] / (gear or 1.0))
+            self.draft.drives[joint] = rate
+
+
+def _onto(direction: Array, where: str) -> Array:
+    """The least rotation that turns z onto a direction, as MuJoCo has it."""
+    z = unit(direction, where)
+    axis = np.array([-z[1], z[0], 0.0])
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-15:
+        return np.diag([1.0, 1.0, 1.0]) if z[2] > 0 else np.diag([1.0, -1.0, -1.0])
+    return np.asarray(Rotation.from_rotvec(axis / sine * math.atan2(sine, z[2])).as_matrix())
+
+
+def _solid(frame: Frame, values: Mapping[str, str], name: str) -> Body | None:
+    """The body of a geom, in global axes; None if its mass cannot be found."""
+    kind, where = values.get("type", "sphere"), f"size of a geom of body {name}"
+    stated = numbers(values.get("mass"), f"mass of a geom of body {name}", 1)[0] if "mass" in values else None
+    density = float(numbers(values.get("density"), f"density of a geom of body {name}", 1, (1000,))[0])
+    if kind in ("plane", "hfield") or stated == 0 or (stated is None and density == 0):
+        return Body(name)
+    count = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}.get(kind, 0)
+    if not count or "mesh" in values or values.get("shellinertia") == "true":
+        return None
+    size = numbers(values.get("size"), where, 0)
+    if "fromto" in values:
+        ends = numbers(values["fromto"], "fromto of geom", 6)
+        half = float(np.linalg.norm(ends[3:] - ends[:3])) / 2
+        size = np.array([size[0], half] if count == 2 else [size[0], size[0], half])
+    if len(size) < count or not (size[:count] > 0).all():
+        raise refused(f"has not {count} lengths above 0", where)
+    a, b, c = (*size[:count], 0.0, 0.0)[:3]
+    if kind in ("sphere", "ellipsoid"):
+        axes = np.array([a, b, c]) if kind == "ellipsoid" else np.full(3, a)
+        volume, squares = 4 / 3 * math.pi * axes.prod(), axes**2 / 5
+    elif kind == "box":
+        volume, squares = 8 * a * b * c, np.array([a, b, c]) ** 2 / 3
+    else:  # of a cylinder of radius a and length 2 b; half a ball on both ends of a capsule
+        ball = 2 / 3 * a / (b + 2 / 3 * a) if kind == "capsule" else 0.0  # share of the balls
+        volume = 2 * math.pi * a * a * b / (1 - ball)
+        across = (1 - ball) * a * a / 4 + ball * a * a / 5
+        squares = np.array([across, across, (1 - ball) * b * b / 3 + ball * (a * a / 5 + b * b + 3 / 4 * a * b)])
+    mass = density * volume if stated is None else float(stated)
+    inertia = mass * np.diag(squares.sum() - squares)
+    return Body(name, mass, frame.place, frame.inertia(inertia))
+
+
+# Out
+
+
+def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
+    """Write the mechanism as MJCF: bodies with the global axes, each with its origin at the joint that carries it.
+
+    A loop is closed at a ball by one `connect`, at a pin by two on its axis; at any other joint the body after it is
+    halved, and a `weld` holds its halves together, so mass and mobility stay.
+    """
+    draft = opening(positions, options.row)
+    tree, cuts = spanning(draft)
+    root = Element("mujoco", model=draft.name or "mechanism")
+    compiler = SubElement(root, "compiler", angle="radian", autolimits="true")
+    SubElement(root, "option", gravity=text_of(np.zeros(3) if draft.gravity is None else draft.gravity))
+    worldbody, equality = SubElement(root, "worldbody"), Element("equality")
+    base = worldbody if draft.ground == WORLD else SubElement(worldbody, "body", name=draft.ground)
+    bodies, origins = {draft.ground: base}, {draft.ground: np.zeros(3)}
+    for pair in [*tree, *_halved(draft, cuts)]:
+        parent, child = pair.links
+        origins[child] = pair.at
+        bodies[child] = SubElement(bodies[parent], "body", name=child, pos=text_of(pair.at - origins[parent]))
+        _write_joints(pair, bodies[child], equality)
+    for name, element in bodies.items():
+        body = draft.bodies[name]
+        if name != draft.ground:
+            matrix = _realisable(body.inertia)
+            full = [matrix[at] for at in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+            centre = body.centre - origins[name]
+            values = {"pos": text_of(centre), "mass": text_of(body.mass), "fullinertia": text_of(full)}
+            element.insert(0, Element("inertial", values))
+            if body.mass < 1e-15 or np.linalg.eigvalsh(matrix)[0] < 1e-15:  # mjMINVAL, below which MuJoCo refuses
+                compiler.attrib.update(boundmass="1e-9", boundinertia="1e-12")
+        for point, place in body.points.items():
+            SubElement(element, "site", name=f"{name}.{point}", pos=text_of(place - origins[name]))
+    _write_loops(draft, cuts, origins, equality)
+    if len(equality):
+        root.append(equality)
+    if draft.drives:
+        actuator = SubElement(root, "actuator")
+        for name in draft.drives:
+            turn = f"{name}.turn" if draft.pairs[name].type in ("cylindrical", "helical") else name
+            SubElement(actuator, "velocity", name=name, joint=turn)
+        SubElement(SubElement(root, "keyframe"), "key", name="drive", ctrl=text_of(list(draft.drives.values())))
+    written(root, path)
+    return draft.findings
+
+
+def _write_loops(draft: Draft, cuts: list[Pair], origins: Mapping[str, Array], equality: Element) -> None:
+    """Write what closes the loops: connects at balls and on the axes of pins, welds of halved bodies."""
+    size = np.ptp([*origins.values()], axis=0).max() or 1.0
+    for pair in cuts:
+        half = (pair.length or size / 10) / 2 * pair.axis / np.linalg.norm(pair.axis)
+        anchors = {"spherical": {"": pair.at}, "revolute": {".1": pair.at - half, ".2": pair.at + half}}
+        for number, anchor in anchors.get(pair.type, {}).items():
+            ends = {"body1": pair.links[0], "body2": pair.links[1], "anchor": text_of(anchor - origins[pair.links[0]])}
+            SubElement(equality, "connect", ends, name=f"{pair.name}{number}")
+    for name in draft.bodies:
+        if "." in name:
+            SubElement(equality, "weld", name=name, body1=name.partition(".")[0], body2=name)
+
+
+def _halved(draft: Draft, cuts: list[Pair]) -> Iterator[Pair]:
+    """Pairs that no connect closes, each to a part of its second body, which has a share of its mass."""
+    ends: dict[str, list[Pair]] = defaultdict(list)
+    for pair in cuts:
+        if pair.type not in ("spherical", "revolute"):
+            pair = pair if pair.links[1] != draft.ground else turned(pair)
+            ends[pair.links[1]].append(pair)
+    for name, pairs in ends.items():
+        body = draft.bodies[name]
+        share = replace(body, mass=body.mass / (1 + len(pairs)), inertia=body.inertia / (1 + len(pairs)))
+        draft.bodies[name] = share
+        for pair in pairs:
+            half = f"{name}.{pair.name}"
+            draft.bodies[half] = replace(share, name=half, points={})
+            yield replace(pair, links=(pair.links[0], half))
+
+
+def _write_joints(pair: Pair, body: Element, equality: Element) -> None:
+    """Write a pair as the joints of a body."""
+    kinds = {"revolute": "hinge", "prismatic": "slide", "spherical": "ball"}
+    for step in [pair] if pair.type == "spherical" else steps(pair):
+        if step.type == "fixed":
+            continue
+        joint = SubElement(body, "joint", name=step.name, type=kinds[step.type])
+        if step.type != "spherical":
+            joint.set("axis", text_of(step.axis))
+            if step.limits is not None:
+                joint.set("range", text_of(step.limits))
+    if pair.type == "helical" and pair.pitch is not None:
+        ends = {"joint1": f"{pair.name}.slide", "joint2": f"{pair.name}.turn"}
+        SubElement(equality, "joint", ends, name=pair.name, polycoef=text_of([0, pair.pitch / (2 * math.pi), 0, 0, 0]))
+
+
+def _realisable(inertia: Array) -> Array:
+    """The tensor, by 1e-12 larger where it is that of a plate, which rounding would make impossible."""
+    a, b, c = np.linalg.eigvalsh(inertia)
+    return inertia + 1e-12 * c * np.eye(3) if a + b - c < 1e-12 * c else inertia

@@ -1,0 +1,314 @@
+"""SDF, the files of Gazebo: read with its frames, and written with every loop as it is, since joints may close them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from trunnion.errors import Finding
+from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, Pair
+from trunnion.exchange.formats import ExportOptions, ImportOptions
+from trunnion.exchange.robots import (
+    WORLD,
+    Frame,
+    Scene,
+    laid_out,
+    numbers,
+    opening,
+    parsed,
+    refused,
+    tensor,
+    text_of,
+    unit,
+    written,
+)  # fmt: skip
+from trunnion.exchange.skeleton import Positions
+
+__all__ = ["Reader", "add_driver", "add_joint", "end_of", "read", "write"]
+
+TYPES = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "ball": "spherical",
+         "universal": "universal", "revolute2": "universal", "screw": "helical", "fixed": "fixed",
+         "planar": "planar"}  # fmt: skip  # the last of URDF
+NAMES = {"spherical": "ball", "helical": "screw"}  # of those that SDF calls otherwise
+UNLIMITED = 1e3  # rad or m, from which a limit is none
+SPECK = Body("", 1e-9, inertia=1e-15 * np.eye(3))  # holds two joints: Gazebo refuses bodies without mass
+CONTROLLER = {"filename": "gz-sim-joint-controller-system", "name": "gz::sim::systems::JointController"}
+YES = ("1", "true")
+
+
+def read(path: Path, options: ImportOptions) -> Draft:
+    """Read the mechanism of an SDF file where it is drawn."""
+    root = parsed(path, "sdf")
+    world = root.find("world")
+    models = (root if world is None else world).findall("model")
+    if not models:
+        raise refused("has no model", remedy="export a model")
+    reader = Reader(models[0].get("name", ""), root.get("version", "1.6"))
+    draft = reader.draft
+    if world is not None:
+        gravity = numbers(world.findtext("gravity"), "gravity", 3, (0, 0, -9.8))
+        draft.gravity = gravity if gravity.any() else None
+    for number, model in enumerate(models):
+        reader.add_model(model, f"{model.get('name', number)}::" if number else "", WORLD)
+    if root.find(".//include") is not None:
+        draft.warn("exchange.brings", "", "models that it includes are not read", "write it in full by `gz sdf -p`")
+    reader.add_joints()
+    return reader.settled(WORLD, options.ground)
+
+
+class Reader(Scene):
+    """The links, joints and frames of the models of a file, by names with the scope of nested models."""
+
+    def __init__(self, name: str, version: str) -> None:
+        super().__init__(name)
+        self.version = tuple(int(part) if part.isdigit() else 0 for part in version.split("."))
+        self.poses: dict[str, tuple[Frame, str]] = {}  # of every frame, and what it is relative to
+        self.frames: dict[str, Frame] = {WORLD: Frame()}  # those that are found in the global one
+        self.attached: dict[str, str] = {}  # what a frame moves with
+        self.joints: list[tuple[Element, str]] = []
+
+    def add_model(self, model: Element, prefix: str, parent: str) -> None:
+        """Collect the links, joints and frames of a model and of those nested in it."""
+        base = f"{prefix}__model__"
+        self._place(model, base, parent, prefix)
+        for part in model:
+            name = prefix + part.get("name", part.tag)
+            if part.tag == "link":
+                self.add_body(name)
+                self._place(part, name, base, prefix)
+                self.attached.setdefault(base, name)
+            elif part.tag == "frame":
+                self.attached[name] = prefix + part.get("attached_to", "__model__")
+                self._place(part, name, self.attached[name], prefix)
+            elif part.tag == "joint":
+                self.joints.append((part, prefix))
+                child = end_of(part, "child")
+                self._place(part, f"joint {name}", child if child == WORLD else prefix + child, prefix)
+            elif part.tag == "model":
+                self.add_model(part, f"{name}::", base)
+                self.poses[name], self.attached[name] = (Frame(), f"{name}::__model__"), f"{name}::__model__"
+            elif part.tag == "plugin" and part.findtext("joint_name"):
+                rate = numbers(part.findtext("initial_velocity"), f"initial_velocity of {name}", 1, (0,))
+                self.draft.drives[prefix + part.findtext("joint_name", "").strip()] = float(rate[0])
+            elif part.tag == "plugin":
+                self.lost["plugin"].append(part.get("name", ""))
+        for part in model.findall("joint"):  # its name may also be that of a link, in URDF and old files
+            name = prefix + part.get("name", "joint")
+            self.poses.setdefault(name, (Frame(), f"joint {name}"))
+        for link in model.findall("link"):
+            name = prefix + link.get("name", "link")
+            self._weigh(link, name)
+            if link.find("visual") is not None or link.find("collision") is not None:
+                self.lost["shape"].append(name)
+            if (model.findtext("static") or "").strip() in YES:
+                self.add_pair(Pair(f"{name}.static", "fixed", (WORLD, name), np.zeros(3)))
+
+    def _place(self, part: Element, name: str, default: str, prefix: str) -> None:
+        """Note the pose of a part, and what it is relative to."""
+        pose = part.find("pose")
+        relative = "" if pose is None else pose.get("relative_to") or pose.get("frame") or ""
+        self.poses[name] = _pose(pose, name), prefix + relative if relative else default
+
+    def frame(self, name: str) -> Frame:
+        """The global frame of a name; MechanismError if poses go round in a circle or name what is not there."""
+        row = [name]
+        while row[-1] not in self.frames:
+            if row[-1] not in self.poses:
+                raise refused(f"its pose is relative to {row[-1]!r}, which the file does not have", name)
+            row.append(self.poses[row[-1]][1])
+            if row[-1] in row[:-1]:
+                raise refused("its pose is relative to itself, through others", name)
+        for inner in reversed(row[:-1]):
+            local, outer = self.poses[inner]
+            self.frames[inner] = self.frames[outer].then(local)
+        return self.frames[name]
+
+    def _weigh(self, link: Element, name: str) -> None:
+        """Read mass, centre and inertia of a link."""
+        draft, inertial = self.draft, link.find("inertial")
+        body = draft.bodies[name]
+        if inertial is None or inertial.find("mass") is None:
+            what = "states no mass, which by the rules of SDF is 1 kg with 1 kg m² about each axis"
+            draft.warn("exchange.mass", f"links.{name}", what, "state its mass in the model")
+            inertial = Element("inertial") if inertial is None else inertial
+        frame = self.frame(name).then(_pose(inertial.find("pose"), f"inertial of {name}"))
+        body.mass = float(numbers(inertial.findtext("mass"), f"mass of {name}", 1, (1,))[0])
+        entries = [
+            float(numbers(inertial.findtext(f"inertia/i{key}"), f"i{key} of {name}", 1, (key[0] == key[1],))[0])
+            for key in ("xx", "yy", "zz", "xy", "xz", "yz")
+        ]
+        body.centre, body.inertia = frame.place, frame.inertia(tensor(*entries))
+
+    def add_joints(self) -> None:
+        """Make pairs of the joints that were collected, and points of the frames."""
+        bodies = self.draft.bodies
+        if (
+            any(end_of(part, tag) == WORLD for part, _ in self.joints for tag in ("parent", "child"))
+            or self.draft.pairs
+        ):
+            bodies.setdefault(WORLD, Body(WORLD))
+        for part, prefix in self.joints:
+            if part.get("type") != "floating":
+                self.add_pair(self._pair(part, prefix))
+            mimic = part.find("axis/mimic")
+            if mimic is not None:
+                name = prefix + part.get("name", "")
+                ratio = float(numbers(mimic.findtext("multiplier"), f"mimic of {name}", 1, (1,))[0])
+                self.couplings.append((name, prefix + mimic.get("joint", ""), ratio))
+        for name in self.attached:
+            link = self._link(name)
+            if link and not name.endswith("__model__") and name not in bodies:
+                bodies[link].points[name] = self.frame(name).place
+        for name in bodies:  # between joints of a row, as this program writes them
+            row, _, number = name.rpartition(".")
+            pairs = self.draft.pairs_of(name) if row and number.isdigit() else []
+            if len(pairs) == 2 and all(pair.name.startswith(f"{row}.") for pair in pairs):
+                self.between.add(name)
+        self.draft.drives = {name: rate for name, rate in self.draft.drives.items() if name in self.draft.pairs}
+
+    def _pair(self, part: Element, prefix: str) -> Pair:
+        """The pair of a joint."""
+        name, kind = prefix + part.get("name", "joint"), part.get("type", "")
+        where, ends = f"joint {name}", []
+        if kind not in TYPES:
+            raise refused(f"has the type {kind!r}, which is not read", where, f"use {', '.join([*TYPES][:-1])}")
+        for tag in ("parent", "child"):
+            end = end_of(part, tag)
+            ends.append(WORLD if end == WORLD else self._link(prefix + end))
+            if not ends[-1]:
+                raise refused(f"joins {end!r}, which is no link of the file", where)
+        for key in ("damping", "friction", "spring_stiffness"):
+            if any(numbers(value.text, f"{key} of {where}", 1, (0,))[0] for value in part.iter(key)):
+                self.lost[key].append(name)
+        pair = Pair(name, TYPES[kind], (ends[0], ends[1]), self.frame(where).place)
+        if pair.type not in ("spherical", "fixed"):
+            pair.axis = self._axis(part, "axis", where, prefix)
+            texts = [part.findtext(f"axis/limit/{end}", "inf").replace("inf", "1e16") for end in ("lower", "upper")]
+            low, high = (float(numbers(text, f"limit of {where}", 1)[0]) for text in texts)
+            pair.limits = (low, high) if max(abs(low), abs(high)) < UNLIMITED else None
+        if pair.type == "universal":
+            pair.second_axis = self._axis(part, "axis2", where, prefix)
+            if abs(pair.axis @ pair.second_axis) > PARALLEL:
+                raise refused("turns about two axes that are not square to each other", where, "write two joints")
+        if pair.type == "helical":
+            pitch, old = part.findtext("screw_thread_pitch"), part.findtext("thread_pitch")
+            if pitch is None and old is not None:  # rad/m, left-handed
+                pair.pitch = -2 * np.pi / float(numbers(old, f"thread_pitch of {where}", 1)[0] or np.inf)
+            else:
+                pair.pitch = float(numbers(pitch, f"screw_thread_pitch of {where}", 1)[0])
+        return pair
+
+    def _axis(self, part: Element, tag: str, where: str, prefix: str) -> Array:
+        """The direction of an axis, in global axes."""
+        axis, xyz, frame = part.find(tag), part.find(f"{tag}/xyz"), where
+        text = None if xyz is None else xyz.text
+        in_model = axis is not None and (axis.findtext("use_parent_model_frame") or "").strip() in YES
+        if xyz is not None and xyz.get("expressed_in"):
+            frame = prefix + xyz.get("expressed_in", "")
+        elif in_model or self.version < (1, 5):
+            frame = f"{prefix}__model__"
+        name = f"{tag} of {where}"
+        return np.asarray(self.frame(frame).rotation @ unit(numbers(text, name, 3, (0, 0, 1)), name))
+
+    def _link(self, name: str) -> str:
+        """The link that a name is, or that the frame moves with which it names; empty if there is none."""
+        for _ in self.attached:
+            name = name if name in self.draft.bodies else self.attached.get(name, "")
+        return name if name in self.draft.bodies else ""
+
+
+def end_of(part: Element, tag: str) -> str:
+    """The name of the parent or child of a joint."""
+    end = part.find(tag)
+    name = "" if end is None else (end.text or end.get("link") or "").strip()
+    if not name:
+        raise refused(f"has no {tag}", f"joint {part.get('name')}")
+    return name
+
+
+def _pose(pose: Element | None, name: str) -> Frame:
+    """The frame of a pose: x y z roll pitch yaw."""
+    if pose is None or not (pose.text or "").strip():
+        return Frame()
+    where = f"pose of {name}"
+    if pose.get("rotation_format") == "quat_xyzw":
+        values = numbers(pose.text, where, 7)
+        return Frame(Rotation.from_quat(unit(values[3:], where)).as_matrix(), values[:3])
+    values = numbers(pose.text, where, 6)
+    turns = Rotation.from_euler("xyz", values[3:], degrees=pose.get("degrees") in YES)
+    return Frame(turns.as_matrix(), values[:3])
+
+
+# Out
+
+
+def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
+    """Write the mechanism as SDF: links with the global axes, each with its origin at the joint that carries it.
+
+    Cylindrical and planar pairs, which SDF lacks, are rows of joints with bodies of 1e-9 kg between.
+    """
+    draft = opening(positions, options.row)
+    root = Element("sdf", version="1.10")
+    world = SubElement(root, "world", name="default")
+    _leaf(world, "gravity", np.zeros(3) if draft.gravity is None else draft.gravity)
+    model = SubElement(world, "model", name=draft.name or "mechanism")
+    origins, inner, closing, rates = laid_out(draft, ("cylindrical", "planar"))
+    add_joint(model, Pair("world", "fixed", (WORLD, draft.ground), np.zeros(3)), origins)
+    for name, origin in origins.items():
+        link = SubElement(model, "link", name=name)
+        _leaf_pose(link, origin)
+        body = draft.bodies.get(name, SPECK)
+        inertial = SubElement(link, "inertial")
+        _leaf_pose(inertial, body.centre - origin if name in draft.bodies else np.zeros(3))
+        _leaf(inertial, "mass", body.mass)
+        inertia = SubElement(inertial, "inertia")
+        for row, column in zip(*np.triu_indices(3), strict=True):
+            _leaf(inertia, f"i{'xyz'[row]}{'xyz'[column]}", body.inertia[row, column])
+        for point, place in body.points.items():
+            _leaf_pose(SubElement(model, "frame", name=f"{name}.{point}", attached_to=name), place - origin)
+    for pair in [*inner, *closing]:
+        add_joint(model, pair, origins)
+    for name, rate in rates.items():
+        add_driver(model, name, rate)
+    written(root, path)
+    return draft.findings
+
+
+def add_joint(model: Element, pair: Pair, origins: dict[str, Array]) -> None:
+    """Write a pair as a joint between two links, whose origins are given."""
+    joint = SubElement(model, "joint", name=pair.name, type=NAMES.get(pair.type, pair.type))
+    offset = pair.at - origins[pair.links[1]]
+    if offset.any():
+        _leaf_pose(joint, offset)
+    _leaf(joint, "parent", pair.links[0])
+    _leaf(joint, "child", pair.links[1])
+    if pair.type == "helical" and pair.pitch is not None:
+        _leaf(joint, "screw_thread_pitch", pair.pitch)
+    if pair.type not in ("spherical", "fixed"):
+        axis = SubElement(joint, "axis")
+        _leaf(axis, "xyz", pair.axis)
+        if pair.limits is not None:
+            limit = SubElement(axis, "limit")
+            for end, value in zip(("lower", "upper"), pair.limits, strict=True):
+                _leaf(limit, end, value)
+    if pair.type == "universal" and pair.second_axis is not None:
+        _leaf(SubElement(joint, "axis2"), "xyz", pair.second_axis)
+
+
+def add_driver(model: Element, joint: str, rate: float) -> None:
+    """Write the drive of a joint as Gazebo's controller of its speed."""
+    plugin = SubElement(model, "plugin", CONTROLLER)
+    _leaf(plugin, "joint_name", joint)
+    _leaf(plugin, "initial_velocity", rate)
+
+
+def _leaf(parent: Element, tag: str, content: str | float | Array) -> None:
+    """Add an element that holds a text or numbers."""
+    SubElement(parent, tag).text = content if isinstance(content, str) else text_of(content)
+
+
+def _leaf_pose(parent: Element, place: Array) -> None:
+    _leaf(parent, "pose", np.append(place, np.zeros(3)))

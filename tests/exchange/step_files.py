@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from scipy.integrate import quad
@@ -143,7 +144,7 @@ def turned(profile, axis=(0, 0, 1), origin=(0, 0, 0), split="seam"):
 def revolve(shape, origin, axis, profile):
     """Add the faces and moments of a profile [(r, z), (r, z, centre of the arc before it), …] about an axis."""
     frame = frame_of(axis)
-    for (r1, z1, *_), (r2, z2, *arc) in zip(profile[:-1], profile[1:], strict=True):
+    for (r1, z1, *_), (r2, z2, *arc) in pairwise(profile):
         centre = arc[0] if arc else None
         shape.faces += _swept(shape.split, origin, frame, (r1, z1), (r2, z2), centre)
         if z1 == z2 and not arc:
@@ -300,7 +301,7 @@ class StepFile:
                 if kind == "line":
                     to = self.vector("DIRECTION", _unit(end - start))
                     at = self.vector("CARTESIAN_POINT", start)
-                    curve = self(f"LINE('',#{at},#{self(f'VECTOR({chr(39)*2},#{to},1.)')})")
+                    curve = self(f"LINE('',#{at},#{self(f'VECTOR({chr(39) * 2},#{to},1.)')})")
                 else:
                     curve = self(f"CIRCLE('',#{self.placement(centre, axis, start - centre)},{_real(radius)})")
                 edges[key] = self(f"EDGE_CURVE('',#{vertex(start)},#{vertex(end)},#{curve},.T.)")
@@ -321,9 +322,7 @@ class StepFile:
                 bounds.append(self(f"FACE_{'OUTER_' if number == 0 else ''}BOUND('',#{made},.T.)"))
             numbers = "".join(f",{_real(size)}" for size in sizes)
             surface = self(f"{kind}('',#{self.placement(origin, axis)}{numbers})")
-            faces.append(
-                self(f"ADVANCED_FACE('',({_list(bounds)}),#{surface},.{'T' if face['sense'] else 'F'}.)")
-            )
+            faces.append(self(f"ADVANCED_FACE('',({_list(bounds)}),#{surface},.{'T' if face['sense'] else 'F'}.)"))
         shell = self(f"CLOSED_SHELL('',({_list(faces)}))")
         return self(f"MANIFOLD_SOLID_BREP('{name}',#{shell})")
 

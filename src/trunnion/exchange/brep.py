@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -59,7 +61,7 @@ class Moments:
     @property
     def centre(self) -> Array:
         """Centre of the volume, m."""
-        return self.first / self.volume
+        return np.asarray(self.first / self.volume)
 
     @property
     def inertia(self) -> Array:
@@ -126,11 +128,11 @@ class Geometry:
     def point(self, number: Any) -> Array:
         """A CARTESIAN_POINT, m."""
         values = [float(part) for part in self.file.args(number, "CARTESIAN_POINT")[1]]
-        return self.length * np.array((values + [0.0, 0.0, 0.0])[:3])
+        return self.length * np.array([*values, 0.0, 0.0, 0.0][:3])
 
     def direction(self, number: Any) -> Array:
         """A DIRECTION, of unit length."""
-        values = np.array((list(self.file.args(number, "DIRECTION")[1]) + [0.0])[:3], dtype=float)
+        values = np.array([*self.file.args(number, "DIRECTION")[1], 0.0][:3], dtype=float)
         size = float(np.linalg.norm(values))
         if not size > 0:
             raise self.file.unreadable(f"has a direction without length at #{number}")
@@ -151,7 +153,10 @@ class Geometry:
     # ---- edges ---------------------------------------------------------------------------------------------
 
     def edge(self, number: int) -> tuple[Array, Array, Array]:
-        """Nodes, m, weighted tangents, and ends of an EDGE_CURVE: ∫ f dq = Σ f(node) · tangent. ValueError if unread."""
+        """Nodes, m, weighted tangents and ends of an EDGE_CURVE: ∫ f dq = Σ f(node) · tangent.
+
+        ValueError if its curve is of a kind that is not read.
+        """
         if number not in self._edges:
             _, start, end, curve, same = self.file.args(number, "EDGE_CURVE")
             ends = [self.point(self.file.args(vertex, "VERTEX_POINT")[1]) for vertex in (start, end)]
@@ -166,7 +171,7 @@ class Geometry:
         if kind == "TRIMMED_CURVE":
             return self._nodes(entity[kind][1], ends, closed, same)
         if kind == "LINE":
-            return _gauss(lambda t: (ends[0] + np.outer(t, ends[1] - ends[0]), np.outer(t**0, ends[1] - ends[0])), [0, 1])
+            return _segment(ends[0], ends[1])
         if "B_SPLINE_CURVE_WITH_KNOTS" in entity:
             return self._spline_nodes(entity, ends, closed, same)
         if kind not in ("CIRCLE", "ELLIPSE", "HYPERBOLA", "PARABOLA"):
@@ -184,9 +189,9 @@ class Geometry:
             turn = (last - first if same else first - last) % (2 * math.pi)
             turn = 2 * math.pi if closed or turn < CLOSED else turn
             last = first + (turn if same else -turn)
-        functions = {
+        functions: Sequence[Callable[[Array], Array]] = {
             "HYPERBOLA": (np.cosh, np.sinh, np.sinh, np.cosh),
-            "PARABOLA": (np.square, lambda t: t, lambda t: 2 * t, np.ones_like),
+            "PARABOLA": (np.square, np.array, lambda t: 2 * t, np.ones_like),
         }.get(kind, (np.cos, np.sin, lambda t: -np.sin(t), np.cos))
 
         def course(t: Array) -> tuple[Array, Array]:
@@ -213,7 +218,7 @@ class Geometry:
             return place, (dh[:, :3] - place * dh[:, 3:]) / h[:, 3:]
 
         low, high = float(knots[0]), float(knots[-1])
-        grid = np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in zip(knots[:-1], knots[1:], strict=True)]))
+        grid = np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in pairwise(knots)]))
 
         def parameter(point: Array) -> float:
             away = np.linalg.norm(course(grid)[0] - point, axis=1)

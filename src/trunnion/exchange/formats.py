@@ -46,7 +46,8 @@ class Format:
     needs: str = ""
 
 
-FORMATS: dict[str, Format] = {}
+_STEP = Format("STEP", "step")
+FORMATS: dict[str, Format] = {".step": _STEP, ".stp": _STEP}
 
 
 @dataclass(frozen=True)
@@ -71,10 +72,17 @@ class ImportOptions:
 
 @dataclass(frozen=True)
 class ExportOptions:
-    """How a file is written: the row of the position, for formats of one position; frames of those that move."""
+    """How a file is written.
+
+    Parameters
+    ----------
+    row : of the position, for formats of one position; frames : of those that move.
+    original : the file that the model was imported from, for formats that move its parts.
+    """
 
     row: int = 0
     frames: int = 120
+    original: Path | None = None
 
 
 def _format_of(path: Path, reads: bool) -> Format:
@@ -221,6 +229,8 @@ def export_model(
     if positions is None:
         moves = getattr(module, "MOVES", False)
         positions = positions_of(mechanism, options.frames) if moves else positions_of(mechanism, 360, at)
+    if options.original is not None:
+        reading(options.original)
     with whole(path) as temporary:
         findings: list[Finding] = module.write(positions, temporary, options)
     return findings

@@ -1,7 +1,7 @@
 """The text of a STEP file (ISO 10303-21): its entities by number, read when they are asked for.
 
-`#12=CARTESIAN_POINT('',(0.,1.,2.));` is the entity 12 of the kind CARTESIAN_POINT with the arguments `['', [0., 1., 2.]]`;
-a complex entity has several kinds.
+`#12=CARTESIAN_POINT('',(0.,1.,2.));` is the entity 12 of the kind CARTESIAN_POINT with the arguments
+`['', [0., 1., 2.]]`; a complex entity has several kinds.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ class Part21:
             if token is None:
                 raise self.unreadable(f"cannot be read at #{number}: '{text[position : position + 30].strip()}'")
             position = token.end()
-            name = token.lastgroup
+            name = token.lastgroup or "sign"
             value: str = token[name]
             if name == "kind":
                 pending = value.upper()
@@ -143,7 +143,7 @@ class Part21:
         return dict(records)
 
 
-def _value(name: str | None, text: str) -> Any:
+def _value(name: str, text: str) -> Any:
     if name == "string":
         return _WIDE.sub(_decoded, text[1:-1].replace("''", "'")).replace("\\\\", "\\")
     if name == "ref":

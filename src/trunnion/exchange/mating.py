@@ -1,0 +1,625 @@
+"""Joints between solids by their faces: pins in holes, balls in sockets, slides between facing planes.
+
+Faces say which bodies touch; what the touching bodies can do against each other follows from all their contacts. What
+is not certain is a finding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from trunnion.errors import MechanismError
+from trunnion.exchange.brep import Face
+from trunnion.exchange.draft import Array, Body, Draft, Pair, free_name, perpendicular
+from trunnion.joints.fits import fit
+
+__all__ = ["joined", "loose_contacts"]
+
+ANGLE = 1e-4  # rad, between axes or planes that count as parallel
+NEAR = 1e-6  # m, between places that count as equal
+COVERED = 0.55, 0.45  # of a turn: a hole that holds its pin; one that may
+THREAD = 0.12  # of the radius: a pin that much larger than its hole is pressed or threaded in
+FITS = ("H7/h6", "H7/g6", "H7/f7", "H8/f7", "H8/e8", "H9/d9", "H11/c11")
+ALIKE = 3  # of the gap: the difference of radii up to which a pin without a joint is spoken of
+
+
+@dataclass(frozen=True)
+class Round:
+    """A pin or hole of a body: cylindrical faces of one axis and radius that follow each other, or a ball."""
+
+    body: str
+    point: Array
+    axis: Array
+    radius: float
+    low: float  # along the axis from the point, m
+    high: float
+    hole: bool
+    covered: float  # of its full area
+    faces: tuple[int, ...]
+
+    @property
+    def label(self) -> str:
+        """In words, with its numbers in the file."""
+        numbers = ", ".join(f"#{number}" for number in self.faces[:4])
+        kind = (("pin", "hole") if self.high > self.low else ("ball", "socket"))[self.hole]
+        return f"{kind} d={2e3 * self.radius:.9g} mm of {self.body} ({numbers})"
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A pin in a hole, or a ball in a socket: low to high along the hole's axis from its point."""
+
+    pin: Round
+    hole: Round
+    low: float
+    high: float
+
+    @property
+    def play(self) -> float:
+        """Radius of the hole less that of the pin, m; what is rounding is none."""
+        play = self.hole.radius - self.pin.radius
+        return 0.0 if abs(play) < 1e-9 * self.hole.radius else play
+
+    @property
+    def middle(self) -> Array:
+        """Middle of the bearing."""
+        return np.asarray(self.hole.point + (self.low + self.high) / 2 * self.hole.axis)
+
+    def on_line_of(self, other: Contact) -> bool:
+        """Whether both have the same axis."""
+        axis, off = self.hole.axis, other.middle - self.middle
+        play = abs(self.play) + abs(other.play) + NEAR
+        return parallel(axis, other.hole.axis) and bool(np.linalg.norm(off - (off @ axis) * axis) <= play)
+
+
+@dataclass(frozen=True)
+class Facing:
+    """Two flat faces that look at each other.
+
+    Parameters
+    ----------
+    bodies : names. outlines : points of the bounds of their faces, m.
+    normal : out of the first body. level : of its face along the normal, m. gap : to the other face, m.
+    corners : of the overlap, m, (4, 3).
+    """
+
+    bodies: tuple[str, str]
+    outlines: tuple[Array, Array]
+    normal: Array
+    level: float
+    gap: float
+    corners: Array
+
+    @property
+    def back(self) -> Facing:
+        """The same from the other body."""
+        bodies, outlines = self.bodies[::-1], self.outlines[::-1]
+        return replace(self, bodies=bodies, outlines=outlines, normal=-self.normal, level=-self.level - self.gap)
+
+
+def parallel(one: Array, other: Array) -> bool:
+    """Whether two unit vectors are parallel or opposite."""
+    return bool(np.linalg.norm(np.cross(one, other)) < ANGLE)
+
+
+class Groups:
+    """Bodies that move together: each by the name of the first of them."""
+
+    def __init__(self, draft: Draft) -> None:
+        self.draft, self.leader = draft, {name: name for name in draft.bodies}
+
+    def __call__(self, name: str) -> str:
+        while self.leader[name] != name:
+            name = self.leader[name]
+        return name
+
+    def weld(self, one: str, other: str, comment: str) -> None:
+        """Make two bodies one."""
+        first, second = self(one), self(other)
+        if second == self(self.draft.ground) if self.draft.ground else False:
+            first, second = second, first
+        self.leader[second] = first
+        name = free_name(f"fixed {one} {other}", self.draft.pairs)
+        self.draft.pairs[name] = Pair(name, "fixed", (first, second), np.zeros(3), comments=[comment])
+        self.draft.bodies[other].comments.append(comment)
+
+    def bodies(self) -> list[str]:
+        """The first of each group."""
+        return list(dict.fromkeys(self(name) for name in self.leader))
+
+
+def joined(draft: Draft, faces: dict[str, list[Face]], gap: float) -> None:
+    """Add the pairs between the bodies of a draft, found by their faces.
+
+    Parameters
+    ----------
+    draft : gets the pairs and the findings. faces : of every body, in the global frame.
+    gap : greatest difference of the radii of a pin and its hole, and distance of facing planes, m.
+    """
+    groups = Groups(draft)
+    rounds = {kind: _rounds(faces, kind) for kind in ("cylinder", "sphere")}
+    contacts = _contacts(draft, groups, rounds["cylinder"], gap)
+    balls = _contacts(draft, groups, rounds["sphere"], gap)
+    facings = list(_facings(faces, gap))
+    held = _Held(draft, groups, contacts, balls, facings)
+    held.patterns(rounds["cylinder"])
+    while held.step():
+        pass
+    held.unconnected()
+    held.pairs()
+
+
+def loose_contacts(faces: dict[str, list[Face]], gap: float) -> int:
+    """Number of pins with play between solids."""
+    draft = Draft(bodies={name: Body(name) for name in faces})
+    contacts = _contacts(draft, Groups(draft), _rounds(faces, "cylinder"), gap)
+    return sum(contact.play > NEAR for contact in contacts)
+
+
+# ---- features -------------------------------------------------------------------------------------------------
+
+
+def _rounds(faces: dict[str, list[Face]], kind: str) -> list[Round]:
+    """Pins and holes, or balls and sockets, of all bodies; faces that are parts of the same are united."""
+    rounds: list[Round] = []
+    for body, all_faces in faces.items():
+        pieces = []
+        for face in (face for face in all_faces if face.kind == kind):
+            axis = face.axis * np.sign(face.axis[int(np.argmax(abs(face.axis)))])
+            along = (face.outline - face.origin) @ axis if len(face.outline) else np.array([0.0])
+            spread = (float(along.min()), float(along.max())) if kind == "cylinder" else (0.0, 0.0)
+            pieces.append(
+                Round(body, face.origin, axis, face.radius, *spread, not face.outward, face.area, (face.number,))
+            )
+        while pieces:
+            piece = pieces.pop()
+            for other in [*pieces]:
+                united = _united(piece, other, kind)
+                if united is not None:
+                    pieces.remove(other)
+                    pieces.append(united)
+                    break
+            else:
+                length = piece.high - piece.low
+                full = 2 * math.pi * piece.radius * (length if kind == "cylinder" else 2 * piece.radius)
+                if full > 0:
+                    rounds.append(replace(piece, covered=piece.covered / full, faces=tuple(sorted(piece.faces))))
+    return rounds
+
+
+def _united(one: Round, other: Round, kind: str) -> Round | None:
+    """Two pieces of the same cylinder or ball as one; None if they are of different ones."""
+    off = other.point - one.point
+    if one.hole != other.hole or abs(one.radius - other.radius) > 1e-7 * one.radius:
+        return None
+    area, faces = one.covered + other.covered, one.faces + other.faces
+    if kind == "sphere":
+        return replace(one, covered=area, faces=faces) if np.linalg.norm(off) < NEAR else None
+    shift = float(off @ one.axis)
+    if not parallel(one.axis, other.axis) or np.linalg.norm(off - shift * one.axis) > NEAR:
+        return None
+    low, high = other.low + shift, other.high + shift
+    if low > one.high + NEAR or high < one.low - NEAR:
+        return None
+    return replace(one, low=min(low, one.low), high=max(high, one.high), covered=area, faces=faces)
+
+
+def _contacts(draft: Draft, groups: Groups, rounds: Sequence[Round], gap: float) -> list[Contact]:
+    """Pins in holes of other bodies; doubtful ones are findings, pressed ones are welded."""
+    holes = [item for item in rounds if item.hole]
+    contacts: list[Contact] = []
+    doubts: list[Contact] = []
+    for pin in (item for item in rounds if not item.hole and item.covered >= COVERED[0]):
+        for hole in (hole for hole in holes if hole.body != pin.body and hole.covered >= COVERED[1]):
+            contact, play = _overlap(pin, hole), hole.radius - pin.radius
+            if contact is None or play > ALIKE * gap:
+                continue
+            if hole.covered < COVERED[0]:
+                if -NEAR <= play <= gap:
+                    what = f"{hole.label} covers only half of {pin.label}: no joint is made of it"
+                    draft.warn("half", f"links.{hole.body}", what, "add the joint to the model file if it is one")
+            elif contact.play >= 0:
+                (contacts if play <= gap else doubts).append(contact)
+            elif -play <= max(gap, THREAD * pin.radius):
+                what = f"{pin.label} is larger than {hole.label}: pressed or threaded, the two parts are fixed"
+                draft.warn("interference", f"links.{pin.body}", what, "draw the play if they turn", play=play)
+                if groups(pin.body) != groups(hole.body):
+                    groups.weld(hole.body, pin.body, f"{pin.body} is pressed or threaded into {hole.body}")
+            else:
+                doubts.append(contact)
+    met = {frozenset((contact.pin.body, contact.hole.body)) for contact in contacts}
+    for contact in doubts:
+        pin, hole = contact.pin, contact.hole
+        if frozenset((pin.body, hole.body)) not in met and groups(pin.body) != groups(hole.body):
+            size = 1e3 * contact.play
+            what = f"{pin.label} lies in {hole.label} with a gap of {size:.6g} mm on the radius: no joint is made of it"
+            if size < 0:
+                what = f"{pin.label} runs through the smaller {hole.label}: no joint is made of it"
+            draft.warn("gap", f"links.{pin.body}", what, "a larger --gap makes one", gap=contact.play)
+    return contacts
+
+
+def _overlap(pin: Round, hole: Round) -> Contact | None:
+    """Where a pin lies in a hole around the same axis, or a ball in a socket around the same centre."""
+    play = abs(hole.radius - pin.radius)
+    if pin.low == pin.high:  # balls
+        return Contact(pin, hole, 0.0, 0.0) if np.linalg.norm(pin.point - hole.point) <= play + NEAR else None
+    if not parallel(pin.axis, hole.axis):
+        return None
+    off = pin.point - hole.point
+    shift, sign = float(off @ hole.axis), float(np.sign(pin.axis @ hole.axis))
+    ends = sorted((shift + sign * pin.low, shift + sign * pin.high))
+    low, high = max(ends[0], hole.low), min(ends[1], hole.high)
+    if high - low < NEAR or np.linalg.norm(off - shift * hole.axis) > play + NEAR:
+        return None
+    return Contact(pin, hole, low, high)
+
+
+def _facings(faces: dict[str, list[Face]], gap: float) -> Iterator[Facing]:
+    """Flat faces of different bodies that look at each other across at most the gap and overlap."""
+    planes = []
+    for body, all_faces in faces.items():
+        for face in (face for face in all_faces if face.kind == "plane" and len(face.outline)):
+            normal = face.axis if face.outward else -face.axis
+            planes.append((body, normal, float(face.outline[0] @ normal), face.outline))
+    if not planes:
+        return
+    normals, levels = np.array([plane[1] for plane in planes]), np.array([plane[2] for plane in planes])
+    for index, (body, normal, level, outline) in enumerate(planes):
+        distance = -levels - level
+        near = (normals @ normal < -1 + ANGLE**2) & (distance >= -NEAR) & (distance <= gap)
+        for other in np.nonzero(near[index + 1 :])[0] + index + 1:
+            if planes[other][0] == body:
+                continue
+            frame = _tight(outline, normal)
+            one, two = (points @ frame[:2].T for points in (outline, planes[other][3]))
+            low, high = np.maximum(one.min(axis=0), two.min(axis=0)), np.minimum(one.max(axis=0), two.max(axis=0))
+            if (high - low > NEAR).all():
+                flat = np.array([(a, b) for a in (low[0], high[0]) for b in (low[1], high[1])]) @ frame[:2]
+                corners = flat + (level + distance[other] / 2) * normal
+                outlines = outline, planes[other][3]
+                yield Facing((body, planes[other][0]), outlines, normal, level, float(distance[other]), corners)
+
+
+def _tight(outline: Array, normal: Array) -> Array:
+    """Rows x, y and normal of the frame whose axes run along an edge of a flat face, with the least box around it."""
+    x = np.diff(outline[:: max(1, len(outline) // 200)], axis=0)
+    x = np.vstack([perpendicular(normal), x[np.linalg.norm(x, axis=1) > NEAR]])
+    x = x - np.outer(x @ normal, normal)
+    x /= np.linalg.norm(x, axis=1)[:, None]
+    y = np.cross(normal, x)
+    best = int(np.argmin(np.ptp(outline @ x.T, axis=0) * np.ptp(outline @ y.T, axis=0)))
+    return np.array([x[best], y[best], normal])
+
+
+# ---- what the contacts mean -----------------------------------------------------------------------------------
+
+
+class _Held:
+    """The contacts of all bodies, and what they leave free."""
+
+    def __init__(
+        self, draft: Draft, groups: Groups, contacts: list[Contact], balls: list[Contact], facings: list[Facing]
+    ) -> None:
+        self.draft, self.groups, self.contacts, self.balls, self.facings = draft, groups, contacts, balls, facings
+        self._ends: dict[tuple[str, str], list[Facing]] = defaultdict(list)
+        self.plane = self._plane()
+
+    def _plane(self) -> Array | None:
+        """The normal of a plane that the mechanism may move in: two pins on it, all others along or across it."""
+        if self.balls or not self.contacts:
+            return None
+        for contact in self.contacts:
+            normal = contact.hole.axis
+            along = [other for other in self.contacts if parallel(other.hole.axis, normal)]
+            across = [other for other in self.contacts if abs(other.hole.axis @ normal) < ANGLE]
+            several = any(not contact.on_line_of(other) for other in along)
+            if several and len(along) + len(across) == len(self.contacts):
+                return normal
+        return None
+
+    def between(self) -> dict[tuple[str, str], list[Contact]]:
+        """Contacts of pins by the two bodies that they join."""
+        found: dict[tuple[str, str], list[Contact]] = defaultdict(list)
+        for contact in self.contacts:
+            one, other = sorted((self.groups(contact.hole.body), self.groups(contact.pin.body)))
+            if one != other:
+                found[one, other].append(contact)
+        return found
+
+    def ends(self, one: str, other: str) -> list[Facing]:
+        """Facing planes of two bodies, seen from the first."""
+        if not self._ends:
+            for facing in self.facings:
+                first, second = map(self.groups, facing.bodies)
+                if first != second:
+                    self._ends[first, second].append(facing)
+                    self._ends[second, first].append(facing.back)
+        return self._ends.get((one, other), [])
+
+    def weld(self, one: str, other: str, comment: str) -> None:
+        """Make two bodies one."""
+        self.groups.weld(one, other, comment)
+        self._ends.clear()
+
+    def stops(self, one: str, other: str, axis: Array) -> int:
+        """In how many of the two directions along an axis end faces hold two bodies."""
+        along = [facing.normal @ axis for facing in self.ends(one, other)]
+        return int(any(part > 1 - ANGLE for part in along)) + int(any(part < -1 + ANGLE for part in along))
+
+    def step(self) -> bool:
+        """Make two bodies one that cannot move against each other; False if there are none left."""
+        return self._bolted() or self._twins() or self._loose()
+
+    def patterns(self, rounds: Sequence[Round]) -> None:
+        """Bodies that touch where two holes of each lie on the same axes are bolted to each other."""
+        holes: dict[str, list[Round]] = defaultdict(list)
+        for item in rounds:
+            if item.hole and item.covered > COVERED[0]:
+                holes[item.body].append(item)
+        for facing in (facing for facing in self.facings if facing.gap <= NEAR):
+            one, other = facing.bodies
+            lines: list[Contact] = []
+            for first in (hole for hole in holes[one] if parallel(hole.axis, facing.normal)):
+                for second in holes[other]:
+                    line = Contact(first, second, 0.0, 0.0)
+                    aligned = parallel(first.axis, second.axis) and _eccentricity(line) < NEAR
+                    if aligned and not any(line.on_line_of(item) for item in lines):
+                        lines.append(line)
+            if len(lines) > 1 and self.groups(one) != self.groups(other):
+                what = f"{one} and {other} touch, and {len(lines)} holes of each lie on the same axes: fixed"
+                self.draft.note("bolted", f"links.{other}", what, "draw the pins if they move")
+                self.weld(one, other, what)
+
+    def _bolted(self) -> bool:
+        """Two bodies with pins on two axes do not turn; if planes touch or the axes cross they do not slide."""
+        for (one, other), contacts in self.between().items():
+            second = next((item for item in contacts if not item.on_line_of(contacts[0])), None)
+            if second is None:
+                continue
+            axis = contacts[0].hole.axis
+            if not parallel(axis, second.hole.axis) or self.stops(one, other, axis):
+                what = f"{one} and {other} are fixed to each other: pins on several axes join them"
+                self.draft.note("bolted", f"links.{other}", what)
+                self.weld(one, other, what)
+                return True
+        return False
+
+    def _twins(self) -> bool:
+        """Two bodies on the same two axes move as one, such as the two side plates of a link."""
+        lines: dict[str, list[Contact]] = defaultdict(list)
+        for (one, other), contacts in self.between().items():
+            for contact in contacts:
+                for body in (one, other):
+                    if not any(contact.on_line_of(line) for line in lines[body]):
+                        lines[body].append(contact)
+        for one, other in combinations(lines, 2):
+            shared = [line for line in lines[one] if any(line.on_line_of(item) for item in lines[other])]
+            if len(shared) > 1 and tuple(sorted((one, other))) not in self.between():
+                what = f"{one} and {other} turn about the same axes and are one link"
+                self.draft.note("twins", f"links.{one}", what, "")
+                self.weld(one, other, what)
+                return True
+        return False
+
+    def _loose(self) -> bool:
+        """A pin or sleeve whose contacts all lie on its axis spins without effect: it is fixed where its play is least."""
+        between = self.between()
+        for body in self.groups.bodies():
+            mine = {pair: contacts for pair, contacts in between.items() if body in pair}
+            first = next(iter(mine.values()), [None])[0]
+            if first is None or len(between) == 1 or body == self.draft.ground or not self._centred(body, first):
+                continue
+            aligned = all(first.on_line_of(contact) for contacts in mine.values() for contact in contacts)
+            ball = any(body in map(self.groups, (item.pin.body, item.hole.body)) for item in self.balls)
+            others = (other for other in self.groups.bodies() if other != body)
+            guided = any(tuple(sorted((body, other))) not in mine and self._walls(body, other) for other in others)
+            if not aligned or ball or guided:
+                continue
+            plays = {pair: min(contact.play for contact in contacts) for pair, contacts in mine.items()}
+            tightest = min(plays, key=lambda pair: plays[pair])
+            holder = next(name for name in tightest if name != body)
+            what = f"{body} turns only about its own axis: it is taken as fixed in {holder}"
+            what += ", where its play is least" if len(mine) > 1 else ""
+            note = self.draft.warn if len(mine) == 1 else self.draft.note
+            note("loose", f"links.{body}", what, "draw less play where it is held" if len(mine) > 1 else "")
+            self.weld(holder, body, what)
+            return True
+        return False
+
+    def _centred(self, body: str, contact: Contact) -> bool:
+        """Whether the mass centre of a body lies on the axis of a contact."""
+        parts = [part for name, part in self.draft.bodies.items() if self.groups(name) == body]
+        mass = sum(part.mass for part in parts)
+        centre = sum(part.mass * part.centre for part in parts) / mass if mass else parts[0].centre
+        off = centre - contact.hole.point
+        across = off - (off @ contact.hole.axis) * contact.hole.axis
+        return bool(np.linalg.norm(across) <= contact.play + 1e-3 * contact.hole.radius)
+
+    def _walls(self, one: str, other: str) -> list[tuple[Facing, Facing]]:
+        """Opposite walls that hold two bodies, for independent directions, seen from the first."""
+        walls: list[tuple[Facing, Facing]] = []
+        for front, back in combinations(self.ends(one, other), 2):
+            if front.normal @ back.normal < -1 + ANGLE**2:
+                normals = [*(wall[0].normal for wall in walls), front.normal]
+                if np.linalg.matrix_rank(np.array(normals), tol=ANGLE) == len(normals):
+                    walls.append((front, back))
+        return walls
+
+    def unconnected(self) -> None:
+        """What no joint connects with the rest is fixed to what it touches, or left out."""
+        while True:
+            bodies = self.groups.bodies()
+            links = {body: {body} for body in bodies}
+            near = [tuple(map(self.groups, (item.pin.body, item.hole.body))) for item in (*self.contacts, *self.balls)]
+            near += [pair for pair in combinations(bodies, 2) if self._walls(*pair)]
+            for one, other in near:
+                if links[one] is not links[other]:
+                    united = links[one] | links[other]
+                    links.update(dict.fromkeys(united, united))
+            main = links[self.groups(self.draft.ground)] if self.draft.ground else max(links.values(), key=len)
+            apart = [body for body in bodies if body not in main]
+            touching = [
+                (self.groups(facing.bodies[0]), self.groups(facing.bodies[1]))
+                for facing in self.facings
+                if facing.gap <= NEAR and len(main & {self.groups(body) for body in facing.bodies}) == 1
+            ]
+            if not apart or not touching:
+                break
+            one, other = touching[0] if touching[0][0] in main else touching[0][::-1]
+            what = f"{other} has no joint with the rest, and touches {one}: it is taken as fixed to it"
+            self.draft.warn("touching", f"links.{other}", what, "draw the pin if it moves")
+            self.weld(one, other, what)
+        for body in apart if len(main) > 1 else []:
+            what = f"{body} has no joint with the rest and is left out"
+            self.draft.warn("unconnected", f"links.{body}", what, "draw the pin in its hole, or a larger --gap")
+            for name in [name for name in self.draft.bodies if self.groups(name) == body]:
+                del self.draft.bodies[name]
+        names = set(self.draft.bodies)
+        self.draft.pairs = {name: pair for name, pair in self.draft.pairs.items() if set(pair.links) <= names}
+        self.contacts = [item for item in self.contacts if {item.pin.body, item.hole.body} <= names]
+        self.balls = [item for item in self.balls if {item.pin.body, item.hole.body} <= names]
+        self.groups.leader = {name: lead for name, lead in self.groups.leader.items() if name in names}
+
+    # ---- pairs -------------------------------------------------------------------------------------------------
+
+    def pairs(self) -> None:
+        """Add the pairs of all bodies that touch and move against each other."""
+        between = self.between()
+        for (one, other), contacts in between.items():
+            self._add(self._turning(one, other, contacts))
+        for ball in self.balls:
+            if self.groups(ball.pin.body) != self.groups(ball.hole.body):
+                self._add(replace(_pair("spherical", [ball]), at=ball.hole.point, length=None))
+        for one, other in combinations(self.groups.bodies(), 2):
+            if (one, other) not in between and (other, one) not in between:
+                walls = self._walls(one, other)
+                if walls:
+                    self._sliding(one, other, walls)
+
+    def _add(self, pair: Pair) -> None:
+        letters = (f"{chr(65 + n % 26)}{n // 26 or ''}" for n in range(26 * 1000))
+        pair.name = next(name for name in letters if name not in self.draft.pairs and name not in self.draft.bodies)
+        self.draft.pairs[pair.name] = pair
+
+    def _turning(self, one: str, other: str, contacts: list[Contact]) -> Pair:
+        """The pair of pins on one axis, or on several parallel ones that only slide."""
+        axis = contacts[0].hole.axis
+        stops = self.stops(one, other, axis)
+        if any(not contacts[0].on_line_of(contact) for contact in contacts):
+            pair = _pair("prismatic", contacts)
+            pair.comments.append("pins on several parallel axes, and no end faces along them: it slides")
+        elif self.plane is not None and abs(axis @ self.plane) < ANGLE:
+            pair = _pair("prismatic", contacts)
+            pair.comments.append("its axis lies in the plane of the mechanism: it slides")
+        else:
+            pair = _pair("revolute" if stops == 2 or self.plane is not None else "cylindrical", contacts)
+            if stops < 2:
+                pair.comments.append(f"end faces hold it in {('neither direction', 'one direction only')[stops]}")
+        sizes = {round(contact.pin.radius / NEAR) for contact in contacts}
+        plays = {round(contact.play / 1e-9) for contact in contacts}
+        if len(sizes) > 1 or len(plays) > 1:
+            what = f"has {len(contacts)} bearings of different sizes; the joint has those of the longest"
+            self.draft.warn("bearings", f"joints.{one}-{other}", what, "see the comments of the joint")
+        if stops == 1 and pair.type == "cylindrical":
+            what = f"the pin between {one} and {other} is held in one direction only: the joint is cylindrical"
+            self.draft.warn("stops", f"links.{other}", what, "make it revolute if a load or a ring holds it")
+        apart = max(_eccentricity(contact) for contact in contacts)
+        if apart > NEAR:
+            what = (
+                f"pin and hole between {one} and {other} are drawn {1e3 * apart:.3g} mm apart; the joint is at the hole"
+            )
+            self.draft.note("eccentric", f"links.{other}", what, "draw them on one axis", distance=apart)
+        return pair
+
+    def _sliding(self, one: str, other: str, walls: list[tuple[Facing, Facing]]) -> None:
+        """The pair of bodies that flat walls guide."""
+        normals = np.array([wall[0].normal for wall in walls])
+        comment = "; ".join(
+            f"walls {1e3 * abs(a.level + b.level):.9g} mm apart, play {1e3 * (a.gap + b.gap):.6g} mm" for a, b in walls
+        )
+        if len(walls) == 1 and self.plane is not None and parallel(normals[0], self.plane):
+            return  # the plates of a plane mechanism lie against each other
+        if len(walls) > 2:
+            what = f"{one} and {other} hold each other in all directions: they are taken as fixed"
+            self.draft.warn("fixed", f"links.{other}", what, "draw the play if they move")
+            self.weld(one, other, what)
+            return
+        middle = np.mean([facing.corners for facing in walls[0]], axis=(0, 1))
+        if len(walls) == 1 and self.plane is None:
+            self._add(Pair("", "planar", (one, other), middle, normals[0], comments=[comment]))
+            return
+        plane = np.zeros(3) if self.plane is None else self.plane
+        axis = np.cross(normals[0], normals[1] if len(walls) == 2 else plane)
+        axis = axis / np.linalg.norm(axis)
+        front, back = min(walls, key=lambda wall: abs(float(wall[0].normal @ plane)))
+        width, play = front.level + back.level, front.gap + back.gap  # a width below 0: the first body is outside
+        half = width / 2 if width > 0 else -(width + play) / 2
+        along = np.concatenate([face.corners for face in (front, back)]) @ axis
+        reach = [np.ptp(outline @ axis) for outline in front.outlines]
+        links = (other, one) if reach[0] <= reach[1] else (one, other)  # the second carries the bearing along
+        middle = np.mean([front.corners, back.corners], axis=(0, 1))
+        self._add(
+            Pair(
+                "",
+                "prismatic",
+                links,
+                middle,
+                axis,
+                None,
+                half,
+                half + play / 2,
+                float(np.ptp(along)),
+                comments=[comment],
+            )
+        )
+
+
+def _pair(kind: str, contacts: list[Contact]) -> Pair:
+    """A pair of pins on one axis: sizes of its longest bearing, length from the first end to the last."""
+    main = max(contacts, key=lambda contact: contact.high - contact.low)
+    axis = main.hole.axis
+    ends = []
+    for contact in contacts:
+        shift = float((contact.hole.point - main.hole.point) @ axis)
+        sign = float(np.sign(contact.hole.axis @ axis))
+        ends += [shift + sign * contact.low, shift + sign * contact.high]
+    links = main.pin.body, main.hole.body
+    if kind != "revolute" and main.pin.high - main.pin.low < main.hole.high - main.hole.low:
+        links = links[::-1]  # the second carries the bearing along
+    pair = Pair("", kind, links, main.hole.point + (min(ends) + max(ends)) / 2 * axis, axis)
+    pair.pin_radius, pair.hole_radius, pair.length = main.pin.radius, main.hole.radius, max(ends) - min(ends)
+    if main.play == 0:
+        pair.hole_radius = pair.pin_radius
+    for contact in contacts:
+        over = f", over {1e3 * (contact.high - contact.low):.9g} mm" if contact.high > contact.low else ""
+        pair.comments.append(f"{contact.pin.label} in {contact.hole.label}{over}")
+    if kind in ("revolute", "cylindrical"):
+        pair.comments.append(_nearest_fit(main))
+    return pair
+
+
+def _eccentricity(contact: Contact) -> float:
+    """Distance of a pin's axis from its hole's, m."""
+    off = contact.pin.point - contact.hole.point
+    return float(np.linalg.norm(off - (off @ contact.hole.axis) * contact.hole.axis))
+
+
+def _nearest_fit(contact: Contact) -> str:
+    """The usual fit whose mean play is nearest to that drawn, in words."""
+    size = round(2e3 * contact.hole.radius, 1) * 1e-3
+    try:
+        fits = {name: fit(size, *name.split("/")) for name in FITS}
+    except MechanismError:
+        return "no ISO fit for its size"
+    play = 2 * contact.play
+    name = min(fits, key=lambda name: abs(fits[name].mean - play))
+    drawn = "no play is drawn" if play == 0 else f"play {1e6 * play:.4g} µm on the diameter"
+    span = f"{1e6 * fits[name].minimum:.4g} to {1e6 * fits[name].maximum:.4g} µm"
+    return f"{drawn}; nearest usual fit: {1e3 * size:.6g} mm {name}, {span}"

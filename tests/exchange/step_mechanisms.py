@@ -57,3 +57,62 @@ def slider_crank(angle=math.pi / 3, split="seam"):
         "rod": (rod, turn(z, lean), pin),
         "slider": (slider, np.eye(3), np.array([x, 0, 0])),
     }
+
+
+def four_bar(angle=math.pi / 3, split="seam"):
+    """Ground 100 mm, crank 30, coupler 90, rocker 70; four loose pins of one part."""
+    ground = bar(100, [(0, 10.04), (100, 10.04)], -10, 0, split=split)
+    crank = bar(30, [(0, 10.02), (30, 10.05)], 0, 10, 8, split)
+    coupler = bar(90, [(0, 10.03), (90, 10.03)], 10, 20, 8, split)
+    rocker = bar(70, [(0, 10.02), (70, 10.06)], 0, 10, 8, split)
+    pin = turned([(0, 0), (5, 0), (5, 20), (0, 20)], split=split)
+    b = 30 * np.array([math.cos(angle), math.sin(angle)])
+    to_d = np.array([100, 0]) - b
+    far = float(np.linalg.norm(to_d))
+    lean = math.atan2(to_d[1], to_d[0]) + math.acos((90**2 + far**2 - 70**2) / (2 * 90 * far))
+    c = b + 90 * np.array([math.cos(lean), math.sin(lean)])
+    swing = math.atan2(c[1], c[0] - 100)
+    z = (0, 0, 1)
+    at = {"pin": (0, 0, -10), "pin-2": (*b, 0), "pin-3": (*c, 0), "pin-4": (100, 0, -10)}
+    links = {
+        "ground": (ground, *STILL),
+        "crank": (crank, turn(z, angle), np.zeros(3)),
+        "coupler": (coupler, turn(z, lean), np.array([*b, 0])),
+        "rocker": (rocker, turn(z, swing), np.array([100, 0, 0])),
+    }
+    return links | {name: (pin, np.eye(3), np.array(place, float)) for name, place in at.items()}
+
+
+SHAFTS = math.pi / 6  # angle between the shafts of the Cardan joint
+
+
+def cardan(split="seam"):
+    """Two forks and a cross, drawn with the pin of the first fork normal to the plane of the shafts, z."""
+    c, s = math.cos(SHAFTS), math.sin(SHAFTS)
+    along, across = np.array([c, s]), np.array([-s, c])
+    wall = [along * a + across * b for a, b in ((60, -90), (60, 40), (40, 40), (40, -60))]
+    outline = [(-60, -90), *wall, (-40, -60), (-40, 40), (-60, 40)]
+    frame = prism(outline, -30, 30, split)
+    frame.feature(5, (-40, 0, 0), [(10.02, 0), (10.02, -20)], 7)
+    frame.feature(3, (*(40 * along), 0), [(10.03, 0), (10.03, -20)], 1)
+
+    def fork(shaft):
+        outline = [(-23, -30), (23, -30), (23, 10), (15, 10), (15, -22), (-15, -22), (-15, 10), (-23, 10)]
+        shape = prism(outline, -8, 8, split)
+        shape.feature(1, (23, 0, 0), [(5.01, 0), (5.01, -8)], 3).feature(7, (-23, 0, 0), [(5.01, 0), (5.01, -8)], 5)
+        return shape.feature(0, (0, -30, 0), shaft)
+
+    held = [(14, 0), (14, 10), (10, 10), (10, 30), (14, 30), (14, 35), (0, 35)]
+    plain = [(14, 0), (14, 9), (10, 9), (10, 40), (0, 40)]
+    cross = box((-9, -9, -9), (9, 9, 9), split)
+    for face, x, y in ((0, 0, -9), (1, 9, 0), (2, 0, 9), (3, -9, 0)):
+        boss(cross, face, (x, y, 0), 10, 14)
+    z, x, second = np.array([0.0, 0, 1]), np.array([1.0, 0, 0]), np.array([-s, c, 0])
+    out = -np.array([c, s, 0])
+    parts = {
+        "frame": (frame, *STILL),
+        "input": (fork(held), np.column_stack([z, x, np.cross(z, x)]), np.zeros(3)),
+        "cross": (cross, np.column_stack([z, second, np.cross(z, second)]), np.zeros(3)),
+        "output": (fork(plain), np.column_stack([second, out, np.cross(second, out)]), np.zeros(3)),
+    }
+    return parts

@@ -48,7 +48,7 @@ def copied(folder: Path) -> Path:
 def run_tests(sources: Path, tests: Sequence[str]) -> int:
     """Exit status of pytest on the tests, with the package of a copy; that of a failure where it does not end."""
     told = {"PYTHONPATH": str(sources), "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", "-m", "not slow", *tests]
+    command = [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", *tests]
     try:
         ran = subprocess.run(
             command, cwd=ROOT, env={**os.environ, **told}, capture_output=True, timeout=LONGEST, check=False

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from trunnion import dual as dual
-    from trunnion import rig
+    from trunnion import exchange, rig
     from trunnion.cycle.analyse import analyse
     from trunnion.cycle.inspect import check
     from trunnion.cycle.locking import locking
@@ -54,7 +54,7 @@ _PLACES = {
     "tolerance": ("trunnion.studies.tolerance.study", "tolerance"),
 }
 _RESULTS = {"analyse", "assemble", "allocate", "locking", "play", "simulate", "sweep", "tolerance"}
-_MODULES = {"dual": "trunnion.dual", "rig": "trunnion.rig"}
+_MODULES = {"dual": "trunnion.dual", "exchange": "trunnion.exchange", "rig": "trunnion.rig"}
 
 __all__ = [
     "FrictionMethod",
@@ -66,6 +66,7 @@ __all__ = [
     "assemble",
     "check",
     "design",
+    "exchange",
     "locking",
     "play",
     "plot",

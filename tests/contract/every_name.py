@@ -47,6 +47,16 @@ def studies(mechanism: trunnion.Mechanism) -> list[xr.Dataset]:
     ]
 
 
+def exchange(mechanism: trunnion.Mechanism, step: Path) -> str:
+    """Files of other programs."""
+    draft: trunnion.exchange.Draft = trunnion.exchange.import_file(step, ground="frame", material="aluminium")
+    bodies: list[trunnion.exchange.Body] = list(draft.bodies.values())
+    pairs: list[trunnion.exchange.Pair] = list(draft.pairs.values())
+    lost = trunnion.exchange.export_model(mechanism, step.with_suffix(".xml"), at="60 deg", frames=12)
+    print(bodies, pairs, lost, sorted(trunnion.exchange.FORMATS))
+    return trunnion.exchange.model_text(draft)
+
+
 def rig(mechanism: trunnion.Mechanism, plan: Path, mapping: Path) -> tuple[xr.Dataset, xr.Dataset]:
     """Measured data."""
     seen: trunnion.rig.Observation = trunnion.rig.observe(mechanism, plan, seed=2)

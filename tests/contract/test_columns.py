@@ -35,6 +35,7 @@ def names(result: xr.Dataset, *wanted: str) -> list[str]:
     return [name for name, _, _ in selected(result, wanted or None)]
 
 
+@pytest.mark.slow
 def test_without_a_wish_the_columns_are_the_usual_ones(result: xr.Dataset) -> None:
     assert names(result) == names(result, "usual") == [name for name, _, _ in columns(result)]
 

@@ -34,6 +34,7 @@ def test_every_code_is_written_out() -> None:
         assert re.fullmatch(r"[a-z_]+\.[a-z_]+", str(code.value)), code.value
 
 
+@pytest.mark.slow
 def test_no_sentence_ends_with_a_full_stop() -> None:
     for path in sorted(Path(trunnion.__file__).parent.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):

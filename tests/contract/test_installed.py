@@ -48,7 +48,8 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_script_has_every_public_name() -> None:
     text = SCRIPT.read_text("utf-8")
-    names = [f"trunnion.{name}" for name in trunnion.__all__ if name != "rig"]
+    names = [f"trunnion.{name}" for name in trunnion.__all__ if name not in ("exchange", "rig")]
+    names += [f"trunnion.exchange.{name}" for name in trunnion.exchange.__all__]
     names += [f"trunnion.rig.{name}" for name in trunnion.rig.__all__]
     assert [name for name in names if not re.search(rf"\b{re.escape(name)}\b", text)] == []
 

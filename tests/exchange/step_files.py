@@ -236,8 +236,8 @@ def _swept(split, origin, frame, start, end, centre):
 class StepFile:
     """Lines of a STEP file; `part` and `assembly` add products, `write` writes it."""
 
-    def __init__(self, unit="mm", degrees=False):
-        self.lines, self.unit = [], unit
+    def __init__(self, unit="mm", degrees=False, splines=False):
+        self.lines, self.unit, self.splines = [], unit, splines
         self.application = self("APPLICATION_CONTEXT('automotive design')")
         self.product_context = self(f"PRODUCT_CONTEXT('',#{self.application},'mechanical')")
         self.definition_context = self(f"PRODUCT_DEFINITION_CONTEXT('part definition',#{self.application},'design')")
@@ -275,6 +275,19 @@ class StepFile:
         at, z = self.vector("CARTESIAN_POINT", origin), self.vector("DIRECTION", frame[2])
         return self(f"AXIS2_PLACEMENT_3D('',#{at},#{z},#{self.vector('DIRECTION', frame[0])})")
 
+    def spline_circle(self, centre, axis, start):
+        """A full circle as a rational B-spline of degree 2 with nine poles."""
+        x = start - centre
+        y = np.cross(axis, x)
+        ring = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0)]
+        poles = [self.vector("CARTESIAN_POINT", centre + a * x + b * y) for a, b in ring]
+        weights = ",".join(_real(1 if n % 2 == 0 else math.sqrt(0.5)) for n in range(9))
+        return self(
+            f"(BOUNDED_CURVE()B_SPLINE_CURVE(2,({_list(poles)}),.UNSPECIFIED.,.T.,.F.)"
+            "B_SPLINE_CURVE_WITH_KNOTS((3,2,2,2,3),(0.,0.25,0.5,0.75,1.),.UNSPECIFIED.)CURVE()"
+            f"GEOMETRIC_REPRESENTATION_ITEM()RATIONAL_B_SPLINE_CURVE(({weights}))REPRESENTATION_ITEM(''))"
+        )
+
     def solid(self, shape, name=""):
         """Write a solid; its edges are shared by the two faces that they bound."""
         vertices, edges = {}, {}
@@ -303,7 +316,10 @@ class StepFile:
                     at = self.vector("CARTESIAN_POINT", start)
                     curve = self(f"LINE('',#{at},#{self(f'VECTOR({chr(39) * 2},#{to},1.)')})")
                 else:
-                    curve = self(f"CIRCLE('',#{self.placement(centre, axis, start - centre)},{_real(radius)})")
+                    place = self.placement(centre, axis, start - centre)
+                    curve = self(f"CIRCLE('',#{place},{_real(radius)})")
+                    if self.splines and kind == "circle":
+                        curve = self.spline_circle(centre, axis, start)
                 edges[key] = self(f"EDGE_CURVE('',#{vertex(start)},#{vertex(end)},#{curve},.T.)")
                 edges[key, "start"] = vertex(start), None if kind == "line" else np.array(axis)
             else:
@@ -318,6 +334,7 @@ class StepFile:
                 sizes[1] = math.degrees(sizes[1])
             bounds = []
             for number, loop in enumerate(face["loops"]):
+                loop = [part for item in loop for part in _halves(item, shape.split)]
                 made = self(f"EDGE_LOOP('',({','.join(f'#{oriented(item)}' for item in loop)}))")
                 bounds.append(self(f"FACE_{'OUTER_' if number == 0 else ''}BOUND('',#{made},.T.)"))
             numbers = "".join(f",{_real(size)}" for size in sizes)
@@ -379,6 +396,15 @@ def _list(numbers):
 
 def _unit(vector):
     return vector / np.linalg.norm(vector)
+
+
+def _halves(item, split):
+    """A circle as two arcs where cylinders are written in two halves."""
+    if item[0] != "circle" or split != "halves":
+        return [item]
+    _, centre, axis, radius, start, _ = item
+    far = 2 * centre - start
+    return [("arc", centre, axis, radius, start, far), ("arc", centre, axis, radius, far, start)]
 
 
 def _circle(origin, axis, radius, level, sign):

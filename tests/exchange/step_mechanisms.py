@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from exchange.step_files import StepFile, box, prism, turn
+from exchange.step_files import StepFile, box, prism, turn, turned
 
 STILL = (np.eye(3), np.zeros(3))
 

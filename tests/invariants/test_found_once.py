@@ -71,6 +71,7 @@ def test_errors_of_changed_numbers_are_found_among_these_alone(change: dict[str,
     assert bool(own) == any(change is one for one in WRONG)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rssr", "double-butterfly", "open"])
 def test_wide_steps_along_a_branch_come_to_what_narrow_ones_do(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # with a longer crank the linkage comes apart on the way

@@ -223,6 +223,7 @@ def test_what_has_no_mass_has_no_acceleration() -> None:
     assert caught.value.findings[0].where == "drivers.A"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.0, 0.06])
 def test_a_start_where_no_mass_moves_is_refused(friction: float) -> None:
     """A piston that is the only mass, at its dead centre; not with a rotor, nor beside the dead centre."""
@@ -298,6 +299,7 @@ def test_numbers_without_sense_are_refused(options: dict[str, Any]) -> None:
         simulate(wheel(LINEAR), **options)
 
 
+@pytest.mark.slow
 def test_a_load_that_may_hold_a_joint_stands_beside_rigid_bodies_in_play() -> None:
     """The slider rests until the pin strikes, and the load takes a force times the way."""
     loads = {"drag": {"joint": "S", "resisting_force": 1}}

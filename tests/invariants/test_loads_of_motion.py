@@ -55,6 +55,7 @@ def test_it_is_the_same_in_time() -> None:
     assert np.abs(one["energy_residual"]).max() < 1e-8 * np.abs(one["work_drive"]).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["S.slide_velocity", "piston.Q.velocity_x"])
 def test_a_force_by_a_speed_is_that_of_a_damper(name: str) -> None:
     damped = slider_crank(0.1, loads={}, springs={"oil": {"joint": "S", "damping": 50}})

@@ -40,6 +40,7 @@ def figures(mechanism: Mechanism, steps: int) -> dict[str, tuple[Any, str]]:
     return {one.name: (one.value, one.place) for one in result.trunnion.summary}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("space", ["planar", "spatial"])
 def test_figures_are_of_the_motion_and_not_of_its_rows(space: str) -> None:
     """Extremes between the rows, and what there is at the end of a motion that ends between them."""
@@ -65,6 +66,7 @@ def test_the_figures_at_the_end_are_of_the_end() -> None:
 # ---- ranges -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("space", "first", "compiled"), [("planar", True, True), ("planar", False, False), ("spatial", False, True)]
 )
@@ -186,6 +188,7 @@ def test_what_makes_a_motion_stiff_is_named(space: str, spring: dict[str, float]
     assert any(f"springs.stop.{name} = {spring[name]:.4g}" in cause for cause in figures["causes"])
 
 
+@pytest.mark.slow
 def test_evaluations_suffice_or_the_motion_ends() -> None:
     """Their number is that of the integration: one more than is needed changes nothing."""
     whole = simulate(slider_crank(), 0.05, 5)

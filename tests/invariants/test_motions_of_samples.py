@@ -104,6 +104,7 @@ MOTORS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MOTORS)
 def test_together_as_each_by_itself(name: str) -> None:
     """Every kind of motor, with its own numbers varied, on a slider-crank with friction and a load that resists."""

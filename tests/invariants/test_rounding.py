@@ -97,6 +97,7 @@ def digits(result: Any) -> list[tuple[str, str]]:
 NAMES = ("slider-crank", "inverted", "rssr", "balanced", "balanced rssr", "parallelogram")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "size"), [*zip(NAMES, cycle(SIZES[1:]), strict=False)])
 def test_digits_do_not_depend_on_the_size_of_a_mechanism(name: str, size: tuple[float, float]) -> None:
     data = {

@@ -110,6 +110,7 @@ def test_same_slider_crank_does_not_change_sides() -> None:
     assert np.all(x[beyond] > 0.5 * np.cos(q[beyond]))
 
 
+@pytest.mark.slow
 def test_later_modules_wait_for_earlier_ones() -> None:
     """Where the first dyad is open the second has no numbers either, and the finding names the first."""
     data = MODELS["Watt six-bar"]()
@@ -163,6 +164,7 @@ def test_exactly_at_a_dead_centre(kind: str) -> None:
     assert np.all(np.isfinite(result["drive_effort"].values[:, 1:]))
 
 
+@pytest.mark.slow
 def test_parallelogram_passes_its_change_points() -> None:
     """B, C, D in line at 0 and 180°: SINGULAR there, and the parallel assembly on both sides of them."""
     data = four_bar(0.5, 1.0, 0.5, 1.0)

@@ -17,6 +17,7 @@ def findings(result) -> list[dict[str, str]]:
     return json.loads(result.attrs["findings"])
 
 
+@pytest.mark.slow
 def test_a_change_point_is_told() -> None:
     """A parallelogram goes through a position where it may become an antiparallelogram."""
     data = four_bar(0.3, 1.0, 0.3, 1.0)

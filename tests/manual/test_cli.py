@@ -354,8 +354,8 @@ def test_every_verb_is_found_with_the_options_of_one_read() -> None:
         app.main()
     assert stop.value.code == 2
     for verb in app.VERBS:
-        assert verb.callback is not None
-        words = ["trunnion", verb.callback.__name__, "--help"]
+        assert verb.name is not None
+        words = ["trunnion", verb.name, "--help"]
         with mock.patch.object(sys, "argv", words), pytest.raises(SystemExit) as stop:
             app.main()
         assert not stop.value.code
@@ -370,6 +370,7 @@ def test_help_needs_no_heavy_imports() -> None:
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_an_analysis_on_the_terminal_needs_few_libraries() -> None:
     """What takes as long to load as the analysis itself is loaded for files, figures and reports only.
 
@@ -394,6 +395,7 @@ for model in {models}:
     assert [line for line in done.stdout.splitlines() if line.startswith("loaded")] == ["loaded []"] * len(models)
 
 
+@pytest.mark.slow
 def test_a_study_on_the_terminal_draws_nothing() -> None:
     """Matplotlib is loaded for figures and reports only."""
     studies = [

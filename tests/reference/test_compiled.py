@@ -241,6 +241,7 @@ def test_the_engine_is_chosen_by_size(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [one.figures for one in found.trunnion.findings if one.code == "samples.engine"] == [{"engine": "compiled"}]
 
 
+@pytest.mark.slow
 def test_auto_leaves_to_numpy_what_only_numpy_does(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trunnion.studies.tolerance.kernel, "WORTH_COMPILING", 1)
     data = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml").data()

@@ -294,6 +294,7 @@ def test_few_positions(steps: int) -> None:
     agree(*both(trunnion.read(DURANGO), steps))
 
 
+@pytest.mark.slow
 def test_mechanisms_with_errors_and_without_go_by_programs_of_their_own() -> None:
     """Errors that are 0 in the ideal mechanism are none that its program could have left out of the other's."""
     mechanism = trunnion.read(EXAMPLES / "pezzuti-cardan-as-built.yaml").with_values({"joint_defaults.seat": "free"})

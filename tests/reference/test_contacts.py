@@ -176,6 +176,7 @@ def test_a_rod_that_no_joint_holds() -> None:
     assert np.allclose(force, 0.21 * centre + 0.14 * slider, rtol=1e-7, atol=1e-6 * float(abs(force).max()))
 
 
+@pytest.mark.slow
 def test_a_slider_rests_on_its_guide() -> None:
     """Falls through its play, bounces, and then lies on two corners with the weight that it carries."""
     mechanism = loose_slider()
@@ -189,6 +190,7 @@ def test_a_slider_rests_on_its_guide() -> None:
     assert float(abs(result["energy_residual"]).max()) < 1e-8 * max(1.0, float(abs(result["work_drive"]).max()))
 
 
+@pytest.mark.slow
 def test_less_clearance_gives_the_reactions_without_play() -> None:
     """A pin that a load keeps at its wall: what the reaction differs by falls with the clearance."""
     more: dict[str, Any] = {

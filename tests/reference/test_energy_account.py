@@ -63,6 +63,7 @@ def test_every_example_that_moves_in_time_has_its_account_tested() -> None:
     assert moving == MOVING.keys()
 
 
+@pytest.mark.slow
 def test_a_motion_whose_account_is_off_is_found_again_with_a_finer_tolerance(monkeypatch: pytest.MonkeyPatch) -> None:
     """Coarsened, all that is integrated with 1e-9 is off by more than 1e-8."""
     asked: list[float] = []

@@ -166,6 +166,7 @@ def expression(seed: int) -> Callable[..., Any]:
     return made
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10**9))
 def test_random_expressions(seed: int) -> None:

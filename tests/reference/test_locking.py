@@ -237,6 +237,7 @@ def toward_its_dead_centre() -> Mechanism:
     return build({**data, "assembly": {"B": [0.1, 0.28]}}, friction=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mechanism", "note"),
     [
@@ -253,6 +254,7 @@ def test_efforts_and_reactions_have_no_maximum_where_they_grow_without_bound(mec
         assert (figures[name].value, figures[name].note) == (None, note)
 
 
+@pytest.mark.slow
 def test_efforts_that_come_to_a_limit_where_it_locks_have_a_maximum() -> None:
     mechanism = build(four_bar(), friction=1.0, radius=0.5)
     figures = {figure.name: figure for figure in summary_of(trunnion.analyse(mechanism, 12))}

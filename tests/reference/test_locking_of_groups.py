@@ -83,6 +83,7 @@ def test_joints_of_a_group_without_loads_have_no_critical_multiple() -> None:
         assert np.all(np.isnan(found["critical_multiple"].sel(joint=joint).values[locked]) == unknown)
 
 
+@pytest.mark.slow
 def test_the_compiled_engine_has_the_same_margins() -> None:
     over = {"joint_defaults.friction.coefficient": [0.3, 0.5, 1.2, 2.0]}
     one, other = (sweep(ram(0.4, 400.0), over, steps=STEPS, margin=True, engine=name) for name in ("numpy", "compiled"))

@@ -279,6 +279,7 @@ def swing(by_mass: bool) -> Mechanism:
     return Mechanism(**data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lifted", [lift, swing])
 def test_a_weight_pushes_as_the_same_force_does_stated_as_a_load(lifted: Callable[[bool], Mechanism]) -> None:
     """By `locking`, at every position and between them, and by `analyse`."""

@@ -155,6 +155,7 @@ def test_a_prescribed_cycle_leaves_them_out() -> None:
         trunnion.play(stated(mechanism, joint_defaults={"pin": {"radius": 0.01, "clearance": 1e-5}}), ["one"])
 
 
+@pytest.mark.slow
 def test_tolerances_are_allocated_to_a_limit_of_the_starting_time() -> None:
     """Two tolerances of equal cost per share of what they do to the start: B₁/t₁ + B₂/t₂ with s₁ t₁ + s₂ t₂ = limit.
 

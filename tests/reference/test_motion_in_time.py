@@ -235,6 +235,7 @@ def test_a_mass_on_a_belt_sticks_and_slips() -> None:
     assert np.abs(result["energy_residual"].values).max() < 1e-8 * float(result["work_drive"].values.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clutch", [False, True])
 def test_a_feed_works_on_the_spring_of_a_carriage_at_rest(clutch: bool) -> None:
     """At rest the nut stretches the screw, F₀ + k v t, from 20 N on: its work is ∫ F v dt, all of it in the spring.
@@ -254,6 +255,7 @@ def test_a_feed_works_on_the_spring_of_a_carriage_at_rest(clutch: bool) -> None:
     assert result["work_springs"].values == pytest.approx(-result["work_drive"].values, rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [1e-3, 0.1])
 def test_the_stated_speed_of_a_free_driver_is_nothing_to_its_motion(speed: float) -> None:
     """Its range then lasts another time than that of the prescribed nut, which `analyse` refuses."""
@@ -287,6 +289,7 @@ def test_a_pulled_mass_with_bristles() -> None:
     assert bristles == pytest.approx(1.18168e-5, abs=5e-11)
 
 
+@pytest.mark.slow
 def test_stiff_bristles_take_a_slider_crank_past_its_dead_centre() -> None:
     """At 148.6 ms the integrator first asks far off, where the friction has no solution; a shorter step finds one."""
     law = {
@@ -402,6 +405,7 @@ def test_a_huge_flywheel_runs_as_the_analysis_prescribes() -> None:
     assert misses[0] / misses[1] == pytest.approx(10.0, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_summary_says_how_it_starts() -> None:
     """Of a light crank, which runs steadily after some turns; the starting time is that of longer runs."""
     links = slider_crank().data()["links"]
@@ -459,6 +463,7 @@ def test_a_controller_does_not_wind_up_while_its_limit_holds(gain: float) -> Non
     assert speed[-1] == pytest.approx(100, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", [10.0, -10.0])
 @pytest.mark.parametrize(("proportional", "begin"), [(0.0, 0.0), (0.02, 0.0), (0.02, 40.0), (0.02, -20.0)])
 def test_the_integral_of_a_controller_at_rest(target: float, proportional: float, begin: float) -> None:

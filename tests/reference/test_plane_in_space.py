@@ -134,6 +134,7 @@ def coupled_wheels(third: tuple[float, float], stiffness: dict[str, float] | Non
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("third", [(2.5, 0.0), (1.7, 0.9)])
 def test_three_wheels_on_a_rod(third: tuple[float, float]) -> None:
     """In the plane as in space, where everything that holds it across the plane carries nothing."""

@@ -322,6 +322,7 @@ VERBS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", VERBS)
 @pytest.mark.parametrize(("apart", "bearing"), [(0.5, 0.2), (2.0, 0.02)])
 def test_hinges_share_the_load_as_two_ends_of_a_bearing_each_do(verb: str, apart: float, bearing: float) -> None:

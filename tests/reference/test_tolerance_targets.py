@@ -113,6 +113,7 @@ def run(tmp_path: Path, mechanism: Mechanism, *arguments: str) -> tuple[int, str
     return told.exit_code, told.stdout, told.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("limit", "code"), [("±0.05 deg", 1), ("±0.5 deg", 0)])
 def test_the_first_line_and_the_exit_status(tmp_path: Path, limit: str, code: int) -> None:
     page = tmp_path / "x.html"

@@ -87,6 +87,7 @@ def test_what_seats_leave_is_no_efficiency_above_one() -> None:
     assert "efficiency.above_one" not in [one.code for one in result.trunnion.findings]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.1, 8.0])
 def test_a_load_where_it_locks_is_not_told_to_take_no_power(friction: float) -> None:
     """The work is met by 15 of 360 positions, all of which lock with the larger friction: that is told, and why."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 
 import numpy as np
+import pytest
 from PIL import Image
 
 import trunnion
@@ -16,6 +17,7 @@ from trunnion.studio.animation import _forces
 from trunnion.views.common.drawing import picture
 
 
+@pytest.mark.slow
 def test_forces_on_the_ram_are_in_balance():
     """It has no mass: guide with its friction, pin and load add up to nothing."""
     result = trunnion.analyse(Mechanism(**entries_of(TEXT)[0]), 90)
@@ -26,6 +28,7 @@ def test_forces_on_the_ram_are_in_balance():
     assert np.nanmax(np.abs(forces["G"][0])) > 1.0  # friction along the guide
 
 
+@pytest.mark.slow
 def test_names_forces_and_loads_are_drawn():
     frames = {}
     for force in ("150 N", "0 N"):

@@ -108,6 +108,7 @@ def test_every_example_opens(example):
     assert found["solved"] or set(why) <= {"mobility.redundant", "input.drivers", "input.tables"}, found["findings"]
 
 
+@pytest.mark.slow
 def test_a_margin_is_of_positions_that_there_are():
     text = EXAMPLES[FOURBAR].replace("BC: 6.00 m", "BC: 3.00 m")
     found = ask(ask="model", text=text)
@@ -227,6 +228,7 @@ def test_what_a_drag_changes_is_named_in_words():
 # ---- dragging ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @settings(max_examples=6, deadline=None)
 @given(st.integers(0, 359), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
 def test_what_is_dragged_goes_there_and_its_neighbours_stay(index, x, y):
@@ -248,6 +250,7 @@ def test_what_is_dragged_goes_there_and_its_neighbours_stay(index, x, y):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", ["U", "L", "K", "B", "G", "G2", "B2"])
 def test_links_of_three_joints_keep_the_others(joint):
     """Jansen's leg: what is dragged goes there with the pins on its spot, the others stay where they are."""

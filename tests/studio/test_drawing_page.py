@@ -86,6 +86,7 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         user.idle()
         assert np.abs(effort(user) - torque).max() <= PEAK * np.abs(torque).max()
 
+    @pytest.mark.slow
     def test_a_load_against_the_motion_is_put_on_a_pivot_and_on_its_link(user):
         user.box = {"x": 0, "y": 0}
         for spot in (user.handle("D"), None):
@@ -188,6 +189,7 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         links = user.state("s.answer.value.entries.links")
         return {name: links[name]["points"] for name in ("link1", "link2", "link3")}
 
+    @pytest.mark.slow
     def test_a_joint_on_its_path_moves_the_mechanism_and_off_it_changes_lengths(user):
         user.new_sheet()
         user.draw_four_bar()

@@ -38,6 +38,7 @@ def test_a_slotted_lever_points_at_the_crank_pin():
     assert list(entries_of(text)[0]["joints"]) == ["A", "C", "E", "B", "D", "G", "F"]
 
 
+@pytest.mark.slow
 def test_the_forces_on_a_block_balance_with_the_friction_of_its_guide():
     rubbing = {"pin": {"radius": "5 mm"}, "guide": {"length": "30 mm"}, "friction": 0.2}
     text, _ = edited(
@@ -123,6 +124,7 @@ def test_gears_mesh_as_they_are_drawn(typed, written, ratio):
     np.testing.assert_allclose(two - two[0], ratio * (one - one[0]), atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "gesture",
     [

@@ -62,6 +62,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.page.reload()
         user.until("s.about.value.version && s.answer.value")
 
+    @pytest.mark.slow
     def test_another_file_is_replaced_only_after_a_question(tabs, folder):
         user = tabs()
         (folder / "compose.yaml").write_text("services: {}\n", "utf-8")  # after the page has read the folder
@@ -81,6 +82,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         assert (folder / "compose.yaml").read_text("utf-8") == FOURBAR
         assert user.page.locator("dialog").count() == 0
 
+    @pytest.mark.slow
     def test_work_stays_with_its_folder(tabs, folder, tmp_path):
         user = tabs()
         typed(user, FOURBAR + "# of one\n")
@@ -105,6 +107,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
     def bearer(studio):
         return {"Authorization": f"Bearer {studio.token}"}
 
+    @pytest.mark.slow
     def test_of_two_tabs_on_one_file_neither_loses_its_work(tabs, folder):
         first, second = tabs(), tabs()
         for user, words in ((first, "# first\n"), (second, "# second\n")):
@@ -129,6 +132,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         assert fourth.state("s.text.value") == FOURBAR + "# first\n"
         assert fourth.page.locator(".message-card").count() == 0
 
+    @pytest.mark.slow
     def test_a_duplicated_tab_keeps_its_own_work(tabs):
         first = tabs()
         typed(first, FOURBAR + "# first\n")
@@ -140,6 +144,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         reloaded(first)
         assert first.state("s.text.value") == FOURBAR + "# first\n"
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("free", [0, 60_000])
     def test_a_full_browser_says_so_and_recovers_nothing_older(tabs, free):
         """With a little room the text is kept and the oldest steps are not; with none nothing is, and that is told."""
@@ -166,6 +171,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         assert "trunnion studio" in page.locator("[role=alert]").inner_text()
         page.close()
 
+    @pytest.mark.slow
     def test_the_token_goes_to_no_other_port(tabs):
         user = tabs(tabs.studio.entrance())
         assert "once=" not in user.page.url
@@ -173,6 +179,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         again = tabs(f"http://127.0.0.1:{tabs.studio.port}/")  # another tab of the browser that was let in
         assert again.state("s.text.value") == FOURBAR
 
+    @pytest.mark.slow
     def test_a_full_browser_is_still_let_in_after_a_reload(browser, studio):
         user = User(browser.new_page(), studio)
         user.page.goto(f"http://127.0.0.1:{studio.port}/web/report.css")

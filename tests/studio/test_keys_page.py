@@ -20,6 +20,7 @@ if CHROMIUM:  # not a skip: this is the page's own part
     def focused(user):
         return user.page.evaluate("document.activeElement.textContent.trim()")
 
+    @pytest.mark.slow
     def test_a_menu_is_gone_through_by_arrows(user):
         user.page.focus("summary:has-text('File')")
         seen = []
@@ -31,6 +32,7 @@ if CHROMIUM:  # not a skip: this is the page's own part
         assert focused(user) == "File"
         assert user.page.locator("details[open]").count() == 0
 
+    @pytest.mark.slow
     def test_a_question_mark_lists_the_keys(user):
         user.page.locator(".sheet > svg").focus()
         user.keys("?")
@@ -42,6 +44,7 @@ if CHROMIUM:  # not a skip: this is the page's own part
         user.keys("?")  # in a field it is a letter
         assert user.state("s.dialog.value") is None
 
+    @pytest.mark.slow
     def test_torque_friction_and_margin_are_those_of_the_dragged_mechanism(user):
         user.until("s.solved.value")
         torque = user.page.locator(".readout div:has-text('torque A') dd")
@@ -74,6 +77,7 @@ if CHROMIUM:  # not a skip: this is the page's own part
         a1, b1, a2, b2 = user.page.evaluate(slot)
         assert (b2 - b1) * (x2 - x1) == pytest.approx((y2 - y1) * (a2 - a1), abs=1.0)
 
+    @pytest.mark.slow
     def test_what_is_wrong_leaves_the_mechanism_in_view_until_it_is_pointed_at(user):
         user.of("actions", "m.typed(given)", TEXT.replace("friction: 0.12", "friction: 2"))
         user.until("s.answer.value.margin_least?.value < 1")

@@ -64,6 +64,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.idle()
         assert user.state("s.text.value") == rubbing
 
+    @pytest.mark.slow
     def test_a_mistake_in_drawing_a_part_leaves_the_rest_and_ends_with_the_next_answer(user):
         user.of("actions", "m.setValue(['dimensions', 'BC'], '5.9 m')")
         user.idle()
@@ -75,6 +76,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         assert "> 10 everywhere" in user.page.locator(".bottom .margin").inner_text()
         assert user.page.locator("[role=alert]").count() == 0
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         "mistake",
         [
@@ -131,6 +133,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.keys("Control+z")
         assert user.state("s.text.value") == drawn
 
+    @pytest.mark.slow
     def test_unsaved_work_on_a_file_is_offered_beside_another_sheet_with_its_variant(user):
         user.of("actions", "m.save(given)", "lever.yaml")
         user.page.click("role=tab[name=Plots]")
@@ -156,6 +159,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.of("actions", "m.save(given)", "lever.yaml")
         user.idle()
 
+    @pytest.mark.slow
     def test_an_unsaved_sheet_that_gives_way_is_told_with_how_it_comes_back(user):
         notice = user.page.locator(".bottom .notice")
         file = user.state("s.text.value")
@@ -176,6 +180,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.idle()
         assert user.state("s.text.value") == "name: Mine\n"
 
+    @pytest.mark.slow
     def test_a_studio_that_has_stopped_says_so_and_answers_a_save(user, tmp_path):
         (tmp_path / "four-bar.yaml").write_text(EXAMPLES["durango-fourbar"], "utf-8")
         with served(tmp_path, "four-bar.yaml") as other:
@@ -210,6 +215,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.keys("Control+z")
         assert user.state("s.text.value") == before
 
+    @pytest.mark.slow
     def test_a_plot_that_is_pointed_at_gives_the_position_back_and_undo_keeps_its_place(user):
         undo = user.page.locator("button[title^='Undo'], button[title='Nothing to undo']")
         before = undo.bounding_box()["x"]
@@ -336,6 +342,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
             assert user.state("s.solved.value") or set(errors) <= allowed, (name, errors)
             assert not user.wrong, (name, user.wrong)
 
+    @pytest.mark.slow
     def test_a_picture_shows_the_position_of_the_sheet(user):
         user.state("s.index.value = 90")
         user.page.click("summary:has-text('Export')")

@@ -115,6 +115,7 @@ def test_an_address_of_a_browsers_arguments_lets_in_once(served):
     assert "another program has opened it" in text
 
 
+@pytest.mark.slow
 def test_the_arguments_of_the_browser_hold_no_token(tmp_path):
     """The program that is to be the browser writes down what everybody may read of it."""
     recorder, record = tmp_path / "browser", tmp_path / "arguments"

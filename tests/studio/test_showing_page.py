@@ -43,6 +43,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.of("actions", "m.takeText(given, 'Edit')", text)
         user.until(f"s.solved.value && s.answer.value.text.length === {len(text)}")
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("text", "words"),
         [
@@ -59,6 +60,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         written(user, EXAMPLES["drawing-press"])
         assert "least 3.45 at 0 mm" in margin.inner_text()
 
+    @pytest.mark.slow
     def test_rounding_is_shown_as_nothing(user):
         written(user, EXAMPLES["chebyshev-line"])
         user.page.click("role=tab[name=Plots]")
@@ -102,6 +104,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
             assert np.hypot(px + frame["x"] - centre[0], py + frame["y"] - centre[1]) == pytest.approx(reach, abs=0.3)
         assert user.state("s.share.value") == 0  # where it stands it is at a position
 
+    @pytest.mark.slow
     def test_the_frame_of_an_empty_sheet_stays_with_the_first_link(user):
         user.new_sheet()
         scale = user.of("sheet", "m.sheet.view.frame.scale")
@@ -154,6 +157,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.until("s.live.value === null")
         assert user.state("s.text.value") == text
 
+    @pytest.mark.slow
     def test_one_question_of_a_drag_is_under_way_and_the_newest_is_asked_next(user):
         asked, most = [], [0]
 
@@ -187,6 +191,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         there = user.handle("C")
         assert np.hypot(there[0] - x + 29.5, there[1] - y + 59) < 2
 
+    @pytest.mark.slow
     def test_an_answer_to_what_was_changed_since_is_dropped(user):
         """A step that is answered after the text was changed, and a cycle of a text that is no longer there."""
         changed = FOURBAR.replace("BC: 6.00 m", "BC: 5.80 m")

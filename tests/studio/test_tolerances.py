@@ -23,6 +23,7 @@ def cycle(crank):
     return trunnion.analyse(Mechanism(**entries_of(TEXT.replace("crank: 30 mm", f"crank: {crank} mm"))[0]), 720)
 
 
+@pytest.mark.slow
 def test_worst_cases_are_those_of_the_numbers_at_their_limits():
     found = ask(ask="tolerances", text=TOLERANCED, steps=360)
     torque, stroke, ratio = found["rows"]
@@ -59,6 +60,7 @@ if CHROMIUM:  # not a skip: the numbers are tested above
         with served(folder, "ram.yaml") as own:
             yield own
 
+    @pytest.mark.slow
     def test_the_table_stands_under_the_plots(user):
         user.until("s.solved.value")
         user.page.click("role=tab[name=Plots]")

@@ -15,6 +15,7 @@ from trunnion.views.cycle.scene import scene
 FORCE = "-150 N * max(-1, min(1, G.slide_velocity / (1 mm/s)))"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("force", "law"),
     [(FORCE, lambda v: -150 * np.clip(v / 1e-3, -1, 1)), ("-400 N*s/m * G.slide_velocity", lambda v: -400 * v)],

@@ -65,6 +65,7 @@ def test_another_version_is_refused(begun: Path, monkeypatch: pytest.MonkeyPatch
     assert "and 9.9 here" in refusal(begun, ToyJob())
 
 
+@pytest.mark.slow
 def test_damage_costs_blocks_and_never_bits(begun: Path) -> None:
     """Single bits changed anywhere, and ends cut off, as by a power cut: refused, or the blocks are done again."""
     sound, chance = begun.read_bytes(), random.Random(1)

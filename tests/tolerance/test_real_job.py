@@ -113,6 +113,7 @@ def test_seed_and_only_the_seed_changes_samples() -> None:
     assert found[3]["mean"].item() != found[0]["mean"].item()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["numpy", "compiled"])
 def test_memory_grows_with_the_figures_kept_alone(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Three times as many samples need the bytes of their figures more: two copies while they are joined."""

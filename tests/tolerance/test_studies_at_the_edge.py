@@ -179,6 +179,7 @@ def test_few_samples(method: str, samples: int) -> None:
     assert 0 < result["yield_low"].item() < result["yield_high"].item() == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [1, 3])
 def test_few_positions(steps: int) -> None:
     measures = {

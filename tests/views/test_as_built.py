@@ -54,6 +54,7 @@ def test_every_figure_is_drawn(which, request, tmp_path):
         assert save(plots.figure(result, name), tmp_path / f"{name}.svg").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_the_result(slider):
     figure = plots.figure(slider, "error")
     place, slide = figure.axes
@@ -92,6 +93,7 @@ def test_the_band_lies_about_the_error_of_the_dimensions():
     assert np.isnan(result["transmission_centre"].sel(joint="B")).all()
 
 
+@pytest.mark.slow
 def test_positions_without_an_answer_are_gaps(slider, tmp_path):
     blank = slider.copy(deep=True)
     hole = np.arange(blank.sizes["position"]) // 10 == 2
@@ -119,6 +121,7 @@ def _drawn(figure):
     return {axes.get_title(loc="left"): axes for axes in figure.axes if axes.get_title(loc="left")}
 
 
+@pytest.mark.slow
 def test_ends_stand_side_by_side_and_their_pins_touch_the_wall(cardan):
     diagrams = _drawn(plots.figure(cardan, "seat"))
     assert list(diagrams) == [

@@ -77,6 +77,7 @@ if NODE:  # not a skip: what must hold everywhere is tested in Python; this is t
         assert np.hypot(*np.subtract(*ends)) > 2 * 26
         assert page(analyse(slider_crank(), 24), tmp_path)["slits"] == []
 
+    @pytest.mark.slow
     def test_a_driven_slide_is_a_barrel_with_a_rod_out_of_it(tmp_path):
         """Rod and barrel end at their eyes and overlap; neither sticks out behind the other's pin."""
         result = analysed(read(EXAMPLES / "toggle-press.yaml"), 24)
@@ -90,6 +91,7 @@ if NODE:  # not a skip: what must hold everywhere is tested in Python; this is t
             assert (by[0] - x) * end[3] - (by[1] - y) * end[2] == pytest.approx(0, abs=0.3 * apart)
         assert page(analyse(MODELS["inverted slider-crank"](), 24), tmp_path)["cylinders"] == []
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("example", ["toggle-press", "drawing-press", "slider-crank"])
     def test_loads_are_on_the_scale_of_the_reactions_and_no_name_covers_their_values(example, tmp_path):
         shown = page(analysed(read(EXAMPLES / f"{example}.yaml"), 24), tmp_path)

@@ -66,6 +66,7 @@ def test_a_link_in_space_is_moved_turned_and_stretched_to_its_errors(cardan):
         assert left == pytest.approx(np.repeat(bys[:, None], 72, axis=1), abs=2e-9)
 
 
+@pytest.mark.slow
 def test_the_table_of_errors_has_the_figures_of_the_result(cardan):
     rows = {row["label"]: row for row in error_rows(cardan)}
     efficiency = rows["Efficiency of the cycle"]
@@ -83,6 +84,7 @@ def test_the_table_of_errors_has_the_figures_of_the_result(cardan):
     assert torque["ideal"] == f"{np.max(ideal):.2f}\u00a0N m"
 
 
+@pytest.mark.slow
 def test_losses_are_told_with_their_angles(slider):
     (row,) = loss_rows(slider)
     lost = np.flatnonzero(slider.contact_lost.sel(joint="S").values)
@@ -117,6 +119,7 @@ if shutil.which("node"):  # as in test_browser.py
             for pin, (x, y, radius) in zip(told["apart"], told["holes"], strict=True):
                 assert np.hypot(pin[0] - x, pin[1] - y) == pytest.approx(radius - 5, abs=0.2)  # at the wall
 
+    @pytest.mark.slow
     def test_errors_are_magnified_in_space(cardan, tmp_path):
         shown = page(cardan, tmp_path)["built"]
         assert shown["seats"] == [

@@ -236,6 +236,7 @@ def test_every_result_makes_a_page_that_fetches_and_runs_nothing(name):
         assert not [one for one in attrs if one.startswith("on") or one == "style"]
 
 
+@pytest.mark.slow
 def test_the_report_has_what_a_laboratory_files(tmp_path):
     result = case("wrong")
     words = " ".join(Page(page_of("wrong")).words)

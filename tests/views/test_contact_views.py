@@ -54,6 +54,7 @@ def test_gaps_and_forces_over_time() -> None:
     assert np.nanmax(drawn.get_ydata()) == pytest.approx(45.8, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_report_has_force_gap_orbit_and_spectrum() -> None:
     page = Page(report(rattled()))
     assert not page.open

@@ -35,6 +35,7 @@ def meet(one: np.ndarray, other: np.ndarray) -> bool:
     return bool(np.all(one[0] < other[1]) and np.all(other[0] < one[1]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["indexing-press", "rssr"])
 def test_names_of_a_mechanism(name: str) -> None:
     figure = plots.mechanism(trunnion.analyse(trunnion.read(EXAMPLES / f"{name}.yaml"), 12))

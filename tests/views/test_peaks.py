@@ -59,6 +59,7 @@ def drawn(figure):
     return [max(float(np.nanmax(np.abs(values), initial=0.0)) for values in lines) for lines in panels]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["torque", "reactions", "power", "friction-power", "motion"])
 def test_a_short_working_stroke_is_shown_whole(kind):
     """Ten of 360 positions carry all of the load, far above the rest."""

@@ -105,6 +105,7 @@ def test_columns_of_the_cardan_joint(results, tmp_path):
     assert np.linalg.norm(quaternion, axis=1) == pytest.approx(np.ones(24))
 
 
+@pytest.mark.slow
 def test_ways_of_a_spatial_group_are_drawn(tmp_path):
     mechanism = Mechanism.read(EXAMPLES / "pezzuti-cardan.yaml")
     told = tuple(AssemblyMode(f"way-{number}", {"pin-2": (0.0, 0.0, 0.0)}, number == 1) for number in (1, 2, 9))

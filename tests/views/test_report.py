@@ -46,6 +46,7 @@ class Page(HTMLParser):
         return json.loads(next(text for text in self.raw if text.startswith('{"format"')))
 
 
+@pytest.mark.slow
 def test_every_kind_of_result_makes_a_well_formed_page(case):
     _, result = case
     page = Page(report(result, result))

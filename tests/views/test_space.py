@@ -60,6 +60,7 @@ def test_motion_tells_rotations_slides_and_links():
     )
 
 
+@pytest.mark.slow
 def test_the_figure_says_where_how_long_and_how_strong():
     figure = mechanism(rssr())
     words = _texts(figure)
@@ -75,6 +76,7 @@ def test_a_position_that_cannot_be_drawn_is_refused():
         mechanism(rssr(gap=(40, 60, Status.NOT_ASSEMBLED)), index=50)
 
 
+@pytest.mark.slow
 def test_where_all_axes_meet_there_is_no_scale_unless_a_pin_gives_one():
     assert "all axes meet in one point: drawn on a sphere" in _texts(mechanism(cardan()))
     pins = [
@@ -174,6 +176,7 @@ def test_a_cardan_joint_is_a_fork_a_cross_and_a_fork():
         assert (prongs[0][-1] + prongs[1][-1]) / 2 == pytest.approx(centre, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_of_crossing_bars_the_nearer_is_painted_over_the_farther():
     """Bars that all but touch, from any side: wherever the nearer one is seen, no facet of the other comes after it."""
     rng = np.random.default_rng(0)

@@ -44,6 +44,7 @@ def test_sweep() -> None:
         assert f">{value:.6g}</td>" in page
 
 
+@pytest.mark.slow
 def test_assembly() -> None:
     result = assemble(read(EXAMPLES / "misaligned-hinges.yaml"), steps=6)
     page = _page(report(result))
@@ -53,6 +54,7 @@ def test_assembly() -> None:
     assert "smallest clearance" in page
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "line",
     [

@@ -92,6 +92,7 @@ def test_every_figure_of_every_result_stays_on_its_sheet(case, kind):
     assert not outside(figure(case, kind, few(case)))
 
 
+@pytest.mark.slow
 def test_the_legend_of_correlated_tolerances_stays_on_a_sheet_of_three_columns():
     """ "RSS, uncorrelated" is longer than "RSS"."""
     result = toleranced(24, 500, measures=2).assign_attrs(correlated=1, limits=json.dumps([None, None]))
@@ -99,6 +100,7 @@ def test_the_legend_of_correlated_tolerances_stays_on_a_sheet_of_three_columns()
     assert not outside(sheet(plain))
 
 
+@pytest.mark.slow
 def test_every_result_makes_tables(case):
     for table in [*tables(case), inputs(case), overview(case)]:
         assert table.title

@@ -76,6 +76,7 @@ def test_all_drawings_have_one_scale_and_hold_the_mechanism():
             assert (y[known] <= high[1]).all()
 
 
+@pytest.mark.slow
 def test_what_has_no_place_is_said():
     data = stephenson_six_bar()
     data["links"]["rod"]["points"]["H"] = [0.3, 0]  # long enough for one way of the four-bar only

@@ -62,12 +62,12 @@ def export(
     ] = None,
     set_: Set = None,
 ) -> None:
-    """Write a mechanism for another program, at a position of its cycle."""
-    from trunnion.exchange import ExportOptions, export_model
+    """Write a mechanism for another program, at a position."""
+    from trunnion.exchange import export_model
 
     mechanism = stated(file, set_)
     with lines_of(file):
-        findings = export_model(mechanism, out, at, ExportOptions(frames=frames, original=original))
+        findings = export_model(mechanism, out, at, frames, original)
     wrote(out)
     say(placed(findings, file), every=True)
     raise typer.Exit(exit_status(findings))

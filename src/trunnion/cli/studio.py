@@ -25,6 +25,8 @@ def studio(
     open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the browser.")] = True,
 ) -> None:
     """Draw a mechanism in the browser, drag it, watch its forces."""
+    from trunnion.cli.forms import forms
+
     try:
         from trunnion.studio.server import Studio
     except ImportError:
@@ -35,7 +37,7 @@ def studio(
         raise MechanismError(Finding("does not exist", str(file), "name a model file or a folder"))
     folder, opened = (path, None) if path.is_dir() else (path.parent, path.name)
     bound = _usual() if port is None else _bound(port)
-    own = Studio(folder, opened, bound.getsockname()[1])
+    own = Studio(folder, opened, bound.getsockname()[1], forms=forms())
     for line in (f"studio: {own.address}", "It answers this machine alone. Ctrl-C ends it."):
         console().print(line, markup=False, highlight=False, soft_wrap=True)
     if open_:

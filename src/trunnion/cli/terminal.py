@@ -166,8 +166,12 @@ def say(findings: Iterable[Finding], every: bool = False) -> None:
 def bar(what: str, total: int | None, least: int = 0) -> Iterator[Callable[[int], None] | None]:
     """A progress bar on the error stream, to be called with how many are done; None off a terminal or below `least`.
 
-    total: None where it is not known beforehand: the bar then only counts.
+    total: None where it is not known beforehand: the bar then only counts. Where TRUNNION_PROGRESS is set, what is done
+    is written for a program that reads it.
     """
+    if os.environ.get("TRUNNION_PROGRESS"):
+        yield lambda done: print(f"\x1e{done}/{total or '-'}", file=sys.stderr, flush=True)
+        return
     if (total is not None and total < least) or not sys.stderr.isatty():
         yield None
         return

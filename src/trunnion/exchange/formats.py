@@ -19,7 +19,7 @@ import numpy as np
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import Draft
 from trunnion.exchange.model_text import complete
-from trunnion.exchange.skeleton import Positions, positions_of
+from trunnion.exchange.skeleton import positions_of
 from trunnion.files import reading, whole
 from trunnion.model.names import nearest
 from trunnion.model.quantity import Quantity
@@ -32,6 +32,7 @@ __all__ = ["FORMATS", "MATERIALS", "ExportOptions", "Format", "ImportOptions", "
 
 MATERIALS = {"steel": 7850.0, "stainless": 7900.0, "aluminium": 2700.0, "brass": 8500.0, "cast-iron": 7200.0,
              "titanium": 4430.0, "nylon": 1140.0, "pom": 1410.0, "abs": 1050.0, "pla": 1240.0}  # fmt: skip
+FEWEST = 4  # positions of a cycle of which the first is written
 LARGEST = 200_000_000  # bytes of a file that is read
 
 
@@ -203,8 +204,8 @@ def export_model(
     mechanism: Mechanism,
     path: str | os.PathLike[str],
     at: float | str | None = None,
-    options: ExportOptions | None = None,
-    positions: Positions | None = None,
+    frames: int = 120,
+    original: str | os.PathLike[str] | None = None,
 ) -> list[Finding]:
     """Write a mechanism in the format of another program.
 
@@ -213,7 +214,8 @@ def export_model(
     mechanism : the model.
     path : the file; its extension decides the format.
     at : the position, as for `analyse`; the first of the cycle if not given. Formats that move take the whole cycle.
-    options : see ExportOptions; positions : where the mechanism is, if they are known already.
+    frames : number of positions in a format that moves.
+    original : the STEP file that the model was imported from, whose parts are written where they are then.
 
     Returns
     -------
@@ -223,14 +225,17 @@ def export_model(
     ------
     MechanismError : if the mechanism has no solution there or the format cannot hold it.
     """
-    path, options = Path(path), options or ExportOptions()
+    path, options = Path(path), ExportOptions(0, frames, None if original is None else Path(original))
     entry = _format_of(path, reads=False)
     module = _module(entry, path)
-    if positions is None:
-        moves = getattr(module, "MOVES", False)
-        positions = positions_of(mechanism, options.frames) if moves else positions_of(mechanism, 360, at)
+    moves = getattr(module, "MOVES", False)
+    positions = positions_of(mechanism, frames) if moves else positions_of(mechanism, FEWEST, at)
     if options.original is not None:
+        if not getattr(module, "MOVES_PARTS", False):
+            raise MechanismError(Finding(f"no parts are moved in {entry.name}", "--from", "write a .step file"))
         reading(options.original)
+        with _readable(options.original):
+            options.original.open("rb").close()
     with whole(path) as temporary:
         findings: list[Finding] = module.write(positions, temporary, options)
     return findings

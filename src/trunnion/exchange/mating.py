@@ -29,7 +29,7 @@ FITS = ("H7/h6", "H7/g6", "H7/f7", "H8/f7", "H8/e8", "H9/d9", "H11/c11")
 ALIKE = 3  # of the gap: the difference of radii up to which a pin without a joint is spoken of
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Round:
     """A pin or hole of a body: cylindrical faces of one axis and radius that follow each other, or a ball."""
 
@@ -51,7 +51,7 @@ class Round:
         return f"{kind} d={2e3 * self.radius:.9g} mm of {self.body} ({numbers})"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Contact:
     """A pin in a hole, or a ball in a socket: low to high along the hole's axis from its point."""
 
@@ -78,7 +78,7 @@ class Contact:
         return parallel(axis, other.hole.axis) and bool(np.linalg.norm(off - (off @ axis) * axis) <= play)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Facing:
     """Two flat faces that look at each other.
 
@@ -409,7 +409,7 @@ class _Held:
         return False
 
     def _loose(self) -> bool:
-        """A pin or sleeve whose contacts all lie on its axis spins without effect: it is fixed where its play is least."""
+        """A pin or sleeve with all contacts on its own axis spins without effect: it is fixed where its play is least."""
         between = self.between()
         for body in self.groups.bodies():
             mine = {pair: contacts for pair, contacts in between.items() if body in pair}

@@ -15,6 +15,7 @@ from trunnion.joints.pairs import PAIRS
 __all__ = ["complete", "flat_frame", "model_text"]
 
 DIGITS = 12  # significant digits of a written number
+FIXED = ("ground", "frame", "base", "housing", "world", "gestell", "rahmen", "bâti")  # in names of fixed parts
 TINY = 1e-12  # of the size of the mechanism: below it a coordinate is rounding
 STROKE = 0.1  # of the size, of a driven slide whose file states no limits
 IN_PLANE = {"revolute", "prismatic"}
@@ -24,9 +25,10 @@ RELEASED = {"cylindrical": "revolute", "spherical": "revolute", "planar": ""}  #
 def complete(draft: Draft, ground: str = "", drive: str = "", speed: float = 1.0) -> Draft:
     """The draft with welded bodies united, a ground and a drive.
 
-    ground, drive: names that the user states. Without them the ground is the body that the file says, else the one
-    with the most pairs (the heaviest of several); the drive is that of the file, else the first pair on the ground
-    that has one coordinate. Both choices are findings. speed: of a drive that the file does not state, rad/s or m/s.
+    ground, drive: names that the user states. Without them the ground is the body that the file says, else one with
+    such a name, else the one with the most pairs (the heaviest of several); the drive is that of the file, else the
+    first pair on the ground that has one coordinate. Both choices are findings. speed: of a drive that the file does
+    not state, rad/s or m/s.
     Raises MechanismError if a stated name is not in the file.
     """
     draft = replace(draft, findings=list(draft.findings))
@@ -34,9 +36,11 @@ def complete(draft: Draft, ground: str = "", drive: str = "", speed: float = 1.0
         draft.ground = _existing(draft, ground, list(draft.bodies), "part", "--ground")
     draft = draft.welded()
     if not draft.ground and draft.bodies:
-        draft.ground = max(draft.bodies, key=lambda name: (len(draft.pairs_of(name)), draft.bodies[name].mass))
-        joined = len(draft.pairs_of(draft.ground))
-        what = f"is taken as the part that does not move: it has the most joints, {joined}"
+        named = [name for name in draft.bodies if any(word in name.casefold() for word in FIXED)]
+        joined = {name: len(draft.pairs_of(name)) for name in named or draft.bodies}
+        draft.ground = max(joined, key=lambda name: (joined[name], draft.bodies[name].mass))
+        reason = "by its name" if named else f"it has the most joints, {joined[draft.ground]}"
+        what = f"is taken as the part that does not move: {reason}"
         draft.note("ground", f"links.{draft.ground}", what, "state it with --ground")
     if drive:
         drive = _existing(draft, drive, list(draft.pairs), "joint", "--drive")

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = ["read", "write"]
 
+MOVES_PARTS = True  # of the file that a model came from
 PATIENCE = 60.0  # s, for the mesh of a free-form solid
 DEFLECTION = 1e-3  # of a mesh from its surface, of the unit of the file; and angle, rad
 SIZE = 0.02  # of the mechanism: length of an axis of a skeleton that has no bearing

@@ -24,8 +24,10 @@ from trunnion.model.file import text_of
 from trunnion.model.rewrite import changed_text
 from trunnion.results.attributes import findings_of, summary_of, units_of
 from trunnion.results.quantities import quantity
+from trunnion.results.scales import without_noise
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
+from trunnion.studio.blocks import blocks_of
 from trunnion.studio.ends import held, vector
 from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
@@ -318,6 +320,13 @@ def _layers(asked: Asked) -> dict[str, Any]:
     return found
 
 
+def _blocks(asked: Asked) -> dict[str, Any]:
+    """The mechanism as blocks wired by their pins, with what passes the wires at each position."""
+    state, steps = loaded(str(asked["text"])), _steps(asked)
+    friction = asked.get("friction") != "off"
+    return blocks_of(state.run.system, without_noise(state.motion(steps, friction)))
+
+
 def _moving(asked: Asked, result: xr.Dataset) -> dict[str, Any] | None:
     """Motion of the point, or in the plane of the place on a link, that is asked for; None where there is none."""
     if asked.get("place") and result.sizes["axis"] == 2:
@@ -376,6 +385,7 @@ ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "export": _export,
     "assemblies": _assemblies,
     "layers": _layers,
+    "blocks": _blocks,
     "compare": _compare,
     "tolerances": _tolerances,
 }

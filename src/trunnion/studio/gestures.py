@@ -11,6 +11,7 @@ from trunnion.studio.changing import delete, lock, move, put_value
 from trunnion.studio.renaming import rename
 from trunnion.studio.sketch import Sketch
 from trunnion.studio.strokes import add_point, link, pinned, slide
+from trunnion.studio.wiring import block
 
 __all__ = ["GESTURES", "Gesture", "done"]
 
@@ -43,6 +44,7 @@ GESTURES: dict[str, Gesture] = {
     "load": load,
     "spring": spring,
     "gear": gear,
+    "block": block,
     "move": move,
     "lock": lock,
     "set": put_value,

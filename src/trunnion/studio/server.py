@@ -17,10 +17,12 @@ import logging
 import mimetypes
 import os
 import secrets
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from threading import Event, Lock
+from typing import Any
 
 import uvicorn
 from starlette.applications import Starlette
@@ -31,6 +33,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from trunnion.files import whole
+from trunnion.studio.jobs import Jobs
 from trunnion.studio.page import document, found, script
 
 __all__ = ["Studio"]
@@ -57,13 +60,17 @@ ANSWERING = Lock()  # one after another: the second about a text finds what was 
 
 @dataclass(frozen=True)
 class Studio:
-    """folder: whose models can be opened and saved; opened: the one that is opened first; port: of the server."""
+    """folder: whose models can be opened and saved; opened: the one that is opened first; port: of the server.
+
+    forms: the studies that the page can start, see `studio.jobs`.
+    """
 
     folder: Path
     opened: str | None
     port: int
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
     entrances: set[str] = field(default_factory=set)  # codes of addresses that were not opened yet
+    forms: Sequence[Mapping[str, Any]] = ()
     seen: Event = field(default_factory=Event)  # that the page has what its first picture is drawn of
 
     @property
@@ -97,6 +104,10 @@ class Studio:
             Route("/first/{name:path}", self._admitted(self._first)),
             Route("/thumbnail/{name}", self._admitted(_thumbnail)),
             Route("/file/{name:path}", self._admitted(self._write), methods=["PUT"]),
+            Route("/jobs", self._admitted(self._jobs)),
+            Route("/jobs", self._admitted(self._start), methods=["PUT"]),
+            Route("/jobs/{number}", self._admitted(self._stop), methods=["DELETE"]),
+            Route("/result/{code}", self._own(self._result)),
             Route("/{place:str}/{name:path}", self._own(self._asset)),
             WebSocketRoute("/socket", self._socket),
         ]
@@ -110,6 +121,7 @@ class Studio:
             text = self._text(self.opened or "")
         warming = asyncio.get_running_loop().run_in_executor(None, _look, text, self.seen)
         yield
+        self.jobs.close()
         self.seen.set()
         await warming
 
@@ -169,7 +181,7 @@ class Studio:
         policy = (
             f"default-src 'none'; script-src 'self' 'nonce-{nonce}'; style-src 'self' 'unsafe-inline'; "
             "img-src 'self' data:; connect-src 'self'; base-uri 'none'; "
-            "form-action 'none'; frame-ancestors 'none'"
+            "form-action 'none'; frame-src 'self'; frame-ancestors 'none'"
         )
         headers = {
             "Content-Security-Policy": policy,
@@ -269,6 +281,37 @@ class Studio:
         with contextlib.suppress(ValueError):
             return self._text(path.name) not in texts
         return True
+
+    # ---- studies --------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def jobs(self) -> Jobs:
+        """The studies that the page has started."""
+        return Jobs(self.forms, self.folder)
+
+    async def _jobs(self, request: Request) -> Response:
+        return JSONResponse({"forms": list(self.jobs.forms.values()), "jobs": self.jobs.told()})
+
+    async def _start(self, request: Request) -> Response:
+        """Start a study of `{text, name, verb, options, mapping}`."""
+        body = json.loads(await request.body())
+        if not isinstance(body, dict) or not isinstance(body.get("text"), str):
+            raise ValueError("there is no model to be studied")
+        mapping = self._model(str(body["mapping"])) if body.get("mapping") else None
+        return JSONResponse({"id": self.jobs.start(body, str(body.get("name") or "model.yaml"), mapping)})
+
+    async def _stop(self, request: Request) -> Response:
+        self.jobs.stop(request.path_params["number"])
+        return JSONResponse({})
+
+    async def _result(self, request: Request) -> Response:
+        """The report of a study, by a name that only the page was told; it runs in a frame that reaches nothing."""
+        policy = (
+            "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline'; "
+            "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; frame-ancestors 'self'"
+        )
+        headers = {**FILE_HEADERS, "Content-Security-Policy": policy, "Referrer-Policy": "no-referrer"}
+        return HTMLResponse(self.jobs.report(request.path_params["code"]), headers=headers)
 
     # ---- questions ------------------------------------------------------------------------------------------------
 

@@ -33,3 +33,16 @@ declare module "htm" {
   const htm: { bind<T>(h: T): (strings: TemplateStringsArray, ...values: unknown[]) => object };
   export default htm;
 }
+declare module "dagre" {
+  export class Graph {
+    constructor(how?: object);
+    setGraph(how: object): void;
+    setDefaultEdgeLabel(make: () => object): void;
+    setNode(name: string, label: object): void;
+    setEdge(from: string, to: string, label: object, name?: string): void;
+    node(name: string): { x: number; y: number; width: number; height: number };
+    edge(from: string, to: string, name?: string): { x: number; y: number; points: { x: number; y: number }[] };
+    graph(): { width: number; height: number };
+  }
+  export function layout(graph: Graph): void;
+}

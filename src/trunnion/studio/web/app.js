@@ -2,6 +2,7 @@
 
 import { discard, save, takeWaiting } from "./actions.js";
 import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
+import { Blocks, Formula } from "./blocks.js";
 import { Bounded, Failures } from "./boundary.js";
 import { Dialogs } from "./dialogs.js";
 import { Findings } from "./findings.js";
@@ -17,7 +18,7 @@ import { choose } from "./tools.js";
 import { Button, focusOn, html } from "./ui.js";
 
 const TOP = 140; // px, where messages stand
-const TABS = { properties: ["Properties", Properties], plots: ["Plots", Plots], text: ["Text", Text], findings: ["Findings", Findings] };
+const TABS = { properties: ["Properties", Properties], plots: ["Plots", Plots], blocks: ["Blocks", Blocks], text: ["Text", Text], findings: ["Findings", Findings] };
 
 export function App() {
   const bounded = (...parts) => parts.map((Part) => html`<${Bounded} key=${Part.name}><${Part} /><//>`);
@@ -27,6 +28,7 @@ export function App() {
       <div class="middle-part">
         <div class="window">
           ${state.spatial.value ? bounded(Space) : bounded(Stage, ZoomBar, Welcome)}
+          ${bounded(Formula)}
           ${bounded(Messages)}
         </div>
         ${bounded(Motion)}

@@ -5,6 +5,7 @@ import { LAYERS } from "./layers.js";
 import { Margin } from "./margin.js";
 import { sheet } from "./sheet.js";
 import * as state from "./state.js";
+import { STUDY_OF, openStudy } from "./studies.js";
 import { nextTheme, theme } from "./theme.js";
 import { TOOLS, choose, hint } from "./tools.js";
 import { Button, Icon, Menu, html } from "./ui.js";
@@ -39,6 +40,7 @@ export function TopBar() {
         onChange=${(event) => (state.layers.value = { ...state.layers.value, [name]: event.target.checked })} /> ${label}</label>`)}
       <label class="tick"><input type="checkbox" checked=${state.snapping.value} onChange=${(event) => (state.snapping.value = event.target.checked)} /> Snap to the grid</label>
     <//>
+    <${Button} label="Studies …" title="Play, tolerance, allocation, motion in time, sweep, measured data" disabled=${!state.solved.value} onClick=${() => openStudy()} />
     <${Menu} label="Export" disabled=${!state.solved.value}>${EXPORTS.map(([what, label]) => html`<${Button} label=${label} onClick=${() => exported(what)} />`)}<//>
     <${Button} kind="icon" label=${`Colours: ${theme.value}`} title=${`Colours: ${theme.value}; click for the next`} onClick=${nextTheme}><${Icon} name=${theme.value} /><//>
   </header>`; // prettier-ignore
@@ -80,7 +82,7 @@ export function BottomBar() {
   return html`<footer class="bar bottom">
     <ul class="ready" aria-label="What the model is ready for">
       ${ready.map(({ what, ok, why }) => html`<li><button type="button" class=${ok ? "chip ok" : "chip"} title=${why} aria-label=${`${what}: ${ok ? "ready" : "not yet"}. ${why}`}
-        onClick=${() => state.say(`${what[0].toUpperCase()}${what.slice(1)}: ${why}`)}><span aria-hidden="true">${ok ? "✓" : "–"}</span> ${what}</button></li>`)}
+        onClick=${() => (ok && STUDY_OF[what] ? openStudy(STUDY_OF[what]) : state.say(`${what[0].toUpperCase()}${what.slice(1)}: ${why}`))}><span aria-hidden="true">${ok ? "✓" : "–"}</span> ${what}</button></li>`)}
     </ul>
     <${Margin} />
     <span class=${bad ? "notice bad" : "notice"} title=${words}>${words || (state.spatial.value ? "Drag turns the mechanism, with Shift it shifts, the wheel zooms." : hint())}</span>

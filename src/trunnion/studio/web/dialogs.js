@@ -6,6 +6,7 @@ import { Examples } from "./gallery.js";
 import { stemOf } from "./geometry.js";
 import { Keys } from "./keysheet.js";
 import * as state from "./state.js";
+import { Studies } from "./studies.js";
 import { Button, html } from "./ui.js";
 
 const NO_REFUSAL = { error: "", existing: "" };
@@ -13,7 +14,7 @@ const NO_REFUSAL = { error: "", existing: "" };
 export function Dialogs() {
   const name = state.dialog.value;
   if (!name) return null;
-  const Body = { examples: Examples, keys: Keys, open: Open, save: Save }[name];
+  const Body = { examples: Examples, keys: Keys, open: Open, save: Save, studies: Studies }[name];
   return html`<${Frame} key=${name}><${Body} /><//>`;
 }
 

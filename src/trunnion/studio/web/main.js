@@ -3,6 +3,7 @@
 import { render } from "preact";
 import { start } from "./actions.js";
 import { App } from "./app.js";
+import { keepBlocks } from "./blocks.js";
 import { listenToFailures } from "./boundary.js";
 import { listenToDrops } from "./dialogs.js";
 import { keepOthers } from "./ghosts.js";
@@ -22,4 +23,5 @@ listenToDrops(document);
 start();
 keepOthers();
 keepLayers();
+keepBlocks();
 keepCompared();

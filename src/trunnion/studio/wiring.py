@@ -1,0 +1,115 @@
+"""A mechanism built of blocks: a driver, gears or a dyad, wired to pins that are there or new on the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import hypot
+from typing import Any
+
+import numpy as np
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import KINDS, UnitError
+from trunnion.studio.acting import driver, gear
+from trunnion.studio.ends import begin, place_of, refused
+from trunnion.studio.sketch import Sketch, Vector
+from trunnion.studio.strokes import link, slide
+
+__all__ = ["block"]
+
+Given = Mapping[str, Any]
+APEX = 0.6  # of the distance of its pins, how far off their line the inner pin of an RRR is put
+BEYOND = 1.5  # of the distance of its pins, how long the link of an RPR is
+
+
+def block(sketch: Sketch, given: Given) -> str:
+    """A block of the list BLOCKS.
+
+    pins: joints, free points "link.P", or {ground: "x, y"} for a new pin on the ground. at: "x, y" of the inner pin,
+    of a driver or RPR the end of its link; as it fits if empty. ratio: of gears.
+    """
+    kind = str(given["kind"])
+    if kind not in BLOCKS:
+        raise refused(f"'{kind}' is no block", "the block", f"choose {', '.join(BLOCKS)}")
+    begin(sketch)
+    if kind == "gear":
+        return gear(sketch, {"joints": given["pins"], "ratio": given.get("ratio")})
+    pins = [pin if isinstance(pin, str) else {"ground": _place(pin["ground"])} for pin in given["pins"]]
+    BLOCKS[kind](sketch, pins, _place(given["at"]) if str(given.get("at") or "").strip() else None)
+    return f"Add {'a driver' if kind == 'driver' else kind}"
+
+
+def _place(text: Any) -> Vector:
+    """A place of two lengths, "120 mm, 0.4 in", m; plain numbers are in m."""
+    parts = str(text).replace(";", ",").split(",")
+    try:
+        x, y = (float(np.asarray(Quantity.read(_number(part), KINDS["length"]).evaluate())) for part in parts)
+    except (UnitError, ValueError) as error:
+        what = f"'{str(text)[:40]}' is no place ({getattr(error, 'what', 'two lengths are needed')})"
+        raise MechanismError(Finding(what, "the block", "write two lengths, such as 120 mm, 40 mm")) from None
+    return x, y
+
+
+def _number(text: str) -> float | str:
+    """A plain number as such, else the text."""
+    try:
+        return float(text)
+    except ValueError:
+        return text.strip()
+
+
+def _bar(sketch: Sketch, start: Any, end: Any) -> str:
+    """A new link from one end to another; its name."""
+    before = set(sketch.of("links"))
+    link(sketch, {"from": start, "to": end})
+    return next(name for name in sketch.of("links") if name not in before)
+
+
+def _end(sketch: Sketch, name: str) -> str:
+    """The free point of a link that was just drawn."""
+    point = next(point for point in reversed(list(sketch.points(name))) if point not in sketch.joints)
+    return f"{name}.{point}"
+
+
+def _across(sketch: Sketch, pins: list[Any], share: float) -> Vector:
+    """A place left of the middle of two pins, by a share of their distance."""
+    (x, y), (a, b) = (place_of(sketch, pin) for pin in pins)
+    if not hypot(a - x, b - y) > 0:
+        raise refused("its two pins are on one spot", "the block", "choose two pins that are apart")
+    return (x + a) / 2 - share * (b - y), (y + b) / 2 + share * (a - x)
+
+
+def _crank(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
+    x, y = place_of(sketch, pins[0])
+    before = set(sketch.joints)
+    _bar(sketch, pins[0], list(at or (x, y + max(0.3 * sketch.size, 0.04))))
+    driver(sketch, {"joint": next(name for name in sketch.joints if name not in before), "add": True})
+
+
+def _rrr(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
+    first = _bar(sketch, pins[0], list(at or _across(sketch, pins, APEX)))
+    _bar(sketch, pins[1], _end(sketch, first))
+
+
+def _rrp(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
+    x, y = place_of(sketch, pins[0])
+    rod = _bar(sketch, pins[0], list(at or (x + 1.2 * max(sketch.size, 0.04), y)))
+    slide(sketch, {"joint": _end(sketch, rod), "angle": 0.0})
+
+
+def _rpr(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
+    if not isinstance(pins[1], str):
+        raise refused("its second pin is what slides along the link", "the block", "choose a pin that is drawn")
+    (x, y), (a, b) = (place_of(sketch, pin) for pin in pins)
+    lever = _bar(sketch, pins[0], list(at or (x + BEYOND * (a - x), y + BEYOND * (b - y))))
+    slide(sketch, {"joint": pins[1], "along": lever})
+
+
+BLOCKS: dict[str, Callable[[Sketch, list[Any], Vector | None], None]] = {
+    "driver": _crank,
+    "RRR": _rrr,
+    "RRP": _rrp,
+    "RPR": _rpr,
+    "gear": lambda *_: None,
+}

@@ -1,0 +1,146 @@
+"""Drafts: a mechanism as bodies and pairs in one frame, and the model file made of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+import trunnion
+from trunnion.exchange.draft import Body, Draft, Pair, about, moved
+from trunnion.exchange.formats import FORMATS
+from trunnion.exchange.model_text import complete, model_text
+from trunnion.exchange.skeleton import positions_of
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.mechanism import Mechanism
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
+# no position without play, no driver, or two driven slides whose laws a draft does not know
+APART = {"indexing-press", "fourbar-in-space", "misaligned-fourbar", "misaligned-hinges", "one-way-clutch"}
+MOVING = [path for path in EXAMPLES if path.stem not in APART and not trunnion.read(path).gears]
+
+
+def read(text: str, folder: Path) -> Mechanism:
+    path = folder / "model.yaml"
+    path.write_text(text, "utf-8")
+    return trunnion.read(path)
+
+
+def four_bar() -> Draft:
+    return positions_of(trunnion.read(Path("examples/durango-fourbar.yaml")), 4).draft()
+
+
+@pytest.mark.parametrize("path", MOVING, ids=lambda path: path.stem)
+def test_the_model_of_a_draft_moves_as_the_mechanism_does(path: Path, tmp_path: Path) -> None:
+    stated = trunnion.read(path)
+    try:
+        draft = positions_of(stated, 4).draft()
+    except trunnion.MechanismError:
+        pytest.fail("the first position has no solution")
+    again = positions_of(read(model_text(complete(draft)), tmp_path), 4).draft()
+    assert again.drives.keys() == draft.drives.keys()
+    for name, body in again.bodies.items():
+        if name != draft.ground:
+            assert body.mass == pytest.approx(draft.bodies[name].mass, rel=1e-9)
+            if body.mass > 0:
+                np.testing.assert_allclose(body.centre, draft.bodies[name].centre, atol=1e-9)
+                np.testing.assert_allclose(body.inertia, draft.bodies[name].inertia, atol=1e-9 * body.mass)
+    for name, pair in again.pairs.items():
+        assert (pair.type, pair.links) == (draft.pairs[name].type, draft.pairs[name].links)
+        np.testing.assert_allclose(pair.at, draft.pairs[name].at, atol=1e-9)
+        if PAIRS[pair.type].needs_axis:
+            assert abs(pair.axis @ draft.pairs[name].axis) == pytest.approx(1, abs=1e-9)
+
+
+TURNED = ("durango-fourbar", "slider-crank", "jansen", "rssr", "double-cardan", "rccc", "whitworth-quick-return")
+
+
+@settings(deadline=None, max_examples=6)
+@given(name=st.sampled_from(TURNED), seed=st.integers(0, 2**31 - 1))
+def test_the_drive_torque_does_not_depend_on_the_frame(
+    name: str, seed: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    stated = trunnion.read(Path("examples") / f"{name}.yaml")
+    stated = stated.with_friction("off").model_copy(update={"loads": {}, "measures": {}})
+    draft = positions_of(stated, 4).draft()
+    draft = replace(draft, plane=False)
+    rotation = Rotation.random(random_state=seed).as_matrix()
+    turned = moved(draft, rotation, np.random.default_rng(seed).normal(size=3))
+    if stated.space == "planar":  # a plane has no third component of gravity
+        turned.gravity = draft.gravity if draft.gravity is None else rotation @ draft.gravity
+    again = read(model_text(complete(turned)), tmp_path_factory.mktemp("turned"))
+    assert again.space == stated.space
+    expected = trunnion.analyse(stated, 24)["drive_effort"].values
+    found = trunnion.analyse(again, 24)["drive_effort"].values
+    np.testing.assert_allclose(abs(found), abs(expected), atol=1e-8 * np.nanmax(abs(expected)))
+
+
+def test_fixed_pairs_make_one_body_with_the_mass_of_both() -> None:
+    one = Body("one", 2.0, np.array([0.0, 0.0, 0.0]), np.diag([1.0, 2.0, 3.0]))
+    two = Body("two", 1.0, np.array([3.0, 0.0, 0.0]), np.diag([1.0, 1.0, 1.0]))
+    pairs = {
+        "weld": Pair("weld", "fixed", ("one", "two"), np.zeros(3)),
+        "A": Pair("A", "revolute", ("base", "two"), np.zeros(3)),
+    }
+    draft = Draft("", {"one": one, "two": two, "base": Body("base")}, pairs, "base").welded()
+    assert list(draft.bodies) == ["one", "base"]
+    assert list(draft.pairs) == ["A"]
+    assert draft.pairs["A"].links == ("base", "one")
+    united = draft.bodies["one"]
+    assert united.mass == 3.0
+    np.testing.assert_allclose(united.centre, [1.0, 0.0, 0.0])
+    np.testing.assert_allclose(about(united, np.zeros(3)), about(one, np.zeros(3)) + about(two, np.zeros(3)))
+
+
+def test_the_ground_gives_its_name_to_what_is_fixed_to_it() -> None:
+    pairs = {"weld": Pair("weld", "fixed", ("bracket", "base"), np.zeros(3))}
+    draft = Draft("", {"bracket": Body("bracket"), "base": Body("base")}, pairs, "base").welded()
+    assert list(draft.bodies) == ["base"]
+    assert draft.ground == "base"
+
+
+def test_ground_and_drive_are_taken_where_the_file_says_neither_and_said_so() -> None:
+    draft = replace(four_bar(), ground="", drives={})
+    made = complete(draft)
+    assert made.ground == "ground"
+    assert len(made.drives) == 1
+    assert [finding.code for finding in made.findings] == ["exchange.ground", "exchange.drive"]
+
+
+def test_a_part_or_joint_that_is_not_there_names_the_nearest() -> None:
+    with pytest.raises(trunnion.MechanismError, match=r"no part of the file.*did you mean 'crank'"):
+        complete(four_bar(), ground="crnk")
+    with pytest.raises(trunnion.MechanismError, match=r"no joint of the file"):
+        complete(four_bar(), drive="crank")
+
+
+def test_names_and_comments_of_any_kind_stay_names_and_comments(tmp_path: Path) -> None:
+    draft = four_bar()
+    names = dict(zip(draft.bodies, ("yes", 'a "b" \\ c', "Kurbel: Ø 8 # links", "杆"), strict=True))
+    bodies = {names[name]: replace(body, name=names[name]) for name, body in draft.bodies.items()}
+    bodies["yes"].comments.append("two\nlines: [not a key]\x00")
+    pairs = {
+        name: replace(pair, links=(names[pair.links[0]], names[pair.links[1]])) for name, pair in draft.pairs.items()
+    }
+    made = read(model_text(complete(replace(draft, bodies=bodies, pairs=pairs, ground=names[draft.ground]))), tmp_path)
+    assert set(made.links) == set(names.values())
+
+
+def test_extensions_that_nothing_reads_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "model.xyz"
+    path.write_text("text")
+    with pytest.raises(trunnion.MechanismError, match=r"'\.xyz', which is not read here"):
+        trunnion.exchange.import_file(path)
+    for suffix in FORMATS:
+        empty = tmp_path / f"empty{suffix}"
+        empty.touch()
+        if FORMATS[suffix].reads:
+            with pytest.raises(trunnion.MechanismError, match="is empty"):
+                trunnion.exchange.import_file(empty)
+            with pytest.raises(trunnion.MechanismError, match="cannot be read"):
+                trunnion.exchange.import_file(tmp_path / f"missing{suffix}")

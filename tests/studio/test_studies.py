@@ -1,0 +1,156 @@
+"""Studies started from the page: the verbs of the command line, with their options, figures and reports."""
+
+from __future__ import annotations
+
+import re
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from browsing import CHROMIUM, QUIET, User
+from trunnion.cli.app import VERBS
+from trunnion.cli.forms import forms
+from trunnion.studio.jobs import Jobs
+from trunnion.studio.server import Studio
+
+ROOT = Path(__file__).resolve().parents[2]
+TOLERANCED = (ROOT / "examples" / "toleranced-fourbar.yaml").read_text("utf-8")
+PLAYING = (ROOT / "examples" / "fourbar-with-play.yaml").read_text("utf-8")
+WORDS = re.compile(r"<[^>]+>|\s+")
+
+
+@pytest.fixture
+def jobs(tmp_path):
+    own = Jobs(forms(), tmp_path)
+    yield own
+    own.close()
+
+
+def ended(jobs, number, longest=120.0):
+    limit = time.monotonic() + longest
+    while time.monotonic() < limit:
+        (job,) = [one for one in jobs.told() if one["id"] == number]
+        if not job["running"]:
+            return job
+        time.sleep(0.05)
+    pytest.fail(f"still running: {job}")
+
+
+def test_every_study_has_the_options_of_its_verb() -> None:
+    names = {verb.name for verb in VERBS}
+    for form in forms():
+        assert form["verb"] in names
+        done = subprocess.run(
+            [sys.executable, "-m", "trunnion", form["verb"], "--help"], capture_output=True, text=True, check=True
+        )
+        assert form["fields"]
+        for field in form["fields"]:
+            assert field["flag"] in done.stdout, (form["verb"], field["flag"])
+        written = [
+            one["flag"] for one in form["fields"] if one["flag"] in ("--out", "--report", "--write", "--checkpoint")
+        ]
+        assert written == []
+
+
+def test_the_report_of_a_study_is_that_of_its_verb(jobs, tmp_path) -> None:
+    number = jobs.start(
+        {"text": PLAYING, "verb": "play", "options": {"--steps": "36", "--measure": ["effort:A", "rocker.C.x"]}},
+        "model.yaml", None,
+    )  # fmt: skip
+    job = ended(jobs, number)
+    assert job["status"] in (0, 1), job
+    assert job["command"] == "trunnion play model.yaml --steps=36 --measure=effort:A --measure=rocker.C.x"
+    (tmp_path / "model.yaml").write_text(PLAYING, "utf-8")
+    command = [sys.executable, "-m", *job["command"].split(), "--report", "own.html"]
+    subprocess.run(command, cwd=tmp_path, capture_output=True, check=False)
+    pages = [jobs.report(job["report"].rpartition("/")[2]), (tmp_path / "own.html").read_text("utf-8")]
+    own, other = (WORDS.sub(" ", page) for page in pages)
+    assert own == other
+
+
+def test_a_study_is_stopped_and_tells_how_far_it_is(jobs) -> None:
+    options = {"--samples": "3000000", "--method": "monte-carlo"}
+    number = jobs.start({"text": TOLERANCED, "verb": "tolerance", "options": options}, "model.yaml", None)
+    limit = time.monotonic() + 60
+    while time.monotonic() < limit and not (jobs.told()[0]["progress"] or [0])[0]:
+        time.sleep(0.1)
+    done, total = jobs.told()[0]["progress"]
+    assert 0 < done < total == 3_000_000
+    jobs.stop(number)
+    job = ended(jobs, number)
+    assert job["stopped"]
+    assert job["report"] is None
+    assert "\x1e" not in job["output"]
+
+
+def test_what_is_wrong_with_a_model_is_its_output(jobs) -> None:
+    job = ended(
+        jobs, jobs.start({"text": "trunnion: 1\nlinks: {}\n", "verb": "play", "options": {}}, "model.yaml", None)
+    )
+    assert job["status"] == 2
+    assert "error" in job["output"]
+    assert job["report"] is None
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"verb": "rm"}, "no study"),
+        ({"verb": "play", "options": {"--out": "/etc/passwd"}}, "no option"),
+        ({"verb": "play", "options": {"--report": "x.html"}}, "no option"),
+        ({"verb": "play", "options": {"--steps": ["36", "72"]}}, "given once"),
+        ({"verb": "compare"}, "mapping"),
+    ],
+)
+def test_nothing_but_the_options_of_a_form_is_started(jobs, asked, words) -> None:
+    with pytest.raises(ValueError, match=words):
+        jobs.start({"text": TOLERANCED, **asked}, "model.yaml", None)
+    assert jobs.told() == []
+
+
+def test_a_value_is_never_an_option(jobs) -> None:
+    asked = {"text": PLAYING, "verb": "play", "options": {"--at": "--report=/tmp/x.html"}}
+    job = ended(jobs, jobs.start(asked, "model.yaml", None))
+    assert job["status"] == 2
+    assert "at: " in job["output"]
+
+
+if CHROMIUM:
+
+    @pytest.fixture
+    def page(tmp_path):
+        from playwright.sync_api import sync_playwright
+
+        (tmp_path / "four-bar.yaml").write_text(TOLERANCED, "utf-8")
+        with socket.socket() as bound, sync_playwright() as playwright:
+            bound.bind(("127.0.0.1", 0))
+            studio = Studio(tmp_path, "four-bar.yaml", bound.getsockname()[1], forms=forms())
+            server = studio.server()
+            thread = threading.Thread(target=server.run, kwargs={"sockets": [bound]}, daemon=True)
+            thread.start()
+            while not server.started:
+                thread.join(0.01)
+            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
+            user = User(browser.new_page(viewport={"width": 1280, "height": 720}), studio)
+            user.open()
+            user.until("s.solved.value")
+            yield user.page
+            assert not user.wrong, user.wrong
+            browser.close()
+            server.should_exit = True
+            thread.join(10)
+
+    def test_a_chip_opens_its_study_and_the_report_is_read_in_the_page(page) -> None:
+        page.locator(".chip", has_text="tolerance").click()
+        page.get_by_label("samples", exact=True).fill("0")
+        page.get_by_label("steps", exact=True).fill("36")
+        page.get_by_role("button", name="Run", exact=True).click()
+        page.get_by_role("button", name="Open the report").click(timeout=60_000)
+        page.frame_locator("iframe.report").get_by_text("Four-bar with tolerances").first.wait_for()
+        page.get_by_role("button", name="Back to the studies").click()
+        assert "trunnion tolerance four-bar.yaml --samples=0 --steps=36" in page.locator(".job code").inner_text()

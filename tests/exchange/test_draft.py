@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 import trunnion
 from trunnion.exchange.draft import Body, Draft, Pair, about, moved
 from trunnion.exchange.formats import FORMATS
-from trunnion.exchange.model_text import complete, model_text
+from trunnion.exchange.model_file import complete, model_text
 from trunnion.exchange.skeleton import positions_of
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from trunnion.exchange.formats import FORMATS as FORMATS
     from trunnion.exchange.formats import export_model as export_model
     from trunnion.exchange.formats import import_file as import_file
-    from trunnion.exchange.model_text import model_text as model_text
+    from trunnion.exchange.model_file import model_text as model_text
 
 _PLACES = {
     "FORMATS": "formats",
@@ -26,7 +26,7 @@ _PLACES = {
     "Pair": "draft",
     "export_model": "formats",
     "import_file": "formats",
-    "model_text": "model_text",
+    "model_text": "model_file",
 }
 
 __all__ = ["FORMATS", "Body", "Draft", "Pair", "export_model", "import_file", "model_text"]

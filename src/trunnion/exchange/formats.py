@@ -18,7 +18,7 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import Draft
-from trunnion.exchange.model_text import complete
+from trunnion.exchange.model_file import complete
 from trunnion.exchange.skeleton import positions_of
 from trunnion.files import reading, whole
 from trunnion.model.names import nearest

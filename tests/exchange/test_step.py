@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import re
+import time
 
 import numpy as np
 import pytest
@@ -10,9 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import trunnion
-from exchange.step_files import box, turn, turned
-from exchange.step_mechanisms import STILL, cardan, four_bar, placed, slider_crank, written
-from trunnion.exchange import import_file, model_text
+from exchange.step_files import StepFile, box, prism, turn, turned
+from exchange.step_mechanisms import STILL, bar, boss, cardan, four_bar, placed, slider_crank, written
+from trunnion.errors import MechanismError
+from trunnion.exchange import export_model, import_file, model_text
 from trunnion.exchange.brep import Geometry
 from trunnion.exchange.part21 import Part21
 
@@ -302,3 +306,275 @@ drivers: {{A: {{speed: 600 rpm}}}}
     draft = import_file(tmp_path / "a.step", ground="frame", drive=shaft, speed="600 rpm")
     imported, expected = torques(draft, tmp_path, by_hand, steps=24)
     np.testing.assert_allclose(imported, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+
+
+# ---- noise ----------------------------------------------------------------------------------------------------
+
+
+def test_inches(tmp_path):
+    parts = slider_crank()
+    draft = import_file(written(tmp_path / "a.step", parts, "in"), ground="frame", gap="20 mm")
+    for name, part in parts.items():
+        expect_body(draft.bodies[name], [part], 25.4e-3)
+    pair = joint(draft, "crank", "frame")
+    np.testing.assert_allclose([pair.pin_radius, pair.hole_radius, pair.length], 25.4e-3 * np.array([10, 10.02, 12]))
+
+
+def test_chamfers_fillets_and_blind_holes(tmp_path):
+    """A pin with a chamfer and a fillet in a blind hole with a conical bottom and a chamfered edge."""
+    base = box((-30, -30, -20), (30, 30, 0)).feature("top", (0, 0, 0), [(11, 0), (10, -1), (10, -15), (0, -18)])
+    profile = [(12, 0), (10, 2, (12, 2)), (10, 13), (9, 14), (0, 14)]
+    lever = box((-15, -15, 0), (80, 15, 8)).feature("bottom", (0, 0, 0), profile)
+    parts = {"base": (base, *STILL), "lever": (lever, np.eye(3), np.array([0, 0, 1.0]))}
+    draft = import_file(written(tmp_path / "a.step", parts))
+    for name, part in parts.items():
+        expect_body(draft.bodies[name], [part])
+    pair = joint(draft, "base", "lever")
+    assert pair.type == "cylindrical"  # nothing holds it along the axis
+    # the pin's cylinder from z = -1 to -12, the hole's from -1 to -15
+    np.testing.assert_allclose([pair.pin_radius, pair.hole_radius, pair.length], [0.01, 0.01, 0.011], atol=1e-12)
+    np.testing.assert_allclose(pair.at, [0, 0, -0.0065], atol=1e-12)
+    assert len(draft.pairs) == 1
+
+
+def test_rounded_corners_are_no_pins(tmp_path):
+    """Quarter cylinders at the corners of a part that fit a quarter hollow of another."""
+    outline = [(0, 0), (40, 0), (40, 30), (0, 30)]
+    shape = prism(outline, 0, 10)
+    other = prism([(50, 0), (90, 0), (90, 30), (50, 30)], 0, 10)
+    draft = import_file(written(tmp_path / "a.step", {"one": (shape, *STILL), "two": (other, *STILL)}))
+    assert not draft.pairs
+    assert "joints" in codes(draft)
+
+
+def test_two_coaxial_pins_of_different_parts_on_one_axis(tmp_path):
+    """Two levers turn on the two ends of one axle that stands still: two joints, not three."""
+    axle = turned([(0, 0), (6, 0), (6, 10), (9, 10), (9, 20), (6, 20), (6, 30), (0, 30)])
+    block = boss(box((-20, -20, -40), (20, 20, -30)), "top", (10, 10, -30), 5, 5)
+    lever = bar(60, [(0, 12.04)], 0, 10)
+    levers = {"left": (lever, *STILL), "right": (lever, turn((0, 0, 1), 1), np.array([0, 0, 20.0]))}
+    draft = import_file(written(tmp_path / "a.step", {"axle": (axle, *STILL)} | levers), ground="axle")
+    assert {frozenset(pair.links) for pair in draft.pairs.values()} == {
+        frozenset(("axle", "left")),
+        frozenset(("axle", "right")),
+    }
+    assert all(pair.length == pytest.approx(0.01) for pair in draft.pairs.values())
+    assert "unconnected" in codes(
+        import_file(
+            written(tmp_path / "b.step", {"axle": (axle, *STILL), "block": (block, *STILL)} | levers), ground="axle"
+        )
+    )
+
+
+def test_a_shaft_in_two_bearings_is_one_joint(tmp_path):
+    """Bearings at both ends: the length goes from the first end to the last."""
+    yoke = prism([(-30, 0), (60, 0), (60, 40), (50, 40), (50, 10), (-20, 10), (-20, 40), (-30, 40)], -15, 15)
+    yoke.feature(1, (60, 25, 0), [(5.01, 0), (5.01, -10)], 3).feature(7, (-30, 25, 0), [(5.01, 0), (5.01, -10)], 5)
+    shaft = turned([(0, -35), (5, -35), (5, -20), (7, -20), (7, 50), (5, 50), (5, 65), (0, 65)], (1, 0, 0), (0, 25, 0))
+    arm = boss(box((70, 20, -5), (75, 60, 5)), 3, (70, 25, 0), 8, 5)
+    draft = import_file(written(tmp_path / "a.step", {"yoke": (yoke, *STILL), "shaft": (shaft, *STILL)}), ground="yoke")
+    pair = joint(draft, "yoke", "shaft")
+    assert pair.type == "revolute"
+    np.testing.assert_allclose([pair.length, *pair.at], [0.09, 0.015, 0.025, 0], atol=1e-9)
+    assert arm.volume > 0
+
+
+def test_patterns_of_equal_holes_are_bolted(tmp_path):
+    """A flange on a plate: four screws through equal holes, each a use of one part; they move as one."""
+    corners = [(20, 20), (-20, 20), (-20, -20), (20, -20)]
+
+    def flange(low, high):
+        shape = box((-30, -30, low), (30, 30, high))
+        for x, y in corners:
+            shape.feature("bottom", (x, y, low), [(3.3, 0), (3.3, low - high)], "top")
+        return shape
+
+    screw = turned([(0, 0), (3, 0), (3, 20), (5, 20), (5, 24), (0, 24)])
+    base = flange(-10, 0)
+    top = flange(0, 10).feature("top", (0, 0, 10), [(8, 0), (8, 15), (0, 15)])
+    wheel = bar(50, [(0, 16.05)], 10, 20)
+    parts = {"base": (base, *STILL), "flange": (top, *STILL), "arm": (wheel, *STILL)}
+    parts |= {f"screw{n}": (screw, np.eye(3), np.array([x, y, -10.0])) for n, (x, y) in enumerate(corners)}
+    draft = import_file(written(tmp_path / "a.step", parts), ground="base")
+    assert set(draft.bodies) == {"base", "arm"}
+    expect_body(draft.bodies["base"], [part for name, part in parts.items() if name != "arm"])
+    assert [pair.type for pair in draft.pairs.values()] == ["revolute"] or len(draft.pairs) == 1
+    bare = {name: part for name, part in parts.items() if "screw" not in name}
+    again = import_file(written(tmp_path / "b.step", bare), ground="base")
+    assert set(again.bodies) == {"base", "arm"}
+    assert "bolted" in codes(again)
+
+
+def test_a_part_used_twice_is_two_links_and_twins_are_one(tmp_path):
+    """A rocker whose two side plates are uses of one part; the pins are of the crank and the ground."""
+    parts = four_bar()
+    shape, matrix, shift = parts["rocker"]
+    parts["pin-3"] = (turned([(0, 0), (5, 0), (5, 40), (0, 40)]), np.eye(3), parts["pin-3"][2])
+    parts["pin-4"] = (turned([(0, 0), (5, 0), (5, 40), (0, 40)]), np.eye(3), parts["pin-4"][2])
+    file = StepFile()
+    made = {name: file.part(name, part) for name, (part, *_) in parts.items()}
+    uses = [(made[name], *place) for name, (_, *place) in parts.items()]
+    file.assembly("twins", *uses, (made["rocker"], matrix, shift + np.array([0, 0, 20])))
+    draft = import_file(file.write(tmp_path / "a.step"), ground="ground")
+    assert set(draft.bodies) == {"ground", "crank", "coupler", "rocker"}
+    assert draft.bodies["rocker"].mass > 1.9 * STEEL * shape.volume * 1e-9
+    assert "twins" in codes(draft)
+    mechanism = model(draft, tmp_path)
+    assert (trunnion.analyse(mechanism, 12)["status"].values <= 2).all()
+
+
+def test_mirrored_parts(tmp_path):
+    parts = {
+        name: (shape.placed(np.diag([1, -1, 1]), (0, 0, 0)), matrix, at)
+        for name, (shape, matrix, at) in placed(slider_crank(-math.pi / 3)).items()
+    }
+    draft = import_file(written(tmp_path / "a.step", parts), ground="frame")
+    for name, part in parts.items():
+        expect_body(draft.bodies[name], [part])
+    assert len(draft.pairs) == 4
+
+
+def test_gap_interference_and_threads_are_findings(tmp_path):
+    def pair(hole, pin):
+        parts = {"base": (bar(80, [(0, hole)], 0, 10), *STILL)}
+        parts["arm"] = (boss(bar(60, [], 10, 20), "bottom", (0, 0, 10), pin, 10), *STILL)
+        return import_file(written(tmp_path / "a.step", parts), ground="base")
+
+    assert [item.type for item in pair(10.9, 10).pairs.values()] == ["revolute"] or len(pair(10.9, 10).pairs) == 1
+    wide = pair(11.2, 10)
+    assert not wide.pairs
+    assert "gap" in codes(wide)
+    pressed = pair(9.96, 10)
+    assert "interference" in codes(pressed)
+    assert set(pressed.bodies) == {"base"}
+    thread = pair(6.8, 8)
+    assert "interference" in codes(thread)
+    assert set(thread.bodies) == {"base"}
+    through = pair(5, 10)
+    assert not through.pairs
+    assert {"gap", "touching"} & codes(through)
+
+
+def test_half_a_hole_is_asked(tmp_path):
+    """Half shells hold a pin from one side: no joint without a question."""
+    shell = turned([(5.01, 0), (9, 0), (9, 10), (5.01, 10), (5.01, 0)], split="halves")
+    assert shell.volume > 0
+    outline = [(-20, 0), (-20, -20), (20, -20), (20, 0)]
+    block = prism(outline, 0, 10)
+    draft = import_file(written(tmp_path / "a.step", {"a": (block, *STILL), "b": (shell, *STILL)}))
+    assert not draft.pairs
+
+
+def test_several_solids_surfaces_and_units_are_said(tmp_path):
+    file = StepFile()
+    two = file.part("two", plate(), plate().placed(np.eye(3), (0, 0, 50)))
+    lone = file.part("lone", plate())
+    file.assembly("all", (two, *STILL), (lone, np.eye(3), np.array([0, 100, 0])))
+    draft = import_file(file.write(tmp_path / "a.step"))
+    assert "rigid" in codes(draft)
+    assert draft.bodies["two"].mass == pytest.approx(2 * draft.bodies["lone"].mass)
+    single = StepFile()
+    single.part("body", plate(), plate().placed(np.eye(3), (0, 0, 50)))
+    assert "solids" in codes(import_file(single.write(tmp_path / "b.step")))
+    bare = import_file(written(tmp_path / "c.step", {"plate": (plate(), *STILL)}, None))
+    assert "unit" in codes(bare)
+    assert bare.bodies["plate"].mass == pytest.approx(STEEL * 80217.34565773529e-9)
+    surface = written(tmp_path / "d.step", {"plate": (plate(), *STILL)})
+    surface.write_text(surface.read_text().replace("MANIFOLD_SOLID_BREP(", "SHELL_BASED_SURFACE_MODEL("))
+    with pytest.raises(MechanismError, match="no solids"):
+        import_file(surface)
+
+
+def test_a_ball_in_its_socket(tmp_path):
+    ball = turned([(0, -30), (4, -30), (4, -3), (5, 0, (0, 0)), (0, 5, (0, 0))])
+    hollow = box((-10, -10, -6), (10, 10, 10))
+    height = math.sqrt(5.02**2 - 4.5**2)
+    hollow.feature("bottom", (0, 0, -6), [(4.5, 0), (4.5, -6 + height), (0, -11.02, (0, -6))])
+    draft = import_file(written(tmp_path / "a.step", {"ball": (ball, *STILL), "cup": (hollow, *STILL)}))
+    assert [pair.type for pair in draft.pairs.values()] == ["spherical"]
+
+
+# ---- densities ------------------------------------------------------------------------------------------------
+
+
+def test_density_of_the_file_goes_before_that_of_the_option(tmp_path):
+    file = StepFile()
+    part = file.part("plate", plate())
+    gram, centi = (
+        file("(MASS_UNIT()NAMED_UNIT(*)SI_UNIT($,.GRAM.))"),
+        file("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.CENTI.,.METRE.))"),
+    )
+    one, three = (file(f"DERIVED_UNIT_ELEMENT(#{unit},{power}.)") for unit, power in ((gram, 1), (centi, -3)))
+    unit = file(f"DERIVED_UNIT((#{one},#{three}))")
+    item = file(f"MEASURE_REPRESENTATION_ITEM('density measure',POSITIVE_RATIO_MEASURE(2.7),#{unit})")
+    held = file(f"REPRESENTATION('density',(#{item}),#{file.context})")
+    owner = file(f"PROPERTY_DEFINITION('material property','density',#{part[0]})")
+    file(f"PROPERTY_DEFINITION_REPRESENTATION(#{owner},#{held})")
+    body = import_file(file.write(tmp_path / "a.step"), material="brass").bodies["plate"]
+    assert body.mass == pytest.approx(2700 * 80217.34565773529e-9)
+    plain = import_file(written(tmp_path / "b.step", {"plate": (plate(), *STILL)}), material="brass").bodies["plate"]
+    assert plain.mass == pytest.approx(8500 * 80217.34565773529e-9)
+
+
+# ---- hostile files --------------------------------------------------------------------------------------------
+
+
+def million(path):
+    lines = "".join(f"#{n}=CARTESIAN_POINT('',(0.,0.,{n}.));\n" for n in range(1, 1_000_001))
+    path.write_text(f"ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n{lines}ENDSEC;\nEND-ISO-10303-21;\n")
+
+
+def damaged(path, change):
+    written(path, {"plate": (plate(), *STILL)})
+    path.write_text(change(path.read_text()))
+
+
+HOSTILE = {
+    "a million entities": million,
+    "cut off": lambda path: damaged(path, lambda text: text[: len(text) // 2]),
+    "junk": lambda path: path.write_bytes(bytes(range(256)) * 40),
+    "junk with a head": lambda path: path.write_bytes(b"ISO-10303-21;" + bytes(range(256)) * 40 + b"ENDSEC;"),
+    "a missing entity": lambda path: damaged(path, lambda text: re.sub(r"#40=.*\n", "", text)),
+    "brackets": lambda path: damaged(path, lambda text: text.replace("#40=", "#40=" + "X(" * 5000, 1)),
+    "a wrong kind": lambda path: damaged(path, lambda text: text.replace("ADVANCED_FACE", "VERTEX_POINT")),
+    "no numbers": lambda path: damaged(path, lambda text: re.sub(r"\d\.\d+E", "nan", text)),
+    "a list for a number": lambda path: damaged(path, lambda text: text.replace("L_SURFACE('',", "L_SURFACE('',(),")),
+    "no shapes": lambda path: damaged(path, lambda text: text.replace("SHAPE_DEFINITION_REP", "OTHER_REP")),
+    "zero axes": lambda path: damaged(
+        path, lambda text: re.sub(r"DIRECTION\('',\(.*?\)\)", "DIRECTION('',(0.,0.,0.))", text)
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_hostile_files_are_one_sentence(tmp_path, kind):
+    path = tmp_path / "a.step"
+    HOSTILE[kind](path)
+    start = time.monotonic()
+    with pytest.raises(MechanismError) as error:
+        import_file(path)
+    assert time.monotonic() - start < 10
+    assert len(error.value.findings) == 1
+    assert len(str(error.value)) < 500
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10**6), st.sampled_from(["", "'", "(", ")", "#1", "$", "*", "1.E400", ";", "\x00"]))
+def test_a_damaged_file_is_a_sentence_or_a_part(tmp_path_factory, place, text):
+    path = written(tmp_path_factory.mktemp("step") / "a.step", {"plate": (plate(), *STILL)})
+    whole = path.read_text()
+    at = place % len(whole)
+    path.write_text(whole[:at] + text + whole[at + 3 :])
+    with contextlib.suppress(MechanismError):
+        import_file(path)
+
+
+def test_a_product_inside_itself(tmp_path):
+    file = StepFile()
+    part = file.part("plate", plate())
+    top = file.assembly("top", (part, *STILL))
+    text = file.write(tmp_path / "a.step").read_text()
+    use = re.search(r"NEXT_ASSEMBLY_USAGE_OCCURRENCE\([^)]*\)", text)[0]
+    file(re.sub(r"#\d+,#\d+,\$", f"#{part[0]},#{top[0]},$", use))
+    with pytest.raises(MechanismError):
+        import_file(file.write(tmp_path / "a.step"))

@@ -36,6 +36,10 @@ KINDS = {
 WRAPPED = ("SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE")
 
 
+class UnreadError(Exception):
+    """A curve that is not integrated along."""
+
+
 @dataclass
 class Moments:
     """Volume, m³, its first moment, m⁴ (3,), and second moment ∫ q qᵀ dV, m⁵ (3, 3), about the origin."""
@@ -66,7 +70,8 @@ class Moments:
     @property
     def inertia(self) -> Array:
         """Inertia tensor about the centre for a density of 1, m⁵."""
-        return np.trace(self.second) * np.eye(3) - self.second - self.volume * steiner(self.centre)
+        about = np.trace(self.second) * np.eye(3) - self.second
+        return np.asarray(about - self.volume * steiner(self.centre))
 
 
 @dataclass
@@ -155,7 +160,7 @@ class Geometry:
     def edge(self, number: int) -> tuple[Array, Array, Array]:
         """Nodes, m, weighted tangents and ends of an EDGE_CURVE: ∫ f dq = Σ f(node) · tangent.
 
-        ValueError if its curve is of a kind that is not read.
+        UnreadError if its curve is of a kind that is not read.
         """
         if number not in self._edges:
             _, start, end, curve, same = self.file.args(number, "EDGE_CURVE")
@@ -175,7 +180,7 @@ class Geometry:
         if "B_SPLINE_CURVE_WITH_KNOTS" in entity:
             return self._spline_nodes(entity, ends, closed, same)
         if kind not in ("CIRCLE", "ELLIPSE", "HYPERBOLA", "PARABOLA"):
-            raise ValueError(f"a curve {kind}")
+            raise UnreadError(f"a curve {kind}")
         frame, centre = self.placement(entity[kind][1])
         sizes = [self.length * float(size) for size in entity[kind][2:]]
         a, b = (sizes[0], sizes[-1]) if kind != "PARABOLA" else (sizes[0], 2 * sizes[0])
@@ -237,7 +242,7 @@ class Geometry:
         if closed and not same:
             first, last = high, low
         if first == last or (first < last) != same:
-            raise ValueError("a spline that is cut across its seam")
+            raise UnreadError("a spline that is cut across its seam")
         inside = [knot for knot in knots if min(first, last) < knot < max(first, last)]
         return _gauss(course, sorted([first, *inside, last], reverse=first > last))
 
@@ -303,7 +308,7 @@ class Geometry:
             sign = 1.0 if bool(forward) == along else -1.0
             try:
                 edges = self.loop(loop)
-            except ValueError as error:
+            except UnreadError as error:
                 solid.doubts.append(f"it has {error}")
                 continue
             used.update((edge, direction == (sign > 0)) for *_, edge, direction in edges)

@@ -24,7 +24,7 @@ __all__ = ["joined", "loose_contacts"]
 ANGLE = 1e-4  # rad, between axes or planes that count as parallel
 NEAR = 1e-6  # m, between places that count as equal
 COVERED = 0.55, 0.45  # of a turn: a hole that holds its pin; one that may
-THREAD = 0.12  # of the radius: a pin that much larger than its hole is pressed or threaded in
+THREAD = 0.2  # of the radius: a pin that much larger than its hole is pressed or threaded in
 FITS = ("H7/h6", "H7/g6", "H7/f7", "H8/f7", "H8/e8", "H9/d9", "H11/c11")
 ALIKE = 3  # of the gap: the difference of radii up to which a pin without a joint is spoken of
 
@@ -409,7 +409,7 @@ class _Held:
         return False
 
     def _loose(self) -> bool:
-        """A pin or sleeve with all contacts on its own axis spins without effect: it is fixed where its play is least."""
+        """A pin or sleeve with all contacts on its own axis spins without effect: it is fixed at the least play."""
         between = self.between()
         for body in self.groups.bodies():
             mine = {pair: contacts for pair, contacts in between.items() if body in pair}

@@ -22,7 +22,7 @@ from trunnion.exchange.brep import Face, Moments, Solid
 from trunnion.exchange.draft import Array, Body, Draft, free_name
 from trunnion.exchange.formats import MATERIALS
 from trunnion.exchange.mating import joined, loose_contacts
-from trunnion.exchange.model_text import flat_frame
+from trunnion.exchange.model_file import flat_frame
 from trunnion.exchange.part21 import Part21, quoted
 from trunnion.exchange.step_assembly import Assembly, Occurrence, Place
 
@@ -445,7 +445,7 @@ def _model_frame(positions: Positions, draft: Draft) -> Array:
 
     The model's links must have the file's frame, as the import wrote them: only then is their motion that of the parts.
     """
-    from trunnion.exchange.model_text import complete
+    from trunnion.exchange.model_file import complete
 
     spatial = positions.mechanism.space == "spatial"
     drawn = complete(draft, positions.mechanism.fixed_link if positions.mechanism.fixed_link in draft.bodies else "")

@@ -34,7 +34,7 @@ class Place:
     @property
     def inverse(self) -> Place:
         """The place of the other frame in this one."""
-        matrix = np.linalg.inv(self.matrix)
+        matrix = np.asarray(np.linalg.inv(self.matrix), dtype=float)
         return Place(matrix, -matrix @ self.shift)
 
 

@@ -199,15 +199,15 @@ links:
   rod: {{points: {{P: [0, 0], Q: [200 mm, 0]}}, {shapes["rod"]}}}
   slider: {{points: {{Q: [0, 0], S: {{at: [0, 0], axis: [1, 0]}}}}, {shapes["slider"]}}}
 joints:
-  O: {{type: revolute, links: [crank, frame], pin: {{radius: 10 mm, length: 12 mm, clearance: 20 um}}}}
+  O: {{type: revolute, links: [frame, crank], pin: {{radius: 10 mm, length: 12 mm, clearance: 20 um}}}}
   P: {{type: revolute, links: [crank, rod], pin: {{radius: 8 mm, length: 10 mm, clearance: 15 um}}}}
   Q: {{type: revolute, links: [slider, rod], pin: {{radius: 6 mm, length: 10 mm, clearance: 10 um}}}}
   S: {{type: prismatic, links: [frame, slider], guide: {{length: 40 mm, clearance: 20 um}}}}
-drivers: {{O: {{speed: -600 rpm, start: -60 deg}}}}
+drivers: {{O: {{speed: 600 rpm, start: 60 deg}}}}
 assembly: {{Q: [0.2, 0]}}
 """
     path = written(tmp_path / "a.step", slider_crank())
-    draft = import_file(path, ground="frame", drive="B", speed="-600 rpm")
+    draft = import_file(path, ground="frame", drive="B", speed="600 rpm")
     imported, expected = torques(draft, tmp_path, by_hand)
     np.testing.assert_allclose(imported, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
 
@@ -251,13 +251,13 @@ links:
   coupler: {{points: {{B: {b}, C: {c}}}, {drawn["coupler"]}}}
   rocker: {{points: {{C: {c}, D: [100 mm, 0]}}, {drawn["rocker"]}}}
 joints:
-  A: {{type: revolute, links: [crank, ground], pin: {{radius: 5 mm, length: 10 mm, clearance: 20 um}}}}
+  A: {{type: revolute, links: [ground, crank], pin: {{radius: 5 mm, length: 10 mm, clearance: 20 um}}}}
   B: {{type: revolute, links: [coupler, crank], pin: {{radius: 5 mm, length: 10 mm, clearance: 25 um}}}}
   C: {{type: revolute, links: [coupler, rocker], pin: {{radius: 5 mm, length: 10 mm, clearance: 30 um}}}}
-  D: {{type: revolute, links: [rocker, ground], pin: {{radius: 5 mm, length: 10 mm, clearance: 20 um}}}}
-drivers: {{A: {{speed: -600 rpm}}}}
+  D: {{type: revolute, links: [ground, rocker], pin: {{radius: 5 mm, length: 10 mm, clearance: 20 um}}}}
+drivers: {{A: {{speed: 600 rpm}}}}
 """
-    draft = import_file(written(tmp_path / "a.step", parts), ground="ground", speed="-600 rpm")
+    draft = import_file(written(tmp_path / "a.step", parts), ground="ground", speed="600 rpm")
     imported, expected = torques(draft, tmp_path, by_hand)
     np.testing.assert_allclose(imported, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
 
@@ -296,7 +296,7 @@ links:
   cross: {{points: {{{point("B")}, {point("C")}}}, {drawn["cross"]}}}
   output: {{points: {{{point("C")}, {point("D")}}}, {drawn["output"]}}}
 joints:
-  A: {{type: revolute, links: [input, frame], pin: {{radius: 10 mm, length: 20 mm, clearance: 20 um}}}}
+  A: {{type: revolute, links: [frame, input], pin: {{radius: 10 mm, length: 20 mm, clearance: 20 um}}}}
   B: {{type: cylindrical, links: [cross, input], pin: {{radius: 5 mm, length: 46 mm, clearance: 10 um}}}}
   C: {{type: cylindrical, links: [cross, output], pin: {{radius: 5 mm, length: 46 mm, clearance: 10 um}}}}
   D: {{type: cylindrical, links: [output, frame], pin: {{radius: 10 mm, length: 20 mm, clearance: 30 um}}}}
@@ -578,3 +578,97 @@ def test_a_product_inside_itself(tmp_path):
     file(re.sub(r"#\d+,#\d+,\$", f"#{part[0]},#{top[0]},$", use))
     with pytest.raises(MechanismError):
         import_file(file.write(tmp_path / "a.step"))
+
+
+# ---- free-form solids -----------------------------------------------------------------------------------------
+
+
+def free_form(path):
+    """The plate with its top, the second of its faces, as a spline surface, which is flat."""
+    file = StepFile()
+    file.assembly("all", (file.part("plate", plate()), *STILL))
+    rows = [[(x, y, 12) for y in (-30, 30)] for x in (-30, 230)]
+    numbers = [[file.vector("CARTESIAN_POINT", corner) for corner in row] for row in rows]
+    poles = ",".join(f"(#{one},#{other})" for one, other in numbers)
+    knots = "(2,2),(2,2),(0.,1.),(0.,1.),.UNSPECIFIED."
+    surface = file(f"B_SPLINE_SURFACE_WITH_KNOTS('',1,1,({poles}),.PLANE_SURF.,.F.,.F.,.F.,{knots})")
+    top = [n for n, line in enumerate(file.lines) if line.startswith("ADVANCED_FACE")][1]
+    file.lines[top] = re.sub(r"#\d+,(\.[TF]\.\))$", rf"#{surface},\1", file.lines[top])
+    return file.write(path)
+
+
+def test_a_free_form_solid_has_the_mass_of_a_mesh_and_says_so(tmp_path):
+    pytest.importorskip("cascadio")
+    draft = import_file(free_form(tmp_path / "a.step"))
+    assert "mesh" in codes(draft)
+    body = draft.bodies["plate"]
+    mass, centre, inertia = plate().moments()
+    assert body.mass == pytest.approx(mass, rel=1e-4)
+    np.testing.assert_allclose(body.centre, centre, atol=1e-5)
+    np.testing.assert_allclose(body.inertia, inertia, atol=1e-4 * np.abs(inertia).max())
+    assert any("by a mesh, to about" in comment for comment in body.comments)
+
+
+# ---- writing --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rotation", [np.eye(3), turn((1, 2, 3), 0.7)])
+@pytest.mark.parametrize("turned_by", [0.0, 40.0, 200.0])
+def test_parts_of_the_original_are_moved(tmp_path, rotation, turned_by):
+    path = written(tmp_path / "a.step", placed(slider_crank(), rotation, (30, 20, -10)))
+    draft = import_file(path, ground="frame")
+    mechanism = model(draft, tmp_path)
+    assert export_model(mechanism, tmp_path / "b.step", f"{turned_by} deg", original=path) == []
+    again = import_file(tmp_path / "b.step", ground="frame")
+    normal = rotation[:, 2]
+    way = np.sign(normal[np.argmax(abs(normal))])  # the model turns about the normal's side with the largest component
+    near = placed(slider_crank(math.pi / 3 + way * math.radians(turned_by)), rotation, (30, 20, -10))
+    for name, part in near.items():
+        expect_body(again.bodies[name], [part])
+    assert len(again.pairs) == len(draft.pairs)
+
+
+def test_welded_parts_move_with_their_link_and_edited_models_are_refused(tmp_path):
+    path = written(tmp_path / "a.step", four_bar())
+    draft = import_file(path, ground="ground")
+    mechanism = model(draft, tmp_path)
+    export_model(mechanism, tmp_path / "b.step", "90 deg", original=path)
+    again = import_file(tmp_path / "b.step", ground="ground")
+    assert {name: body.mass for name, body in again.bodies.items()} == pytest.approx(
+        {name: body.mass for name, body in draft.bodies.items()}
+    )
+    text = (tmp_path / "model.yaml").read_text()
+    (tmp_path / "other.yaml").write_text(re.sub(r"D: \[100 mm", "D: [101 mm", text))
+    assert "101 mm" in (tmp_path / "other.yaml").read_text()
+    with pytest.raises(MechanismError, match="other points"):
+        export_model(trunnion.read(tmp_path / "other.yaml"), tmp_path / "c.step", original=path)
+    with pytest.raises(MechanismError, match="cannot be read"):
+        export_model(mechanism, tmp_path / "c.step", original=tmp_path / "none.step")
+
+
+@pytest.mark.parametrize("name", ["slider-crank", "rssr", "universal-joint"])
+def test_the_skeleton_has_the_points_of_the_position(tmp_path, name):
+    from trunnion.exchange.skeleton import positions_of
+    from trunnion.exchange.step_assembly import Assembly
+
+    mechanism = trunnion.read(f"examples/{name}.yaml")
+    path = tmp_path / "a.step"
+    findings = export_model(mechanism, path, "30 deg")
+    assert "exchange.skeleton" in {finding.code for finding in findings}
+    drawn = positions_of(mechanism, 4, "30 deg").draft()
+    file = Part21(path)
+    assembly = Assembly(file, 1e-3)
+    (root,) = assembly.tree()
+    assert [part.name for part in root.children] == list(drawn.bodies)
+    for part in root.children:
+        shape = assembly.shapes[part.definition][0]
+        (wires,) = assembly.items(shape, "GEOMETRIC_CURVE_SET")
+        points = {
+            file[item]["CARTESIAN_POINT"][0]: part.place.matrix @ assembly.geometry(shape).point(item)
+            + part.place.shift
+            for item in file[wires]["GEOMETRIC_CURVE_SET"][1]
+            if "CARTESIAN_POINT" in file[item]
+        }
+        for pair in drawn.pairs_of(part.name):
+            if pair.type in ("revolute", "spherical"):
+                np.testing.assert_allclose(points[pair.name], pair.at, atol=1e-9)

@@ -300,6 +300,8 @@ class Geometry:
     def _face(self, number: Any, along: bool, solid: Solid, used: Counter[tuple[int, bool]]) -> None:
         """Add a face and its share of the moments to a solid."""
         kind = self.file.kind(number)
+        if kind not in ("ADVANCED_FACE", "FACE_SURFACE"):
+            raise self.file.unreadable(f"has {kind} at #{number} where a face belongs")
         _, bounds, surface, same = self.file[number][kind][:4]
         face = self.surface(surface, bool(same) == along, int(number))
         loops, points = [], []

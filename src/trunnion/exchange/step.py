@@ -22,7 +22,7 @@ from trunnion.exchange.brep import Face, Moments, Solid
 from trunnion.exchange.draft import Array, Body, Draft, free_name
 from trunnion.exchange.formats import MATERIALS
 from trunnion.exchange.mating import joined, loose_contacts
-from trunnion.exchange.model_file import flat_frame
+from trunnion.exchange.model_file import complete, flat_frame
 from trunnion.exchange.part21 import Part21, quoted
 from trunnion.exchange.step_assembly import Assembly, Occurrence, Place
 
@@ -103,6 +103,10 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
         draft.warn("unit", "", what, "state it with --unit")
     draft.ground = options.ground if options.ground in draft.bodies else ""
     joined(draft, faces, options.gap)
+    still = complete(draft)
+    for name, pair in still.pairs.items():
+        if pair.type == "revolute" and pair.links[1] == still.ground:  # its coordinate is then that of the moving link
+            draft.pairs[name].links = draft.pairs[name].links[::-1]
     if not draft.pairs and len(draft.bodies) > 1:
         what = "no pin lies in a hole and no two walls guide a part: there are no joints"
         draft.warn("joints", "", what, "state a larger --gap, or the unit with --unit")
@@ -445,8 +449,6 @@ def _model_frame(positions: Positions, draft: Draft) -> Array:
 
     The model's links must have the file's frame, as the import wrote them: only then is their motion that of the parts.
     """
-    from trunnion.exchange.model_file import complete
-
     spatial = positions.mechanism.space == "spatial"
     drawn = complete(draft, positions.mechanism.fixed_link if positions.mechanism.fixed_link in draft.bodies else "")
     normal = None if spatial else drawn.plane_normal()

@@ -494,6 +494,22 @@ def test_a_ball_in_its_socket(tmp_path):
     assert [pair.type for pair in draft.pairs.values()] == ["spherical"]
 
 
+def test_other_layouts_of_the_text(tmp_path):
+    """Blanks, comments, line breaks, entities in any order, texts with brackets and semicolons, unicode."""
+    parts = slider_crank()
+    path = written(tmp_path / "a.step", parts)
+    head, _, data = path.read_text().partition("DATA;\n")
+    lines = data.split("ENDSEC")[0].splitlines()
+    spaced = [re.sub(r"([(),=])", r" \1\n ", line) + " /* a comment; with ( */" for line in lines[::-1]]
+    text = "\n".join(spaced).replace("'rod'", "'Pleuel \\X2\\00FC\\X0\\;(''1'') é'")
+    path.write_text(f"{head}DATA;\n{text}\nENDSEC;\nEND-ISO-10303-21;\n", encoding="utf-8")
+    draft = import_file(path, ground="frame")
+    assert list(draft.bodies) == ["frame", "crank", "Pleuel ü;('1') é", "slider"]
+    expect_body(draft.bodies["Pleuel ü;('1') é"], [parts["rod"]])
+    assert len(draft.pairs) == 4
+    assert (trunnion.analyse(model(draft, tmp_path), 4)["status"].values <= 2).all()
+
+
 # ---- densities ------------------------------------------------------------------------------------------------
 
 

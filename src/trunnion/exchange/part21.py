@@ -22,7 +22,7 @@ DEEPEST = 100  # lists in lists
 _ENTITY = re.compile(r"#(\d+)\s*+=\s*+((?:[^;'/]++|'[^']*+'|/\*.*?\*/|/)*+);", re.DOTALL)
 _KIND = re.compile(r"\s*([A-Z][A-Z0-9_]*)\s*\(")
 _TOKEN = re.compile(
-    r"\s*+(?:/\*.*?\*/\s*+)*(?:(?P<string>'(?:[^']|'')*')|#(?P<ref>\d+)|(?P<number>[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)"
+    r"\s*+(?:/\*.*?\*/\s*+)*(?:(?P<string>'(?:[^']|'')*')|#(?P<ref>\d+)|(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
     r"|\.(?P<enum>\w+)\.|(?P<kind>[A-Za-z_]\w*)|(?P<sign>[()$*,])|\"(?P<binary>[0-9A-F]*)\")",
     re.DOTALL,
 )

@@ -82,7 +82,8 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
         solids = _solids(assembly, link, draft)
         label = link.name or "part"
         if len(links) == 1 and len(solids) > 1:  # a file of bodies without an assembly
-            names = [str(file[solid.number][file.kind(solid.number)][0] or label) for _, solid, _ in solids]
+            names = [str(file[solid.number][file.kind(solid.number)][0] or "") for _, solid, _ in solids]
+            names = [label if text in ("", "NONE") else text for text in names]
             what = f"is the only part, with {len(solids)} solids: each is taken as a link"
             draft.warn("solids", f"links.{label}", what, "export an assembly to move its parts", count=len(solids))
             groups = [(own, [entry]) for own, entry in zip(names, solids, strict=True)]

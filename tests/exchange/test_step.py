@@ -504,7 +504,7 @@ def test_other_layouts_of_the_text(tmp_path):
     text = "\n".join(spaced).replace("'rod'", "'Pleuel \\X2\\00FC\\X0\\;(''1'') é'")
     path.write_text(f"{head}DATA;\n{text}\nENDSEC;\nEND-ISO-10303-21;\n", encoding="utf-8")
     draft = import_file(path, ground="frame")
-    assert list(draft.bodies) == ["frame", "crank", "Pleuel ü;('1') é", "slider"]
+    assert set(draft.bodies) == {"frame", "crank", "Pleuel ü;('1') é", "slider"}
     expect_body(draft.bodies["Pleuel ü;('1') é"], [parts["rod"]])
     assert len(draft.pairs) == 4
     assert (trunnion.analyse(model(draft, tmp_path), 4)["status"].values <= 2).all()

@@ -141,8 +141,8 @@ def test_edges_that_are_splines(tmp_path):
 @pytest.mark.parametrize(("rotation", "shift"), [(np.eye(3), (0, 0, 0)), (turn((1, 2, 3), 0.7), (100, -50, 30))])
 def test_slider_crank(tmp_path, split, rotation, shift):
     parts = placed(slider_crank(split=split), rotation, shift)
-    draft = import_file(written(tmp_path / "a.step", parts), ground="frame", drive="B")
-    assert codes(draft) <= {"drive"}
+    draft = import_file(written(tmp_path / "a.step", parts), ground="frame")
+    assert codes(draft) == {"drive"}
     for name, part in parts.items():
         expect_body(draft.bodies[name], [part])
     sizes = {("crank", "frame"): (10, 10.02, 12), ("crank", "rod"): (8, 8.015, 10), ("rod", "slider"): (6, 6.01, 10)}
@@ -207,7 +207,8 @@ drivers: {{O: {{speed: 600 rpm, start: 60 deg}}}}
 assembly: {{Q: [0.2, 0]}}
 """
     path = written(tmp_path / "a.step", slider_crank())
-    draft = import_file(path, ground="frame", drive="B", speed="600 rpm")
+    shaft = joint(import_file(path), "crank", "frame").name
+    draft = import_file(path, ground="frame", drive=shaft, speed="600 rpm")
     imported, expected = torques(draft, tmp_path, by_hand)
     np.testing.assert_allclose(imported, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
 
@@ -530,6 +531,36 @@ def test_density_of_the_file_goes_before_that_of_the_option(tmp_path):
     assert body.mass == pytest.approx(2700 * 80217.34565773529e-9)
     plain = import_file(written(tmp_path / "b.step", {"plate": (plate(), *STILL)}), material="brass").bodies["plate"]
     assert plain.mass == pytest.approx(8500 * 80217.34565773529e-9)
+
+
+def test_tolerances_of_the_file_stand_in_the_comments(tmp_path):
+    file = StepFile()
+    parts = {name: file.part(name, part[0]) for name, part in slider_crank().items()}
+    bores = [n for n, line in enumerate(file.lines, 1) if line.startswith("CYLINDRICAL") and "1.002" in line]
+    face = next(n for n, line in enumerate(file.lines, 1) if line.startswith("ADV") and f"#{bores[0]},." in line)
+    file.assembly("all", *((part, *slider_crank()[name][1:]) for name, part in parts.items()))
+    shape = file(f"PRODUCT_DEFINITION_SHAPE('','',#{parts['frame'][0]})")
+    aspect = file(f"SHAPE_ASPECT('','',#{shape},.T.)")
+    size = file(f"DIMENSIONAL_SIZE(#{aspect},'diameter')")
+    limits = file("LIMITS_AND_FITS('H','','7','')")
+    file(f"PLUS_MINUS_TOLERANCE(#{limits},#{size})")
+    file(f"GEOMETRIC_ITEM_SPECIFIC_USAGE('','',#{aspect},#{parts['frame'][1]},#{face})")
+    draft = import_file(file.write(tmp_path / "a.step"), ground="frame")
+    assert any("hole d=20.04 mm H7 of frame" in comment for comment in joint(draft, "crank", "frame").comments)
+
+
+def test_an_assembly_with_solids_of_its_own_keeps_them(tmp_path):
+    """Solids that lie in the assembly itself are a link beside its parts."""
+    file = StepFile()
+    arm = file.part("arm", boss(bar(60, [], 12, 20), "bottom", (0, 0, 12), 15.96, 12))
+    top = file.assembly("top", (arm, *STILL))
+    solid = file.solid(plate())
+    line = file.lines[top[1] - 1]
+    file.lines[top[1] - 1] = line.replace("),", f",#{solid}),", 1)
+    draft = import_file(file.write(tmp_path / "a.step"))
+    assert set(draft.bodies) == {"top", "arm"}
+    expect_body(draft.bodies["top"], [(plate(), *STILL)])
+    assert joint(draft, "top", "arm").hole_radius == pytest.approx(0.008)
 
 
 # ---- hostile files --------------------------------------------------------------------------------------------

@@ -96,6 +96,7 @@ class Face:
     outward: bool
     number: int
     minor: float = 0.0  # angle of a cone, rad; radius of the tube of a torus, m
+    tolerance: str = ""  # of its diameter, as the file states it
     area: float = 0.0
     outline: Array = field(default_factory=lambda: np.zeros((0, 3)))
 

@@ -11,6 +11,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,7 @@ NEAR = 1e-6  # m, between places that count as equal
 COVERED = 0.55, 0.45  # of a turn: a hole that holds its pin; one that may
 THREAD = 0.2  # of the radius: a pin that much larger than its hole is pressed or threaded in
 FITS = ("H7/h6", "H7/g6", "H7/f7", "H8/f7", "H8/e8", "H9/d9", "H11/c11")
+TRIED = 24  # directions of edges for the least box around a face
 ALIKE = 3  # of the gap: the difference of radii up to which a pin without a joint is spoken of
 
 
@@ -42,13 +44,15 @@ class Round:
     hole: bool
     covered: float  # of its full area
     faces: tuple[int, ...]
+    tolerance: str = ""  # as the file states it
 
     @property
     def label(self) -> str:
         """In words, with its numbers in the file."""
         numbers = ", ".join(f"#{number}" for number in self.faces[:4])
         kind = (("pin", "hole") if self.high > self.low else ("ball", "socket"))[self.hole]
-        return f"{kind} d={2e3 * self.radius:.9g} mm of {self.body} ({numbers})"
+        size = f"{2e3 * self.radius:.9g} mm" + f" {self.tolerance}" * bool(self.tolerance)
+        return f"{kind} d={size} of {self.body} ({numbers})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,12 +74,6 @@ class Contact:
     def middle(self) -> Array:
         """Middle of the bearing."""
         return np.asarray(self.hole.point + (self.low + self.high) / 2 * self.hole.axis)
-
-    def on_line_of(self, other: Contact) -> bool:
-        """Whether both have the same axis."""
-        axis, off = self.hole.axis, other.middle - self.middle
-        play = abs(self.play) + abs(other.play) + NEAR
-        return parallel(axis, other.hole.axis) and bool(np.linalg.norm(off - (off @ axis) * axis) <= play)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +104,26 @@ class Facing:
 def parallel(one: Array, other: Array) -> bool:
     """Whether two unit vectors are parallel or opposite."""
     return bool(np.linalg.norm(np.cross(one, other)) < ANGLE)
+
+
+def _line_numbers(points: Sequence[Array], axes: Sequence[Array], slack: Sequence[float]) -> list[int]:
+    """A number for each line, equal for lines that lie on each other but for their slack, m."""
+    numbers: list[int] = []
+    first: list[int] = []
+    for index, (point, axis) in enumerate(zip(points, axes, strict=True)):
+        if first:
+            other = np.array([axes[line] for line in first])
+            off = point - np.array([points[line] for line in first])
+            away = np.linalg.norm(off - (off * other).sum(axis=1)[:, None] * other, axis=1)
+            turned = np.linalg.norm(np.cross(other, axis), axis=1)
+            room = slack[index] + np.array([slack[line] for line in first]) + NEAR
+            same = np.nonzero((away <= room) & (turned < ANGLE))[0]
+            if len(same):
+                numbers.append(int(same[0]))
+                continue
+        numbers.append(len(first))
+        first.append(index)
+    return numbers
 
 
 class Groups:
@@ -168,81 +186,80 @@ def loose_contacts(faces: dict[str, list[Face]], gap: float) -> int:
 def _rounds(faces: dict[str, list[Face]], kind: str) -> list[Round]:
     """Pins and holes, or balls and sockets, of all bodies; faces that are parts of the same are united."""
     rounds: list[Round] = []
+    ball = kind == "sphere"
     for body, all_faces in faces.items():
-        pieces = []
-        for face in (face for face in all_faces if face.kind == kind):
-            axis = face.axis * np.sign(face.axis[int(np.argmax(abs(face.axis)))])
-            along = (face.outline - face.origin) @ axis if len(face.outline) else np.array([0.0])
-            spread = (float(along.min()), float(along.max())) if kind == "cylinder" else (0.0, 0.0)
-            pieces.append(
-                Round(body, face.origin, axis, face.radius, *spread, not face.outward, face.area, (face.number,))
-            )
-        while pieces:
-            piece = pieces.pop()
-            for other in [*pieces]:
-                united = _united(piece, other, kind)
-                if united is not None:
-                    pieces.remove(other)
-                    pieces.append(united)
-                    break
-            else:
-                length = piece.high - piece.low
-                full = 2 * math.pi * piece.radius * (length if kind == "cylinder" else 2 * piece.radius)
+        mine = [face for face in all_faces if face.kind == kind and (ball or len(face.outline))]
+        axes = [face.axis * np.sign(face.axis[int(np.argmax(abs(face.axis)))]) for face in mine]
+        numbers: list[Any] = _line_numbers([face.origin for face in mine], axes, [0.0] * len(mine))
+        if ball:
+            numbers = [tuple(np.round(face.origin / NEAR)) for face in mine]
+        groups: dict[tuple[int, int, bool], list[tuple[float, float, Face]]] = defaultdict(list)
+        for face, number in zip(mine, numbers, strict=True):
+            lead = numbers.index(number)
+            along = np.zeros(1) if ball else (face.outline - mine[lead].origin) @ axes[lead]
+            piece = float(along.min()), float(along.max()), face
+            groups[lead, round(face.radius * 1e9), not face.outward].append(piece)
+        for (lead, _, hole), pieces in groups.items():
+            pieces.sort(key=lambda piece: piece[0])
+            while pieces:
+                low, high, face = pieces.pop(0)
+                parts = [face]
+                while pieces and pieces[0][0] <= high + NEAR:
+                    high = max(high, pieces[0][1])
+                    parts.append(pieces.pop(0)[2])
+                full = 2 * math.pi * face.radius * (2 * face.radius if ball else high - low)
                 if full > 0:
-                    rounds.append(replace(piece, covered=piece.covered / full, faces=tuple(sorted(piece.faces))))
+                    covered = sum(part.area for part in parts) / full
+                    ids = tuple(part.number for part in parts)
+                    where = mine[lead].origin, axes[lead], face.radius, low, high
+                    rounds.append(Round(body, *where, hole, covered, ids, face.tolerance))
     return rounds
-
-
-def _united(one: Round, other: Round, kind: str) -> Round | None:
-    """Two pieces of the same cylinder or ball as one; None if they are of different ones."""
-    off = other.point - one.point
-    if one.hole != other.hole or abs(one.radius - other.radius) > 1e-7 * one.radius:
-        return None
-    area, faces = one.covered + other.covered, one.faces + other.faces
-    if kind == "sphere":
-        return replace(one, covered=area, faces=faces) if np.linalg.norm(off) < NEAR else None
-    shift = float(off @ one.axis)
-    if not parallel(one.axis, other.axis) or np.linalg.norm(off - shift * one.axis) > NEAR:
-        return None
-    low, high = other.low + shift, other.high + shift
-    if low > one.high + NEAR or high < one.low - NEAR:
-        return None
-    return replace(one, low=min(low, one.low), high=max(high, one.high), covered=area, faces=faces)
 
 
 def _contacts(draft: Draft, groups: Groups, rounds: Sequence[Round], gap: float) -> list[Contact]:
     """Pins in holes of other bodies; doubtful ones are findings, pressed ones are welded."""
-    holes = [item for item in rounds if item.hole]
     contacts: list[Contact] = []
     doubts: list[Contact] = []
-    for pin in (item for item in rounds if not item.hole and item.covered >= COVERED[0]):
-        for hole in (hole for hole in holes if hole.body != pin.body and hole.covered >= COVERED[1]):
-            contact, play = _overlap(pin, hole), hole.radius - pin.radius
-            if contact is None or play > ALIKE * gap:
-                continue
-            if hole.covered < COVERED[0]:
-                if -NEAR <= play <= gap:
-                    what = f"{hole.label} covers only half of {pin.label}: no joint is made of it"
-                    draft.warn("half", f"links.{hole.body}", what, "add the joint to the model file if it is one")
-            elif contact.play >= 0:
-                (contacts if play <= gap else doubts).append(contact)
-            elif -play <= max(gap, THREAD * pin.radius):
-                what = f"{pin.label} is larger than {hole.label}: pressed or threaded, the two parts are fixed"
-                draft.warn("interference", f"links.{pin.body}", what, "draw the play if they turn", play=play)
-                if groups(pin.body) != groups(hole.body):
-                    groups.weld(hole.body, pin.body, f"{pin.body} is pressed or threaded into {hole.body}")
-            else:
-                doubts.append(contact)
+    for contact in _overlaps(rounds, ALIKE * gap):
+        pin, hole, play = contact.pin, contact.hole, contact.play
+        if hole.covered < COVERED[0]:
+            if 0 <= play <= gap:
+                what = f"{hole.label} covers only half of {pin.label}: no joint is made of it"
+                draft.warn("half", f"links.{hole.body}", what, "add the joint to the model file if it is one")
+        elif play >= 0:
+            (contacts if play <= gap else doubts).append(contact)
+        elif -play <= max(gap, THREAD * pin.radius):
+            what = f"{pin.label} is larger than {hole.label}: pressed or threaded, the two parts are fixed"
+            draft.warn("interference", f"links.{pin.body}", what, "draw the play if they turn", play=play)
+            if groups(pin.body) != groups(hole.body):
+                groups.weld(hole.body, pin.body, f"{pin.body} is pressed or threaded into {hole.body}")
+        else:
+            doubts.append(contact)
     met = {frozenset((contact.pin.body, contact.hole.body)) for contact in contacts}
     for contact in doubts:
-        pin, hole = contact.pin, contact.hole
+        pin, hole, size = contact.pin, contact.hole, 1e3 * contact.play
         if frozenset((pin.body, hole.body)) not in met and groups(pin.body) != groups(hole.body):
-            size = 1e3 * contact.play
             what = f"{pin.label} lies in {hole.label} with a gap of {size:.6g} mm on the radius: no joint is made of it"
             if size < 0:
                 what = f"{pin.label} runs through the smaller {hole.label}: no joint is made of it"
             draft.warn("gap", f"links.{pin.body}", what, "a larger --gap makes one", gap=contact.play)
     return contacts
+
+
+def _overlaps(rounds: Sequence[Round], widest: float) -> Iterator[Contact]:
+    """Pins in holes of other bodies whose radius exceeds theirs by at most `widest`, or balls in sockets."""
+    holes = [item for item in rounds if item.hole and item.covered >= COVERED[1]]
+    points, axes = (np.array([getattr(hole, key) for hole in holes]).reshape(-1, 3) for key in ("point", "axis"))
+    radii = np.array([hole.radius for hole in holes])
+    for pin in (item for item in rounds if not item.hole and item.covered >= COVERED[0]):
+        off, ball = points - pin.point, pin.low == pin.high
+        away = off if ball else off - (off @ pin.axis)[:, None] * pin.axis
+        near = np.linalg.norm(away, axis=1) <= abs(radii - pin.radius) + NEAR + ANGLE * np.linalg.norm(off, axis=1)
+        near &= (radii - pin.radius <= widest) & (ball | (abs(axes @ pin.axis) > 1 - ANGLE))
+        for hole in (holes[index] for index in np.nonzero(near)[0] if holes[index].body != pin.body):
+            contact = _overlap(pin, hole)
+            if contact is not None:
+                yield contact
 
 
 def _overlap(pin: Round, hole: Round) -> Contact | None:
@@ -274,10 +291,9 @@ def _facings(faces: dict[str, list[Face]], gap: float) -> Iterator[Facing]:
     for index, (body, normal, level, outline) in enumerate(planes):
         distance = -levels - level
         near = (normals @ normal < -1 + ANGLE**2) & (distance >= -NEAR) & (distance <= gap)
-        for other in np.nonzero(near[index + 1 :])[0] + index + 1:
-            if planes[other][0] == body:
-                continue
-            frame = _tight(outline, normal)
+        others = [other for other in np.nonzero(near[index + 1 :])[0] + index + 1 if planes[other][0] != body]
+        frame = _tight(outline, normal) if others else np.eye(3)
+        for other in others:
             one, two = (points @ frame[:2].T for points in (outline, planes[other][3]))
             low, high = np.maximum(one.min(axis=0), two.min(axis=0)), np.minimum(one.max(axis=0), two.max(axis=0))
             if (high - low > NEAR).all():
@@ -289,8 +305,10 @@ def _facings(faces: dict[str, list[Face]], gap: float) -> Iterator[Facing]:
 
 def _tight(outline: Array, normal: Array) -> Array:
     """Rows x, y and normal of the frame whose axes run along an edge of a flat face, with the least box around it."""
-    x = np.diff(outline[:: max(1, len(outline) // 200)], axis=0)
-    x = np.vstack([perpendicular(normal), x[np.linalg.norm(x, axis=1) > NEAR]])
+    steps = np.diff(outline, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    longest = np.argsort(lengths)[-TRIED:]
+    x = np.vstack([perpendicular(normal), steps[longest[lengths[longest] > NEAR]]])
     x = x - np.outer(x @ normal, normal)
     x /= np.linalg.norm(x, axis=1)[:, None]
     y = np.cross(normal, x)
@@ -309,6 +327,9 @@ class _Held:
     ) -> None:
         self.draft, self.groups, self.contacts, self.balls, self.facings = draft, groups, contacts, balls, facings
         self._ends: dict[tuple[str, str], list[Facing]] = defaultdict(list)
+        axes, slack = [contact.hole.axis for contact in contacts], [abs(contact.play) for contact in contacts]
+        numbers = _line_numbers([contact.middle for contact in contacts], axes, slack)
+        self.line = dict(zip(contacts, numbers, strict=True))  # number of the axis of each contact
         self.plane = self._plane()
 
     def _plane(self) -> Array | None:
@@ -319,10 +340,13 @@ class _Held:
             normal = contact.hole.axis
             along = [other for other in self.contacts if parallel(other.hole.axis, normal)]
             across = [other for other in self.contacts if abs(other.hole.axis @ normal) < ANGLE]
-            several = any(not contact.on_line_of(other) for other in along)
-            if several and len(along) + len(across) == len(self.contacts):
+            if len(self.lines(along)) > 1 and len(along) + len(across) == len(self.contacts):
                 return normal
         return None
+
+    def lines(self, contacts: Sequence[Contact]) -> set[int]:
+        """Numbers of the axes of contacts."""
+        return {self.line[contact] for contact in contacts}
 
     def between(self) -> dict[tuple[str, str], list[Contact]]:
         """Contacts of pins by the two bodies that they join."""
@@ -359,32 +383,27 @@ class _Held:
 
     def patterns(self, rounds: Sequence[Round]) -> None:
         """Bodies that touch where two holes of each lie on the same axes are bolted to each other."""
-        holes: dict[str, list[Round]] = defaultdict(list)
-        for item in rounds:
-            if item.hole and item.covered > COVERED[0]:
-                holes[item.body].append(item)
+        holes = [item for item in rounds if item.hole and item.covered > COVERED[0]]
+        numbers = _line_numbers([hole.point for hole in holes], [hole.axis for hole in holes], [0.0] * len(holes))
+        lines: dict[str, dict[int, Array]] = defaultdict(dict)
+        for hole, number in zip(holes, numbers, strict=True):
+            lines[hole.body][number] = hole.axis
         for facing in (facing for facing in self.facings if facing.gap <= NEAR):
             one, other = facing.bodies
-            lines: list[Contact] = []
-            for first in (hole for hole in holes[one] if parallel(hole.axis, facing.normal)):
-                for second in holes[other]:
-                    line = Contact(first, second, 0.0, 0.0)
-                    aligned = parallel(first.axis, second.axis) and _eccentricity(line) < NEAR
-                    if aligned and not any(line.on_line_of(item) for item in lines):
-                        lines.append(line)
-            if len(lines) > 1 and self.groups(one) != self.groups(other):
-                what = f"{one} and {other} touch, and {len(lines)} holes of each lie on the same axes: fixed"
-                self.draft.note("bolted", f"links.{other}", what, "draw the pins if they move")
+            shared = lines[one].keys() & lines[other].keys()
+            count = sum(parallel(lines[one][number], facing.normal) for number in shared)
+            if count > 1 and self.groups(one) != self.groups(other):
+                what = f"{one} and {other} touch, and {count} holes of each lie on the same axes: fixed"
+                self.draft.warn("bolted", f"links.{other}", what, "draw the pins if they move")
                 self.weld(one, other, what)
 
     def _bolted(self) -> bool:
         """Two bodies with pins on two axes do not turn; if planes touch or the axes cross they do not slide."""
         for (one, other), contacts in self.between().items():
-            second = next((item for item in contacts if not item.on_line_of(contacts[0])), None)
-            if second is None:
-                continue
             axis = contacts[0].hole.axis
-            if not parallel(axis, second.hole.axis) or self.stops(one, other, axis):
+            if len(self.lines(contacts)) == 1:
+                continue
+            if self.stops(one, other, axis) or not all(parallel(axis, contact.hole.axis) for contact in contacts):
                 what = f"{one} and {other} are fixed to each other: pins on several axes join them"
                 self.draft.note("bolted", f"links.{other}", what)
                 self.weld(one, other, what)
@@ -393,15 +412,13 @@ class _Held:
 
     def _twins(self) -> bool:
         """Two bodies on the same two axes move as one, such as the two side plates of a link."""
-        lines: dict[str, list[Contact]] = defaultdict(list)
-        for (one, other), contacts in self.between().items():
-            for contact in contacts:
-                for body in (one, other):
-                    if not any(contact.on_line_of(line) for line in lines[body]):
-                        lines[body].append(contact)
+        lines: dict[str, set[int]] = defaultdict(set)
+        between = self.between()
+        for pair, contacts in between.items():
+            for body in pair:
+                lines[body] |= self.lines(contacts)
         for one, other in combinations(lines, 2):
-            shared = [line for line in lines[one] if any(line.on_line_of(item) for item in lines[other])]
-            if len(shared) > 1 and tuple(sorted((one, other))) not in self.between():
+            if len(lines[one] & lines[other]) > 1 and tuple(sorted((one, other))) not in between:
                 what = f"{one} and {other} turn about the same axes and are one link"
                 self.draft.note("twins", f"links.{one}", what, "")
                 self.weld(one, other, what)
@@ -416,7 +433,7 @@ class _Held:
             first = next(iter(mine.values()), [None])[0]
             if first is None or len(between) == 1 or body == self.draft.ground or not self._centred(body, first):
                 continue
-            aligned = all(first.on_line_of(contact) for contacts in mine.values() for contact in contacts)
+            aligned = len(self.lines([contact for contacts in mine.values() for contact in contacts])) == 1
             ball = any(body in map(self.groups, (item.pin.body, item.hole.body)) for item in self.balls)
             others = (other for other in self.groups.bodies() if other != body)
             guided = any(tuple(sorted((body, other))) not in mine and self._walls(body, other) for other in others)
@@ -512,7 +529,7 @@ class _Held:
         """The pair of pins on one axis, or on several parallel ones that only slide."""
         axis = contacts[0].hole.axis
         stops = self.stops(one, other, axis)
-        if any(not contacts[0].on_line_of(contact) for contact in contacts):
+        if len(self.lines(contacts)) > 1:
             pair = _pair("prismatic", contacts)
             pair.comments.append("pins on several parallel axes, and no end faces along them: it slides")
         elif self.plane is not None and abs(axis @ self.plane) < ANGLE:

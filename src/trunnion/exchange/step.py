@@ -76,8 +76,10 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
     links = assembly.tree()
     name = links[0].name if len(links) == 1 else ""
     while len(links) == 1 and links[0].children:
-        links = links[0].children
-    draft, faces, parts = Draft(name), {}, {}
+        top = links[0]
+        own = [replace(top, children=[])] if assembly.solids(top.definition)[0] else []
+        links = own + top.children
+    draft, faces, parts, tolerances = Draft(name), {}, {}, assembly.tolerances()
     for link in links:
         solids = _solids(assembly, link, draft)
         label = link.name or "part"
@@ -92,7 +94,11 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
         for text, entries in groups:
             body = _body(assembly, free_name(text, draft.bodies), entries, options, draft)
             draft.bodies[body.name], parts[body.name] = body, link
-            faces[body.name] = [face for _, solid, place in entries for face in _placed(solid.faces, place)]
+            faces[body.name] = [
+                replace(face, tolerance=tolerances.get(face.number, ""))
+                for _, solid, place in entries
+                for face in _placed(solid.faces, place)
+            ]
             if len(entries) > 1:
                 _rigid(draft, body.name, link, entries, options)
     if not draft.bodies:
@@ -117,10 +123,10 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
 def _solids(assembly: Assembly, link: Occurrence, draft: Draft) -> list[Entry]:
     """The solids of a link with the parts that they belong to and their places in the whole."""
     solids = []
-    for leaf in link.leaves():
+    for leaf in link.parts():
         own, surfaces = assembly.solids(leaf.definition)
         solids += [(leaf, solid, leaf.place @ place) for solid, place in own]
-        if surfaces or not own:
+        if surfaces or not (own or leaf.children):
             what = f"has {counted(surfaces, 'surface body', 'surface bodies')} or meshes, which are left out"
             what = what if surfaces else "has no solid and is left out"
             draft.warn("surfaces", f"links.{leaf.name or 'part'}", what, "export it as a solid")

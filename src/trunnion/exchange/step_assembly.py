@@ -52,12 +52,11 @@ class Occurrence:
     parent: Place = field(default_factory=Place)
     children: list[Occurrence] = field(default_factory=list)
 
-    def leaves(self) -> Iterator[Occurrence]:
-        """The parts at the ends of the tree."""
-        if not self.children:
-            yield self
+    def parts(self) -> Iterator[Occurrence]:
+        """It and all that is in it."""
+        yield self
         for child in self.children:
-            yield from child.leaves()
+            yield from child.parts()
 
 
 class Assembly:
@@ -229,10 +228,14 @@ class Assembly:
             solids: list[tuple[Solid, Place]] = []
             surfaces = 0
             others = {shape for child, shapes in self.shapes.items() if child != definition for shape in shapes}
-            queue = [(shape, Place()) for shape in self.shapes.get(definition, [])]
+            still = Place()
+            queue = [(shape, still) for shape in self.shapes.get(definition, [])]
+            taken = set()  # equal representations may both list a solid
             for shape, place in queue:  # grows while it runs
                 geometry = self.geometry(shape)
-                solids += [(geometry.solid(item), place) for item in self.items(shape, *SOLIDS)]
+                new = [item for item in self.items(shape, *SOLIDS) if (item, id(place)) not in taken]
+                taken |= {(item, id(place)) for item in new}
+                solids += [(geometry.solid(item), place) for item in new]
                 surfaces += len(self.items(shape, *SURFACES))
                 for item in self.items(shape, "MAPPED_ITEM"):
                     inner, source = self._mapped(item, shape)
@@ -240,6 +243,34 @@ class Assembly:
                         queue.append((source, place @ inner))
             self._solids[definition] = solids, surfaces
         return self._solids[definition]
+
+    def tolerances(self) -> dict[int, str]:
+        """Tolerances of diameters that the file states, by the number of the face: classes such as H7, or limits."""
+        aspects = {}
+        for entity in self.file.of("PLUS_MINUS_TOLERANCE"):
+            limits, dimension = self.file.args(entity, "PLUS_MINUS_TOLERANCE")[:2]
+            if "DIMENSIONAL_SIZE" in self.file[dimension]:
+                aspects[self.file[dimension]["DIMENSIONAL_SIZE"][0]] = self._limits(limits)
+        faces = {}
+        for entity in self.file.of("GEOMETRIC_ITEM_SPECIFIC_USAGE"):
+            _, _, aspect, _, item = self.file.args(entity, "GEOMETRIC_ITEM_SPECIFIC_USAGE")
+            if aspect in aspects and isinstance(item, Ref):
+                faces[int(item)] = aspects[aspect]
+        return faces
+
+    def _limits(self, number: Any) -> str:
+        """Limits of a dimension in words: a class of ISO 286, or its two deviations in mm."""
+        entity = self.file[number]
+        if "LIMITS_AND_FITS" in entity:
+            letter, _, grade = entity["LIMITS_AND_FITS"][:3]
+            return f"{letter}{grade}"
+        ends = []
+        for bound in self.file.args(number, "TOLERANCE_VALUE"):
+            for args in self.file[bound].values():
+                measure = next((part for part in args if isinstance(part, tuple)), None)
+                if measure is not None:
+                    ends.append(f"{1e3 * float(measure[1][0]) * self.size(args[-1]):+.6g}")
+        return f"{'/'.join(ends[::-1])} mm"
 
     def density(self, definition: int) -> tuple[float | None, str]:
         """Density of a product, kg/m³, and the name of its material, as far as the file has them."""

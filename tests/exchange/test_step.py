@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import re
+import subprocess
+import sys
 import time
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
 import trunnion
 from exchange.step_files import StepFile, box, prism, turn, turned
 from exchange.step_mechanisms import STILL, bar, boss, cardan, four_bar, placed, slider_crank, written
+from trunnion.cli.app import app
 from trunnion.errors import MechanismError
 from trunnion.exchange import export_model, import_file, model_text
 from trunnion.exchange.brep import Geometry
@@ -644,6 +649,7 @@ def free_form(path):
     return file.write(path)
 
 
+@pytest.mark.slow
 def test_a_free_form_solid_has_the_mass_of_a_mesh_and_says_so(tmp_path):
     pytest.importorskip("cascadio")
     draft = import_file(free_form(tmp_path / "a.step"))
@@ -719,3 +725,58 @@ def test_the_skeleton_has_the_points_of_the_position(tmp_path, name):
         for pair in drawn.pairs_of(part.name):
             if pair.type in ("revolute", "spherical"):
                 np.testing.assert_allclose(points[pair.name], pair.at, atol=1e-9)
+
+
+OPENED = """
+import io, json, sys
+import cascadio, trimesh
+glb = cascadio.load(open(sys.argv[1], "rb").read(), tol_linear=0.01, tol_angular=0.1, use_parallel=False)
+scene = trimesh.load(io.BytesIO(glb), file_type="glb")
+shapes = [scene.geometry[scene.graph[node][1]].copy().apply_transform(scene.graph[node][0])
+          for node in scene.graph.nodes_geometry]
+print(json.dumps([[*shape.center_mass, shape.volume] if hasattr(shape, "center_mass") else shape.bounds.tolist()
+                  for shape in shapes]))
+"""
+
+
+def opencascade(path):
+    """What OpenCASCADE sees in a file: centre and volume of each solid, bounds of each wire."""
+    pytest.importorskip("cascadio")
+    command = [sys.executable, "-c", OPENED, str(path)]
+    done = subprocess.run(command, capture_output=True, timeout=60, check=True)
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.mark.slow
+def test_opencascade_sees_the_same_parts_and_the_skeleton(tmp_path):
+    path = written(tmp_path / "a.step", slider_crank())
+    mechanism = model(import_file(path, ground="frame"), tmp_path)
+    export_model(mechanism, tmp_path / "b.step", "40 deg", original=path)
+    draft = import_file(tmp_path / "b.step", ground="frame")
+    ours = sorted([*body.centre, body.mass / STEEL] for body in draft.bodies.values())
+    for expected, mesh in zip(ours, sorted(opencascade(tmp_path / "b.step")), strict=True):
+        np.testing.assert_allclose(mesh[:3], expected[:3], atol=2e-5)
+        assert mesh[3] == pytest.approx(expected[3], rel=1e-3)
+    export_model(mechanism, tmp_path / "c.step", "40 deg")
+    wires = opencascade(tmp_path / "c.step")
+    assert len(wires) == 4
+    points = [pair.at for pair in draft.pairs.values()]
+    reach = np.max([high for _, high in wires], axis=0)
+    np.testing.assert_allclose(reach[0], max(point[0] for point in points) + 0.02, atol=1e-5)  # the guide of 40 mm
+
+
+def test_the_command_line_imports_and_moves(tmp_path):
+    path = written(tmp_path / "a.step", slider_crank())
+    run = CliRunner().invoke
+    done = run(app, ["import", str(path), "-o", str(tmp_path / "a.yaml"), "--ground", "frame", "--material", "brass"])
+    assert done.exit_code == 0, done.output
+    assert "4 links, 4 joints" in done.output
+    text = (tmp_path / "a.yaml").read_text()
+    assert "8500 kg/m³ of the import, exact by its faces" in text
+    assert "nearest usual fit: 16 mm H7/f7" in text
+    moved = ["export", str(tmp_path / "a.yaml"), "-o", str(tmp_path / "b.step"), "--at", "60deg", "--from", str(path)]
+    assert run(app, moved).exit_code == 0
+    assert import_file(tmp_path / "b.step").bodies.keys() == {"frame", "crank", "rod", "slider"}
+    over = run(app, [*moved[:3], str(path), *moved[4:]])
+    assert over.exit_code == 2
+    assert path.read_text() == written(tmp_path / "c.step", slider_crank()).read_text()

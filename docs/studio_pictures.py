@@ -20,7 +20,8 @@ def main() -> None:
     """Write all pictures in both themes, those of the press with layers and a variant last."""
     four_bar = {"start": _at_rest, "plots": _compared, "drawing": _drawing}
     press = {"layers": _layers, "variants": _variants}
-    for model, shots in (("durango-fourbar", four_bar), ("drawing-press", press)):
+    watt = {"blocks": _blocks}
+    for model, shots in (("durango-fourbar", four_bar), ("drawing-press", press), ("watt-six-bar", watt)):
         with _studio(model) as address, sync_playwright() as begun:
             browser = begun.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
             for (name, prepare), theme in product(shots.items(), ("light", "dark")):
@@ -52,6 +53,12 @@ def _go(page: Page, index: int) -> None:
 
 def _at_rest(page: Page) -> None:
     _go(page, 48)
+
+
+def _blocks(page: Page) -> None:
+    _go(page, 40)
+    page.click("role=tab[name=Blocks]")
+    page.locator(".formula .term").nth(1).click()
 
 
 def _compared(page: Page) -> None:
@@ -97,7 +104,6 @@ def _layers(page: Page) -> None:
         page.get_by_label(name, exact=True).click()
     page.keyboard.press("Escape")
     page.click("role=tab[name=Plots]")
-    page.get_by_role("button", name="Table of Drive force Z").click()
 
 
 def _variants(page: Page) -> None:

@@ -14,7 +14,8 @@ import trunnion
 from trunnion.errors import Finding, Severity
 from trunnion.results.attributes import finding_rows
 
-MAKERS = {"Finding.note": 0, "Finding.warning": 0, "Finding.error": 0, "Finding.weighed": 1}  # place of the code
+# place of the code
+MAKERS = {"Finding.note": 0, "Finding.warning": 0, "Finding.error": 0, "Finding.weighed": 1, "draft.note": 0, "draft.warn": 0}
 
 
 def made() -> Iterator[tuple[str, int, ast.Call]]:
@@ -27,7 +28,7 @@ def made() -> Iterator[tuple[str, int, ast.Call]]:
 
 def test_every_code_is_written_out() -> None:
     """So that the list of codes in the manual, which is read of the source, is whole."""
-    calls = [(file, call.args[place], call) for file, place, call in made() if file != "errors.py"]
+    calls = [(file, call.args[place], call) for file, place, call in made() if file not in ("errors.py", "draft.py")]
     assert len(calls) > 100
     for file, code, call in calls:
         assert isinstance(code, ast.Constant), f"{file}:{call.lineno}"

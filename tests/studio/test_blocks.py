@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -179,7 +180,12 @@ if CHROMIUM:
         page.locator("[data-block='2'][aria-pressed=true]").wait_for()
         before = page.evaluate(WIDTHS)
         user.of("state", "m.index.value = 120")
-        page.wait_for_function(f"{WIDTHS} !== {before!r}")
+        for _ in range(100):
+            if page.evaluate(WIDTHS) != before:
+                break
+            page.wait_for_timeout(20)
+        else:
+            pytest.fail("the wires do not follow the position")
 
     def test_a_mechanism_is_built_of_blocks_by_the_keyboard(user):
         page = user.page
@@ -196,3 +202,12 @@ if CHROMIUM:
         page.get_by_role("button", name="Place the block").press("Enter")
         user.until("s.solved.value")
         assert page.locator(".formula .term").all_inner_texts() == ["I(0,1)R", "II(2,3)RRR"]
+
+    def test_the_scrub_track_is_red_where_it_is_near_to_locking(user):
+        text = EXAMPLES["drawing-press"]
+        opened(user, text.replace("friction: 0.1", "friction: 0.3"))
+        near = user.page.locator(".margin-band").evaluate("one => one.style.background")
+        shares = [float(one) for one in re.findall(r"var\(--bad\) ([\d.]+)%", near)]
+        margin = np.minimum(np.array(ask("model", text.replace("friction: 0.1", "friction: 0.3"))["margin"], float), 4)
+        assert shares[0] == pytest.approx(100 * np.clip((4 - margin[0]) / 3, 0, 1), abs=1)
+        assert max(shares) > 50

@@ -351,3 +351,20 @@ def test_a_load_against_the_motion_takes_power_from_a_slide_whichever_way_it_goe
     text, _ = edited(text, places, {"do": "set", "path": ["loads", "load1", "only"], "value": "negative"})
     (acts,) = (load["acts"] for load in solved(text)["scene"]["loads"] if load["name"] == "load1")
     np.testing.assert_array_equal(np.array(acts)[clear], np.where(ahead < 0, 1, 0)[clear])
+
+
+def test_the_mass_of_a_flat_bar_is_that_of_its_section() -> None:
+    """m = ρ l b t, J = m (l² + b²)/12 about the middle: 7850 · 0.1 · 0.02 · 0.01 = 0.157 kg, 1.36067e-4 kg m²."""
+    text, places = edited("", {}, {"do": "link", "from": {"ground": [0, 0]}, "to": [0.06, 0.08]})
+    bar = {"do": "bar-mass", "link": "link1", "width": "20 mm", "thickness": "10 mm"}
+    link = Mechanism(**entries_of(edited(text, places, bar | {"density": "7850 kg/m^3"})[0])[0]).parameters()
+    assert link["links.link1.mass"] == pytest.approx(0.157, rel=1e-6)
+    assert link["links.link1.inertia"] == pytest.approx(0.157 * (0.1**2 + 0.02**2) / 12, rel=1e-5)
+    assert (link["links.link1.centre.x"], link["links.link1.centre.y"]) == pytest.approx((0.05, 0))
+    for wrong, words in (
+        ({"width": "-1 mm"}, "not above 0"),
+        ({"density": "7 kg"}, "no density"),
+        ({"link": "ground"}, "no bar"),
+    ):
+        question = {"places": places, "gestures": [bar | {"density": "7850 kg/m^3"} | wrong]}
+        assert words in ask(ask="edit", text=text, **question)["error"]

@@ -5,6 +5,7 @@ Every test fails on an error of the page, on one in its console, and on a reques
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -15,6 +16,8 @@ import trunnion
 from browsing import CHROMIUM
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
+from trunnion.studio.answers import answer
+from trunnion.studio.message import unpacked
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
@@ -163,3 +166,50 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.page.click("button:has-text('Drop A')")
         user.idle()
         assert user.page.locator(".changes").count() == 0
+
+
+def test_every_column_of_the_table_can_be_a_curve() -> None:
+    """Names, units and values are those of the table that is written."""
+    text = (ROOT / "examples" / "durango-fourbar.yaml").read_text("utf-8")
+    question = {"ask": "curves", "text": text, "revision": 1, "names": ["coupler.angle_velocity", "A.effort", "none"]}
+    found = unpacked(answer(json.dumps(question).encode()))
+    result = trunnion.analyse(Mechanism(**entries_of(text)[0]))
+    assert dict(found["names"])["coupler.angle_velocity"] == "rad/s"
+    assert found["columns"].keys() == {"coupler.angle_velocity", "A.effort"}
+    expected = result["link_angle_velocity"].sel(link="coupler").values
+    np.testing.assert_allclose(found["columns"]["coupler.angle_velocity"]["values"], expected, atol=1e-5)
+
+
+if CHROMIUM:
+
+    def test_curves_are_chosen_over_another_and_the_table_of_joints_has_the_largest(user):
+        page = user.page
+        page.get_by_role("tab", name="Plots").click()
+        page.locator("#columns option").nth(20).wait_for(state="attached")
+        for name in ("coupler.angle_velocity", "rocker.angle_velocity"):
+            page.get_by_label("Curve to add").fill(name)
+        chart = page.locator(".own-curves figure")
+        chart.wait_for()
+        page.locator(".own-curves path.curve").nth(1).wait_for(state="attached")
+        page.get_by_label("Over", exact=True).fill("rocker.angle")
+        page.get_by_label("Over", exact=True).press("Enter")
+        page.locator(".own-curves .axis", has_text="rocker.angle [°]").wait_for()
+        assert "NaN" not in page.locator(".own-curves path.curve").first.get_attribute("d")
+        page.locator(".of-joints summary").click()
+        rows = page.locator(".of-joints tbody tr")
+        assert rows.count() == 4
+        assert rows.first.inner_text().split("\t")[0] == "A"
+
+    def test_the_panel_is_made_wider_by_keys_and_by_the_mouse(user):
+        panel, divider = user.page.locator("aside.panel"), user.page.get_by_role("separator", name="Width of the panel")
+        before = panel.bounding_box()["width"]
+        divider.focus()
+        user.page.keyboard.press("ArrowLeft")
+        user.page.keyboard.press("ArrowLeft")
+        assert panel.bounding_box()["width"] == pytest.approx(before + 48, abs=1)
+        box = divider.bounding_box()
+        user.page.mouse.move(box["x"] + 2, box["y"] + 200)
+        user.page.mouse.down()
+        user.page.mouse.move(box["x"] - 98, box["y"] + 200)
+        user.page.mouse.up()
+        assert panel.bounding_box()["width"] == pytest.approx(before + 148, abs=4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -34,7 +35,8 @@ def import_(
     """Make a model file of a drawing or a model of another program."""
     from trunnion.exchange import import_file, model_text
     from trunnion.files import whole
-    from trunnion.model.mechanism import read_mechanism
+    from trunnion.model.file import entries_of, place
+    from trunnion.model.mechanism import Mechanism
 
     if out.suffix.lower() not in (".yaml", ".yml"):
         raise MechanismError(Finding(f"a model is not written as '{out.suffix}'", "--out", "write .yaml"))
@@ -45,9 +47,14 @@ def import_(
     with whole(out) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
     bodies, pairs = counted(len(draft.bodies), "link"), counted(len(draft.pairs), "joint")
-    console().print(f"{file.name}: {bodies}, {pairs}", markup=False)
+    console().print(f"{draft.source}: {bodies}, {pairs}", markup=False)
     wrote(out)
-    findings = [*draft.findings, *placed(read_mechanism(out).checked, out)]
+    data, lines = entries_of(text)
+    try:
+        checked: Iterable[Finding] = Mechanism.model_validate(data).checked
+    except MechanismError as error:  # of a file without joints, as a mesh is: what it lacks
+        checked = error.findings
+    findings = [*draft.findings, *place(checked, str(out), lines, data)]
     say(findings, every=True)
     raise typer.Exit(exit_status(findings))
 

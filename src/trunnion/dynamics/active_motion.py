@@ -83,13 +83,13 @@ class ActiveMotion(Integration):
         self.seeing = cast("Seeing", self.dynamics)
         self.count = self.rows = len(self.motion.contacts.each)  # rows of `_gaps`
         self.onsets = (None,) * self.count
-        self.now = 0.5 * self.breaks[0]
+        self.now = self.first_now
         self._open: dict[int, OpenContact] = {}
         self._crossed: int | None = None
         self._steps = 0
 
     def _begins(self, row: Array) -> bool:
-        return self._decided(0.0, row) and super()._begins(row)
+        return self._decided(self.start, row) and super()._begins(row)
 
     def _couple(self, time: float, row: Array, now: float) -> None:
         self.now = now

@@ -72,7 +72,7 @@ class ClutchMotion(Integration):
         self.dynamics = self.rates
         self.meanwhile: Meanwhile | None = None  # what prescribed drivers do while the coordinate rests
         self.let_go = 0.0  # sense in which a clutch that held begins to slip
-        self.known = "holds" if self.drive.engaged(0.0) else "opens"
+        self.known = "holds" if self.drive.engaged(self.start) else "opens"
 
     # ---- how the clutch is --------------------------------------------------------------------------------------
 

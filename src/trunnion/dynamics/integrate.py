@@ -78,7 +78,8 @@ class Integration:
     bends: coordinates within one cycle of one free driver at which a force jumps or bends, and the cycle's length;
     limits: by driver the coordinates between which it may move; progress: told the share of the duration that is
     reached; times: s, at which a load jumps or bends; evaluations: of the forces, at most, a walk counted as WALK;
-    meetings: see `Places`; onsets, senses: how contacts and joints that may stick are, see `Moment`.
+    meetings: see `Places`; onsets, senses: how contacts and joints that may stick are, see `Moment`; start: time, s, at
+    which it begins; duration: at which it ends.
     """
 
     motion: FreeMotion
@@ -94,16 +95,19 @@ class Integration:
     meetings: Sequence[tuple[float, int]] = ()
     onsets: tuple[Onset, ...] = ()
     senses: tuple[int, ...] = ()
+    start: float = 0.0
 
     def __post_init__(self) -> None:
         self.layout = Layout.of(self.motion)
         self.solution = Solution(self.layout)
         known = [time for drive in self.motion.drives.values() for time in drive.times]
-        times = {time for time in (*known, *self.times) if 0 < time < self.duration}
+        times = {time for time in (*known, *self.times) if self.start < time < self.duration}
         self.pace = np.sqrt(self.motion.unit)  # typical rates
         self.turned_over, self.asked_for, self.slips, self.resting = 0.0, 0, 0.0, False
+        self.last = self.start, np.empty(0)  # time and row from which it is to go on
         self._doubts = 0
         self.breaks = [*sorted(times), self.duration]
+        self.first_now = 0.5 * (self.start + self.breaks[0])
         self.rest = Rest(self.motion, self.layout) if self.motion.rests else None
         self.ends = np.array([self.limits.get(name, (-np.inf, np.inf)) for name in self.motion.names], float).T
         margins = getattr(self.dynamics, "margins", Walks(self.motion).margins)
@@ -119,12 +123,13 @@ class Integration:
         return self.solution
 
     def _run(self, row: Array) -> None:
-        self._follow(0.0, row, 0.0, 0.0)
+        self._follow(self.start, row, 0.0, self.start)
         if not self._begins(row):
             return
-        before, time, step, stayed = -1.0, 0.0, None, 0
+        before, time, step, stayed = self.start - 1.0, self.start, None, 0
         sense = float(np.sign(row[self.layout.coordinates])) if self.motion.rests else 0.0
         for _ in range(MOST_EVENTS):
+            self.last = time, row
             if time >= self.duration * (1 - CLOSE) or self.solution.ended:
                 return
             stayed, before = (stayed + 1 if time == before else 0), time
@@ -132,7 +137,7 @@ class Integration:
                 self._stop("step", time, row)
                 return
             k = next(k for k, one in enumerate(self.breaks) if one > time + CLOSE * self.duration)
-            until, now = self.breaks[k], 0.5 * (self.breaks[k] + (self.breaks[k - 1] if k else 0.0))
+            until, now = self.breaks[k], 0.5 * (self.breaks[k] + (self.breaks[k - 1] if k else self.start))
             self._couple(time, row, now)
             if self.solution.ended:
                 return
@@ -174,14 +179,14 @@ class Integration:
 
     def _begins(self, row: Array) -> bool:
         """Whether there are accelerations at the start; they also tell what rates are typical."""
-        n, now = self.layout.coordinates, 0.5 * self.breaks[0]
+        n, now, start = self.layout.coordinates, self.first_now, self.start
         if self.rest is not None and row[n] == 0.0:
-            if self._assembled(self.moment(0.0, row, 1.0, now)):
+            if self._assembled(self.moment(start, row, 1.0, now)):
                 return True
-            self._stop("not_assembled", 0.0, row)
+            self._stop("not_assembled", start, row)
             return False
         sense = float(np.sign(row[n])) if self.motion.rests else 0.0
-        at = self.moment(0.0, row, sense, now)
+        at = self.moment(start, row, sense, now)
         with np.errstate(all="ignore"):
             second = self.dynamics(at).second
             if n == 1 and row[n] != 0.0 and not np.all(np.isfinite(second)):  # as where the ends of a spring meet
@@ -189,10 +194,10 @@ class Integration:
                 second = self.dynamics(at._replace(q=ahead)).second
                 self.bends = (*self.bends, float(row[0] % self.period if self.period else row[0]))
         if not np.all(np.isfinite(second)):
-            cause = self._cause(0.0, row, sense, now) or "no_acceleration"
-            if self._locked(0.0, row, sense, now, [cause]):
+            cause = self._cause(start, row, sense, now) or "no_acceleration"
+            if self._locked(start, row, sense, now, [cause]):
                 return True
-            self._stop(cause, 0.0, row)
+            self._stop(cause, start, row)
             return False
         self.pace = np.maximum(self.pace, np.maximum(np.sqrt(np.abs(second)), np.abs(row[n : 2 * n])))
         return True
@@ -509,7 +514,7 @@ class Integration:
         self.turned_over = max(self.turned_over, float(np.max(np.abs(row[-len(self.layout.works_named) :]))))
         self.asked_for += 1
         if self.asked_for & (self.asked_for - 1) == 0:  # the 1st, 2nd, 4th … time: energy may be large and no work done
-            self.turned_over = max(self.turned_over, self._kinetic(0.0, row, 0.0, 0.0))
+            self.turned_over = max(self.turned_over, self._kinetic(self.start, row, 0.0, self.start))
         # at the start nothing is turned over: the works follow the motion then
         found[-len(self.layout.works_named) :] = self.tolerance * self.turned_over if self.turned_over else np.inf
         return found

@@ -13,7 +13,7 @@ from trunnion.joints.motors import transmitted
 from trunnion.model.parts import Motor
 from trunnion.solve.system import System, Values
 
-__all__ = ["Drive", "drives", "switched"]
+__all__ = ["Drive", "applied_to", "drives", "switched"]
 
 Array = NDArray[np.float64]
 
@@ -24,9 +24,10 @@ CARRIED = Motor(kind="constant")  # stands for what comes through a clutch that 
 class Drive:
     """What drives one free coordinate; nothing if it has no motor.
 
-    parameters: of the motor, SI; inertia: of the rotor as the motor sees it, kg m² or kg; ratio: motor speed over the
-    coordinate's; off_from, brake_from: times, s, from which the motor is off and the brake on; clutch: effort that a
-    clutch between rotor and gear transmits at most, N m or N, engaged between two times, s.
+    parameters: of the motor, SI; applied: effort on the coordinate beside it, N m or N; inertia: of the rotor as the
+    motor sees it, kg m² or kg; ratio: motor speed over the coordinate's; off_from, brake_from: times, s, from which the
+    motor is off and the brake on; clutch: effort that a clutch between rotor and gear transmits at most, N m or N,
+    engaged between two times, s.
     """
 
     motor: Motor | None
@@ -40,6 +41,7 @@ class Drive:
     clutch: float = np.inf
     clutch_from: float = 0.0
     clutch_until: float = np.inf
+    applied: float = 0.0
 
     @property
     def controlled(self) -> bool:
@@ -123,7 +125,7 @@ class Drive:
         sense: of the motion about to begin where the speed is 0, by which the loss in the gear goes.
         """
         free = self.shaft(time, speed, integral, now) - self.inertia * self.ratio * second
-        return transmitted(free, np.where(speed != 0.0, speed, sense), self.ratio, self.efficiency)
+        return transmitted(free, np.where(speed != 0.0, speed, sense), self.ratio, self.efficiency) + self.applied
 
     def resisted(self, time: Array, speed: Array, second: Array, integral: Array, now: float, share: Any) -> Array:
         """Effort as of `effort`, less the brake: full losses of a motion in the sense of a share of ±1, a share of them
@@ -131,7 +133,7 @@ class Drive:
         free = self.shaft(time, speed, integral, now) - self.inertia * self.ratio * second
         ahead, back = (transmitted(free, np.asarray(sense), self.ratio, self.efficiency) for sense in (1.0, -1.0))
         found: Array = 0.5 * ((1.0 + share) * ahead + (1.0 - share) * back) - share * self.braking(now)
-        return found
+        return found + self.applied
 
     def braking(self, now: float) -> float:
         """Effort of the brake, against the motion."""
@@ -153,6 +155,11 @@ def switched(drives_: Mapping[str, Drive], end: float) -> Iterator[tuple[float, 
             yield drive.brake_from, "brake", name, drive.brake
 
 
+def applied_to(driver: str) -> str:
+    """The path of an effort on a free driver beside its motor's, which no file states."""
+    return f"drivers.{driver}.applied"
+
+
 def drives(system: System, values: Values, number: Callable[[Any], Any] = float) -> dict[str, Drive]:
     """What drives each free coordinate, by driver. number: what becomes of a value."""
     found: dict[str, Drive] = {}
@@ -160,8 +167,9 @@ def drives(system: System, values: Values, number: Callable[[Any], Any] = float)
         if not driver.found:
             continue
         motor, path = driver.motor, f"drivers.{name}.motor."
+        applied = number(values.get(applied_to(name), 0.0))
         if motor is None:
-            found[name] = Drive(None, {})
+            found[name] = Drive(None, {}, applied=applied)
             continue
         own = {key.removeprefix(path): number(value) for key, value in values.items() if key.startswith(path)}
         parameters: dict[str, Any] = {"integral": 0.0, **own, "over": motor.over}
@@ -169,5 +177,5 @@ def drives(system: System, values: Values, number: Callable[[Any], Any] = float)
             parameters[f"points.{key}"] = [own[f"points.{k}.{key}"] for k in range(len(motor.points or ()))]
         known = ("ratio", "efficiency", "inertia", "off_from", "brake", "brake_from",
                  "clutch", "clutch_from", "clutch_until")  # fmt: skip
-        found[name] = Drive(motor, parameters, **{key: own[key] for key in known if key in own})
+        found[name] = Drive(motor, parameters, applied=applied, **{key: own[key] for key in known if key in own})
     return found

@@ -21,17 +21,27 @@ CYCLES = 10  # of the nominal motion: the duration if none is stated
 
 def integration_of(
     motion: FreeMotion, rates: CompiledRates | Walks, known: Places, duration: float, tolerance: float,
-    progress: Callable[[float], None] | None = None, evaluations: int = MOST_EVALUATIONS,
+    progress: Callable[[float], None] | None = None, evaluations: int = MOST_EVALUATIONS, start: float = 0.0,
+    senses: tuple[int, ...] = (),
 ) -> Integration:  # fmt: skip
-    """What integrates a motion. evaluations: see `Integration`."""
+    """What integrates a motion. duration, evaluations, start, senses: see `Integration`."""
     times = load_times(motion, duration)
     limits = ranges(motion, motion.names, known)
     if motion.resisted:
         return ActiveMotion(
-            motion, rates, duration, tolerance, limits=limits, progress=progress, times=times, evaluations=evaluations
+            motion,
+            rates,
+            duration,
+            tolerance,
+            limits=limits,
+            progress=progress,
+            times=times,
+            evaluations=evaluations,
+            senses=senses,
+            start=start,
         )
     kind = ClutchMotion if any(drive.clutched for drive in motion.drives.values()) else Integration
     return kind(
         motion, bridged(motion, rates), duration, tolerance, known.bends, known.period, limits, progress,
-        times, evaluations, known.meetings,
+        times, evaluations, known.meetings, start=start,
     )  # fmt: skip

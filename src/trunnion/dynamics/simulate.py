@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from trunnion.results.result import Result
 
-__all__ = ["simulate", "simulated"]
+__all__ = ["check_start", "simulate", "simulated"]
 
 Array = NDArray[np.float64]
 
@@ -122,7 +122,7 @@ def simulated(
     motion = FreeMotion.of(run)
     known = places(motion)
     rates, row, time = rates_of(motion), initial_row(motion), np.linspace(0.0, duration, steps + 1)
-    _check_start(motion, row, ranges(motion, motion.names, known))
+    check_start(motion, row, ranges(motion, motion.names, known))
 
     def found(tolerance: float) -> Found:
         motion.begin(None)
@@ -168,7 +168,7 @@ def _with_play(
     refuse_undetermined(loose, in_play(run.system.mechanism))
     motion = FreeMotion.of(loose, contacts)
     row, limits = initial_row(motion), ranges(motion, run.system.mechanism.drivers, Places())
-    _check_start(motion, row, limits)
+    check_start(motion, row, limits)
     refuse_massless(motion, row)
     fine = tolerance * min(1.0, contacts.least_clearance / float(np.ravel(run.system.size(run.values))[0]))
     times, time = load_times(motion, duration), np.linspace(0.0, duration, steps + 1)
@@ -195,7 +195,7 @@ def _integrating(motion: FreeMotion, rigid: bool) -> Callable[..., ActiveMotion]
     return partial(ActiveMotion, motion, rates_of(motion))
 
 
-def _check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float, float]]) -> None:
+def check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float, float]]) -> None:
     """MechanismError for a start outside a range, at a change point, or where nothing moves that has a mass."""
     for name, (low, high) in limits.items():
         place = row[motion.names.index(name)]

@@ -109,13 +109,13 @@ class Draft:
     findings: list[Finding] = field(default_factory=list)
 
     def warn(self, code: str, where: str, what: str, remedy: str = "", **figures: Any) -> None:
-        """Note a doubt; code: after `exchange.`."""
-        weighed = Finding.weighed(Severity.WARNING, f"exchange.{code}", where, what, remedy, **figures)
+        """Note a doubt; code: of the list in the manual, `exchange.…`."""
+        weighed = Finding.weighed(Severity.WARNING, code, where, what, remedy, **figures)
         self.findings.append(weighed)
 
     def note(self, code: str, where: str, what: str, remedy: str = "", **figures: Any) -> None:
         """Note something that is lost or assumed."""
-        weighed = Finding.weighed(Severity.NOTE, f"exchange.{code}", where, what, remedy, **figures)
+        weighed = Finding.weighed(Severity.NOTE, code, where, what, remedy, **figures)
         self.findings.append(weighed)
 
     def pairs_of(self, body: str) -> list[Pair]:

@@ -32,6 +32,7 @@ __all__ = ["FORMATS", "MATERIALS", "ExportOptions", "Format", "ImportOptions", "
 
 MATERIALS = {"steel": 7850.0, "stainless": 7900.0, "aluminium": 2700.0, "brass": 8500.0, "cast-iron": 7200.0,
              "titanium": 4430.0, "nylon": 1140.0, "pom": 1410.0, "abs": 1050.0, "pla": 1240.0}  # fmt: skip
+LINKS = "http:/", "https:/"  # how a path begins that is a link: its text is read, nothing is fetched
 FEWEST = 4  # positions of a cycle of which the first is written
 LARGEST = 200_000_000  # bytes of a file that is read
 
@@ -47,8 +48,16 @@ class Format:
     needs: str = ""
 
 
-_STEP = Format("STEP", "step")
-FORMATS: dict[str, Format] = {".step": _STEP, ".stp": _STEP}
+FORMATS: dict[str, Format] = {
+    ".step": Format("STEP", "step"),
+    ".stp": Format("STEP", "step"),
+    ".fcstd": Format("FreeCAD", "freecad", writes=False),
+    ".pmks": Format("PMKS+", "pmks", writes=False),
+    ".url": Format("PMKS+", "pmks", writes=False),
+    ".txt": Format("PMKS+", "pmks", writes=False),
+    ".json": Format("pylinkage", "pylinkage", writes=False),
+    ".fmu": Format("FMU", "fmu", reads=False),
+}
 
 
 @dataclass(frozen=True)
@@ -143,7 +152,7 @@ def import_file(
 
     Parameters
     ----------
-    path : the file; its extension decides the format, see `FORMATS`.
+    path : the file; its extension decides the format, see `FORMATS`. Or a link that holds a drawing, as of PMKS+.
     ground, drive : names of the part that does not move and of the joint that is driven; found if not given.
     speed : of a drive whose file states none. material, density : of parts whose file states neither mass nor density.
     gap : greatest difference of the radii of a pin and its hole. unit : of lengths in a file that states none.
@@ -163,6 +172,17 @@ def import_file(
         ground, heaviness, _number(gap, "gap", KINDS["length"]), drive, _number(f"1 {unit}", "unit", KINDS["length"])
     )
     rate = _number(speed, "speed", KINDS["angular speed"] | KINDS["speed"])
+    if str(path).startswith(LINKS):
+        draft = import_module("trunnion.exchange.pmks").read_link(str(path), options)
+    else:
+        draft = _read(path, options)
+    draft.source = draft.source or path.name
+    draft.name = draft.name or path.stem
+    return complete(draft.checked(), ground, drive, rate)
+
+
+def _read(path: Path, options: ImportOptions) -> Draft:
+    """The draft of a file."""
     entry = _format_of(path, reads=True)
     reading(path)
     with _readable(path):
@@ -176,9 +196,7 @@ def import_file(
             draft: Draft = module.read(path, options)
     except (RecursionError, MemoryError):
         raise MechanismError(Finding("is nested too deeply or too large to be read", file=str(path))) from None
-    draft.source = draft.source or path.name
-    draft.name = draft.name or path.stem
-    return complete(draft.checked(), ground, drive, rate)
+    return draft
 
 
 def _number(value: str | float, name: str, kind: Kind) -> float:

@@ -225,12 +225,12 @@ def _contacts(draft: Draft, groups: Groups, rounds: Sequence[Round], gap: float)
         if hole.covered < COVERED[0]:
             if 0 <= play <= gap:
                 what = f"{hole.label} covers only half of {pin.label}: no joint is made of it"
-                draft.warn("half", f"links.{hole.body}", what, "add the joint to the model file if it is one")
+                draft.warn("exchange.half", f"links.{hole.body}", what, "add the joint to the model file if it is one")
         elif play >= 0:
             (contacts if play <= gap else doubts).append(contact)
         elif -play <= max(gap, THREAD * pin.radius):
             what = f"{pin.label} is larger than {hole.label}: pressed or threaded, the two parts are fixed"
-            draft.warn("interference", f"links.{pin.body}", what, "draw the play if they turn", play=play)
+            draft.warn("exchange.interference", f"links.{pin.body}", what, "draw the play if they turn", play=play)
             if groups(pin.body) != groups(hole.body):
                 groups.weld(hole.body, pin.body, f"{pin.body} is pressed or threaded into {hole.body}")
         else:
@@ -242,7 +242,7 @@ def _contacts(draft: Draft, groups: Groups, rounds: Sequence[Round], gap: float)
             what = f"{pin.label} lies in {hole.label} with a gap of {size:.6g} mm on the radius: no joint is made of it"
             if size < 0:
                 what = f"{pin.label} runs through the smaller {hole.label}: no joint is made of it"
-            draft.warn("gap", f"links.{pin.body}", what, "a larger --gap makes one", gap=contact.play)
+            draft.warn("exchange.gap", f"links.{pin.body}", what, "a larger --gap makes one", gap=contact.play)
     return contacts
 
 
@@ -394,7 +394,7 @@ class _Held:
             count = sum(parallel(lines[one][number], facing.normal) for number in shared)
             if count > 1 and self.groups(one) != self.groups(other):
                 what = f"{one} and {other} touch, and {count} holes of each lie on the same axes: fixed"
-                self.draft.warn("bolted", f"links.{other}", what, "draw the pins if they move")
+                self.draft.warn("exchange.bolted", f"links.{other}", what, "draw the pins if they move")
                 self.weld(one, other, what)
 
     def _bolted(self) -> bool:
@@ -405,7 +405,7 @@ class _Held:
                 continue
             if self.stops(one, other, axis) or not all(parallel(axis, contact.hole.axis) for contact in contacts):
                 what = f"{one} and {other} are fixed to each other: pins on several axes join them"
-                self.draft.note("bolted", f"links.{other}", what)
+                self.draft.note("exchange.bolted", f"links.{other}", what)
                 self.weld(one, other, what)
                 return True
         return False
@@ -420,7 +420,7 @@ class _Held:
         for one, other in combinations(lines, 2):
             if len(lines[one] & lines[other]) > 1 and tuple(sorted((one, other))) not in between:
                 what = f"{one} and {other} turn about the same axes and are one link"
-                self.draft.note("twins", f"links.{one}", what, "")
+                self.draft.note("exchange.twins", f"links.{one}", what, "")
                 self.weld(one, other, what)
                 return True
         return False
@@ -445,7 +445,7 @@ class _Held:
             what = f"{body} turns only about its own axis: it is taken as fixed in {holder}"
             what += ", where its play is least" if len(mine) > 1 else ""
             note = self.draft.warn if len(mine) == 1 else self.draft.note
-            note("loose", f"links.{body}", what, "draw less play where it is held" if len(mine) > 1 else "")
+            note("exchange.loose", f"links.{body}", what, "draw less play where it is held" if len(mine) > 1 else "")
             self.weld(holder, body, what)
             return True
         return False
@@ -491,11 +491,11 @@ class _Held:
                 break
             one, other = touching[0] if touching[0][0] in main else touching[0][::-1]
             what = f"{other} has no joint with the rest, and touches {one}: it is taken as fixed to it"
-            self.draft.warn("touching", f"links.{other}", what, "draw the pin if it moves")
+            self.draft.warn("exchange.touching", f"links.{other}", what, "draw the pin if it moves")
             self.weld(one, other, what)
         for body in apart if len(main) > 1 else []:
             what = f"{body} has no joint with the rest and is left out"
-            self.draft.warn("unconnected", f"links.{body}", what, "draw the pin in its hole, or a larger --gap")
+            self.draft.warn("exchange.unconnected", f"links.{body}", what, "draw the pin in its hole, or a larger --gap")
             for name in [name for name in self.draft.bodies if self.groups(name) == body]:
                 del self.draft.bodies[name]
         names = set(self.draft.bodies)
@@ -543,16 +543,16 @@ class _Held:
         plays = {round(contact.play / 1e-9) for contact in contacts}
         if len(sizes) > 1 or len(plays) > 1:
             what = f"has {len(contacts)} bearings of different sizes; the joint has those of the longest"
-            self.draft.warn("bearings", f"joints.{one}-{other}", what, "see the comments of the joint")
+            self.draft.warn("exchange.bearings", f"joints.{one}-{other}", what, "see the comments of the joint")
         if stops == 1 and pair.type == "cylindrical":
             what = f"the pin between {one} and {other} is held in one direction only: the joint is cylindrical"
-            self.draft.warn("stops", f"links.{other}", what, "make it revolute if a load or a ring holds it")
+            self.draft.warn("exchange.stops", f"links.{other}", what, "make it revolute if a load or a ring holds it")
         apart = max(_eccentricity(contact) for contact in contacts)
         if apart > NEAR:
             what = (
                 f"pin and hole between {one} and {other} are drawn {1e3 * apart:.3g} mm apart; the joint is at the hole"
             )
-            self.draft.note("eccentric", f"links.{other}", what, "draw them on one axis", distance=apart)
+            self.draft.note("exchange.eccentric", f"links.{other}", what, "draw them on one axis", distance=apart)
         return pair
 
     def _sliding(self, one: str, other: str, walls: list[tuple[Facing, Facing]]) -> None:
@@ -565,7 +565,7 @@ class _Held:
             return  # the plates of a plane mechanism lie against each other
         if len(walls) > 2:
             what = f"{one} and {other} hold each other in all directions: they are taken as fixed"
-            self.draft.warn("fixed", f"links.{other}", what, "draw the play if they move")
+            self.draft.warn("exchange.fixed", f"links.{other}", what, "draw the play if they move")
             self.weld(one, other, what)
             return
         middle = np.mean([facing.corners for facing in walls[0]], axis=(0, 1))

@@ -41,7 +41,7 @@ def complete(draft: Draft, ground: str = "", drive: str = "", speed: float = 1.0
         draft.ground = max(joined, key=lambda name: (joined[name], draft.bodies[name].mass))
         reason = "by its name" if named else f"it has the most joints, {joined[draft.ground]}"
         what = f"is taken as the part that does not move: {reason}"
-        draft.note("ground", f"links.{draft.ground}", what, "state it with --ground")
+        draft.note("exchange.ground", f"links.{draft.ground}", what, "state it with --ground")
     if drive:
         drive = _existing(draft, drive, list(draft.pairs), "joint", "--drive")
         draft.drives = {drive: draft.drives.get(drive, speed)}
@@ -51,7 +51,7 @@ def complete(draft: Draft, ground: str = "", drive: str = "", speed: float = 1.0
         first = min(drivable, key=lambda name: not PAIRS[draft.pairs[name].type].turns)
         draft.drives = {first: speed}
         what = "is taken as the driver: the first joint on the part that does not move"
-        draft.note("drive", f"joints.{first}", what, "state it with --drive")
+        draft.note("exchange.drive", f"joints.{first}", what, "state it with --drive")
     return draft
 
 
@@ -98,7 +98,7 @@ def _laid_flat(draft: Draft, normal: Array) -> Draft:
             comment = f"{pair.type} in the file; in a plane it only turns"
             pairs[name] = replace(pair, type=RELEASED[pair.type], comments=[*pair.comments, comment])
         else:
-            turned.note("flat", f"joints.{name}", f"is {pair.type}, which constrains nothing in a plane", "")
+            turned.note("exchange.flat", f"joints.{name}", f"is {pair.type}, which constrains nothing in a plane", "")
     turned.pairs = pairs
     return turned
 

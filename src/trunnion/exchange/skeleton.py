@@ -76,7 +76,7 @@ class Positions:
                 pair.limits = float(np.min(places)) - here, float(np.max(places)) - here
         if mechanism.gears:
             what = f"gears, racks and screws are not written: {', '.join(mechanism.gears)}"
-            draft.warn("gears", "gears", what, "join their turns in the other program")
+            draft.warn("exchange.gears", "gears", what, "join their turns in the other program")
         return draft
 
     def drive(self, row: int) -> str:

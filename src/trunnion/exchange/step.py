@@ -87,7 +87,7 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
             names = [str(file[solid.number][file.kind(solid.number)][0] or "") for _, solid, _ in solids]
             names = [label if text in ("", "NONE") else text for text in names]
             what = f"is the only part, with {len(solids)} solids: each is taken as a link"
-            draft.warn("solids", f"links.{label}", what, "export an assembly to move its parts", count=len(solids))
+            draft.warn("exchange.solids", f"links.{label}", what, "export an assembly to move its parts", count=len(solids))
             groups = [(own, [entry]) for own, entry in zip(names, solids, strict=True)]
         else:
             groups = [(label, solids)] if solids else []
@@ -107,7 +107,7 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
         raise file.unreadable(what, "export solids, as AP214 or AP242 with exact geometry")
     if assembly.missing:
         what = f"states no length unit: {1e3 * options.unit:.6g} mm is taken"
-        draft.warn("unit", "", what, "state it with --unit")
+        draft.warn("exchange.unit", "", what, "state it with --unit")
     draft.ground = options.ground if options.ground in draft.bodies else ""
     joined(draft, faces, options.gap)
     still = complete(draft)
@@ -116,7 +116,7 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
             draft.pairs[name].links = draft.pairs[name].links[::-1]
     if not draft.pairs and len(draft.bodies) > 1:
         what = "no pin lies in a hole and no two walls guide a part: there are no joints"
-        draft.warn("joints", "", what, "state a larger --gap, or the unit with --unit")
+        draft.warn("exchange.joints", "", what, "state a larger --gap, or the unit with --unit")
     return draft, assembly, parts
 
 
@@ -129,7 +129,7 @@ def _solids(assembly: Assembly, link: Occurrence, draft: Draft) -> list[Entry]:
         if surfaces or not (own or leaf.children):
             what = f"has {counted(surfaces, 'surface body', 'surface bodies')} or meshes, which are left out"
             what = what if surfaces else "has no solid and is left out"
-            draft.warn("surfaces", f"links.{leaf.name or 'part'}", what, "export it as a solid")
+            draft.warn("exchange.surfaces", f"links.{leaf.name or 'part'}", what, "export it as a solid")
     return solids
 
 
@@ -142,7 +142,7 @@ def _rigid(draft: Draft, name: str, link: Occurrence, entries: Sequence[Entry], 
     if count:
         what += f"; {counted(count, 'pin')} in it {'has' if count == 1 else 'have'} play"
     note = draft.warn if count or not link.children else draft.note
-    note("rigid", f"links.{name}", what, "export it dissolved, its parts right below the top, if they move")
+    note("exchange.rigid", f"links.{name}", what, "export it dissolved, its parts right below the top, if they move")
 
 
 def _body(
@@ -164,13 +164,13 @@ def _body(
             density, origin = options.density, "of the import"
             if material:
                 what = f"is of {material!r}, whose density the file does not state: {density:g} kg/m³ is taken"
-                draft.warn("material", f"links.{name}", what, "state it with --material or --density")
+                draft.warn("exchange.material", f"links.{name}", what, "state it with --material or --density")
         moments, how = solid.moments, "exact by its faces"
         if solid.doubts:
             moments, how = _meshed(assembly.file, solid)
             doubts = "; ".join(dict.fromkeys(solid.doubts))
             what = f"has a solid (#{solid.number}) that is not integrated by its faces: {doubts}; its mass is {how}"
-            draft.warn("mesh", f"links.{name}", what, "compare it with that of the CAD program")
+            draft.warn("exchange.mesh", f"links.{name}", what, "compare it with that of the CAD program")
         total = total + moments.placed(place.matrix, place.shift) * density
         body.comments.append(f"{leaf.name or name}, solid #{solid.number}: {density:g} kg/m³ {origin}, {how}")
     if total.volume > 0:
@@ -345,7 +345,7 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
         relation = text(_relation(representation, whole[1], moved))
         text(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{shape})")
     path.write_text(text.whole(), encoding="ascii")
-    draft.note("skeleton", "", "points, axes and lines are written; a STEP file has no masses, joints or friction")
+    draft.note("exchange.skeleton", "", "points, axes and lines are written; a STEP file has no masses, joints or friction")
     return draft.findings
 
 
@@ -393,7 +393,7 @@ def _write_moved(positions: Positions, path: Path, options: ExportOptions) -> li
     for name, part in parts.items():
         link = links.get(name, "")
         if not link:
-            draft.note("still", f"links.{name}", "is no link of the model and stays where it is drawn", "")
+            draft.note("exchange.still", f"links.{name}", "is no link of the model and stays where it is drawn", "")
             continue
         rotation, origin = positions.rotations[link][options.row], positions.origins[link][options.row]
         if not np.isfinite(rotation).all():

@@ -421,6 +421,21 @@ class Mechanism(Numbers):
         """
         return _notebook().mechanism_figure(self)  # type: ignore[no-any-return]
 
+    def studio(self, height: int = 720) -> Any:
+        """The studio on the mechanism, for a cell of a notebook; its `mechanism` is what was made of it there.
+
+        height: of the cell, px. Raises MechanismError where the extra `notebook` is not installed.
+
+        Examples
+        --------
+        In a notebook: `view = mechanism.studio()`, then `view`, and after dragging `view.mechanism`.
+        """
+        try:
+            return import_module("trunnion.studio.widget").studio(self, height)
+        except ImportError:
+            what = "the studio of notebooks is not installed"
+            raise MechanismError(Finding(what, remedy="pip install 'trunnion[notebook]'")) from None
+
     def __repr__(self) -> str:
         """One line; `data()` has all of it."""
         parts = f"{len(self.effective_links)} links, {len(self.effective_joints)} joints"

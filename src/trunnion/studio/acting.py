@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from math import atan2, degrees, hypot
+from itertools import combinations
+from math import atan2, degrees, dist, hypot
 from typing import Any
 
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import KINDS, UnitError
 from trunnion.studio.ends import begin, numbered, point_of, refused
 from trunnion.studio.sketch import Sketch
 
-__all__ = ["driver", "gear", "load", "spring"]
+__all__ = ["bar_mass", "driver", "gear", "load", "spring"]
 
 Given = Mapping[str, Any]
 RATIO = re.compile(r"\s*([-+]?)\s*(\d+\.?\d*|\.\d+)\s*(?:([:/])\s*(\d+\.?\d*|\.\d+)\s*)?")
@@ -84,6 +87,40 @@ def spring(sketch: Sketch, given: Given) -> str:
     sketch.made = ("springs", name)
     sketch.section("springs")[name] = entry | {"free_length": sketch.length(hypot(a - x, b - y))}
     return f"Add {name}"
+
+
+def bar_mass(sketch: Sketch, given: Given) -> str:
+    """Mass, mass centre and inertia of a link that is a flat bar between its two points that are farthest apart.
+
+    width, thickness, density: as they were typed. With length l and width b: J = m (l² + b²) / 12 about the middle.
+    """
+    link = str(given["link"])
+    points = {point: sketch.local(link, point) for point in sketch.points(link)}
+    if len(points) < 2 or link == sketch.ground:
+        raise refused("is no bar", f"links.{link}", "choose a moving link with two points")
+    (x, y), (a, b) = max(combinations(points.values(), 2), key=lambda ends: dist(*ends))
+    length = dist((x, y), (a, b))
+    kinds = {"width": "length", "thickness": "length", "density": "density"}
+    width, thickness, density = (_above_zero(given.get(key), key, kind) for key, kind in kinds.items())
+    mass = density * length * width * thickness
+    sketch.section("links")[link] |= {
+        "mass": f"{mass:.6g} kg",
+        "centre": [sketch.length((x + a) / 2), sketch.length((y + b) / 2)],
+        "inertia": f"{mass * (length**2 + width**2) / 12:.6g} kg m^2",
+    }
+    return f"Mass of {link}"
+
+
+def _above_zero(typed: Any, key: str, kind: str) -> float:
+    """A quantity that was typed, in SI."""
+    try:
+        value = float(Quantity.read(str(typed or ""), KINDS[kind]).evaluate())
+    except (UnitError, ValueError, TypeError) as error:
+        remedy = getattr(error, "remedy", "") or f"type it as {KINDS[kind].example}"
+        raise refused(f"'{str(typed)[:30]}' is no {kind}", f"the {key}", remedy) from None
+    if not 0 < value < float("inf"):
+        raise refused("is not above 0", f"the {key}", f"type it as {KINDS[kind].example}")
+    return value
 
 
 # ---- gears ----------------------------------------------------------------------------------------------------

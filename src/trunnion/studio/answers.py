@@ -25,6 +25,7 @@ from trunnion.model.rewrite import changed_text
 from trunnion.results.attributes import findings_of, summary_of, units_of
 from trunnion.results.quantities import quantity
 from trunnion.results.scales import without_noise
+from trunnion.results.tables import selected
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
 from trunnion.studio.blocks import blocks_of
@@ -327,6 +328,17 @@ def _blocks(asked: Asked) -> dict[str, Any]:
     return blocks_of(state.run.system, without_noise(state.motion(steps, friction)))
 
 
+def _curves(asked: Asked) -> dict[str, Any]:
+    """Names and units of all columns of the table of a cycle, and those that are wanted, in SI."""
+    result = loaded(str(asked["text"])).result(_steps(asked), asked.get("friction") != "off")
+    columns = {one.name: one for one in selected(without_noise(result), ["all"]) if one.values.dtype.kind == "f"}
+    wanted = [name for name in asked.get("names") or () if name in columns]
+    return {
+        "names": [[one.name, one.unit] for one in columns.values()],
+        "columns": {name: {"unit": columns[name].unit, "values": columns[name].values} for name in wanted},
+    }
+
+
 def _moving(asked: Asked, result: xr.Dataset) -> dict[str, Any] | None:
     """Motion of the point, or in the plane of the place on a link, that is asked for; None where there is none."""
     if asked.get("place") and result.sizes["axis"] == 2:
@@ -386,6 +398,7 @@ ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "assemblies": _assemblies,
     "layers": _layers,
     "blocks": _blocks,
+    "curves": _curves,
     "compare": _compare,
     "tolerances": _tolerances,
 }

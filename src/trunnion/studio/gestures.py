@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.studio.acting import driver, gear, load, spring
+from trunnion.studio.acting import bar_mass, driver, gear, load, spring
 from trunnion.studio.changing import delete, lock, move, put_value
 from trunnion.studio.renaming import rename
 from trunnion.studio.sketch import Sketch
@@ -45,6 +45,7 @@ GESTURES: dict[str, Gesture] = {
     "spring": spring,
     "gear": gear,
     "block": block,
+    "bar-mass": bar_mass,
     "move": move,
     "lock": lock,
     "set": put_value,

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
 from trunnion.views.common.bundle import module
 
-__all__ = ["document", "found", "script"]
+__all__ = ["document", "found", "one_file", "script"]
 
 PLACES = {"studio": ("trunnion.studio", "web"), "web": ("trunnion.views", "web")}
 IMPORT_MAP = re.compile(r'<script type="importmap"[^>]*>(.*?)</script>', re.S)
@@ -40,6 +42,31 @@ def script() -> str:
     """All modules of the page as one; the libraries that the document names stay files of their own."""
     known = json.loads(IMPORT_MAP.search(_text("studio/index.html"))[1])["imports"]  # type: ignore[index]  # it has one
     return module("studio/main.js", _text, known)
+
+
+@lru_cache(maxsize=1)
+def one_file() -> str:
+    """The page in one file, for a frame in a notebook: style, modules and libraries inside it, nothing fetched."""
+    known: dict[str, str] = json.loads(IMPORT_MAP.search(_text("studio/index.html"))[1])["imports"]  # type: ignore[index]
+    libraries: dict[str, str] = {}
+    while len(libraries) < len(known):  # a library comes after those that it imports
+        for name, path in known.items():
+            text = _text(path.removeprefix("/"))
+            needs = [other for other in known if re.search(rf'from *"{re.escape(other)}"', text)]
+            if name not in libraries and all(other in libraries for other in needs):
+                libraries[name] = _as_data(text, libraries)
+    style = "".join(_text(path) for path in ("web/report.css", "studio/studio.css", "studio/panels.css"))
+    head = '<meta charset="utf-8"><meta name="token" content=""><meta name="cell"><title>Trunnion studio</title>'
+    body = f'<div id="studio"></div><script type="module" src="{_as_data(script(), libraries)}"></script>'
+    return f'<!doctype html><html lang="en"><head>{head}<style>{style}</style></head><body>{body}</body></html>'
+
+
+def _as_data(text: str, libraries: Mapping[str, str]) -> str:
+    """A module as a data address, what it imports being such addresses too."""
+    for name, address in libraries.items():
+        for before in (f'from"{name}"', f'from "{name}"'):
+            text = text.replace(before, f'from "{address}"')
+    return f"data:text/javascript;base64,{base64.b64encode(text.encode()).decode()}"
 
 
 def _text(path: str) -> str:

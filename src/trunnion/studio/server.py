@@ -17,6 +17,7 @@ import logging
 import mimetypes
 import os
 import secrets
+import tempfile
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -32,6 +33,7 @@ from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from trunnion.errors import MechanismError
 from trunnion.files import whole
 from trunnion.studio.jobs import Jobs
 from trunnion.studio.page import document, found, script
@@ -104,6 +106,7 @@ class Studio:
             Route("/first/{name:path}", self._admitted(self._first)),
             Route("/thumbnail/{name}", self._admitted(_thumbnail)),
             Route("/file/{name:path}", self._admitted(self._write), methods=["PUT"]),
+            Route("/import/{name}", self._admitted(_imported), methods=["PUT"]),
             Route("/jobs", self._admitted(self._jobs)),
             Route("/jobs", self._admitted(self._start), methods=["PUT"]),
             Route("/jobs/{number}", self._admitted(self._stop), methods=["DELETE"]),
@@ -331,6 +334,28 @@ class Studio:
             with contextlib.suppress(WebSocketDisconnect):
                 while (question := await socket.receive())["type"] == "websocket.receive":
                     answering.create_task(tell(question.get("bytes") or (question.get("text") or "").encode()))
+
+
+async def _imported(request: Request) -> Response:
+    """The text of a model made of a dropped file of another program, `{text, says}`."""
+    text, says = await run_in_threadpool(_read, request.path_params["name"], await request.body())
+    return JSONResponse({"text": text, "says": says})
+
+
+def _read(name: str, content: bytes) -> tuple[str, list[str]]:
+    from trunnion.exchange.formats import import_file
+    from trunnion.exchange.model_text import model_text
+
+    with tempfile.TemporaryDirectory(prefix="trunnion-import-") as folder:
+        path = Path(folder) / f"dropped{Path(name).suffix}"
+        path.write_bytes(content)
+        try:
+            draft = import_file(path)
+        except MechanismError as error:
+            why = "; ".join(f"{one.what}{f' ({one.remedy})' if one.remedy else ''}" for one in error.findings[:3])
+            raise ValueError(f"{name[:80]} {why}") from None
+    draft.source, draft.name = name, Path(name).stem if draft.name == "dropped" else draft.name
+    return model_text(draft), [f"{one.where}: {one.what}" for one in draft.findings]
 
 
 async def _thumbnail(request: Request) -> Response:

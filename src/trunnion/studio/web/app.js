@@ -33,9 +33,30 @@ export function App() {
         </div>
         ${bounded(Motion)}
       </div>
-      ${bounded(Panel)}
+      ${bounded(Divider, Panel)}
     </main>
     ${bounded(BottomBar, Dialogs)}`;
+}
+
+const LEAST = 300; // px of the panel, and of the sheet beside it
+const STEP = 24; // px that an arrow key moves the divider
+
+/** Between sheet and panel: dragged, or moved by arrow keys. */
+function Divider() {
+  const set = (width) => {
+    const most = Math.max(window.innerWidth - LEAST, LEAST);
+    document.documentElement.style.setProperty("--panel-width", `${Math.round(Math.min(Math.max(width, LEAST), most))}px`);
+  };
+  const drag = (event) => event.buttons && set(window.innerWidth - event.clientX);
+  const key = (event) => {
+    const by = { ArrowLeft: STEP, ArrowRight: -STEP }[event.key];
+    if (!by) return;
+    event.preventDefault();
+    event.stopPropagation();
+    set(document.querySelector(".panel").getBoundingClientRect().width + by);
+  };
+  return html`<div class="divider" role="separator" tabindex="0" aria-orientation="vertical" aria-label="Width of the panel" title="Drag, or use the arrow keys"
+    onPointerDown=${(event) => event.currentTarget.setPointerCapture(event.pointerId)} onPointerMove=${drag} onKeyDown=${key}></div>`; // prettier-ignore
 }
 
 function Panel() {

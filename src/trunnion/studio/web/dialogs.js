@@ -5,6 +5,7 @@ import { openFile, openText, save } from "./actions.js";
 import { Examples } from "./gallery.js";
 import { stemOf } from "./geometry.js";
 import { Keys } from "./keysheet.js";
+import { request } from "./socket.js";
 import * as state from "./state.js";
 import { Studies } from "./studies.js";
 import { Button, html } from "./ui.js";
@@ -29,11 +30,11 @@ function Frame({ children }) {
 
 function Open() {
   const { folder, names } = state.folder.value;
-  const take = async ({ target }) => target.files[0] && openText(await target.files[0].text(), `${target.files[0].name} opened`);
+  const take = ({ target }) => target.files[0] && openDropped(target.files[0]);
   return html`<h2>Open</h2>
     <p class="calm">${folder}</p>
     <ul class="list">${names.map((name) => html`<li><button type="button" class="plain wide" onClick=${() => openFile(name)}>${name}</button></li>`)}</ul>
-    <label class="choice">A file from elsewhere <input type="file" accept=".yaml,.yml,.json,.txt" onChange=${take} /></label>`; // prettier-ignore
+    <label class="choice">A file from elsewhere <input type="file" onChange=${take} /></label>`; // prettier-ignore
 }
 
 function Save() {
@@ -57,12 +58,23 @@ function Save() {
   </form>`; // prettier-ignore
 }
 
+/** Open a file from elsewhere: a model, or a drawing or model of another program, of which one is made. */
+async function openDropped(file) {
+  if (/\.(ya?ml|json|txt)$/i.test(file.name)) return openText(await file.text(), `${file.name} opened`);
+  state.say(`${file.name} is being read …`);
+  const reply = await request(`/import/${encodeURIComponent(file.name)}`, { method: "PUT", body: await file.arrayBuffer() });
+  const told = await reply.json().catch(() => ({ error: `${file.name} could not be read.` }));
+  if (told.error) return state.say(told.error, true);
+  await openText(told.text, `${file.name} imported`);
+  state.say(`${file.name} imported. ${told.says.length ? `To look at: ${told.says.slice(0, 3).join("; ")}${told.says.length > 3 ? ` and ${told.says.length - 3} more` : ""}.` : ""}`);
+}
+
 /** Files dropped on the page are opened. */
 export function listenToDrops(target) {
   target.addEventListener("dragover", (event) => event.preventDefault());
-  target.addEventListener("drop", async (event) => {
+  target.addEventListener("drop", (event) => {
     event.preventDefault();
     const [file] = event.dataTransfer.files;
-    if (file) openText(await file.text(), `${file.name} opened`);
+    if (file) openDropped(file);
   });
 }

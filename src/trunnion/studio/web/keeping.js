@@ -1,6 +1,7 @@
 // What the browser keeps of the work over a reload and a crash, for each folder, sheet and tab.
 
 import { effect } from "@preact/signals";
+import { unique } from "./socket.js";
 import * as state from "./state.js";
 
 const ROOM = 2e6; // characters of a sheet that are kept
@@ -19,8 +20,8 @@ const workKey = (name) => WORK + JSON.stringify([state.folder.value.id, name, ta
 
 /** Give this tab its name, which it had before it was loaded again; a tab that was duplicated takes a new one. */
 export async function enterTab() {
-  tab = state.read(sessionStorage, TAB) ?? crypto.randomUUID();
-  await held(tab).catch(() => held((tab = crypto.randomUUID())));
+  tab = state.read(sessionStorage, TAB) ?? unique();
+  await held(tab).catch(() => held((tab = unique())));
   put(sessionStorage, TAB, tab);
   addEventListener("storage", lookForTabs); // another tab keeps work
   await lookForTabs();

@@ -74,6 +74,7 @@ function fill(holder) {
     }
     Object.assign(crank, { count: scene.count, once: Boolean(scene.motion), words: figures.words, show });
     crank.strip.replaceChildren(...strips(scene));
+    crank.band.style.background = bandOf(state.answer.value.margin);
     holder.replaceChildren(crank.player.element, figures.element);
     crank.own = crank.figures = figures.element;
     figures.show(state.index.value);
@@ -97,9 +98,26 @@ function follow(live) {
 function lightUp(held) {
   const slider = held.player.element.querySelector("input[type=range]");
   held.strip = element("span", { class: "strip" });
+  held.band = element("span", { class: "margin-band", title: "Locking margin: the redder, the nearer a position is to locking" });
   const track = element("span", { class: "track-of-slider" });
   slider.replaceWith(track);
-  track.append(slider, held.strip);
+  track.append(slider, held.band, held.strip);
+}
+
+const STOPS = 120; // colours along the band
+const FAR = 4; // so many times the friction are far from locking
+
+/** The locking margin along the slider, as colours: red at 1 and below, none where it is far. */
+function bandOf(margin) {
+  if (!margin) return "none";
+  const last = Math.max(margin.length - 1, 1);
+  const length = Math.min(STOPS, margin.length);
+  const colours = Array.from({ length }, (_, order) => {
+    const index = Math.round((order * last) / Math.max(length - 1, 1));
+    const near = margin[index] === null || margin[index] === undefined ? 0 : Math.min(Math.max((FAR - margin[index]) / (FAR - 1), 0), 1);
+    return `color-mix(in srgb, var(--bad) ${(100 * near).toFixed(0)}%, transparent) ${((100 * index) / last).toFixed(1)}%`;
+  });
+  return `linear-gradient(to right, ${colours.join(", ")})`;
 }
 
 function strips(scene) {

@@ -3,10 +3,12 @@
 import { effect, signal, untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { lineChart } from "../web/chart.js";
-import { at, full, magnitude } from "../web/data.js";
+import { at, full, magnitude, say as position } from "../web/data.js";
+import { quantity } from "../web/format.js";
 import { polarChart } from "../web/polar.js";
 import { charts } from "../web/report.js";
 import { edit } from "./actions.js";
+import { chosenCharts, Choice } from "./curves.js";
 import { clicked, laid } from "./layers.js";
 import { crank } from "./motion.js";
 import { kindsOf } from "./sheet.js";
@@ -30,7 +32,9 @@ export function Plots() {
     <${Variants} />
     <${Place} />
     <${Curves} class="charts" listOf=${curves} />
+    <${Chosen} />
     <${Polars} />
+    <${Joints} />
     <${Figures} />
     <${Tolerances} />
     ${!state.solved.value && html`<p class="calm">Curves appear as soon as the mechanism is solved.</p>`}
@@ -116,6 +120,31 @@ function Place() {
   return html`<p class="row-of-buttons of-place">${point
     ? html`<span>The place clicked on ${name}.</span> <${Button} label="Make it a point" onClick=${keep} />`
     : html`<span>Click ${name} on the sheet: the place there draws its curve.</span> <${Button} label="Its middle" onClick=${middle} />`}</p>`;
+}
+
+/** Curves that the reader has chosen from the table of the cycle. */
+function Chosen() {
+  return state.solved.value && html`<section class="own-curves" aria-label="Curves of your choice"><h2>Curves of your choice</h2><${Choice} /><${Curves} class="charts" listOf=${chosenCharts} /></section>`;
+}
+
+/** The largest reaction and friction power of each joint, and where. */
+function Joints() {
+  const { scene } = state.answer.value ?? {};
+  if (!state.solved.value) return null;
+  const largest = (values) => values.reduce((best, value, index) => ((value ?? -1) > (values[best] ?? -1) ? index : best), 0);
+  const rows = scene.joints.slice(0, MOST).map(({ name, reaction, friction_power: power }) => {
+    const cell = (values, unit) => {
+      const index = largest(values);
+      return values[index] ? [quantity(values[index], unit, undefined, scene.units), position(scene, index)] : ["0", ""];
+    };
+    const friction = full(power, scene.count).map((value) => (value === null ? null : Math.abs(value)));
+    return [name, ...cell(magnitude(reaction, scene.count), "N"), ...cell(friction, "W")];
+  });
+  const head = ["joint", "largest reaction", "at", "largest friction power", "at"];
+  const copy = () => navigator.clipboard?.writeText([head, ...rows].map((row) => row.join("\t")).join("\n")).then(() => state.say("The table is on the clipboard."));
+  return html`<details class="of-joints"><summary>Largest loads of the joints</summary>
+    <table><thead><tr>${head.map((word) => html`<th>${word}</th>`)}</tr></thead><tbody>${rows.map((row) => html`<tr>${row.map((cell) => html`<td>${cell}</td>`)}</tr>`)}</tbody></table>
+    <${Button} label="Copy the table" onClick=${copy} /></details>`; // prettier-ignore
 }
 
 /** Polar diagrams of the reactions: the force vector of each joint as a closed curve. */

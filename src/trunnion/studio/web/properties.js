@@ -35,6 +35,7 @@ function Chosen({ kind, name }) {
       </h2>
       <${Rows} rows=${rows} findings=${findings} />
       ${kind === "joints" && state.solved.value && html`<p class="calm">${arrowOf(entries?.joints?.[name])}</p>`}
+      ${kind === "links" && name !== groundOf(entries) && !state.spatial.value && html`<${BarMass} link=${name} />`}
       ${driver && html`<h3>Driver</h3><${Rows} rows=${rowsOf(entries, "drivers", name)} findings=${findings} />`}
       <p class="row-of-buttons">
         ${kind === "joints" && !driver && html`<${Button} label="Drive this joint" onClick=${() => edit([{ do: "driver", joint: name }])} />`}
@@ -47,6 +48,15 @@ function Chosen({ kind, name }) {
         <${Button} label="All parts" onClick=${() => (state.selection.value = null)} />
       </p>
     </section>`; // prettier-ignore
+}
+
+/** Mass, centre and inertia of a flat bar by its section and density. */
+function BarMass({ link }) {
+  const [typed, setTyped] = useState({ width: "20 mm", thickness: "10 mm", density: "7850 kg/m^3" });
+  const put = (key) => ({ target }) => setTyped({ ...typed, [key]: target.value });
+  return html`<details class="bar-mass"><summary>Mass of a flat bar</summary>
+    ${Object.keys(typed).map((key) => html`<label class="choice">${key} <input aria-label=${key} value=${typed[key]} onInput=${put(key)} /></label>`)}
+    <${Button} label="Set mass, centre and inertia" onClick=${() => edit([{ do: "bar-mass", link, ...typed }])} /></details>`; // prettier-ignore
 }
 
 /** What the arrow at a joint is. */

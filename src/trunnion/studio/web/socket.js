@@ -26,8 +26,33 @@ function inStores(act) {
   });
 }
 
+/** Whether the page stands in a cell of a notebook, whose kernel answers in place of a server. */
+const inCell = () => document.querySelector("meta[name=cell]") !== null;
+/** A name that no other tab or frame has; a page that came by http from another machine has no randomUUID. */
+export const unique = () => crypto.randomUUID?.() ?? Array.from(crypto.getRandomValues(new Uint32Array(4)), (one) => one.toString(36)).join("-");
+const FRAME = unique();
+const posted = new Map();
+
+/** Send what the kernel answers with {status, body}, through the notebook around this frame. */
+function post(/** @type {object} */ message) {
+  if (!posted.size) window.addEventListener("message", received); // once: the same listener is not added twice
+  const id = `${FRAME} ${posted.size}`;
+  window.parent.postMessage({ trunnion: id, ...message }, "*");
+  return new Promise((resolve) => posted.set(id, resolve));
+}
+
+function received({ source, data }) {
+  if (source !== window.parent || !data?.trunnion) return;
+  posted.get(data.trunnion)?.(data);
+  posted.set(data.trunnion, null); // its number is not used again
+}
+
 /** Fetch what only the page may have. */
-export function request(/** @type {string} */ path, /** @type {RequestInit} */ how = {}) {
+export async function request(/** @type {string} */ path, /** @type {RequestInit} */ how = {}) {
+  if (inCell()) {
+    const { status, body } = await post({ path, method: how.method ?? "GET", body: how.body ?? null });
+    return new Response(body, { status });
+  }
   return fetch(path, { ...how, headers: { Authorization: `Bearer ${token}` } });
 }
 
@@ -62,6 +87,7 @@ export function connection(/** @type {(open: boolean) => void} */ onState) {
   let ready;
 
   const open = () => {
+    if (inCell()) return void (ready = Promise.resolve().then(() => onState(true)));
     socket = new WebSocket(`ws://${location.host}/socket`, ["trunnion", token]);
     socket.binaryType = "arraybuffer";
     ready = new Promise((resolve) => socket.addEventListener("open", resolve));
@@ -90,6 +116,7 @@ export function connection(/** @type {(open: boolean) => void} */ onState) {
   const settle = (/** @type {Answer} */ answer) => {
     if (waiting[answer.ask]?.revision === answer.revision) finish(answer.ask, answer);
   };
+  const send = (question) => (inCell() ? post({ question }).then(({ body }) => settle(decode(body))) : socket.send(question));
   open();
   return {
     /** @returns {Promise<Answer | null>} */
@@ -97,7 +124,7 @@ export function connection(/** @type {(open: boolean) => void} */ onState) {
       const revision = (revisions[kind] = (revisions[kind] ?? 0) + 1);
       finish(kind, null);
       const answer = new Promise((resolve) => (waiting[kind] = { revision, resolve }));
-      ready.then(() => waiting[kind]?.revision === revision && socket.send(JSON.stringify({ ask: kind, revision, ...fields })));
+      ready.then(() => waiting[kind]?.revision === revision && send(JSON.stringify({ ask: kind, revision, ...fields })));
       return answer; // a connection that is lost answers with null, though it may never have been there
     },
   };

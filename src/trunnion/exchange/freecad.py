@@ -1,0 +1,290 @@
+"""FreeCAD: the parts and joints of an Assembly (FreeCAD 1.0 and later) in a .FCStd file, read without FreeCAD.
+
+The file is a zip archive whose Document.xml has all objects with their properties. A joint names two connectors, each a
+path through the tree of parts to a face, edge or vertex, and the placement of a frame in the last part of the path; the
+first part of the path is what moves. Frames coincide but for what the joint leaves free, which is about and along z.
+"""
+
+from __future__ import annotations
+
+import math
+import zipfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element, ParseError
+
+import numpy as np
+from defusedxml import DefusedXmlException
+from defusedxml.ElementTree import iterparse
+from scipy.spatial.transform import Rotation
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.exchange.draft import PARALLEL, Array, Body, Draft, Pair, free_name
+from trunnion.exchange.formats import ImportOptions
+
+__all__ = ["read"]
+
+MEMBER = "Document.xml"
+LARGEST, MOST, MEMBERS = 100_000_000, 1_000_000, 100_000  # bytes and elements of it; members of an archive
+MILLI = 1e-3  # m
+APART = 1e-6  # of the size of the assembly: frames of a joint that do not coincide
+TYPES = ("Fixed", "Revolute", "Cylindrical", "Slider", "Ball", "Distance", "Parallel", "Perpendicular", "Angle",
+         "RackPinion", "Screw", "Gears", "Belt")  # fmt: skip
+PAIRS = dict(zip(TYPES, ("fixed", "revolute", "cylindrical", "prismatic", "spherical"), strict=False))
+ASSEMBLY, BODY, LINKS = "Assembly::AssemblyObject", "PartDesign::Body", "App::LinkGroup"
+CONTAINERS = ("App::Part", LINKS, "Assembly::AssemblyLink", ASSEMBLY)
+GROUPS = ("App::DocumentObjectGroup", "Assembly::JointGroup", "Assembly::ViewGroup")
+INERT = (*GROUPS, "App::Origin", "App::FeaturePython")  # what is no part
+IN_BODIES = ("Sketcher::SketchObject", "PartDesign::Point", "PartDesign::Line", "PartDesign::Plane",
+             "PartDesign::CoordinateSystem", "Part::LocalCoordinateSystem")  # fmt: skip
+PROPERTIES = {
+    "Label", "Placement", "LinkPlacement", "LinkTransform", "LinkedObject", "Group", "Rigid", "ObjectToGround",
+    "JointType", "Reference1", "Reference2", "Placement1", "Placement2", "Activated", "Suppressed",
+    *(f"{enable}{key}{end}" for enable in ("", "Enable") for key in ("Length", "Angle") for end in ("Min", "Max")),
+}  # fmt: skip
+OTHERS = {"SolverId": "Assembly3 or Assembly4", "AssemblyType": "Assembly4", "a2p_Version": "A2plus"}
+
+
+@dataclass
+class DocumentObject:
+    """An object of the document: its name, type, and what is wanted of its properties."""
+
+    name: str
+    type: str
+    properties: dict[str, Element]
+
+    def first(self, key: str) -> Element:
+        """What stands first in a property."""
+        return next(iter(self.properties.get(key, ())), Element(""))
+
+    def value(self, key: str, default: str = "") -> str:
+        """The text of a property."""
+        return self.first(key).get("value") or default
+
+    def on(self, key: str, default: str = "false") -> bool:
+        """A property that is true or false."""
+        return self.value(key, default).lower() in ("true", "1")
+
+    @property
+    def label(self) -> str:
+        """The name that the user sees."""
+        return self.value("Label", self.name)
+
+    def frame(self, *keys: str) -> Array:
+        """The first placement that there is, lengths in m, (4, 4); ValueError for one that is none."""
+        place = self.first(next((key for key in keys if key in self.properties), ""))
+        axes, (x, y, z) = np.eye(4), (float(place.get(key, "0")) for key in ("Px", "Py", "Pz"))
+        q = np.array([float(place.get(f"Q{k}", "01"[k == 3])) for k in range(4)])
+        axes[:3, 3] = x * MILLI, y * MILLI, z * MILLI
+        axes[:3, :3] = Rotation.from_quat(q).as_matrix()  # ValueError for 0
+        if not np.isfinite(axes).all():
+            raise ValueError
+        return axes
+
+    def links(self, key: str) -> list[str]:
+        """The names of objects that a property refers to, or the path of a connector."""
+        link = self.first(key)
+        if link.tag == "XLink":
+            path = next((sub.get("value", "") for sub in link.iter("Sub")), link.get("sub", ""))
+            return [name for name in (link.get("name", ""), *path.split(".")) if name] if link.get("name") else []
+        names = (each.get("value", "") for child in self.properties.get(key, ()) for each in child.iter("Link"))
+        return [name for name in names if name]
+
+
+def read(path: Path, options: ImportOptions) -> Draft:
+    """Read the assembly of a file."""
+    objects, others = _document(path)
+    assemblies = [each for each in objects.values() if each.type == ASSEMBLY]
+    inner = {name for assembly in assemblies for name in assembly.links("Group")}
+    outer = [assembly for assembly in assemblies if assembly.name not in inner]
+    if not outer:
+        what = "has no assembly of FreeCAD 1.0 or later"
+        what += f", but one of {' and '.join(others)}, whose attachments are not joints" if others else ""
+        raise MechanismError(Finding(what, file=str(path), remedy="join the parts in FreeCAD's Assembly workbench"))
+    draft = Draft(outer[0].label)
+    if len(outer) > 1:
+        draft.warn(
+            "exchange.assemblies",
+            "",
+            f"{outer[0].label} is read of {len(outer)} assemblies",
+            "keep the others in files",
+        )
+    try:
+        _Assembly(objects, outer[0], draft).read()
+    except (ValueError, KeyError, IndexError):
+        raise MechanismError(Finding("has a joint or placement that cannot be read", file=str(path))) from None
+    if not draft.pairs:
+        raise MechanismError(Finding("has no joint between two parts that is read", file=str(path)))
+    what = f"masses of {len(draft.bodies)} parts are not read: they follow from shapes that only FreeCAD knows"
+    draft.note(
+        "exchange.masses", "links", what, "write mass, centre and inertia of each link, or import the parts as STEP too"
+    )
+    return draft
+
+
+def _document(path: Path) -> tuple[dict[str, DocumentObject], list[str]]:
+    """The objects of a file by name, and other programs whose assemblies it has."""
+    what, remedy = "is damaged, or no file of FreeCAD", "save it with FreeCAD"
+    try:
+        with zipfile.ZipFile(path) as archive:
+            member = archive.getinfo(MEMBER)
+            if len(archive.namelist()) <= MEMBERS and member.file_size <= LARGEST:
+                with archive.open(member) as stream:
+                    return _objects(stream)
+        what = f"has more than {MEMBERS:,} members, or a {MEMBER} of more than {LARGEST:,} bytes"
+    except KeyError:
+        what = f"has no {MEMBER}"
+    except OverflowError:
+        what, remedy = f"has a {MEMBER} of more than {MOST:,} elements", "save the assembly alone"
+    except DefusedXmlException:
+        what = f"has entities in its {MEMBER}, which may hide anything"
+    except (zipfile.BadZipFile, zlib.error, ParseError, EOFError, NotImplementedError, RuntimeError, UnicodeError):
+        pass
+    raise MechanismError(Finding(what, file=str(path), remedy=remedy))
+
+
+def _objects(stream: Any) -> tuple[dict[str, DocumentObject], list[str]]:
+    """The objects of a document, read as it comes so that what is not wanted takes no memory."""
+    types, objects, others = dict[str, str](), dict[str, DocumentObject](), dict[str, None]()
+    for count, (_, element) in enumerate(iterparse(stream)):
+        if count > MOST:
+            raise OverflowError
+        name = element.get("name", "")
+        if element.tag == "Property" and name not in PROPERTIES:
+            others |= dict.fromkeys([OTHERS[name]] if name in OTHERS else [])
+            element.clear()
+        elif element.tag == "Object" and element.get("type"):
+            types[name] = element.get("type", "")
+        elif element.tag == "Object":
+            properties = {each.get("name", ""): each for each in element.iter("Property")}
+            objects[name] = DocumentObject(name, types.get(name, ""), properties)
+    return objects, list(others)
+
+
+class _Assembly:
+    """An assembly, in whose frame everything is."""
+
+    def __init__(self, objects: dict[str, DocumentObject], assembly: DocumentObject, draft: Draft) -> None:
+        self.objects, self.assembly, self.draft = objects, assembly, draft
+        self.bodies: dict[str, str] = {}  # name of the body by that of the object
+        self.frames: dict[str, tuple[Array, Array]] = {}  # of the connectors, by pair
+
+    def read(self) -> None:
+        """Add what is grounded, and the pairs of the joints."""
+        draft, members = self.draft, list(self._members(self.assembly, set()))
+        for each in members:
+            for name in each.links("ObjectToGround"):
+                body = self._body(name)
+                draft.ground = draft.ground or body
+                if body != draft.ground:
+                    weld = free_name(each.label, draft.pairs)
+                    draft.pairs[weld] = Pair(weld, "fixed", (draft.ground, body), np.zeros(3))
+        for each in members:
+            if "JointType" in each.properties:
+                self._joint(each)
+        loose = [each.label for each in members if each.name not in self.bodies and each.type not in INERT]
+        if loose:
+            draft.note("exchange.loose", "links", f"{', '.join(loose[:9])} have no joint and are left out", "join them")
+        places = np.array([frame[:3, 3] for both in self.frames.values() for frame in both])
+        size = float(np.ptp(places, axis=0).max()) if len(places) else 0.0
+        for name, (first, second) in self.frames.items():
+            self._compare(draft.pairs[name], first, second, APART * size)
+
+    def _members(self, group: DocumentObject, visited: set[str]) -> Iterator[DocumentObject]:
+        """What an assembly or group holds, groups resolved."""
+        for name in group.links("Group"):
+            if name in self.objects and name not in visited:
+                visited.add(name)
+                yield self.objects[name]
+                if self.objects[name].type in GROUPS:
+                    yield from self._members(self.objects[name], visited)
+
+    def _body(self, name: str) -> str:
+        """The body of a part that moves."""
+        if name not in self.bodies:
+            label = free_name(self.objects[name].label, self.draft.bodies)
+            self.bodies[name], self.draft.bodies[label] = label, Body(label)
+        return self.bodies[name]
+
+    def _connector(self, joint: DocumentObject, which: str) -> tuple[str, Array]:
+        """The part that moves with a connector, and the frame of the connector in that of the assembly."""
+        path = joint.links(f"Reference{which}")
+        if self.assembly.name in path:
+            path = path[path.index(self.assembly.name) + 1 :]
+        frame, moving = np.eye(4), ""
+        for k, part in ((k, self.objects[name]) for k, name in enumerate(path) if name in self.objects):
+            if part.type in GROUPS:
+                continue
+            loose = part.type == LINKS or (part.type == "Assembly::AssemblyLink" and not part.on("Rigid", "true"))
+            moving = moving or ("" if loose else part.name)
+            frame, target = frame @ part.frame("LinkPlacement", "Placement"), self._target(part)
+            if part.on("LinkTransform") and target is not part:
+                frame = frame @ target.frame("LinkPlacement", "Placement")
+            if part.first("LinkedObject").get("file") and len(path) > k + 2:
+                what = f"joins a part in another file, {'.'.join(path)}: where it lies in that is not known"
+                self.draft.warn(
+                    "exchange.outside", f"joints.{joint.label}", what, "look at its place, or join the part itself"
+                )
+            inside = self.objects.get(path[k + 1]) if len(path) > k + 1 else None
+            if target.type == BODY and inside is not None and inside.type in IN_BODIES:
+                frame = frame @ inside.frame("Placement")
+            if target.type not in CONTAINERS:
+                break
+        return moving, frame @ joint.frame(f"Placement{which}")
+
+    def _target(self, part: DocumentObject) -> DocumentObject:
+        """What a link stands for, in the same file."""
+        visited = {part.name}
+        while (link := part.links("LinkedObject")) and link[0] in self.objects and link[0] not in visited:
+            visited.add(link[0])
+            part = self.objects[link[0]]
+        return part
+
+    def _joint(self, joint: DocumentObject) -> None:
+        """Add the pair of a joint, or tell why there is none."""
+        draft, where = self.draft, f"joints.{joint.label}"
+        kinds = [text.get("value", "") for text in joint.properties["JointType"].iter("Enum")] or TYPES
+        kind = kinds[int(joint.value("JointType", "0"))]
+        (part, first), (mate, second) = self._connector(joint, "1"), self._connector(joint, "2")
+        if not joint.on("Activated", "true") or joint.on("Suppressed"):
+            draft.note(
+                "exchange.inactive", where, "is not active, and left out", "activate it in FreeCAD if it is meant"
+            )
+        elif kind not in PAIRS:
+            what = f"is of the kind {kind}, which is no pair, and is left out"
+            draft.warn(
+                "exchange.joint", where, what, "add what it holds to the model, a gear, rack or screw under gears"
+            )
+        elif not part or not mate or part == mate:
+            draft.warn("exchange.open", where, "does not join two parts, and is left out", "give it two connectors")
+        else:
+            name = free_name(joint.label, draft.pairs)
+            pair = Pair(name, PAIRS[kind], (self._body(part), self._body(mate)), second[:3, 3], first[:3, 2])
+            paths = (".".join(joint.links(f"Reference{which}")[1:]) for which in "12")
+            pair.comments.append(f"{kind} joint of {' and '.join(paths)}")
+            pair.limits = _limits(joint, kind, np.linalg.inv(first) @ second)
+            draft.pairs[name], self.frames[name] = pair, (first, second)
+
+    def _compare(self, pair: Pair, first: Array, second: Array, most: float) -> None:
+        """A doubt where the frames of a joint do not coincide as its kind has it: the assembly was not solved."""
+        gap, axis = second[:3, 3] - first[:3, 3], first[:3, 2]
+        if pair.type in ("cylindrical", "prismatic"):
+            gap = gap - (gap @ axis) * axis
+        tilt = 0.0 if pair.type == "spherical" else float(np.linalg.norm(np.cross(axis, second[:3, 2])))
+        if np.linalg.norm(gap) > most or tilt > PARALLEL:
+            what = f"its connectors are {1e3 * np.linalg.norm(gap):.3g} mm and {math.degrees(tilt):.3g}° apart"
+            self.draft.warn("exchange.apart", f"joints.{pair.name}", what, "solve the assembly in FreeCAD and save it")
+
+
+def _limits(joint: DocumentObject, kind: str, between: Array) -> tuple[float, float] | None:
+    """The range of a joint's coordinate from where it is drawn, rad or m; None if it is not limited on both sides."""
+    key, here, unit = "Length", between[2, 3], MILLI
+    if kind == "Revolute":
+        key, here, unit = "Angle", math.atan2(between[1, 0], between[0, 0]), math.pi / 180
+    if kind not in ("Revolute", "Slider") or not (joint.on(f"Enable{key}Min") and joint.on(f"Enable{key}Max")):
+        return None
+    low, high = (float(joint.value(f"{key}{end}", "0")) * unit - float(here) for end in ("Min", "Max"))
+    return (low, high) if low < high else None

@@ -1,0 +1,102 @@
+"""The studio in a cell of a notebook: its page in a frame, answered by the kernel, both ways."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import anywidget
+import traitlets
+
+from trunnion.model.file import entries_of, text_of
+from trunnion.model.mechanism import Mechanism
+from trunnion.studio.answers import answer, examples
+from trunnion.studio.page import found, one_file
+
+__all__ = ["StudioWidget", "studio"]
+
+NAME = "mechanism.yaml"
+
+
+class StudioWidget(anywidget.AnyWidget):
+    """A mechanism that is drawn and dragged in a cell.
+
+    Parameters
+    ----------
+    text : str
+        The model as YAML; it follows what is done in the cell.
+    height : int
+        Of the cell, px.
+    """
+
+    _esm = traitlets.Unicode(found("studio", "cell.js").read_text("utf-8")).tag(sync=True)
+    height = traitlets.Int(720).tag(sync=True)
+
+    def __init__(self, text: str, height: int = 720) -> None:
+        """Show a text."""
+        super().__init__(height=height)
+        self.text = text
+        self.on_msg(self._asked)
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism as it is in the cell now; MechanismError if it is not sound, as one that is half drawn."""
+        return Mechanism(**entries_of(self.text)[0])
+
+    def _asked(self, _widget: Any, message: Mapping[str, Any], buffers: list[Any]) -> None:
+        """Answer the page: with itself, to a question as the server does, or as a folder of one file."""
+        if message.get("page"):
+            self.send({"page": one_file()})
+            return
+        if message.get("question") is not None:
+            question = str(message["question"])
+            asked = json.loads(question)
+            if asked.get("ask") in ("model", "edit") and isinstance(asked.get("text"), str):
+                self.text = asked["text"]
+            status, body = 200, answer(question.encode())
+        else:
+            status, body = self._request(str(message.get("path")), bytes(buffers[0]) if buffers else b"")
+        self.send({"id": message["id"], "status": status}, [body])
+
+    def _request(self, path: str, body: bytes) -> tuple[int, bytes]:
+        kind, _, name = path.strip("/").partition("/")
+        known: dict[str, Callable[[], bytes]] = {
+            "files": self._files,
+            "first": self._first,
+            "file": lambda: self._saved(body),
+            "thumbnail": lambda: _small(name),
+            "jobs": lambda: json.dumps({"forms": [], "jobs": []}).encode(),
+        }
+        if kind not in known:
+            return 404, json.dumps({"error": "A notebook does not do that: use the command line."}).encode()
+        return 200, known[kind]()
+
+    def _files(self) -> bytes:
+        own = hashlib.sha256(self.model_id.encode()).hexdigest()[:16]
+        return json.dumps({"folder": "notebook", "id": own, "open": NAME, "files": [NAME]}).encode()
+
+    def _first(self) -> bytes:
+        from trunnion.studio.message import packed
+        from trunnion.studio.placed import placed
+
+        return packed(placed(self.text))
+
+    def _saved(self, body: bytes) -> bytes:
+        self.text = str(json.loads(body)["text"])
+        return json.dumps({"saved": NAME}).encode()
+
+
+def _small(name: str) -> bytes:
+    from urllib.parse import unquote
+
+    from trunnion.studio.message import packed
+    from trunnion.studio.thumbnails import thumbnail
+
+    return packed(thumbnail(examples()[unquote(name)]))
+
+
+def studio(mechanism: Mechanism, height: int = 720) -> StudioWidget:
+    """The studio on a mechanism, for a cell of a notebook."""
+    return StudioWidget(text_of(mechanism.data()), height)

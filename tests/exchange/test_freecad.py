@@ -1,0 +1,356 @@
+"""Assemblies of FreeCAD, written here as its Document.xml has them, at any placement and through any tree of parts."""
+
+from __future__ import annotations
+
+import math
+import time
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from trunnion import analyse
+from trunnion.errors import MechanismError
+from trunnion.exchange import Draft, import_file, model_text
+from trunnion.model.mechanism import read_mechanism
+
+KINDS = ["Fixed", "Revolute", "Cylindrical", "Slider", "Ball", "Distance", "Parallel", "Perpendicular", "Angle",
+         "RackPinion", "Screw", "Gears", "Belt"]  # fmt: skip
+UP = (0.0, 0.0, 0.0, 1.0)  # a quaternion: x, y, z, w
+
+
+def turned(axis: Any, angle: float) -> tuple[float, ...]:
+    """The quaternion of a rotation."""
+    unit = np.asarray(axis, float) / np.linalg.norm(axis)
+    return (*(unit * math.sin(angle / 2)), math.cos(angle / 2))
+
+
+def matrix(place: Any, q: Any) -> np.ndarray:
+    """The frame of a placement: by the columns e of q e q*."""
+    x, y, z, w = q
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    frame = np.eye(4)
+    frame[:3, :3] = np.eye(3) + 2 * w * cross + 2 * cross @ cross
+    frame[:3, 3] = place
+    return frame
+
+
+def quaternion(rotation: np.ndarray) -> tuple[float, ...]:
+    """The quaternion of a rotation matrix: the eigenvector of the largest eigenvalue (Bar-Itzhack 2000)."""
+    r = rotation
+    k = np.array(
+        [
+            [r[0, 0] - r[1, 1] - r[2, 2], r[1, 0] + r[0, 1], r[2, 0] + r[0, 2], r[2, 1] - r[1, 2]],
+            [r[1, 0] + r[0, 1], r[1, 1] - r[0, 0] - r[2, 2], r[2, 1] + r[1, 2], r[0, 2] - r[2, 0]],
+            [r[2, 0] + r[0, 2], r[2, 1] + r[1, 2], r[2, 2] - r[0, 0] - r[1, 1], r[1, 0] - r[0, 1]],
+            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], r[0, 0] + r[1, 1] + r[2, 2]],
+        ]
+    )
+    return tuple(np.linalg.eigh(k)[1][:, -1])
+
+
+class Drawing:
+    """A document: objects with properties, as FreeCAD writes them."""
+
+    def __init__(self) -> None:
+        self.objects: list[tuple[str, str, str]] = []
+
+    def add(self, kind: str, name: str, **properties: str) -> str:
+        rows = "".join(
+            f'<Property name="{key}" type="App::Property">{text}</Property>' for key, text in properties.items()
+        )
+        self.objects.append((kind, name, f'<Properties Count="{len(properties)}">{rows}</Properties>'))
+        return name
+
+    def text(self) -> str:
+        types = "".join(f'<Object type="{kind}" name="{name}" id="1"/>' for kind, name, _ in self.objects)
+        data = "".join(f'<Object name="{name}">{rows}</Object>' for _, name, rows in self.objects)
+        head = (
+            '<?xml version="1.0" encoding="utf-8"?><Document SchemaVersion="4" ProgramVersion="1.0.0" FileVersion="1">'
+        )
+        return f"{head}<Objects>{types}</Objects><ObjectData>{data}</ObjectData></Document>"
+
+    def save(self, path: Path) -> Path:
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("Document.xml", self.text())
+            archive.writestr("GuiDocument.xml", "<Document/>")
+            archive.writestr("PartShape.brp", "DBRep_DrawableShape")
+        return path
+
+
+def string(value: str) -> str:
+    return f'<String value="{value}"/>'
+
+
+def boolean(value: bool) -> str:
+    return f'<Bool value="{str(value).lower()}"/>'
+
+
+def number(value: float) -> str:
+    return f'<Float value="{value!r}"/>'
+
+
+def placed(frame: np.ndarray) -> str:
+    (x, y, z), (a, b, c, d) = frame[:3, 3], quaternion(frame[:3, :3])
+    return f'<PropertyPlacement Px="{x!r}" Py="{y!r}" Pz="{z!r}" Q0="{a!r}" Q1="{b!r}" Q2="{c!r}" Q3="{d!r}"/>'.replace(
+        "np.float64(", ""
+    ).replace(")", "")
+
+
+def grouped(*names: str) -> str:
+    return f'<LinkList count="{len(names)}">{"".join(f"""<Link value="{name}"/>""" for name in names)}</LinkList>'
+
+
+def linked(name: str, *subs: str, file: str = "") -> str:
+    inner = "".join(f'<Sub value="{sub}"/>' for sub in subs)
+    return f'<XLink file="{file}" stamp="" name="{name}" count="{len(subs)}">{inner}</XLink>'
+
+
+def kinds(kind: str) -> str:
+    listed = "".join(f'<Enum value="{one}"/>' for one in KINDS)
+    return (
+        f'<Integer value="{KINDS.index(kind)}" CustomEnum="true"/><CustomEnumList count="13">{listed}</CustomEnumList>'
+    )
+
+
+def joint(drawing: Drawing, name: str, kind: str, ends: Any, **more: str) -> str:
+    """A joint of two connectors: root, path and the frame in the last part."""
+    properties = {"Label": string(name), "JointType": kinds(kind)}
+    for which, (root, path, frame) in zip("12", ends, strict=True):
+        properties |= {f"Reference{which}": linked(root, path, path), f"Placement{which}": placed(frame)}
+    return drawing.add("App::FeaturePython", name, **properties, **more)
+
+
+# a four-bar in mm: ground pins at (0, 0) and (200, 0), crank pin at (60, 0), B where the bars of 180 and 150 meet
+PINS = {"O": (0.0, 0.0, 0.0), "A": (60.0, 0.0, 3.0), "C": (200.0, 0.0, 0.0)}
+_x = (180.0**2 - 150.0**2 + 140.0**2) / (2 * 140.0)
+PINS["B"] = (60.0 + _x, math.sqrt(180.0**2 - _x**2), 6.0)
+BARS = {"O": ("Base", "Crank"), "A": ("Crank", "Rod"), "B": ("Rod", "Rocker"), "C": ("Base", "Rocker")}
+
+
+def four_bar(frame: np.ndarray, frames: dict[str, np.ndarray]) -> Drawing:
+    """The four-bar turned as a whole by a frame, each part with a frame and a tree of its own, shapes in `frame`."""
+    drawing, top = Drawing(), matrix((5.0, -3.0, 2.0), turned((1, 2, 3), 0.7))
+    inner = matrix((1.0, 2.0, 3.0), turned((3, -1, 2), 1.1))
+    path, local = {}, {}
+    # a body alone; a feature in a part; a link to a body elsewhere; a link to a part with a body and a datum in it
+    drawing.add(
+        "PartDesign::Body", "Base", Label=string("Base"), Placement=placed(frame @ frames["Base"]),
+        Group=grouped("Pad"),
+    )  # fmt: skip
+    drawing.add("PartDesign::Pad", "Pad", Placement=placed(top))
+    path["Base"], local["Base"] = "Base.Pad.Face3", frame @ frames["Base"]
+    drawing.add(
+        "App::Part", "Crank", Label=string("Crank"), Placement=placed(frame @ frames["Crank"]), Group=grouped("Box")
+    )
+    drawing.add("Part::Feature", "Box", Placement=placed(inner))
+    path["Crank"], local["Crank"] = "Crank.Box.Edge1", frame @ frames["Crank"] @ inner
+    drawing.add("PartDesign::Body", "Body", Placement=placed(top), Group=grouped("Pad001"))
+    drawing.add(
+        "App::Link", "Rod", Label=string("Rod"), LinkedObject=linked("Body"), LinkTransform=boolean(False),
+        LinkPlacement=placed(frame @ frames["Rod"]), Placement=placed(frame @ frames["Rod"]),
+    )  # fmt: skip
+    path["Rod"], local["Rod"] = "Rod.Pad001.Edge2", frame @ frames["Rod"]
+    drawing.add("App::Part", "Sub", Placement=placed(top), Group=grouped("Inner"))
+    drawing.add("PartDesign::Body", "Inner", Placement=placed(inner), Group=grouped("Datum"))
+    drawing.add("PartDesign::CoordinateSystem", "Datum", Placement=placed(top))
+    drawing.add(
+        "App::Link", "Link", Label=string("Rocker"), LinkedObject=linked("Sub"), LinkTransform=boolean(False),
+        LinkPlacement=placed(frame @ frames["Rocker"]),
+    )  # fmt: skip
+    path["Rocker"], local["Rocker"] = "Link.Inner.Datum.", frame @ frames["Rocker"] @ inner @ top
+    names = []
+    for k, (name, bars) in enumerate(BARS.items()):
+        ends = []
+        for bar, flip in zip(
+            bars, (UP, turned((1, 1, 0), math.pi) if k % 2 else turned((0, 0, 1), 0.3 * k)), strict=True
+        ):
+            at = frame @ matrix(PINS[name], flip)
+            ends.append(("Assembly", path[bar], np.linalg.inv(local[bar]) @ at))
+        names.append(joint(drawing, name, "Revolute", ends))
+    drawing.add("App::FeaturePython", "Grounded", ObjectToGround='<Link value="Base"/>', Placement=placed(top))
+    drawing.add("Assembly::JointGroup", "Joints", Group=grouped("Grounded", *names))
+    drawing.add("App::DocumentObjectGroup", "Folder", Group=grouped("Crank", "Rod"))
+    drawing.add(
+        "Assembly::AssemblyObject", "Assembly", Label=string("Four-bar"), Placement=placed(top),
+        Group=grouped("Base", "Folder", "Link", "Joints"),
+    )  # fmt: skip
+    return drawing
+
+
+ALIKE = dict.fromkeys(("Base", "Crank", "Rod", "Rocker"), np.eye(4))
+
+
+def codes(draft: Draft) -> list[str]:
+    return [finding.code.removeprefix("exchange.") for finding in draft.findings]
+
+
+frames = st.builds(
+    lambda place, axis, angle: matrix(place, turned(axis, angle)),
+    st.tuples(*[st.floats(-500, 500)] * 3),
+    st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda axis: np.linalg.norm(axis) > 0.1),
+    st.floats(-3, 3),
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(whole=frames, own=st.tuples(frames, frames, frames, frames))
+def test_joints_lie_where_the_tree_of_parts_has_them(tmp_path_factory: Any, whole: np.ndarray, own: Any) -> None:
+    drawing = four_bar(whole, dict(zip(("Base", "Crank", "Rod", "Rocker"), own, strict=True)))
+    draft = import_file(drawing.save(tmp_path_factory.mktemp("fc") / "one.FCStd"))
+    assert draft.ground == "Base"
+    assert set(draft.bodies) == {"Base", "Crank", "Rod", "Rocker"}
+    assert codes(draft) == ["masses", "drive"]
+    for name, bars in BARS.items():
+        pair = draft.pairs[name]
+        assert pair.links == bars
+        assert pair.type == "revolute"
+        np.testing.assert_allclose(pair.at * 1e3, (whole @ [*PINS[name], 1.0])[:3], atol=1e-9)
+        np.testing.assert_allclose(pair.axis, whole[:3, 2], atol=1e-12)
+
+
+def test_the_model_moves_like_one_written_by_hand(tmp_path: Path) -> None:
+    whole = matrix((100.0, 20.0, -40.0), turned((1, 1, 1), 2 * math.pi / 3))
+    draft = import_file(
+        four_bar(whole, dict.fromkeys(("Base", "Crank", "Rod", "Rocker"), whole)).save(tmp_path / "a.fcstd")
+    )
+    (tmp_path / "model.yaml").write_text(model_text(draft), encoding="utf-8")
+    mechanism = read_mechanism(tmp_path / "model.yaml")
+    assert mechanism.space == "planar"
+    turns = analyse(mechanism, 90, variables=["joint_rotation"])["joint_rotation"].sel(joint="C").values
+    crank = np.arange(90) * math.radians(4.0)
+    pin = np.array([60 * np.cos(crank) - 200.0, 60 * np.sin(crank)])  # from C
+    away = np.hypot(*pin)
+    rocker = np.arctan2(pin[1], pin[0]) - np.arccos((away**2 + 150.0**2 - 180.0**2) / (300.0 * away))
+    np.testing.assert_allclose(np.diff(np.unwrap(turns)), np.diff(np.unwrap(rocker)), atol=1e-9)
+
+
+def pair_of(kind: str, second: np.ndarray, tmp_path: Path, **more: str) -> Draft:
+    """Two bodies with one joint, the second connector at a frame in that of the first; a pin joins them to a third."""
+    drawing = Drawing()
+    for name in ("Base", "Slide", "Arm"):
+        drawing.add("Part::Box", name, Placement=placed(np.eye(4)))
+    names = [
+        joint(drawing, "J", kind, [("Base", "Face1", np.eye(4)), ("Slide", "Face1", second)], **more),
+        joint(drawing, "P", "Revolute", [("Slide", "Face1", second), ("Arm", "Face1", second)]),
+    ]
+    drawing.add("App::FeaturePython", "Grounded", ObjectToGround='<Link value="Base"/>')
+    drawing.add("Assembly::JointGroup", "Joints", Group=grouped("Grounded", *names))
+    drawing.add("Assembly::AssemblyObject", "Assembly", Group=grouped("Base", "Slide", "Arm", "Joints"))
+    return import_file(drawing.save(tmp_path / "two.FCStd"))
+
+
+def test_kinds_of_joints_and_their_limits(tmp_path: Path) -> None:
+    ends = {"LengthMin": number(-5.0), "LengthMax": number(20.0), "AngleMin": number(-30.0), "AngleMax": number(90.0)}
+    ends |= {f"Enable{key}": boolean(True) for key in ends}
+    along, round_ = matrix((0, 0, 8.0), UP), matrix((0, 0, 0), turned((0, 0, 1), math.radians(10)))
+    slider = pair_of("Slider", along, tmp_path, **ends)
+    assert slider.pairs["J"].type == "prismatic"
+    assert slider.pairs["J"].limits == pytest.approx((-0.013, 0.012))
+    pin = pair_of("Revolute", round_, tmp_path, **ends)
+    assert pin.pairs["J"].limits == pytest.approx((math.radians(-40), math.radians(80)))
+    for kind, wanted in (("Cylindrical", "cylindrical"), ("Ball", "spherical")):
+        assert pair_of(kind, round_, tmp_path).pairs["J"].type == wanted
+    fixed = pair_of("Fixed", np.eye(4), tmp_path)
+    assert set(fixed.bodies) == {"Base", "Arm"}
+    assert codes(slider) == ["masses", "drive"]
+
+
+@pytest.mark.parametrize("kind", KINDS[5:])
+def test_what_is_no_pair_is_said(kind: str, tmp_path: Path) -> None:
+    draft = pair_of(kind, np.eye(4), tmp_path)
+    assert set(draft.pairs) == {"P"}
+    (lost,) = [finding for finding in draft.findings if finding.code == "exchange.joint"]
+    assert kind in lost.what
+    assert lost.where == "joints.J"
+
+
+def test_doubts_are_said(tmp_path: Path) -> None:
+    unsolved = pair_of("Revolute", matrix((3.0, 4.0, 0.0), turned((1, 0, 0), 0.1)), tmp_path)
+    (doubt,) = [finding for finding in unsolved.findings if finding.code == "exchange.apart"]
+    assert "5 mm and 5.72° apart" in doubt.what
+    off = pair_of("Revolute", np.eye(4), tmp_path, Activated=boolean(False))
+    assert "inactive" in codes(off)
+    drawing = four_bar(np.eye(4), ALIKE)
+    drawing.objects = [(kind, name, text.replace('file="" stamp="" name="Sub"', 'file="x.FCStd" stamp="" name="Sub"'))
+                       for kind, name, text in drawing.objects if name != "Sub"]  # fmt: skip
+    assert "outside" in codes(import_file(drawing.save(tmp_path / "outside.FCStd")))
+
+
+def test_several_grounded_parts_are_one(tmp_path: Path) -> None:
+    drawing = four_bar(np.eye(4), ALIKE)
+    drawing.add("App::FeaturePython", "Second", ObjectToGround='<Link value="Plate"/>')
+    drawing.add("Part::Box", "Plate", Label=string("Plate"))
+    old, new = '<Link value="Grounded"/>', '<Link value="Grounded"/><Link value="Second"/>'
+    drawing.objects = [(kind, name, text.replace(old, new)) for kind, name, text in drawing.objects]
+    draft = import_file(drawing.save(tmp_path / "one.FCStd"))
+    assert set(draft.bodies) == {"Base", "Crank", "Rod", "Rocker"}
+
+
+def archive(tmp_path: Path, text: str | bytes, name: str = "Document.xml") -> Path:
+    with zipfile.ZipFile(tmp_path / "bad.FCStd", "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr(name, text)
+    return tmp_path / "bad.FCStd"
+
+
+HEAD = '<?xml version="1.0"?>'
+ENTITY = '<!DOCTYPE d [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]><Document>&b;</Document>'
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (HEAD + ENTITY, "entities"),
+        (HEAD + "<Document><Objects>", "damaged"),
+        ("\x00\x01binary", "damaged"),
+        (HEAD + "<Document/>", "no assembly of FreeCAD"),
+        (HEAD + '<D><Objects><Object type="App::Part" name="A"/></Objects><ObjectData><Object name="A"><Properties>'
+         '<Property name="SolverId"/></Properties></Object></ObjectData></D>', "Assembly4"),
+    ],
+)  # fmt: skip
+def test_bad_documents_are_refused_in_a_sentence(text: str, says: str, tmp_path: Path) -> None:
+    with pytest.raises(MechanismError, match=says) as error:
+        import_file(archive(tmp_path, text))
+    assert len(error.value.findings) == 1
+
+
+def test_bad_archives_are_refused_in_a_sentence(tmp_path: Path) -> None:
+    cases = {"no Document.xml": archive(tmp_path, "x", "other.xml").read_bytes(), "damaged": b"PK\x03\x04cut"}
+    good = four_bar(np.eye(4), ALIKE).save(tmp_path / "good.FCStd")
+    whole = good.read_bytes()
+    for says, data in (
+        *cases.items(),
+        ("damaged", whole[: len(whole) // 2]),
+        ("damaged", whole[:40] + b"!" * 400 + whole[440:]),
+    ):
+        (tmp_path / "bad.FCStd").write_bytes(data)
+        with pytest.raises(MechanismError, match=says):
+            import_file(tmp_path / "bad.FCStd")
+
+
+@pytest.mark.slow
+def test_bombs_are_refused_in_time(tmp_path: Path) -> None:
+    big = archive(tmp_path, b" " * 200_000_000)
+    begin = time.perf_counter()
+    with pytest.raises(MechanismError, match="bytes"):
+        import_file(big)
+    many = archive(tmp_path, HEAD + "<Document>" + "<a/>" * 3_000_000 + "</Document>")
+    with pytest.raises(MechanismError, match="1,000,000 elements"):
+        import_file(many)
+    assert time.perf_counter() - begin < 10
+
+
+@pytest.mark.parametrize(
+    "old", ['Q3="', 'Px="', 'Integer value="1"', 'name="Assembly" count', "Sub value=", "Link value="]
+)
+@pytest.mark.parametrize("new", ["", 'Q3="x', 'Px="nan', 'Integer value="99"', "Link value="])
+def test_replaced_parts_never_end_in_a_traceback(old: str, new: str, tmp_path: Path) -> None:
+    drawing = four_bar(np.eye(4), ALIKE)
+    try:
+        model_text(import_file(archive(tmp_path, drawing.text().replace(old, new))))
+    except MechanismError as error:
+        assert error.findings  # noqa: PT017 (it may be read as well)

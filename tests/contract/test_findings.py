@@ -15,7 +15,14 @@ from trunnion.errors import Finding, Severity
 from trunnion.results.attributes import finding_rows
 
 # place of the code
-MAKERS = {"Finding.note": 0, "Finding.warning": 0, "Finding.error": 0, "Finding.weighed": 1, "draft.note": 0, "draft.warn": 0}
+MAKERS = {
+    "Finding.note": 0,
+    "Finding.warning": 0,
+    "Finding.error": 0,
+    "Finding.weighed": 1,
+    "draft.note": 0,
+    "draft.warn": 0,
+}
 
 
 def made() -> Iterator[tuple[str, int, ast.Call]]:

@@ -319,7 +319,7 @@ class StepFile:
                     place = self.placement(centre, axis, start - centre)
                     curve = self(f"CIRCLE('',#{place},{_real(radius)})")
                     if self.splines and kind == "circle":
-                        curve = self.spline_circle(centre, axis, start)
+                        curve = self(f"SURFACE_CURVE('',#{self.spline_circle(centre, axis, start)},(),.CURVE_3D.)")
                 edges[key] = self(f"EDGE_CURVE('',#{vertex(start)},#{vertex(end)},#{curve},.T.)")
                 edges[key, "start"] = vertex(start), None if kind == "line" else np.array(axis)
             else:

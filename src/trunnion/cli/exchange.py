@@ -65,7 +65,8 @@ def export(
     at: Annotated[str | None, typer.Option("--at", help="Position of the mechanism: 60deg, 20mm, 0.1s.")] = None,
     frames: Annotated[int, typer.Option("--frames", help="Number of positions in a file that moves.")] = 120,
     original: Annotated[
-        Path | None, typer.Option("--from", help="The STEP file it was imported from, whose parts are to be moved.")
+        str | None,
+        typer.Option("--from", metavar="FILE", help="The STEP file it was imported from, whose parts are to be moved."),
     ] = None,
     set_: Set = None,
 ) -> None:

@@ -327,9 +327,9 @@ class Geometry:
         face.area = area if face.outward else -area
         if face.kind in ("sphere", "torus") and face.area <= 1e-12 * face.radius**2:
             sign = 1.0 if face.outward else -1.0
-            whole_area, whole = _closed_surface(face)
-            face.area += whole_area
-            moments = moments + whole * sign
+            full_area, full = _closed_surface(face)
+            face.area += full_area
+            moments = moments + full * sign
         if not face.area > 0:
             solid.doubts.append("it has faces whose bounds run the wrong way round")
         solid.moments = solid.moments + moments
@@ -354,12 +354,12 @@ def _gauss(course: Any, breaks: Any) -> tuple[Array, Array]:
 
 def _profile(face: Face, v: Array) -> tuple[Array, Array, Array, Array]:
     """r(v), z(v), r′(v), z′(v) of a surface of revolution."""
-    one, nought = np.ones_like(v), np.zeros_like(v)
+    unit, nought = np.ones_like(v), np.zeros_like(v)
     if face.kind == "cylinder":
-        return face.radius * one, v, nought, one
+        return face.radius * unit, v, nought, unit
     if face.kind == "cone":
         slope = math.tan(face.minor)
-        return face.radius + slope * v, v, slope * one, one
+        return face.radius + slope * v, v, slope * unit, unit
     ring, tube = (0.0, face.radius) if face.kind == "sphere" else (face.radius, face.minor)
     return ring + tube * np.cos(v), tube * np.sin(v), -tube * np.sin(v), tube * np.cos(v)
 
@@ -437,9 +437,9 @@ def _closed_surface(face: Face) -> tuple[float, Moments]:
     """Area and moments of a full sphere or torus."""
     if face.kind == "sphere":
         area, volume = 4 * math.pi * face.radius**2, 4 / 3 * math.pi * face.radius**3
-        own = volume * face.radius**2 / 5 * np.eye(3)
+        central = volume * face.radius**2 / 5 * np.eye(3)
     else:
         area, volume = 4 * math.pi**2 * face.radius * face.minor, 2 * math.pi**2 * face.radius * face.minor**2
         across = volume * (face.radius**2 + 0.75 * face.minor**2) / 2
-        own = face.frame.T @ np.diag([across, across, volume * face.minor**2 / 4]) @ face.frame
-    return area, Moments(volume, volume * face.origin, volume * np.outer(face.origin, face.origin) + own)
+        central = face.frame.T @ np.diag([across, across, volume * face.minor**2 / 4]) @ face.frame
+    return area, Moments(volume, volume * face.origin, volume * np.outer(face.origin, face.origin) + central)

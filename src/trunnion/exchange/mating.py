@@ -101,9 +101,9 @@ class Facing:
         return replace(self, bodies=bodies, outlines=outlines, normal=-self.normal, level=-self.level - self.gap)
 
 
-def parallel(one: Array, other: Array) -> bool:
+def parallel(left: Array, other: Array) -> bool:
     """Whether two unit vectors are parallel or opposite."""
-    return bool(np.linalg.norm(np.cross(one, other)) < ANGLE)
+    return bool(np.linalg.norm(np.cross(left, other)) < ANGLE)
 
 
 def _line_numbers(points: Sequence[Array], axes: Sequence[Array], slack: Sequence[float]) -> list[int]:
@@ -137,13 +137,13 @@ class Groups:
             name = self.leader[name]
         return name
 
-    def weld(self, one: str, other: str, comment: str) -> None:
+    def weld(self, left: str, other: str, comment: str) -> None:
         """Make two bodies one."""
-        first, second = self(one), self(other)
+        first, second = self(left), self(other)
         if second == self(self.draft.ground) if self.draft.ground else False:
             first, second = second, first
         self.leader[second] = first
-        name = free_name(f"fixed {one} {other}", self.draft.pairs)
+        name = free_name(f"fixed {left} {other}", self.draft.pairs)
         self.draft.pairs[name] = Pair(name, "fixed", (first, second), np.zeros(3), comments=[comment])
         self.draft.bodies[other].comments.append(comment)
 
@@ -165,12 +165,12 @@ def joined(draft: Draft, faces: dict[str, list[Face]], gap: float) -> None:
     contacts = _contacts(draft, groups, rounds["cylinder"], gap)
     balls = _contacts(draft, groups, rounds["sphere"], gap)
     facings = list(_facings(faces, gap))
-    held = _Held(draft, groups, contacts, balls, facings)
-    held.patterns(rounds["cylinder"])
-    while held.step():
+    mechanism = _Held(draft, groups, contacts, balls, facings)
+    mechanism.patterns(rounds["cylinder"])
+    while mechanism.step():
         pass
-    held.unconnected()
-    held.pairs()
+    mechanism.unconnected()
+    mechanism.pairs()
 
 
 def loose_contacts(faces: dict[str, list[Face]], gap: float) -> int:
@@ -188,15 +188,15 @@ def _rounds(faces: dict[str, list[Face]], kind: str) -> list[Round]:
     rounds: list[Round] = []
     ball = kind == "sphere"
     for body, all_faces in faces.items():
-        mine = [face for face in all_faces if face.kind == kind and (ball or len(face.outline))]
-        axes = [face.axis * np.sign(face.axis[int(np.argmax(abs(face.axis)))]) for face in mine]
-        numbers: list[Any] = _line_numbers([face.origin for face in mine], axes, [0.0] * len(mine))
+        round_faces = [face for face in all_faces if face.kind == kind and (ball or len(face.outline))]
+        axes = [face.axis * np.sign(face.axis[int(np.argmax(abs(face.axis)))]) for face in round_faces]
+        numbers: list[Any] = _line_numbers([face.origin for face in round_faces], axes, [0.0] * len(round_faces))
         if ball:
-            numbers = [tuple(np.round(face.origin / NEAR)) for face in mine]
+            numbers = [tuple(np.round(face.origin / NEAR)) for face in round_faces]
         groups: dict[tuple[int, int, bool], list[tuple[float, float, Face]]] = defaultdict(list)
-        for face, number in zip(mine, numbers, strict=True):
+        for face, number in zip(round_faces, numbers, strict=True):
             lead = numbers.index(number)
-            along = np.zeros(1) if ball else (face.outline - mine[lead].origin) @ axes[lead]
+            along = np.zeros(1) if ball else (face.outline - round_faces[lead].origin) @ axes[lead]
             piece = float(along.min()), float(along.max()), face
             groups[lead, round(face.radius * 1e9), not face.outward].append(piece)
         for (lead, _, hole), pieces in groups.items():
@@ -211,7 +211,7 @@ def _rounds(faces: dict[str, list[Face]], kind: str) -> list[Round]:
                 if full > 0:
                     covered = sum(part.area for part in parts) / full
                     ids = tuple(part.number for part in parts)
-                    where = mine[lead].origin, axes[lead], face.radius, low, high
+                    where = round_faces[lead].origin, axes[lead], face.radius, low, high
                     rounds.append(Round(body, *where, hole, covered, ids, face.tolerance))
     return rounds
 
@@ -294,8 +294,8 @@ def _facings(faces: dict[str, list[Face]], gap: float) -> Iterator[Facing]:
         others = [other for other in np.nonzero(near[index + 1 :])[0] + index + 1 if planes[other][0] != body]
         frame = _tight(outline, normal) if others else np.eye(3)
         for other in others:
-            one, two = (points @ frame[:2].T for points in (outline, planes[other][3]))
-            low, high = np.maximum(one.min(axis=0), two.min(axis=0)), np.minimum(one.max(axis=0), two.max(axis=0))
+            left, two = (points @ frame[:2].T for points in (outline, planes[other][3]))
+            low, high = np.maximum(left.min(axis=0), two.min(axis=0)), np.minimum(left.max(axis=0), two.max(axis=0))
             if (high - low > NEAR).all():
                 flat = np.array([(a, b) for a in (low[0], high[0]) for b in (low[1], high[1])]) @ frame[:2]
                 corners = flat + (level + distance[other] / 2) * normal
@@ -350,14 +350,14 @@ class _Held:
 
     def between(self) -> dict[tuple[str, str], list[Contact]]:
         """Contacts of pins by the two bodies that they join."""
-        found: dict[tuple[str, str], list[Contact]] = defaultdict(list)
+        joining: dict[tuple[str, str], list[Contact]] = defaultdict(list)
         for contact in self.contacts:
-            one, other = sorted((self.groups(contact.hole.body), self.groups(contact.pin.body)))
-            if one != other:
-                found[one, other].append(contact)
-        return found
+            left, other = sorted((self.groups(contact.hole.body), self.groups(contact.pin.body)))
+            if left != other:
+                joining[left, other].append(contact)
+        return joining
 
-    def ends(self, one: str, other: str) -> list[Facing]:
+    def ends(self, left: str, other: str) -> list[Facing]:
         """Facing planes of two bodies, seen from the first."""
         if not self._ends:
             for facing in self.facings:
@@ -365,16 +365,16 @@ class _Held:
                 if first != second:
                     self._ends[first, second].append(facing)
                     self._ends[second, first].append(facing.back)
-        return self._ends.get((one, other), [])
+        return self._ends.get((left, other), [])
 
-    def weld(self, one: str, other: str, comment: str) -> None:
+    def weld(self, left: str, other: str, comment: str) -> None:
         """Make two bodies one."""
-        self.groups.weld(one, other, comment)
+        self.groups.weld(left, other, comment)
         self._ends.clear()
 
-    def stops(self, one: str, other: str, axis: Array) -> int:
+    def stops(self, left: str, other: str, axis: Array) -> int:
         """In how many of the two directions along an axis end faces hold two bodies."""
-        along = [facing.normal @ axis for facing in self.ends(one, other)]
+        along = [facing.normal @ axis for facing in self.ends(left, other)]
         return int(any(part > 1 - ANGLE for part in along)) + int(any(part < -1 + ANGLE for part in along))
 
     def step(self) -> bool:
@@ -383,55 +383,59 @@ class _Held:
 
     def patterns(self, rounds: Sequence[Round]) -> None:
         """Bodies that touch where two holes of each lie on the same axes are bolted to each other."""
+        draft = self.draft
         holes = [item for item in rounds if item.hole and item.covered > COVERED[0]]
         numbers = _line_numbers([hole.point for hole in holes], [hole.axis for hole in holes], [0.0] * len(holes))
         lines: dict[str, dict[int, Array]] = defaultdict(dict)
         for hole, number in zip(holes, numbers, strict=True):
             lines[hole.body][number] = hole.axis
         for facing in (facing for facing in self.facings if facing.gap <= NEAR):
-            one, other = facing.bodies
-            shared = lines[one].keys() & lines[other].keys()
-            count = sum(parallel(lines[one][number], facing.normal) for number in shared)
-            if count > 1 and self.groups(one) != self.groups(other):
-                what = f"{one} and {other} touch, and {count} holes of each lie on the same axes: fixed"
-                self.draft.warn("exchange.bolted", f"links.{other}", what, "draw the pins if they move")
-                self.weld(one, other, what)
+            left, other = facing.bodies
+            shared = lines[left].keys() & lines[other].keys()
+            count = sum(parallel(lines[left][number], facing.normal) for number in shared)
+            if count > 1 and self.groups(left) != self.groups(other):
+                what = f"{left} and {other} touch, and {count} holes of each lie on the same axes: fixed"
+                draft.warn("exchange.bolted", f"links.{other}", what, "draw the pins if they move")
+                self.weld(left, other, what)
 
     def _bolted(self) -> bool:
         """Two bodies with pins on two axes do not turn; if planes touch or the axes cross they do not slide."""
-        for (one, other), contacts in self.between().items():
+        draft = self.draft
+        for (left, other), contacts in self.between().items():
             axis = contacts[0].hole.axis
             if len(self.lines(contacts)) == 1:
                 continue
-            if self.stops(one, other, axis) or not all(parallel(axis, contact.hole.axis) for contact in contacts):
-                what = f"{one} and {other} are fixed to each other: pins on several axes join them"
-                self.draft.note("exchange.bolted", f"links.{other}", what)
-                self.weld(one, other, what)
+            if self.stops(left, other, axis) or not all(parallel(axis, contact.hole.axis) for contact in contacts):
+                what = f"{left} and {other} are fixed to each other: pins on several axes join them"
+                draft.note("exchange.bolted", f"links.{other}", what)
+                self.weld(left, other, what)
                 return True
         return False
 
     def _twins(self) -> bool:
         """Two bodies on the same two axes move as one, such as the two side plates of a link."""
+        draft = self.draft
         lines: dict[str, set[int]] = defaultdict(set)
         between = self.between()
         for pair, contacts in between.items():
             for body in pair:
                 lines[body] |= self.lines(contacts)
-        for one, other in combinations(lines, 2):
-            if len(lines[one] & lines[other]) > 1 and tuple(sorted((one, other))) not in between:
-                what = f"{one} and {other} turn about the same axes and are one link"
-                self.draft.note("exchange.twins", f"links.{one}", what, "")
-                self.weld(one, other, what)
+        for left, other in combinations(lines, 2):
+            if len(lines[left] & lines[other]) > 1 and tuple(sorted((left, other))) not in between:
+                what = f"{left} and {other} turn about the same axes and are one link"
+                draft.note("exchange.twins", f"links.{left}", what, "")
+                self.weld(left, other, what)
                 return True
         return False
 
     def _loose(self) -> bool:
         """A pin or sleeve with all contacts on its own axis spins without effect: it is fixed at the least play."""
+        draft = self.draft
         between = self.between()
         for body in self.groups.bodies():
             mine = {pair: contacts for pair, contacts in between.items() if body in pair}
             first = next(iter(mine.values()), [None])[0]
-            if first is None or len(between) == 1 or body == self.draft.ground or not self._centred(body, first):
+            if first is None or len(between) == 1 or body == draft.ground or not self._centred(body, first):
                 continue
             aligned = len(self.lines([contact for contacts in mine.values() for contact in contacts])) == 1
             ball = any(body in map(self.groups, (item.pin.body, item.hole.body)) for item in self.balls)
@@ -444,8 +448,12 @@ class _Held:
             holder = next(name for name in tightest if name != body)
             what = f"{body} turns only about its own axis: it is taken as fixed in {holder}"
             what += ", where its play is least" if len(mine) > 1 else ""
-            note = self.draft.warn if len(mine) == 1 else self.draft.note
-            note("exchange.loose", f"links.{body}", what, "draw less play where it is held" if len(mine) > 1 else "")
+            draft.note(
+                "exchange.loose",
+                f"links.{body}",
+                what,
+                "draw less play where it is held" if len(mine) > 1 else "",
+            )
             self.weld(holder, body, what)
             return True
         return False
@@ -459,10 +467,10 @@ class _Held:
         across = off - (off @ contact.hole.axis) * contact.hole.axis
         return bool(np.linalg.norm(across) <= contact.play + 1e-3 * contact.hole.radius)
 
-    def _walls(self, one: str, other: str) -> list[tuple[Facing, Facing]]:
+    def _walls(self, left: str, other: str) -> list[tuple[Facing, Facing]]:
         """Opposite walls that hold two bodies, for independent directions, seen from the first."""
         walls: list[tuple[Facing, Facing]] = []
-        for front, back in combinations(self.ends(one, other), 2):
+        for front, back in combinations(self.ends(left, other), 2):
             if front.normal @ back.normal < -1 + ANGLE**2:
                 normals = [*(wall[0].normal for wall in walls), front.normal]
                 if np.linalg.matrix_rank(np.array(normals), tol=ANGLE) == len(normals):
@@ -471,16 +479,17 @@ class _Held:
 
     def unconnected(self) -> None:
         """What no joint connects with the rest is fixed to what it touches, or left out."""
+        draft = self.draft
         while True:
             bodies = self.groups.bodies()
             links = {body: {body} for body in bodies}
             near = [tuple(map(self.groups, (item.pin.body, item.hole.body))) for item in (*self.contacts, *self.balls)]
             near += [pair for pair in combinations(bodies, 2) if self._walls(*pair)]
-            for one, other in near:
-                if links[one] is not links[other]:
-                    united = links[one] | links[other]
+            for left, other in near:
+                if links[left] is not links[other]:
+                    united = links[left] | links[other]
                     links.update(dict.fromkeys(united, united))
-            main = links[self.groups(self.draft.ground)] if self.draft.ground else max(links.values(), key=len)
+            main = links[self.groups(draft.ground)] if draft.ground else max(links.values(), key=len)
             apart = [body for body in bodies if body not in main]
             touching = [
                 (self.groups(facing.bodies[0]), self.groups(facing.bodies[1]))
@@ -489,17 +498,17 @@ class _Held:
             ]
             if not apart or not touching:
                 break
-            one, other = touching[0] if touching[0][0] in main else touching[0][::-1]
-            what = f"{other} has no joint with the rest, and touches {one}: it is taken as fixed to it"
-            self.draft.warn("exchange.touching", f"links.{other}", what, "draw the pin if it moves")
-            self.weld(one, other, what)
+            left, other = touching[0] if touching[0][0] in main else touching[0][::-1]
+            what = f"{other} has no joint with the rest, and touches {left}: it is taken as fixed to it"
+            draft.warn("exchange.touching", f"links.{other}", what, "draw the pin if it moves")
+            self.weld(left, other, what)
         for body in apart if len(main) > 1 else []:
             what = f"{body} has no joint with the rest and is left out"
-            self.draft.warn("exchange.unconnected", f"links.{body}", what, "draw the pin in its hole, or a larger --gap")
-            for name in [name for name in self.draft.bodies if self.groups(name) == body]:
-                del self.draft.bodies[name]
-        names = set(self.draft.bodies)
-        self.draft.pairs = {name: pair for name, pair in self.draft.pairs.items() if set(pair.links) <= names}
+            draft.warn("exchange.unconnected", f"links.{body}", what, "draw the pin in its hole, or a larger --gap")
+            for name in [name for name in draft.bodies if self.groups(name) == body]:
+                del draft.bodies[name]
+        names = set(draft.bodies)
+        draft.pairs = {name: pair for name, pair in draft.pairs.items() if set(pair.links) <= names}
         self.contacts = [item for item in self.contacts if {item.pin.body, item.hole.body} <= names]
         self.balls = [item for item in self.balls if {item.pin.body, item.hole.body} <= names]
         self.groups.leader = {name: lead for name, lead in self.groups.leader.items() if name in names}
@@ -509,26 +518,27 @@ class _Held:
     def pairs(self) -> None:
         """Add the pairs of all bodies that touch and move against each other."""
         between = self.between()
-        for (one, other), contacts in between.items():
-            self._add(self._turning(one, other, contacts))
+        for (left, other), contacts in between.items():
+            self._add(self._turning(left, other, contacts))
         for ball in self.balls:
             if self.groups(ball.pin.body) != self.groups(ball.hole.body):
                 self._add(replace(_pair("spherical", [ball]), at=ball.hole.point, length=None))
-        for one, other in combinations(self.groups.bodies(), 2):
-            if (one, other) not in between and (other, one) not in between:
-                walls = self._walls(one, other)
+        for left, other in combinations(self.groups.bodies(), 2):
+            if (left, other) not in between and (other, left) not in between:
+                walls = self._walls(left, other)
                 if walls:
-                    self._sliding(one, other, walls)
+                    self._sliding(left, other, walls)
 
     def _add(self, pair: Pair) -> None:
         letters = (f"{chr(65 + n % 26)}{n // 26 or ''}" for n in range(26 * 1000))
         pair.name = next(name for name in letters if name not in self.draft.pairs and name not in self.draft.bodies)
         self.draft.pairs[pair.name] = pair
 
-    def _turning(self, one: str, other: str, contacts: list[Contact]) -> Pair:
+    def _turning(self, left: str, other: str, contacts: list[Contact]) -> Pair:
         """The pair of pins on one axis, or on several parallel ones that only slide."""
+        draft = self.draft
         axis = contacts[0].hole.axis
-        stops = self.stops(one, other, axis)
+        stops = self.stops(left, other, axis)
         if len(self.lines(contacts)) > 1:
             pair = _pair("prismatic", contacts)
             pair.comments.append("pins on several parallel axes, and no end faces along them: it slides")
@@ -543,20 +553,19 @@ class _Held:
         plays = {round(contact.play / 1e-9) for contact in contacts}
         if len(sizes) > 1 or len(plays) > 1:
             what = f"has {len(contacts)} bearings of different sizes; the joint has those of the longest"
-            self.draft.warn("exchange.bearings", f"joints.{one}-{other}", what, "see the comments of the joint")
+            draft.warn("exchange.bearings", f"joints.{left}-{other}", what, "see the comments of the joint")
         if stops == 1 and pair.type == "cylindrical":
-            what = f"the pin between {one} and {other} is held in one direction only: the joint is cylindrical"
-            self.draft.warn("exchange.stops", f"links.{other}", what, "make it revolute if a load or a ring holds it")
+            what = f"the pin between {left} and {other} is held in one direction only: the joint is cylindrical"
+            draft.warn("exchange.stops", f"links.{other}", what, "make it revolute if a load or a ring holds it")
         apart = max(_eccentricity(contact) for contact in contacts)
         if apart > NEAR:
-            what = (
-                f"pin and hole between {one} and {other} are drawn {1e3 * apart:.3g} mm apart; the joint is at the hole"
-            )
-            self.draft.note("exchange.eccentric", f"links.{other}", what, "draw them on one axis", distance=apart)
+            what = f"pin and hole between {left} and {other} lie {1e3 * apart:.3g} mm apart; the joint is at the hole"
+            draft.note("exchange.eccentric", f"links.{other}", what, "draw them on one axis", distance=apart)
         return pair
 
-    def _sliding(self, one: str, other: str, walls: list[tuple[Facing, Facing]]) -> None:
+    def _sliding(self, left: str, other: str, walls: list[tuple[Facing, Facing]]) -> None:
         """The pair of bodies that flat walls guide."""
+        draft = self.draft
         normals = np.array([wall[0].normal for wall in walls])
         comment = "; ".join(
             f"walls {1e3 * abs(a.level + b.level):.9g} mm apart, play {1e3 * (a.gap + b.gap):.6g} mm" for a, b in walls
@@ -564,13 +573,13 @@ class _Held:
         if len(walls) == 1 and self.plane is not None and parallel(normals[0], self.plane):
             return  # the plates of a plane mechanism lie against each other
         if len(walls) > 2:
-            what = f"{one} and {other} hold each other in all directions: they are taken as fixed"
-            self.draft.warn("exchange.fixed", f"links.{other}", what, "draw the play if they move")
-            self.weld(one, other, what)
+            what = f"{left} and {other} hold each other in all directions: they are taken as fixed"
+            draft.warn("exchange.fixed", f"links.{other}", what, "draw the play if they move")
+            self.weld(left, other, what)
             return
         middle = np.mean([facing.corners for facing in walls[0]], axis=(0, 1))
         if len(walls) == 1 and self.plane is None:
-            self._add(Pair("", "planar", (one, other), middle, normals[0], comments=[comment]))
+            self._add(Pair("", "planar", (left, other), middle, normals[0], comments=[comment]))
             return
         plane = np.zeros(3) if self.plane is None else self.plane
         axis = np.cross(normals[0], normals[1] if len(walls) == 2 else plane)
@@ -580,7 +589,7 @@ class _Held:
         half = width / 2 if width > 0 else -(width + play) / 2
         along = np.concatenate([face.corners for face in (front, back)]) @ axis
         reach = [np.ptp(outline @ axis) for outline in front.outlines]
-        links = (other, one) if reach[0] <= reach[1] else (one, other)  # the second carries the bearing along
+        links = (other, left) if reach[0] <= reach[1] else (left, other)  # the second carries the bearing along
         middle = np.mean([front.corners, back.corners], axis=(0, 1))
         self._add(
             Pair(

@@ -77,8 +77,8 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
     name = links[0].name if len(links) == 1 else ""
     while len(links) == 1 and links[0].children:
         top = links[0]
-        own = [replace(top, children=[])] if assembly.solids(top.definition)[0] else []
-        links = own + top.children
+        itself = [replace(top, children=[])] if assembly.solids(top.definition)[0] else []
+        links = itself + top.children
     draft, faces, parts, tolerances = Draft(name), {}, {}, assembly.tolerances()
     for link in links:
         solids = _solids(assembly, link, draft)
@@ -87,8 +87,10 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
             names = [str(file[solid.number][file.kind(solid.number)][0] or "") for _, solid, _ in solids]
             names = [label if text in ("", "NONE") else text for text in names]
             what = f"is the only part, with {len(solids)} solids: each is taken as a link"
-            draft.warn("exchange.solids", f"links.{label}", what, "export an assembly to move its parts", count=len(solids))
-            groups = [(own, [entry]) for own, entry in zip(names, solids, strict=True)]
+            draft.warn(
+                "exchange.solids", f"links.{label}", what, "export an assembly to move its parts", count=len(solids)
+            )
+            groups = [(text, [entry]) for text, entry in zip(names, solids, strict=True)]
         else:
             groups = [(label, solids)] if solids else []
         for text, entries in groups:
@@ -124,9 +126,9 @@ def _solids(assembly: Assembly, link: Occurrence, draft: Draft) -> list[Entry]:
     """The solids of a link with the parts that they belong to and their places in the whole."""
     solids = []
     for leaf in link.parts():
-        own, surfaces = assembly.solids(leaf.definition)
-        solids += [(leaf, solid, leaf.place @ place) for solid, place in own]
-        if surfaces or not (own or leaf.children):
+        solids_here, surfaces = assembly.solids(leaf.definition)
+        solids += [(leaf, solid, leaf.place @ place) for solid, place in solids_here]
+        if surfaces or not (solids_here or leaf.children):
             what = f"has {counted(surfaces, 'surface body', 'surface bodies')} or meshes, which are left out"
             what = what if surfaces else "has no solid and is left out"
             draft.warn("exchange.surfaces", f"links.{leaf.name or 'part'}", what, "export it as a solid")
@@ -141,8 +143,11 @@ def _rigid(draft: Draft, name: str, link: Occurrence, entries: Sequence[Entry], 
     what = f"is a {kind} of {len(entries)} solids, taken as one rigid link"
     if count:
         what += f"; {counted(count, 'pin')} in it {'has' if count == 1 else 'have'} play"
-    note = draft.warn if count or not link.children else draft.note
-    note("exchange.rigid", f"links.{name}", what, "export it dissolved, its parts right below the top, if they move")
+    remedy = "export it dissolved, its parts right below the top, if they move"
+    if count or not link.children:
+        draft.warn("exchange.rigid", f"links.{name}", what, remedy)
+    else:
+        draft.note("exchange.rigid", f"links.{name}", what, remedy)
 
 
 def _body(
@@ -252,7 +257,7 @@ def _alone(file: Part21, number: int) -> str:
     text = _Text(max(file.spans) + 1)
     text.lines = [f"#{entity}={file.text[slice(*file.spans[entity])]};" for entity in sorted(wanted)]
     text.product("solid", [number], "ADVANCED_BREP_SHAPE_REPRESENTATION", int(context))
-    return text.whole()
+    return text.text()
 
 
 # ---- writing --------------------------------------------------------------------------------------------------
@@ -303,7 +308,7 @@ class _Text:
             f"GLOBAL_UNIT_ASSIGNED_CONTEXT((#{length},#{angle},#{solid}))REPRESENTATION_CONTEXT('','3D'))"
         )
 
-    def whole(self) -> str:
+    def text(self) -> str:
         """The text of the file."""
         header = (
             "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'Trunnion','','');\n"
@@ -337,15 +342,17 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
         kind = "GEOMETRICALLY_BOUNDED_WIREFRAME_SHAPE_REPRESENTATION"
         parts.append((name, *text.product(name, items, kind, context), origin, drawn))
     placements = [drawn for *_, drawn in parts]
-    whole = text.product(draft.name or "mechanism", placements, "SHAPE_REPRESENTATION", context)
+    root = text.product(draft.name or "mechanism", placements, "SHAPE_REPRESENTATION", context)
     for name, definition, representation, origin, drawn in parts:
-        use = text(f"NEXT_ASSEMBLY_USAGE_OCCURRENCE({quoted(name)},{quoted(name)},'',#{whole[0]},#{definition},$)")
+        use = text(f"NEXT_ASSEMBLY_USAGE_OCCURRENCE({quoted(name)},{quoted(name)},'',#{root[0]},#{definition},$)")
         shape = text(f"PRODUCT_DEFINITION_SHAPE('','',#{use})")
         moved = text(f"ITEM_DEFINED_TRANSFORMATION('','',#{origin},#{drawn})")
-        relation = text(_relation(representation, whole[1], moved))
+        relation = text(_relation(representation, root[1], moved))
         text(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{shape})")
-    path.write_text(text.whole(), encoding="ascii")
-    draft.note("exchange.skeleton", "", "points, axes and lines are written; a STEP file has no masses, joints or friction")
+    path.write_text(text.text(), encoding="ascii")
+    draft.note(
+        "exchange.skeleton", "", "points, axes and lines are written; a STEP file has no masses, joints or friction"
+    )
     return draft.findings
 
 

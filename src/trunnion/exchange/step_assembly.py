@@ -99,9 +99,9 @@ class Assembly:
             for number in self.file.of(kind):
                 entity = self.file[number]
                 if "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION" not in entity and len(entity[kind]) == 4:
-                    one, other = entity[kind][2:]
-                    equal[one].add(other)
-                    equal[other].add(one)
+                    first, other = entity[kind][2:]
+                    equal[first].add(other)
+                    equal[other].add(first)
         for shapes in self.shapes.values():
             for shape in shapes:  # grows while it runs
                 shapes += sorted(equal[shape] - set(shapes))
@@ -230,11 +230,11 @@ class Assembly:
             others = {shape for child, shapes in self.shapes.items() if child != definition for shape in shapes}
             still = Place()
             queue = [(shape, still) for shape in self.shapes.get(definition, [])]
-            taken = set()  # equal representations may both list a solid
+            listed = set()  # equal representations may both list a solid
             for shape, place in queue:  # grows while it runs
                 geometry = self.geometry(shape)
-                new = [item for item in self.items(shape, *SOLIDS) if (item, id(place)) not in taken]
-                taken |= {(item, id(place)) for item in new}
+                new = [item for item in self.items(shape, *SOLIDS) if (item, id(place)) not in listed]
+                listed |= {(item, id(place)) for item in new}
                 solids += [(geometry.solid(item), place) for item in new]
                 surfaces += len(self.items(shape, *SURFACES))
                 for item in self.items(shape, "MAPPED_ITEM"):

@@ -517,7 +517,7 @@ def test_other_layouts_of_the_text(tmp_path):
 
 
 def test_a_sub_assembly_is_one_rigid_link_at_its_place(tmp_path):
-    """A crank with its pressed pin, nested two deep and in inches, beside a frame in mm; a pin with play in it is said."""
+    """A crank with its pressed pin, nested two deep; the mechanism lies turned in an assembly of its own."""
     parts = slider_crank()
     file = StepFile()
     base, rod, slider = (file.part(name, parts[name][0]) for name in ("frame", "rod", "slider"))

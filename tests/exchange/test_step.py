@@ -593,6 +593,42 @@ def test_voids_bent_bars_and_mirroring_placements(tmp_path):
     np.testing.assert_allclose(1e3 * body.centre, [middle, middle, 0], atol=1e-9)
 
 
+def test_hinges_across_each_other_are_no_slides(tmp_path):
+    """Two hinges along x and one along y, all held by their ends: they turn, and the mechanism is in space."""
+    base = box((-30, -30, -30), (30, 30, 30))
+    for z in (-15, 15):
+        base.feature(1, (30, 0, z), [(5.01, 0), (5.01, -60)], 3)
+    base.feature(2, (20, 30, 0), [(5.01, 0), (5.01, -60)], 0)
+    held = [(5, 0), (5, 60), (8, 60), (8, 65), (0, 65)]
+    arms = [box((30, -5, z - 5), (40, 80, z + 5)).feature(3, (30, 0, z), held) for z in (-15, 15)]
+    arms.append(box((15, 30, -5), (25, 40, 80)).feature(0, (20, 30, 0), held))
+    parts = {"base": (base, *STILL)} | {f"arm{n}": (arm, *STILL) for n, arm in enumerate(arms)}
+    draft = import_file(written(tmp_path / "a.step", parts), ground="base")
+    assert [pair.type for pair in draft.pairs.values()] == ["revolute"] * 3
+    assert not codes(draft) - {"drive"}
+
+
+def test_a_piston_in_its_bore_slides(tmp_path):
+    """The slider-crank with a round slider; the frame is a part of two solids."""
+    parts = slider_crank()
+    x = parts["slider"][2][0]
+    plate_ = box((-30, -40, -12), (30, 40, 0)).feature("bottom", (0, 0, -12), [(10.02, 0), (10.02, -12)], "top")
+    block = box((x + 30, -30, -30), (x + 60, 30, 30)).feature(1, (x + 60, 0, 0), [(12.02, 0), (12.02, -30)], 3)
+    head = box((-10, -14, -10), (10, 14, 10)).feature("bottom", (0, 0, -10), [(6.01, 0), (6.01, -20)], "top")
+    boss(head, 1, (10, 0, 0), 24, 60)
+    rod = boss(bar(200, [(0, 16.03)], 10, 20, 12), "bottom", (200, 0, 10), 12, 20)
+    file = StepFile()
+    frame = file.part("frame", plate_, block)
+    uses = [(file.part("crank", parts["crank"][0]), *parts["crank"][1:]), (file.part("rod", rod), *parts["rod"][1:])]
+    file.assembly("engine", (frame, *STILL), *uses, (file.part("piston", head), np.eye(3), parts["slider"][2]))
+    draft = import_file(file.write(tmp_path / "a.step"), ground="frame")
+    pair = joint(draft, "frame", "piston")
+    assert pair.type == "prismatic"
+    np.testing.assert_allclose([pair.pin_radius, pair.hole_radius, pair.length], [0.012, 0.01202, 0.03], atol=1e-12)
+    assert codes(draft) == {"drive", "rigid", "slides"}
+    assert (trunnion.analyse(model(draft, tmp_path), 12)["status"].values <= 2).all()
+
+
 # ---- densities ------------------------------------------------------------------------------------------------
 
 

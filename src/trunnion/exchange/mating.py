@@ -333,13 +333,18 @@ class _Held:
         self.plane = self._plane()
 
     def _plane(self) -> Array | None:
-        """The normal of a plane that the mechanism may move in: two pins on it, all others along or across it."""
+        """The normal of a plane that the mechanism may move in: two pins along it, all others too or sliding in it."""
         if self.balls or not self.contacts:
             return None
         for contact in self.contacts:
             normal = contact.hole.axis
             along = [other for other in self.contacts if parallel(other.hole.axis, normal)]
-            across = [other for other in self.contacts if abs(other.hole.axis @ normal) < ANGLE]
+            across = [
+                other
+                for other in self.contacts
+                if abs(other.hole.axis @ normal) < ANGLE
+                and self.stops(other.hole.body, other.pin.body, other.hole.axis) < 2
+            ]
             if len(self.lines(along)) > 1 and len(along) + len(across) == len(self.contacts):
                 return normal
         return None
@@ -379,7 +384,7 @@ class _Held:
 
     def step(self) -> bool:
         """Make two bodies one that cannot move against each other; False if there are none left."""
-        return self._bolted() or self._twins() or self._loose()
+        return self._bolted() or self._boxed() or self._twins() or self._loose()
 
     def patterns(self, rounds: Sequence[Round]) -> None:
         """Bodies that touch where two holes of each lie on the same axes are bolted to each other."""
@@ -408,6 +413,17 @@ class _Held:
             if self.stops(left, other, axis) or not all(parallel(axis, contact.hole.axis) for contact in contacts):
                 what = f"{left} and {other} are fixed to each other: pins on several axes join them"
                 draft.note("exchange.bolted", f"links.{other}", what)
+                self.weld(left, other, what)
+                return True
+        return False
+
+    def _boxed(self) -> bool:
+        """Two bodies that flat walls hold in all directions are one."""
+        draft = self.draft
+        for left, other in combinations(self.groups.bodies(), 2):
+            if len(self._walls(left, other)) > 2 and tuple(sorted((left, other))) not in self.between():
+                what = f"{left} and {other} hold each other in all directions: they are taken as fixed"
+                draft.warn("exchange.fixed", f"links.{other}", what, "draw the play if they move")
                 self.weld(left, other, what)
                 return True
         return False
@@ -448,12 +464,7 @@ class _Held:
             holder = next(name for name in tightest if name != body)
             what = f"{body} turns only about its own axis: it is taken as fixed in {holder}"
             what += ", where its play is least" if len(mine) > 1 else ""
-            draft.note(
-                "exchange.loose",
-                f"links.{body}",
-                what,
-                "draw less play where it is held" if len(mine) > 1 else "",
-            )
+            draft.note("exchange.loose", f"links.{body}", what, "draw less play where it is held")
             self.weld(holder, body, what)
             return True
         return False
@@ -475,6 +486,8 @@ class _Held:
                 normals = [*(wall[0].normal for wall in walls), front.normal]
                 if np.linalg.matrix_rank(np.array(normals), tol=ANGLE) == len(normals):
                     walls.append((front, back))
+        if len(walls) == 1 and self.plane is not None and parallel(walls[0][0].normal, self.plane):
+            return []  # the plates of a plane mechanism lie against each other
         return walls
 
     def unconnected(self) -> None:
@@ -545,6 +558,8 @@ class _Held:
         elif self.plane is not None and abs(axis @ self.plane) < ANGLE:
             pair = _pair("prismatic", contacts)
             pair.comments.append("its axis lies in the plane of the mechanism: it slides")
+            what = f"the pin between {left} and {other} lies in the plane of the mechanism: it slides and does not turn"
+            draft.note("exchange.slides", f"links.{other}", what, "draw end faces that hold it if it turns")
         else:
             pair = _pair("revolute" if stops == 2 or self.plane is not None else "cylindrical", contacts)
             if stops < 2:
@@ -565,18 +580,10 @@ class _Held:
 
     def _sliding(self, left: str, other: str, walls: list[tuple[Facing, Facing]]) -> None:
         """The pair of bodies that flat walls guide."""
-        draft = self.draft
         normals = np.array([wall[0].normal for wall in walls])
         comment = "; ".join(
             f"walls {1e3 * abs(a.level + b.level):.9g} mm apart, play {1e3 * (a.gap + b.gap):.6g} mm" for a, b in walls
         )
-        if len(walls) == 1 and self.plane is not None and parallel(normals[0], self.plane):
-            return  # the plates of a plane mechanism lie against each other
-        if len(walls) > 2:
-            what = f"{left} and {other} hold each other in all directions: they are taken as fixed"
-            draft.warn("exchange.fixed", f"links.{other}", what, "draw the play if they move")
-            self.weld(left, other, what)
-            return
         middle = np.mean([facing.corners for facing in walls[0]], axis=(0, 1))
         if len(walls) == 1 and self.plane is None:
             self._add(Pair("", "planar", (left, other), middle, normals[0], comments=[comment]))
@@ -591,20 +598,9 @@ class _Held:
         reach = [np.ptp(outline @ axis) for outline in front.outlines]
         links = (other, left) if reach[0] <= reach[1] else (left, other)  # the second carries the bearing along
         middle = np.mean([front.corners, back.corners], axis=(0, 1))
-        self._add(
-            Pair(
-                "",
-                "prismatic",
-                links,
-                middle,
-                axis,
-                None,
-                half,
-                half + play / 2,
-                float(np.ptp(along)),
-                comments=[comment],
-            )
-        )
+        pair = Pair("", "prismatic", links, middle, axis, comments=[comment])
+        pair.pin_radius, pair.hole_radius, pair.length = half, half + play / 2, float(np.ptp(along))
+        self._add(pair)
 
 
 def _pair(kind: str, contacts: list[Contact]) -> Pair:

@@ -593,6 +593,28 @@ def test_voids_bent_bars_and_mirroring_placements(tmp_path):
     np.testing.assert_allclose(1e3 * body.centre, [middle, middle, 0], atol=1e-9)
 
 
+def test_a_pin_in_a_slot_is_asked(tmp_path):
+    """A slotted lever of a quick return, its slot open at the end, around the pin of a crank."""
+    outline = [(0, -15), (120, -15), (120, -5.02), (20, -5.02), (20, 5.02), (120, 5.02), (120, 15), (0, 15)]
+    base = boss(bar(60, [(0, 12.04)], -10, 0), "top", (60, 0, 0), 8, 10)
+    lever = prism(outline, 0, 10).feature("bottom", (10, 0, 0), [(4.01, 0), (4.01, -10)], "top")
+    crank = boss(boss(bar(30, [], 10, 20, 8), "bottom", (30, 0, 10), 10, 10), "bottom", (0, 0, 10), 12, 20)
+    parts = {
+        "base": (base, *STILL),
+        "crank": (crank, turn((0, 0, 1), 2.0), np.zeros(3)),
+        "lever": (lever, turn((0, 0, 1), 0), np.array([50.0, 0, 0])),
+    }
+    pin = 30 * np.array([math.cos(2.0), math.sin(2.0)])
+    angle = math.atan2(pin[1], pin[0] - 60)
+    parts["lever"] = (lever, turn((0, 0, 1), angle), np.array([60 - 10 * math.cos(angle), -10 * math.sin(angle), 0]))
+    draft = import_file(written(tmp_path / "a.step", parts), ground="base")
+    assert codes(draft) == {"drive", "slot"}
+    assert {frozenset(pair.links) for pair in draft.pairs.values()} == {
+        frozenset(("base", "crank")),
+        frozenset(("base", "lever")),
+    }
+
+
 def test_hinges_across_each_other_are_no_slides(tmp_path):
     """Two hinges along x and one along y, all held by their ends: they turn, and the mechanism is in space."""
     base = box((-30, -30, -30), (30, 30, 30))

@@ -165,6 +165,7 @@ def joined(draft: Draft, faces: dict[str, list[Face]], gap: float) -> None:
     contacts = _contacts(draft, groups, rounds["cylinder"], gap)
     balls = _contacts(draft, groups, rounds["sphere"], gap)
     facings = list(_facings(faces, gap))
+    _slots(draft, faces, rounds["cylinder"], gap)
     mechanism = _Held(draft, groups, contacts, balls, facings)
     mechanism.patterns(rounds["cylinder"])
     while mechanism.step():
@@ -278,13 +279,43 @@ def _overlap(pin: Round, hole: Round) -> Contact | None:
     return Contact(pin, hole, low, high)
 
 
-def _facings(faces: dict[str, list[Face]], gap: float) -> Iterator[Facing]:
-    """Flat faces of different bodies that look at each other across at most the gap and overlap."""
+def _planes(faces: dict[str, list[Face]]) -> list[tuple[str, Array, float, Array]]:
+    """Flat faces: body, normal out of it, level along the normal and outline."""
     planes = []
     for body, all_faces in faces.items():
         for face in (face for face in all_faces if face.kind == "plane" and len(face.outline)):
             normal = face.axis if face.outward else -face.axis
             planes.append((body, normal, float(face.outline[0] @ normal), face.outline))
+    return planes
+
+
+def _slots(draft: Draft, faces: dict[str, list[Face]], rounds: Sequence[Round], gap: float) -> None:
+    """Say which pins lie between two walls of another body: pins in slots, which are no joints of a model."""
+    planes = _planes(faces)
+    all_normals, levels = np.array([plane[1] for plane in planes]).reshape(-1, 3), np.array([p[2] for p in planes])
+    for pin in (item for item in rounds if not item.hole and item.covered >= COVERED[0]):
+        walls: dict[str, list[Array]] = defaultdict(list)
+        middle = pin.point + (pin.low + pin.high) / 2 * pin.axis
+        distances = all_normals @ middle - levels - pin.radius
+        near = (abs(all_normals @ pin.axis) < ANGLE) & (distances >= -NEAR) & (distances <= gap)
+        for body, normal, _, outline in (planes[index] for index in np.nonzero(near)[0]):
+            if body == pin.body:
+                continue
+            across = np.cross(pin.axis, normal)
+            low, high = (float(part) for part in ((outline @ across).min(), (outline @ across).max()))
+            along = (outline - pin.point) @ pin.axis
+            if low <= middle @ across <= high and along.max() > pin.low + NEAR and along.min() < pin.high - NEAR:
+                walls[body].append(normal)
+        for body, normals in walls.items():
+            if any(float(left @ other) < -1 + ANGLE for left, other in combinations(normals, 2)):
+                what = f"{pin.label} lies in a slot of {body}, which is no joint of a model"
+                remedy = f"add a massless link that turns on the pin and slides in {body}"
+                draft.warn("exchange.slot", f"links.{pin.body}", what, remedy)
+
+
+def _facings(faces: dict[str, list[Face]], gap: float) -> Iterator[Facing]:
+    """Flat faces of different bodies that look at each other across at most the gap and overlap."""
+    planes = _planes(faces)
     if not planes:
         return
     normals, levels = np.array([plane[1] for plane in planes]), np.array([plane[2] for plane in planes])

@@ -18,8 +18,9 @@ __all__ = ["Entity", "Part21", "Ref", "quoted"]
 LARGEST = 400_000  # entities of a file that is read; an assembly of a hundred parts has about half of it
 DEEPEST = 100  # lists in lists
 
-# text, comments and what stands between them, up to the semicolon
-_ENTITY = re.compile(r"#(\d+)\s*+=\s*+((?:[^;'/]++|'[^']*+'|/\*.*?\*/|/)*+);", re.DOTALL)
+_START = re.compile(r"#(\d+)\s*+=\s*+")
+# text, comments and what stands between them, up to the semicolon; nothing is tried twice
+_BODY = re.compile(r"(?:[^;'/]++|'[^']*+'|/\*(?:[^*]++|\*(?!/))*+\*/|/(?!\*))*+;")
 _KIND = re.compile(r"\s*([A-Z][A-Z0-9_]*)\s*\(")
 _TOKEN = re.compile(
     r"\s*+(?:/\*.*?\*/\s*+)*(?:(?P<string>'(?:[^']|'')*')|#(?P<ref>\d+)|(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
@@ -62,12 +63,16 @@ class Part21:
         self.spans: dict[int, tuple[int, int]] = {}
         self._kinds: dict[str, list[int]] = defaultdict(list)
         self._read: dict[int, Entity] = {}
-        for match in _ENTITY.finditer(self.text):
-            number = int(match[1])
-            self.spans[number] = match.span(2)
-            kind = _KIND.match(match[2])
-            for name in [kind[1]] if kind else re.findall(r"([A-Z][A-Z0-9_]*)\s*\(", match[2]):
+        start = _START.search(self.text)
+        while start is not None:
+            number, body = int(start[1][:18]), _BODY.match(self.text, start.end())
+            if body is None:
+                raise self.unreadable(f"is damaged at #{number}: the entity has no end")
+            self.spans[number] = start.end(), body.end() - 1
+            kind = _KIND.match(body[0])
+            for name in [kind[1]] if kind else re.findall(r"([A-Z][A-Z0-9_]*)\s*\(", body[0]):
                 self._kinds[name].append(number)
+            start = _START.search(self.text, body.end())
         if not self.spans:
             raise self.unreadable("has no entities", "export it again")
 

@@ -168,18 +168,18 @@ _RIG = (
         ("tests/rig/test_compare.py", "-k", "offset"),
     ),
     Fault(
-        "sign-cut-in-two",
+        "month-before-day",
         "rig/reading/tables.py",
-        "codecs.getincrementaldecoder(encoding)().decode(raw)",
-        "raw.decode(encoding)",
-        ("tests/measured_data/test_tables.py", "-k", "ascii or cut_in_two"),
+        '{"dayfirst": dayfirst}',
+        '{"dayfirst": not dayfirst}',
+        ("tests/measured_data/test_laboratory_files.py", "-k", "order"),
     ),
     Fault(
-        "noon-is-midnight",
-        "rig/reading/tables.py",
-        'hour = hour % 12 + 12 * (stamp["noon"] in "Pp")',
-        'hour = hour + 12 * (stamp["noon"] in "Pp")',
-        ("tests/measured_data/test_laboratory_files.py", "-k", "noon"),
+        "pulses-without-the-line-between",
+        "rig/modelled.py",
+        "for _ in range(3):",
+        "for _ in range(2):",
+        ("tests/rig/test_campaigns.py", "-k", "pulses"),
     ),
 )
 

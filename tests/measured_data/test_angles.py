@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import trunnion
 from measured_data.recording import IDLE, RPM, ZERO, Columns, faults, mapping, off, read, recorded, text_of
 from trunnion.errors import MechanismError
-from trunnion.model.units import KINDS
+from trunnion.rig.modelled import in_condition
 from trunnion.rig.reading.channels import resolution
 from trunnion.rig.reading.read import read_measured
 
@@ -216,10 +217,10 @@ def test_units_of_what_is_set_stay_with_it(clean: Columns, tmp_path: Path) -> No
     columns = {**clean, "beta": np.full(clean["t"].size, 15.0)}
     settings = {"misalignment": {"column": "beta", "unit": "deg"}, "load": "3 N m", "a": {"mean": "brake"}, "b": 2}
     (one,) = read(columns, tmp_path, {"set": settings}).conditions
-    kinds = {"misalignment": "angle", "load": "moment", "a": "moment"}
-    assert one.dimensions == {name: KINDS[kind].dimensions[0] for name, kind in kinds.items()}
-    with pytest.raises(MechanismError, match="'degC' is none that a number of a model has"):
-        read(columns, tmp_path, {"set": {"misalignment": {"column": "beta", "unit": "degC"}}})
+    assert one.units == {"misalignment": "rad", "load": "N m", "a": "N m"}
+    (warm,) = read(columns, tmp_path, {"set": {"misalignment": {"column": "beta", "unit": "degC"}}}).conditions
+    with pytest.raises(MechanismError, match="'K' is not one of mechanics \\(in condition misalignment 15 degC\\)"):
+        in_condition(trunnion.read("examples/pezzuti-cardan.yaml"), warm)
     with pytest.raises(MechanismError, match="has a tolerance, which has no effect here"):
         read(columns, tmp_path, {"set": {"misalignment": "15 ± 1 deg"}})
 

@@ -109,7 +109,7 @@ def test_an_angle_that_counts_backwards_is_told_of_the_power_and_refused_beside_
     (power,) = (one for one in data.findings if "data.turns" not in one.code)
     assert power.code == "data.power.sign"
     assert "or sign: in angle:" in power.remedy
-    bare = replace(data, conditions=tuple(replace(one, values={}, dimensions={}) for one in data.conditions))
+    bare = replace(data, conditions=tuple(replace(one, values={}, units={}) for one in data.conditions))
     model = trunnion.Mechanism.model_validate(FOUR_BAR)
     for run in (trunnion.rig.compare, lambda *given: trunnion.rig.identify(*given, ["CD"])):
         for one in (data, bare) if known else (bare,):

@@ -120,7 +120,7 @@ def test_clipped_at_the_range(run: Columns, tmp_path: Path) -> None:
     assert "larger range" in one.remedy
 
 
-@pytest.mark.parametrize("code", [9.99e37, 99999.0, -187.3])
+@pytest.mark.parametrize("code", [99999.0, -187.3])
 def test_a_code_for_an_overload_changes_nothing_else(run: Columns, tmp_path: Path, code: float) -> None:
     """Neither the steps that the readings tell nor an uncertainty; it is no end of a range."""
     run["T2"] = np.round(run["T2"] / 0.2) * 0.2
@@ -219,7 +219,7 @@ def test_what_comes_back_every_turn_is_the_signals_own(run: Columns, tmp_path: P
             "torque-in",
             "turns (-1257 W): the sign of torque-in is wrong, unless the load drives the motor",
         ),
-        ("n1", "speed-in", "the angle has the wrong sign"),
+        ("n1", "speed-in", "sign: the angle turns at 600 rpm, 'speed-in' reads -600 rpm"),
         ("T2", "brake", "power delivered to brake is negative in all 19 turns"),
     ],
 )
@@ -259,8 +259,8 @@ def test_drift_is_taken_off_from_when_the_zero_was_read(run: Columns, tmp_path: 
     assert off(read(run, tmp_path, early).conditions[0]) < 0.06
 
 
-def test_drift_between_unloaded_stretches(run: Columns, tmp_path: Path) -> None:
-    """The zero before and after tells its drift without the turns."""
+def test_a_zero_that_differs_between_unloaded_stretches_is_uncertain(run: Columns, tmp_path: Path) -> None:
+    """The zero is their mean, and uncertain by what they differ by."""
     rest = recorded(turns=3)
     idle = {name: values[:900] for name, values in rest.items()}
     long = {name: np.concatenate([run[name], idle[name]]) for name in run}
@@ -269,9 +269,9 @@ def test_drift_between_unloaded_stretches(run: Columns, tmp_path: Path) -> None:
     long["encoder"][-900:], long["angle"][-900:] = last, run["angle"][-1]
     long["T1"] += 0.05 * (long["t"] - 0.1)
     changes = {"channels/torque-in/zero": {"over": [["0 s", "0.19 s"], ["2.21 s", "2.37 s"]]}}
-    assert faults(read(long, tmp_path, changes), "the zero drifts by 1.")
-    mended = read(long, tmp_path, {**changes, "drift": "remove"})
-    assert off(mended.conditions[0]) < 0.06
+    found = read(long, tmp_path, changes).conditions[0].courses["torque-in"].accuracy
+    apart = 10 * 0.05 * (2.29 - 0.095)  # N m, by a drift of 0.05 V/s
+    assert found.zero == pytest.approx(apart / 12**0.5, rel=0.02)
 
 
 def test_lost_pulses_by_the_index(run: Columns, tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ import pytest
 
 import trunnion
 from trunnion.errors import MechanismError, Severity
-from trunnion.rig.reading.angle import _turns
 from trunnion.rig.reading.read import read_measured
 from trunnion.rig.reading.tables import ungrouped
 
@@ -78,7 +77,7 @@ def test_a_heading_that_is_wanted_whole_keeps_its_unit(tmp_path: Path) -> None:
     ("text", "decimal", "told"),
     [
         ("1.450,33", ",", "1450.33"), ("-12.001.450,5", ",", "-12001450.5"), ("1 450,33", ",", "1450.33"),
-        ("1'450.33", ".", "1450.33"), ("1,450.33", ".", "1450.33"), ("980,50", ",", "980.50"),
+        ("1,450.33", ".", "1450.33"), ("980,50", ",", "980.50"),
         ("1.45,3", ",", "1.45.3"), ("1.450", ",", "1.450"), ("12.2026", ".", "12.2026"),
     ],
 )  # fmt: skip
@@ -110,8 +109,6 @@ def test_an_angle_in_steps_is_smoothed_to_what_the_shaft_does(tmp_path: Path) ->
     rough = off()
     mapping["angle"]["resolution"] = "8 deg"
     assert off() < 2.0 < rough / 3
-    assert not [one for one in read_measured(mapping, [tmp_path / "lauf.csv"]).done if " 1 turns" in one]
-    assert [_turns(number) for number in (0.5, 1.0, 2.0)] == ["0.5 turns", "1 turn", "2 turns"]
 
 
 def test_the_resolution_is_a_step_above_zero() -> None:

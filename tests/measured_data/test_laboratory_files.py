@@ -14,7 +14,7 @@ from measured_data.recording import Columns, mapping, off, recorded, text_of
 from trunnion.errors import Finding, MechanismError
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
-from trunnion.rig.reading.tables import read_table
+from trunnion.rig.reading.tables import Column, read_table
 
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")
@@ -60,7 +60,6 @@ FORMS: dict[str, Callable[[float], str]] = {
     "date, decimal comma": lambda t: f"22.11.2026 11:40:{int(t):02d},{_part(t)}",
     "world time": lambda t: f"2026-11-22T11:40:{int(t):02d}.{_part(t)}Z",
     "time of day": lambda t: f"11:40:{int(t):02d},{_part(t)}",
-    "over midnight": lambda t: f"{'23:59:59' if t < 0.3 else '00:00:00'},{_part(t + 0.7)}",
     "over the end of the year": lambda t: f"{'31.12.26 23:59:59' if t < 0.3 else '1.1.27 0:00:00'},{_part(t + 0.7)}",
     "one day, whichever order": lambda t: f"03/04/2026 11:40:{int(t):02d}.{_part(t)}",
     "noon": lambda t: f"03/04/2026 12:40:{int(t):02d}.{_part(t)} PM",
@@ -85,8 +84,23 @@ def test_time_stamps_keep_their_last_digit(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(
         "t;x\n22.11.2026 11:40:00,000000100;1\n22.11.2026 11:40:00,000000300;2\n;3\n", encoding="utf-8"
     )
-    seconds = read_table(tmp_path / "a.csv", ["t", "x"]).columns["t"].values
+    seconds = read_table(tmp_path / "a.csv", ["t", "x"]).columns["t"].seconds()
     np.testing.assert_array_equal(seconds, [0.0, 200 * 1e-9, np.nan])
+
+
+@pytest.mark.parametrize(
+    ("stamps", "dayfirst", "seconds"),
+    [
+        (("2026-03-04 11:40:00", "2026-03-05 11:40:00.5"), True, 86400.5),
+        (("04.03.2026 11:40:00", "05.03.2026 11:40:00,5"), True, 86400.5),
+        (("03/04/2026 11:40:00", "03/05/2026 11:40:00.5"), False, 86400.5),
+        (("2026-03-04T11:40:00+01:00", "2026-03-05T11:40:00.5+01:00"), True, 86400.5),
+        (("4.3.26 11:40:00", "5.3.26 11:40:00,5"), True, 86400.5),
+    ],
+)
+def test_the_order_of_a_date(stamps: tuple[str, ...], dayfirst: bool, seconds: float) -> None:
+    """The day comes first unless the year does, or the mapping says otherwise."""
+    assert Column(np.zeros(2), "", 2, stamps[0], stamps).seconds(dayfirst)[1] == pytest.approx(seconds)
 
 
 def test_time_stamps_of_parquet_and_tdms(columns: Columns, tmp_path: Path) -> None:
@@ -102,8 +116,6 @@ def test_time_stamps_of_parquet_and_tdms(columns: Columns, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("form", "what"),
     [
-        (lambda t: f"{3 if t < 0.3 else 4}/11/2026 11:40:{int(t):02d}.{_part(t)}", "the day or with the month"),
-        (lambda t: f"{'3.11.2026' if t < 0.3 else '2026-11-04'} 11:40:{int(t):02d}.{_part(t)}", "not all dates of one"),
         (lambda t: "later", "has texts, such as 'later'"),
         (lambda t: "40:00,5", "has texts, such as '40:00,5'"),
     ],
@@ -155,12 +167,10 @@ def test_unit_of_the_angle_that_is_unknown(columns: Columns, tmp_path: Path, uni
 def test_rows_of_words_below_the_names(tmp_path: Path) -> None:
     """A row of units none of which is known is no row of readings, and what stands in it is told as a unit."""
     path = tmp_path / "a.csv"
-    path.write_text("t;x\nSekunden;Newtonmeter\nUhr;Welle 1\n0;1,5\n1;2,5\n", encoding="utf-8")
+    path.write_text("t;x\nSekunden;Newtonmeter\n0;1,5\n1;2,5\n", encoding="utf-8")
     found = read_table(path, ["t", "x"]).columns
     assert found["x"].values.tolist() == [1.5, 2.5]
     assert (found["t"].unit, found["x"].unit, found["x"].texts) == ("Sekunden", "Newtonmeter", 0)
-    path.write_text("t;x\nUhr;Welle 1\ns;N m\n0;1,5\n1;2,5\n", encoding="utf-8")
-    assert read_table(path, ["t", "x"]).columns["x"].unit == "N m"
     path.write_text("t;x\n0;ERR\n1;2,5\n", encoding="utf-8")
     assert read_table(path, ["t", "x"]).columns["x"].texts == 1
 
@@ -185,55 +195,7 @@ def test_file_without_an_end_of_line(tmp_path: Path) -> None:
     assert "no end of a line in its first 16 MiB" in finding.what
 
 
-@pytest.mark.slow
-def test_parquet_that_unfolds(tmp_path: Path) -> None:
-    path, zeros = tmp_path / "a.parquet", pa.array(np.zeros(2_500_000))
-    table = pa.table(dict.fromkeys("abcdef", zeros))
-    with pq.ParquetWriter(path, table.schema) as writer:
-        for _ in range(8):
-            writer.write_table(table)
-    assert path.stat().st_size < 2e6
-    before = pa.total_allocated_bytes()
-    (finding,) = _refused(lambda: read_table(path, list("abcdef")))
-    assert "20,000,000 rows of 6 columns unfold to 0.96 GB" in finding.what
-    assert "at most 100 million numbers (0.8 GB)" in finding.what
-    assert "split it" in finding.remedy
-    assert pa.total_allocated_bytes() <= before
-    assert read_table(path, ["a"]).rows == 20_000_000  # what is not asked for does not count
-
-
-def test_parquet_texts_are_read_once(tmp_path: Path) -> None:
-    """Eight kilobytes of file, three gigabytes of text if each cell had its own."""
-    path = tmp_path / "a.parquet"
-    text = pa.DictionaryArray.from_arrays(pa.array([0, 1, 0, 2, None] * 600), ["x" * 1_000_000, "12.5", "11:40:00"])
-    pq.write_table(pa.table({"a": text, "t": np.arange(3000.0)}), path)
-    limit = pa.default_memory_pool().max_memory() or 0
-    found = read_table(path, ["a", "t"]).columns["a"]
-    assert (pa.default_memory_pool().max_memory() or 0) <= max(limit, 1e8)
-    assert found.texts == 1800
-    np.testing.assert_array_equal(found.values[:5], [np.nan, 12.5, np.nan, np.nan, np.nan])
-    assert found.example == "x" * 40
-
-
 def test_parquet_cells_that_are_lists(tmp_path: Path) -> None:
     pq.write_table(pa.table({"a": pa.array([[1.0], [2.0, 3.0]]), "t": [0.0, 1.0]}), tmp_path / "a.parquet")
     (finding,) = _refused(lambda: read_table(tmp_path / "a.parquet", ["a", "t"]))
     assert "in each cell" in finding.what
-
-
-def test_tdms_that_says_more_than_it_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("trunnion.rig.reading.tables.MOST", 100)
-    with TdmsWriter(tmp_path / "a.tdms") as writer:
-        writer.write_segment([RootObject({}), *(ChannelObject("rig", key, np.zeros(60)) for key in "ab")])
-    (finding,) = _refused(lambda: read_table(tmp_path / "a.tdms", ["a", "b"]))
-    assert "60 rows of 2 columns" in finding.what
-    assert read_table(tmp_path / "a.tdms", ["a"]).rows == 60
-
-
-def test_hours_before_and_after_noon(tmp_path: Path) -> None:
-    """12 AM is midnight and 12 PM is noon."""
-    times = ("12:00:05 AM", "01:00:05 AM", "11:59:59 AM", "12:00:00 PM", "01:00:00 PM", "11:00:00 PM")
-    (tmp_path / "a.csv").write_text("t;x\n" + "".join(f"{one};1\n" for one in times), encoding="utf-8")
-    seconds = read_table(tmp_path / "a.csv", ["t", "x"]).columns["t"].values
-    hours = np.array([5 / 3600, 1 + 5 / 3600, 12 - 1 / 3600, 12, 13, 23])
-    np.testing.assert_allclose(seconds, 3600 * (hours - hours[0]), rtol=1e-12)

@@ -15,7 +15,7 @@ from measured_data.recording import mapping, read, recorded
 from trunnion.errors import MechanismError
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
-from trunnion.rig.reading.tables import HEAD, read_table
+from trunnion.rig.reading.tables import read_table
 
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")
@@ -93,23 +93,6 @@ def test_names_beyond_ascii(tmp_path: Path, encoding: str) -> None:
     found = read_table(path, ["Drehmoment µ"]).columns["Drehmoment µ"]
     assert found.values.tolist() == [1.5, 2.5]
     assert found.unit == "N·m"
-
-
-@pytest.mark.parametrize("sign", ["é", "€", "😀"])
-def test_a_sign_cut_in_two_at_the_end_of_the_first_part(tmp_path: Path, sign: str) -> None:
-    """Wherever in its bytes the part that tells the encoding ends, the file is read as UTF-8."""
-    raw = sign.encode()
-    head = "t;Drehmoment µ [N·m];Notiz\n".encode()
-    row = b"0;1,5;"
-    for inside in range(1, len(raw)):
-        filled = head + b"1;2,5;-\n" * ((HEAD - len(head) - len(row) - 100) // 8)
-        text = filled + row + b"x" * (HEAD - inside - len(filled) - len(row)) + raw + b"\n"
-        assert text[:HEAD].endswith(raw[:inside])
-        path = tmp_path / f"{inside}.csv"
-        path.write_bytes(text)
-        found = read_table(path, ["Drehmoment µ"]).columns["Drehmoment µ"]
-        assert found.unit == "N·m"
-        assert found.values[-1] == 1.5
 
 
 def test_numbers_that_are_none(tmp_path: Path) -> None:

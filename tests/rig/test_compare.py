@@ -242,12 +242,12 @@ def test_the_direction_is_that_of_the_speed_that_a_dimension_makes(verb):
 
 def test_a_length_that_is_set_with_its_unit_is_no_plain_number():
     """As of all files that state the same; one without a unit is told."""
-    mechanism, length = trunnion.read(EXAMPLES / "slider-crank.yaml"), KINDS["length"].dimensions[0]
+    mechanism = trunnion.read(EXAMPLES / "slider-crank.yaml")
     path = next(path for path, one in mechanism.parameter_set.entries.items() if one.kind is KINDS["length"])
-    for dimensions in ({path: length}, {}):
-        run = prepare(in_condition(mechanism, Condition("a", {path: 0.06}, np.zeros(1), {}, dimensions=dimensions)))
+    for units in ({path: "m"}, {}):
+        run = prepare(in_condition(mechanism, Condition("a", {path: 0.06}, np.zeros(1), {}, units=units)))
         told = [one for one in model_notes(run.system.mechanism, run.system) if "a plain number" in one.what]
-        assert bool(told) != bool(dimensions)
+        assert bool(told) != bool(units)
         assert run.system.mechanism.parameters()[path] == 0.06
 
 
@@ -522,10 +522,9 @@ def test_a_load_that_rests_takes_no_power():
 def test_units_of_what_is_set_are_those_of_the_model(verb):
     mechanism = rocker()
     whole = measured(mechanism, ({"A.speed": 20.0},))
-    for kind, fitting in (("angular speed", True), ("length", False), ("moment", False)):
-        dimensions = {"A.speed": KINDS[kind].dimensions[0]}
-        other = replace(whole, conditions=tuple(replace(one, dimensions=dimensions) for one in whole.conditions))
-        if fitting:
+    for kind, unit in (("angular speed", "rad/s"), ("length", "m"), ("moment", "N m")):
+        other = replace(whole, conditions=tuple(replace(one, units={"A.speed": unit}) for one in whole.conditions))
+        if unit == "rad/s":
             compare(other, mechanism)
             continue
         with pytest.raises(MechanismError, match=rf"20.0 .+ is a {kind} where an angular speed") as caught:

@@ -65,23 +65,6 @@ def test_uncertainty_is_the_scatter_of_many_rigs() -> None:
     assert np.mean(inside) == pytest.approx(0.955, abs=0.02)
 
 
-def test_noise_that_is_planned_is_the_scatter_that_comes() -> None:
-    """The uncertainty worked out from the noise is that found from the scatter between turns."""
-    random = np.random.default_rng(6)
-    none = dict.fromkeys(TRUE, Accuracy())
-    planned = efficiency_of(
-        condition(exact(), none), noise={name: one / (TURNS * POSITIONS) ** 0.5 for name, one in NOISE.items()}
-    )
-    values = []
-    for _ in range(400):
-        turns = {
-            name: course + NOISE[name] * random.standard_normal((TURNS, POSITIONS)) for name, course in TRUE.items()
-        }
-        values.append(efficiency_of(condition(turns, none)).value)
-    assert planned.uncertainty == pytest.approx(float(np.std(values)), rel=0.12)
-    assert {one.source for one in planned.contributions} == {"repeatability"}
-
-
 def test_contributions_are_those_of_small_changes() -> None:
     """The effect of each gain and zero is what changing the readings by it does, and their squares add up."""
     found = efficiency_of(condition(exact()))

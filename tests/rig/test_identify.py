@@ -105,12 +105,9 @@ def test_more_turns_make_it_narrower_but_not_beyond_the_sensor(cardan: trunnion.
     assert float(many["share"].sel(source="zero of torque-out")[0]) > 0.99
 
 
-@pytest.mark.parametrize("sensors", ["channel", "condition"])
-def test_the_zero_of_each_file_counts_however_the_sensors_are_grouped(
-    cardan: trunnion.Mechanism, shaft: True_, sensors: Any
-) -> None:
+def test_the_zero_of_each_file_counts(cardan: trunnion.Mechanism, shaft: True_) -> None:
     data = own_zeros(replace(shaft, conditions=shaft.conditions[:2], courses=shaft.courses[:2]).measured(2), 0.1)
-    found = identify(cardan, data, ["brake.resisting_torque"], channels=["torque-out"], sensors=sensors)
+    found = identify(cardan, data, ["brake.resisting_torque"], channels=["torque-out"])
     assert found["standard_uncertainty"].values[0] == pytest.approx(0.1 / np.sqrt(2), rel=0.05)
     assert found["share"].sel(source="zero of each file of torque-out").values[0] > 0.9
 
@@ -142,7 +139,7 @@ def test_a_coefficient_on_its_limit_has_a_one_sided_interval(four_bar: trunnion.
     for one, limit in zip(found, limits, strict=True):
         assert one["lower"].values[0] >= 0.0
         assert one["upper"].values[0] > 0.0
-        assert (limit == -1) == ("at its bound 0: at most" in said(one))
+        assert (limit == -1) == (one["estimate"].values[0] == 0.0)
 
 
 def test_derivatives_are_those_of_differences(cardan: trunnion.Mechanism) -> None:
@@ -241,6 +238,17 @@ def test_a_model_that_does_not_fit_is_said_and_its_intervals_are_wider(
     assert float(heavy["reduced_chi_squared"]) > 2
 
 
+def test_an_estimate_that_is_wider_than_itself_is_not_written(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    """With much noise the coefficient may be anything up to twice itself: the model stays as it was."""
+    one = replace(torque, conditions=torque.conditions[:1], courses=torque.courses[:1])
+    found = identify(four_bar, one.measured(1, 3, Sensors(noise=0.6)), [FRICTION])
+    half = 2 * found["standard_uncertainty"].values[0]
+    assert half > found["estimate"].values[0]
+    assert found["told"].values[0] == 0
+    assert "is wider than the value itself" in said(found, "warning")
+    assert with_estimates(four_bar, found).data() == four_bar.data()
+
+
 def test_what_is_held_out_is_predicted(four_bar: trunnion.Mechanism, torque: True_) -> None:
     data = torque.measured(4)
     found = identify(four_bar, data, [FRICTION], hold_out=["run-2", "A.speed=8"])
@@ -311,18 +319,13 @@ def test_a_clearance_by_the_seat_it_is_given(four_bar: trunnion.Mechanism) -> No
     assert found["standard_uncertainty"].values[0] < 0.1e-3
 
 
-@pytest.mark.slow
-def test_a_clearance_by_pins_that_lie_as_they_are_loaded() -> None:
+def test_pins_that_lie_as_they_are_loaded_are_refused() -> None:
     model = read_mechanism("examples/fourbar-with-play.yaml")
-    joint = next(iter(model.seated))
-    path = model.path_of(f"joints.{joint}.pin.clearance")
-    true, output = float(model.parameters()[path]), next(iter(model.drivers))
-    course = trunnion.analyse(model, steps=24)["drive_effort"].sel(driver=output).values
-    noise = np.random.default_rng(1).normal(size=(6, 24)) * 1e-7 * np.max(np.abs(course))
-    data = Signal("torque", f"effort:{output}", "N m", course + noise)
+    joint, output = next(iter(model.seated)), next(iter(model.drivers))
+    data = Signal("torque", f"effort:{output}", "N m", np.ones((3, 24)))
     measured = Measurement("play", (Condition("one", {}, np.arange(24) / 24, {"torque": data}),))
-    found = identify(model, measured, [path], start={path: 0.7 * true})
-    assert found["estimate"].values[0] == pytest.approx(true, rel=0.02)
+    with pytest.raises(MechanismError, match="pins lie as their loads press them"):
+        identify(model, measured, [f"joints.{joint}.pin.clearance"])
 
 
 def test_terms_of_a_law_with_speed(four_bar: trunnion.Mechanism) -> None:

@@ -163,9 +163,7 @@ def test_results_are_not_written_over_what_is_read(  # type: ignore[no-untyped-d
         (["--parameter", FRICTION, "--write", MODEL], "is the model itself"),
         (["--parameter", FRICTION, "--write", "x.toml"], "write .yaml or .json"),
         (["--parameter", FRICTION, "--report", "x.pdf"], "a report is HTML"),
-        (["--parameter", FRICTION, "--sensors", "file"], "channel or condition"),
         (["--parameter", FRICTION, "--guard", "-1"], "guard"),
-        (["--parameter", FRICTION, "--starts", "0"], "starts"),
     ],
 )
 def test_bad_input_is_told(call, options: list[str], message: str) -> None:  # type: ignore[no-untyped-def]

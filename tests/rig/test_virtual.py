@@ -1,4 +1,4 @@
-"""The virtual rig: true courses through sensors, files that are read as they were meant, findings, planning."""
+"""The virtual rig: true courses through sensors, files that are read as they were meant, findings."""
 
 from __future__ import annotations
 
@@ -14,9 +14,7 @@ from trunnion.errors import MechanismError, Severity
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.reading.efficiency import efficiency_of
 from trunnion.rig.reading.rig_file import Rig
-from trunnion.rig.virtual.files import units_of
 from trunnion.rig.virtual.observe import Observation
-from trunnion.rig.virtual.plan import plan
 from trunnion.solve.run import prepare
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -131,7 +129,7 @@ def test_files_are_read_as_they_were_meant(seen: Observation, form: str, tmp_pat
     table = read_table(tmp_path / names[0], list(record.columns))
     for name, values in record.columns.items():
         assert np.array_equal(table.columns[name].values, values), name
-        assert table.columns[name].unit == units_of(seen).get(name, "")
+        assert table.columns[name].unit == seen.units.get(name, "")
     found = read_measured(tmp_path / "mapping.yaml")
     told = [one.what for one in found.findings if one.severity is not Severity.NOTE]
     assert not [one for one in told if "spikes" not in one]  # a corner of the torque may look like one
@@ -154,7 +152,7 @@ def test_names_with_separators_are_read_back(mechanism: Mechanism, name: str, tm
 
 
 def test_a_load_at_rest_reads_nothing(tmp_path: Path) -> None:
-    """The strip of the press rests two thirds of the cycle: no cell is empty, the course is read back, and planned."""
+    """The strip of the press rests two thirds of the cycle: no cell is empty, the course is read back."""
     press = trunnion.read(EXAMPLES / "indexing-press.yaml")
     sensors = {"T": {"measures": "effort:R"}, "v": {"measures": "rate:R"}, "L": {"measures": "load:strip"},
                "vF": {"measures": "rate:F"}}  # fmt: skip
@@ -165,7 +163,6 @@ def test_a_load_at_rest_reads_nothing(tmp_path: Path) -> None:
     assert np.count_nonzero(speed == 0) > 0.3 * len(speed)
     assert not np.any(load[speed == 0])
     assert np.abs(load[np.abs(speed) > 1e-3]) == pytest.approx(30)
-    assert plan(seen).conditions[0].measured is not None
     seen.write(tmp_path)
     rows = (tmp_path / "run-01.csv").read_text("utf-8")
     assert ",," not in rows
@@ -225,7 +222,6 @@ def test_clipped_readings_and_lost_pulses_are_told(mechanism: Mechanism) -> None
     assert "readings are clipped" in told["sensors.T1.range"]
     assert "pulses are lost" in told["encoder.kind"]
     assert np.max(np.abs(next(found.records()).columns["T1"])) <= 1.0
-    assert plan(found).sensors[0].clipped == (1,)
 
 
 @pytest.mark.parametrize(
@@ -274,47 +270,12 @@ def test_a_range_is_run_through_once() -> None:
     assert mapping["channels"]["e"]["zero"]["over"][0] == "-1 s"
 
 
-def test_plan_expects_what_comes(seen: Observation) -> None:
-    """Readings of the plan are those without random errors, its uncertainty is that of the data."""
-    found = plan(seen)
-    torque = found.sensors[0]
-    true = seen.cases[0].true.values[0]
-    assert (torque.least, torque.most) == pytest.approx((true.min(), true.max()), abs=1e-4)
-    assert torque.share == pytest.approx(np.max(np.abs(true)) / 10)
-    assert torque.steps == pytest.approx(np.ptp(true) / (20 / 2**14), rel=1e-3)
-    (forecast,) = found.conditions
-    assert forecast.measured is not None
-    (condition,) = seen.measurement(250).conditions
-    own = efficiency_of(condition)
-    assert forecast.measured.uncertainty == pytest.approx(own.uncertainty, rel=0.03)
-    assert forecast.model == pytest.approx(seen.cases[0].efficiency)
-    assert abs(forecast.bias) < 0.05 * own.uncertainty
-    assert forecast.dominant.startswith(("T1 ", "T2 "))
-
-
-def test_negative_sensitivity_is_planned_and_read_back(mechanism: Mechanism, seen: Observation, tmp_path: Path) -> None:
-    """Both torques by sensors that read downward: the same shares, the same courses from the files."""
+def test_negative_sensitivity_is_read_back(mechanism: Mechanism, seen: Observation, tmp_path: Path) -> None:
+    """Both torques by sensors that read downward: the same courses from the files."""
     mirrored = {
         name: one | {"sensitivity": "-100 mV/(N m)"} if name.startswith("T") else one for name, one in SENSORS.items()
     }
     down = trunnion.rig.observe(mechanism, rig(sensors=mirrored), seed=4)
-    for one, other in zip(plan(down).sensors[:2], plan(seen).sensors[:2], strict=True):
-        assert (one.share, one.steps, one.noise) == pytest.approx(
-            (other.share, other.steps, 100 * other.noise), rel=1e-3
-        )
-        assert (one.least, one.most) == pytest.approx((-100 * other.most, -100 * other.least), rel=1e-3)
     down.write(tmp_path)
     read = trunnion.rig.read(tmp_path / "mapping.yaml").conditions[0].courses["T1"]
     assert read.mean.mean() == pytest.approx(seen.measurement(360).conditions[0].courses["T1"].mean.mean(), abs=0.02)
-
-
-def test_plan_tells_slow_sensors_and_coarse_converters(mechanism: Mechanism) -> None:
-    slow = {name: one | {"bandwidth": "2 Hz"} for name, one in SENSORS.items()}
-    slow["w2"] = slow["w2"] | {"bits": 6, "range": "1000 rad/s"}
-    told = {one.where: one for one in plan(trunnion.rig.observe(mechanism, rig(sensors=slow))).findings}
-    assert "too slow for the cycle" in told["sensors"].what
-    assert "steps of the converter" in told["sensors.w2.bits"].what
-    assert "of the range" in told["sensors.w2.range"].what
-    alone = plan(trunnion.rig.observe(mechanism, rig(sensors={"T1": SENSORS["T1"]})))
-    assert alone.conditions[0].measured is None
-    assert "no efficiency is predicted" in alone.findings[-1].what

@@ -29,19 +29,15 @@ def run(program: Run) -> Run:
 
 
 @pytest.mark.slow
-def test_plan_and_files(run: Run, tmp_path: Path) -> None:
+def test_files_of_a_rig(run: Run, tmp_path: Path) -> None:
     planned = run(FOUR_BAR, RIG)
     assert planned.code == 0
-    assert "Predicted readings" in planned.out
-    assert "Predicted efficiency" in planned.out
-    assert "torque-rocker" in planned.out
     assert not list(tmp_path.iterdir())
     done = run(FOUR_BAR, RIG, "--out", "data", "--seed", 3, "--set", "schedule.turns=2")
     assert done.code == 2
     assert "schedule" in done.err
     done = run(FOUR_BAR, RIG, "--out", "data", "--seed", 3, "--set", "joint_defaults.friction.coefficient=0.05")
     assert done.code == 0
-    assert "Readings" not in done.out
     assert "wrote data" in done.out
     assert {path.name for path in (tmp_path / "data").iterdir()} == {
         "run-01.csv", "run-02.csv", "run-03.csv", "mapping.yaml", "truth.yaml",

@@ -134,7 +134,7 @@ def test_dyads_with_a_slider_move():
         (block("XYZ"), "is no block"),
         (block("driver", {"ground": "0 mm"}), "is no place"),
         (block("driver", {"ground": "0 kg, 1 kg"}), "is no place"),
-        (block("RRR", {"ground": "0, 0"}, {"ground": "0, 0"}), "one spot"),
+        (block("RRR", {"ground": "0, 0"}, {"ground": "0, 0"}), "same pin twice"),
         (block("RPR", {"ground": "0, 0"}, {"ground": "1, 0"}), "choose a pin that is drawn"),
         (block("RRR", "none", {"ground": "1, 0"}), "is not a joint or a point"),
     ],
@@ -192,13 +192,13 @@ if CHROMIUM:
         user.new_sheet()
         page.get_by_role("tab", name="Blocks").click()
         page.get_by_label("Place of pin 1").fill("0 mm, 0 mm")
-        page.get_by_label("Place of the inner pin").fill("0 mm, 40 mm")
+        page.get_by_label("End at").fill("0 mm, 40 mm")
         page.get_by_role("button", name="Place the block").press("Enter")
         user.until("Object.keys(s.answer.value?.entries?.links ?? {}).length === 2")
         page.get_by_label("Kind of block").select_option("RRR")
         page.get_by_label("Pin 1", exact=True).select_option("link1.B")
         page.get_by_label("Place of pin 2").fill("120 mm, 0 mm")
-        page.get_by_label("Place of the inner pin").fill("100 mm, 80 mm")
+        page.get_by_label("Inner pin at").fill("100 mm, 80 mm")
         page.get_by_role("button", name="Place the block").press("Enter")
         user.until("s.solved.value")
         assert page.locator(".formula .term").all_inner_texts() == ["I(0,1)R", "II(2,3)RRR"]

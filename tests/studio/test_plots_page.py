@@ -187,7 +187,8 @@ if CHROMIUM:
         page.get_by_role("tab", name="Plots").click()
         page.locator("#columns option").nth(20).wait_for(state="attached")
         for name in ("coupler.angle_velocity", "rocker.angle_velocity"):
-            page.get_by_label("Curve to add").fill(name)
+            page.get_by_label("Curve to add").press_sequentially(name)  # though rocker.angle is a column too
+            page.keyboard.press("Enter")
         chart = page.locator(".own-curves figure")
         chart.wait_for()
         page.locator(".own-curves path.curve").nth(1).wait_for(state="attached")

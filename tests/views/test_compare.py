@@ -241,7 +241,7 @@ def test_the_report_has_what_a_laboratory_files(tmp_path):
     result = case("wrong")
     words = " ".join(Page(page_of("wrong")).words)
     for told in ("bench", "crank and rocker", result.attrs["model_hash"], "Sensors", "Conditions", "Verdicts",
-                 "Efficiency", "Definitions", "Expanded uncertainty", "JCGM 100:2008", "counts as exact", "SHA-256",
+                 "Efficiency", "Expanded uncertainty", "JCGM 100:2008", "counts as exact", "SHA-256",
                  "Checked by", "What would explain the residual"):  # fmt: skip
         assert told in words, told
 

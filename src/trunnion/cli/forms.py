@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from enum import Enum
+from inspect import signature
 from pathlib import Path
 from types import UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
@@ -42,11 +43,11 @@ def _form(study: Callable[..., None]) -> dict[str, Any]:
         "verb": study.__name__,
         "help": (study.__doc__ or "").strip().splitlines()[0],
         "mapping": "mapping" in arguments,
-        "fields": list(_fields(hints)),
+        "fields": list(_fields(hints, {name: one.default for name, one in signature(study).parameters.items()})),
     }
 
 
-def _fields(hints: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def _fields(hints: dict[str, Any], usual: dict[str, Any]) -> Iterator[dict[str, Any]]:
     for name, hint in hints.items():
         info = _info(hint, OptionInfo)
         kind = get_args(hint)[0] if info is not None else None
@@ -57,7 +58,12 @@ def _fields(hints: dict[str, Any]) -> Iterator[dict[str, Any]]:
         choices = next(([str(one.value) for one in part] for part in _parts(kind) if _is_enum(part)), None)
         sort = "flag" if _is(kind, bool) else "number" if _is(kind, int) or _is(kind, float) else "text"
         several = any(get_origin(part) is list for part in (kind, *get_args(kind)))
-        yield {"flag": flag, "help": info.help or "", "kind": sort, "choices": choices, "several": several}
+        value = usual[name] if usual[name] not in (None, False) else ""
+        said = (info.help or "").replace(" Repeatable.", "").replace(" Repeatable;", ";")
+        yield {
+            "flag": flag, "help": said, "kind": sort, "choices": choices, "several": several,
+            "usual": str(getattr(value, "value", value)),
+        }  # fmt: skip
 
 
 def _info(hint: Any, of: type) -> Any:

@@ -61,11 +61,7 @@ HeldOut = Annotated[
         help="A condition, or a share of the turns such as 0.2, for validation instead of the fit. Repeatable.",
     ),
 ]
-Sensors = Annotated[
-    str, typer.Option("--sensors", help="Zero and gain errors are common to a channel, or to each condition.")
-]
 Guard = Annotated[int | None, typer.Option("--guard", help="Positions left out on each side of a friction reversal.")]
-Starts = Annotated[int, typer.Option("--starts", help="Number of start points.")]
 Kind = Annotated[str | None, typer.Option("--kind", help="Which figure: intervals, correlation or residuals.")]
 
 
@@ -77,9 +73,7 @@ def identify(
     channel: Channels = None,
     start: Starting = None,
     hold_out: HeldOut = None,
-    sensors: Sensors = "channel",
     guard: Guard = None,
-    starts: Starts = 1,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
@@ -107,8 +101,7 @@ def identify(
         held = held_out(hold_out or [])
         measurement = read_measured(mapping, [str(path) for path in data] if data else None)
         with bar("models evaluated", None) as progress:
-            result = run(mechanism, measurement, wanted, channel, begin, held, sensors, guard, starts,  # type: ignore[arg-type]
-                         progress=progress)  # fmt: skip
+            result = run(mechanism, measurement, wanted, channel, begin, held, guard, progress=progress)
     found = gathered(  # of the notes those that tell what was set, and why intervals may be too narrow
         one for one in measurement.findings if one.severity is not Severity.NOTE or one.where == "files"
     )

@@ -1,8 +1,7 @@
-"""`trunnion rig`: a test rig that is not there yet: what its sensors will show, and the files that they would leave."""
+"""`trunnion rig`: the data files that a test rig would leave which is not there yet."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,17 +11,14 @@ import typer
 
 from trunnion.cli.model import exit_status, lines_of, stated
 from trunnion.cli.options import File, FrictionLaw, Seats, Seed, Set, TableFile
-from trunnion.cli.terminal import bar, console, say, show_rows, wrote
+from trunnion.cli.terminal import bar, console, say, wrote
 from trunnion.errors import Finding, MechanismError, counted
 
 if TYPE_CHECKING:
     from trunnion.rig.virtual.observe import Observation
-    from trunnion.rig.virtual.plan import Expected, Forecast
 
 __all__ = ["rig"]
 
-MOST_SHOWN = 60  # conditions in a table
-BIASED = 0.5  # of the standard uncertainty: a bias of the sensors that is shown
 FEWEST = 20  # conditions from which a progress bar is worth it
 
 
@@ -32,9 +28,6 @@ def rig(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder for data files, mapping.yaml and truth.yaml.")
     ] = None,
-    plan: Annotated[
-        bool, typer.Option("--plan", help="Predict readings and efficiency; the default without --out.")
-    ] = False,
     format_: Annotated[
         str | None, typer.Option("--format", help="csv, parquet or tdms; default: as stated in the rig file.")
     ] = None,
@@ -44,7 +37,10 @@ def rig(
     friction: FrictionLaw = None,
     seat: Seats = None,
 ) -> None:
-    """Virtual test rig: plan sensors, or write simulated data files."""
+    """Virtual test rig: write simulated data files.
+
+    Without --out the rig file is only checked.
+    """
     from trunnion.rig.reading.rig_file import Rig, placed_in_rig
     from trunnion.rig.virtual.files import check_folder, check_form
     from trunnion.rig.virtual.observe import observe
@@ -62,10 +58,7 @@ def rig(
             check_folder(stated_rig, out, format_ or "")
         with bar("conditions", count, least=FEWEST) as progress:
             observation = observe(mechanism, stated_rig, seed, progress)
-    found = list(observation.findings)
     _about(observation)
-    if plan or out is None:
-        found += _show_plan(observation)
     if out:
         with bar("files", len(observation.cases), least=FEWEST) as progress:
             names = observation.write(out, format_ or "", progress)
@@ -73,8 +66,8 @@ def rig(
         first, last, *_ = (*names[:1], *names[-3:-2])
         span = first if first == last else f"{first} … {last}"
         console().print(f"  {span}, {', '.join(names[-2:])}", markup=False, highlight=False, soft_wrap=True)
-    say(placed_in_rig(found, rig_file))
-    raise typer.Exit(exit_status(found) or int(bool(observation.skipped)))
+    say(placed_in_rig(observation.findings, rig_file))
+    raise typer.Exit(exit_status(observation.findings) or int(bool(observation.skipped)))
 
 
 def _in_order(file: Path) -> None:
@@ -109,50 +102,3 @@ def _about(observation: Observation) -> None:
         counted(observation.rows, "row") + (f", at most {rows:,} a file" if conditions > 1 else ""),
     )
     out.print("; ".join(texts), markup=False, highlight=False, soft_wrap=True)
-
-
-def _show_plan(observation: Observation) -> list[Finding]:
-    """The two tables of a plan; what is to be thought about."""
-    from trunnion.rig.virtual.plan import plan
-
-    found = plan(observation)
-    head = ["sensor", "measures", "least", "most", "unit", "of range", "steps", "noise"]
-    show_rows("Predicted readings", head, [_sensor(one) for one in found.sensors])
-    told = [one for one in found.conditions if one.measured]
-    if told:
-        names = list(dict.fromkeys(name for one in found.conditions for name in one.case.settings))
-        biased = any(abs(one.bias) > BIASED * one.measured.uncertainty for one in told if one.measured)
-        head = [*(names or ["condition"]), "η", *(["as measured"] if biased else []), "U (k = 2)", "main source"]
-        rows = [_condition(one, names, biased) for one in told[:MOST_SHOWN]]
-        show_rows(
-            "Predicted efficiency: of the model, with the expanded uncertainty U = 2 u of its measurement", head, rows
-        )
-        if len(told) > MOST_SHOWN:
-            console().print(f"{counted(len(told) - MOST_SHOWN, 'condition')} more", markup=False, highlight=False)
-    return list(found.findings)
-
-
-def _sensor(one: Expected) -> list[str]:
-    share = "" if math.isnan(one.share) else f"{100 * one.share:.3g} %"
-    if one.clipped:
-        share = f"{share} clipped"
-    steps = "" if math.isnan(one.steps) else f"{one.steps:,.0f}"
-    noise = f"{one.noise:.3g}" if one.noise else ""
-    return [one.sensor, one.measures, f"{one.least + 0.0:.5g}", f"{one.most + 0.0:.5g}", one.unit, share, steps, noise]
-
-
-def _condition(one: Forecast, names: list[str], biased: bool) -> list[str]:
-    assert one.measured is not None  # only those are shown
-    settings = [_value(one.case.settings.get(name, "")) for name in names] or [str(one.case.number)]
-    expanded = one.measured.expanded
-    return [
-        *settings,
-        f"{one.model:.4f}" if math.isfinite(one.model) else "none",
-        *([f"{one.measured.value:.4f}"] if biased else []),
-        f"{expanded:#.2g}" if math.isfinite(expanded) else "unknown",
-        one.dominant,
-    ]
-
-
-def _value(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.6g}"

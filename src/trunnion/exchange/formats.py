@@ -51,6 +51,10 @@ class Format:
 FORMATS: dict[str, Format] = {
     ".step": Format("STEP", "step"),
     ".stp": Format("STEP", "step"),
+    ".dxf": Format("DXF", "dxf"),
+    ".stl": Format("STL", "mesh", writes=False),
+    ".3mf": Format("3MF", "mesh", writes=False),
+    ".glb": Format("glTF", "glb"),
     ".fcstd": Format("FreeCAD", "freecad", writes=False),
     ".pmks": Format("PMKS+", "pmks", writes=False),
     ".url": Format("PMKS+", "pmks", writes=False),

@@ -120,11 +120,11 @@ def _lines(draft: Draft, spatial: bool) -> Iterator[str]:
     for body in draft.bodies.values():
         yield from _link(draft, body, spatial, size)
     yield ""
-    yield "joints:"
+    yield "joints:" if draft.pairs else "joints: {}"
     for pair in draft.pairs.values():
         yield from _joint(pair, size)
     yield ""
-    yield "drivers:"
+    yield "drivers:" if draft.drives else "drivers: {}"
     for name, rate in draft.drives.items():
         pair = draft.pairs[name]
         if PAIRS[pair.type].turns:
@@ -141,7 +141,7 @@ def _link(draft: Draft, body: Body, spatial: bool, size: float) -> Iterator[str]
     for comment in body.comments:
         yield f"  # {_comment(comment)}"
     yield f"  {_quoted(body.name)}:"
-    yield "    points:"
+    yield "    points:" if draft.pairs_of(body.name) or body.points else "    points: {}"
     for pair in draft.pairs_of(body.name):
         yield f"      {_quoted(pair.name)}: {_point(pair, body.name, spatial, size)}"
     for name, place in body.points.items():

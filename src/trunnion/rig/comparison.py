@@ -278,7 +278,8 @@ def _condition(
     without_friction = cache(lambda: _frictionless(mechanism, condition, measured, method))
     channels = {}
     for name in measured:
-        signal, course, comparable = condition.courses[name], model.courses[name], model.comparable(name)
+        signal = replace(condition.courses[name], local=model.left_open.get(name, 0.0))
+        course, comparable = model.courses[name], model.comparable(name)
         judgement, explained = judge(signal, course, comparable, coverage), {}
         if judgement.verdict in (Verdict.NOT, Verdict.OFFSET):
             residual = np.where(comparable, difference(signal.mean, course), np.nan)
@@ -301,7 +302,7 @@ def _frictionless(
         free = stated.with_friction("off")
         if free.data() == stated.data():
             return {}
-        return modelled(free, replace(condition, values={}, dimensions={}), channels, method).courses
+        return modelled(free, replace(condition, values={}, units={}), channels, method).courses
     except MechanismError:
         return {}
 

@@ -91,9 +91,8 @@ def uncertainty_of(signal: Signal) -> Uncertainty:
     zero = np.full_like(signal.mean, np.hypot(signal.accuracy.zero, signal.accuracy.cut))
     shared = np.array([zero, signal.accuracy.gain * signal.read])
     random = signal.scatter / np.sqrt(np.maximum(signal.count, 1))
-    return Uncertainty(
-        random, np.full_like(random, signal.unresolved), shared, signal.count, signal.turns - signal.mean
-    )
+    local = np.hypot(np.full_like(random, signal.unresolved), signal.local)
+    return Uncertainty(random, local, shared, signal.count, signal.turns - signal.mean)
 
 
 def _nearly_complete(turns: Array) -> Array:

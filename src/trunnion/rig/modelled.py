@@ -15,17 +15,17 @@ from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
-from trunnion.model.units import si_unit
 from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Condition, Signal
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 
-__all__ = ["Modelled", "apart", "each", "in_condition", "measure_of", "modelled", "refuse_backwards",
+__all__ = ["Modelled", "apart", "each", "in_condition", "measure_of", "modelled", "over_pulses", "refuse_backwards",
            "refuse_unit"]  # fmt: skip
 
 Array = NDArray[np.float64]
 FAR = 0.05  # of a speed: an error of the settings
+RIPPLE = 0.3  # of what pulses take of a speed, by where they come: 8/√720, the rest of a parabola over a straight line
 SLOWER = 0.01  # of the duration of a cycle: a machine that keeps time runs no farther off
 
 
@@ -34,7 +34,8 @@ class Modelled:
     """What the model has at the positions of a condition, SI.
 
     drive: coordinate of the first driver if it runs one way, else time; unit: rad, m or s; span: what `drive` gains
-    over the cycle; status: (position,); courses: by channel, NaN where the status rules one out.
+    over the cycle; status: (position,); courses: by channel, NaN where the status rules one out; left_open: standard
+    uncertainty of a speed of pulses, by where these come.
     """
 
     run: Run
@@ -44,6 +45,7 @@ class Modelled:
     status: NDArray[np.int8]
     courses: Mapping[str, Array]
     measures: Mapping[str, Measure]
+    left_open: Mapping[str, Array]
 
     @property
     def speed(self) -> float:
@@ -124,20 +126,40 @@ def modelled(
         drive, edges = (_row(run.system.drive(run.values, name, at)[0], at) for at in (time, ends))
         first, last = (float(end) for end in edges)
     _same_cycle(run, condition, unit, first, last - first)
-    courses = {}
+    courses, left_open = {}, dict[str, Array]()
     for channel, measure in measures.items():
         courses[channel] = course = _row(by_measure[measure.name][0], time)
         if measure.turning(run.system):  # both count their turns each in its own way
             turns = np.round((condition.courses[channel].mean - course) / (2 * np.pi))
             courses[channel] = course + 2 * np.pi * np.nan_to_num(turns)
-    return Modelled(run, drive, unit, last - first, status, courses, measures)
+        elif (per_turn := condition.courses[channel].per_turn) and run.cycle.periodic:
+            courses[channel] = over_pulses(course, np.asarray(condition.phase, float), run.cycle.duration, per_turn)
+            left_open[channel] = RIPPLE * np.abs(course - courses[channel])
+    return Modelled(run, drive, unit, last - first, status, courses, measures, left_open)
+
+
+def over_pulses(speed: Array, phase: Array, duration: float, per_turn: int) -> Array:
+    """A speed as a sensor of pulses shows it: their pitch over the time from each to the next, and straight in between.
+
+    The first is the mean over the time of a pulse. The second is, over all places between two pulses, that mean twice.
+    speed: (position,), rad/s, of a periodic cycle; it stays where it changes its sign or has no value.
+    """
+    from scipy.interpolate import CubicSpline
+
+    half = np.pi / per_turn
+    if not np.all(np.sign(speed[0]) * speed > 0) or half >= np.mean(np.abs(speed)) * duration / 2:
+        return speed
+    time, at = duration * np.concatenate([phase - 1, phase, phase + 1]), duration * phase
+    for _ in range(3):
+        angle, lasts = CubicSpline(time, np.tile(speed, 3)).antiderivative(), half / np.abs(speed)
+        speed = np.asarray((angle(at + lasts) - angle(at - lasts)) / (2 * lasts))
+    return speed
 
 
 def in_condition(mechanism: Mechanism, condition: Condition) -> Mechanism:
     """The mechanism with the values of a condition, each in the unit it was stated in."""
     stated: dict[str, float | str] = dict(condition.values)
-    for name, dimension in condition.dimensions.items():
-        unit = si_unit(dimension)
+    for name, unit in condition.units.items():
         if unit != "1" and np.isfinite(condition.values.get(name, np.nan)):
             stated[name] = f"{condition.values[name]} {unit}"
     with _told_of(condition):

@@ -57,7 +57,7 @@ class _Job:
             "running": status is None,
             "stopped": self.stopped,
             "status": status,
-            "output": PROGRESS.sub("", text)[-TAIL:],
+            "output": PROGRESS.sub("", text).replace(f"wrote {REPORT}\n", "")[-TAIL:],
             "report": f"/result/{self.code}" if has_report else None,
         }
 

@@ -59,7 +59,7 @@ def _said(
     yield rubs, "Joints rub." if rubs else "State friction of a joint, and the radius of its pin."
     yield bool(mechanism.seated), "Pins have play." if mechanism.seated else "State a clearance or fit of a pin."
     tolerated = bool(mechanism.tolerated())
-    done = "Numbers have tolerances: what they do stands under the plots; trunnion tolerance FILE tells more."
+    done = "Numbers have tolerances: see what they do."
     yield tolerated, done if tolerated else "Write a tolerance, such as 60 mm ± 0.05 mm."
     free = any(driver.found for driver in mechanism.drivers.values())
     driver = next(iter(mechanism.drivers), "A")

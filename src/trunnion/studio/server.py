@@ -344,7 +344,7 @@ async def _imported(request: Request) -> Response:
 
 def _read(name: str, content: bytes) -> tuple[str, list[str]]:
     from trunnion.exchange.formats import import_file
-    from trunnion.exchange.model_text import model_text
+    from trunnion.exchange.model_file import model_text
 
     with tempfile.TemporaryDirectory(prefix="trunnion-import-") as folder:
         path = Path(folder) / f"dropped{Path(name).suffix}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from math import hypot
 from typing import Any
@@ -19,6 +20,7 @@ from trunnion.studio.strokes import link, slide
 __all__ = ["block"]
 
 Given = Mapping[str, Any]
+PLAIN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)")
 APEX = 0.6  # of the distance of its pins, how far off their line the inner pin of an RRR is put
 BEYOND = 1.5  # of the distance of its pins, how long the link of an RPR is
 
@@ -33,30 +35,28 @@ def block(sketch: Sketch, given: Given) -> str:
     if kind not in BLOCKS:
         raise refused(f"'{kind}' is no block", "the block", f"choose {', '.join(BLOCKS)}")
     begin(sketch)
+    if len(given["pins"]) == 2 and given["pins"][0] == given["pins"][1]:
+        raise refused("has the same pin twice", "the block", "choose two pins")
     if kind == "gear":
+        if not all(isinstance(pin, str) for pin in given["pins"]):
+            raise refused("need two pivots that are drawn", "the gears", "choose two pins")
         return gear(sketch, {"joints": given["pins"], "ratio": given.get("ratio")})
-    pins = [pin if isinstance(pin, str) else {"ground": _place(pin["ground"])} for pin in given["pins"]]
-    BLOCKS[kind](sketch, pins, _place(given["at"]) if str(given.get("at") or "").strip() else None)
+    pins = [pin if isinstance(pin, str) else {"ground": _place(sketch, pin["ground"])} for pin in given["pins"]]
+    BLOCKS[kind](sketch, pins, _place(sketch, given["at"]) if str(given.get("at") or "").strip() else None)
     return f"Add {'a driver' if kind == 'driver' else kind}"
 
 
-def _place(text: Any) -> Vector:
-    """A place of two lengths, "120 mm, 0.4 in", m; plain numbers are in m."""
-    parts = str(text).replace(";", ",").split(",")
+def _place(sketch: Sketch, text: Any) -> Vector:
+    """A place of two lengths, "120 mm, 0.4 in", m; plain numbers are in the unit of the sheet."""
+    parts = (part.strip() for part in str(text).replace(";", ",").split(","))
     try:
-        x, y = (float(np.asarray(Quantity.read(_number(part), KINDS["length"]).evaluate())) for part in parts)
-    except (UnitError, ValueError) as error:
+        x, y = (
+            Quantity.read(f"{part} {sketch.unit}" if PLAIN.fullmatch(part) else part, KINDS["length"]) for part in parts
+        )
+        return float(np.asarray(x.evaluate())), float(np.asarray(y.evaluate()))
+    except (UnitError, ValueError, KeyError) as error:
         what = f"'{str(text)[:40]}' is no place ({getattr(error, 'what', 'two lengths are needed')})"
         raise MechanismError(Finding(what, "the block", "write two lengths, such as 120 mm, 40 mm")) from None
-    return x, y
-
-
-def _number(text: str) -> float | str:
-    """A plain number as such, else the text."""
-    try:
-        return float(text)
-    except ValueError:
-        return text.strip()
 
 
 def _bar(sketch: Sketch, start: Any, end: Any) -> str:
@@ -76,7 +76,7 @@ def _across(sketch: Sketch, pins: list[Any], share: float) -> Vector:
     """A place left of the middle of two pins, by a share of their distance."""
     (x, y), (a, b) = (place_of(sketch, pin) for pin in pins)
     if not hypot(a - x, b - y) > 0:
-        raise refused("its two pins are on one spot", "the block", "choose two pins that are apart")
+        raise refused("has its two pins on one spot", "the block", "choose two that are apart")
     return (x + a) / 2 - share * (b - y), (y + b) / 2 + share * (a - x)
 
 
@@ -94,13 +94,14 @@ def _rrr(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
 
 def _rrp(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
     x, y = place_of(sketch, pins[0])
-    rod = _bar(sketch, pins[0], list(at or (x + 1.2 * max(sketch.size, 0.04), y)))
+    level = next((sketch.places[f"{sketch.ground}.{name}"][1] for name in sketch.points(sketch.ground)), y)
+    rod = _bar(sketch, pins[0], list(at or (x + 2 * max(sketch.size, 0.04), level)))
     slide(sketch, {"joint": _end(sketch, rod), "angle": 0.0})
 
 
 def _rpr(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
     if not isinstance(pins[1], str):
-        raise refused("its second pin is what slides along the link", "the block", "choose a pin that is drawn")
+        raise refused("is what slides along the link", "the second pin", "choose a pin that is drawn")
     (x, y), (a, b) = (place_of(sketch, pin) for pin in pins)
     lever = _bar(sketch, pins[0], list(at or (x + BEYOND * (a - x), y + BEYOND * (b - y))))
     slide(sketch, {"joint": pins[1], "along": lever})

@@ -6,8 +6,6 @@ What was measured is drawn with its expanded uncertainty U, the model as a curve
 from __future__ import annotations
 
 import math
-import re
-from html import escape
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING
@@ -498,8 +496,10 @@ def report(result: xr.Dataset) -> str:
     if table is not None:
         parts.append(Section("Efficiency", pictures=[(KINDS["efficiency"], figure(result, "efficiency"))],
                              after=[table]))  # fmt: skip
-    parts += [Section(one.title.capitalize(), tables=[one]) for one in (verdicts(result), conditions(result),
-                                                                        sensors(result))]  # fmt: skip
+    about = f"Expanded uncertainty U of the mean over the turns, {coverage_of(result)} coverage (JCGM 100:2008); the " \
+            "model counts as exact."  # fmt: skip
+    parts += [Section("Verdicts", about, tables=[verdicts(result)])]
+    parts += [Section(one.title.capitalize(), tables=[one]) for one in (conditions(result), sensors(result))]
     for i, name in enumerate(names(result, "channel")):
         there = [k for _, k in panels(result, name)]
         drawn = sorted(sorted(there, key=lambda k, i=i: -_severity(result, i, k))[:MOST_DRAWN])  # type: ignore[misc]
@@ -517,7 +517,7 @@ def report(result: xr.Dataset) -> str:
              *counts(*((result.sizes[dim], dim) for dim in ("condition", "channel", "position")))]  # fmt: skip
     return page(
         result, "Comparison of a model with a measurement", facts, parts, summary=headline(result), signed=True,
-        end=[data_section(result, "files"), Section("Definitions", terms=definitions(result))],
+        end=[data_section(result, "files")],
         name=str(result.attrs["comparing"]) or "Measurement", about_data=about_data(result),
     )  # fmt: skip
 
@@ -548,37 +548,3 @@ def _severity(result: xr.Dataset, channel: int, condition: int) -> float:
         return -1.0
     scale = np.where(np.isfinite(wide) & (wide > 0), wide, 1.0)
     return float(np.sqrt(np.mean((residual / scale)[there] ** 2)))
-
-
-def definitions(result: xr.Dataset) -> list[tuple[str, str]]:
-    """(term, equation and meaning); the statement of uncertainty has the factor and the probability of this result."""
-    from markupsafe import Markup  # slow to import
-
-    factor, covered = float(result.attrs["coverage"]), coverage_of(result)
-    terms = [
-        ("Mean and scatter", "ȳ(φ) = Σⱼ yⱼ(φ)/n, s(φ)² = Σⱼ (yⱼ(φ) − ȳ(φ))²/(n − 1), over the n turns j with a value "
-         "at the position φ of the cycle."),
-        ("Standard uncertainty of the mean", "u² = s²/n + u₀² + (u_g ȳ)², with u₀ of the zero and u_g of the gain "
-         "(relative) as stated for the sensor; the resolution is added where the scatter is less than half a step. "
-         "s²/n is of type A, the others of type B (GUM 4.2, 4.3, 5.1): not reduced by averaging."),
-        ("Expanded uncertainty", f"U = k_p u with the coverage probability {covered}. k_p is Student's t for "
-         "ν_eff = (n − 1) u⁴/(s²/n)² degrees of freedom (Welch and Satterthwaite, GUM G.4.1): "
-         f"{factor:g} where turns are many or zero and gain prevail, more where turns are few."),
-        ("Residual", "r(φ) = ȳ(φ) − m(φ), measured minus model m. RMS is √(Σ r²/N) over the N positions that are "
-         "compared, largest the r of the largest magnitude, bias b = Σ r/N, whose U is of the scatter of the means of "
-         "the turns, of the zero and of the gain."),
-        ("Verdict", f"Of a true model {covered} of the positions are expected within ±U. A signal is within ±U if its "
-         "share is no less than this by more than 2.33 standard deviations of a share among N²/Σρᵢⱼ² independent "
-         "positions (column “required”); ρ is the correlation of the errors of two positions. “Offset only”: r − b is "
-         "within ±U, against the scatter and the gain alone."),
-        ("Model", "It is computed with the values of each condition at the same positions and counts as exact: the "
-         "verdicts do not include the uncertainty of its parameters. Forces are not compared where a joint is "
-         "momentarily at rest or a dead centre is close: friction is an interval there."),
-    ]  # fmt: skip
-    if "efficiency" in result:
-        terms.append(("Efficiency", "η = P_out/P_in = T_out ω_out/(T_in ω_in), powers being means over the time of "
-                      "whole turns of torque times speed (Pezzuti et al. 2006, eq. 22). Its uncertainty is of the "
-                      "scatter of η between turns, and of zero, gain and resolution of every channel, each with its "
-                      "sensitivity (GUM 5.1). η of the model is computed from its signals alike."))  # fmt: skip
-    # indices, written behind a low line, set low
-    return [(term, Markup(re.sub(r"_([a-z]+)", r"<sub>\1</sub>", escape(words, quote=False)))) for term, words in terms]

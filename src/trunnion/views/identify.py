@@ -400,8 +400,7 @@ def report(result: xr.Dataset) -> str:
     if held:
         about = "Data not used in the fit, and the error of their prediction."
         parts.append(Section("Held out", about, after=[held]))
-    end = [data_section(result, "data_files"), Section("Definitions", terms=DEFINITIONS),
-           Section("Parameters", tables=[stated(result)])]  # fmt: skip
+    end = [data_section(result, "data_files"), Section("Parameters", tables=[stated(result)])]
     model = str(result.attrs["name"]) or "model"
     sizes = [(result.sizes[dim], dim) for dim in ("parameter", "channel", "condition")]
     facts = [(model, f"model {result.attrs.get('model_hash', '')}"),
@@ -420,34 +419,3 @@ def _summary(result: xr.Dataset) -> Summary:
         summary.append((row.short, [pair if row.identifiable else ("not identifiable", "from these data")]))
     chi = float(result["reduced_chi_squared"])
     return [*summary, *([("reduced χ²", [(number(chi, 3), "near 1 if the model fits")])] if np.isfinite(chi) else [])]
-
-
-DEFINITIONS = (
-    (
-        "Estimate",
-        "The values that minimise Σ w (ȳ − (1 + g) f − z)² + Σ a²: ȳ the means over the turns, f the model, g and z "
-        "the errors of gain and zero of each sensor, a the same in their stated standard uncertainties. The weights w "
-        "are 1 over the variance of the mean, by the scatter between turns and its correlation along a turn.",
-    ),
-    (
-        "Standard uncertainty",
-        "From the contribution of each turn to the estimate, whatever the correlation within it (type A), and from the "
-        "stated uncertainties of zero, gain and resolution (type B), both with the exact derivatives of the model. "
-        "Where the model does not fit, or the conditions disagree, the remaining deviation is added.",
-    ),
-    (
-        "Interval",
-        "It holds the true value in 95 of 100 such experiments if the model is right: estimate ± t u, Student's t for "
-        "the effective degrees of freedom (Welch and Satterthwaite, GUM G.4.1). At a bound it is one-sided.",
-    ),
-    (
-        "Reduced χ²",
-        "Mean square of the residuals relative to that expected from the scatter between turns, frequency by "
-        "frequency along the cycle: near 1 if the model fits.",
-    ),
-    (
-        "Not identifiable",
-        "Parameters with the same effect on the data have no estimate; a finding names the combinations that are "
-        "determined.",
-    ),
-)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from trunnion.errors import Finding, Severity, agreeing, counted
+from trunnion.errors import Finding, Severity, counted
 from trunnion.results.quantities import with_uncertainty
 from trunnion.rig.comparison import other_speed
 from trunnion.rig.identification.fit import FAR, shared_zero
@@ -22,7 +22,7 @@ OFF = 3.0  # standard uncertainties from what was stated of a sensor
 
 def findings_of(identified: Identified) -> list[Finding]:
     """Errors and warnings first."""
-    parts = (_speeds, _search, _fit, _repetitions, _sensors, _groups, _limits, _data)
+    parts = (_speeds, _search, _fit, _repetitions, _sensors, _groups, _vague, _held_out)
     rows = [finding for part in parts for finding in part(identified)]
     return sorted(rows, key=lambda finding: list(Severity).index(finding.severity))
 
@@ -46,7 +46,7 @@ def _speeds(identified: Identified) -> Iterator[Finding]:
 
 def _search(identified: Identified) -> Iterator[Finding]:
     """How the search went."""
-    unknowns, solution = identified.fit.model.unknowns, identified.solution
+    solution = identified.solution
     if not solution.converged:
         what = f"the search did not converge within {solution.evaluations} evaluations"
         remedy = "give start values closer to the solution, or fewer parameters"
@@ -54,11 +54,6 @@ def _search(identified: Identified) -> Iterator[Finding]:
     elif not solution.settled:
         what = "the search did not converge: the set of usable positions changes with the estimates"
         yield Finding.warning("search.unsettled", "search", what, "use a guard of 2 or more")
-    if identified.other is not None and not np.any(identified.lost[: len(unknowns)]):
-        values = {one.name: float(value) for one, value in zip(unknowns, identified.other, strict=False)}
-        text = ", ".join(f"{one.name} = {with_uncertainty(values[one.name], None, one.unit)}" for one in unknowns)
-        remedy = "hold out a condition, or measure more conditions"
-        yield Finding.warning("search.other", "search", f"other values fit equally well: {text}", remedy, values=values)
 
 
 def _fit(identified: Identified) -> Iterator[Finding]:
@@ -120,9 +115,6 @@ def _repetitions(identified: Identified) -> Iterator[Finding]:
         what = f"successive turns are correlated ({spread.follows:.2f}): the intervals are widened accordingly"
         remedy = "look for a drift; warm the rig up"
         yield Finding.warning("fit.turns_alike", "data", what, remedy, correlation=spread.follows)
-    if identified.unused:
-        what = f"no parameter acts on {', '.join(identified.unused)}: not used in the fit"
-        yield Finding.note("fit.unused", "channels", what)
 
 
 def _sensors(identified: Identified) -> Iterator[Finding]:
@@ -177,6 +169,16 @@ def _groups(identified: Identified) -> Iterator[Finding]:
         yield Finding.warning("parameter.not_told_apart", where, what, remedy, names=names)
 
 
+def _vague(identified: Identified) -> Iterator[Finding]:
+    """Unknowns that the data hardly determine."""
+    for p in np.flatnonzero(identified.vague):
+        unknown = identified.fit.model.unknowns[p]
+        about = with_uncertainty(float(identified.x[p]), float(identified.half[p]), unknown.unit)
+        what = f"{unknown.name} is not identifiable: its 95 % interval, {about}, is wider than the value itself"
+        remedy = "fix it, or measure a quantity that depends on it more"
+        yield Finding.warning("parameter.vague", f"parameter {unknown.name}", what, remedy)
+
+
 def _determined(identified: Identified, group: InseparableUnknowns, names: Sequence[str]) -> str:
     """What of unknowns that are not told apart is known, and that the rest is not."""
     one, unknowns = group.determined, identified.fit.model.unknowns
@@ -193,26 +195,8 @@ def _determined(identified: Identified, group: InseparableUnknowns, names: Seque
     return f"{subject} is determined, {with_uncertainty(one.value, one.uncertainty, unit)}, neither alone"
 
 
-def _limits(identified: Identified) -> Iterator[Finding]:
-    """Estimates on a limit, whose interval is one-sided."""
-    low, high = identified.interval
-    for p, unknown in enumerate(identified.fit.model.unknowns):
-        if identified.limit[p]:
-            far, side = (high[p], "at most") if identified.limit[p] < 0 else (low[p], "at least")
-            limit, end = (with_uncertainty(value, None, unknown.unit) for value in (identified.estimate[p], far))
-            what = f"is at its bound {limit}: {side} {end} (95 %, one-sided)"
-            figures = {"limit": identified.estimate[p], "far": far}
-            yield Finding.note("parameter.limit", f"parameter {unknown.name}", what, **figures)
-
-
-def _data(identified: Identified) -> Iterator[Finding]:
-    """How many positions are left out, and held-out data that are not predicted."""
-    used, out = identified.positions
-    if out:
-        what = f"{out:,} of {counted(used + out, 'position')} {agreeing(out, 'is', 'are')} left out: friction "
-        what += "reverses, a joint is at rest, a load has a corner or a jump, the position is close to singular, or "
-        what += "the model has no solution"
-        yield Finding.note("data.left_out", "data", what, count=out, positions=used + out)
+def _held_out(identified: Identified) -> Iterator[Finding]:
+    """Held-out data that are not predicted."""
     ratio, conditions = identified.hold_out_ratio, identified.measurement.conditions
     if ratio > POOR:
         names = dict.fromkeys(conditions[one.condition].name for one in identified.fit.blocks if len(one.held))

@@ -163,13 +163,8 @@ def shared_zero(accuracy: Accuracy) -> float:
     return inf if np.isinf(accuracy.zero) else float(np.sqrt(max(accuracy.zero**2 - accuracy.own**2, 0.0)))
 
 
-def sensor_errors(
-    model: Model, conditions: Sequence[Condition], blocks: Sequence[Block], by_condition: bool
-) -> list[SensorError]:
-    """All that is stated of the sensors; an infinite standard uncertainty says that nothing is known.
-
-    by_condition: whether zero and gain of a channel are off in each condition by their own, else in all by the same.
-    """
+def sensor_errors(model: Model, conditions: Sequence[Condition], blocks: Sequence[Block]) -> list[SensorError]:
+    """All that is stated of the sensors; an infinite standard uncertainty says that nothing is known."""
     errors: dict[str, SensorError] = {}
     usual: dict[str, float] = {}
     for name in dict.fromkeys(block.channel for block in blocks):
@@ -185,15 +180,15 @@ def sensor_errors(
 
     for k, block in enumerate(blocks):
         condition, accuracy, channel = conditions[block.condition], block.signal.accuracy, block.channel
-        place, file = f" in {condition.name}" * by_condition, " ".join(block.files or (str(block.condition),))
         for kind, size in (("zero", float(np.hypot(shared_zero(accuracy), accuracy.cut))), ("gain", accuracy.gain)):
             if size > 0:
-                add(k, size, SensorError(f"{kind} of {channel}{place}", channel, kind))
+                add(k, size, SensorError(f"{kind} of {channel}", channel, kind))
         for name, size in {f"{FILE_ZERO} of {channel}": accuracy.own, **block.effects}.items():
             if size and name.startswith(FILE_ZERO):
+                file = " ".join(block.files or (str(block.condition),))
                 add(k, size, SensorError(f"{name}: {file}", channel, "zero", group=name))
             elif size:
-                add(k, size, SensorError(f"{name}{place}", name.partition(" of ")[2], name.partition(" ")[0]))
+                add(k, size, SensorError(name, name.partition(" of ")[2], name.partition(" ")[0]))
         turn, duration = model.turns[block.condition], model.durations[block.condition]
         if block.turns.shape[1] > 2 and condition.lag and duration:
             error = SensorError(f"{FILE_ANGLE}: {condition.name}", "", "angle", group=FILE_ANGLE)

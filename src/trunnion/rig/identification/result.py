@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,8 +18,8 @@ from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import decimals
 from trunnion.results.tables.studies import CURVES
 from trunnion.rig.comparison import data_findings, hashed_files, written_unit
-from trunnion.rig.identification.fit import FAR, Fit, Solution
-from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, InseparableUnknowns, LackOfFit, quantile
+from trunnion.rig.identification.fit import FAR, Fit, Solution, sizes_of, solved
+from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, InseparableUnknowns, quantile
 from trunnion.rig.reading.measurement import Measurement, rms
 
 if TYPE_CHECKING:
@@ -33,6 +32,7 @@ SOURCES = (
     "G. A. F. Seber, C. J. Wild, Nonlinear Regression, Wiley, 1989, doi:10.1002/0471725315",
     "JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in measurement",
 )
+NEAR_LIMIT = 0.98  # of the most that a stated error may come to
 AT_LIMIT = 0.05  # of the standard uncertainty: nearer than this to a limit is on it
 
 
@@ -46,7 +46,7 @@ VARIABLES = {
     "upper": Variable(PARAMETER, "of the parameter", "upper end of the 95 % interval"),
     "degrees_of_freedom": Variable(PARAMETER, "1", "effective degrees of freedom of the standard uncertainty"),
     "limit": Variable(PARAMETER, "1", "−1 on the lower limit, 1 on the upper: the interval is one-sided"),
-    "told": Variable(PARAMETER, "1", "1 if identifiable, 0 if not"),
+    "told": Variable(PARAMETER, "1", "1 if identifiable, 0 if not, or if the interval is wider than the value itself"),
     "correlation": Variable(("parameter", "parameter_2"), "1", "correlation of the estimates"),
     "share": Variable(("parameter", "source"), "1", "share of a source in the variance of an estimate"),
     "singular_value": Variable(
@@ -65,15 +65,11 @@ VARIABLES = {
     "turns": Variable(BLOCK, "1", "turns used", np.int32),
     "held_out_turns": Variable(BLOCK, "1", "held-out turns", np.int32),
     "held_out_before": Variable(
-        BLOCK,
-        "of the channel",
-        "root mean square of the residual of the held-out data, at the start values",
+        BLOCK, "of the channel", "root mean square of the residual of the held-out data, at the start values"
     ),
     "held_out_after": Variable(BLOCK, "of the channel", "the same with the estimates"),
     "held_out_expected": Variable(
-        BLOCK,
-        "of the channel",
-        "its expected value from the scatter and the uncertainty of the prediction",
+        BLOCK, "of the channel", "its expected value from the scatter and the uncertainty of the prediction"
     ),
     "reduced_chi_squared": Variable((), "1", "χ² of the residuals relative to the scatter between turns"),
     "chi_squared_freedom": Variable((), "1", "degrees of freedom of that χ²"),
@@ -83,11 +79,7 @@ VARIABLES = {
     "phase": Variable(("condition", "position"), "1", "share of the cycle"),
     "measured": Variable(COURSE, "of the channel", "mean over the turns"),
     "residual_before": Variable(COURSE, "of the channel", "measured minus model, at the start"),
-    "residual_after": Variable(
-        COURSE,
-        "of the channel",
-        "measured value minus predicted reading of the sensor",
-    ),
+    "residual_after": Variable(COURSE, "of the channel", "measured value minus predicted reading of the sensor"),
     "residual_uncertainty": Variable(COURSE, "of the channel", "standard uncertainty of the mean over the turns"),
 }
 
@@ -97,8 +89,7 @@ class MisfitCause(NamedTuple):
 
     kind: zero, gain or angle; channel: empty of the angle; size: in the unit of the channel, relative, or rad by which
     the readings are ahead of the model; expanded: U of it, 95 %; explains: share of the part of χ² above what scatter
-    leads to expect; estimates, halves: of the unknowns with it, and U of each, 95 %, (unknown,); left: how well the
-    model fits with it.
+    leads to expect; estimates, halves: of the unknowns with it, and U of each, 95 %, (unknown,).
     """
 
     kind: str
@@ -108,29 +99,22 @@ class MisfitCause(NamedTuple):
     explains: float
     estimates: Array
     halves: Array
-    left: LackOfFit
 
 
 @dataclass(frozen=True)
 class Identified:
     """An identification, with the figures of it, (unknown,) unless said.
 
-    starts: places that the search began at; other: another that fits as well; groups: what the data do not tell apart;
-    causes: what would explain a misfit, best first; beyond: errors of sensors that are no stated ones, by their place;
-    unused: channels that no unknown acts on.
+    groups: what the data do not tell apart; causes: what would explain a misfit, best first.
     """
 
     mechanism: Mechanism
     measurement: Measurement
     fit: Fit
     solution: Solution
-    starts: int
-    other: Array | None
     spread: Covariances
     groups: Sequence[InseparableUnknowns]
     causes: Sequence[MisfitCause]
-    beyond: dict[int, float]
-    unused: Sequence[str]
 
     @property
     def x(self) -> Array:
@@ -151,6 +135,29 @@ class Identified:
     def refuted(self) -> bool:
         """Whether the estimates stand for something else: a gross misfit, or an error beyond what is stated of it."""
         return self.spread.test.gross or bool(self.beyond) or self.times_stated > FAR
+
+    @cached_property
+    def beyond(self) -> dict[int, float]:
+        """What errors of sensors at their limit come to with nothing stated of them, by place; no stated one is so."""
+        fit, beyond = self.fit, dict[int, float]()
+        for s, (error, size) in enumerate(zip(fit.sensors, self.x[fit.count :], strict=True)):
+            if error.stated and abs(size) > NEAR_LIMIT * error.most:
+                free = [*fit.sensors[:s], replace(error, stated=False), *fit.sensors[s + 1 :]]
+                found = float(solved(replace(fit, sensors=free), self.x).x[fit.count + s])
+                beyond |= {s: found} if abs(found) >= FAR else {}
+        return beyond
+
+    @cached_property
+    def vague(self) -> NDArray[np.bool_]:
+        """Unknowns whose 95 % interval is wider than twice themselves, or than their limits are apart, (unknown,)."""
+        n, (low, high) = self.fit.count, self.fit.bounds
+        widest = np.minimum(sizes_of(self.fit, self.x), (high - low) / 2)[:n]
+        return np.asarray((self.half > widest) & ~self.lost[:n])
+
+    @cached_property
+    def half(self) -> Array:
+        """Half of a two-sided interval, (unknown,), whether the data tell the unknown or not."""
+        return np.asarray((quantile(self.spread.freedom) * self.spread.deviation)[: self.fit.count])
 
     @cached_property
     def lost(self) -> NDArray[np.bool_]:
@@ -295,7 +302,6 @@ def dataset(identified: Identified, findings: Sequence[Finding]) -> xr.Dataset:
         "done": list(measurement.done),
         "inputs": inputs(mechanism),
         "evaluations": fit.courses_at.count,
-        "starts": identified.starts,
         "converged": int(identified.solution.converged),
         "references": "\n".join([*SOURCES, *references(mechanism)]),
         "findings": finding_rows(findings),
@@ -324,7 +330,7 @@ def _parameters(identified: Identified) -> dict[str, NDArray[Any]]:
         "upper": upper,
         "degrees_of_freedom": spread.freedom[:n],
         "limit": identified.limit,
-        "told": (~lost[:n]).astype(np.int8),
+        "told": (~lost[:n] & ~identified.vague).astype(np.int8),
         "correlation": correlation,
         "share": np.where(lost[:n, None], np.nan, share),
         "singular_value": np.append(singular, np.zeros(n - len(singular))),  # fewer data than unknowns
@@ -352,13 +358,13 @@ def with_estimates(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
 
     Returns
     -------
-    The mechanism with the estimates, in the units that were written there; what was not told apart stays as it is.
+    The mechanism with the estimates, in the units that were written there; what is not identifiable stays as it is.
     """
     values: dict[str, float | str] = {}
     units = attribute(result, "parameter_units")
     for p, paths in enumerate(attribute(result, "parameter_paths")):
         estimate, u = (float(result[name].values[p]) for name in ("estimate", "standard_uncertainty"))
-        if math.isfinite(estimate):
+        if result["told"].values[p]:
             values |= {path: _text(mechanism, path, estimate, u, units[p]) for path in paths}
     return mechanism.with_values(values)
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,24 +28,14 @@ from trunnion.rig.identification.fit import (
     Evaluations,
     Fit,
     SensorError,
-    Solution,
     refined,
     sensor_errors,
     shared_zero,
-    sizes_of,
     solved,
 )
 from trunnion.rig.identification.result import Identified, MisfitCause, dataset
-from trunnion.rig.identification.signals import Model, SeatedModel
-from trunnion.rig.identification.uncertainty import (
-    LackOfFit,
-    beyond_stated,
-    excess,
-    inseparable,
-    lack_of_fit,
-    quantile,
-    spread_of,
-)
+from trunnion.rig.identification.signals import Model
+from trunnion.rig.identification.uncertainty import LackOfFit, excess, inseparable, quantile, spread_of
 from trunnion.rig.identification.unknowns import Parameters, described, unknowns
 from trunnion.rig.modelled import apart, each, in_condition, measure_of, refuse_backwards, refuse_unit
 from trunnion.rig.reading.efficiency import efficiency_of, load_joints, pairs_of
@@ -64,9 +54,6 @@ NOTHING = 1e-9  # of a course: what an unknown does to it
 MOST_NAMED = 6  # conditions in a message
 SAME = 1e-6  # of a setting
 HALVINGS = 8  # of a friction that locks at the start
-OTHERS = (0.3, 3.0)  # times the start: where else a search begins first
-CLOSE = 1e-3  # of the sizes: two searches ended at one place
-AS_GOOD = 4.0  # sum of squares: another place is named if it is not worse by more
 EXPLAINS = 0.8  # of a misfit, at least, for a cause of it to be named
 DEGREE, SETTLED = np.radians(1.0), np.radians(0.01)
 ROUNDS = 5  # of the angle
@@ -81,9 +68,7 @@ def identify(
     channels: Sequence[str] | None = None,
     start: Mapping[str, float | str] | None = None,
     hold_out: HoldOut = None,
-    sensors: Literal["channel", "condition"] = "channel",
     guard: int | None = None,
-    starts: int = 1,
     friction_method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
@@ -102,10 +87,8 @@ def identify(
     start : where the search begins, by name, SI or texts with units; the model's values if not given.
     hold_out : conditions by name, file or setting, or the share of the turns of each (the last), that are not fitted
         but predicted.
-    sensors : whether zero and gain of a channel are off by the same in all conditions, or in each by its own.
     guard : positions left out on each side where the sense of a friction changes; one for every 90 of a cycle if not
         given.
-    starts : places to begin at.
     friction_method : how friction and reactions are settled; Newton's method if not given.
     progress : called with the number of models evaluated.
 
@@ -120,8 +103,6 @@ def identify(
     """
     if guard is not None and guard < 0:
         raise MechanismError(Finding(f"{guard} positions cannot be left out", "guard", "give 0 or more"))
-    if starts < 1:
-        raise MechanismError(Finding(f"the number of start points is {starts}", "starts", "give 1 or more"))
     conditions = measurement.conditions
     each(conditions, partial(in_condition, mechanism))
     paths = described(mechanism, parameters)
@@ -131,20 +112,22 @@ def identify(
         run.determinacy.refuse()
     names = _channels(measurement, channels, joints)
     blocks = _blocks(measurement, names, held_out(mechanism, measurement, hold_out), joints)
-    kind = SeatedModel if any(seat.given is None for seat in run.seats) else Model
+    if follow := [seat.joint for seat in run.seats if seat.given is None]:
+        what = f"pins lie as their loads press them, which carries no derivatives: {', '.join(follow)}"
+        raise MechanismError(Finding(what, "seat", "state seat: free, or the side that each lies on"))
     phases = tuple(np.asarray(one.phase, float) for one in conditions)
     sought, measures = tuple(unknowns(mechanism, paths, start or {})), _measures(mechanism, run, blocks)
-    model = kind(run, sought, measures, settings, phases, friction_method or FrictionMethod())
+    model = Model(run, sought, measures, settings, phases, friction_method or FrictionMethod())
     if channels is None:
         model = replace(model, measures=_acted_on(model))
         blocks = [block for block in blocks if block.channel in model.measures]
     at = np.array([one.start for one in sought])
     speeds = iter([model.driven(k, at)[2] for k in range(len(conditions))])
     each(conditions, lambda one: refuse_backwards(mechanism, one, next(speeds)))
-    errors = sensor_errors(model, conditions, blocks, sensors == "condition")
+    errors = sensor_errors(model, conditions, blocks)
     fit = Fit(Evaluations(model, progress), blocks, errors, guard)
     begin = _runnable(fit)
-    fit, best, other = _searched(fit, begin, starts)
+    fit, best = refined(fit, begin)
     spread = spread_of(fit, best.x)
     fit = replace(fit, inflation=excess(fit, spread))
     if fit.inflation > 1 and fit.sensors:
@@ -152,9 +135,8 @@ def identify(
         spread = spread_of(fit, best.x)
     other_speeds = [apart(one.speed, model.driven(k, best.x[: fit.count])[2]) for k, one in enumerate(conditions)]
     causes = _causes(fit, begin, spread.test) if spread.test.misfit and not any(other_speeds) else []
-    unused = [name for name in measures if name not in model.measures]
-    identified = Identified(mechanism, measurement, fit, best, starts, other, spread, inseparable(fit, best.x, spread),
-                            causes, beyond_stated(fit, best.x), unused)  # fmt: skip
+    groups = inseparable(fit, best.x, spread)
+    identified = Identified(mechanism, measurement, fit, best, spread, groups, causes)
     return dataset(identified, findings_of(identified))
 
 
@@ -264,10 +246,7 @@ def _with_setting(mechanism: Mechanism, conditions: Sequence[Condition], text: s
 
 
 def _with_settings(
-    mechanism: Mechanism,
-    measurement: Measurement,
-    paths: Mapping[str, Sequence[str]],
-    start: Mapping[str, float | str],
+    mechanism: Mechanism, measurement: Measurement, paths: Mapping[str, Sequence[str]], start: Mapping[str, float | str]
 ) -> tuple[Mechanism, tuple[dict[str, float], ...]]:
     """The mechanism with all numbers stated that conditions set or that are looked for, and what each sets, by path.
 
@@ -349,63 +328,38 @@ def _runnable(fit: Fit) -> Array:
     return best
 
 
-def _searched(fit: Fit, begin: Array, starts: int) -> tuple[Fit, Solution, Array | None]:
-    """The best of the fits from several places, and another place that fits as well, if there is one.
-
-    Others are the start times and divided by 3, then at random between a tenth and ten times.
-    """
-    best_fit, best = refined(fit, begin)
-    other, random = None, np.random.default_rng(1)
-    low, high = fit.bounds
-    for k in range(starts - 1):
-        place = begin.copy()
-        place[: fit.count] *= OTHERS[k] if k < len(OTHERS) else 10 ** random.uniform(-1, 1, fit.count)
-        try:
-            next_fit, found = refined(fit, np.clip(place, low, high))
-        except ValueError:  # no answer of the model there
-            continue
-        away = np.max(np.abs(found.x - best.x)[: fit.count] / sizes_of(best_fit, best.x)[: fit.count])
-        if not found.converged or away <= CLOSE:
-            continue
-        if found.cost < best.cost * (1 - 1e-6) - 1e-6:
-            other = best.x if best.cost < found.cost + AS_GOOD else None
-            best_fit, best = next_fit, found
-        elif found.cost < best.cost + AS_GOOD:
-            other = found.x
-    return best_fit, best, other
-
-
 def _causes(fit: Fit, start: Array, test: LackOfFit) -> list[MisfitCause]:
     """Errors that explain most of a misfit, each by itself, the best first: a fit with one free error more."""
-    causes, model = [], fit.model
+    causes = []
     for error, unit in _free_errors(fit):
-        moved, begin, size, rounds = (
-            fit,
-            start,
-            0.0,
-            ROUNDS if error.kind == "angle" and model.run.cycle.periodic else 1,
-        )
         try:
-            for _ in range(rounds):  # the positions follow the angle until it is settled
-                more, best = refined(
-                    replace(moved, sensors=[*fit.sensors, error], inflation=1.0), np.append(begin, 0.0)
-                )
-                size, begin = size + float(best.x[-1]) * unit, best.x[:-1]
-                if rounds == 1 or abs(best.x[-1] * unit) < SETTLED or abs(size) > np.pi:
-                    break
-                phases = zip(model.phases, model.turns, strict=True)
-                shifted = replace(model, phases=tuple((phase + size / turn) % 1.0 for phase, turn in phases))
-                moved = replace(fit, courses_at=Evaluations(shifted))
+            more, best, size = _with_error(fit, start, error, unit)
         except ValueError:  # no answer of the model there
             continue
-        left, spread = lack_of_fit(more, best.x), spread_of(more, best.x)
+        spread = spread_of(more, best)
         half = quantile(spread.freedom) * spread.deviation
-        share, wide = (test.reduced - left.reduced) / (test.reduced - 1), float(half[-1]) * unit
+        share, wide = (test.reduced - spread.test.reduced) / (test.reduced - 1), float(half[-1]) * unit
         nothing_left = error.kind == "gain" and size < 2e-6 - 1  # of the model
         if share >= EXPLAINS and wide < abs(size) < (np.pi if error.kind == "angle" else np.inf) and not nothing_left:
-            causes.append(MisfitCause(error.kind, error.channel, size, wide, min(share, 1.0), best.x[: fit.count],
-                                      half[: fit.count], left))  # fmt: skip
+            n = fit.count
+            causes.append(MisfitCause(error.kind, error.channel, size, wide, min(share, 1.0), best[:n], half[:n]))
     return sorted(causes, key=lambda one: -round(one.explains, 2))  # of equal ones first the simplest
+
+
+def _with_error(fit: Fit, start: Array, error: SensorError, unit: float) -> tuple[Fit, Array, float]:
+    """The fit with an error more, where it ends, and how large the error is there; of an angle in several rounds."""
+    model, moved, size = fit.model, fit, 0.0
+    turning = error.kind == "angle" and model.run.cycle.periodic
+    for _ in range(ROUNDS):  # the positions follow the angle until it is settled
+        more = replace(moved, sensors=[*fit.sensors, error], inflation=1.0)
+        more, best = refined(more, np.append(start, 0.0))
+        size, start = size + float(best.x[-1]) * unit, best.x[:-1]
+        if not turning or abs(best.x[-1] * unit) < SETTLED or abs(size) > np.pi:
+            break
+        phases = zip(model.phases, model.turns, strict=True)
+        shifted = replace(model, phases=tuple((phase + size / turn) % 1.0 for phase, turn in phases))
+        moved = replace(fit, courses_at=Evaluations(shifted))
+    return more, best.x, size
 
 
 def _free_errors(fit: Fit) -> Iterator[tuple[SensorError, float]]:

@@ -15,26 +15,23 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
-from trunnion.errors import MechanismError, Status
 from trunnion.measures.measures import Measure, coordinate_unit
 from trunnion.rig.identification.unknowns import Unknown
 from trunnion.solve import shifts
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, posed
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.run import Run, prepare
-from trunnion.solve.seating import seating_of
+from trunnion.solve.run import Run
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.switches import Mechanisms, bends
 from trunnion.solve.system import sticking
 
-__all__ = ["Courses", "Model", "Said", "SeatedModel"]
+__all__ = ["Courses", "Model", "Said"]
 
 Array = NDArray[np.float64]
 AT_ONCE = 20_000  # numbers in an array
 STILL = 1e-9  # of the largest speed in the cycle: rounding, whose sign says nothing
 STEP = 1e-6  # of a driver's number, for what it does to the duration of the cycle
-SEATED = 1e-4  # of an unknown, for derivatives by differences: seats are settled to some 1e-6 of their clearance
 
 
 class Said(NamedTuple):
@@ -205,7 +202,7 @@ class Model:
             for path in unknown.paths:
                 overrides[path] = Dual(np.full((len(seed), 1), at[p] + self._errors.get(path, 0.0)), seed)
         values = self.run.system.mechanism.parameters(overrides)
-        for seat in self.run.seats:  # given ones: those that follow their loads are in `seated`
+        for seat in self.run.seats:
             play = shifts.play_of(self.run.system.mechanism.space, self.run.system.joints[seat.joint][0], values,
                                   seat.joint)  # fmt: skip
             if play is not None:
@@ -269,48 +266,3 @@ class Model:
                 low, high = (self._duration(k, end) for end in ends)
                 slope[i * many + p] = (high - low) / (2 * step)
         return Dual(phase * duration, phase * slope)
-
-
-@dataclass(frozen=True)
-class SeatedModel(Model):
-    """A Model of a mechanism whose pins lie as their loads press them: each condition by itself.
-
-    The seats follow the loads and the loads the seats, in an iteration that carries no derivatives.
-    """
-
-    def courses(self, at: Array) -> Courses:
-        """What the model says at these values of the unknowns, SI."""
-        rows = []
-        for k in range(len(self.phases)):
-            values, status, turned = self._condition(k, at)
-            said = {name: Said(row, np.full((len(at), len(row)), np.nan)) for name, row in values.items()}
-            for p, unknown in enumerate(self.unknowns):
-                step = SEATED * (abs(at[p]) or unknown.size or 1.0)
-                low, high = (float(np.clip(at[p] + way, unknown.lower, unknown.upper)) for way in (-step, step))
-                below, above = (
-                    self._condition(k, np.where(np.arange(len(at)) == p, end, at))[0] for end in (low, high)
-                )
-                for name, one in said.items():
-                    one.slope[p] = (above[name] - below[name]) / (high - low)
-            rows.append((said, status, turned))
-        return Courses(*zip(*rows, strict=True))
-
-    def _condition(self, k: int, at: Array) -> tuple[dict[str, Array], NDArray[np.int8], NDArray[np.bool_]]:
-        """One condition: courses, statuses, where a sense changes."""
-        size = len(self.phases[k])
-        try:
-            values: dict[str, float | str] = dict(self._overrides(k, at))
-            run = prepare(self.run.system.mechanism.with_values(values))
-        except MechanismError:
-            lost = dict.fromkeys(self.measures, np.full(size, np.nan))
-            return lost, np.full(size, Status.NOT_ASSEMBLED, np.int8), np.zeros(size, bool)
-        with np.errstate(all="ignore"):
-            seated = seating_of(run, self.friction).at(self.phases[k] * run.cycle.duration, self.friction)
-            status = status_of(seated.back, (size,))
-            courses = {
-                name: np.array(np.broadcast_to(primal(self._course(measure, seated.back)), (size,)), float)
-                for name, measure in self.measures.items()
-            }
-            turned = self._turned(seated.back, (size,))
-        status = np.where(seated.sticks, np.maximum(status, Status.ZERO_SLIP), status).astype(np.int8)
-        return courses, status, turned

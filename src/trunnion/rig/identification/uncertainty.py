@@ -8,7 +8,7 @@ taken from what it is turn by turn, whatever the correlation within a turn (clus
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.sparse.csgraph import connected_components
 
-from trunnion.rig.identification.fit import FAR, Fit, sizes_of, solved
+from trunnion.rig.identification.fit import Fit, sizes_of
 from trunnion.rig.reading.measurement import student
 from trunnion.rig.reading.steps import covariance_of_steps
 
 __all__ = [
-    "CONFIDENCE", "Combination", "Covariances", "InseparableUnknowns", "LackOfFit", "beyond_stated", "excess",
+    "CONFIDENCE", "Combination", "Covariances", "InseparableUnknowns", "LackOfFit", "excess",
     "inseparable", "lack_of_fit", "quantile", "spread_of",
 ]  # fmt: skip
 
@@ -35,7 +35,6 @@ RARE = 0.01  # one below which conditions are said to disagree
 GROSS = 9.0  # reduced χ² of residuals of three times the scatter
 WORTH = 1.05  # reduced χ² up to which it is not
 ENOUGH_PAIRS = 10  # of turns, to see whether they follow each other
-NEAR_LIMIT = 0.02  # of the most that a stated error may come to
 PART = 0.05  # of the largest share in a direction: what is below it takes no part
 SAME = 0.02  # of 1: how near a factor is to it to be called it
 SINGULAR = 1e-10  # of the largest eigenvalue of the scaled information: derivatives are exact to some 1e-12 of it
@@ -212,23 +211,6 @@ def _apart(fit: Fit, x: Array, pulls: dict[int, Array], by_condition: dict[int, 
     usual = float(np.median([turns - 1.0 for _, turns in by_condition.values()]))
     chance = special.fdtrc(freedom, max(freedom * usual, 4.0), squares / freedom)
     return np.asarray(np.where(chance < RARE, np.maximum(squares / freedom, 1.0), 1.0))
-
-
-def beyond_stated(fit: Fit, x: Array) -> dict[int, float]:
-    """What errors of sensors at a limit would come to without it, where that is more than any stated error may be.
-
-    In standard uncertainties, by the place among the sensors; each by itself, with nothing stated of it.
-    """
-    beyond, places = {}, zip(fit.sensors, x[fit.count :], strict=True)
-    for s, (sensor, size) in enumerate(places):
-        if sensor.stated and abs(size) > (1 - NEAR_LIMIT) * sensor.most:
-            lifted, free = (
-                replace(fit, sensors=[*fit.sensors[:s], other, *fit.sensors[s + 1 :]])
-                for other in (replace(sensor, most=np.inf), replace(sensor, stated=False))
-            )
-            if abs(solved(lifted, x).x[fit.count + s]) >= FAR:
-                beyond[s] = float(solved(free, x).x[fit.count + s])
-    return beyond
 
 
 # ---- what the model leaves over -------------------------------------------------------------------------------

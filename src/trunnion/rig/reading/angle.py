@@ -170,7 +170,7 @@ def _of_pulses(
     elif index.size == 1:
         counts = counts - np.interp(index[0], pulses.times, counts)
     angles, pitch = source.sign * TURN / source.per_turn * counts, TURN / source.per_turn
-    when, spans, lag = pulses.times, np.zeros(0), 0.0
+    when, lag = pulses.times, 0.0
     if not pulses.crossings and slack < 1:  # a count for each event: its time is not known
         when, spans = smoothed(when, 0.5 * step, source.per_turn, counts)
         lag = unresolved((pulses.times - when)[spans > 0], step)
@@ -178,9 +178,7 @@ def _of_pulses(
         raw = angles
         angles, spans = smoothed(raw, pitch * min(0.5 * slack, 0.5), source.per_turn / slack, when)
         lag = unresolved((raw - angles)[spans > 0], pitch) / pitch * step / slack
-    usual = float(np.median(spans)) if spans.size else 0.0
-    over = f"; it is smoothed over {_turns(usual)}, with which all pulses agree" if usual > 0 else ""
-    say(f"the angle is interpolated between pulses {np.degrees(pitch):.4g} deg apart{over}")
+    say(f"the angle is interpolated between pulses {np.degrees(pitch):.4g} deg apart, and smoothed within a sample")
     values = np.interp(line.seconds, when, angles, left=np.nan, right=np.nan)
     values[line.seconds > until] = np.nan
     return Coordinate(values + zero, spoilt, lag)
@@ -241,10 +239,10 @@ def _check_level(pulses: Pulses, line: Timeline, indexed: bool, say: Say) -> flo
     if usual < 2.5:
         what, remedy = f"a pulse of the encoder has {usual:.3g} samples", "sample at least 4 times a pulse"
         say(warning("pulses.few_samples", "angle", f"{what}: edges are missed", f"{remedy}, or record a count"))
-    gaps = line.breaks[line.seconds[line.breaks] < pulses.times[-1]]
+    gaps = np.flatnonzero(np.diff(line.seconds[line.seconds < pulses.times[-1]]) > GAP * line.step)
     if indexed or not gaps.size:
         return np.inf
-    until = float(line.seconds[gaps[0] - 1])
+    until = float(line.seconds[gaps[0]])
     what = f"no pulses are counted in gaps of time: the angle is not known after {until:.5g} s"
     say(warning("pulses.gap", "angle", f"{what}; the turns from there on are left out", "record a count or an index"))
     return until
@@ -311,14 +309,8 @@ def _refined(source: AngleSource, values: Array, line: Timeline, say: Say) -> tu
     smooth, spans = smoothed(raw, 0.5 * step, TURN / (rate * line.step), seconds)
     refined = values.copy()
     refined[known] = smooth
-    usual = float(np.median(spans))
-    over = f"; it is smoothed over {_turns(usual)}, with which all readings agree" if usual > 0 else ""
-    say(f"the angle is read in steps of {np.degrees(step):.4g} deg{over}")
+    say(f"the angle is read in steps of {np.degrees(step):.4g} deg, and smoothed within them")
     return refined, unresolved((raw - smooth)[spans > 0], step) / rate, step / math.sqrt(12.0)
-
-
-def _turns(number: float) -> str:
-    return f"{number:.3g} turn{'s' * (number != 1)}"
 
 
 def smoothed(values: Array, off: float, per_turn: float, over: Array | None = None) -> tuple[Array, Array]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -13,20 +12,11 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.checks import outliers
-from trunnion.rig.reading.log import at_times, counted, note, runs, warning
+from trunnion.rig.reading.log import at_times, counted, note, warning
 from trunnion.rig.reading.mapping import Channel, Filter, Zero
 from trunnion.rig.reading.tables import Column
 from trunnion.rig.reading.timebase import Timeline
-from trunnion.rig.reading.units import (
-    HERTZ,
-    OTHER_COLUMN,
-    Amount,
-    SensorScale,
-    alike,
-    default_unit,
-    dimensions,
-    scale,
-)
+from trunnion.rig.reading.units import HERTZ, OTHER_COLUMN, Amount, SensorScale, alike, default_unit, dimensions, scale
 
 __all__ = [
     "LOOKED_AT", "ChannelReading", "Zeroed", "check_filter", "filtered", "mean_uncertainty", "noise_of", "reading",
@@ -41,19 +31,15 @@ FEWEST_LEVELS = 3  # of readings in all files of a channel, from which they show
 LEVELS = 8  # from which they show it though some are left out, or the last decimal
 DECIMALS = 10  # looked for
 EXACT = 1e9  # below which a float tells whole numbers from others to 1e-6
-BRIDGED = 0.1  # of the period of the cut-off: gaps up to this are bridged for the filter
+LONGEST = 10.0  # periods of the cut-off, over which a line bridges a gap for the filter
 
 
 @dataclass(frozen=True)
 class Zeroed:
-    """Zero of a channel, in readings. uncertainty: of it, in readings; drift: readings a second, from `since`.
-
-    since: when the zero was that, s; NaN where it is a value that was stated.
-    """
+    """Zero of a channel and its uncertainty, in readings. since: when it was that, s; NaN of one that was stated."""
 
     value: float
     uncertainty: float = 0.0
-    drift: float = 0.0
     since: float = float("nan")
 
 
@@ -68,10 +54,9 @@ class ChannelReading:
     accuracy_gain: float
     resolution: float = 0.0
 
-    def quantity(self, readings: Array, zero: Zeroed, sign: int, seconds: Array) -> Array:
+    def quantity(self, readings: Array, zero: Zeroed, sign: int) -> Array:
         """What the readings measure, SI."""
-        off = readings - zero.value
-        return sign * self.scale.factor * (off - zero.drift * (seconds - zero.since) if zero.drift else off)
+        return sign * self.scale.factor * (readings - zero.value)
 
     def datum(self, zero: Zero | Amount, value: float, sign: int) -> float:
         """What is measured where the sensor reads 0, if a zero is stated in the unit of the quantity; else 0.
@@ -143,49 +128,32 @@ def unit_differs(where: str, name: str, unit: str, column: Column) -> Finding | 
 # ---- zero -----------------------------------------------------------------------------------------------------
 
 
-def zeroed(
-    name: str, channel: Channel, sensor: ChannelReading, readings: Array, line: Timeline, remove: bool, say: Say
-) -> Zeroed:
-    """The zero of a channel: a value, or the mean over its unloaded stretches.
-
-    Two stretches or more show a drift of the zero between them; remove: it is corrected, a straight line through them.
-    """
+def zeroed(name: str, channel: Channel, sensor: ChannelReading, readings: Array, line: Timeline, say: Say) -> Zeroed:
+    """The zero of a channel: a value, or the mean over its unloaded stretches, uncertain by how they differ, too."""
     if isinstance(channel.zero, Amount):
         return Zeroed(sensor.scale.reading(channel.zero, "zero"))
-    where, rows = f"channels.{name}", []
+    where, times, parts = f"channels.{name}.zero", [], []
     for begin, end in channel.zero.over:
         low, high = np.searchsorted(line.seconds, (begin.value, end.value))
-        known = np.isfinite(readings[low:high])
-        part, when = readings[low:high][known], line.seconds[low:high][known]
+        finite = np.isfinite(readings[low:high])
+        part, when = readings[low:high][finite], line.seconds[low:high][finite]
         if (spikes := outliers(part)).any():
             what = f"spikes: {counted(int(spikes.sum()), 'reading')} of {part.size:,} in the unloaded stretch, "
             what += f"{at_times(when[spikes])}; left out"
-            say(warning("readings.spikes", f"{where}.zero", what, "check shielding"))
+            say(warning("readings.spikes", where, what, "check shielding"))
             part, when = part[~spikes], when[~spikes]
         if not part.size:
             span, ends = f"{begin.value:g} to {end.value:g} s", f"{line.seconds[0]:g} to {line.seconds[-1]:g} s"
             what = f"there are no readings from {span}; the file runs from {ends}"
             remedy = "state a stretch in which the sensor is not loaded"
-            raise MechanismError(Finding(what, f"{where}.zero", remedy, code="data.zero.no_readings"))
-        rows.append((float(np.mean(when)), float(np.mean(part)), mean_uncertainty(part)))
-    middles, means, errors = np.array(rows).T
-    scatters = bool(np.all(errors > 0))
-    weights = 1 / np.maximum(errors, 1e-300) ** 2 if scatters else np.ones(means.size)
-    mean, since = (float(np.average(row, weights=weights)) for row in (means, middles))
-    error = float(1 / np.sqrt(weights.sum())) if scatters else 0.0
-    apart = float(np.ptp(middles))
-    if apart > 0:
-        slope = float(np.polyfit(middles, means, 1)[0])
-        if abs(slope * apart) > 5 * float(np.hypot(errors[0], errors[-1])):
-            by = f"{sensor.scale.factor * slope * apart * channel.sign:.3g} {sensor.scale.unit} in {apart:.4g} s"
-            what = f"the zero drifts by {by}, between the unloaded stretches"
-            what += "; a straight line is subtracted" * remove
-            remedy = "let the sensor warm up" + ("" if remove else ", or state drift: remove")
-            say(warning("zero.drift", where, what, remedy))
-            if remove:
-                return Zeroed(float(np.mean(means)), error, slope, float(np.mean(middles)))
+            raise MechanismError(Finding(what, where, remedy, code="data.zero.no_readings"))
+        times.append(when)
+        parts.append(part)
+    means = [float(np.mean(part)) for part in parts]
+    within = mean_uncertainty(np.concatenate([part - mean for part, mean in zip(parts, means, strict=True)]))
     say(f"zero of {name}: mean over the unloaded stretch")
-    return Zeroed(mean, error, since=since)
+    error = float(np.hypot(within, np.ptp(means) / 12**0.5))  # between them rectangular, GUM 4.3.7
+    return Zeroed(float(np.mean(np.concatenate(parts))), error, float(np.mean(np.concatenate(times))))
 
 
 def mean_uncertainty(samples: Array) -> float:
@@ -222,46 +190,32 @@ def check_filter(low_pass: Filter, line: Timeline, say: Say) -> None:
         what = "the samples are not evenly spaced in time, as a filter needs them"
         say(warning("filter.uneven", "filter", what, "record at a fixed rate, or leave out the filter"))
     passes = f"order {low_pass.order}, forward and backward, together 3 dB down at {cut_off:g} Hz"
-    say(f"low-pass filter: Butterworth of {passes}; gaps up to {100 / cut_off:.3g} ms are bridged for it")
+    say(f"low-pass filter: Butterworth of {passes}; gaps are bridged by a line for it")
 
 
-def filtered(values: Array, line: Timeline, low_pass: Filter, where: str) -> tuple[Array, Finding | None]:
+def filtered(values: Array, line: Timeline, low_pass: Filter) -> Array:
     """A Butterworth low-pass forward and backward, 3 dB down at the cut-off after both.
 
-    Gaps up to a tenth of the period of the cut-off are bridged by a straight line and are gaps again afterwards; over
-    longer ones nothing is carried: the stretches between them are filtered each by itself, and those too short for it
-    have no values.
+    Gaps are bridged by a straight line, long ones by a short one, and are gaps again afterwards.
     """
     from scipy.signal import butter, sosfiltfilt  # brings scipy.stats: longer to import than all the rest
 
-    rate, cut_off, finite = 1.0 / line.step, low_pass.cut_off.value, np.isfinite(values)
-    hole = ~finite
-    for begin, length in zip(*runs(~finite), strict=True):
-        if length * line.step <= BRIDGED / cut_off:
-            hole[begin : begin + length] = begin == 0 or begin + length == values.size
-    if hole.all():
-        return values, None
-    bridged = np.interp(line.seconds, line.seconds[finite], values[finite])
+    finite, rate, cut_off = np.isfinite(values), 1.0 / line.step, low_pass.cut_off.value
+    if not finite.any():
+        return values
+    longest = int(LONGEST * rate / cut_off)
+    steps = np.clip(np.rint(np.diff(line.seconds) / line.step), 1, longest).astype(np.int64)
+    place = np.concatenate([[0], np.cumsum(steps)])
+    bridged = np.interp(np.arange(place[-1] + 1), place[finite], values[finite])
     # both passes together are 3 dB down at the cut-off if each is where |H|² = 1/√2
     edge = np.tan(np.pi * cut_off / rate) / (np.sqrt(2.0) - 1.0) ** (1.0 / (2 * low_pass.order))
     sections = butter(low_pass.order, min(2 / np.pi * np.arctan(edge), 1 - 1e-9), output="sos")
-    least = 3 * (2 * len(sections) + 1) + 1
-    result, lost = np.full(values.size, np.nan), 0
-    for begin, length in zip(*runs(~hole), strict=True):
-        cuts = line.breaks[(line.breaks > begin) & (line.breaks < begin + length)]
-        for low, high in pairwise([begin, *cuts.tolist(), begin + length]):
-            if high - low < least:
-                lost += high - low
-                continue
-            pad = min(high - low - 1, max(least - 1, int(rate / cut_off)))
-            try:
-                result[low:high] = sosfiltfilt(sections, bridged[low:high], padlen=pad)
-            except np.linalg.LinAlgError:
-                what = f"order {low_pass.order} at {cut_off:g} Hz of {rate:.4g} Hz cannot be computed"
-                raise MechanismError(Finding(what, "filter", "lower the order")) from None
-    result[~finite] = np.nan
-    what, remedy = f"{lost:,} samples between gaps too close for the filter", "raise the cut-off, or mend the gaps"
-    return result, warning("filter.gaps", where, f"{what}; left out", remedy) if lost else None
+    pad = min(bridged.size - 1, max(3 * (2 * len(sections) + 1), int(rate / cut_off)))
+    try:
+        return np.where(finite, sosfiltfilt(sections, bridged, padlen=pad)[place], np.nan)
+    except np.linalg.LinAlgError:
+        what = f"order {low_pass.order} at {cut_off:g} Hz of {rate:.4g} Hz cannot be computed"
+        raise MechanismError(Finding(what, "filter", "lower the order")) from None
 
 
 # ---- steps and noise ------------------------------------------------------------------------------------------

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
-from scipy.special import bdtrc
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.rig.reading.log import counted, note, places, runs, warning
@@ -27,13 +26,12 @@ __all__ = [
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 CLIP = 0.9995  # of the range, from which a reading is at it: the top code of 12 bits is 2047/2048
-OVERLOAD = 9.9e37  # what SCPI instruments write for an overload or no number (SCPI 1999.0, 7.2.1), and more
 MOST = 0.5  # of the readings at the end of the range: more is no load that is now and then too large
 STUCK = 30  # equal readings in a row at least
 WIDTH = 7  # samples of the median that spikes are told from: up to three in a row are found
 FAR = 12.0  # robust standard deviations from it
 SEEN = 0.1  # of the span from the 1st to the 99th percentile, that a spike exceeds
-NEAR, CHANCE = 0.01, 0.025  # of a turn, in which what recurs is in the same place; chance that faults lie so close
+CHANCE = 0.005  # that a fault comes as near as that to the place of another
 FEW = 4  # turns from which what comes back in them can be told from faults
 STEADY = 0.03  # of the mean speed, between the slowest and the fastest turn
 CERTAIN = 6.0  # standard errors from which a slope is one
@@ -46,9 +44,8 @@ APART = 0.03  # of a mean speed, between the angle and the channel that reads it
 
 
 def missing(where: str, column: Column, readings: Array, seconds: Array) -> Finding | None:
-    """Cells without a number, which all become NaN: infinite ones and codes for an overload too."""
-    size = np.abs(readings)
-    readings[np.isinf(size) | ((size >= OVERLOAD) & (size < 1e38))] = np.nan
+    """Cells without a number, which all become NaN: infinite ones too."""
+    readings[np.isinf(readings)] = np.nan
     mask = np.isnan(readings)
     if not mask.any():
         return None
@@ -94,62 +91,54 @@ def faults(
     """
     begin, end = turns
     running = slice(int(np.searchsorted(seconds, begin[0])), int(np.searchsorted(seconds, end[-1], "right")))
-    known = readings[running][np.isfinite(readings[running])]
-    if known.size < 10:
+    finite = readings[running][np.isfinite(readings[running])]
+    if finite.size < 10:
         return
-    if known.min() == known.max():
-        what = f"reads {known[0]:.6g} in every one of {known.size:,} rows"
+    if finite.min() == finite.max():
+        what = f"reads {finite[0]:.6g} in every one of {finite.size:,} rows"
         remedy = "check that the sensor is connected and the column the right one"
         yield (warning if moves else note)("readings.constant", where, what, remedy)
         return
     if begin.size < FEW:
         return
-    wide = max(float(np.subtract(*np.percentile(known, (99, 1)))), 1e-300)
+    rare, wide = 0.5 * begin.size, max(float(np.subtract(*np.percentile(finite, (99, 1)))), 1e-300)
     stuck = _stuck(readings[running])
-    if 0 < (times := runs(stuck)[0].size) < 0.5 * begin.size:
+    if 0 < (times := runs(stuck)[0].size) < rare:
         what = f"stuck: the reading does not change for {counted(int(stuck.sum()) + times, 'sample')}, "
         what += f"{places(stuck, seconds[running])}; left out"
         readings[running][stuck] = np.nan
         yield warning("readings.stuck", where, what, "check sensor and logger")
     near = slice(max(running.start - beside, 0), running.stop + beside)
-    part, (far, off) = readings[near], _spikes(readings[near], wide)
-    if runs(far)[0].size < 0.5 * begin.size:
-        far[np.flatnonzero(far)[_recurring(seconds[near][far], begin, end)]] = False
-    else:
-        far[:] = False
-    if far.any():
+    far, off = _spikes(readings[near], wide)
+    often = runs(far)[0].size >= rare
+    far[np.flatnonzero(far)[_returning(seconds[near][far], begin, end)]] = False
+    if far.any() and not often:
         what = (
-            f"spikes: {counted(int(far.sum()), 'reading')} of {known.size:,} up to {off[far].max() / wide:.2g} times "
+            f"spikes: {counted(int(far.sum()), 'reading')} of {finite.size:,} up to {off[far].max() / wide:.2g} times "
         )
         what += f"the usual span off their neighbours, {places(far, seconds[near])}; left out"
-        part[far] = np.nan
+        readings[near][far] = np.nan
         yield warning("readings.spikes", where, what, "check shielding and earth")
 
 
-def _recurring(time: Array, begin: Array, end: Array) -> Mask:
-    """What others are in the same place of the turn as, more than chance has it (binomial): the signal's own."""
+def _returning(time: Array, begin: Array, end: Array) -> Mask:
+    """What another turn has in the same place: of places at random 0.5 % lie so near to the next."""
     turn = np.clip(np.searchsorted(begin, time, side="right") - 1, 0, begin.size - 1)
-    phase, own = ((time - begin[turn]) / (end - begin)[turn]) % 1.0, np.zeros(time.size, dtype=np.bool_)
-    while np.count_nonzero(~own) > 1:  # what is found does not count any more
-        rest = phase[~own]
-        around = np.sort(np.concatenate([rest - 1, rest, rest + 1]))
-        others = np.searchsorted(around, rest + NEAR, side="right") - np.searchsorted(around, rest - NEAR) - 1
-        again = np.asarray(bdtrc(others - 1, rest.size - 1, 2 * NEAR) < CHANCE)
-        if not again.any():
-            break
-        own[np.flatnonzero(~own)[again]] = True
-    return own
+    phase = ((time - begin[turn]) / (end - begin)[turn]) % 1.0
+    order, returns = np.argsort(phase), np.zeros(time.size, dtype=np.bool_)
+    after = np.roll(order, -1)
+    near = ((phase[after] - phase[order]) % 1.0 < CHANCE / max(time.size, 1)) & (turn[after] != turn[order])
+    returns[order[near]] = returns[after[near]] = True
+    return returns
 
 
 def _stuck(part: Array) -> Mask:
-    """The same reading in a row much more often than is usual for the channel; none where that is most of it."""
+    """The same reading in a row ten times as long as nearly all others stay; none where that is most of it."""
     starts, lengths = runs(np.concatenate([np.diff(part) == 0, [False]]))
     stuck = np.zeros(part.size, dtype=np.bool_)
-    if not starts.size:
-        return stuck
     single = part.size - int(np.sum(lengths + 1))
-    ranks = np.sort(np.concatenate([lengths + 1, np.ones(min(single, 10 * lengths.size), dtype=np.intp)]))
-    usual = float(ranks[int(0.99 * (ranks.size - 1))])
+    stays = np.sort(np.concatenate([lengths + 1, np.ones(min(single, 10 * lengths.size), dtype=np.intp)]))
+    usual = float(stays[int(0.99 * (stays.size - 1))]) if stays.size else 0.0
     long = lengths + 1 > max(STUCK, 10 * usual if usual < 0.1 * part.size else STUCK)
     for begin, length in zip(starts[long], lengths[long], strict=True):
         stuck[begin + 1 : begin + length + 1] = True
@@ -160,10 +149,9 @@ def _spikes(part: Array, wide: float) -> tuple[Mask, Array]:
     """One to three readings far from the median of those around them, and how far; wide: what the readings span."""
     finite, far, distance = np.isfinite(part), np.zeros(part.size, dtype=np.bool_), np.zeros(part.size)
     if np.count_nonzero(finite) >= 2 * WIDTH:
-        known = part[finite]
-        off = np.abs(known - median_filter(known, size=WIDTH, mode="nearest"))
-        ends = np.abs(known - median_filter(known, size=WIDTH, mode="mirror"))  # which a slope moves, too
-        distance[finite] = off = np.where(ends > wide, np.maximum(off, ends), off)
+        off, ends = (np.abs(part[finite] - median_filter(part[finite], size=WIDTH, mode=mode))
+                     for mode in ("nearest", "mirror"))  # fmt: skip
+        distance[finite] = off = np.where(ends > wide, np.maximum(off, ends), off)  # else a slope at an end
         far[finite] = off > max(FAR * 1.4826 * np.median(off), 2.5 * np.percentile(off, 99), SEEN * wide)
     return far, distance
 
@@ -250,15 +238,12 @@ def signs(
         against = courses[rate] if rate else np.full_like(courses[effort], turning)
         power, below = _power(courses[effort], against, zeros[effort])
         gives = gives or bool(below or (power.size and np.mean(power > 0) > NEARLY_ALL))
-        if below:
-            opposed = rate is not None and len(drivers) == 1 and float(np.nanmean(courses[rate])) * turning < 0
-            suspect = str(rate) if opposed else effort
-            cause = f"the sign of {suspect} is wrong, unless the load drives the motor"
-            cause = "the angle has the wrong sign" if opposed else cause
-            what = f"sign: the power into {driver} is negative in {below} ({power.mean():.4g} W): {cause}"
+        opposed = rate is not None and len(drivers) == 1 and float(np.nanmean(courses[rate])) * turning < 0
+        if below and not opposed:  # else the speed is at fault, see `speeds`
+            what = f"sign: the power into {driver} is negative in {below} ({power.mean():.4g} W): the sign of {effort} "
+            what += "is wrong, unless the load drives the motor"
             other = "" if rate else "; or sign: in angle:, if that runs backwards"
-            remedy = f"write sign: {-channels[suspect].sign}{other}"
-            yield warning("power.sign", f"channels.{suspect}", what, remedy)
+            yield warning("power.sign", f"channels.{effort}", what, f"write sign: {-channels[effort].sign}{other}")
     free = [key for joint, key in rates.items() if joint not in drivers]
     for load, key in loads.items():
         rate = rates.get(load) or (free[0] if len(free) == 1 else None)

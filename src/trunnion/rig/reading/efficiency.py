@@ -73,10 +73,10 @@ class Efficiency:
     @property
     def freedom(self) -> float:
         """Effective degrees of freedom: those of the scatter between turns by its share of u². GUM, G.4.1."""
-        own = [one.effect for one in self.contributions if one.source == "repeatability" and not one.channel]
-        scatter = sum(effect * effect for effect in own)  # not a power: near the end of the floats that is an error
-        share = self.uncertainty * self.uncertainty / scatter if scatter > 0 else float("inf")
-        return (self.turns - 1) * share * share if scatter > 0 else float("inf")
+        scatter = sum(one.effect for one in self.contributions if one.source == "repeatability")
+        share = self.uncertainty / scatter if scatter > 0 else float("inf")
+        square = share * share  # not a power: near the end of the floats that is an error
+        return (self.turns - 1) * square * square if scatter > 0 else float("inf")
 
     def factor(self, coverage: float = COVERAGE) -> float:
         """k of U = k u: Student's for the freedom, with the probability that `coverage` has of a normal one."""
@@ -132,14 +132,10 @@ def pairs_of(condition: Condition, joints: Mapping[str, str] | None = None) -> P
     )
 
 
-def efficiency_of(
-    condition: Condition, joints: Mapping[str, str] | None = None, noise: Mapping[str, float] | None = None
-) -> Efficiency:
+def efficiency_of(condition: Condition, joints: Mapping[str, str] | None = None) -> Efficiency:
     """The efficiency of one condition, with its standard uncertainty.
 
-    joints: see `pairs_of`. With fewer than two whole turns the scatter is not known, and the uncertainty is NaN. noise:
-    of each channel, the standard deviation of the mean of as many readings as there are positions and turns together;
-    it then takes the place of the scatter between turns, for an experiment that is planned.
+    joints: see `pairs_of`. With fewer than two whole turns the scatter is not known, and the uncertainty is NaN.
     Raises MechanismError where the channels do not tell both powers, no turn is whole, or no power goes in.
     """
     pairs = pairs_of(condition, joints)
@@ -166,16 +162,8 @@ def efficiency_of(
     with np.errstate(all="ignore"):
         per_turn = powers_out / powers_in
     weights = _weights(pairs, value, power_in, whole, dwell, timing)
-    if noise is None:
-        several = len(per_turn) > 1
-        scatter = float(np.std(per_turn, ddof=1)) / len(per_turn) ** 0.5 if several else float("nan")
-        repeated = [UncertaintyContribution("", "repeatability", scatter, 1.0)]
-    else:
-        repeated = [
-            UncertaintyContribution(name, "repeatability", noise.get(name, 0.0), float(np.sqrt(np.nanmean(weight**2))))
-            for name, (_, weight) in weights.items()
-        ]
-    contributions = [one for one in repeated if one.input != 0]
+    scatter = float(np.std(per_turn, ddof=1)) / len(per_turn) ** 0.5 if len(per_turn) > 1 else float("nan")
+    contributions = [UncertaintyContribution("", "repeatability", scatter, 1.0)] if scatter != 0 else []
     for name, (course, weight) in weights.items():  # of what it reads, x → (1 + gain) x + zero
         by_zero, read = float(np.nanmean(weight)), course.turns - course.accuracy.datum
         every = [

@@ -89,11 +89,12 @@ class FileAngle(Part):
 
 
 class TimeBase(Part):
-    """Where time comes from: a column with its unit, or a sampling rate."""
+    """Where time comes from: a column with its unit, or a sampling rate. dayfirst: 3/4/2026 is the third of April."""
 
     column: str | None = None
     unit: UnitText | None = None
     rate: Frequency | None = None
+    dayfirst: bool = True
 
     @model_validator(mode="after")
     def _one(self) -> TimeBase:
@@ -194,7 +195,8 @@ class Accuracies(Part):
 class Channel(Part):
     """A column that measures something of the model, and how its readings become that.
 
-    Quantity = sign · (reading − zero) · gain, or / gain, as its unit tells.
+    Quantity = sign · (reading − zero) · gain, or / gain, as its unit tells. per_turn: pulses of a speed that is worked
+    out from the time from each to the next.
     """
 
     column: str
@@ -206,9 +208,12 @@ class Channel(Part):
     range: Number | None = None
     resolution: Number | None = None
     accuracy: Accuracies = Accuracies()
+    per_turn: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
 
     @model_validator(mode="after")
     def _fitting(self) -> Channel:
+        if self.per_turn is not None and not self.measures.startswith("rate:"):
+            raise problem("pulses measure a speed only", "measure rate:JOINT, or remove per_turn")
         if self.range is not None and self.range.value <= 0:
             raise problem("the range is not above zero", "write the full scale, such as 100 N m")
         if self.resolution is not None and self.resolution.value <= 0:

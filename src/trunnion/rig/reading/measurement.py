@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, stdtrit
 
 from trunnion.errors import Finding
-from trunnion.model.units import Dimension
 from trunnion.results.attributes import finding_rows
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described
 from trunnion.rig.reading.steps import LeftOfSteps
@@ -68,6 +67,8 @@ class Signal:
     channel: its name in the mapping; measures: what it measures, as `measures.measures.named` reads it (`effort:input`,
     `rate:output`, `load:brake`); unit: SI; turns: (turn, position), NaN where there is nothing to be had.
     read_in: unit of the readings for people, factor to SI, where they are in a unit of what is measured: U/min.
+    per_turn: pulses of a speed that is worked out from them, 0 of others; local: standard uncertainty of each position
+    by itself, beside that of the accuracy.
     """
 
     channel: str
@@ -76,6 +77,8 @@ class Signal:
     turns: Array
     accuracy: Accuracy = Accuracy()
     read_in: tuple[str, float] = ("", 1.0)
+    per_turn: int = 0
+    local: Array | float = 0.0
 
     @property
     def shown(self) -> tuple[str, float]:
@@ -139,7 +142,7 @@ class Condition:
     start, cycle: coordinate of the driver at phase 0, and how far it goes in a cycle, rad; NaN where that is not known.
     lag: standard uncertainty, s, of when the coordinate is passed, of all channels together, by the sampling of pulses;
     cut: that of the angle, rad with its sign, by readings that may be cut off, alike in all files of that resolution.
-    dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI.
+    units: SI, of those of `values` that were stated with a unit; the others are plain numbers.
     duration: of a cycle that is a time, s; NaN of one that is an angle.
     """
 
@@ -153,7 +156,7 @@ class Condition:
     cycle: float = float("nan")
     lag: float = 0.0
     cut: float = 0.0
-    dimensions: Mapping[str, Dimension] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
     duration: float = float("nan")
 
 

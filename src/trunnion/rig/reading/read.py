@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.quantity import Quantity
-from trunnion.model.units import BASES, Dimension, UnitError
+from trunnion.model.units import UnitError, si_unit
 from trunnion.rig.reading import checks
 from trunnion.rig.reading.angle import coordinate
 from trunnion.rig.reading.channels import (
@@ -34,10 +33,10 @@ from trunnion.rig.reading.log import counted, gathered, note, warning
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Zero, read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
 from trunnion.rig.reading.steps import LeftOfSteps, left_in_turns
-from trunnion.rig.reading.tables import DataTable, read_table
+from trunnion.rig.reading.tables import Column, DataTable, read_table
 from trunnion.rig.reading.timebase import timeline
 from trunnion.rig.reading.turns import DENSE, Turns, cut, joined, resampled, time_mean
-from trunnion.rig.reading.units import Dimensions, dimensions
+from trunnion.rig.reading.units import dimensions, unit_name
 
 __all__ = ["read_measured"]
 
@@ -136,25 +135,31 @@ def _distinct(conditions: Sequence[Condition]) -> list[Condition]:
 class _Part:
     """One condition of a file.
 
-    values: numbers of the model that were set, SI, by name; dimensions: of those that were stated with a unit; means:
-    channels whose mean is the value; window: rows from the first to the last for which it was set; rows: those for
-    which it was; courses: of the channels, (turn, position); left: what of the error by steps its turns repeat.
+    texts: numbers of the model that were set, as written, by name; values: the same and what is measured, SI; units:
+    of those that were stated with a unit, SI; means: channels whose mean is the value; window: rows from the first to
+    the last for which it was set; rows: those of them for which it was; courses: of the channels, (turn, position);
+    left: what of the error by steps its turns repeat.
     """
 
-    name: str
+    texts: dict[str, str]
     values: dict[str, float]
-    dimensions: dict[str, Dimension]
-    means: Mapping[str, str]
+    units: dict[str, str]
+    means: dict[str, str]
     window: slice
-    rows: NDArray[np.bool_]
+    rows: NDArray[np.bool_] = field(init=False)
     turns: Turns = field(init=False)
     courses: dict[str, Array] = field(default_factory=dict)
     left: dict[str, LeftOfSteps] = field(default_factory=dict)
 
     @property
+    def name(self) -> str:
+        """By what was set in it; empty where nothing was."""
+        return ", ".join(f"{path} {text}" for path, text in self.texts.items())
+
+    @property
     def where(self) -> str:
         """What a finding about the condition is about; its file says which one, where nothing is set."""
-        return f"condition {self.name}" if self.name else "turns"
+        return f"condition {self.name}" if self.texts else "turns"
 
 
 class _Recording:
@@ -206,7 +211,7 @@ class _Recording:
             say(checks.missing(where, column, values, self.line.seconds))
             if sensor.limit is not None:
                 say(checks.clipped(where, values, sensor.limit, sensor.unit, self.line.seconds))
-            self.zeros[name] = zeroed(name, channel, sensor, values, self.line, mapping.drift == "remove", say)
+            self.zeros[name] = zeroed(name, channel, sensor, values, self.line, say)
         self.used = np.ones(self.line.seconds.size, dtype=np.bool_)
         if self.entry.over is not None:
             begin, end = (one.value for one in self.entry.over)
@@ -242,7 +247,7 @@ class _Recording:
                 what = f"the channel '{name}' is a speed in {sensor.scale.unit}, not of a turning driver"
                 raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s"))
             sign = mapping.channels[name].sign
-            speed = sensor.quantity(self.readings[name], self.zeros[name], sign, self.line.seconds)
+            speed = sensor.quantity(self.readings[name], self.zeros[name], sign)
         angle = coordinate(mapping.angle, self.table, self.line, speed, self.say)
         self.lag, self.cut = angle.lag, angle.cut
         known = np.flatnonzero(np.isfinite(angle.values) & self.used)
@@ -254,59 +259,51 @@ class _Recording:
 
     def _settings(self) -> list[_Part]:
         """The conditions of the file: one, or as many as the columns that state them take different values."""
-        values, kinds, texts, means, columns = {}, dict[str, Dimension](), dict[str, str](), {}, dict[str, str]()
+        whole, size = _Part({}, {}, {}, {}, slice(0, self.line.seconds.size)), self.line.seconds.size
+        columns: dict[str, tuple[Column, float, str]] = {}  # with the factor to SI and the unit
         for path, one in self.mapping.settings(self.entry).items():
             if isinstance(one, Quantity):
-                values[path], texts[path] = float(one.evaluate()), str(one.source)
+                whole.values[path], whole.texts[path] = float(one.evaluate()), str(one.source)
                 kind = None if one.expression and one.expression.bare else one.check({})
-                kinds |= {path: kind} if kind is not None else {}
+                whole.units |= {path: si_unit(kind)} if kind is not None else {}
             elif one.mean is not None:
-                means[path] = one.mean
+                whole.means[path] = one.mean
             else:
-                columns[path] = str(one.column)
-        size = self.line.seconds.size
+                column = self.table.columns[str(one.column)]
+                unit = one.unit or column.unit
+                try:
+                    factor, exponents = dimensions(unit) if unit else (1.0, {})
+                except UnitError as error:
+                    remedy = f"state the unit: set: {{{path}: {{column: …, unit: …}}}}; in the file, {error.remedy}"
+                    raise MechanismError(Finding(error.what, f"set.{path}", remedy)) from None
+                columns[path] = column, factor, unit
+                whole.units |= {path: unit_name(exponents)} if unit else {}
         if not columns:
-            everywhere = np.ones(size, dtype=np.bool_)
-            return [_Part(_named(texts), values, kinds, means, slice(0, size), everywhere)]
-        units, factors = self._units_of(columns)
-        kinds |= {path: kind for path, (_, kind) in factors.items() if kind is not None}
-        raw = np.column_stack([self.line.rows(self.table.columns[name].values) for name in columns.values()])
-        known = np.isfinite(raw).all(axis=1)
-        if not known.any():
+            whole.rows = np.ones(size, dtype=np.bool_)
+            return [whole]
+        raw = np.column_stack([self.line.rows(column.values) for column, _, _ in columns.values()])
+        stated = np.isfinite(raw).all(axis=1)
+        if not stated.any():
             what = "the columns that state the condition have no numbers"
             raise MechanismError(Finding(what, "set", "check set: {…: {column: …}}"))
-        if not known.all():
-            what = f"{counted(int(np.count_nonzero(~known)), 'row')} of {size:,} without a condition; left out"
+        if not stated.all():
+            what = f"{counted(int(np.count_nonzero(~stated)), 'row')} of {size:,} without a condition; left out"
             self.say(warning("setting.missing", "set", what, "check the column"))
-        levels, which = np.unique(_rounded(raw[known]), axis=0, return_inverse=True)
+        levels, which = np.unique(_rounded(raw[stated]), axis=0, return_inverse=True)
         if len(levels) > MOST_VALUES:
             what = f"the columns that state the condition have {len(levels):,} different values"
             raise MechanismError(Finding(what, "set", "a measured value is not a setting: write {mean: channel}"))
         number, parts = np.full(size, -1), []
-        number[known] = which.ravel()
+        number[stated] = which.ravel()
         for k in dict.fromkeys(which.ravel().tolist()):  # in the order of the file
             rows = np.flatnonzero(number == k)
             window = slice(int(rows[0]), int(rows[-1]) + 1)
-            own = dict(zip(columns, levels[k].tolist(), strict=True))
-            name = _named(texts | {path: f"{value:.6g} {units[path]}".strip() for path, value in own.items()})
-            si = values | {path: value * factors[path][0] for path, value in own.items()}
-            parts.append(_Part(name, si, dict(kinds), means, window, number[window] == k))
+            part = _Part(dict(whole.texts), dict(whole.values), dict(whole.units), whole.means, window)
+            for (path, (_, factor, unit)), value in zip(columns.items(), levels[k].tolist(), strict=True):
+                part.texts[path], part.values[path] = f"{value:.6g} {unit}".strip(), value * factor
+            part.rows = number[window] == k
+            parts.append(part)
         return parts
-
-    def _units_of(self, columns: Mapping[str, str]) -> tuple[dict[str, str], dict[str, tuple[float, Dimension | None]]]:
-        """Units of the columns that state settings, and their factors to SI with their dimensions."""
-        stated = self.mapping.settings(self.entry)
-        units, factors = {}, dict[str, tuple[float, Dimension | None]]()
-        for path, column in columns.items():
-            one = stated[path]
-            unit = units[path] = (one.unit if isinstance(one, FromData) else "") or self.table.columns[column].unit
-            try:
-                factor, exponents = dimensions(unit) if unit else (1.0, {})
-                factors[path] = factor, _dimension(exponents, unit) if unit else None
-            except UnitError as error:
-                remedy = f"state the unit: set: {{{path}: {{column: …, unit: …}}}}; in the file, {error.remedy}"
-                raise MechanismError(Finding(error.what, f"set.{path}", remedy)) from None
-        return units, factors
 
     def _check_sampling(self) -> None:
         """How turns are sampled, whether they are enough and equally fast, and stretches without load in them."""
@@ -365,10 +362,9 @@ class _Recording:
         if not self.mapping.timed:
             turning = self._speed(self.parts)
             zeros = {name: accuracy.zero for name, accuracy in accuracies.items()}
-            wrong = list(checks.signs(channels, together, zeros, turning))
             units = {name: sensor.shown for name, sensor in self.sensors.items()}
-            speed = checks.speeds(channels, together, units, turning)
-            for finding in [*wrong, *([speed] if speed and speed.where not in {one.where for one in wrong} else [])]:
+            self.say(checks.speeds(channels, together, units, turning))
+            for finding in checks.signs(channels, together, zeros, turning):
                 self.say(finding)
         return [self._condition(part, accuracies) for part in self.parts]
 
@@ -379,12 +375,11 @@ class _Recording:
         readings = self.readings.pop(name)
         step = sensor.resolution or steps[name, sensor.unit, sensor.scale.factor]
         noise = noise_of(readings[self.running])
-        values = sensor.quantity(readings, zero, channel.sign, line.seconds)
+        values = sensor.quantity(readings, zero, channel.sign)
         angle = values if sensor.scale.unit == "rad" else None
         values = values if angle is None else joined(angle)
         if self.mapping.filter is not None:
-            values, finding = filtered(values, line, self.mapping.filter, where)
-            self.say(finding)
+            values = filtered(values, line, self.mapping.filter)
         for part in self.parts:
             part.courses[name] = resampled(part.turns, values, angle)
         if self.mapping.filter is None:  # the scatter of turns may show less noise than neighbouring readings do
@@ -424,43 +419,29 @@ class _Recording:
         mapping, courses = self.mapping, dict[str, Signal]()
         for name, channel in mapping.channels.items():
             sensor, accuracy = self.sensors[name], accuracies[name]
-            course = Signal(name, channel.measures, sensor.scale.unit, part.courses[name], accuracy, sensor.read_in)
+            course = Signal(name, channel.measures, sensor.scale.unit, part.courses[name], accuracy, sensor.read_in,
+                            channel.per_turn or 0)  # fmt: skip
             cut_off = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
             courses[name] = replace(course, accuracy=replace(accuracy, cut=cut_off, left=part.left.get(name)))
-        values, kinds = part.values, part.dimensions
         speed = np.nan if mapping.timed else self._speed([part])
         for path, name in part.means.items():
             if name not in courses:  # of the angle
-                values[path], kinds[path] = speed, _dimension(dimensions("rad/s")[1], "rad/s")
+                part.values[path], part.units[path] = speed, "rad/s"
                 continue
             if not np.isfinite(courses[name].turns).any():
                 what = f"the channel '{name}', whose mean it is, has no value in any turn"
                 raise MechanismError(Finding(what, f"set.{path}", "correct the channel, or state it"))
-            values[path] = time_mean(part.turns, courses[name].turns)
-            kinds[path] = _dimension(self.sensors[name].scale.of_quantity, courses[name].unit)
+            part.values[path], part.units[path] = time_mean(part.turns, courses[name].turns), courses[name].unit
         start, span, duration = self.start, self.cycle, np.nan
         if mapping.timed:
             start, span, duration = np.nan, np.nan, self.cycle
         return Condition(
-            part.name or self.path.stem, values, np.arange(mapping.positions) / mapping.positions, courses,
-            (str(self.path),), speed, start, span, lag=self.lag, cut=self.cut, dimensions=kinds, duration=duration,
+            part.name or self.path.stem, part.values, np.arange(mapping.positions) / mapping.positions, courses,
+            (str(self.path),), speed, start, span, lag=self.lag, cut=self.cut, units=part.units, duration=duration,
         )  # fmt: skip
 
 
 # ---- helpers --------------------------------------------------------------------------------------------------
-
-
-def _named(texts: Mapping[str, str]) -> str:
-    """Name of a condition by what was set in it."""
-    return ", ".join(f"{path} {text}" for path, text in texts.items())
-
-
-def _dimension(exponents: Dimensions, unit: str) -> Dimension:
-    """Exponents of a unit as a dimension of the model; UnitError for volts, degrees of temperature and the like."""
-    if any(power for name, power in exponents.items() if name not in BASES[:4]):
-        raise UnitError(f"the unit '{unit}' is none that a number of a model has", "write one such as deg, mm or N m")
-    length, mass, time, angle = (Fraction(exponents.get(name, 0)) for name in BASES[:4])
-    return length, mass, time, angle
 
 
 def _rounded(values: Array) -> Array:
@@ -499,7 +480,7 @@ def _of_text(where: str, table: DataTable, name: str) -> Finding | None:
     """A column most of whose cells are text, and no times; where: the entry that names it."""
     column = table.columns[name]
     numbers = int(np.count_nonzero(~np.isnan(column.values)))
-    if column.stamp or column.texts <= numbers:
+    if column.stamps or column.texts <= numbers:
         return None
     what = f"'{name}' has text in {column.texts:,} cells and a number in {numbers:,}; the first text is "
     remedy, figures = (

@@ -150,6 +150,12 @@ class Rig(Part):
         except MechanismError as error:
             raise MechanismError(place(error.findings, str(path), lines, data)) from None
 
+    @property
+    def names(self) -> list[str]:
+        """Names of the conditions, and of their files: run-01, run-02, …"""
+        count = len(self.schedule.rows())
+        return [f"run-{number:0{max(2, len(str(count)))}d}" for number in range(1, count + 1)]
+
     def column(self, sensor: str) -> str:
         """The column of the readings of a sensor."""
         return self.sensors[sensor].column or sensor

@@ -9,15 +9,12 @@ that begin with # are passed over, and so is what a logger writes above the head
 
 from __future__ import annotations
 
-import codecs
 import csv
 import importlib.util
 import re
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
-from datetime import datetime, time
-from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -34,21 +31,20 @@ __all__ = ["FORMATS", "Column", "DataTable", "read_table", "ungrouped"]
 
 Array = NDArray[np.float64]
 SHOWN = 40  # columns named in a message
-MOST = 100_000_000  # numbers of a binary file in memory, 0.8 GB: a small file may unfold to any size
 
 
 @dataclass(frozen=True)
 class Column:
     """Numbers of one column. unit: as the file states it; texts: cells that are text, with the first of them.
 
-    stamp: the first time of day or time stamp of a column of such; its values are seconds since then.
+    stamps: the cells themselves where these are times of day or time stamps; there are no numbers then.
     """
 
     values: Array
     unit: str = ""
     texts: int = 0
     example: str = ""
-    stamp: str = ""
+    stamps: tuple[str, ...] = ()
 
     def factor(self, where: str, name: str, stated: str | None, si: str, say: Callable[[Finding], None]) -> float:
         """What a 1 in the column is, SI: in the unit that is stated, else in the file's, else it is SI.
@@ -68,6 +64,22 @@ class Column:
             what = f"the column '{name}' has the unit '{unit}', which is no {where}"
             raise MechanismError(Finding(what, where, "name another column"))
         return factor
+
+    def seconds(self, dayfirst: bool = True) -> Array:
+        """Seconds since the first time stamp, or since the first time of day; NaN of what is neither."""
+        import pandas as pd
+
+        texts = pd.Series(self.stamps).str.replace(",", ".").str.replace(_WHOLE, r"\g<0>.0", regex=True)
+        if _DAYTIME.match(self.example):
+            times = pd.to_timedelta(texts, errors="coerce")
+        else:  # in the order of ISO 8601 no day comes first
+            order: dict[str, Any] = {"format": "ISO8601"} if _YEAR.match(self.example) else {"dayfirst": dayfirst}
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # of an order that the first stamp shows to be another
+                times = pd.to_datetime(texts, errors="coerce", utc=True, **order)
+        since = times - times.loc[times.first_valid_index()] if times.notna().any() else times
+        whole = since.astype("timedelta64[ns]").to_numpy().astype(np.int64)  # exact, unlike seconds since 1970
+        return np.where(times.notna(), whole * 1e-9, np.nan)
 
 
 @dataclass(frozen=True)
@@ -148,10 +160,15 @@ def _places(path: Path, present: Sequence[str], names: Sequence[str], optional: 
 
 NOTHING = frozenset({"", "nan", "n/a", "na", "#n/a", "null", "none", "-nan", "inf", "-inf", "+inf", "infinity"})
 GROUPED = {  # thousands with a sign between them; of a point or a comma only where decimals tell which of them it is
-    ",": re.compile(r"[-+]?\d{1,3}(?:(?:\.\d{3})+,\d+|(?:['’\u00a0\u202f ]\d{3})+(?:,\d+)?)"),
-    ".": re.compile(r"[-+]?\d{1,3}(?:(?:,\d{3})+\.\d+|(?:['’\u00a0\u202f ]\d{3})+(?:\.\d+)?)"),
+    ",": re.compile(r"[-+]?\d{1,3}(?:(?:\.\d{3})+,\d+|(?:[\u00a0\u202f ]\d{3})+(?:,\d+)?)"),
+    ".": re.compile(r"[-+]?\d{1,3}(?:(?:,\d{3})+\.\d+|(?:[\u00a0\u202f ]\d{3})+(?:\.\d+)?)"),
 }
-_BETWEEN = re.compile(r"[.,'’\u00a0\u202f ](?=\d{3}(?:\D|$))")
+_BETWEEN = re.compile(r"[.,\u00a0\u202f ](?=\d{3}(?:\D|$))")
+_COMMA = re.compile(r"[-+]?(?:\d{1,3}(?:[.\u00a0\u202f ]\d{3})+|\d*),\d+(?:[eE][-+]?\d+)?")
+_POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
+_WHOLE = re.compile(r"\d:\d\d:\d\d(?![\d.])", re.ASCII)  # seconds without a fraction
+_DAYTIME, _YEAR = re.compile(r"\d{1,2}:", re.ASCII), re.compile(r"\d{4}-", re.ASCII)
+_TIME = re.compile(r"(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[ T]\s*)?\d{1,2}:[0-5]\d:[0-5]\d.*", re.ASCII)
 
 
 def _number(text: object) -> float:
@@ -176,88 +193,27 @@ def _column(cells: Any, unit: str = "", decimal: str = ".") -> Column:
     if cells.dtype.kind in "fiub":
         return Column(np.asarray(cells, dtype=np.float64), unit)
     if cells.dtype.kind in "mM":
-        known = ~np.isnat(cells)
-        if cells.dtype.kind == "M":
-            cells = cells.astype("datetime64[ns]")
-            cells = cells - (cells[known][0] if known.any() else np.datetime64(0, "ns"))
-        seconds = cells.astype("timedelta64[ns]").astype(np.int64) * 1e-9
-        return Column(np.where(known, seconds, np.nan), unit)
-    texts, example = 0, ""
-    values = np.empty(cells.size)
-    for place, cell in enumerate(rows := [str(cell) if isinstance(cell, time) else cell for cell in cells.tolist()]):
-        text = ungrouped(cell.strip().replace("−", "-"), decimal) if isinstance(cell, str) else cell
-        values[place] = _number(text)
-        if np.isnan(values[place]) and isinstance(text, str) and text.casefold() not in NOTHING:
-            texts, example = texts + 1, example or str(cell).strip()[:40]
-    if texts and _TIME.fullmatch(example) and not np.isfinite(values).any():
-        return Column(_seconds(rows), unit, texts, example, example)
-    return Column(values, unit, texts, example)
-
-
-_TIME = re.compile(
-    r"(?:(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[ T]\s*)?"
-    r"(?P<hour>\d{1,2}):(?P<minute>[0-5]\d):(?P<second>[0-5]\d)(?:[.,](?P<part>\d{1,12}))?"
-    r"(?:\s?(?P<noon>[AaPp])[Mm])?(?:\s?(?:Z|(?P<zone>[-+]\d\d):?(?P<off>\d\d)))?",
-    re.ASCII,
-)
-DAY = 86_400 * 10**9
-
-
-def _seconds(cells: Sequence[Any]) -> Array:
-    """Seconds since the first of times of day and time stamps, NaN where there is none.
-
-    In whole nanoseconds: seconds since a year as floats would be off by more than a sample. Without a date a step back
-    by more than half a day is midnight. ValueError, in words, where the dates do not show their order.
-    """
-    found = [_TIME.fullmatch(cell.strip()) if isinstance(cell, str) else None for cell in cells]
-    stamps = {place: stamp for place, stamp in enumerate(found) if stamp is not None and int(stamp["hour"]) < 24}
-    days = _day_numbers(list(dict.fromkeys(stamp["date"] or "" for stamp in stamps.values())))
-    when = np.empty(len(stamps), np.int64)
-    for k, stamp in enumerate(stamps.values()):
-        hour, minute = int(stamp["hour"]), int(stamp["minute"])
-        if stamp["noon"]:
-            hour = hour % 12 + 12 * (stamp["noon"] in "Pp")
-        if stamp["zone"]:
-            hour, minute = hour - int(stamp["zone"]), minute - int(stamp["zone"][0] + stamp["off"])
-        part = int((stamp["part"] or "").ljust(9, "0")[:9])
-        when[k] = days[stamp["date"] or ""] * DAY + (3600 * hour + 60 * minute + int(stamp["second"])) * 10**9 + part
-    if list(days) == [""]:
-        when += DAY * np.concatenate([[0], np.cumsum(np.diff(when) < -DAY // 2)])
-    values = np.full(len(cells), np.nan)
-    values[list(stamps)] = (when - when[:1]) * 1e-9
-    return values
-
-
-def _day_numbers(dates: Sequence[str]) -> dict[str, int]:
-    """Number of the day of every date; 0 where there is none. ValueError if they may be read in two ways."""
-    if dates == [""]:
-        return {"": 0}
-    sign = next((one for one in "./-" if one in dates[0]), "-")
-    read: list[list[int]] = []
-    for order in ("%Y-%m-%d", "%d-%m-%Y", "%m-%d-%Y", "%d-%m-%y", "%m-%d-%y"):
-        with suppress(ValueError):
-            read.append([datetime.strptime(one, order.replace("-", sign)).toordinal() for one in dates])
-    if not read:
-        raise ValueError(f"the dates, such as {dates[0] or dates[-1]}, are not all dates of one form")
-    if sign != "." and len({tuple(np.subtract(days, days[0])) for days in read}) > 1:
-        raise ValueError(f"the dates, such as {dates[0]}, may begin with the day or with the month")
-    return {date: day - read[0][0] for date, day in zip(dates, read[0], strict=True)}
+        there = ~np.isnat(cells)
+        ticks = cells.astype(f"{'timedelta' if cells.dtype.kind == 'm' else 'datetime'}64[ns]").astype(np.int64)
+        since = ticks[there][0] if cells.dtype.kind == "M" and there.any() else 0
+        return Column(np.where(there, (ticks - since) * 1e-9, np.nan), unit)
+    rows = ["" if cell is None or (isinstance(cell, float) and np.isnan(cell)) else str(cell).strip() for cell in cells]
+    values = np.array([_number(ungrouped(row.replace("−", "-"), decimal)) for row in rows])
+    texts = [row for row, value in zip(rows, values, strict=True) if np.isnan(value) and row.casefold() not in NOTHING]
+    if texts and _TIME.fullmatch(texts[0]) and not np.isfinite(values).any():
+        return Column(values, unit, len(texts), texts[0], tuple(rows))
+    return Column(values, unit, len(texts), texts[0][:40] if texts else "")
 
 
 # ---- text -----------------------------------------------------------------------------------------------------
 
-HEAD = 1 << 16  # bytes in which the header and the first rows are looked for, and more where the lines are long
-LINES = 20  # that are read at least
-LONGEST = 1 << 24  # bytes in which the first lines have to end
-FIRST = 200  # lines in which the header may stand, and rows that show how numbers are written
+FIRST = 200  # lines in which the header may stand, and as many rows that show how numbers are written
+LONGEST = 1 << 24  # signs in which a line has to end
 WIDE = 40  # columns from which those that are not asked for are passed over, and too many cells in a row not seen
-MOST_ABOVE = 3  # rows of units and remarks between names and numbers
 GERMAN = ("Grad", "U/min", "Umin", "Umdr./min")  # units in headings, if not all are read without the mapping's word
 _NO_UNIT = ("", "-", "–", "1")
 _UNIT = re.compile(r"^(.*?)\s*\[([^\[\]]*)\]\s*$", re.DOTALL)
 _BEHIND = re.compile(r"^(.*?\S)\s*(?:\(([^()]+)\)|(?:\s/|\sin)\s+(\S.*))$", re.DOTALL)  # T (V), T / V, T in V
-_COMMA = re.compile(r"[-+]?(?:\d{1,3}(?:\.\d{3})+|\d{1,3}(?:['’\u00a0\u202f ]\d{3})+|\d*),\d+(?:[eE][-+]?\d+)?")
-_POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -299,39 +255,31 @@ def _read_text(path: Path, names: Sequence[str], optional: Sequence[str]) -> Dat
         if layout.decimal == "," and cells.dtype.kind not in "fiub":
             points = (cell for cell in cells.tolist() if isinstance(cell, str) and _POINT.fullmatch(cell.strip()))
             if (point := next(points, None)) is not None:  # of thousands or of decimals
-                told = f"'{point.strip()[:20]}' in '{name}' beside decimal commas"
-                what = f"decimal and thousands signs are mixed: {told}"
+                what = (
+                    f"decimal and thousands signs are mixed: '{point.strip()[:20]}' in '{name}' beside decimal commas"
+                )
                 remedy = "export it without a sign between thousands, and with one sign for decimals"
                 raise _failed(path, what, remedy)
-        columns[name] = _with_times(path, name, cells, layout.units[place], layout.decimal)
+        columns[name] = _column(cells, layout.units[place], layout.decimal)
     return DataTable(str(path), columns, encoding=layout.encoding)
 
 
-def _with_times(path: Path, name: str, cells: Any, unit: str, decimal: str = ".") -> Column:
-    """A column; MechanismError where its dates may be read in two ways."""
-    try:
-        return _column(cells, unit, decimal)
-    except ValueError as error:
-        remedy = "write them as 2026-11-22 11:40:00.0002, or state time: {rate: …}"
-        raise _failed(path, f"{name}: {error}", remedy) from None
-
-
 def _first_lines(path: Path) -> tuple[list[str], str]:
-    """The first lines and their encoding."""
+    """The first lines and their encoding: UTF-16 by its mark, UTF-8 where that can be, else Windows-1252."""
     with path.open("rb") as file:
-        raw = file.read(HEAD)
-        while max(raw.count(b"\n"), raw.count(b"\r")) < LINES and len(raw) < LONGEST and (more := file.read(len(raw))):
-            raw += more
-        if not (b"\n" in raw or b"\r" in raw) and file.read(1):
+        marked = file.read(2) in (b"\xff\xfe", b"\xfe\xff")
+    for encoding in ["utf-16"] if marked else ["utf-8-sig", "cp1252", "latin-1"]:
+        try:
+            with path.open(encoding=encoding) as stream:
+                lines = [stream.readline(LONGEST) for _ in range(2 * FIRST)]
+        except UnicodeDecodeError:
+            continue
+        if any("\0" in line for line in lines):
+            raise _failed(path, "is not a text file", "check that it is CSV; use .tdms or .parquet for binary files")
+        if any(len(line) == LONGEST for line in lines):
             what = f"has no end of a line in its first {LONGEST >> 20} MiB"
             raise _failed(path, what, "check that it is CSV, with a row of the table in each line", 1)
-    encodings = ["utf-16"] if raw.startswith((b"\xff\xfe", b"\xfe\xff")) else ["utf-8-sig", "cp1252", "latin-1"]
-    if b"\0" in raw and encodings[0] != "utf-16":
-        raise _failed(path, "is not a text file", "check that it is CSV; use .tdms or .parquet for binary files")
-    for encoding in encodings:
-        with suppress(UnicodeDecodeError):
-            text = codecs.getincrementaldecoder(encoding)().decode(raw)  # the last sign may be cut in two
-            return text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), encoding
+        return [line.rstrip("\n") for line in lines], encoding
     raise _failed(path, "is not a text file", "save it as UTF-8")
 
 
@@ -362,13 +310,11 @@ def _layout(path: Path, wanted: set[str]) -> _Layout:
         what = f"has no header: its first line is {', '.join(cells[:4])}"
         raise _failed(path, what, remedy, stated[header][0] + 1)
     rows = [(place, _cells(line, separator)) for place, line in stated[header + 1 :][:FIRST]]
-    above = [
-        ["" if cell.strip("[]() ") in _NO_UNIT else cell.strip("[]() ") for cell in row]
-        for row in takewhile(_words, [row for _, row in rows[:MOST_ABOVE]])
-    ]
-    of_row = next((row for row in above if any(map(_is_unit, row))), above[0] if above else [])
-    units = [unit or (of_row[k] if k < len(of_row) else "") for k, (_, unit) in enumerate(named)]
-    rows, skip = rows[len(above) :], stated[header + len(above)][0] + 1
+    skip, units = stated[header][0] + 1, [unit for _, unit in named]
+    if rows and _words(rows[0][1]):  # a row of units
+        below = ["" if cell.strip("[]() ") in _NO_UNIT else cell.strip("[]() ") for cell in rows[0][1]]
+        units = [unit or (below[k] if k < len(below) else "") for k, unit in enumerate(units)]
+        skip, rows = rows[0][0] + 1, rows[1:]
     sample = [cell for _, row in rows for (name, _), cell in zip(named, row, strict=False) if name in wanted]
     comma = separator != "," and any(_COMMA.fullmatch(cell) for cell in sample)
     for place, row in rows:
@@ -392,21 +338,22 @@ def _named(cell: str, wanted: set[str]) -> tuple[str, str]:
     A name that is wanted with its unit in it stays whole.
     """
     cell = unguarded(cell.strip().strip('"').strip())
-    if found := _UNIT.match(cell):
-        unit = "" if found[2].strip() in _NO_UNIT else found[2].strip()
-        return (cell if cell in wanted else found[1]), unit
-    found = _BEHIND.match(cell)
-    unit = (found[2] or found[3]).strip() if found else ""
-    if not found or not (_is_unit(unit) or unit in GERMAN):
-        return cell, ""
-    return (cell if cell in wanted else found[1]), unit
+    match, unit = _UNIT.match(cell), ""
+    if match:
+        unit = "" if match[2].strip() in _NO_UNIT else match[2].strip()
+    elif match := _BEHIND.match(cell):
+        unit = (match[2] or match[3]).strip()
+        if not (_is_unit(unit) or unit in GERMAN):
+            return cell, ""
+    return (cell if cell in wanted or match is None else match[1]), unit
 
 
 def _words(cells: Sequence[str]) -> bool:
-    """Whether there is no number and no time in a row, and at least one word."""
-    if any(not np.isnan(_number(cell.replace(",", "."))) or _TIME.fullmatch(cell) for cell in cells if cell != "1"):
+    """Whether there is no number and no time in a row, and at least one unit or more words than one."""
+    texts = [cell.strip("[]() ") for cell in cells if cell and cell != "1"]
+    if any(not np.isnan(_number(cell.replace(",", "."))) or _TIME.fullmatch(cell) for cell in texts):
         return False
-    return any(re.search(r"[^\W\d_]|[°%‰]", cell) and cell.casefold() not in NOTHING for cell in cells)
+    return any(re.search(r"[^\W\d_]|[°%‰]", cell) and cell.casefold() not in NOTHING for cell in texts)
 
 
 def _is_unit(text: str) -> bool:
@@ -419,42 +366,26 @@ def _is_unit(text: str) -> bool:
 # ---- Parquet and TDMS -----------------------------------------------------------------------------------------
 
 
-def _check_size(path: Path, rows: int, columns: int) -> None:
-    """MechanismError for a file that unfolds to more than memory is to be asked for, before it is read."""
-    if rows * columns > MOST:
-        what = f"{rows:,} rows of {columns} columns unfold to {8e-9 * rows * columns:.3g} GB"
-        most = f"at most {MOST / 1e6:,.0f} million numbers ({8e-9 * MOST:.2g} GB) are read"
-        raise _failed(path, f"{what}; {most}", "split it by time or working condition, or sample more slowly")
-
-
 def _read_parquet(path: Path, names: Sequence[str], optional: Sequence[str]) -> DataTable:
     """The columns of a Parquet file; a unit is the entry `unit` or `units` of the column's metadata."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
-        schema = pq.read_schema(path)
-        places = _places(path, list(schema.names), names, optional)
-        nested = [name for name in places if pa.types.is_nested(schema.field(name).type)]
-        if nested:
-            what = f"the column '{nested[0]}' has {schema.field(nested[0]).type} in each cell, not a number"
-            raise _failed(path, what[:200], "write one column for each number")
-        _check_size(path, pq.read_metadata(path).num_rows, len(places))
-        words = [name for name in places if not pa.types.is_primitive(schema.field(name).type)]
-        columns = {}
-        for name in places:  # one after the other: memory is that of the numbers; a text that repeats is held once
-            with pq.ParquetFile(path, read_dictionary=words) as file:
-                cells = file.read(columns=[name]).column(name).unify_dictionaries().combine_chunks()
-            if pa.types.is_dictionary(cells.type):
-                texts = np.array([*cells.dictionary.to_pylist(), None], dtype=object)
-                cells = texts[cells.indices.fill_null(len(texts) - 1).to_numpy()]
-            else:
-                cells = cells.to_pandas()
-            meta = schema.field(name).metadata or {}
-            unit = (meta.get(b"unit") or meta.get(b"units") or b"").decode("utf-8", "replace")
-            columns[name] = _with_times(path, name, cells, unit)
+        with pq.ParquetFile(path) as file:
+            schema = file.schema_arrow
+            places = _places(path, list(schema.names), names, optional)
+            table = file.read(columns=list(places))
     except pa.ArrowException as error:
         raise _failed(path, f"is not Parquet: {str(error).splitlines()[0][:120]}", "check the file") from None
+    columns = {}
+    for name in places:
+        if pa.types.is_nested(schema.field(name).type):
+            what = f"the column '{name}' has {schema.field(name).type} in each cell, not a number"
+            raise _failed(path, what[:200], "write one column for each number")
+        meta = schema.field(name).metadata or {}
+        unit = (meta.get(b"unit") or meta.get(b"units") or b"").decode("utf-8", "replace")
+        columns[name] = _column(table.column(name).to_pandas(), unit)
     return DataTable(str(path), columns)
 
 
@@ -477,27 +408,23 @@ def _read_tdms(path: Path, names: Sequence[str], optional: Sequence[str]) -> Dat
 def _channels(path: Path, file: Any, names: Sequence[str], optional: Sequence[str]) -> DataTable:
     full = {f"{group.name}/{channel.name}": channel for group in file.groups() for channel in group.channels()}
     short = [channel.name for channel in full.values()]
-    present = [channel.name if short.count(channel.name) == 1 else name for name, channel in full.items()]
-    channels = dict(zip(present, full.values(), strict=True))
-    alias = dict(zip(full, present, strict=True))
+    alias = {name: one.name if short.count(one.name) == 1 else name for name, one in full.items()}
+    channels = {alias[name]: channel for name, channel in full.items()}
     asked = {name: alias.get(name, name) for name in (*names, *optional)}
-    _places(path, present, [asked[name] for name in names], [asked[name] for name in optional])
-    asked = {name: own for name, own in asked.items() if own in channels}
-    lengths = {name: len(channels[own]) for name, own in asked.items()}
-    if len(set(lengths.values())) > 1:
-        told = ", ".join(f"'{name}' {size:,}" for name, size in lengths.items())
-        raise _failed(path, f"its channels have different numbers of samples: {told}", "record them at one rate")
-    _check_size(path, max(lengths.values(), default=0), len(asked))
+    _places(path, list(alias.values()), [asked[name] for name in names], [asked[name] for name in optional])
+    chosen = {name: channels[short] for name, short in asked.items() if short in channels}
+    if len({len(channel) for channel in chosen.values()}) > 1:
+        lengths = ", ".join(f"'{name}' {len(channel):,}" for name, channel in chosen.items())
+        raise _failed(path, f"its channels have different numbers of samples: {lengths}", "record them at one rate")
     columns, intervals = {}, set()
-    for name, own in asked.items():
-        properties = channels[own].properties
-        columns[name] = _with_times(path, name, channels[own][:], str(properties.get("unit_string", "") or ""))
-        step = properties.get("wf_increment")
+    for name, channel in chosen.items():
+        columns[name] = _column(channel[:], str(channel.properties.get("unit_string", "") or ""))
+        step = channel.properties.get("wf_increment")
         if isinstance(step, (int, float)) and step > 0:
-            intervals.add((float(properties.get("wf_start_offset", 0.0)), float(step)))
+            intervals.add((float(channel.properties.get("wf_start_offset", 0.0)), float(step)))
     if len({round(step, 15) for _, step in intervals}) > 1:
-        told = " and ".join(f"{1 / step:g} Hz" for _, step in sorted(intervals))
-        raise _failed(path, f"its channels are sampled at {told}", "record them at one rate")
+        rates = " and ".join(f"{1 / step:g} Hz" for _, step in sorted(intervals))
+        raise _failed(path, f"its channels are sampled at {rates}", "record them at one rate")
     return DataTable(str(path), columns, next(iter(sorted(intervals)), None))
 
 

@@ -24,22 +24,19 @@ UNEVEN = 0.2  # of the usual step, standard deviation
 class Timeline:
     """Rising times of the rows that are kept.
 
-    seconds: (row,); kept: rows of the table, None if all; step: the usual one, s; breaks: rows that follow a gap;
-    even: whether the samples are evenly spaced but for gaps; spoilt: times at which the clock ran backward.
+    seconds: (row,); kept: rows of the table, None if all; step: the usual one, s; even: whether the samples are evenly
+    spaced but for gaps; spoilt: times at which the clock ran backward.
     """
 
     seconds: Array
     kept: NDArray[np.intp] | None
     step: float
-    breaks: NDArray[np.intp]
     even: bool = True
     spoilt: Array = field(default_factory=lambda: np.empty(0))
 
     def part(self, window: slice) -> Timeline:
         """The rows of a window, those of all that are kept."""
-        low, high, _ = window.indices(self.seconds.size)
-        inside = (self.breaks > low) & (self.breaks < high)
-        return replace(self, seconds=self.seconds[window], kept=None, breaks=self.breaks[inside] - low)
+        return replace(self, seconds=self.seconds[window], kept=None)
 
     def rows(self, values: Array) -> Array:
         """The values of the rows that are kept."""
@@ -53,9 +50,9 @@ def timeline(table: DataTable, base: TimeBase | None, say: Callable[[Finding | s
     """
     if base is not None and base.column in table.columns:
         column = table.columns[str(base.column)]
-        if column.stamp:
+        if column.stamps:
             say("time is counted in s from the first time stamp")
-            return _stated(column.values, say)
+            return _stated(column.seconds(base.dayfirst), say)
         if column.texts == column.values.size:
             what = f"the column '{base.column}' has texts, such as '{column.example}', where times are needed"
             remedy = "write them in s, as 11:40:00.0002 or as 2026-11-22 11:40:00.0002, or state time: {rate: …}"
@@ -69,32 +66,31 @@ def timeline(table: DataTable, base: TimeBase | None, say: Callable[[Finding | s
     else:
         remedy = "add time: {column: …, unit: s} or time: {rate: 2 kHz} to the mapping"
         raise MechanismError(Finding("no column gives the time of its rows", "time", remedy))
-    return Timeline(start + np.arange(table.rows, dtype=np.float64) * step, None, step, np.empty(0, dtype=np.intp))
+    return Timeline(start + np.arange(table.rows, dtype=np.float64) * step, None, step)
 
 
 def _stated(seconds: Array, say: Callable[[Finding | str], None]) -> Timeline:
     """Times that rise, from a column: rows whose time does not rise are left out."""
     finite, total = np.isfinite(seconds), seconds.size
     highest = np.maximum.accumulate(np.where(finite, seconds, -np.inf))
-    rising = finite & (seconds > np.concatenate([[-np.inf], highest[:-1]]))
+    kept = np.flatnonzero(finite & (seconds > np.concatenate([[-np.inf], highest[:-1]])))
     if lost := int(np.count_nonzero(~finite)):
         what = f"no time in {counted(lost, 'row')} of {total:,}; left out"
         say(warning("time.missing", "time", what, "check the logger, or state time: {rate: …}"))
-    kept = np.flatnonzero(rising)
     if kept.size < 3:
         what = f"the time rises in {kept.size} of {counted(total, 'row')}"
         raise MechanismError(Finding(what, "time", "check that time.column is the right one"))
-    known = seconds[finite]
-    steps = np.diff(known)
+    stated = seconds[finite]
+    steps = np.diff(stated)
     repeated, back = np.flatnonzero(steps == 0), np.flatnonzero(steps < 0)
     if repeated.size:
-        coarse = repeated.size > 0.05 * known.size
+        coarse = repeated.size > 0.05 * stated.size
         remedy = "the column is rounded: state time: {rate: …} instead" if coarse else "check the logger"
-        what = f"the time repeats in {counted(repeated.size, 'row')} of {known.size:,}, {at_times(known[repeated])}"
+        what = f"the time repeats in {counted(repeated.size, 'row')} of {stated.size:,}, {at_times(stated[repeated])}"
         say(warning("time.repeats", "time", f"{what}; these rows are left out", remedy))
     if back.size:
-        times, size = f"{counted(back.size, 'time')}, {at_times(known[back])}", f"by up to {-steps.min():.4g} s"
-        what = f"the time runs backward {times}, {size}; rows are left out until it has passed"
+        what = f"the time runs backward {counted(back.size, 'time')}, {at_times(stated[back])}, by up to "
+        what += f"{-steps.min():.4g} s; rows are left out until it has passed"
         remedy = "split the file where a new recording begins, or check the logger's clock"
         say(warning("time.backward", "time", what, remedy))
     clean = seconds[kept]
@@ -104,9 +100,11 @@ def _stated(seconds: Array, say: Callable[[Finding | str], None]) -> Timeline:
     if (gaps := np.flatnonzero(wide)).size:
         missing = float(np.sum(np.rint(steps[gaps] / step) - 1))
         longest = int(gaps[np.argmax(steps[gaps])])
-        what = f"{counted(gaps.size, 'gap')} in time, {missing:,.0f} {'sample' if missing == 1 else 'samples'} missing"
-        where = f"the longest {steps[longest]:.4g} s at {clean[longest]:.5g} s"
+        what = (
+            f"{counted(gaps.size, 'gap')} in time, {missing:,.0f} {'sample' if missing == 1 else 'samples'} missing, "
+        )
+        what += f"the longest {steps[longest]:.4g} s at {clean[longest]:.5g} s"
         remedy = "the positions in them have fewer turns; check the logger's buffer"
-        say(warning("time.gaps", "time", f"{what}, {where}", remedy))
+        say(warning("time.gaps", "time", what, remedy))
     even = float(np.std(steps[~wide] / step)) < UNEVEN
-    return Timeline(clean, kept if kept.size < total else None, step, np.flatnonzero(wide) + 1, even, known[back])
+    return Timeline(clean, kept if kept.size < total else None, step, even, stated[back])

@@ -72,19 +72,15 @@ def cut(
     where : what these are about.
     """
     share, line = shares[window], times.part(window)
-    known = np.isfinite(share)
-    highest = np.maximum.accumulate(np.where(known, share, -np.inf))
-    begin, end, numbers = _whole(share, highest, line)
+    finite = np.isfinite(share)
+    begin, end, numbers = _whole(share, line)
     inside = _covered(begin, end, allowed, line)
     begin, end, numbers = begin[inside], end[inside], numbers[inside]
-    odd, hit = np.zeros(numbers.size, dtype=np.bool_), np.zeros(numbers.size, dtype=np.bool_)
-    if numbers.size:
-        usual = float(np.median(end - begin))
-        odd = np.abs((end - begin) / usual - 1) > APART
+    lengths, usual = end - begin, float(np.median(end - begin)) if numbers.size else 1.0
+    odd, hit = np.abs(lengths / usual - 1) > APART, np.zeros(numbers.size, dtype=np.bool_)
     if odd.any():
-        left_out = int(np.sum(np.maximum(np.rint((end - begin)[odd] / usual), 1)))  # over a gap it may be several
-        lengths = (end - begin)[odd]
-        span = f"{lengths.min():.4g} to {lengths.max():.4g} s" if odd.sum() > 1 else f"{lengths[0]:.4g} s"
+        left_out = int(np.sum(np.maximum(np.rint(lengths[odd] / usual), 1)))  # over a gap it may be several
+        span = f"{lengths[odd].min():.4g} to {lengths[odd].max():.4g} s"
         what = f"{counted(left_out, 'turn')} left out, {at_times(begin[odd])}: {span} long where {usual:.4g} s is usual"
         remedy = "the drive starts, stops or rests there, or rows are missing; use files: over: for the steady part"
         say(note("turns.unusual", where, what, remedy))
@@ -93,26 +89,21 @@ def cut(
         hit |= (begin <= high - slack) & (end >= low + slack)
     keep = ~odd & ~hit
     numbers, begin, end = numbers[keep], begin[keep], end[keep]
-    rows = _rows_of(share, numbers, begin, end, line, known & allowed, positions)
+    rows = _rows_of(share, begin, end, line, finite & allowed, positions)
     return Turns(share, numbers, begin, end, rows, positions, line, window)
 
 
-def _whole(share: Array, highest: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]]:
+def _whole(share: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]]:
     """Begin, end and number of every turn that is gone through from its start to its end, but for one sample."""
-    nothing = np.empty(0), np.empty(0), np.empty(0, dtype=np.intp)
-    finite = np.isfinite(highest)
-    if np.count_nonzero(finite) < 3:
-        return nothing
-    first = int(np.argmax(finite))
-    last = int(np.searchsorted(highest, highest[-1]))  # what follows stands, or is not known
+    highest = np.maximum.accumulate(np.where(np.isfinite(share), share, -np.inf))
+    first, last = int(np.argmax(np.isfinite(highest))), int(np.searchsorted(highest, highest[-1]))  # then it stands
     rising, seconds = highest[first : last + 1], line.seconds[first : last + 1]
-    if rising.size < 3:
-        return nothing
     steps = np.diff(rising)
     usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
-    low, high = int(np.ceil(rising[0] - 1.01 * usual)), int(np.floor(rising[-1] + 1.01 * usual))
-    if high - low < 1 or usual == 0 or high - low > rising.size:
-        return nothing
+    slack = 1.01 * usual if np.isfinite(usual) else 0.0
+    low, high = (int(np.ceil(rising[0] - slack)), int(np.floor(rising[-1] + slack))) if usual else (0, 0)
+    if rising.size < 3 or high - low < 1 or high - low > rising.size:
+        return np.empty(0), np.empty(0), np.empty(0, dtype=np.intp)
     whole = np.arange(low, high + 1)
     after = np.clip(np.searchsorted(rising, whole, side="right"), 1, rising.size - 1)
     before = after - 1
@@ -124,20 +115,15 @@ def _whole(share: Array, highest: Array, line: Timeline) -> tuple[Array, Array, 
 
 def _covered(begin: Array, end: Array, allowed: Mask, line: Timeline) -> Mask:
     """Whether all rows of each turn are allowed."""
-    if allowed.all():
-        return np.ones(begin.size, dtype=np.bool_)
     refused = np.concatenate([[0], np.cumsum(~allowed)])
     slack = 0.5 * line.step
-    low = np.searchsorted(line.seconds, begin + slack)
-    high = np.searchsorted(line.seconds, end - slack)
-    return np.asarray(refused[np.maximum(high, low)] == refused[low]) & (high > low)
+    low, high = np.searchsorted(line.seconds, begin + slack), np.searchsorted(line.seconds, end - slack)
+    return np.asarray(allowed.all() | ((refused[np.maximum(high, low)] == refused[low]) & (high > low)))
 
 
-def _rows_of(
-    share: Array, numbers: NDArray[np.intp], begin: Array, end: Array, line: Timeline, known: Mask, positions: int
-) -> Mask:
+def _rows_of(share: Array, begin: Array, end: Array, line: Timeline, known: Mask, positions: int) -> Mask:
     """Rows within turns, half a position before and after included, that move."""
-    if not numbers.size:
+    if not begin.size:
         return np.zeros(share.size, dtype=np.bool_)
     usual = float(np.median(end - begin))
     margin = 0.5 * usual / positions + line.step

@@ -21,7 +21,7 @@ from trunnion.model.units import BASES, UnitError, normalise, pound_feet, root, 
 
 __all__ = [
     "Amount", "Dimensions", "Frequency", "MeasureText", "Number", "SensorScale", "UnitText", "alike", "default_unit",
-    "dimensions", "multiplied", "read_amount", "scale",
+    "dimensions", "multiplied", "read_amount", "scale", "unit_name",
 ]  # fmt: skip
 
 Dimensions = Mapping[str, Fraction]

@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.rig.reading.rig_file import Rig, Value
+from trunnion.rig.virtual import files
 from trunnion.rig.virtual.sensors import SensorChannel, SensorErrors, draw, index_level, level, pulses, readings, stream
 from trunnion.rig.virtual.true_signals import SampledSignals
 from trunnion.solve.run import Run
+from trunnion.version import __version__
 
-__all__ = ["Case", "Record", "Recorded", "case_names", "check_seed", "speed_differs"]
+__all__ = ["Case", "Observation", "check_seed", "speed_differs"]
 
 Array = NDArray[np.float64]
 MOST_SEEDS = 1 << 128
 PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6}
 TIME_DECIMALS = {"s": 9, "ms": 6, "us": 3}
+POSITIONS = (360, 180, 120, 90, 72, 60, 36, 24, 12)  # of a cycle: fewer than samples
+FEWER = 0.99
+AT_REST = 0.9  # share of the idle stretch that the zero is taken from: a filter carries the run into the rest
 
 
 @dataclass(frozen=True)
@@ -94,21 +100,13 @@ class Case:
         return f"condition {self.number} ({stated})"
 
 
+@strict_arguments
 @dataclass(frozen=True)
-class Record:
-    """The columns of one file, by name; NaN is an empty cell. settings: what is set in it, as in the rig file."""
-
-    name: str
-    settings: Mapping[str, Value]
-    columns: Mapping[str, NDArray[Any]]
-
-
-@dataclass(frozen=True)
-class Recorded:
+class Observation:
     """A rig put to a mechanism: conditions with their true courses, sensors with the errors they have in fact.
 
-    Readings are made when they are asked for, and are the same every time. skipped: conditions, by number from 1, that
-    the model cannot be in.
+    Readings are made when they are asked for, and are the same every time. cases: the conditions that the model can be
+    in; skipped: the numbers, from 1, of the others.
     """
 
     mechanism: Mechanism
@@ -131,17 +129,16 @@ class Recorded:
         """Samples a second."""
         return self.rig.rate.value
 
-    @cached_property
+    @property
     def rows(self) -> int:
         """Rows of all files."""
         return sum(case.rows for case in self.cases)
 
-    def records(self) -> Iterator[Record]:
+    def records(self) -> Iterator[files.Record]:
         """The readings of every condition, one after the other."""
-        return (self.record(case) for case in self.cases)
+        return (self._record(case) for case in self.cases)
 
-    def record(self, case: Case) -> Record:
-        """The readings of one condition."""
+    def _record(self, case: Case) -> files.Record:
         rig, unit = self.rig, self.rig.time.unit
         time = (np.arange(case.rows) - case.origin) / self.rate * PER_SECOND[unit]
         columns: dict[str, NDArray[Any]] = {rig.time.column: np.round(time, TIME_DECIMALS[unit])}
@@ -154,24 +151,17 @@ class Recorded:
             if rig.encoder.index:
                 columns[rig.encoder.index] = index_level(angle, rig.encoder.per_turn, zero)
         columns |= {self.channels[name].column: values for name, values in self._readings(case).items()}
-        return Record(case.name, case.settings, columns)
+        return files.Record(case.name, case.settings, columns)
 
-    def perfect(self, case: Case) -> dict[str, Array]:
-        """Readings in their units without random errors: what bandwidth, pulses and range leave."""
-        return self._readings(case, perfect=True)
-
-    def _readings(self, case: Case, perfect: bool = False) -> dict[str, Array]:
+    def _readings(self, case: Case) -> dict[str, Array]:
+        """Readings by sensor, in their units, idle stretches included."""
         values = {}
         for i, (name, channel) in enumerate(self.channels.items()):
             course = case.true.at_samples(i)
             ends = (0.0, 0.0) if channel.at_rest else (course[0], course[-1])
             true = np.concatenate([np.full(case.before, ends[0]), course, np.full(case.after, ends[1])])
-            if perfect:
-                channel, noise, drawn = replace(channel, drift=0.0, step=0.0), None, SensorErrors(0.0, 0.0, 0.0)
-            else:
-                noise = stream(self.seed, case.number, name, "noise").standard_normal(case.rows)
-                drawn = self.drawn[name]
-            values[name] = readings(channel, true, case.part, self.rate, drawn, noise)
+            noise = stream(self.seed, case.number, name, "noise").standard_normal(case.rows)
+            values[name] = readings(channel, true, case.part, self.rate, self.drawn[name], noise)
         return values
 
     def zero_uncertainty(self, name: str) -> float:
@@ -203,12 +193,41 @@ class Recorded:
                 channel, values = self.channels[name], values / self.channels[name].per
                 zero = float(np.mean(values[: case.before])) if channel.zeroed and case.before else 0.0
                 by_turn = np.interp(at.ravel(), np.arange(case.rows), values - zero).reshape(at.shape)
-                courses[name] = Signal(name, channel.measures, channel.unit, by_turn, self.accuracy(name))
+                courses[name] = Signal(name, channel.measures, channel.unit, by_turn, self.accuracy(name),
+                                       per_turn=channel.per_turn)  # fmt: skip
             stated = {**self.rig.set_, **case.settings}
-            settings = {name: _si(self.mechanism, name, value) for name, value in stated.items()}
+            changed = self.mechanism.with_values(stated)
+            settings = {name: float(np.ravel(changed.parameters()[changed.path_of(name)])[0]) for name in stated}
             speed = case.drive(self.rate)[1]
             conditions.append(Condition(case.name, settings, phase, courses, (), speed))
         return Measurement(self.rig.name, tuple(conditions), self.findings, ("made by a virtual rig, not read",))
+
+    def mapping(self, form: str = "") -> dict[str, Any]:
+        """The mapping that reads the files: what a laboratory knows, and no more than that."""
+        return _mapping_of(self, form or self.rig.format)
+
+    def truth(self) -> dict[str, Any]:
+        """What was drawn and what is true, in SI: to check what is found from the files, not to find it."""
+        return _truth_of(self)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every column that has one."""
+        units = {self.rig.time.column: self.rig.time.unit}
+        return units | {channel.column: channel.reading for channel in self.channels.values()}
+
+    def write(
+        self, folder: str | os.PathLike[str], form: str = "", progress: Callable[[int], None] | None = None
+    ) -> list[str]:
+        """Write a file for each condition, `mapping.yaml` and `truth.yaml` into a folder; their names.
+
+        form: csv, parquet or tdms, that of the rig file if not given; progress: called with the files written.
+        """
+        form = form or self.rig.format
+        files.check_form(form)
+        files.check_folder(self.rig, folder, form)
+        texts = {files.MAPPING: self.mapping(form), files.TRUTH: self.truth()}
+        return files.write(self.records(), self.units, texts, folder, form, progress)
 
 
 def check_seed(seed: int) -> None:
@@ -217,20 +236,158 @@ def check_seed(seed: int) -> None:
         raise MechanismError(Finding(f"the seed {seed} is no whole number from 0", "seed", "give one such as 1"))
 
 
-def _si(mechanism: Mechanism, name: str, value: Value) -> float:
-    """What is set, in SI."""
-    changed = mechanism.with_values({name: value})
-    return float(np.ravel(changed.parameters()[changed.path_of(name)])[0])
-
-
-def case_names(count: int) -> list[str]:
-    """Names of conditions, and of their files."""
-    width = max(2, len(str(count)))
-    return [f"run-{number:0{width}d}" for number in range(1, count + 1)]
-
-
 def speed_differs(cases: Sequence[Case]) -> bool:
     """Whether the first driver runs one way and not as fast in all conditions."""
     durations = [case.run.cycle.duration for case in cases]
     one_way = cases[0].run.system.span(cases[0].run.values, cases[0].driver).one_way
     return one_way and max(durations) - min(durations) > 1e-9 * max(durations)
+
+
+# ---- mapping and truth ----------------------------------------------------------------------------------------------
+
+
+def _mapping_of(observation: Observation, form: str) -> dict[str, Any]:
+    rig = observation.rig
+    found: dict[str, Any] = {"trunnion-data": 1, "name": rig.name or observation.mechanism.name}
+    angle = _angle(observation)
+    timed = angle.get("angle", {}).get("from") == "time" or "angle" not in angle
+    found["files"] = [_file(observation, case, form, timed) for case in observation.cases]
+    if rig.set_:
+        found["set"] = dict(rig.set_)
+    found["time"] = {"column": rig.time.column, "unit": rig.time.unit}
+    found |= angle
+    least = min(case.run.cycle.duration for case in observation.cases) * observation.rate
+    positions = next((one for one in POSITIONS if one < least * FEWER), POSITIONS[-1])
+    if positions != POSITIONS[0]:
+        found["positions"] = positions
+    found["channels"] = {name: _channel(observation, name) for name in observation.channels}
+    return found
+
+
+def _file(observation: Observation, case: Case, form: str, timed: bool) -> dict[str, Any]:
+    """A file with what was set, its zero of an encoder, and where the time alone tells the position, when it ran."""
+    found: dict[str, Any] = {"file": f"{case.name}.{form}"}
+    if case.settings:
+        found["set"] = dict(case.settings)
+    if observation.rig.encoder and (zero := _counted_from(observation, case)) != _counted_from(observation):
+        found["angle"] = {"zero": f"{math.degrees(zero):.12g} deg"}
+    if timed and case.rows > case.running:
+        ends = (case.before - case.origin, case.before + case.running - 1 - case.origin)
+        found["over"] = [f"{end / observation.rate:.9g} s" for end in ends]
+    return found
+
+
+def _angle(observation: Observation) -> dict[str, Any]:
+    """Where the coordinate of the driver comes from, and what a cycle is."""
+    case = observation.cases[0]
+    run, driver = case.run, case.driver
+    duration = run.cycle.duration
+    if not case.named:
+        return {"cycle": f"{duration:.15g} s"}
+    first, last = (float(np.ravel(run.system.drive(run.values, driver, time)[0])[0]) for time in (0.0, duration))
+    found: dict[str, Any] = {"angle": _source(observation, case)}
+    extent = math.degrees(abs(last - first))
+    if abs(extent - 360) > 1e-9:
+        found["cycle"] = f"{extent:.12g} deg"
+    if first:
+        found["start"] = f"{math.degrees(first):.12g} deg"
+    return found
+
+
+def _source(observation: Observation, case: Case) -> dict[str, Any]:
+    """The encoder if there is one, else a constant speed, else a measured one."""
+    rate, encoder = observation.rate, observation.rig.encoder
+    if encoder:
+        found: dict[str, Any] = {"from": "pulses", "column": encoder.column, "per_turn": encoder.per_turn}
+        found["kind"] = encoder.kind
+        if encoder.kind == "level" and case.drive(rate)[1] < 0:
+            found["sign"] = -1
+        if zero := _counted_from(observation):
+            found["zero"] = f"{math.degrees(zero):.12g} deg"
+        if encoder.index:
+            found["index"] = {"column": encoder.index}
+        return found
+    if speed_differs(observation.cases):
+        channels = observation.channels.items()
+        measured = next(name for name, one in channels if one.measures == f"rate:{case.driver}")
+        start = math.degrees(case.drive(rate)[0])
+        return {"from": "speed", "channel": measured} | ({"zero": f"{start:.12g} deg"} if start else {})
+    start, speed = case.drive(rate, -case.before)
+    return {"from": "time", "speed": f"{speed:.15g} rad/s", "zero": f"{math.degrees(start):.12g} deg"}
+
+
+def _counted_from(observation: Observation, case: Case | None = None) -> float:
+    """Coordinate, rad, where an encoder reads zero: at its index, else where its count is 0, its level rises."""
+    encoder, case = observation.rig.encoder, case or observation.cases[0]
+    assert encoder is not None  # asked of encoders only
+    zero, pitch = float(encoder.zero.evaluate()), 2 * math.pi / encoder.per_turn
+    start, speed = case.drive(observation.rate)
+    if encoder.index:
+        return zero if speed > 0 else zero + pitch  # backward, the first pulse is entered at its far end
+    if encoder.kind == "count":
+        return zero
+    count = (start - zero) / pitch
+    # backward, the level rises in the middle of a pulse
+    edge = math.floor(count + 1e-9) + 1 if speed > 0 else math.ceil(count - 0.5 - 1e-9) - 0.5
+    return zero + edge * pitch
+
+
+def _channel(observation: Observation, name: str) -> dict[str, Any]:
+    channel = observation.channels[name]
+    stated = channel.stated
+    found: dict[str, Any] = {"column": channel.column, "measures": channel.measures, "unit": channel.reading}
+    if stated.sensitivity:
+        found["gain"] = stated.sensitivity.source
+    case = observation.cases[0]
+    if channel.zeroed and case.before > 1:
+        rest = (-case.origin, AT_REST * case.before - case.origin)
+        found["zero"] = {"over": [f"{one / observation.rate + 0.0:.6g} s" for one in rest]}
+    if stated.range:
+        found["range"] = stated.range.source
+    if channel.per_turn:
+        found["per_turn"] = channel.per_turn
+    accuracy: dict[str, Any] = {}
+    if channel.gain:
+        accuracy["gain"] = stated.accuracy.gain.source
+    zero = observation.zero_uncertainty(name)
+    if channel.noise <= channel.step / 2:  # which does not carry readings over the steps of the converter
+        zero = math.hypot(zero, channel.step / math.sqrt(12))  # GUM F.2.2.1
+    if zero:
+        accuracy["zero"] = f"{zero:.4g} {channel.unit}"
+    return found | ({"accuracy": accuracy} if accuracy else {})
+
+
+def _truth_of(observation: Observation) -> dict[str, Any]:
+    mechanism = observation.mechanism
+    found: dict[str, Any] = {
+        "trunnion-truth": 1,
+        "made_by": f"trunnion {__version__}",
+        "model": mechanism.name,
+        "model_hash": mechanism.digest,
+        "seed": observation.seed,
+        "sensors": {},
+        "conditions": [],
+    }
+    for name, channel in observation.channels.items():
+        errors = observation.drawn[name]
+        found["sensors"][name] = {
+            "measures": channel.measures, "unit": channel.unit, "gain_error": errors.gain, "zero_error": errors.zero,
+            "offset": errors.offset, "drift_per_second": float(f"{channel.drift:.12g}"),
+            "noise": float(f"{channel.noise:.12g}"), "step": float(f"{channel.step:.12g}"),
+        }  # fmt: skip
+    for case in observation.cases:
+        whole = round(observation.rig.schedule.turns * case.run.cycle.duration * observation.rate)
+        part = slice(case.first, case.first + whole)
+        found["conditions"].append({
+            "name": case.name, "set": dict(case.settings),
+            "efficiency": case.efficiency if math.isfinite(case.efficiency) else None,
+            "cycle_seconds": case.run.cycle.duration,
+            "mean": {name: float(np.mean(case.true.at_samples(i)[part]))
+                     for i, name in enumerate(observation.channels)},
+        })  # fmt: skip
+    if observation.skipped:
+        found["left_out"] = list(observation.skipped)
+    found["parameters"] = {
+        path: float(np.ravel(value)[0]) for path, value in mechanism.parameters().items() if np.size(value) == 1
+    }
+    return found

@@ -1,8 +1,8 @@
 """A virtual test rig: the model observed through sensors, under a schedule of working conditions.
 
-`observe` puts a rig to a mechanism: it solves the model in every condition and draws the errors that the sensors have.
-The Observation that it returns makes the readings, condition by condition (`records`), and writes them like those of a
-real rig, with the mapping that reads them and the truth (`write`); or it hands them on as a Measurement.
+`observe` solves the model in every condition and draws the errors that the sensors have. The Observation that it
+returns makes the readings, condition by condition (`records`), writes them like those of a real rig, with the mapping
+that reads them and the truth (`write`), or hands them on as a Measurement.
 
 The machine stands still and unloaded while it is idle, and moves as its drivers say from the first sample after: it is
 not brought up to speed, and neither motor nor brake has a dynamics of its own. Sensors do not act back on the machine.
@@ -26,8 +26,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
 from trunnion.rig.modelled import measure_of
 from trunnion.rig.reading.rig_file import Rig, Value
-from trunnion.rig.virtual import files
-from trunnion.rig.virtual.observation import Case, Recorded, case_names, check_seed, speed_differs
+from trunnion.rig.virtual.observation import Case, Observation, check_seed, speed_differs
 from trunnion.rig.virtual.sensors import SensorChannel, draw, resolved
 from trunnion.rig.virtual.true_signals import cycle_efficiency, sampled
 from trunnion.solve.run import Run, prepare
@@ -37,28 +36,6 @@ __all__ = ["Observation", "observe"]
 MOST_ROWS = 20_000_000
 MOST_NAMED = 20  # conditions in one finding
 BEYOND = 0.1  # of a cycle that is recorded before the first and past the last, so that their ends are there
-
-
-@strict_arguments
-class Observation(Recorded):
-    """What a virtual rig has recorded, with its files: data, mapping and truth."""
-
-    def mapping(self, form: str = "") -> dict[str, Any]:
-        """The mapping that reads the files; see `files.mapping_of`."""
-        return files.mapping_of(self, form or self.rig.format)
-
-    def truth(self) -> dict[str, Any]:
-        """What was drawn and what is true; see `files.truth_of`."""
-        return files.truth_of(self)
-
-    def write(
-        self, folder: str | os.PathLike[str], form: str = "", progress: Callable[[int], None] | None = None
-    ) -> list[str]:
-        """Write a file for each condition, `mapping.yaml` and `truth.yaml` into a folder; their names.
-
-        form: csv, parquet or tdms, that of the rig file if not given; progress: called with the files written.
-        """
-        return files.write(self, folder, form or self.rig.format, progress)
 
 
 @strict_arguments
@@ -94,7 +71,7 @@ def observe(
     rows = rig.schedule.rows()
     channels: dict[str, SensorChannel] = {}
     cases: list[Case] = []
-    for number, (name, row) in enumerate(zip(case_names(len(rows)), rows, strict=True), 1):
+    for number, (name, row) in enumerate(zip(rig.names, rows, strict=True), 1):
         key = f"conditions.{number - 1}" if rig.schedule.conditions else "over"
         with _placed(f"schedule.{key}", number):
             run = prepare(mechanism.with_values(dict(row)) if row else mechanism)

@@ -8,9 +8,10 @@ import { set, svg } from "../web/dom.js";
 import { magnitude } from "../web/data.js";
 import { number, quantity } from "../web/format.js";
 import { askOf, edit } from "./actions.js";
+import { dictionary, groundOf } from "./geometry.js";
 import { sheet } from "./sheet.js";
 import * as state from "./state.js";
-import { Button, html } from "./ui.js";
+import { html } from "./ui.js";
 
 const NODE = { width: 138, height: 46 };
 const WIDEST = 8; // px, of the wire with the largest force; others by the root of theirs
@@ -171,14 +172,18 @@ function Values({ found }) {
   const vector = (parts, unit) => (parts ? Object.values(parts).map((one) => quantity(one[index], unit, undefined, units)).join(", ") : "—");
   const amount = (part, unit) => (part === undefined ? "—" : Array.isArray(part) ? quantity(part[index], unit, undefined, units) : vector(part, unit));
   const goes = (wire) => (order === null ? `${wire.links[0]} → ${wire.links[1]}` : wire.to === order ? `from ${wire.links[0]}` : `to ${wire.links[1]}`);
+  const backs = ({ type, back }) => [
+    ...(type === "revolute" && Array.isArray(back.moment) ? [] : [["moment", amount(back.moment, "N m")]]),
+    ["friction", amount(back.friction, type === "prismatic" ? "N" : "N m")],
+  ];
   return html`<section class="passing" aria-label="What passes the wires">
     <h2>${block ? block.label : "All wires"}</h2>
     ${block && html`<p class="calm">${block.links.join(", ")}${share === null || share === undefined ? "" : `; ${number(100 * share, 3)} % of the friction power`}</p>`}
     <div class="scrolls"><table>
-      <thead><tr><th>pin</th><th>position</th><th>velocity</th><th>force back</th><th>moment back</th><th>of it friction</th></tr></thead>
-      <tbody>${wires.map((wire) => html`<tr><th title=${goes(wire)}>${wire.joint}<br /><span class="calm">${goes(wire)}</span></th>
-        <td>${vector(wire.forward.position, "m")}</td><td>${vector(wire.forward.velocity, "m/s")}</td>
-        <td>${vector(wire.back.force, "N")}</td><td>${amount(wire.back.moment, "N m")}</td><td>${amount(wire.back.friction, wire.type === "prismatic" ? "N" : "N m")}</td></tr>`)}</tbody>
+      <thead><tr><th>pin</th><th>forward</th><th>back</th></tr></thead>
+      <tbody>${wires.map((wire) => html`<tr><th>${wire.joint}<br /><span class="calm">${goes(wire)}</span></th>
+        <td><span class="calm">at</span> ${vector(wire.forward.position, "m")}<br /><span class="calm">with</span> ${vector(wire.forward.velocity, "m/s")}</td>
+        <td><span class="calm">force</span> ${vector(wire.back.force, "N")}${backs(wire).map(([word, text]) => html`<br /><span class="calm">${word}</span> ${text}`)}</td></tr>`)}</tbody>
     </table></div>
   </section>`; // prettier-ignore
 }
@@ -195,7 +200,13 @@ const KINDS = {
 
 /** Pins that a block can be wired to: joints, free ends, and a new pin on the ground. */
 function pinsOf() {
-  return [...sheet.spots().map(({ name }) => ({ value: name, label: name })), { value: "", label: "a new pin on the ground" }];
+  const { entries } = state.answer.value ?? {};
+  const joints = Object.keys(dictionary(entries?.joints));
+  const ground = groundOf(entries);
+  const points = Object.entries(dictionary(entries?.links))
+    .filter(([link]) => link !== ground)
+    .flatMap(([link, { points: own }]) => Object.keys(dictionary(own)).filter((name) => !joints.includes(name)).map((name) => `${link}.${name}`));
+  return [...[...joints, ...points].map((name) => ({ value: name, label: name })), { value: "", label: "a new pin on the ground" }];
 }
 
 /** A block of the list, its pins chosen or typed, becomes links and joints of the drawing. */
@@ -204,22 +215,27 @@ function Palette() {
   const [pins, setPins] = useState(["", ""]);
   const [typed, setTyped] = useState({ ground: ["0 mm, 0 mm", "100 mm, 0 mm"], at: "", ratio: "20:40" });
   const choices = pinsOf();
+  const there = (order) => (choices.some(({ value }) => value === pins[order]) ? pins[order] : ""); // it may be gone
   const { pins: count } = KINDS[kind];
   const take = (order) => (event) => setPins(pins.map((one, at) => (at === order ? event.target.value : one)));
   const write = (order) => (event) => setTyped({ ...typed, ground: typed.ground.map((one, at) => (at === order ? event.target.value : one)) });
-  const place = () => {
-    const ends = Array.from({ length: Math.max(count, 1) }, (_, order) => (count && pins[order] ? pins[order] : { ground: typed.ground[order] }));
-    edit([{ do: "block", kind, pins: ends, at: typed.at, ratio: typed.ratio }]);
+  const place = async (event) => {
+    event.preventDefault();
+    const ends = Array.from({ length: Math.max(count, 1) }, (_, order) => (count && there(order) ? there(order) : { ground: typed.ground[order] }));
+    if (!(await edit([{ do: "block", kind, pins: ends, at: typed.at, ratio: typed.ratio }]))) return;
+    setTyped({ ...typed, at: "" });
+    sheet.fit();
   };
-  return html`<section class="palette" aria-label="Add a block">
+  const inner = kind === "driver" || kind === "RPR" ? "End at" : "Inner pin at";
+  return html`<form class="palette" aria-label="Add a block" onSubmit=${place}>
     <h2>Add a block</h2>
-    <label>Block <select aria-label="Kind of block" value=${kind} onChange=${(event) => setKind(event.target.value)}>${Object.entries(KINDS).map(([name, { label }]) => html`<option value=${name}>${label}</option>`)}</select></label>
+    <label>Block <select aria-label="Kind of block" value=${kind} onChange=${(event) => (setKind(event.target.value), setTyped({ ...typed, at: "" }))}>${Object.entries(KINDS).map(([name, { label }]) => html`<option value=${name}>${label}</option>`)}</select></label>
     ${Array.from({ length: Math.max(count, 1) }, (_, order) => html`<label>Pin ${order + 1}
-      ${count > 0 && html`<select aria-label=${`Pin ${order + 1}`} value=${pins[order]} onChange=${take(order)}>${choices.map(({ value, label }) => html`<option value=${value}>${label}</option>`)}</select>`}
-      ${(!count || !pins[order]) && kind !== "gear" && html`<input aria-label=${`Place of pin ${order + 1}`} value=${typed.ground[order]} onInput=${write(order)} />`}</label>`)}
+      ${count > 0 && html`<select aria-label=${`Pin ${order + 1}`} value=${there(order)} onChange=${take(order)}>${choices.map(({ value, label }) => html`<option value=${value}>${label}</option>`)}</select>`}
+      ${(!count || !there(order)) && kind !== "gear" && html`<input aria-label=${`Place of pin ${order + 1}`} value=${typed.ground[order]} onInput=${write(order)} />`}</label>`)}
     ${kind === "gear"
       ? html`<label>Ratio <input aria-label="Ratio" value=${typed.ratio} onInput=${(event) => setTyped({ ...typed, ratio: event.target.value })} /></label>`
-      : html`<label>${kind === "driver" || kind === "RPR" ? "End at" : "Inner pin at"} <input aria-label="Place of the inner pin" placeholder="as it fits" value=${typed.at} onInput=${(event) => setTyped({ ...typed, at: event.target.value })} /></label>`}
-    <${Button} label="Place the block" onClick=${place} />
-  </section>`; // prettier-ignore
+      : html`<label>${inner} <input aria-label=${inner} placeholder="as it fits" value=${typed.at} onInput=${(event) => setTyped({ ...typed, at: event.target.value })} /></label>`}
+    <button type="submit" class="plain">Place the block</button>
+  </form>`; // prettier-ignore
 }

@@ -8,6 +8,8 @@ import { crank } from "./motion.js";
 import * as state from "./state.js";
 import { html } from "./ui.js";
 
+const TYPED = /^(insertText|delete|insertComposition)/; // letters, which may be the beginning of a longer name
+
 /** Names of the chosen columns, and what they are drawn over: "" for the drive, else a column. */
 const chosen = signal([]);
 const over = signal("");
@@ -51,19 +53,24 @@ export function chosenCharts({ scene }) {
 /** What is drawn, and over what. */
 export function Choice() {
   const names = told.value?.names ?? [];
+  const known = (name) => names.some(([one]) => one === name);
+  const unknown = (name) => state.say(`The table has no column ${name}.`, true);
   const add = (event) => {
     const name = event.target.value.trim();
-    if (!names.some(([one]) => one === name)) return;
+    if (!name) return;
+    if (!known(name)) return unknown(name);
     if (!chosen.value.includes(name)) chosen.value = [...chosen.value, name];
     event.target.value = "";
   };
+  const picked = (event) => !TYPED.test(event.inputType ?? "") && known(event.target.value) && add(event); // from the list
   const across = (event) => {
     const name = event.target.value.trim();
-    if (!name || names.some(([one]) => one === name)) over.value = name;
+    if (name && !known(name)) return unknown(name);
+    over.value = name;
   };
   return html`<div class="choice-of-curves">
     <datalist id="columns">${names.map(([name, unit]) => html`<option value=${name}>${unit}</option>`)}</datalist>
-    <label class="choice">Curve <input list="columns" aria-label="Curve to add" placeholder="coupler.angle_velocity, A.effort …" onChange=${add} onInput=${(event) => names.some(([one]) => one === event.target.value) && add(event)} /></label>
+    <label class="choice">Curve <input list="columns" aria-label="Curve to add" placeholder="coupler.angle_velocity, A.effort …" onChange=${add} onInput=${picked} /></label>
     <label class="choice">over <input list="columns" aria-label="Over" placeholder="the drive" value=${over.value} onChange=${across} /></label>
     <p class="row-of-buttons">${chosen.value.map((name) => html`<button type="button" class="plain" title="Take this curve away" onClick=${() => (chosen.value = chosen.value.filter((one) => one !== name))}>${name} ×</button>`)}</p>
   </div>`; // prettier-ignore

@@ -17,6 +17,7 @@ let letters = null;
 export function listenToKeys(target) {
   target.addEventListener("keydown", (event) => {
     if (event.defaultPrevented || event.isComposing) return;
+    if (state.dialog.value && !event.target.closest?.("dialog")) return; // Escape closes the dialog
     if (withControl(event) || ordinary(event)) event.preventDefault();
   });
   target.addEventListener("focusout", () => state.settle());

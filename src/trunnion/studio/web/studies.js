@@ -14,6 +14,8 @@ export const STUDY_OF = { play: "play", tolerance: "tolerance", time: "simulate"
 const known = signal({ forms: [], jobs: [] });
 /** The study whose form is open. */
 const verb = signal("tolerance");
+/** The text that each study was started with, and whether it was saved. */
+const begun = new Map();
 /** Settings by study: {flag: text or true}. */
 const settings = signal({});
 
@@ -39,6 +41,7 @@ async function run(form, mapping) {
   const body = JSON.stringify({ text: state.text.value, name, verb: form.verb, options: optionsOf(form), mapping });
   const reply = await request("/jobs", { method: "PUT", body });
   const told = await reply.json().catch(() => ({ error: "The study could not be started." }));
+  if (told.id) begun.set(told.id, { text: state.text.value, saved: !state.unsaved.value });
   if (told.error) state.say(told.error, true);
   await look();
   return told.error ?? "";
@@ -74,37 +77,39 @@ export function Studies() {
       </form>
       <section aria-label="Started studies"><h3>Results</h3>
         ${known.value.jobs.length === 0 && html`<p class="calm">What you run is kept here until the studio ends.</p>`}
-        ${known.value.jobs.map((job) => html`<${Job} key=${job.id} job=${job} open=${() => setShown(job)} />`)}
+        ${known.value.jobs.map((job) => html`<${Job} key=${job.id} job=${job} latest=${job === known.value.jobs[0]} open=${() => setShown(job)} />`)}
       </section>
     </div>`; // prettier-ignore
 }
 
-function Field({ study, field: { flag, help, kind, choices, several } }) {
+function Field({ study, field: { flag, help, kind, choices, several, usual } }) {
   const own = settings.value[study]?.[flag] ?? "";
   const put = (value) => (settings.value = { ...settings.value, [study]: { ...settings.value[study], [flag]: value } });
   const name = flag.slice(2);
   const control = () => {
     if (kind === "flag") return html`<input type="checkbox" aria-label=${name} checked=${own === true} onChange=${(event) => put(event.target.checked)} />`;
-    if (choices) return html`<select aria-label=${name} value=${own} onChange=${(event) => put(event.target.value)}><option value="">as usual</option>${choices.map((one) => html`<option>${one}</option>`)}</select>`;
+    if (choices) return html`<select aria-label=${name} value=${own} onChange=${(event) => put(event.target.value)}><option value="">${usual || "as usual"}</option>${choices.map((one) => html`<option>${one}</option>`)}</select>`;
     if (several) return html`<textarea aria-label=${name} rows=${Math.max(own.split("\n").length, 1)} placeholder="one a line" value=${own} onInput=${(event) => put(event.target.value)}></textarea>`;
-    return html`<input aria-label=${name} value=${own} inputmode=${kind === "number" ? "decimal" : "text"} onInput=${(event) => put(event.target.value)} />`;
+    return html`<input aria-label=${name} value=${own} placeholder=${usual} inputmode=${kind === "number" ? "decimal" : "text"} onInput=${(event) => put(event.target.value)} />`;
   };
   return html`<label class="field" title=${help}><span>${name}</span>${control()}<small class="calm">${help}</small></label>`;
 }
 
-function Job({ job, open }) {
-  const { id, command, seconds, progress, running, stopped, status, output, report } = job;
+function Job({ job, latest, open }) {
+  const { id, verb, command, seconds, progress, running, stopped, status, output, report } = job;
   const [done, total] = progress ?? [null, null];
   const words = running ? "runs" : stopped ? "stopped" : status === 0 ? "done" : status === 1 ? "done, with findings" : "failed";
+  const { text, saved } = begun.get(id) ?? { text: null, saved: true };
+  const doubts = [saved ? "" : "with changes that were not saved: the command reads the file", text !== null && text !== state.text.value ? "the model was changed since" : ""].filter(Boolean).join("; ");
   const copy = () => navigator.clipboard?.writeText(command).then(() => state.say("The command is on the clipboard."));
   const stop = () => request(`/jobs/${id}`, { method: "DELETE" }).then(look);
   return html`<article class="job">
-    <p><code>${command}</code></p>
+    <p><code>${command}</code>${doubts && html` <em class="calm">(${doubts})</em>`}</p>
     <p class="row-of-buttons"><span role="status">${words}, ${seconds} s${running && done !== null ? `, ${done}${total ? ` of ${total}` : ""}` : ""}</span>
       ${running && html`<progress aria-label="Progress" value=${total ? done : undefined} max=${total ?? undefined}></progress><${Button} label="Stop" onClick=${stop} />`}
-      ${report && html`<${Button} label="Open the report" onClick=${open} />`}
+      ${report && html`<${Button} label="Open the report" onClick=${open} /><a class="plain" href=${report} download=${`${verb}.html`}>Save the report</a>`}
       <${Button} label="Copy as command" onClick=${copy} /></p>
-    ${output.trim() && html`<details open=${!report && !running}><summary>Output</summary><pre>${output}</pre></details>`}
+    ${output.trim() && html`<details open=${latest || (!report && !running)}><summary>Output</summary><pre>${output}</pre></details>`}
   </article>`; // prettier-ignore
 }
 

@@ -1,0 +1,528 @@
+"""A mechanism drawn in a DXF: layers are links, concentric circles joints, slots and lines on each other guides.
+
+What is drawn is gathered as marks on layers, then read: nothing is a joint that does not lie in the same place on both
+layers, and whatever could be read in two ways is a finding.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from logging.handlers import BufferingHandler
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from ezdxf import recover
+from ezdxf.filemanagement import readfile
+from ezdxf.lldxf.const import DXFError
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.exchange.draft import Array, Body, Draft, Pair, free_name
+from trunnion.exchange.drawing import AUXILIARY, write
+
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing
+
+    from trunnion.exchange.formats import ImportOptions
+
+__all__ = ["read", "write"]
+
+GROUNDS = ("ground", "frame", "base", "fixed")  # words in the name of a layer that does not move; else it is layer 0
+SKIPPED = ("defpoints", AUXILIARY)  # how the names of layers begin that hold no link
+MOST_OBJECTS, MOST_PARTS, MOST_MARKS = 40_000, 20_000, 2_000  # in a file, blocks taken apart, and in a skeleton
+DEEPEST, FARTHEST = 12, 1e6  # blocks in blocks; m from the origin
+TOUCH = 1e-5  # of the drawing: what lies nearer is in one place; rad, what differs less is parallel
+UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 9: 2.54e-5, 10: 0.9144, 13: 1e-6, 14: 0.1}  # m, by $INSUNITS
+HALF = 1e-3  # rad, by which a half circle may differ from one
+NEAR, CROWD = 0.05, 8  # of the drawing: within it a text names what it lies at, of so many that are nearest
+SPOILT = (DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A line of a layer from one place to another, m."""
+
+    layer: str
+    start: Array
+    end: Array
+
+    @property
+    def span(self) -> Array:
+        """From start to end, m."""
+        return self.end - self.start
+
+    @property
+    def length(self) -> float:
+        """Of the line, m."""
+        return float(np.hypot(*self.span))
+
+
+@dataclass(frozen=True, eq=False)
+class Slot(Line):
+    """A slot of a layer between the centres of its ends, or a half circle between its ends; half its width, m."""
+
+    half: float
+
+    def holds(self, at: Array, radius: float, near: float) -> bool:
+        """Whether a pin lies on the middle line and fits in."""
+        along, aside = (
+            (at - self.start) @ self.span / self.length,
+            abs(_cross(self.span, at - self.start)) / self.length,
+        )
+        return bool(-near <= along <= self.length + near and aside <= near and radius <= self.half + near)
+
+
+@dataclass
+class Sketch:
+    """What of a drawing may be part of a mechanism, m: circles and points (radius 0), lines, half circles, texts.
+
+    left: how many entities of each kind are not read; heights: along z.
+    """
+
+    circles: list[tuple[str, Array, float]] = field(default_factory=list)
+    lines: list[Line] = field(default_factory=list)
+    halves: list[Slot] = field(default_factory=list)
+    texts: list[tuple[str, Array, str]] = field(default_factory=list)
+    left: Counter[str] = field(default_factory=Counter)
+    heights: list[float] = field(default_factory=list)
+
+
+def read(path: Path, options: ImportOptions) -> Draft:
+    """The links and joints of a drawing.
+
+    Parameters
+    ----------
+    path : the file, text or binary. options : `unit` of a drawing without $INSUNITS; `gap`, the greatest difference of
+        the radii of a pin and its hole; `ground`, the layer that does not move.
+
+    Returns
+    -------
+    Draft : in the plane, without masses.
+
+    Raises
+    ------
+    MechanismError : if the file cannot be read or holds no mechanism.
+    """
+    draft = Draft(plane=True)
+    try:
+        document = _document(path, draft)
+        sketch = _gathered(document, _unit(document, options, draft))
+    except SPOILT as error:
+        if isinstance(error, MechanismError):
+            raise
+        raise MechanismError(Finding("is no DXF, or too damaged to be read", file=str(path))) from None
+    count = len(sketch.circles) + len(sketch.lines) + len(sketch.halves) + len(sketch.texts)
+    places = np.array(
+        [place for _, place, _ in sketch.circles] + [end for line in sketch.lines for end in (line.start, line.end)]
+    )
+    what = "" if len(places) else "holds no circle, point or line"
+    if count > MOST_MARKS:
+        what = f"holds {count:,} lines, circles and texts; a skeleton has at most {MOST_MARKS:,}"
+    elif not np.abs(places).max(initial=0.0) < FARTHEST:
+        what = f"holds coordinates that are no numbers or beyond {FARTHEST:g} m"
+    if what:
+        what = f"is damaged, and {what}" if any(f.code == "exchange.damaged" for f in draft.findings) else what
+        remedy = "draw each link on a layer of its own: its pins as circles, lines between them"
+        raise MechanismError(Finding(what, file=str(path), remedy=remedy))
+    if sketch.left:
+        left = ", ".join(f"{count} {kind}" for kind, count in sketch.left.most_common(6))
+        draft.note("exchange.left", "file", f"is not read: {left}", "joints are circles, points, lines and slots")
+    size = max(float(np.ptp(places, axis=0).max()), 1e-6)
+    if np.ptp(sketch.heights) > TOUCH * size:
+        draft.warn("exchange.flat", "file", "is drawn in space; it is read as seen along z", "draw all at z = 0")
+    _Reader(sketch, draft, options, size).read()
+    draft.note("exchange.mass", "file", "a DXF holds no masses", "add mass, centre and inertia to the links")
+    return draft
+
+
+def _document(path: Path, draft: Draft) -> Drawing:
+    """The drawing, mended if it is damaged; MechanismError if it holds too much."""
+    objects = len(re.findall(rb"\n *0\r?\n[A-Z]|\x00[A-Z][A-Z0-9_]{2,}\x00", path.read_bytes()))
+    if objects > MOST_OBJECTS:
+        what = f"holds some {objects:,} objects; at most {MOST_OBJECTS:,} are read"
+        raise MechanismError(Finding(what, file=str(path), remedy="export the skeleton alone"))
+    heard, logger = BufferingHandler(MOST_OBJECTS), logging.getLogger("ezdxf")
+    logger.addHandler(heard)
+    try:
+        return readfile(path)
+    except SPOILT:
+        document, _ = recover.readfile(path)
+        mended = "; ".join(record.getMessage() for record in heard.buffer[:3])
+        what = "is damaged; what could be mended is read" + (f": {mended}" if mended else "")
+        draft.warn("exchange.damaged", "file", what, "compare it with the drawing")
+        return document
+    finally:
+        logger.removeHandler(heard)
+
+
+def _unit(document: Drawing, options: ImportOptions, draft: Draft) -> float:
+    """The length unit of the drawing, m."""
+    unit = UNITS.get(document.header.get("$INSUNITS", 0))
+    if unit is not None:
+        return unit
+    what = f"states no unit; {1e3 * options.unit:g} mm is taken for 1"
+    draft.warn("exchange.unit", "file", what, "state it with --unit")
+    return options.unit
+
+
+# ---- what is drawn ------------------------------------------------------------------------------------------------
+
+
+def _gathered(document: Drawing, unit: float) -> Sketch:
+    """The marks on the layers that are switched on."""
+    sketch = Sketch()
+    hidden = {entry.dxf.name.casefold() for entry in document.layers if entry.is_off() or entry.is_frozen()}
+    names: dict[str, str] = {}
+    for layer, entity in _entities(document.modelspace(), "", 0, [0]):
+        key = layer.casefold()
+        if key.startswith(SKIPPED):
+            continue
+        if key in hidden:
+            sketch.left[f"entity on the hidden layer {layer}"] += 1
+            continue
+        if key not in names:
+            names[key] = free_name(layer, names.values())
+        _gather(sketch, names[key], entity, unit)
+    return sketch
+
+
+def _entities(entities: Iterable[Any], inserted: str, depth: int, count: list[int]) -> Iterator[tuple[str, Any]]:
+    """Lines, arcs, circles, points and texts with their layers, blocks and polylines taken apart.
+
+    inserted: the layer on which the block lies; it is that of what lies on layer 0 in the block.
+    """
+    for entity in entities:
+        count[0] += 1
+        if count[0] > MOST_PARTS or depth > DEEPEST:
+            what = f"holds blocks of over {MOST_PARTS:,} parts, or {DEEPEST} deep"
+            raise MechanismError(Finding(what, "file", "export the skeleton alone"))
+        layer = entity.dxf.get("layer", "0")
+        layer = inserted if inserted and layer == "0" else layer
+        kind = entity.dxftype()
+        if kind == "INSERT":
+            for single in entity.multi_insert() if entity.mcount > 1 else (entity,):
+                count[0] += 1
+                yield from _entities(single.virtual_entities(), layer, depth + 1, count)
+                yield from ((layer, attribute) for attribute in single.attribs)
+        elif kind in ("LWPOLYLINE", "POLYLINE"):
+            for part in entity.virtual_entities():
+                count[0] += 1
+                yield layer, part
+        else:
+            yield layer, entity
+
+
+def _gather(sketch: Sketch, layer: str, entity: Any, unit: float) -> None:
+    """Add an entity to a sketch, in m."""
+    kind, dxf = entity.dxftype(), entity.dxf
+
+    def place(point: Any) -> Array:
+        sketch.heights.append(unit * point.z)
+        return unit * np.array([point.x, point.y])
+
+    if kind in ("CIRCLE", "ARC", "ELLIPSE") and abs(abs(dxf.extrusion.normalize().z) - 1) > TOUCH:
+        kind = f"tilted {kind}"
+    if kind == "LINE":
+        sketch.lines.append(Line(layer, place(dxf.start), place(dxf.end)))
+    elif kind == "CIRCLE":
+        sketch.circles.append((layer, place(entity.ocs().to_wcs(dxf.center)), abs(unit * dxf.radius)))
+    elif kind == "POINT":
+        sketch.circles.append((layer, place(dxf.location), 0.0))
+    elif kind == "ARC" and abs((dxf.end_angle - dxf.start_angle) % 360 - 180) < math.degrees(HALF):
+        sketch.halves.append(Slot(layer, place(entity.start_point), place(entity.end_point), unit * dxf.radius))
+    elif kind == "ELLIPSE" and abs(dxf.ratio - 1) < TOUCH and abs(dxf.end_param - dxf.start_param - math.tau) < HALF:
+        sketch.circles.append((layer, place(dxf.center), unit * dxf.major_axis.magnitude))  # of a scaled block
+    elif kind in ("TEXT", "ATTRIB"):
+        sketch.texts.append((layer, place(entity.get_placement()[1]), entity.plain_text()))
+    elif kind == "MTEXT" and "\n" not in entity.plain_text().strip():
+        sketch.texts.append((layer, place(dxf.insert), entity.plain_text()))
+    else:
+        sketch.left[kind] += 1
+
+
+# ---- what it means ------------------------------------------------------------------------------------------------
+
+
+class _Reader:
+    """Links and joints of a sketch, written into a draft.
+
+    places: where marks lie, m; what touches is in one place. marks: at each place the radii of the circles of each
+    layer, 0 of a point; none where only its lines end. joined: the places that are joints.
+    """
+
+    def __init__(self, sketch: Sketch, draft: Draft, options: ImportOptions, size: float) -> None:
+        self.sketch, self.draft, self.gap, self.size = sketch, draft, options.gap, size
+        self.places = np.zeros((0, 2))
+        self.joined: set[int] = set()
+        self.marks: dict[int, dict[str, list[float]]] = {}
+        layers = list(dict.fromkeys([*(layer for layer, *_ in sketch.circles), *(line.layer for line in sketch.lines)]))
+        draft.ground = self._ground(layers, options.ground)
+        draft.bodies = {layer: Body(layer) for layer in sorted(layers, key=lambda layer: layer != draft.ground)}
+        for layer, place, radius in sketch.circles:
+            self.marks.setdefault(self._place(place), {}).setdefault(layer, []).append(radius)
+        self.drawn = list(self.marks)
+        self.ends = {line: (self._place(line.start), self._place(line.end)) for line in sketch.lines}
+        self.slots, sides = self._slots()
+        for line in sketch.lines:
+            for number in () if line in sides else self.ends[line]:
+                self.marks.setdefault(number, {}).setdefault(line.layer, [])
+
+    def _place(self, point: Array) -> int:
+        """The number of a place, a new one if none is near."""
+        near = np.flatnonzero(np.hypot(*(self.places - point).T) <= TOUCH * self.size)
+        if not len(near):
+            self.places = np.vstack([self.places, point])
+        return int(near[0]) if len(near) else len(self.places) - 1
+
+    def _ground(self, layers: list[str], option: str) -> str:
+        """The layer that does not move: that which is stated, or has such a name, or layer 0; empty if none."""
+        draft = self.draft
+        named = [layer for layer in layers if any(word in layer.casefold() for word in GROUNDS)]
+        named += [layer for layer in layers if layer == "0"]
+        if option or not named:
+            return option if option in layers else ""
+        if len(named) > 1:
+            what = f"is taken as what does not move, and {', '.join(named[1:])} as links that may"
+            draft.warn("exchange.ground", f"links.{named[0]}", what, "draw all of it on one layer, or state --ground")
+        return named[0]
+
+    def read(self) -> None:
+        """Pins, guides, points and names, in this order; what no joint holds is left out."""
+        draft = self.draft
+        for number in self.drawn:
+            if len(self.marks[number]) > 1:
+                self._pin(number)
+        guided = self._guides()
+        for number, layers in self.marks.items():
+            if number not in self.joined and len(layers) > 1 and not any(pair <= layers.keys() for pair in guided):
+                self._pin(number)
+        for number in self.drawn:
+            if number not in self.joined:
+                self._single(number)
+        loose = [layer for layer in draft.bodies if draft.pairs and not draft.pairs_of(layer)]
+        for layer in loose:
+            del draft.bodies[layer]
+            draft.ground = "" if layer == draft.ground else draft.ground
+            what = "has no joint with another layer and is left out"
+            draft.warn("exchange.loose", f"links.{layer}", what, "draw its joints")
+        self._names()
+
+    def _add(self, kind: str, links: tuple[str, str], number: int, comment: str, axis: Array | None = None) -> Pair:
+        """A new pair that has no name yet, of two links of which the first bears the pin or rail; ground is first."""
+        first, second = links[::-1] if links[1] == self.draft.ground else links
+        pair = Pair(f"J{len(self.draft.pairs) + 1}", kind, (first, second), np.array([*self.places[number], 0.0]))
+        pair.comments.append(comment)
+        if axis is not None:  # as it would be drawn: to the right, or upwards
+            pair.axis = np.array([*axis, 0.0]) / np.hypot(*axis) * np.sign(axis[int(np.argmax(np.abs(axis)))])
+        self.draft.pairs[pair.name] = pair
+        return pair
+
+    def _pin(self, number: int) -> None:
+        """The joints of a place where several layers lie: all turn on the link whose circle is smallest."""
+        draft = self.draft
+        self.joined.add(number)
+        drawn, marks = self.marks[number], dict[str, list[float]]()
+        for layer, radii in drawn.items():
+            sizes = sorted(radius for radius in radii if radius)
+            marks[layer] = [b for a, b in itertools.pairwise([0.0, *sizes]) if b - a > TOUCH * self.size]
+        layers = [layer for layer in draft.bodies if layer in marks]
+        hub = min(layers, key=lambda layer: (min(marks[layer], default=math.inf), -len(drawn[layer])))
+        if len(layers) > 2:
+            what = f"is taken as the link that bears the pin of {', '.join(layers)}"
+            draft.warn("exchange.shared_pin", f"links.{hub}", what, "mend the links of these joints if another does")
+        for other in layers:
+            if other == hub:
+                continue
+            pins, holes = marks[hub], marks[other]
+            near = [sorted(both) for both in itertools.product(pins, holes) if abs(both[0] - both[1]) <= self.gap]
+            fits = near[0] if len(near) == 1 else pins if len(pins) == 1 and not holes else []
+            circles = ", ".join(f"{_mm(radius)} mm" for radius in sorted({*pins, *holes}))
+            pair = self._add(
+                "revolute", (hub, other), number, f"{hub} and {other} share a place; radii: {circles or 'none'}"
+            )
+            pair.pin_radius, pair.hole_radius = [*fits, None, None][:2]
+            if circles and not fits:
+                what = f"has circles of {circles} radius, of which none are clearly its pin and hole"
+                draft.warn("exchange.radius", f"joints.{pair.name}", what, "state its pin, or draw pin and hole alone")
+            if not any(drawn.values()):
+                what = f"is read where lines of {hub} and {other} end; no circle or point marks it"
+                draft.note("exchange.bare_end", f"joints.{pair.name}", what, "draw its pin as a circle")
+
+    def _guides(self) -> set[frozenset[str]]:
+        """Prismatic pairs where lines of two layers lie on each other; the layers that they join.
+
+        A line between two joints is the body of a link, which may lie on another by chance.
+        """
+        draft = self.draft
+        guided: dict[frozenset[str], dict[str, dict[Line, None]]] = {}
+        chance: set[frozenset[str]] = set()
+        for both in _lying(self.sketch.lines, self.gap):
+            layers = frozenset(line.layer for line in both)
+            bodies = [
+                all(k in self.joined or self.marks.get(k, {}).keys() - layers for k in self.ends[line]) for line in both
+            ]
+            if all(bodies) or any(layers <= self.marks[k].keys() for k in self.joined):
+                continue
+            if any(bodies):
+                chance.add(layers)
+                continue
+            for line in both:
+                guided.setdefault(layers, {}).setdefault(line.layer, {})[line] = None
+        for layers in sorted(chance - guided.keys(), key=sorted):
+            what = (
+                f"lines of {' and '.join(sorted(layers))} lie on each other, but one ends at joints; no guide is read"
+            )
+            draft.note("exchange.line", f"links.{min(layers)}", what, "let its lines end elsewhere if it is a guide")
+        for lines in guided.values():
+            free = {
+                layer: [line for line in drawn if not self.joined & {*self.ends[line]}]
+                for layer, drawn in lines.items()
+            }
+            self._guide({layer: free[layer] or list(lines[layer]) for layer in lines})
+        return set(guided)
+
+    def _guide(self, lines: dict[str, list[Line]]) -> None:
+        """The prismatic pair of two layers with lines that lie on each other: the shorter ones are the slider's."""
+        draft = self.draft
+        length = {layer: max(line.length for line in lines[layer]) for layer in lines}
+        order = list(draft.bodies)
+        slider, rail = sorted(lines, key=lambda layer: (length[layer], -order.index(layer)))
+        along = lines[slider][0].span / lines[slider][0].length
+        ways = np.array([sorted(end @ along for end in (line.start, line.end)) for line in lines[slider]])
+        same = all(abs(_cross(along, line.span)) <= 3 * TOUCH * line.length for line in lines[slider])
+        if not same or np.ptp(ways, axis=0).max() > TOUCH * self.size:
+            what = f"has lines of several {'lengths' if same else 'directions'} on those of {rail}; no guide is read"
+            draft.warn("exchange.line", f"links.{slider}", what, "draw the slider as lines of one length")
+            return
+        middle = self._place(np.mean([(line.start + line.end) / 2 for line in lines[slider]], axis=0))
+        pair = self._add("prismatic", (rail, slider), middle, f"lines of {slider} lie on lines of {rail}", along)
+        longer = all(line.length - length[slider] > TOUCH * self.size for line in lines[rail])
+        pair.length = length[slider] if longer else None
+        what = f"is taken as a guide, for lines of {slider} lie on lines of {rail}"
+        draft.note("exchange.guide", f"joints.{pair.name}", what, "if it is none, draw the links at another position")
+
+    def _slots(self) -> tuple[list[Slot], set[Line]]:
+        """What two half circles and two lines of a layer enclose, and these lines."""
+        leads: dict[tuple[str, int], list[tuple[int, Line]]] = {}  # where the lines of a layer lead from a place
+        for line, (start, end) in self.ends.items():
+            leads.setdefault((line.layer, start), []).append((end, line))
+            leads.setdefault((line.layer, end), []).append((start, line))
+        halves = [(half, self._place(half.start), self._place(half.end)) for half in self.sketch.halves]
+        chords = {(half.layer, *chord): half for half, a, b in halves for chord in ((a, b), (b, a))}
+        slots, sides = [], set[Line]()
+        for half, a, b in halves:
+            for (c, left), (d, right) in itertools.product(*(leads.get((half.layer, k), ()) for k in (a, b))):
+                other = chords.get((half.layer, c, d), half)
+                if other is not half and not {left, right} & sides:
+                    ends = [(part.start + part.end) / 2 for part in (half, other)]
+                    slots.append(Slot(half.layer, ends[0], ends[1], (half.half + other.half) / 2))
+                    sides |= {left, right}
+        return slots, sides
+
+    def _single(self, number: int) -> None:
+        """A circle or point that no other layer meets: a pin in a slot of another layer, else a point of the link.
+
+        Between pin and slot lies a block without mass, which turns on the one and slides in the other.
+        """
+        draft, at = self.draft, self.places[number]
+        layer, radii = next(iter(self.marks[number].items()))
+        slots = [
+            slot for slot in self.slots if slot.layer != layer and slot.holds(at, min(radii), 10 * TOUCH * self.size)
+        ]
+        if len(slots) == 1:
+            slot, radius = slots[0], min(radii)
+            comment = (
+                f"a pin of {layer}, radius {_mm(radius)} mm, in a slot of {slot.layer}, {_mm(2 * slot.half)} mm wide"
+            )
+            block = free_name(f"block in {slot.layer}", draft.bodies, "block")
+            draft.bodies[block] = Body(block, comments=[f"{comment}: a block without mass lies between them"])
+            self._add("revolute", (layer, block), number, comment).pin_radius = radius or None
+            guide = self._add("prismatic", (slot.layer, block), number, comment, slot.end - slot.start)
+            ways = sorted(float((end - at) @ guide.axis[:2]) for end in (slot.start, slot.end))
+            guide.limits = ways[0], ways[1]
+            if radius and slot.half - radius > self.gap:
+                what = f"has {_mm(slot.half - radius)} mm of play in the slot of {slot.layer}, which is taken as none"
+                draft.warn("exchange.slot", f"joints.{guide.name}", what, "draw the pin as wide as the slot")
+            return
+        if slots:
+            draft.warn("exchange.slot", f"links.{layer}", "has a pin in several slots; none is read", "draw one slot")
+        points = draft.bodies[layer].points
+        points[f"P{len(points) + 1}"] = np.array([*at, 0.0])
+        near = [k for k in self.drawn if k != number and np.hypot(*(self.places[k] - at)) <= self.gap]
+        others = sorted({other for k in near for other in self.marks[k]} - {layer})
+        if others and max(radii) > 0:
+            what = f"has a circle almost about the centre of one of {', '.join(others)}, which is no joint"
+            draft.warn("exchange.near", f"links.{layer}", what, "draw both about one centre if they are a joint")
+
+    def _names(self) -> None:
+        """Texts name the joint or point nearest to them, those on a layer of its links first.
+
+        A name on the layer of a link that moves makes it the second link of the joint.
+        """
+        draft, near = self.draft, NEAR * self.size
+        targets: list[tuple[str, str, tuple[str, ...], Array]] = []  # layer of a point, old name, links, place
+        targets += [("", pair.name, pair.links, pair.at) for pair in draft.pairs.values()]
+        for link, body in draft.bodies.items():
+            targets += [(link, name, (link,), at) for name, at in body.points.items()]
+            body.points = {}
+        choices = []
+        places = np.array([at[:2] for *_, at in targets]).reshape(-1, 2)
+        for i, (layer, place, _) in enumerate(self.sketch.texts):
+            apart = np.hypot(*(places - place).T)
+            for j in (int(j) for j in np.argsort(apart, kind="stable")[:CROWD] if apart[j] <= near):
+                links = targets[j][2]
+                strange = 0.0 if layer == links[-1] else 0.5 if layer in links else 1.0
+                choices.append((float(apart[j]) + near * strange, j, i))
+        texts: dict[int, int] = {}
+        for _, j, i in sorted(choices):
+            if j not in texts and i not in texts.values():
+                texts[j] = i
+        used: dict[str, list[str]] = {link: [] for link in ("", *draft.bodies)}  # "": by joints
+        pairs, draft.pairs = draft.pairs, {}
+        renamed: dict[str, str] = {}
+        for j in sorted(range(len(targets)), key=lambda j: (targets[j][0] != "", j not in texts)):
+            link, old, links, at = targets[j]
+            layer, _, text = self.sketch.texts[texts[j]] if j in texts else ("", at, old)
+            name = free_name(text.strip(), [*used[""], *used[link]])
+            used[link].append(name)
+            if link:
+                draft.bodies[link].points[name] = at
+                continue
+            turned = layer == links[0] != draft.ground
+            draft.pairs[name] = replace(pairs[old], name=name, links=(links[turned], links[not turned]))
+            renamed[f"joints.{old}"] = f"joints.{name}"
+        draft.findings = [replace(note, where=renamed.get(note.where, note.where)) for note in draft.findings]
+
+
+def _lying(lines: list[Line], gap: float) -> Iterator[tuple[Line, Line]]:
+    """Lines of different layers that are parallel, nearer to each other than the gap, and overlap."""
+    lines = [line for line in lines if line.length > 0]
+    starts, ends = (np.array([getattr(n, end) for n in lines]).reshape(-1, 2) for end in ("start", "end"))
+    lengths, count = np.array([line.length for line in lines]), 0
+    for i, line in enumerate(lines):
+        along = line.span / line.length
+        ways = np.stack([(places[i + 1 :] - line.start) @ along for places in (starts, ends)])
+        aside = np.stack([_cross(along, places[i + 1 :] - line.start) for places in (starts, ends)])
+        overlap = np.minimum(ways.max(axis=0), line.length) - np.maximum(ways.min(axis=0), 0.0)
+        lies = (np.ptp(aside, axis=0) <= TOUCH * lengths[i + 1 :]) & (np.abs(aside).max(axis=0) <= gap)
+        for j in np.flatnonzero(lies & (overlap > 0.01 * np.minimum(lengths[i + 1 :], line.length))):
+            if lines[i + 1 + j].layer != line.layer:
+                count += 1
+                if count > 5 * MOST_MARKS:
+                    what = f"holds more than {5 * MOST_MARKS:,} lines that lie on lines of other layers"
+                    raise MechanismError(Finding(what, "file", "export the skeleton alone"))
+                yield line, lines[i + 1 + j]
+
+
+def _cross(a: Array, b: Array) -> Any:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _mm(length: float) -> str:
+    return f"{1e3 * length:.6g}"

@@ -1,0 +1,460 @@
+"""DXF in: drawings made by ezdxf as a draughtsman would, read as links and joints; and what is asked or refused."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import ezdxf
+import numpy as np
+import pytest
+from ezdxf.math import Matrix44
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import trunnion
+from trunnion.errors import Finding
+from trunnion.exchange import Draft, import_file, model_text
+
+A, B, C, D, E = (0.0, 0.0), (30.0, 40.0), (150.0, 90.0), (120.0, 0.0), (80.0, 110.0)
+PIN, HOLE = 5.0, 5.05
+BOX = ("box", (85, -8), (115, -8), (115, 8), (85, 8))
+FOUR_BAR = {"A": ("ground", "crank"), "B": ("crank", "coupler"), "C": ("coupler", "rocker"), "D": ("ground", "rocker")}
+
+
+def drawing(units: int = 4, **layers: list[tuple[Any, ...]]) -> Any:
+    """A drawing of layers with ("line", a, b), ("circle", c, r), ("point", p), ("text", p, name), ("slot", a, b, r)."""
+    document = ezdxf.new("R2010", units=units)
+    for layer, marks in layers.items():
+        draw(document.modelspace(), layer, marks)
+    return document
+
+
+def draw(space: Any, layer: str, marks: list[tuple[Any, ...]]) -> None:
+    here = {"layer": {"zero": "0"}.get(layer, layer)}
+    for kind, *numbers in marks:
+        if kind == "line":
+            space.add_line(*numbers, dxfattribs=here)
+        elif kind == "circle":
+            space.add_circle(*numbers, dxfattribs=here)
+        elif kind == "point":
+            space.add_point(*numbers, dxfattribs=here)
+        elif kind == "text":
+            space.add_text(numbers[1], height=3, dxfattribs=here).set_placement(numbers[0])
+        elif kind == "box":
+            space.add_lwpolyline(numbers, close=True, dxfattribs=here)
+        elif kind == "slot":
+            a, b, radius = (np.array(n, float) for n in numbers)
+            across = radius * np.array([-(b - a)[1], (b - a)[0]]) / np.hypot(*(b - a))
+            corners = [(*(a - across), 0), (*(b - across), 1), (*(b + across), 0), (*(a + across), 1)]
+            space.add_lwpolyline(corners, format="xyb", close=True, dxfattribs=here)
+
+
+def four_bar() -> dict[str, list[tuple[Any, ...]]]:
+    return {
+        "ground": [("circle", A, PIN), ("circle", D, PIN), ("line", A, D)],
+        "crank": [("circle", A, HOLE), ("circle", B, PIN), ("line", A, B), ("text", (1, 1), "A")],
+        "coupler": [("circle", B, HOLE), ("circle", C, PIN), ("line", B, C), ("point", E), ("text", (30, 41), "B"),
+                    ("text", E, "E")],
+        "rocker": [("circle", C, HOLE), ("circle", D, HOLE), ("line", C, D), ("text", (150, 92), "C"),
+                   ("text", (121, 1), "D")],
+    }  # fmt: skip
+
+
+def read(document: Any, folder: Path, **options: Any) -> Draft:
+    path = folder / "drawing.dxf"
+    document.saveas(path)
+    return import_file(path, **options)
+
+
+def codes(draft: Draft) -> list[str]:
+    return sorted(finding.code.removeprefix("exchange.") for finding in draft.findings)
+
+
+def test_concentric_circles_of_two_layers_are_a_joint_with_pin_hole_and_name(tmp_path: Path) -> None:
+    draft = read(drawing(**four_bar()), tmp_path)
+    assert {name: pair.links for name, pair in draft.pairs.items()} == FOUR_BAR
+    for name, place in zip("ABCD", (A, B, C, D), strict=True):
+        pair = draft.pairs[name]
+        np.testing.assert_allclose(pair.at, [1e-3 * place[0], 1e-3 * place[1], 0], atol=1e-15)
+        assert pair.pin_radius == pytest.approx(5e-3, rel=1e-12)
+        assert pair.clearance == pytest.approx(0.05e-3, rel=1e-9)
+    np.testing.assert_allclose(draft.bodies["coupler"].points["E"], [0.08, 0.11, 0])
+    assert draft.ground == "ground"
+    assert codes(draft) == ["drive", "mass"]
+    (tmp_path / "model.yaml").write_text(model_text(draft), "utf-8")
+    model = trunnion.read(tmp_path / "model.yaml")
+    assert model.space == "planar"
+    assert trunnion.check(model).mobility == 1
+
+
+@settings(deadline=None, max_examples=12)
+@given(
+    turn=st.floats(-180, 180),
+    shift=st.floats(-1e3, 1e3),
+    scale=st.floats(0.2, 5),
+    mirrored=st.booleans(),
+    nested=st.integers(0, 3),
+)
+def test_blocks_are_read_where_they_are_inserted(
+    turn: float, shift: float, scale: float, mirrored: bool, nested: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    document = ezdxf.new("R2010", units=4)
+    block = document.blocks.new("part0")
+    for layer, marks in four_bar().items():
+        draw(block, layer, marks)
+    for depth in range(nested):
+        document.blocks.new(f"part{depth + 1}").add_blockref(f"part{depth}", (0, 0))
+    attributes = {"rotation": turn, "xscale": -scale if mirrored else scale, "yscale": scale, "zscale": scale}
+    document.modelspace().add_blockref(f"part{nested}", (shift, 7.0), dxfattribs=attributes)
+    draft = read(document, tmp_path_factory.mktemp("block"), gap="5 mm")
+    place = Matrix44.chain(
+        Matrix44.scale(-scale if mirrored else scale, scale, 1),
+        Matrix44.z_rotate(math.radians(turn)),
+        Matrix44.translate(shift, 7, 0),
+    )
+    assert {frozenset(pair.links) for pair in draft.pairs.values()} == {frozenset(two) for two in FOUR_BAR.values()}
+    joined = {frozenset(pair.links): pair for pair in draft.pairs.values()}
+    for point, links in zip((A, B, C, D), FOUR_BAR.values(), strict=True):
+        pair = joined[frozenset(links)]
+        np.testing.assert_allclose(1e3 * pair.at, place.transform((*point, 0)).xyz, atol=1e-9 * (abs(shift) + 1e3))
+        assert pair.pin_radius == pytest.approx(5e-3 * scale, rel=1e-9)
+        assert pair.hole_radius == pytest.approx(5.05e-3 * scale, rel=1e-9)
+
+
+def test_what_lies_on_layer_0_of_a_block_is_on_the_layer_of_the_block(tmp_path: Path) -> None:
+    document = drawing(ground=[("circle", A, PIN)])
+    draw(document.blocks.new("arm"), "zero", [("circle", A, HOLE), ("circle", (50, 0), PIN)])
+    document.modelspace().add_blockref("arm", (0, 0), dxfattribs={"layer": "arm"})
+    assert [pair.links for pair in read(document, tmp_path).pairs.values()] == [("ground", "arm")]
+
+
+def test_units_are_those_of_the_file_else_stated_and_a_finding(tmp_path: Path) -> None:
+    inches = read(drawing(units=1, **four_bar()), tmp_path)
+    np.testing.assert_allclose(inches.pairs["D"].at, [120 * 0.0254, 0, 0], rtol=1e-15)
+    bare = read(drawing(units=0, **four_bar()), tmp_path)
+    np.testing.assert_allclose(bare.pairs["D"].at, [0.12, 0, 0])
+    assert "unit" in codes(bare)
+    stated = read(drawing(units=0, **four_bar()), tmp_path, unit="in", gap="0.05in")
+    np.testing.assert_allclose(stated.pairs["D"].at, [120 * 0.0254, 0, 0])
+
+
+def test_layer_0_is_the_ground_where_no_layer_has_such_a_name(tmp_path: Path) -> None:
+    marks = four_bar()
+    draft = read(drawing(zero=marks.pop("ground"), **marks), tmp_path)
+    assert draft.ground == "0"
+    marks = four_bar()
+    both = read(drawing(**marks, zero=[("line", (0, -50), (200, -50))]), tmp_path)
+    assert both.ground == "ground"
+    assert "ground" in codes(both)
+    assert read(drawing(**marks), tmp_path, ground="rocker").ground == "rocker"
+
+
+def test_lines_alone_make_joints_and_say_so(tmp_path: Path) -> None:
+    lines = {layer: [mark for mark in marks if mark[0] == "line"] for layer, marks in four_bar().items()}
+    draft = read(drawing(**lines), tmp_path)
+    assert {frozenset(pair.links) for pair in draft.pairs.values()} == {frozenset(two) for two in FOUR_BAR.values()}
+    assert codes(draft).count("bare_end") == 4
+    assert all(pair.pin_radius is None for pair in draft.pairs.values())
+
+
+def test_one_circle_where_lines_of_several_layers_end_is_a_joint_with_that_pin(tmp_path: Path) -> None:
+    draft = read(drawing(ground=[("line", A, D), ("circle", A, 4)], crank=[("line", A, B)]), tmp_path)
+    (pair,) = draft.pairs.values()
+    assert pair.pin_radius == pytest.approx(4e-3)
+    assert pair.hole_radius is None
+
+
+@pytest.mark.parametrize(
+    ("crank", "code", "joints"),
+    [
+        ([("circle", A, 12.0)], "radius", 1),  # too wide for a hole
+        ([("circle", A, 5.0), ("circle", A, 5.1)], "radius", 1),  # which of the two?
+        ([("circle", (0.2, 0), 5.0)], "near", 0),  # almost concentric
+        ([("circle", (0.2, 0), 5.0), ("line", (0.2, 0), B)], "near", 0),
+    ],
+)
+def test_circles_that_are_not_clearly_pin_and_hole_are_asked(
+    crank: list[tuple[Any, ...]], code: str, joints: int, tmp_path: Path
+) -> None:
+    draft = read(drawing(ground=[("circle", A, PIN), ("line", (0, -40), (100, -40))], crank=crank), tmp_path)
+    assert code in codes(draft)
+    assert len(draft.pairs) == joints
+    assert all(pair.pin_radius is None for pair in draft.pairs.values())
+
+
+def test_three_links_on_one_pin_turn_on_that_with_the_smallest_circle(tmp_path: Path) -> None:
+    marks: dict[str, list[tuple[Any, ...]]] = {
+        "a": [("circle", A, HOLE), ("line", A, B)],
+        "b": [("circle", A, PIN), ("line", A, C)],
+        "c": [("circle", A, HOLE), ("line", A, D)],
+    }
+    draft = read(drawing(**marks), tmp_path)
+    assert [pair.links for pair in draft.pairs.values()] == [("b", "a"), ("b", "c")]
+    assert "shared_pin" in codes(draft)
+    assert [pair.pin_radius for pair in draft.pairs.values()] == pytest.approx([5e-3, 5e-3])
+
+
+def slotted() -> dict[str, list[tuple[Any, ...]]]:
+    """A crank of 40 mm whose pin runs in the slot of a lever 100 mm away, drawn at 90°."""
+    way = np.array([100.0, 40.0]) / math.hypot(100, 40)
+    lever = np.array([-100.0, 0.0])
+    return {
+        "frame": [("circle", A, PIN), ("circle", tuple(lever), PIN)],
+        "crank": [("circle", A, PIN), ("line", A, (0, 40)), ("circle", (0, 40), 6.0)],
+        "lever": [("circle", tuple(lever), PIN), ("slot", tuple(lever + 50 * way), tuple(lever + 150 * way), 6.1)],
+    }
+
+
+def test_a_pin_in_a_slot_turns_and_slides(tmp_path: Path) -> None:
+    draft = read(drawing(**slotted()), tmp_path, drive="J1", speed="10 rad/s")
+    kinds = sorted((pair.type, *pair.links) for pair in draft.pairs.values())
+    block = "block in lever"
+    assert kinds == [("prismatic", "lever", block), ("revolute", "crank", block), ("revolute", "frame", "crank"),
+                     ("revolute", "frame", "lever")]  # fmt: skip
+    guide = next(pair for pair in draft.pairs.values() if pair.type == "prismatic")
+    length = math.hypot(100, 40)
+    assert guide.limits == pytest.approx([1e-3 * (50 - length), 1e-3 * (150 - length)])
+    (tmp_path / "model.yaml").write_text(model_text(draft), "utf-8")
+    result = trunnion.analyse(trunnion.read(tmp_path / "model.yaml"), 24)
+    crank = math.pi / 2 + result["link_angle"].sel(link="crank").values
+    lever = np.arctan2(40 * np.sin(crank), 100 + 40 * np.cos(crank))
+    turned = result["link_angle"].sel(link="lever").values
+    np.testing.assert_allclose(turned, lever - lever[0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("pin", "code"), [((0.0, 40.0), ""), ((1.0, 40.0), ""), ((0.0, 39.0), ""), ((-100.0, 100.0), "")]
+)
+def test_a_pin_beside_the_middle_of_a_slot_is_no_guide(pin: tuple[float, float], code: str, tmp_path: Path) -> None:
+    marks = slotted()
+    marks["crank"][-1] = ("circle", pin, 6.0)
+    types = [pair.type for pair in read(drawing(**marks), tmp_path).pairs.values()]
+    assert ("prismatic" in types) == (pin == (0.0, 40.0))
+
+
+def test_a_loose_pin_in_a_slot_is_asked(tmp_path: Path) -> None:
+    marks = slotted()
+    marks["crank"][-1] = ("circle", (0.0, 40.0), 4.0)
+    assert "slot" in codes(read(drawing(**marks), tmp_path))
+
+
+def slider(rail: list[tuple[Any, ...]], block: list[tuple[Any, ...]]) -> dict[str, list[tuple[Any, ...]]]:
+    return {
+        "ground": [("circle", A, PIN), *rail],
+        "crank": [("circle", A, PIN), ("line", A, (0, 30)), ("circle", (0, 30), PIN)],
+        "rod": [("circle", (0, 30), PIN), ("line", (0, 30), (100, 0)), ("circle", (100, 0), PIN)],
+        "slider": [("circle", (100, 0), PIN), *block],
+    }
+
+
+@pytest.mark.parametrize(
+    ("rail", "block"),
+    [
+        ([("line", (40, 0), (160, 0))], [("line", (85, 0), (115, 0))]),
+        ([("line", (40, 8), (160, 8)), ("line", (40, -8), (160, -8))], [BOX]),
+        ([("line", (40, 8.1), (160, 8.1)), ("line", (160, -8.1), (40, -8.1))], [BOX]),
+        ([("slot", (40, 0), (160, 0), 8)], [BOX]),
+    ],
+)
+def test_lines_that_lie_on_each_other_are_a_guide(rail: list[Any], block: list[Any], tmp_path: Path) -> None:
+    draft = read(drawing(**slider(rail, block)), tmp_path)
+    (guide,) = (pair for pair in draft.pairs.values() if pair.type == "prismatic")
+    assert guide.links == ("ground", "slider")
+    np.testing.assert_allclose(guide.at, [0.1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(guide.axis, [1, 0, 0], atol=1e-12)
+    assert guide.length == pytest.approx(0.03)
+    assert "guide" in codes(draft)
+    assert draft.mobility(planar=True) == 1
+
+
+def test_a_box_in_a_box_is_no_guide_for_nobody_knows_which_way(tmp_path: Path) -> None:
+    draft = read(drawing(**slider([BOX], [BOX])), tmp_path)
+    assert not [pair for pair in draft.pairs.values() if pair.type == "prismatic"]
+    assert "line" in codes(draft)
+
+
+def test_links_in_line_are_no_guide(tmp_path: Path) -> None:
+    marks = {
+        "ground": [("line", (0, 0), (100, 0)), ("circle", (0, 0), PIN), ("circle", (100, 0), PIN)],
+        "crank": [("line", (0, 0), (30, 0)), ("circle", (0, 0), PIN), ("circle", (30, 0), PIN)],
+        "coupler": [("line", (30, 0), (130, 0)), ("circle", (30, 0), PIN), ("circle", (130, 0), PIN)],
+        "rocker": [("line", (130, 0), (100, 0)), ("circle", (130, 0), PIN), ("circle", (100, 0), PIN)],
+    }
+    draft = read(drawing(**marks), tmp_path)  # type: ignore[arg-type]
+    assert [pair.type for pair in draft.pairs.values()] == ["revolute"] * 4
+
+
+def test_hidden_layers_and_other_entities_are_left_and_listed(tmp_path: Path) -> None:
+    document = drawing(**four_bar(), notes=[("circle", A, PIN)], Defpoints=[("point", B)])
+    document.layers.add("notes").off()
+    space = document.modelspace()
+    space.add_spline([(0, 0), (5, 9), (9, 2)], dxfattribs={"layer": "crank"})
+    space.add_circle((0, 0, 0), 3, dxfattribs={"layer": "crank", "extrusion": (1, 0, 0)})
+    draft = read(document, tmp_path)
+    assert set(draft.bodies) == {"ground", "crank", "coupler", "rocker"}
+    (left,) = (finding for finding in draft.findings if finding.code == "exchange.left")
+    assert "SPLINE" in left.what
+    assert "tilted CIRCLE" in left.what
+    assert "hidden layer notes" in left.what
+
+
+def test_a_drawing_in_space_is_read_from_above_and_says_so(tmp_path: Path) -> None:
+    draft = read(drawing(ground=[("line", (0, 0, 0), (9, 0, 50))], crank=[("line", (0, 0, 0), (0, 9, 0))]), tmp_path)
+    assert "flat" in codes(draft)
+
+
+def test_layers_that_differ_by_case_are_one(tmp_path: Path) -> None:
+    document = drawing(ground=[("circle", A, PIN)], Arm=[("circle", A, PIN)])
+    draw(document.modelspace(), "ARM", [("circle", B, PIN)])
+    draft = read(document, tmp_path)
+    assert set(draft.bodies) == {"ground", "Arm"}
+    assert len(draft.bodies["Arm"].points) == 1
+
+
+def test_a_layer_without_a_joint_is_left_out_and_a_name_never_stands_for_two(tmp_path: Path) -> None:
+    frame = [("box", (-200, -100), (300, -100), (300, 200), (-200, 200))]
+    marks = four_bar()
+    marks["crank"][-1] = ("text", (1, 1), "J2")  # as a joint without a name would be called
+    marks["rocker"] = [*marks["rocker"][:3], ("text", (121, 1), "J2"), ("text", C, "a name\nof two lines.")]
+    marks["coupler"][-2] = ("text", (31, 41), "E")
+    draft = read(drawing(border=frame, **marks), tmp_path)
+    assert set(draft.bodies) == {"ground", "crank", "coupler", "rocker"}
+    assert "loose" in codes(draft)
+    assert len(draft.pairs) == 4
+    assert {"J2", "J2-2", "E"} < draft.pairs.keys()
+    assert list(draft.bodies["coupler"].points) == ["E-2"]
+    (tmp_path / "model.yaml").write_text(model_text(draft), "utf-8")
+    assert trunnion.check(trunnion.read(tmp_path / "model.yaml")).mobility == 1
+
+
+def test_layers_have_names_that_a_model_accepts(tmp_path: Path) -> None:
+    marks = {layer.replace("c", "part.", 1): drawn for layer, drawn in four_bar().items()}
+    draft = read(drawing(**marks), tmp_path)
+    assert set(draft.bodies) == {"ground", "part-rank", "part-oupler", "ropart-ker"}
+    (tmp_path / "model.yaml").write_text(model_text(draft), "utf-8")
+    assert trunnion.check(trunnion.read(tmp_path / "model.yaml")).mobility == 1
+
+
+# ---- hostile files ------------------------------------------------------------------------------------------------
+
+
+def text_of(count: int) -> bytes:
+    return (
+        b"  0\nSECTION\n  2\nENTITIES\n"
+        + b"  0\nPOINT\n  8\na\n 10\n1.0\n 20\n2.0\n" * count
+        + b"  0\nENDSEC\n  0\nEOF\n"
+    )
+
+
+def bomb(folder: Path) -> bytes:
+    """Blocks of ten blocks, ten deep."""
+    document = ezdxf.new("R2010")
+    document.blocks.new("b0").add_circle((0, 0), 1)
+    for depth in range(1, 11):
+        block = document.blocks.new(f"b{depth}")
+        for k in range(10):
+            block.add_blockref(f"b{depth - 1}", (k, 0))
+    document.modelspace().add_blockref("b10", (0, 0))
+    document.saveas(folder / "bomb.dxf")
+    return (folder / "bomb.dxf").read_bytes()
+
+
+def array(folder: Path) -> bytes:
+    document = ezdxf.new("R2010")
+    document.blocks.new("b").add_circle((0, 0), 1)
+    attributes = {"row_count": 30000, "column_count": 30000, "row_spacing": 1, "column_spacing": 1}
+    document.modelspace().add_blockref("b", (0, 0), dxfattribs=attributes)
+    document.saveas(folder / "array.dxf")
+    return (folder / "array.dxf").read_bytes()
+
+
+def circular(folder: Path) -> bytes:
+    document = ezdxf.new("R2010")
+    document.blocks.new("a").add_blockref("b", (0, 0))
+    document.blocks.new("b").add_blockref("a", (0, 0))
+    document.modelspace().add_blockref("a", (0, 0))
+    document.saveas(folder / "circular.dxf")
+    return (folder / "circular.dxf").read_bytes()
+
+
+HOSTILE: dict[str, Callable[[Path], bytes]] = {
+    "many": lambda _: text_of(1_000_000),
+    "some": lambda _: text_of(10_000),
+    "bomb": bomb,
+    "array": array,
+    "circular": circular,
+    "empty": lambda _: b"",
+    "blank": lambda _: b"\n\n\n",
+    "junk": lambda _: np.random.default_rng(1).bytes(200_000),
+    "binary": lambda _: b"AutoCAD Binary DXF\r\n\x1a\x00" + np.random.default_rng(1).bytes(20_000),
+    "text": lambda _: "Zeichnung für Gäste\n".encode() * 100,
+    "nan": lambda _: text_of(2).replace(b"1.0", b"nan"),
+    "huge": lambda _: text_of(1).replace(b"1.0", b"1e308") + text_of(1),
+    "letters": lambda _: text_of(2).replace(b"1.0", b"one"),
+    "stack": lambda folder: saved(drawing(**{f"l{i}": [("line", (0, i * 1e-9), (9, 0))] for i in range(900)}), folder),
+    "nothing": lambda folder: saved(drawing(), folder),
+}
+
+
+def saved(document: Any, folder: Path) -> bytes:
+    document.saveas(folder / "saved.dxf")
+    return (folder / "saved.dxf").read_bytes()
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_a_hostile_file_is_a_sentence_within_seconds(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "hostile.dxf"
+    path.write_bytes(HOSTILE[kind](tmp_path))
+    start = time.perf_counter()
+    with pytest.raises(trunnion.MechanismError) as caught:
+        import_file(path)
+    assert time.perf_counter() - start < 10
+    assert len(caught.value.findings) == 1
+    assert caught.value.findings[0].what
+
+
+def tried(path: Path) -> tuple[Draft | None, tuple[Finding, ...]]:
+    """The draft of a file, or why there is none."""
+    try:
+        return import_file(path), ()
+    except trunnion.MechanismError as error:
+        return None, error.findings
+
+
+def test_as_many_marks_as_are_read_take_seconds(tmp_path: Path) -> None:
+    """Marks that crowd in one place are the worst: 600 circles, and 1,300 texts near to them."""
+    marks = [("circle", (0, 0), 5.0)] * 300
+    texts = [("text", (0.01 * k, 0), f"T{k}") for k in range(1300)]
+    start = time.perf_counter()
+    read(drawing(a=[*marks, ("line", (0, 0), (100, 0))], ground=marks, names=texts), tmp_path)
+    assert time.perf_counter() - start < 10
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.8, 0.99])
+def test_a_file_that_is_cut_off_is_mended_or_refused(share: float, tmp_path: Path) -> None:
+    data = saved(drawing(**four_bar()), tmp_path)
+    path = tmp_path / "cut.dxf"
+    path.write_bytes(data[: int(share * len(data))])
+    draft, findings = tried(path)
+    assert len(findings) == 1 or (draft and ("damaged" in codes(draft) or set(draft.pairs) == set(FOUR_BAR)))
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    damage=st.lists(st.tuples(st.floats(0, 0.999), st.binary(max_size=5), st.integers(0, 5)), min_size=1, max_size=4)
+)
+def test_damage_anywhere_is_no_traceback(
+    damage: list[tuple[float, bytes, int]], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = tmp_path_factory.mktemp("damage")
+    data = saved(drawing(**four_bar()), folder)
+    for share, inserted, lost in damage:
+        at = int(share * len(data))
+        data = data[:at] + inserted + data[at + lost :]
+    (folder / "damaged.dxf").write_bytes(data)
+    draft, findings = tried(folder / "damaged.dxf")
+    assert findings or (draft and model_text(draft))

@@ -1,0 +1,252 @@
+"""Meshes: mass, centre and inertia of polyhedra in closed form; STL and 3MF are written here byte by byte."""
+
+from __future__ import annotations
+
+import struct
+import time
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+import trunnion
+from trunnion.exchange import Draft, import_file
+
+BOX = np.array([40.0, 20.0, 10.0])
+CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+FACES = np.array(
+    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+     [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+)  # fmt: skip
+
+
+def stl(corners: Any, faces: Any, text: bool = False) -> bytes:
+    triangles = np.asarray(corners)[np.asarray(faces)]
+    if text:
+        parts = [
+            "facet normal 0 0 0\nouter loop\n"
+            + "".join(f"vertex {x!r} {y!r} {z!r}\n" for x, y, z in triangle.tolist())
+            + "endloop\nendfacet\n"
+            for triangle in triangles
+        ]
+        return ("solid box\n" + "".join(parts) + "endsolid box\n").encode()
+    data = b"".join(struct.pack("<12fH", 0, 0, 0, *triangle.ravel(), 0) for triangle in triangles)
+    return b"\0" * 80 + struct.pack("<I", len(triangles)) + data
+
+
+def model_3mf(objects: str, build: str, unit: str | None = "millimeter", head: str = "") -> bytes:
+    stated = "" if unit is None else f' unit="{unit}"'
+    core = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+    return (
+        f'<?xml version="1.0" encoding="UTF-8"?>{head}<model{stated} xmlns="{core}">'
+        f"<resources>{objects}</resources><build>{build}</build></model>"
+    ).encode()
+
+
+def solid(number: int, corners: Any, faces: Any, name: str = "") -> str:
+    vertices = "".join(f'<vertex x="{x!r}" y="{y!r}" z="{z!r}"/>' for x, y, z in np.asarray(corners).tolist())
+    triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in np.asarray(faces).tolist())
+    label = f' name="{name}"' if name else ""
+    mesh = f"<mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh>"
+    return f'<object id="{number}" type="model"{label}>{mesh}</object>'
+
+
+def packed(folder: Path, data: bytes, name: str = "3D/3dmodel.model") -> Path:
+    path = folder / "part.3mf"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("[Content_Types].xml", "<Types/>")
+        archive.writestr(name, data)
+    return path
+
+
+def written(folder: Path, data: bytes, name: str = "part.stl") -> Path:
+    (folder / name).write_bytes(data)
+    return folder / name
+
+
+def codes(draft: Draft) -> list[str]:
+    return sorted(finding.code.removeprefix("exchange.") for finding in draft.findings)
+
+
+def is_box(draft: Draft, name: str, sides: Any, rotation: Any, shift: Any, density: float = 7850.0) -> None:
+    """A box of these sides, m, whose corner lies at shift, m."""
+    body = draft.bodies[name]
+    mass = density * np.prod(sides)
+    square = np.asarray(sides) ** 2
+    inertia = rotation @ np.diag(mass / 12 * (square.sum() - square)) @ rotation.T
+    assert body.mass == pytest.approx(mass, rel=1e-9)
+    np.testing.assert_allclose(body.centre, rotation @ np.asarray(sides) / 2 + shift, atol=1e-9)
+    np.testing.assert_allclose(body.inertia, inertia, atol=1e-9 * np.trace(inertia))
+
+
+@pytest.mark.parametrize("text", [False, True])
+@pytest.mark.parametrize(("unit", "metre"), [("mm", 1e-3), ("in", 0.0254), ("m", 1.0)])
+def test_a_box_as_stl(text: bool, unit: str, metre: float, tmp_path: Path) -> None:
+    draft = import_file(written(tmp_path, stl(BOX * CORNERS, FACES, text)), unit=unit, material="aluminium")
+    is_box(draft, "part", metre * BOX, np.eye(3), np.zeros(3), 2700.0)
+    assert codes(draft) == ["joints", "unit"]
+
+
+@settings(deadline=None, max_examples=10)
+@given(seed=st.integers(0, 2**31 - 1), inside_out=st.booleans())
+def test_a_tetrahedron_anywhere(seed: int, inside_out: bool, tmp_path_factory: pytest.TempPathFactory) -> None:
+    rng = np.random.default_rng(seed)
+    corners = rng.normal(size=(4, 3)) * 50
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    span = corners[1:] - corners[0]
+    if (np.linalg.det(span) < 0) != inside_out:
+        faces = faces[:, ::-1]
+    path = written(tmp_path_factory.mktemp("stl"), stl(corners, faces, text=True))
+    body = import_file(path, density=1000).bodies["part"]
+    metres = 1e-3 * corners
+    mass = 1000 * abs(np.linalg.det(1e-3 * span)) / 6
+    second = mass / 20 * (metres.T @ metres + 16 * np.outer(metres.mean(axis=0), metres.mean(axis=0)))
+    second -= mass * np.outer(metres.mean(axis=0), metres.mean(axis=0))
+    assert body.mass == pytest.approx(mass, rel=1e-9)
+    np.testing.assert_allclose(body.centre, metres.mean(axis=0), atol=1e-9)
+    np.testing.assert_allclose(body.inertia, np.trace(second) * np.eye(3) - second, atol=1e-9 * np.trace(second))
+
+
+def test_the_parts_of_a_3mf_lie_where_they_are_built(tmp_path: Path) -> None:
+    turn = Rotation.from_rotvec([0.3, -0.5, 0.7]).as_matrix()
+
+    def transform(rotation: Any, shift: Any) -> str:  # points are rows, so the matrix is written transposed
+        return " ".join(repr(float(n)) for n in [*rotation.T.ravel(), *shift])
+
+    quarter = Rotation.from_rotvec([0, 0, np.pi / 2]).as_matrix()
+    objects = solid(1, BOX * CORNERS, FACES, "Gehäuse") + solid(2, 2 * CORNERS, FACES)
+    component = f'<component objectid="2" transform="{transform(quarter, [5, 6, 7])}"/>'
+    objects += f'<object id="3" name="group"><components>{component}</components></object>'
+    build = '<item objectid="1"/>' + f'<item objectid="3" transform="{transform(turn, [1, 2, 3])}"/>'
+    draft = import_file(packed(tmp_path, model_3mf(objects, build, "centimeter")))
+    assert list(draft.bodies) == ["ground", "Gehäuse", "part 2"]
+    is_box(draft, "Gehäuse", 1e-2 * BOX, np.eye(3), np.zeros(3))
+    is_box(draft, "part 2", [0.02] * 3, turn @ quarter, 1e-2 * (turn @ [5, 6, 7] + [1, 2, 3]))
+    assert codes(draft) == ["joints"]
+
+
+def test_a_3mf_without_a_unit_is_in_millimetres_as_its_standard_says(tmp_path: Path) -> None:
+    objects = solid(1, BOX * CORNERS, FACES, "box")
+    draft = import_file(packed(tmp_path, model_3mf(objects, '<item objectid="1"/>', None)))
+    is_box(draft, "box", 1e-3 * BOX, np.eye(3), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    "faces",
+    [FACES[:-1], np.vstack([FACES[:-1], FACES[-1:, ::-1]]), np.vstack([FACES, [[0, 1, 7]]]), FACES[:2]],
+    ids=["hole", "flipped", "fin", "sheet"],
+)
+def test_an_open_mesh_has_no_mass_and_says_so(faces: Any, tmp_path: Path) -> None:
+    draft = import_file(written(tmp_path, stl(BOX * CORNERS, faces)))
+    assert draft.bodies["part"].mass == 0
+    assert "open_mesh" in codes(draft)
+
+
+def test_two_shells_in_one_mesh_are_one_body_and_noted(tmp_path: Path) -> None:
+    corners = np.vstack([BOX * CORNERS, BOX * CORNERS + 100])
+    draft = import_file(written(tmp_path, stl(corners, np.vstack([FACES, FACES + 8]))))
+    assert "shells" in codes(draft)
+    assert draft.bodies["part"].mass == pytest.approx(2 * 7850 * np.prod(1e-3 * BOX), rel=1e-9)
+    np.testing.assert_allclose(draft.bodies["part"].centre, 1e-3 * (BOX / 2 + 50), atol=1e-9)
+
+
+def test_a_cavity_is_subtracted(tmp_path: Path) -> None:
+    corners = np.vstack([BOX * CORNERS, BOX * (0.25 + 0.5 * CORNERS)])
+    draft = import_file(written(tmp_path, stl(corners, np.vstack([FACES, FACES[:, ::-1] + 8]))))
+    assert draft.bodies["part"].mass == pytest.approx(7850 * np.prod(1e-3 * BOX) * 7 / 8, rel=1e-6)
+
+
+# ---- hostile files ------------------------------------------------------------------------------------------------
+
+ENTITIES = '<!DOCTYPE m [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">]>'
+BOXED = solid(1, BOX * CORNERS, FACES)
+ITEM = '<item objectid="1"/>'
+
+
+def packed_bomb(folder: Path) -> Path:
+    return packed(folder, b"<model>" + b" " * 60_000_000 + b"</model>")
+
+
+def lying_bomb(folder: Path) -> Path:
+    """A zip that says its model is small, and unpacks to 60 MB."""
+    path = packed(folder, b"<model>" + b" " * 60_000_000 + b"</model>")
+    data = path.read_bytes()
+    path.write_bytes(data.replace(struct.pack("<I", 60_000_015), struct.pack("<I", 1000)))
+    return path
+
+
+def nested(count: int) -> str:
+    """Objects each of ten of the one before."""
+    parts = [BOXED]
+    for number in range(2, count + 2):
+        component = f'<component objectid="{number - 1}"/>' * 10
+        parts.append(f'<object id="{number}"><components>{component}</components></object>')
+    return "".join(parts)
+
+
+LOOP = '<object id="1"><components><component objectid="1"/></components></object>'
+HOSTILE_3MF = {
+    "bomb": packed_bomb,
+    "lying": lying_bomb,
+    "entities": lambda folder: packed(folder, model_3mf(BOXED, ITEM, head=ENTITIES)),
+    "external": lambda folder: packed(folder, model_3mf(BOXED, ITEM, head='<!DOCTYPE m SYSTEM "file:///etc/passwd">')),
+    "no zip": lambda folder: written(folder, b"PK\3\4 no zip at all", "part.3mf"),
+    "no model": lambda folder: packed(folder, b"<a/>", "readme.txt"),
+    "no object": lambda folder: packed(folder, model_3mf("", ITEM)),
+    "nothing": lambda folder: packed(folder, model_3mf(BOXED, "")),
+    "loop": lambda folder: packed(folder, model_3mf(LOOP, ITEM)),
+    "many": lambda folder: packed(folder, model_3mf(nested(6), '<item objectid="7"/>')),
+    "no corner": lambda folder: packed(folder, model_3mf(solid(1, BOX * CORNERS, FACES + 3), ITEM)),
+    "unit": lambda folder: packed(folder, model_3mf(BOXED, ITEM, "furlong")),
+    "transform": lambda folder: packed(folder, model_3mf(BOXED, '<item objectid="1" transform="1 2 3"/>')),
+    "numbers": lambda folder: packed(folder, model_3mf(BOXED.replace('x="0.0"', 'x="zero"'), ITEM)),
+}
+HOSTILE = {
+    "stl empty": ("part.stl", b""),
+    "stl junk": ("part.stl", np.random.default_rng(1).bytes(50_000)),
+    "stl text": ("part.stl", "solid für Gäste\nfacet\n".encode() * 100),
+    "stl cut": ("part.stl", stl(BOX * CORNERS, FACES)[:300]),
+    "stl count": ("part.stl", b"\0" * 80 + struct.pack("<I", 2**32 - 1) + b"\0" * 500),
+    "glb junk": ("part.glb", np.random.default_rng(1).bytes(50_000)),
+    "glb cut": ("part.glb", struct.pack("<4sII", b"glTF", 2, 100) + struct.pack("<I4s", 80, b"JSON") + b'{"asset":'),
+    "glb empty": ("part.glb", struct.pack("<4sIII4s", b"glTF", 2, 24, 4, b"JSON") + b"{}  "),
+}
+
+
+def refused(path: Path) -> None:
+    start = time.perf_counter()
+    with pytest.raises(trunnion.MechanismError) as caught:
+        import_file(path)
+    assert time.perf_counter() - start < 10
+    assert len(caught.value.findings) == 1
+
+
+@pytest.mark.parametrize("kind", HOSTILE_3MF)
+def test_a_hostile_3mf_is_a_sentence(kind: str, tmp_path: Path) -> None:
+    refused(HOSTILE_3MF[kind](tmp_path))
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_a_hostile_mesh_is_a_sentence(kind: str, tmp_path: Path) -> None:
+    name, data = HOSTILE[kind]
+    refused(written(tmp_path, data, name))
+
+
+def test_too_large_a_mesh_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "part.stl"
+    with path.open("wb") as stream:
+        stream.truncate(190_000_000)
+    refused(path)
+
+
+def test_numbers_that_are_none_leave_a_body_without_mass(tmp_path: Path) -> None:
+    corners = BOX * CORNERS
+    corners[3] = np.nan
+    draft = import_file(written(tmp_path, stl(corners, FACES)))
+    assert draft.bodies["part"].mass == 0
+    assert {"mesh", "open_mesh"} & set(codes(draft))

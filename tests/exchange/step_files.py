@@ -357,16 +357,17 @@ class StepFile:
     def part(self, name, *shapes):
         return self.product(name, [self.solid(shape) for shape in shapes])
 
-    def assembly(self, name, *components):
-        """Components: (part, rotation matrix, shift)."""
+    def assembly(self, name, *components, swapped=False):
+        """Components: (part, rotation matrix, shift); swapped: the parent is the first of each relation."""
         places = [self.placement(shift, matrix[:, 2], matrix[:, 0]) for _, matrix, shift in components]
         parent = self.product(name, places, "SHAPE_REPRESENTATION")
         for (part, _, _), place in zip(components, places, strict=True):
             use = self(f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{place}','','',#{parent[0]},#{part[0]},$)")
             shape = self(f"PRODUCT_DEFINITION_SHAPE('','',#{use})")
-            moved = self(f"ITEM_DEFINED_TRANSFORMATION('','',#{part[2]},#{place})")
+            (first, start), (second, end) = ((parent[1], place), (part[1], part[2]))[:: 1 if swapped else -1]
+            moved = self(f"ITEM_DEFINED_TRANSFORMATION('','',#{start},#{end})")
             relation = self(
-                f"(REPRESENTATION_RELATIONSHIP('','',#{part[1]},#{parent[1]})"
+                f"(REPRESENTATION_RELATIONSHIP('','',#{first},#{second})"
                 f"REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#{moved})SHAPE_REPRESENTATION_RELATIONSHIP())"
             )
             self(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{shape})")

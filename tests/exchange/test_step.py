@@ -819,6 +819,21 @@ def test_parts_of_the_original_are_moved(tmp_path, rotation, turned_by):
     assert len(again.pairs) == len(draft.pairs)
 
 
+def test_relations_from_the_parent_to_the_part(tmp_path):
+    """Some programs state the placement the other way round."""
+    parts = slider_crank()
+    file = StepFile()
+    file.assembly("all", *((file.part(name, part[0]), *part[1:]) for name, part in parts.items()), swapped=True)
+    path = file.write(tmp_path / "a.step")
+    draft = import_file(path, ground="frame")
+    for name, part in parts.items():
+        expect_body(draft.bodies[name], [part])
+    export_model(model(draft, tmp_path), tmp_path / "b.step", "40 deg", original=path)
+    again = import_file(tmp_path / "b.step", ground="frame")
+    for name, part in slider_crank(math.pi / 3 + math.radians(40)).items():
+        expect_body(again.bodies[name], [part])
+
+
 def test_welded_parts_move_with_their_link_and_edited_models_are_refused(tmp_path):
     path = written(tmp_path / "a.step", four_bar())
     draft = import_file(path, ground="ground")

@@ -431,7 +431,7 @@ def _move(assembly: Assembly, part: Occurrence, move: Place, text: _Text, change
     operator = entity["REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION"][0]
     first, second = entity["REPRESENTATION_RELATIONSHIP"][2:4]
     inner = part.parent.inverse @ move @ part.place  # the part's new place in its parent
-    if first not in assembly.shapes.get(part.definition, []) and second not in _parent_shapes(assembly, part):
+    if not part.forward:
         inner = inner.inverse
     if file.kind(operator) != "ITEM_DEFINED_TRANSFORMATION":
         what = f"places {part.name!r} by an operator, which is not rewritten"
@@ -440,11 +440,6 @@ def _move(assembly: Assembly, part: Occurrence, move: Place, text: _Text, change
     end = text.placement(inner @ assembly.frame(start, first), assembly.geometry(second).length)
     new = text(f"ITEM_DEFINED_TRANSFORMATION('','',#{start},#{end})")
     changes[part.relation] = _relation(first, second, new)
-
-
-def _parent_shapes(assembly: Assembly, part: Occurrence) -> list[int]:
-    parents = [parent for parent, uses in assembly.uses.items() if any(child == part.definition for _, child in uses)]
-    return [shape for parent in parents for shape in assembly.shapes.get(parent, [])]
 
 
 def _links_of(draft: Draft, positions: Positions) -> dict[str, str]:

@@ -395,13 +395,18 @@ class _Held:
 
     def ends(self, left: str, other: str) -> list[Facing]:
         """Facing planes of two bodies, seen from the first."""
+        self.facing_pairs()
+        return self._ends.get((left, other), [])
+
+    def facing_pairs(self) -> list[tuple[str, str]]:
+        """Bodies with planes that face each other."""
         if not self._ends:
             for facing in self.facings:
                 first, second = map(self.groups, facing.bodies)
                 if first != second:
                     self._ends[first, second].append(facing)
                     self._ends[second, first].append(facing.back)
-        return self._ends.get((left, other), [])
+        return [pair for pair in self._ends if pair[0] < pair[1]]
 
     def weld(self, left: str, other: str, comment: str) -> None:
         """Make two bodies one."""
@@ -451,8 +456,9 @@ class _Held:
     def _boxed(self) -> bool:
         """Two bodies that flat walls hold in all directions are one."""
         draft = self.draft
-        for left, other in combinations(self.groups.bodies(), 2):
-            if len(self._walls(left, other)) > 2 and tuple(sorted((left, other))) not in self.between():
+        between = self.between()
+        for left, other in self.facing_pairs():
+            if (left, other) not in between and len(self._walls(left, other)) > 2:
                 what = f"{left} and {other} hold each other in all directions: they are taken as fixed"
                 draft.warn("exchange.fixed", f"links.{other}", what, "draw the play if they move")
                 self.weld(left, other, what)
@@ -528,7 +534,7 @@ class _Held:
             bodies = self.groups.bodies()
             links = {body: {body} for body in bodies}
             near = [tuple(map(self.groups, (item.pin.body, item.hole.body))) for item in (*self.contacts, *self.balls)]
-            near += [pair for pair in combinations(bodies, 2) if self._walls(*pair)]
+            near += [pair for pair in self.facing_pairs() if self._walls(*pair)]
             for left, other in near:
                 if links[left] is not links[other]:
                     united = links[left] | links[other]
@@ -555,6 +561,8 @@ class _Held:
         draft.pairs = {name: pair for name, pair in draft.pairs.items() if set(pair.links) <= names}
         self.contacts = [item for item in self.contacts if {item.pin.body, item.hole.body} <= names]
         self.balls = [item for item in self.balls if {item.pin.body, item.hole.body} <= names]
+        self.facings = [facing for facing in self.facings if names.issuperset(facing.bodies)]
+        self._ends.clear()
         self.groups.leader = {name: lead for name, lead in self.groups.leader.items() if name in names}
 
     # ---- pairs -------------------------------------------------------------------------------------------------
@@ -567,11 +575,10 @@ class _Held:
         for ball in self.balls:
             if self.groups(ball.pin.body) != self.groups(ball.hole.body):
                 self._add(replace(_pair("spherical", [ball]), at=ball.hole.point, length=None))
-        for left, other in combinations(self.groups.bodies(), 2):
-            if (left, other) not in between and (other, left) not in between:
-                walls = self._walls(left, other)
-                if walls:
-                    self._sliding(left, other, walls)
+        for left, other in sorted(self.facing_pairs()):
+            walls = self._walls(left, other) if (left, other) not in between else []
+            if walls:
+                self._sliding(left, other, walls)
 
     def _add(self, pair: Pair) -> None:
         letters = (f"{chr(65 + n % 26)}{n // 26 or ''}" for n in range(26 * 1000))

@@ -23,6 +23,8 @@ from trunnion.cli.app import app
 from trunnion.errors import MechanismError
 from trunnion.exchange import export_model, import_file, model_text
 from trunnion.exchange.brep import Geometry
+from trunnion.exchange.draft import Body, Draft
+from trunnion.exchange.mating import joined
 from trunnion.exchange.part21 import Part21
 
 STEEL = 7850.0
@@ -462,13 +464,22 @@ def test_gap_interference_and_threads_are_findings(tmp_path):
 
 
 def test_half_a_hole_is_asked(tmp_path):
-    """Half shells hold a pin from one side: no joint without a question."""
-    shell = turned([(5.01, 0), (9, 0), (9, 10), (5.01, 10), (5.01, 0)], split="halves")
-    assert shell.volume > 0
-    outline = [(-20, 0), (-20, -20), (20, -20), (20, 0)]
-    block = prism(outline, 0, 10)
-    draft = import_file(written(tmp_path / "a.step", {"a": (block, *STILL), "b": (shell, *STILL)}))
-    assert not draft.pairs
+    """A bearing of which only half is there holds its pin from one side: no joint without a question."""
+    base, arm = bar(80, [(0, 10.02)], 0, 10, split="halves"), bar(60, [], 10, 20, split="halves")
+    parts = {"base": (base, *STILL), "arm": (boss(arm, "bottom", (0, 0, 10), 10, 10), *STILL)}
+    file = Part21(written(tmp_path / "a.step", parts))
+    geometry = Geometry(file, 1e-3, 1.0)
+    solids = [geometry.solid(number) for number in file.of("MANIFOLD_SOLID_BREP")]
+    for halves in (2, 1):
+        faces = {name: list(solid.faces) for name, solid in zip(parts, solids, strict=True)}
+        hole = [face for face in faces["base"] if face.kind == "cylinder"]
+        assert len(hole) == 2
+        faces["base"] = [face for face in faces["base"] if face.kind != "cylinder"] + hole[:halves]
+        draft = Draft(bodies={name: Body(name, 1.0) for name in parts})
+        joined(draft, faces, 0.5e-3)
+        kinds = [pair.type for pair in draft.pairs.values() if pair.type != "fixed"]
+        assert kinds == (["cylindrical"] if halves == 2 else [])
+        assert ("half" in codes(draft)) == (halves == 1)
 
 
 def test_several_solids_surfaces_and_units_are_said(tmp_path):

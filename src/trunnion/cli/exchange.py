@@ -64,6 +64,10 @@ def export(
     out: Annotated[Path, typer.Option("--out", "-o", help="The file to write; its extension is the format.")],
     at: Annotated[str | None, typer.Option("--at", help="Position of the mechanism: 60deg, 20mm, 0.1s.")] = None,
     frames: Annotated[int, typer.Option("--frames", help="Number of positions in a file that moves.")] = 120,
+    original: Annotated[
+        str | None,
+        typer.Option("--from", metavar="FILE", help="The STEP file it was imported from, whose parts are to be moved."),
+    ] = None,
     set_: Set = None,
 ) -> None:
     """Write a mechanism for another program, at a position."""
@@ -71,7 +75,7 @@ def export(
 
     mechanism = stated(file, set_)
     with lines_of(file):
-        findings = export_model(mechanism, out, at, frames)
+        findings = export_model(mechanism, out, at, frames, original)
     wrote(out)
     say(placed(findings, file), every=True)
     raise typer.Exit(exit_status(findings))

@@ -56,7 +56,7 @@ class Pair:
     at : a point of the pair, m, (3,): on its axis, centre of its ball or cross, middle of its bearing.
     axis : direction of its axis, or normal of a planar pair; of a universal joint of the pin in the first body.
     second_axis : of a universal joint, direction of the pin in the second body.
-    pin_radius, hole_radius : of the pin or ball, and of what it runs in, m.
+    pin_radius, hole_radius : of the pin or ball, and of what it runs in, m; of a slider and its guide half the widths.
     length : of a bearing or guide, m.
     pitch : of a helical pair, m for a turn.
     limits : range of its coordinate from where it is drawn, rad or m.

@@ -52,6 +52,8 @@ FORMATS: dict[str, Format] = {
     ".mjcf": Format("MJCF", "mjcf", needs="defusedxml"),
     ".sdf": Format("SDF", "sdf", needs="defusedxml"),
     ".urdf": Format("URDF", "urdf", needs="defusedxml"),
+    ".step": Format("STEP", "step"),
+    ".stp": Format("STEP", "step"),
     ".dxf": Format("DXF", "dxf"),
     ".stl": Format("STL", "mesh", writes=False),
     ".3mf": Format("3MF", "mesh", writes=False),
@@ -87,10 +89,17 @@ class ImportOptions:
 
 @dataclass(frozen=True)
 class ExportOptions:
-    """How a file is written: the row of the position, for formats of one position; frames of those that move."""
+    """How a file is written.
+
+    Parameters
+    ----------
+    row : of the position, for formats of one position; frames : of those that move.
+    original : the file that the model was imported from, for formats that move its parts.
+    """
 
     row: int = 0
     frames: int = 120
+    original: Path | None = None
 
 
 def _format_of(path: Path, reads: bool) -> Format:
@@ -223,6 +232,7 @@ def export_model(
     path: str | os.PathLike[str],
     at: float | str | None = None,
     frames: int = 120,
+    original: str | os.PathLike[str] | None = None,
 ) -> list[Finding]:
     """Write a mechanism in the format of another program.
 
@@ -232,6 +242,7 @@ def export_model(
     path : the file; its extension decides the format.
     at : the position, as for `analyse`; the first of the cycle if not given. Formats that move take the whole cycle.
     frames : number of positions in a format that moves.
+    original : the STEP file that the model was imported from, whose parts are written where they are then.
 
     Returns
     -------
@@ -241,11 +252,17 @@ def export_model(
     ------
     MechanismError : if the mechanism has no solution there or the format cannot hold it.
     """
-    path, options = Path(path), ExportOptions(frames=frames)
+    path, options = Path(path), ExportOptions(0, frames, None if original is None else Path(original))
     entry = _format_of(path, reads=False)
     module = _module(entry, path)
     moves = getattr(module, "MOVES", False)
     positions = positions_of(mechanism, frames) if moves else positions_of(mechanism, FEWEST, at)
+    if options.original is not None:
+        if not getattr(module, "MOVES_PARTS", False):
+            raise MechanismError(Finding(f"no parts are moved in {entry.name}", "--from", "write a .step file"))
+        reading(options.original)
+        with _readable(options.original):
+            options.original.open("rb").close()
     with whole(path) as temporary:
         findings: list[Finding] = module.write(positions, temporary, options)
     return findings

@@ -12,7 +12,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import Array, Body, Draft, Pair, moved
 from trunnion.joints.pairs import PAIRS
 
-__all__ = ["complete", "model_text"]
+__all__ = ["complete", "flat_frame", "model_text"]
 
 DIGITS = 12  # significant digits of a written number
 FIXED = ("ground", "frame", "base", "housing", "world", "gestell", "rahmen", "bâti")  # in names of fixed parts
@@ -76,13 +76,18 @@ def model_text(draft: Draft) -> str:
     return "\n".join(_lines(_laid_flat(draft, normal), spatial=False)) + "\n"
 
 
-def _laid_flat(draft: Draft, normal: Array) -> Draft:
-    """The draft turned so that z is the normal of its plane; pairs that only a plane allows become those it has."""
+def flat_frame(normal: Array) -> Array:
+    """The rotation from the frame of a file to that of a model in the plane with a normal: rows x, y, normal."""
     largest = int(np.argmax(abs(normal)))
     across = np.eye(3)[(largest + 1) % 3]
     x = across - (across @ normal) * normal
     x /= np.linalg.norm(x)
-    turned = moved(draft, np.array([x, np.cross(normal, x), normal]), np.zeros(3))
+    return np.array([x, np.cross(normal, x), normal])
+
+
+def _laid_flat(draft: Draft, normal: Array) -> Draft:
+    """The draft turned so that z is the normal of its plane; pairs that only a plane allows become those it has."""
+    turned = moved(draft, flat_frame(normal), np.zeros(3))
     pairs = {}
     for name, pair in turned.pairs.items():
         if pair.type in IN_PLANE:
@@ -183,7 +188,8 @@ def _joint(pair: Pair, size: float) -> Iterator[str]:
             pin.append(f"clearance: {_mm(pair.clearance, size)}")
         parts.append(f"pin: {{{', '.join(pin)}}}")
     elif not turns and pair.length is not None and pair.type == "prismatic":
-        parts.append(f"guide: {{length: {_mm(pair.length, size)}}}")
+        play = f", clearance: {_mm(pair.clearance, size)}" if pair.clearance else ""
+        parts.append(f"guide: {{length: {_mm(pair.length, size)}{play}}}")
     yield f"  {_quoted(pair.name)}: {{{', '.join(parts)}}}"
 
 

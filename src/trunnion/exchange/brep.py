@@ -1,0 +1,445 @@
+"""Solids of a STEP file as their faces bound them: exact moments, and the faces that joints are made of.
+
+A face is a piece of a plane or of a surface of revolution with the profile (r(v), z(v)), cut out by edges. With the
+divergence theorem volume integrals are integrals of q·n over the faces, and with Green's theorem these are integrals
+along the edges, ∬ f du dv = −∮ (∫ f dv) du, which Gauss's rule gives to rounding. Nothing is meshed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.optimize import minimize_scalar
+
+from trunnion.exchange.draft import Array, steiner
+from trunnion.exchange.part21 import Part21
+
+__all__ = ["Face", "Geometry", "Moments", "Solid"]
+
+GAUSS = np.polynomial.legendre.leggauss(12)  # along an edge, a piece of at most 45°
+INNER = np.polynomial.legendre.leggauss(24)  # across a face: exact for powers, 1e-14 for a full turn of a torus
+CLOSED = 1e-9  # rad: an arc shorter than this is a full turn
+KINDS = {
+    "PLANE": "plane",
+    "CYLINDRICAL_SURFACE": "cylinder",
+    "CONICAL_SURFACE": "cone",
+    "SPHERICAL_SURFACE": "sphere",
+    "TOROIDAL_SURFACE": "torus",
+}
+WRAPPED = ("SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE")
+
+
+class UnreadError(Exception):
+    """A curve that is not integrated along."""
+
+
+@dataclass
+class Moments:
+    """Volume, m³, its first moment, m⁴ (3,), and second moment ∫ q qᵀ dV, m⁵ (3, 3), about the origin."""
+
+    volume: float = 0.0
+    first: Array = field(default_factory=lambda: np.zeros(3))
+    second: Array = field(default_factory=lambda: np.zeros((3, 3)))
+
+    def __add__(self, other: Moments) -> Moments:
+        return Moments(self.volume + other.volume, self.first + other.first, self.second + other.second)
+
+    def __mul__(self, factor: float) -> Moments:
+        return Moments(factor * self.volume, factor * self.first, factor * self.second)
+
+    def placed(self, matrix: Array, shift: Array) -> Moments:
+        """Of the same body at matrix · q + shift; the matrix may scale and mirror."""
+        grown = abs(float(np.linalg.det(matrix)))
+        first, second = matrix @ self.first, matrix @ self.second @ matrix.T
+        cross = np.outer(first, shift)
+        whole_shift = self.volume * np.outer(shift, shift)
+        return Moments(self.volume, first + self.volume * shift, second + cross + cross.T + whole_shift) * grown
+
+    @property
+    def centre(self) -> Array:
+        """Centre of the volume, m."""
+        return np.asarray(self.first / self.volume)
+
+    @property
+    def inertia(self) -> Array:
+        """Inertia tensor about the centre for a density of 1, m⁵."""
+        about = np.trace(self.second) * np.eye(3) - self.second
+        return np.asarray(about - self.volume * steiner(self.centre))
+
+
+@dataclass
+class Face:
+    """A face of a solid, in its frame.
+
+    Parameters
+    ----------
+    kind : plane, cylinder, cone, sphere, torus; free for any other surface.
+    frame : rows are x, y and axis, or normal, of the surface (3, 3).
+    origin : point on the axis or plane, centre of a sphere or torus, m.
+    radius : of a cylinder or sphere, m; of a torus that of its middle circle.
+    outward : whether the surface's own normal (away from its axis or centre) leaves the material: a pin, not a hole.
+    area : m². outline : points of its boundary, m, (n, 3).
+    number : of the entity in the file.
+    """
+
+    kind: str
+    frame: Array
+    origin: Array
+    radius: float
+    outward: bool
+    number: int
+    minor: float = 0.0  # angle of a cone, rad; radius of the tube of a torus, m
+    tolerance: str = ""  # of its diameter, as the file states it
+    area: float = 0.0
+    outline: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+    @property
+    def axis(self) -> Array:
+        """Direction of the axis, or normal of the plane."""
+        return np.asarray(self.frame[2])
+
+
+@dataclass
+class Solid:
+    """A body of a file: its faces and moments; doubts: why the moments are not exact."""
+
+    number: int
+    faces: list[Face]
+    moments: Moments
+    doubts: list[str]
+
+
+class Geometry:
+    """The geometry of a representation of a file.
+
+    Parameters
+    ----------
+    file : the STEP file.
+    length, angle : its units, in m and rad.
+    """
+
+    def __init__(self, file: Part21, length: float, angle: float) -> None:
+        self.file, self.length, self.angle = file, length, angle
+        self._edges: dict[int, tuple[Array, Array, Array]] = {}
+
+    # ---- points and frames ---------------------------------------------------------------------------------
+
+    def point(self, number: Any) -> Array:
+        """A CARTESIAN_POINT, m."""
+        values = [float(part) for part in self.file.args(number, "CARTESIAN_POINT")[1]]
+        return self.length * np.array([*values, 0.0, 0.0, 0.0][:3])
+
+    def direction(self, number: Any) -> Array:
+        """A DIRECTION, of unit length."""
+        values = np.array([*self.file.args(number, "DIRECTION")[1], 0.0][:3], dtype=float)
+        size = float(np.linalg.norm(values))
+        if not size > 0:
+            raise self.file.unreadable(f"has a direction without length at #{number}")
+        return values / size
+
+    def placement(self, number: Any) -> tuple[Array, Array]:
+        """The frame, rows x, y, z, and origin, m, of an AXIS2_PLACEMENT_3D."""
+        _, location, axis, reference = (*self.file.args(number, "AXIS2_PLACEMENT_3D"), None, None)[:4]
+        z = np.array([0.0, 0.0, 1.0]) if axis is None else self.direction(axis)
+        x = np.array([1.0, 0.0, 0.0]) if reference is None else self.direction(reference)
+        x = x - (x @ z) * z
+        if np.linalg.norm(x) < 1e-9:  # the standard lets a reader choose x where the file's is along the axis
+            x = np.eye(3)[int(np.argmin(abs(z)))]
+            x = x - (x @ z) * z
+        x /= np.linalg.norm(x)
+        return np.array([x, np.cross(z, x), z]), self.point(location)
+
+    # ---- edges ---------------------------------------------------------------------------------------------
+
+    def edge(self, number: int) -> tuple[Array, Array, Array]:
+        """Nodes, m, weighted tangents and ends of an EDGE_CURVE: ∫ f dq = Σ f(node) · tangent.
+
+        UnreadError if its curve is of a kind that is not read.
+        """
+        if number not in self._edges:
+            _, start, end, curve, same = self.file.args(number, "EDGE_CURVE")
+            ends = [self.point(self.file.args(vertex, "VERTEX_POINT")[1]) for vertex in (start, end)]
+            self._edges[number] = *self._nodes(curve, ends, start == end, bool(same)), np.array(ends)
+        return self._edges[number]
+
+    def _nodes(self, curve: Any, ends: list[Array], closed: bool, same: bool) -> tuple[Array, Array]:
+        entity = self.file[curve]
+        kind = self.file.kind(curve)
+        if kind in WRAPPED:
+            return self._nodes(entity[kind][1], ends, closed, same)
+        if kind == "TRIMMED_CURVE":
+            return self._nodes(entity[kind][1], ends, closed, same)
+        if kind == "LINE":
+            return _segment(ends[0], ends[1])
+        if "B_SPLINE_CURVE_WITH_KNOTS" in entity:
+            return self._spline_nodes(entity, ends, closed, same)
+        if kind not in ("CIRCLE", "ELLIPSE", "HYPERBOLA", "PARABOLA"):
+            raise UnreadError(f"a curve {kind}")
+        frame, centre = self.placement(entity[kind][1])
+        sizes = [self.length * float(size) for size in entity[kind][2:]]
+        a, b = (sizes[0], sizes[-1]) if kind != "PARABOLA" else (sizes[0], 2 * sizes[0])
+
+        def parameter(point: Array) -> float:
+            x, y = frame[0] @ (point - centre) / a, frame[1] @ (point - centre) / b
+            return float(np.arctan2(y, x)) if sizes and kind in ("CIRCLE", "ELLIPSE") else _open_parameter(kind, y)
+
+        first, last = parameter(ends[0]), parameter(ends[1])
+        if kind in ("CIRCLE", "ELLIPSE"):
+            turn = (last - first if same else first - last) % (2 * math.pi)
+            turn = 2 * math.pi if closed or turn < CLOSED else turn
+            last = first + (turn if same else -turn)
+        functions: Sequence[Callable[[Array], Array]] = {
+            "HYPERBOLA": (np.cosh, np.sinh, np.sinh, np.cosh),
+            "PARABOLA": (np.square, np.array, lambda t: 2 * t, np.ones_like),
+        }.get(kind, (np.cos, np.sin, lambda t: -np.sin(t), np.cos))
+
+        def course(t: Array) -> tuple[Array, Array]:
+            f, g, df, dg = (function(t) for function in functions)
+            along, across = a * frame[0], b * frame[1]
+            return centre + np.outer(f, along) + np.outer(g, across), np.outer(df, along) + np.outer(dg, across)
+
+        pieces = max(1, math.ceil(abs(last - first) / (math.pi / 4)))
+        return _gauss(course, np.linspace(first, last, pieces + 1))
+
+    def _spline_nodes(self, entity: Any, ends: list[Array], closed: bool, same: bool) -> tuple[Array, Array]:
+        args = entity["B_SPLINE_CURVE_WITH_KNOTS"]
+        degree, poles = (entity["B_SPLINE_CURVE"] if "B_SPLINE_CURVE" in entity else args[1:])[:2]
+        repeats, knots = args[-3], args[-2]
+        weights = np.array(entity.get("RATIONAL_B_SPLINE_CURVE", [[1.0] * len(poles)])[0], dtype=float)
+        points = np.array([self.point(pole) for pole in poles])
+        spread = np.repeat(np.array(knots, dtype=float), np.array(repeats, dtype=int))
+        spline = BSpline(spread, np.column_stack([points * weights[:, None], weights]), int(degree))
+        rates = spline.derivative()
+
+        def course(t: Array) -> tuple[Array, Array]:
+            h, dh = spline(t), rates(t)
+            place = h[:, :3] / h[:, 3:]
+            return place, (dh[:, :3] - place * dh[:, 3:]) / h[:, 3:]
+
+        low, high = float(knots[0]), float(knots[-1])
+        grid = np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in pairwise(knots)]))
+
+        def parameter(point: Array) -> float:
+            away = np.linalg.norm(course(grid)[0] - point, axis=1)
+            nearest = int(np.argmin(away))
+            around = grid[max(nearest - 1, 0)], grid[min(nearest + 1, len(grid) - 1)]
+            best = minimize_scalar(
+                lambda t: float(np.linalg.norm(course(np.array([t]))[0] - point)),
+                bounds=around,
+                method="bounded",
+                options={"xatol": 1e-12 * (high - low)},
+            )
+            at_ends = {low: away[0], high: away[-1], float(best.x): float(best.fun) + 1e-6 * self.length}
+            return min(at_ends, key=lambda t: at_ends[t])
+
+        first, last = (low, high) if closed else (parameter(ends[0]), parameter(ends[1]))
+        if closed and not same:
+            first, last = high, low
+        if first == last or (first < last) != same:
+            raise UnreadError("a spline that is cut across its seam")
+        inside = [knot for knot in knots if min(first, last) < knot < max(first, last)]
+        return _gauss(course, sorted([first, *inside, last], reverse=first > last))
+
+    def loop(self, number: Any) -> list[tuple[Array, Array, Array, int, bool]]:
+        """The edges of a loop in its order: nodes, tangents, ends, number and whether it runs along its edge."""
+        kind = self.file.kind(number)
+        if kind == "POLY_LOOP":
+            points = [self.point(point) for point in self.file.args(number, kind)[1]]
+            pairs = zip(points, points[1:] + points[:1], strict=True)
+            return [(*_segment(a, b), np.array([a, b]), -1, True) for a, b in pairs]
+        if kind != "EDGE_LOOP":  # a vertex loop bounds a whole sphere or torus
+            return []
+        edges = []
+        for oriented in self.file.args(number, kind)[1]:
+            *_, edge, along = self.file.args(oriented, "ORIENTED_EDGE")
+            nodes, tangents, ends = self.edge(edge)
+            edges.append((nodes, tangents if along else -tangents, ends, int(edge), bool(along)))
+        return edges
+
+    # ---- faces and solids ----------------------------------------------------------------------------------
+
+    def surface(self, number: Any, outward: bool, face: int) -> Face:
+        """The surface of a face, without its bounds."""
+        kind = self.file.kind(number)
+        args = self.file[number][kind]
+        if kind not in KINDS:
+            return Face("free", np.eye(3), np.zeros(3), 0.0, outward, face)
+        frame, origin = self.placement(args[1])
+        sizes = [float(size) for size in args[2:4]]
+        radius = self.length * sizes[0] if sizes else 0.0
+        minor = sizes[1] * (self.angle if kind == "CONICAL_SURFACE" else self.length) if len(sizes) > 1 else 0.0
+        return Face(KINDS[kind], frame, origin, radius, outward, face, minor)
+
+    def solid(self, number: int) -> Solid:
+        """A MANIFOLD_SOLID_BREP, BREP_WITH_VOIDS or FACETED_BREP."""
+        kind = self.file.kind(number)
+        args = self.file[number][kind]
+        shells = [(args[1], True)]
+        for void in args[2] if kind == "BREP_WITH_VOIDS" else []:
+            *_, shell, along = self.file.args(void, "ORIENTED_CLOSED_SHELL")
+            shells.append((shell, bool(along)))
+        solid = Solid(number, [], Moments(), [])
+        used: Counter[tuple[int, bool]] = Counter()
+        for shell, along in shells:
+            for face in self.file[shell][self.file.kind(shell)][1]:
+                self._face(face, along, solid, used)
+        if any(used[edge, True] != used[edge, False] for edge, _ in used if edge >= 0):
+            solid.doubts.append("its surface is not closed")
+        if not solid.doubts and solid.moments.volume < 0:  # inside out
+            solid.moments = solid.moments * -1.0
+            for piece in solid.faces:
+                piece.outward = not piece.outward
+        return solid
+
+    def _face(self, number: Any, along: bool, solid: Solid, used: Counter[tuple[int, bool]]) -> None:
+        """Add a face and its share of the moments to a solid."""
+        kind = self.file.kind(number)
+        if kind not in ("ADVANCED_FACE", "FACE_SURFACE"):
+            raise self.file.unreadable(f"has {kind} at #{number} where a face belongs")
+        _, bounds, surface, same = self.file[number][kind][:4]
+        face = self.surface(surface, bool(same) == along, int(number))
+        loops, points = [], []
+        for bound in bounds:
+            _, loop, forward = self.file[bound][self.file.kind(bound)]
+            sign = 1.0 if bool(forward) == along else -1.0
+            try:
+                edges = self.loop(loop)
+            except UnreadError as error:
+                solid.doubts.append(f"it has {error}")
+                continue
+            used.update((edge, direction == (sign > 0)) for *_, edge, direction in edges)
+            if edges:
+                loops.append((np.vstack([edge[0] for edge in edges]), sign * np.vstack([edge[1] for edge in edges])))
+                points += [np.vstack([edge[0], edge[2]]) for edge in edges]
+        face.outline = np.vstack(points) if points else np.zeros((0, 3))
+        solid.faces.append(face)
+        if face.kind == "free":
+            solid.doubts.append("it has free-form faces")
+            return
+        area, moments = _integrals(face, loops)
+        face.area = area if face.outward else -area
+        if face.kind in ("sphere", "torus") and face.area <= 1e-12 * face.radius**2:
+            sign = 1.0 if face.outward else -1.0
+            full_area, full = _closed_surface(face)
+            face.area += full_area
+            moments = moments + full * sign
+        if not face.area > 0:
+            solid.doubts.append("it has faces whose bounds run the wrong way round")
+        solid.moments = solid.moments + moments
+
+
+def _open_parameter(kind: str, y: float) -> float:
+    return float(np.arcsinh(y)) if kind == "HYPERBOLA" else float(y)
+
+
+def _segment(start: Array, end: Array) -> tuple[Array, Array]:
+    return _gauss(lambda t: (start + np.outer(t, end - start), np.outer(t**0, end - start)), [0, 1])
+
+
+def _gauss(course: Any, breaks: Any) -> tuple[Array, Array]:
+    """Nodes of a curve, and its tangents times the weights, over pieces of its parameter."""
+    breaks = np.asarray(breaks, dtype=float)
+    half = np.diff(breaks) / 2
+    t = (breaks[:-1] + half)[:, None] + half[:, None] * GAUSS[0]
+    places, rates = course(t.ravel())
+    return places, rates * (half[:, None] * GAUSS[1]).ravel()[:, None]
+
+
+def _profile(face: Face, v: Array) -> tuple[Array, Array, Array, Array]:
+    """r(v), z(v), r′(v), z′(v) of a surface of revolution."""
+    unit, nought = np.ones_like(v), np.zeros_like(v)
+    if face.kind == "cylinder":
+        return face.radius * unit, v, nought, unit
+    if face.kind == "cone":
+        slope = math.tan(face.minor)
+        return face.radius + slope * v, v, slope * unit, unit
+    ring, tube = (0.0, face.radius) if face.kind == "sphere" else (face.radius, face.minor)
+    return ring + tube * np.cos(v), tube * np.sin(v), -tube * np.sin(v), tube * np.cos(v)
+
+
+def _integrals(face: Face, loops: list[tuple[Array, Array]]) -> tuple[float, Moments]:
+    """∬ |n| and the moments by the divergence theorem over the part of a surface that loops bound.
+
+    Both have the sign of the loops: positive if they run counter-clockwise as the surface's own normal sees them. Of a
+    sphere or torus they are determined but for a multiple of the closed surface.
+    """
+    if not loops:
+        return 0.0, Moments()
+    frame = _pole_free(face, loops) if face.kind == "sphere" else face.frame
+    places = (np.vstack([nodes for nodes, _ in loops]) - face.origin) @ frame.T
+    rates = np.vstack([tangents for _, tangents in loops]) @ frame.T
+    (x, y, z), (dx, dy, dz) = places.T, rates.T
+    if face.kind == "plane":
+        v = np.multiply.outer(y, (INNER[0] + 1) / 2)
+        q = x[:, None, None] * frame[0] + v[..., None] * frame[1]
+        normal = np.broadcast_to(frame[2], q.shape)
+        return _summed(face.origin + q, normal, -dx * y / 2)
+    rho = np.hypot(x, y)
+    radial = (x[:, None] * frame[0] + y[:, None] * frame[1]) / rho[:, None]
+    du = (x * dy - y * dx) / rho**2
+    if face.kind in ("cylinder", "cone"):
+        v, start = z, float(z.mean())
+        if face.kind == "cone" and abs(du.sum()) > 1e-6:  # the loops do not close without the apex: it is in the face
+            start = -face.radius / math.tan(face.minor)
+    elif face.kind == "sphere":
+        v, start = np.arctan2(z, rho), -math.pi / 2
+    else:
+        level = rho - face.radius
+        middle = math.atan2(z.mean(), level.mean())
+        v, start = middle + np.angle(np.exp(1j * (np.arctan2(z, level) - middle))), middle
+        dv = (level * dz - z * (x * dx + y * dy) / rho) / face.minor**2
+        ends = np.cumsum([len(nodes) for nodes, _ in loops])[:-1]
+        if max(abs(part.sum()) for part in np.split(dv, ends)) > math.pi:  # a piece of a bent bar: ∮ (∫ f du) dv
+            angle = math.atan2(y.mean(), x.mean())
+            u = np.angle(np.exp(1j * (np.arctan2(y, x) - angle)))
+            turned = angle + np.multiply.outer(u, (INNER[0] + 1) / 2)
+            radial = np.cos(turned)[..., None] * frame[0] + np.sin(turned)[..., None] * frame[1]
+            return _revolved(face, frame, v[:, None], radial, u / 2 * dv)
+    across = start + np.multiply.outer(v - start, (INNER[0] + 1) / 2)
+    return _revolved(face, frame, across, radial[:, None, :], -du * (v - start) / 2)
+
+
+def _revolved(face: Face, frame: Array, v: Array, radial: Array, weights: Array) -> tuple[float, Moments]:
+    """The sums over nodes on a surface of revolution; its normal times the area element is r (z′ e_r − r′ e_z)."""
+    r, z, dr, dz = (part[..., None] for part in _profile(face, v))
+    q = face.origin + r * radial + z * frame[2]
+    return _summed(q, np.broadcast_to(r * (dz * radial - dr * frame[2]), q.shape), weights)
+
+
+def _summed(q: Array, normal: Array, weights: Array) -> tuple[float, Moments]:
+    """Σ over nodes (n, 24): areas and moments; ∫ q…q dV = ∬ q…q (q·n) dA / (3 + number of q)."""
+    total = weights[:, None] * INNER[1]
+    area = float((total * np.linalg.norm(normal, axis=-1)).sum())
+    flux = total * (q * normal).sum(axis=-1)
+    first = np.einsum("ij,ijk->k", flux, q) / 4
+    return area, Moments(float(flux.sum()) / 3, first, np.einsum("ij,ijk,ijl->kl", flux, q, q) / 5)
+
+
+def _pole_free(face: Face, loops: list[tuple[Array, Array]]) -> Array:
+    """A frame of a sphere whose axis stays away from its edges, where the longitude would jump."""
+    places = np.vstack([nodes for nodes, _ in loops]) - face.origin
+    axes = np.random.default_rng(0).normal(size=(64, 3))
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    axis = axes[int(np.argmin(abs(places @ axes.T).max(axis=0)))]
+    x = np.cross(axis, np.eye(3)[int(np.argmin(abs(axis)))])
+    x /= np.linalg.norm(x)
+    return np.array([x, np.cross(axis, x), axis])
+
+
+def _closed_surface(face: Face) -> tuple[float, Moments]:
+    """Area and moments of a full sphere or torus."""
+    if face.kind == "sphere":
+        area, volume = 4 * math.pi * face.radius**2, 4 / 3 * math.pi * face.radius**3
+        central = volume * face.radius**2 / 5 * np.eye(3)
+    else:
+        area, volume = 4 * math.pi**2 * face.radius * face.minor, 2 * math.pi**2 * face.radius * face.minor**2
+        across = volume * (face.radius**2 + 0.75 * face.minor**2) / 2
+        central = face.frame.T @ np.diag([across, across, volume * face.minor**2 / 4]) @ face.frame
+    return area, Moments(volume, volume * face.origin, volume * np.outer(face.origin, face.origin) + central)

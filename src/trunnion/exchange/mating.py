@@ -1,0 +1,685 @@
+"""Joints between solids by their faces: pins in holes, balls in sockets, slides between facing planes.
+
+Faces say which bodies touch; what the touching bodies can do against each other follows from all their contacts. What
+is not certain is a finding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from trunnion.errors import MechanismError
+from trunnion.exchange.brep import Face
+from trunnion.exchange.draft import Array, Body, Draft, Pair, free_name, perpendicular
+from trunnion.joints.fits import fit
+
+__all__ = ["joined", "loose_contacts"]
+
+ANGLE = 1e-4  # rad, between axes or planes that count as parallel
+NEAR = 1e-6  # m, between places that count as equal
+COVERED = 0.55, 0.45  # of a turn: a hole that holds its pin; one that may
+THREAD = 0.2  # of the radius: a pin that much larger than its hole is pressed or threaded in
+FITS = ("H7/h6", "H7/g6", "H7/f7", "H8/f7", "H8/e8", "H9/d9", "H11/c11")
+TRIED = 24  # directions of edges for the least box around a face
+ALIKE = 3  # of the gap: the difference of radii up to which a pin without a joint is spoken of
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """A pin or hole of a body: cylindrical faces of one axis and radius that follow each other, or a ball."""
+
+    body: str
+    point: Array
+    axis: Array
+    radius: float
+    low: float  # along the axis from the point, m
+    high: float
+    hole: bool
+    covered: float  # of its full area
+    faces: tuple[int, ...]
+    tolerance: str = ""  # as the file states it
+
+    @property
+    def label(self) -> str:
+        """In words, with its numbers in the file."""
+        numbers = ", ".join(f"#{number}" for number in self.faces[:4])
+        kind = (("pin", "hole") if self.high > self.low else ("ball", "socket"))[self.hole]
+        size = f"{2e3 * self.radius:.9g} mm" + f" {self.tolerance}" * bool(self.tolerance)
+        return f"{kind} d={size} of {self.body} ({numbers})"
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """A pin in a hole, or a ball in a socket: low to high along the hole's axis from its point."""
+
+    pin: Round
+    hole: Round
+    low: float
+    high: float
+
+    @property
+    def play(self) -> float:
+        """Radius of the hole less that of the pin, m; what is rounding is none."""
+        play = self.hole.radius - self.pin.radius
+        return 0.0 if abs(play) < 1e-9 * self.hole.radius else play
+
+    @property
+    def middle(self) -> Array:
+        """Middle of the bearing."""
+        return np.asarray(self.hole.point + (self.low + self.high) / 2 * self.hole.axis)
+
+
+@dataclass(frozen=True, eq=False)
+class Facing:
+    """Two flat faces that look at each other.
+
+    Parameters
+    ----------
+    bodies : names. outlines : points of the bounds of their faces, m.
+    normal : out of the first body. level : of its face along the normal, m. gap : to the other face, m.
+    corners : of the overlap, m, (4, 3).
+    """
+
+    bodies: tuple[str, str]
+    outlines: tuple[Array, Array]
+    normal: Array
+    level: float
+    gap: float
+    corners: Array
+
+    @property
+    def back(self) -> Facing:
+        """The same from the other body."""
+        bodies, outlines = self.bodies[::-1], self.outlines[::-1]
+        return replace(self, bodies=bodies, outlines=outlines, normal=-self.normal, level=-self.level - self.gap)
+
+
+def parallel(left: Array, other: Array) -> bool:
+    """Whether two unit vectors are parallel or opposite."""
+    return bool(np.linalg.norm(np.cross(left, other)) < ANGLE)
+
+
+def _line_numbers(points: Sequence[Array], axes: Sequence[Array], slack: Sequence[float]) -> list[int]:
+    """A number for each line, equal for lines that lie on each other but for their slack, m."""
+    numbers: list[int] = []
+    first: list[int] = []
+    for index, (point, axis) in enumerate(zip(points, axes, strict=True)):
+        if first:
+            other = np.array([axes[line] for line in first])
+            off = point - np.array([points[line] for line in first])
+            away = np.linalg.norm(off - (off * other).sum(axis=1)[:, None] * other, axis=1)
+            turned = np.linalg.norm(np.cross(other, axis), axis=1)
+            room = slack[index] + np.array([slack[line] for line in first]) + NEAR
+            same = np.nonzero((away <= room) & (turned < ANGLE))[0]
+            if len(same):
+                numbers.append(int(same[0]))
+                continue
+        numbers.append(len(first))
+        first.append(index)
+    return numbers
+
+
+class Groups:
+    """Bodies that move together: each by the name of the first of them."""
+
+    def __init__(self, draft: Draft) -> None:
+        self.draft, self.leader = draft, {name: name for name in draft.bodies}
+
+    def __call__(self, name: str) -> str:
+        while self.leader[name] != name:
+            name = self.leader[name]
+        return name
+
+    def weld(self, left: str, other: str, comment: str) -> None:
+        """Make two bodies one."""
+        first, second = self(left), self(other)
+        if second == self(self.draft.ground) if self.draft.ground else False:
+            first, second = second, first
+        self.leader[second] = first
+        name = free_name(f"fixed {left} {other}", self.draft.pairs)
+        self.draft.pairs[name] = Pair(name, "fixed", (first, second), np.zeros(3), comments=[comment])
+        self.draft.bodies[other].comments.append(comment)
+
+    def bodies(self) -> list[str]:
+        """The first of each group."""
+        return list(dict.fromkeys(self(name) for name in self.leader))
+
+
+def joined(draft: Draft, faces: dict[str, list[Face]], gap: float) -> None:
+    """Add the pairs between the bodies of a draft, found by their faces.
+
+    Parameters
+    ----------
+    draft : gets the pairs and the findings. faces : of every body, in the global frame.
+    gap : greatest difference of the radii of a pin and its hole, and distance of facing planes, m.
+    """
+    groups = Groups(draft)
+    rounds = {kind: _rounds(faces, kind) for kind in ("cylinder", "sphere")}
+    contacts = _contacts(draft, groups, rounds["cylinder"], gap)
+    balls = _contacts(draft, groups, rounds["sphere"], gap)
+    facings = list(_facings(faces, gap))
+    _slots(draft, faces, rounds["cylinder"], gap)
+    mechanism = _Held(draft, groups, contacts, balls, facings)
+    mechanism.patterns(rounds["cylinder"])
+    while mechanism.step():
+        pass
+    mechanism.unconnected()
+    mechanism.pairs()
+
+
+def loose_contacts(faces: dict[str, list[Face]], gap: float) -> int:
+    """Number of pins with play between solids."""
+    draft = Draft(bodies={name: Body(name) for name in faces})
+    contacts = _contacts(draft, Groups(draft), _rounds(faces, "cylinder"), gap)
+    return sum(contact.play > NEAR for contact in contacts)
+
+
+# ---- features -------------------------------------------------------------------------------------------------
+
+
+def _rounds(faces: dict[str, list[Face]], kind: str) -> list[Round]:
+    """Pins and holes, or balls and sockets, of all bodies; faces that are parts of the same are united."""
+    rounds: list[Round] = []
+    ball = kind == "sphere"
+    for body, all_faces in faces.items():
+        round_faces = [face for face in all_faces if face.kind == kind and (ball or len(face.outline))]
+        axes = [face.axis * np.sign(face.axis[int(np.argmax(abs(face.axis)))]) for face in round_faces]
+        numbers: list[Any] = _line_numbers([face.origin for face in round_faces], axes, [0.0] * len(round_faces))
+        if ball:
+            numbers = [tuple(np.round(face.origin / NEAR)) for face in round_faces]
+        groups: dict[tuple[int, int, bool], list[tuple[float, float, Face]]] = defaultdict(list)
+        for face, number in zip(round_faces, numbers, strict=True):
+            lead = numbers.index(number)
+            along = np.zeros(1) if ball else (face.outline - round_faces[lead].origin) @ axes[lead]
+            piece = float(along.min()), float(along.max()), face
+            groups[lead, round(face.radius * 1e9), not face.outward].append(piece)
+        for (lead, _, hole), pieces in groups.items():
+            pieces.sort(key=lambda piece: piece[0])
+            while pieces:
+                low, high, face = pieces.pop(0)
+                parts = [face]
+                while pieces and pieces[0][0] <= high + NEAR:
+                    high = max(high, pieces[0][1])
+                    parts.append(pieces.pop(0)[2])
+                full = 2 * math.pi * face.radius * (2 * face.radius if ball else high - low)
+                if full > 0:
+                    covered = sum(part.area for part in parts) / full
+                    ids = tuple(part.number for part in parts)
+                    where = round_faces[lead].origin, axes[lead], face.radius, low, high
+                    rounds.append(Round(body, *where, hole, covered, ids, face.tolerance))
+    return rounds
+
+
+def _contacts(draft: Draft, groups: Groups, rounds: Sequence[Round], gap: float) -> list[Contact]:
+    """Pins in holes of other bodies; doubtful ones are findings, pressed ones are welded."""
+    contacts: list[Contact] = []
+    doubts: list[Contact] = []
+    for contact in _overlaps(rounds, ALIKE * gap):
+        pin, hole, play = contact.pin, contact.hole, contact.play
+        if hole.covered < COVERED[0]:
+            if 0 <= play <= gap:
+                what = f"{hole.label} covers only half of {pin.label}: no joint is made of it"
+                draft.warn("exchange.half", f"links.{hole.body}", what, "add the joint to the model file if it is one")
+        elif play >= 0:
+            (contacts if play <= gap else doubts).append(contact)
+        elif -play <= max(gap, THREAD * pin.radius):
+            what = f"{pin.label} is larger than {hole.label}: pressed or threaded, the two parts are fixed"
+            draft.warn("exchange.interference", f"links.{pin.body}", what, "draw the play if they turn", play=play)
+            if groups(pin.body) != groups(hole.body):
+                groups.weld(hole.body, pin.body, f"{pin.body} is pressed or threaded into {hole.body}")
+        else:
+            doubts.append(contact)
+    met = {frozenset((contact.pin.body, contact.hole.body)) for contact in contacts}
+    for contact in doubts:
+        pin, hole, size = contact.pin, contact.hole, 1e3 * contact.play
+        if frozenset((pin.body, hole.body)) not in met and groups(pin.body) != groups(hole.body):
+            what = f"{pin.label} lies in {hole.label} with a gap of {size:.6g} mm on the radius: no joint is made of it"
+            if size < 0:
+                what = f"{pin.label} runs through the smaller {hole.label}: no joint is made of it"
+            draft.warn("exchange.gap", f"links.{pin.body}", what, "a larger --gap makes one", gap=contact.play)
+    return contacts
+
+
+def _overlaps(rounds: Sequence[Round], widest: float) -> Iterator[Contact]:
+    """Pins in holes of other bodies whose radius exceeds theirs by at most `widest`, or balls in sockets."""
+    holes = [item for item in rounds if item.hole and item.covered >= COVERED[1]]
+    points, axes = (np.array([getattr(hole, key) for hole in holes]).reshape(-1, 3) for key in ("point", "axis"))
+    radii = np.array([hole.radius for hole in holes])
+    for pin in (item for item in rounds if not item.hole and item.covered >= COVERED[0]):
+        off, ball = points - pin.point, pin.low == pin.high
+        away = off if ball else off - (off @ pin.axis)[:, None] * pin.axis
+        near = np.linalg.norm(away, axis=1) <= abs(radii - pin.radius) + NEAR + ANGLE * np.linalg.norm(off, axis=1)
+        near &= (radii - pin.radius <= widest) & (ball | (abs(axes @ pin.axis) > 1 - ANGLE))
+        for hole in (holes[index] for index in np.nonzero(near)[0] if holes[index].body != pin.body):
+            contact = _overlap(pin, hole)
+            if contact is not None:
+                yield contact
+
+
+def _overlap(pin: Round, hole: Round) -> Contact | None:
+    """Where a pin lies in a hole around the same axis, or a ball in a socket around the same centre."""
+    play = abs(hole.radius - pin.radius)
+    if pin.low == pin.high:  # balls
+        return Contact(pin, hole, 0.0, 0.0) if np.linalg.norm(pin.point - hole.point) <= play + NEAR else None
+    if not parallel(pin.axis, hole.axis):
+        return None
+    off = pin.point - hole.point
+    shift, sign = float(off @ hole.axis), float(np.sign(pin.axis @ hole.axis))
+    ends = sorted((shift + sign * pin.low, shift + sign * pin.high))
+    low, high = max(ends[0], hole.low), min(ends[1], hole.high)
+    if high - low < NEAR or np.linalg.norm(off - shift * hole.axis) > play + NEAR:
+        return None
+    return Contact(pin, hole, low, high)
+
+
+def _planes(faces: dict[str, list[Face]]) -> list[tuple[str, Array, float, Array]]:
+    """Flat faces: body, normal out of it, level along the normal and outline."""
+    planes = []
+    for body, all_faces in faces.items():
+        for face in (face for face in all_faces if face.kind == "plane" and len(face.outline)):
+            normal = face.axis if face.outward else -face.axis
+            planes.append((body, normal, float(face.outline[0] @ normal), face.outline))
+    return planes
+
+
+def _slots(draft: Draft, faces: dict[str, list[Face]], rounds: Sequence[Round], gap: float) -> None:
+    """Say which pins lie between two walls of another body: pins in slots, which are no joints of a model."""
+    planes = _planes(faces)
+    all_normals, levels = np.array([plane[1] for plane in planes]).reshape(-1, 3), np.array([p[2] for p in planes])
+    for pin in (item for item in rounds if not item.hole and item.covered >= COVERED[0]):
+        walls: dict[str, list[Array]] = defaultdict(list)
+        middle = pin.point + (pin.low + pin.high) / 2 * pin.axis
+        distances = all_normals @ middle - levels - pin.radius
+        near = (abs(all_normals @ pin.axis) < ANGLE) & (distances >= -NEAR) & (distances <= gap)
+        for body, normal, _, outline in (planes[index] for index in np.nonzero(near)[0]):
+            if body == pin.body:
+                continue
+            across = np.cross(pin.axis, normal)
+            low, high = (float(part) for part in ((outline @ across).min(), (outline @ across).max()))
+            along = (outline - pin.point) @ pin.axis
+            if low <= middle @ across <= high and along.max() > pin.low + NEAR and along.min() < pin.high - NEAR:
+                walls[body].append(normal)
+        for body, normals in walls.items():
+            if any(float(left @ other) < -1 + ANGLE for left, other in combinations(normals, 2)):
+                what = f"{pin.label} lies in a slot of {body}, which is no joint of a model"
+                remedy = f"add a massless link that turns on the pin and slides in {body}"
+                draft.warn("exchange.slot", f"links.{pin.body}", what, remedy)
+
+
+def _facings(faces: dict[str, list[Face]], gap: float) -> Iterator[Facing]:
+    """Flat faces of different bodies that look at each other across at most the gap and overlap."""
+    planes = _planes(faces)
+    if not planes:
+        return
+    normals, levels = np.array([plane[1] for plane in planes]), np.array([plane[2] for plane in planes])
+    for index, (body, normal, level, outline) in enumerate(planes):
+        distance = -levels - level
+        near = (normals @ normal < -1 + ANGLE**2) & (distance >= -NEAR) & (distance <= gap)
+        others = [other for other in np.nonzero(near[index + 1 :])[0] + index + 1 if planes[other][0] != body]
+        frame = _tight(outline, normal) if others else np.eye(3)
+        for other in others:
+            left, two = (points @ frame[:2].T for points in (outline, planes[other][3]))
+            low, high = np.maximum(left.min(axis=0), two.min(axis=0)), np.minimum(left.max(axis=0), two.max(axis=0))
+            if (high - low > NEAR).all():
+                flat = np.array([(a, b) for a in (low[0], high[0]) for b in (low[1], high[1])]) @ frame[:2]
+                corners = flat + (level + distance[other] / 2) * normal
+                outlines = outline, planes[other][3]
+                yield Facing((body, planes[other][0]), outlines, normal, level, float(distance[other]), corners)
+
+
+def _tight(outline: Array, normal: Array) -> Array:
+    """Rows x, y and normal of the frame whose axes run along an edge of a flat face, with the least box around it."""
+    steps = np.diff(outline, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    longest = np.argsort(lengths)[-TRIED:]
+    x = np.vstack([perpendicular(normal), steps[longest[lengths[longest] > NEAR]]])
+    x = x - np.outer(x @ normal, normal)
+    x /= np.linalg.norm(x, axis=1)[:, None]
+    y = np.cross(normal, x)
+    best = int(np.argmin(np.ptp(outline @ x.T, axis=0) * np.ptp(outline @ y.T, axis=0)))
+    return np.array([x[best], y[best], normal])
+
+
+# ---- what the contacts mean -----------------------------------------------------------------------------------
+
+
+class _Held:
+    """The contacts of all bodies, and what they leave free."""
+
+    def __init__(
+        self, draft: Draft, groups: Groups, contacts: list[Contact], balls: list[Contact], facings: list[Facing]
+    ) -> None:
+        self.draft, self.groups, self.contacts, self.balls, self.facings = draft, groups, contacts, balls, facings
+        self._ends: dict[tuple[str, str], list[Facing]] = defaultdict(list)
+        axes, slack = [contact.hole.axis for contact in contacts], [abs(contact.play) for contact in contacts]
+        numbers = _line_numbers([contact.middle for contact in contacts], axes, slack)
+        self.line = dict(zip(contacts, numbers, strict=True))  # number of the axis of each contact
+        self.plane = self._plane()
+
+    def _plane(self) -> Array | None:
+        """The normal of a plane that the mechanism may move in: two pins along it, all others too or sliding in it."""
+        if self.balls or not self.contacts:
+            return None
+        for contact in self.contacts:
+            normal = contact.hole.axis
+            along = [other for other in self.contacts if parallel(other.hole.axis, normal)]
+            across = [
+                other
+                for other in self.contacts
+                if abs(other.hole.axis @ normal) < ANGLE
+                and self.stops(other.hole.body, other.pin.body, other.hole.axis) < 2
+            ]
+            if len(self.lines(along)) > 1 and len(along) + len(across) == len(self.contacts):
+                return normal
+        return None
+
+    def lines(self, contacts: Sequence[Contact]) -> set[int]:
+        """Numbers of the axes of contacts."""
+        return {self.line[contact] for contact in contacts}
+
+    def between(self) -> dict[tuple[str, str], list[Contact]]:
+        """Contacts of pins by the two bodies that they join."""
+        joining: dict[tuple[str, str], list[Contact]] = defaultdict(list)
+        for contact in self.contacts:
+            left, other = sorted((self.groups(contact.hole.body), self.groups(contact.pin.body)))
+            if left != other:
+                joining[left, other].append(contact)
+        return joining
+
+    def ends(self, left: str, other: str) -> list[Facing]:
+        """Facing planes of two bodies, seen from the first."""
+        self.facing_pairs()
+        return self._ends.get((left, other), [])
+
+    def facing_pairs(self) -> list[tuple[str, str]]:
+        """Bodies with planes that face each other."""
+        if not self._ends:
+            for facing in self.facings:
+                first, second = map(self.groups, facing.bodies)
+                if first != second:
+                    self._ends[first, second].append(facing)
+                    self._ends[second, first].append(facing.back)
+        return [pair for pair in self._ends if pair[0] < pair[1]]
+
+    def weld(self, left: str, other: str, comment: str) -> None:
+        """Make two bodies one."""
+        self.groups.weld(left, other, comment)
+        self._ends.clear()
+
+    def stops(self, left: str, other: str, axis: Array) -> int:
+        """In how many of the two directions along an axis end faces hold two bodies."""
+        along = [facing.normal @ axis for facing in self.ends(left, other)]
+        return int(any(part > 1 - ANGLE for part in along)) + int(any(part < -1 + ANGLE for part in along))
+
+    def step(self) -> bool:
+        """Make two bodies one that cannot move against each other; False if there are none left."""
+        return self._bolted() or self._boxed() or self._twins() or self._loose()
+
+    def patterns(self, rounds: Sequence[Round]) -> None:
+        """Bodies that touch where two holes of each lie on the same axes are bolted to each other."""
+        draft = self.draft
+        holes = [item for item in rounds if item.hole and item.covered > COVERED[0]]
+        numbers = _line_numbers([hole.point for hole in holes], [hole.axis for hole in holes], [0.0] * len(holes))
+        lines: dict[str, dict[int, Array]] = defaultdict(dict)
+        for hole, number in zip(holes, numbers, strict=True):
+            lines[hole.body][number] = hole.axis
+        for facing in (facing for facing in self.facings if facing.gap <= NEAR):
+            left, other = facing.bodies
+            shared = lines[left].keys() & lines[other].keys()
+            count = sum(parallel(lines[left][number], facing.normal) for number in shared)
+            if count > 1 and self.groups(left) != self.groups(other):
+                what = f"{left} and {other} touch, and {count} holes of each lie on the same axes: fixed"
+                draft.warn("exchange.bolted", f"links.{other}", what, "draw the pins if they move")
+                self.weld(left, other, what)
+
+    def _bolted(self) -> bool:
+        """Two bodies with pins on two axes do not turn; if planes touch or the axes cross they do not slide."""
+        draft = self.draft
+        for (left, other), contacts in self.between().items():
+            axis = contacts[0].hole.axis
+            if len(self.lines(contacts)) == 1:
+                continue
+            if self.stops(left, other, axis) or not all(parallel(axis, contact.hole.axis) for contact in contacts):
+                what = f"{left} and {other} are fixed to each other: pins on several axes join them"
+                draft.note("exchange.bolted", f"links.{other}", what)
+                self.weld(left, other, what)
+                return True
+        return False
+
+    def _boxed(self) -> bool:
+        """Two bodies that flat walls hold in all directions are one."""
+        draft = self.draft
+        between = self.between()
+        for left, other in self.facing_pairs():
+            if (left, other) not in between and len(self._walls(left, other)) > 2:
+                what = f"{left} and {other} hold each other in all directions: they are taken as fixed"
+                draft.warn("exchange.fixed", f"links.{other}", what, "draw the play if they move")
+                self.weld(left, other, what)
+                return True
+        return False
+
+    def _twins(self) -> bool:
+        """Two bodies on the same two axes move as one, such as the two side plates of a link."""
+        draft = self.draft
+        lines: dict[str, set[int]] = defaultdict(set)
+        between = self.between()
+        for pair, contacts in between.items():
+            for body in pair:
+                lines[body] |= self.lines(contacts)
+        for left, other in combinations(lines, 2):
+            if len(lines[left] & lines[other]) > 1 and tuple(sorted((left, other))) not in between:
+                what = f"{left} and {other} turn about the same axes and are one link"
+                draft.note("exchange.twins", f"links.{left}", what, "")
+                self.weld(left, other, what)
+                return True
+        return False
+
+    def _loose(self) -> bool:
+        """A pin or sleeve with all contacts on its own axis spins without effect: it is fixed at the least play."""
+        draft = self.draft
+        between = self.between()
+        for body in self.groups.bodies():
+            mine = {pair: contacts for pair, contacts in between.items() if body in pair}
+            first = next(iter(mine.values()), [None])[0]
+            if first is None or len(between) == 1 or body == draft.ground or not self._centred(body, first):
+                continue
+            aligned = len(self.lines([contact for contacts in mine.values() for contact in contacts])) == 1
+            ball = any(body in map(self.groups, (item.pin.body, item.hole.body)) for item in self.balls)
+            others = (other for other in self.groups.bodies() if other != body)
+            guided = any(tuple(sorted((body, other))) not in mine and self._walls(body, other) for other in others)
+            if not aligned or ball or guided:
+                continue
+            plays = {pair: min(contact.play for contact in contacts) for pair, contacts in mine.items()}
+            tightest = min(plays, key=lambda pair: plays[pair])
+            holder = next(name for name in tightest if name != body)
+            what = f"{body} turns only about its own axis: it is taken as fixed in {holder}"
+            what += ", where its play is least" if len(mine) > 1 else ""
+            draft.note("exchange.loose", f"links.{body}", what, "draw less play where it is held")
+            self.weld(holder, body, what)
+            return True
+        return False
+
+    def _centred(self, body: str, contact: Contact) -> bool:
+        """Whether the mass centre of a body lies on the axis of a contact."""
+        parts = [part for name, part in self.draft.bodies.items() if self.groups(name) == body]
+        mass = sum(part.mass for part in parts)
+        centre = sum(part.mass * part.centre for part in parts) / mass if mass else parts[0].centre
+        off = centre - contact.hole.point
+        across = off - (off @ contact.hole.axis) * contact.hole.axis
+        return bool(np.linalg.norm(across) <= contact.play + 1e-3 * contact.hole.radius)
+
+    def _walls(self, left: str, other: str) -> list[tuple[Facing, Facing]]:
+        """Opposite walls that hold two bodies, for independent directions, seen from the first."""
+        walls: list[tuple[Facing, Facing]] = []
+        for front, back in combinations(self.ends(left, other), 2):
+            if front.normal @ back.normal < -1 + ANGLE**2:
+                normals = [*(wall[0].normal for wall in walls), front.normal]
+                if np.linalg.matrix_rank(np.array(normals), tol=ANGLE) == len(normals):
+                    walls.append((front, back))
+        if len(walls) == 1 and self.plane is not None and parallel(walls[0][0].normal, self.plane):
+            return []  # the plates of a plane mechanism lie against each other
+        return walls
+
+    def unconnected(self) -> None:
+        """What no joint connects with the rest is fixed to what it touches, or left out."""
+        draft = self.draft
+        while True:
+            bodies = self.groups.bodies()
+            links = {body: {body} for body in bodies}
+            near = [tuple(map(self.groups, (item.pin.body, item.hole.body))) for item in (*self.contacts, *self.balls)]
+            near += [pair for pair in self.facing_pairs() if self._walls(*pair)]
+            for left, other in near:
+                if links[left] is not links[other]:
+                    united = links[left] | links[other]
+                    links.update(dict.fromkeys(united, united))
+            main = links[self.groups(draft.ground)] if draft.ground else max(links.values(), key=len)
+            apart = [body for body in bodies if body not in main]
+            touching = [
+                (self.groups(facing.bodies[0]), self.groups(facing.bodies[1]))
+                for facing in self.facings
+                if facing.gap <= NEAR and len(main & {self.groups(body) for body in facing.bodies}) == 1
+            ]
+            if not apart or not touching:
+                break
+            left, other = touching[0] if touching[0][0] in main else touching[0][::-1]
+            what = f"{other} has no joint with the rest, and touches {left}: it is taken as fixed to it"
+            draft.warn("exchange.touching", f"links.{other}", what, "draw the pin if it moves")
+            self.weld(left, other, what)
+        for body in apart if len(main) > 1 else []:
+            what = f"{body} has no joint with the rest and is left out"
+            draft.warn("exchange.unconnected", f"links.{body}", what, "draw the pin in its hole, or a larger --gap")
+            for name in [name for name in draft.bodies if self.groups(name) == body]:
+                del draft.bodies[name]
+        names = set(draft.bodies)
+        draft.pairs = {name: pair for name, pair in draft.pairs.items() if set(pair.links) <= names}
+        self.contacts = [item for item in self.contacts if {item.pin.body, item.hole.body} <= names]
+        self.balls = [item for item in self.balls if {item.pin.body, item.hole.body} <= names]
+        self.facings = [facing for facing in self.facings if names.issuperset(facing.bodies)]
+        self._ends.clear()
+        self.groups.leader = {name: lead for name, lead in self.groups.leader.items() if name in names}
+
+    # ---- pairs -------------------------------------------------------------------------------------------------
+
+    def pairs(self) -> None:
+        """Add the pairs of all bodies that touch and move against each other."""
+        between = self.between()
+        for (left, other), contacts in between.items():
+            self._add(self._turning(left, other, contacts))
+        for ball in self.balls:
+            if self.groups(ball.pin.body) != self.groups(ball.hole.body):
+                self._add(replace(_pair("spherical", [ball]), at=ball.hole.point, length=None))
+        for left, other in sorted(self.facing_pairs()):
+            walls = self._walls(left, other) if (left, other) not in between else []
+            if walls:
+                self._sliding(left, other, walls)
+
+    def _add(self, pair: Pair) -> None:
+        letters = (f"{chr(65 + n % 26)}{n // 26 or ''}" for n in range(26 * 1000))
+        pair.name = next(name for name in letters if name not in self.draft.pairs and name not in self.draft.bodies)
+        self.draft.pairs[pair.name] = pair
+
+    def _turning(self, left: str, other: str, contacts: list[Contact]) -> Pair:
+        """The pair of pins on one axis, or on several parallel ones that only slide."""
+        draft = self.draft
+        axis = contacts[0].hole.axis
+        stops = self.stops(left, other, axis)
+        if len(self.lines(contacts)) > 1:
+            pair = _pair("prismatic", contacts)
+            pair.comments.append("pins on several parallel axes, and no end faces along them: it slides")
+        elif self.plane is not None and abs(axis @ self.plane) < ANGLE:
+            pair = _pair("prismatic", contacts)
+            pair.comments.append("its axis lies in the plane of the mechanism: it slides")
+            what = f"the pin between {left} and {other} lies in the plane of the mechanism: it slides and does not turn"
+            draft.note("exchange.slides", f"links.{other}", what, "draw end faces that hold it if it turns")
+        else:
+            pair = _pair("revolute" if stops == 2 or self.plane is not None else "cylindrical", contacts)
+            if stops < 2:
+                pair.comments.append(f"end faces hold it in {('neither direction', 'one direction only')[stops]}")
+        sizes = {round(contact.pin.radius / NEAR) for contact in contacts}
+        plays = {round(contact.play / 1e-9) for contact in contacts}
+        if len(sizes) > 1 or len(plays) > 1:
+            what = f"has {len(contacts)} bearings of different sizes; the joint has those of the longest"
+            draft.warn("exchange.bearings", f"joints.{left}-{other}", what, "see the comments of the joint")
+        if stops == 1 and pair.type == "cylindrical":
+            what = f"the pin between {left} and {other} is held in one direction only: the joint is cylindrical"
+            draft.warn("exchange.stops", f"links.{other}", what, "make it revolute if a load or a ring holds it")
+        apart = max(_eccentricity(contact) for contact in contacts)
+        if apart > NEAR:
+            what = f"pin and hole between {left} and {other} lie {1e3 * apart:.3g} mm apart; the joint is at the hole"
+            draft.note("exchange.eccentric", f"links.{other}", what, "draw them on one axis", distance=apart)
+        return pair
+
+    def _sliding(self, left: str, other: str, walls: list[tuple[Facing, Facing]]) -> None:
+        """The pair of bodies that flat walls guide."""
+        normals = np.array([wall[0].normal for wall in walls])
+        comment = "; ".join(
+            f"walls {1e3 * abs(a.level + b.level):.9g} mm apart, play {1e3 * (a.gap + b.gap):.6g} mm" for a, b in walls
+        )
+        middle = np.mean([facing.corners for facing in walls[0]], axis=(0, 1))
+        if len(walls) == 1 and self.plane is None:
+            self._add(Pair("", "planar", (left, other), middle, normals[0], comments=[comment]))
+            return
+        plane = np.zeros(3) if self.plane is None else self.plane
+        axis = np.cross(normals[0], normals[1] if len(walls) == 2 else plane)
+        axis = axis / np.linalg.norm(axis)
+        front, back = min(walls, key=lambda wall: abs(float(wall[0].normal @ plane)))
+        width, play = front.level + back.level, front.gap + back.gap  # a width below 0: the first body is outside
+        half = width / 2 if width > 0 else -(width + play) / 2
+        along = np.concatenate([face.corners for face in (front, back)]) @ axis
+        reach = [np.ptp(outline @ axis) for outline in front.outlines]
+        links = (other, left) if reach[0] <= reach[1] else (left, other)  # the second carries the bearing along
+        middle = np.mean([front.corners, back.corners], axis=(0, 1))
+        pair = Pair("", "prismatic", links, middle, axis, comments=[comment])
+        pair.pin_radius, pair.hole_radius, pair.length = half, half + play / 2, float(np.ptp(along))
+        self._add(pair)
+
+
+def _pair(kind: str, contacts: list[Contact]) -> Pair:
+    """A pair of pins on one axis: sizes of its longest bearing, length from the first end to the last."""
+    main = max(contacts, key=lambda contact: contact.high - contact.low)
+    axis = main.hole.axis
+    ends = []
+    for contact in contacts:
+        shift = float((contact.hole.point - main.hole.point) @ axis)
+        sign = float(np.sign(contact.hole.axis @ axis))
+        ends += [shift + sign * contact.low, shift + sign * contact.high]
+    links = main.pin.body, main.hole.body
+    if kind != "revolute" and main.pin.high - main.pin.low < main.hole.high - main.hole.low:
+        links = links[::-1]  # the second carries the bearing along
+    pair = Pair("", kind, links, main.hole.point + (min(ends) + max(ends)) / 2 * axis, axis)
+    pair.pin_radius, pair.hole_radius, pair.length = main.pin.radius, main.hole.radius, max(ends) - min(ends)
+    if main.play == 0:
+        pair.hole_radius = pair.pin_radius
+    for contact in contacts:
+        over = f", over {1e3 * (contact.high - contact.low):.9g} mm" if contact.high > contact.low else ""
+        pair.comments.append(f"{contact.pin.label} in {contact.hole.label}{over}")
+    if kind in ("revolute", "cylindrical"):
+        pair.comments.append(_nearest_fit(main))
+    return pair
+
+
+def _eccentricity(contact: Contact) -> float:
+    """Distance of a pin's axis from its hole's, m."""
+    off = contact.pin.point - contact.hole.point
+    return float(np.linalg.norm(off - (off @ contact.hole.axis) * contact.hole.axis))
+
+
+def _nearest_fit(contact: Contact) -> str:
+    """The usual fit whose mean play is nearest to that drawn, in words."""
+    size = round(2e3 * contact.hole.radius, 1) * 1e-3
+    try:
+        fits = {name: fit(size, *name.split("/")) for name in FITS}
+    except MechanismError:
+        return "no ISO fit for its size"
+    play = 2 * contact.play
+    name = min(fits, key=lambda name: abs(fits[name].mean - play))
+    drawn = "no play is drawn" if play == 0 else f"play {1e6 * play:.4g} µm on the diameter"
+    span = f"{1e6 * fits[name].minimum:.4g} to {1e6 * fits[name].maximum:.4g} µm"
+    return f"{drawn}; nearest usual fit: {1e3 * size:.6g} mm {name}, {span}"

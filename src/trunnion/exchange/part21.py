@@ -1,0 +1,176 @@
+"""The text of a STEP file (ISO 10303-21): its entities by number, read when they are asked for.
+
+`#12=CARTESIAN_POINT('',(0.,1.,2.));` is the entity 12 of the kind CARTESIAN_POINT with the arguments
+`['', [0., 1., 2.]]`; a complex entity has several kinds.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+from trunnion.errors import Finding, MechanismError
+
+__all__ = ["Entity", "Part21", "Ref", "quoted"]
+
+LARGEST = 400_000  # entities of a file that is read; an assembly of a hundred parts has about half of it
+DEEPEST = 100  # lists in lists
+
+_START = re.compile(r"#(\d+)\s*+=\s*+")
+# text, comments and what stands between them, up to the semicolon; nothing is tried twice
+_BODY = re.compile(r"(?:[^;'/]++|'[^']*+'|/\*(?:[^*]++|\*(?!/))*+\*/|/(?!\*))*+;")
+_KIND = re.compile(r"\s*([A-Z][A-Z0-9_]*)\s*\(")
+_TOKEN = re.compile(
+    r"\s*+(?:/\*.*?\*/\s*+)*(?:(?P<string>'(?:[^']|'')*')|#(?P<ref>\d+)|(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+    r"|\.(?P<enum>\w+)\.|(?P<kind>[A-Za-z_]\w*)|(?P<sign>[()$*,])|\"(?P<binary>[0-9A-F]*)\")",
+    re.DOTALL,
+)
+_WIDE = re.compile(r"\\X2\\((?:[0-9A-F]{4})+)\\X0\\|\\X\\([0-9A-F]{2})|\\S\\(.)")
+
+Entity = dict[str, list[Any]]  # kind → arguments
+
+
+class Ref(int):
+    """The number of another entity."""
+
+
+class Part21:
+    """A STEP file.
+
+    Parameters
+    ----------
+    path : the file.
+
+    Raises
+    ------
+    MechanismError : if it is no STEP file, is cut off or has too many entities.
+    """
+
+    def __init__(self, path: Path) -> None:
+        raw = path.read_bytes()
+        self.path = path
+        if b"ISO-10303-21" not in raw[:4096]:
+            raise self.unreadable("is not a STEP file: it does not begin with ISO-10303-21", "export it again")
+        if b"ENDSEC" not in raw[-4096:]:
+            raise self.unreadable("is cut off: its end is missing", "copy or export it again")
+        count = raw.count(b"=")
+        if count > LARGEST:
+            what = f"has about {count:,} entities; at most {LARGEST:,} are read"
+            raise self.unreadable(what, "export fewer parts, without threads, screws and logos")
+        self.text = raw.decode("utf-8", errors="replace")
+        self.spans: dict[int, tuple[int, int]] = {}
+        self._kinds: dict[str, list[int]] = defaultdict(list)
+        self._read: dict[int, Entity] = {}
+        start = _START.search(self.text)
+        while start is not None:
+            number, body = int(start[1][:18]), _BODY.match(self.text, start.end())
+            if body is None:
+                raise self.unreadable(f"is damaged at #{number}: the entity has no end")
+            self.spans[number] = start.end(), body.end() - 1
+            kind = _KIND.match(body[0])
+            for name in [kind[1]] if kind else re.findall(r"([A-Z][A-Z0-9_]*)\s*\(", body[0]):
+                self._kinds[name].append(number)
+            start = _START.search(self.text, body.end())
+        if not self.spans:
+            raise self.unreadable("has no entities", "export it again")
+
+    def unreadable(self, what: str, remedy: str = "export it again") -> MechanismError:
+        """What forbids to read the file, to be raised."""
+        return MechanismError(Finding(what, file=str(self.path), remedy=remedy, code="exchange.step"))
+
+    def of(self, kind: str) -> list[int]:
+        """Numbers of all entities of a kind, in the order of the file."""
+        return self._kinds.get(kind, [])
+
+    def __getitem__(self, number: int) -> Entity:
+        """An entity: its arguments by kind."""
+        entity = self._read.get(number)
+        if entity is None:
+            if number not in self.spans:
+                raise self.unreadable(f"refers to #{number}, which it does not have")
+            start, end = self.spans[number]
+            entity = self._read[number] = self._parsed(number, self.text[start:end])
+        return entity
+
+    def kind(self, number: int) -> str:
+        """The kind of an entity, of a complex one the first."""
+        return next(iter(self[number]))
+
+    def args(self, number: Any, kind: str) -> list[Any]:
+        """The arguments of an entity that must be of a kind."""
+        entity = self[number] if isinstance(number, Ref | int) else {}
+        if kind not in entity:
+            raise self.unreadable(f"has {', '.join(entity) or 'nothing'} at #{number} where {kind} belongs")
+        return entity[kind]
+
+    def references(self, number: int) -> set[int]:
+        """Numbers that the text of an entity names."""
+        start, end = self.spans.get(number, (0, 0))
+        bare = re.sub(r"'[^']*'", "", self.text[start:end])
+        return {int(digits) for digits in re.findall(r"#(\d+)", bare)}
+
+    def _parsed(self, number: int, text: str) -> Entity:
+        values: list[Any] = []
+        stack: list[list[Any]] = [values]
+        kinds: list[str] = []  # the kind in front of each open list; empty if none
+        pending = ""
+        position, end = 0, len(text.rstrip())
+        while position < end:
+            token = _TOKEN.match(text, position)
+            if token is None:
+                raise self.unreadable(f"cannot be read at #{number}: '{text[position : position + 30].strip()}'")
+            position = token.end()
+            name = token.lastgroup or "sign"
+            value: str = token[name]
+            if name == "kind":
+                pending = value.upper()
+            elif value == "(" and name == "sign":
+                stack.append([])
+                kinds.append(pending)
+                pending = ""
+            elif value == ")" and name == "sign":
+                if len(stack) < 2:
+                    raise self.unreadable(f"has a bracket too many at #{number}")
+                inner, kind = stack.pop(), kinds.pop()
+                stack[-1].append((kind, inner) if kind else inner)
+            elif name == "sign":
+                if value != ",":
+                    stack[-1].append(None)
+            else:
+                stack[-1].append(_value(name, value))
+            if len(stack) > DEEPEST:
+                raise self.unreadable(f"has more than {DEEPEST} brackets in one another at #{number}")
+        records = values[0] if len(values) == 1 and isinstance(values[0], list) else values
+        if len(stack) > 1 or not all(isinstance(record, tuple) for record in records):
+            raise self.unreadable(f"cannot be read at #{number}: its brackets do not match")
+        return dict(records)
+
+
+def _value(name: str, text: str) -> Any:
+    if name == "string":
+        return _WIDE.sub(_decoded, text[1:-1].replace("''", "'")).replace("\\\\", "\\")
+    if name == "ref":
+        return Ref(text)
+    if name == "number":
+        return float(text)
+    return text == "T" if name == "enum" and text in ("T", "F") else text
+
+
+def _decoded(match: re.Match[str]) -> str:
+    if match[1]:
+        return bytes.fromhex(match[1]).decode("utf-16-be", errors="replace")
+    return chr(int(match[2], 16)) if match[2] else chr(ord(match[3]) + 128)
+
+
+def quoted(text: str) -> str:
+    """A text as a string of a STEP file."""
+
+    def coded(sign: str) -> str:
+        if " " <= sign <= "~":
+            return sign
+        return f"\\X2\\{sign.encode('utf-16-be').hex().upper()}\\X0\\"
+
+    plain = text.replace("\\", "\\\\").replace("'", "''")
+    return "'" + "".join(coded(sign) for sign in plain) + "'"

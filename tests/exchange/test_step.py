@@ -1,0 +1,946 @@
+"""STEP files: parts, joints and placements against closed forms; torques against models written by hand."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import re
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+import trunnion
+from exchange.step_files import Shape, StepFile, box, prism, turn, turned
+from exchange.step_mechanisms import STILL, bar, boss, cardan, four_bar, placed, slider_crank, written
+from trunnion.cli.app import app
+from trunnion.errors import MechanismError
+from trunnion.exchange import export_model, import_file, model_text
+from trunnion.exchange.brep import Geometry
+from trunnion.exchange.draft import Body, Draft
+from trunnion.exchange.mating import joined
+from trunnion.exchange.part21 import Part21
+
+STEEL = 7850.0
+
+
+def plate(split="seam"):
+    """The plate of the theory sheet."""
+    shape = box((-20, -15, 0), (220, 15, 12), split)
+    shape.feature("bottom", (0, 0, 0), [(8, 0), (8, -12)], "top")
+    return shape.feature("bottom", (200, 0, 0), [(10, 0), (10, -12)], "top")
+
+
+def model(draft, tmp_path, extra=""):
+    """The mechanism of an imported draft."""
+    path = tmp_path / "model.yaml"
+    path.write_text(model_text(draft) + extra)
+    return trunnion.read(path)
+
+
+def stated(tmp_path, text):
+    path = tmp_path / "stated.yaml"
+    path.write_text(text)
+    return trunnion.read(path)
+
+
+def codes(draft):
+    return {finding.code.removeprefix("exchange.") for finding in draft.findings}
+
+
+def joint(draft, *links):
+    """The pair between two links."""
+    return next(pair for pair in draft.pairs.values() if set(pair.links) == set(links))
+
+
+def expect_body(body, parts, scale=1e-3, density=STEEL):
+    """A body against closed forms: parts are (shape, matrix, shift) in the unit of the file."""
+    moments = [shape.placed(matrix, shift).moments(scale, density) for shape, matrix, shift in parts]
+    mass = sum(part[0] for part in moments)
+    centre = sum(part[0] * part[1] for part in moments) / mass
+    inertia = np.zeros((3, 3))
+    for part, at, own in moments:
+        off = at - centre
+        inertia += own + part * (off @ off * np.eye(3) - np.outer(off, off))
+    assert body.mass == pytest.approx(mass, rel=1e-9)
+    np.testing.assert_allclose(body.centre, centre, atol=1e-9)
+    np.testing.assert_allclose(body.inertia, inertia, atol=1e-9 * np.abs(inertia).max())
+
+
+# ---- moments --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("split", ["seam", "halves", "none"])
+def test_the_plate_of_the_theory_sheet(tmp_path, split):
+    body = import_file(written(tmp_path / "a.step", {"plate": (plate(split), *STILL)})).bodies["plate"]
+    assert body.mass / STEEL * 1e9 == pytest.approx(80217.34565773529, rel=1e-12)
+    assert body.centre[0] * 1e3 == pytest.approx(98.30813645699342, rel=1e-12)
+    assert body.inertia[2, 2] / STEEL * 1e15 == pytest.approx(358878138.926531, rel=1e-12)
+
+
+def shapes(split):
+    """Solids with faces of every kind: cones, apexes, balls, fillets and grooves, blind holes."""
+    cross = box((-10, -10, -10), (10, 10, 10), split)
+    cross.feature(1, (10, 0, 0), [(6, 0), (5, 1, (6, 1)), (5, 10), (4, 11), (0, 11)])
+    cross.feature("top", (2, 3, 10), [(3, 0), (3, -5), (0, -7)])
+    return {
+        "cross": cross,
+        "pin": turned([(0, 0), (5, 0), (6, 1), (6, 30), (4, 32, (4, 30)), (4, 40), (0, 44, (0, 40))], split=split),
+        "cone": turned([(0, 0), (6, 0), (0, 10)], (1, 1, 0), (3, 2, 1), split),
+        "ball": turned([(0, -5), (5, 0, (0, 0)), (0, 5, (0, 0))], (1, 1, 0), (3, 2, 1), split),
+        "groove": turned([(0, 0), (10, 0), (10, 5), (8, 7, (10, 7)), (10, 9, (10, 7)), (10, 20), (0, 20)], split=split),
+        "bush": turned([(4, 0), (6, 0), (6, 9), (4, 9), (4, 0)], (0, 1, 0), (1, 1, 1), split),
+    }
+
+
+@pytest.mark.parametrize("split", ["seam", "halves", "none"])
+@pytest.mark.parametrize("degrees", [False, True])
+def test_moments_are_exact_for_every_kind_of_face(tmp_path, split, degrees):
+    parts = {name: (shape, *STILL) for name, shape in shapes(split).items()}
+    file = Part21(written(tmp_path / "a.step", parts, degrees=degrees))
+    geometry = Geometry(file, 1e-3, math.radians(1) if degrees else 1.0)
+    for number, (name, (shape, *_)) in zip(file.of("MANIFOLD_SOLID_BREP"), parts.items(), strict=True):
+        solid = geometry.solid(number)
+        assert not solid.doubts, name
+        mass, centre, inertia = shape.moments()
+        assert STEEL * solid.moments.volume == pytest.approx(mass, rel=1e-12), name
+        np.testing.assert_allclose(solid.moments.centre, centre, atol=1e-12)
+        np.testing.assert_allclose(STEEL * solid.moments.inertia, inertia, atol=1e-12 * np.abs(inertia).max())
+
+
+@settings(max_examples=10, deadline=None)
+@given(
+    st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda axis: np.linalg.norm(axis) > 0.1),
+    st.floats(-3, 3),
+    st.tuples(*[st.floats(-500, 500)] * 3),
+    st.sampled_from(["seam", "halves", "none"]),
+    st.booleans(),
+    st.sampled_from(["cross", "pin", "cone", "ball", "groove", "bush"]),
+)
+def test_turned_shifted_and_mirrored_parts(tmp_path_factory, axis, angle, shift, split, mirrored, name):
+    matrix = turn(axis, angle) @ np.diag([1, 1, -1 if mirrored else 1])
+    shape = shapes(split)[name].placed(matrix, shift)
+    file = Part21(written(tmp_path_factory.mktemp("step") / "a.step", {name: (shape, *STILL)}))
+    solid = Geometry(file, 1e-3, 1.0).solid(file.of("MANIFOLD_SOLID_BREP")[0])
+    mass, centre, inertia = shape.moments()
+    assert not solid.doubts
+    assert STEEL * solid.moments.volume == pytest.approx(mass, rel=1e-9)
+    np.testing.assert_allclose(solid.moments.centre, centre, atol=1e-9)
+    np.testing.assert_allclose(STEEL * solid.moments.inertia, inertia, atol=1e-7 * np.abs(inertia).max())
+
+
+def test_edges_that_are_splines(tmp_path):
+    path = written(tmp_path / "a.step", {"plate": (plate(), *STILL)}, splines=True)
+    assert "RATIONAL_B_SPLINE_CURVE" in path.read_text()
+    expect_body(import_file(path).bodies["plate"], [(plate(), *STILL)])
+
+
+# ---- mechanisms -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("split", ["seam", "halves", "none"])
+@pytest.mark.parametrize(("rotation", "shift"), [(np.eye(3), (0, 0, 0)), (turn((1, 2, 3), 0.7), (100, -50, 30))])
+def test_slider_crank(tmp_path, split, rotation, shift):
+    parts = placed(slider_crank(split=split), rotation, shift)
+    draft = import_file(written(tmp_path / "a.step", parts), ground="frame")
+    assert codes(draft) == {"drive"}
+    for name, part in parts.items():
+        expect_body(draft.bodies[name], [part])
+    sizes = {("crank", "frame"): (10, 10.02, 12), ("crank", "rod"): (8, 8.015, 10), ("rod", "slider"): (6, 6.01, 10)}
+    for links, expected in sizes.items():
+        pair = joint(draft, *links)
+        assert pair.type == "revolute"
+        np.testing.assert_allclose(
+            [pair.pin_radius, pair.hole_radius, pair.length], 1e-3 * np.array(expected), atol=1e-12
+        )
+        np.testing.assert_allclose(abs(pair.axis @ rotation[:, 2]), 1, atol=1e-12)
+    guide = joint(draft, "frame", "slider")
+    assert guide.type == "prismatic"
+    np.testing.assert_allclose([guide.pin_radius, guide.hole_radius, guide.length], [0.015, 0.01502, 0.04], atol=1e-9)
+    np.testing.assert_allclose(abs(guide.axis @ rotation[:, 0]), 1, atol=1e-9)
+    pin = 1e-3 * (np.array(shift) + rotation @ [25, 50 * math.sin(math.pi / 3), 15])
+    np.testing.assert_allclose(joint(draft, "crank", "rod").at, pin, atol=1e-12)
+
+
+FRICTION = "joint_defaults: {friction: 0.1}\n"
+KEYS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+
+
+def numbers(*parts, spatial=False):
+    """Mass, centre and inertia of shapes (shape, matrix, shift), in closed form, as keys of a link."""
+    moved = [shape.placed(matrix, shift) for shape, matrix, shift in parts]
+    united = moved[0]
+    for other in moved[1:]:
+        united.gain(other.volume, other.first, other.second)
+    mass, centre, inertia = united.moments()
+    middle = ", ".join(f"{float(part):.15g}" for part in centre[: 3 if spatial else 2])
+    tensor = ", ".join(f"{key}: {float(inertia[at]):.15e}" for key, at in KEYS.items())
+    about = f"{{{tensor}}}" if spatial else f"{float(inertia[2, 2]):.15e}"
+    return f"mass: {float(mass):.15g}, centre: [{middle}], inertia: {about}"
+
+
+def torques(draft, tmp_path, by_hand, extra=FRICTION, steps=48):
+    """Drive torques of an imported mechanism and of the one that is written by hand."""
+    results = []
+    for mechanism in (model(draft, tmp_path, extra), stated(tmp_path, by_hand + extra)):
+        result = trunnion.analyse(mechanism, steps)
+        assert (result["status"].values <= 2).all()
+        results.append(result["drive_effort"].values.ravel())
+    return results
+
+
+def test_torque_of_the_slider_crank_is_that_of_the_model_by_hand(tmp_path):
+    shapes = {name: numbers((part[0], *STILL)) for name, part in slider_crank().items()}
+    by_hand = f"""trunnion: 1
+space: planar
+ground: frame
+links:
+  frame: {{points: {{O: [0, 0], S: {{at: [0, 0], axis: [1, 0]}}}}}}
+  crank: {{points: {{O: [0, 0], P: [50 mm, 0]}}, {shapes["crank"]}}}
+  rod: {{points: {{P: [0, 0], Q: [200 mm, 0]}}, {shapes["rod"]}}}
+  slider: {{points: {{Q: [0, 0], S: {{at: [0, 0], axis: [1, 0]}}}}, {shapes["slider"]}}}
+joints:
+  O: {{type: revolute, links: [frame, crank], pin: {{radius: 10 mm, length: 12 mm, clearance: 20 um}}}}
+  P: {{type: revolute, links: [crank, rod], pin: {{radius: 8 mm, length: 10 mm, clearance: 15 um}}}}
+  Q: {{type: revolute, links: [slider, rod], pin: {{radius: 6 mm, length: 10 mm, clearance: 10 um}}}}
+  S: {{type: prismatic, links: [frame, slider], guide: {{length: 40 mm, clearance: 20 um}}}}
+drivers: {{O: {{speed: 600 rpm, start: 60 deg}}}}
+assembly: {{Q: [0.2, 0]}}
+"""
+    path = written(tmp_path / "a.step", slider_crank())
+    shaft = joint(import_file(path), "crank", "frame").name
+    draft = import_file(path, ground="frame", drive=shaft, speed="600 rpm")
+    imported, expected = torques(draft, tmp_path, by_hand)
+    np.testing.assert_allclose(imported, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+
+
+def test_four_bar_with_loose_pins(tmp_path):
+    parts = four_bar()
+    draft = import_file(written(tmp_path / "a.step", parts), ground="ground", speed="600 rpm")
+    held = {"ground": ["ground"], "crank": ["crank", "pin"], "coupler": ["coupler", "pin-2", "pin-3"]}
+    held["rocker"] = ["rocker", "pin-4"]
+    assert set(draft.bodies) == set(held)
+    for name, members in held.items():
+        expect_body(draft.bodies[name], [parts[member] for member in members])
+    sizes = {("ground", "crank"): 10.04, ("crank", "coupler"): 10.05, ("coupler", "rocker"): 10.06}
+    sizes[("ground", "rocker")] = 10.04
+    for links, hole in sizes.items():
+        pair = joint(draft, *links)
+        np.testing.assert_allclose(
+            [pair.pin_radius, pair.hole_radius, pair.length], [5e-3, hole / 2e3, 0.01], atol=1e-12
+        )
+    assert codes(draft) == {"loose", "drive"}
+
+
+def test_torque_of_the_four_bar_is_that_of_the_model_by_hand(tmp_path):
+    parts = four_bar()
+    drawn = {
+        name: numbers(*(parts[member] for member in members))
+        for name, members in {
+            "crank": ("crank", "pin"),
+            "coupler": ("coupler", "pin-2", "pin-3"),
+            "rocker": ("rocker", "pin-4"),
+        }.items()
+    }
+    b, c = (1e3 * 1e-3 * np.array(parts[name][2])[:2] for name in ("pin-2", "pin-3"))
+    b, c = (f"[{float(p[0]):.15g} mm, {float(p[1]):.15g} mm]" for p in (b, c))
+    by_hand = f"""trunnion: 1
+space: planar
+ground: ground
+links:
+  ground: {{points: {{A: [0, 0], D: [100 mm, 0]}}}}
+  crank: {{points: {{A: [0, 0], B: {b}}}, {drawn["crank"]}}}
+  coupler: {{points: {{B: {b}, C: {c}}}, {drawn["coupler"]}}}
+  rocker: {{points: {{C: {c}, D: [100 mm, 0]}}, {drawn["rocker"]}}}
+joints:
+  A: {{type: revolute, links: [ground, crank], pin: {{radius: 5 mm, length: 10 mm, clearance: 20 um}}}}
+  B: {{type: revolute, links: [coupler, crank], pin: {{radius: 5 mm, length: 10 mm, clearance: 25 um}}}}
+  C: {{type: revolute, links: [coupler, rocker], pin: {{radius: 5 mm, length: 10 mm, clearance: 30 um}}}}
+  D: {{type: revolute, links: [ground, rocker], pin: {{radius: 5 mm, length: 10 mm, clearance: 20 um}}}}
+drivers: {{A: {{speed: 600 rpm}}}}
+"""
+    draft = import_file(written(tmp_path / "a.step", parts), ground="ground", speed="600 rpm")
+    imported, expected = torques(draft, tmp_path, by_hand)
+    np.testing.assert_allclose(imported, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+
+
+def test_cardan(tmp_path):
+    parts = cardan()
+    draft = import_file(written(tmp_path / "a.step", parts), ground="frame")
+    for name, part in parts.items():
+        expect_body(draft.bodies[name], [part])
+    expected = {
+        ("input", "frame"): ("revolute", 10, 10.02, 20),
+        ("output", "frame"): ("cylindrical", 10, 10.03, 20),
+        ("input", "cross"): ("cylindrical", 5, 5.01, 38),  # two lugs of 8 mm, 46 mm from end to end: 23 − 15 each
+        ("cross", "output"): ("cylindrical", 5, 5.01, 38),
+    }
+    for links, (kind, *sizes) in expected.items():
+        pair = joint(draft, *links)
+        sizes[2] = 46 if "cross" in links else sizes[2]
+        assert pair.type == kind
+        np.testing.assert_allclose([pair.pin_radius, pair.hole_radius, pair.length], 1e-3 * np.array(sizes), atol=1e-12)
+    drawn = {name: numbers(part, spatial=True) for name, part in parts.items()}
+    c, s = math.cos(math.pi / 6), math.sin(math.pi / 6)
+    axes = {"A": (1, 0, 0), "B": (0, 0, 1), "C": (-s, c, 0), "D": (c, s, 0)}
+    at = {"A": np.array([-0.05, 0, 0]), "B": np.zeros(3), "C": np.zeros(3), "D": np.array([0.05 * c, 0.05 * s, 0])}
+
+    def point(name):
+        place, axis = (", ".join(f"{float(part):.15g}" for part in vector) for vector in (at[name], axes[name]))
+        return f"{name}: {{at: [{place}], axis: [{axis}]}}"
+
+    by_hand = f"""trunnion: 1
+space: spatial
+ground: frame
+links:
+  frame: {{points: {{{point("A")}, {point("D")}}}}}
+  input: {{points: {{{point("A")}, {point("B")}}}, {drawn["input"]}}}
+  cross: {{points: {{{point("B")}, {point("C")}}}, {drawn["cross"]}}}
+  output: {{points: {{{point("C")}, {point("D")}}}, {drawn["output"]}}}
+joints:
+  A: {{type: revolute, links: [frame, input], pin: {{radius: 10 mm, length: 20 mm, clearance: 20 um}}}}
+  B: {{type: cylindrical, links: [cross, input], pin: {{radius: 5 mm, length: 46 mm, clearance: 10 um}}}}
+  C: {{type: cylindrical, links: [cross, output], pin: {{radius: 5 mm, length: 46 mm, clearance: 10 um}}}}
+  D: {{type: cylindrical, links: [output, frame], pin: {{radius: 10 mm, length: 20 mm, clearance: 30 um}}}}
+drivers: {{A: {{speed: 600 rpm}}}}
+"""
+    shaft = joint(draft, "input", "frame").name
+    draft = import_file(tmp_path / "a.step", ground="frame", drive=shaft, speed="600 rpm")
+    imported, expected = torques(draft, tmp_path, by_hand, steps=24)
+    np.testing.assert_allclose(imported, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+
+
+# ---- noise ----------------------------------------------------------------------------------------------------
+
+
+def test_inches(tmp_path):
+    parts = slider_crank()
+    draft = import_file(written(tmp_path / "a.step", parts, "in"), ground="frame", gap="20 mm")
+    for name, part in parts.items():
+        expect_body(draft.bodies[name], [part], 25.4e-3)
+    pair = joint(draft, "crank", "frame")
+    np.testing.assert_allclose([pair.pin_radius, pair.hole_radius, pair.length], 25.4e-3 * np.array([10, 10.02, 12]))
+
+
+def test_chamfers_fillets_and_blind_holes(tmp_path):
+    """A pin with a chamfer and a fillet in a blind hole with a conical bottom and a chamfered edge."""
+    base = box((-30, -30, -20), (30, 30, 0)).feature("top", (0, 0, 0), [(11, 0), (10, -1), (10, -15), (0, -18)])
+    profile = [(12, 0), (10, 2, (12, 2)), (10, 13), (9, 14), (0, 14)]
+    lever = box((-15, -15, 0), (80, 15, 8)).feature("bottom", (0, 0, 0), profile)
+    parts = {"base": (base, *STILL), "lever": (lever, np.eye(3), np.array([0, 0, 1.0]))}
+    draft = import_file(written(tmp_path / "a.step", parts))
+    for name, part in parts.items():
+        expect_body(draft.bodies[name], [part])
+    pair = joint(draft, "base", "lever")
+    assert pair.type == "cylindrical"  # nothing holds it along the axis
+    # the pin's cylinder from z = -1 to -12, the hole's from -1 to -15
+    np.testing.assert_allclose([pair.pin_radius, pair.hole_radius, pair.length], [0.01, 0.01, 0.011], atol=1e-12)
+    np.testing.assert_allclose(pair.at, [0, 0, -0.0065], atol=1e-12)
+    assert len(draft.pairs) == 1
+
+
+def test_rounded_corners_are_no_pins(tmp_path):
+    """Quarter cylinders at the corners of a part that fit a quarter hollow of another."""
+    outline = [(0, 0), (40, 0), (40, 30), (0, 30)]
+    shape = prism(outline, 0, 10)
+    other = prism([(50, 0), (90, 0), (90, 30), (50, 30)], 0, 10)
+    draft = import_file(written(tmp_path / "a.step", {"one": (shape, *STILL), "two": (other, *STILL)}))
+    assert not draft.pairs
+    assert "joints" in codes(draft)
+
+
+def test_two_coaxial_pins_of_different_parts_on_one_axis(tmp_path):
+    """Two levers turn on the two ends of one axle that stands still: two joints, not three."""
+    axle = turned([(0, 0), (6, 0), (6, 10), (9, 10), (9, 20), (6, 20), (6, 30), (0, 30)])
+    block = boss(box((-20, -20, -40), (20, 20, -30)), "top", (10, 10, -30), 5, 5)
+    lever = bar(60, [(0, 12.04)], 0, 10)
+    levers = {"left": (lever, *STILL), "right": (lever, turn((0, 0, 1), 1), np.array([0, 0, 20.0]))}
+    draft = import_file(written(tmp_path / "a.step", {"axle": (axle, *STILL)} | levers), ground="axle")
+    assert {frozenset(pair.links) for pair in draft.pairs.values()} == {
+        frozenset(("axle", "left")),
+        frozenset(("axle", "right")),
+    }
+    assert all(pair.length == pytest.approx(0.01) for pair in draft.pairs.values())
+    assert "unconnected" in codes(
+        import_file(
+            written(tmp_path / "b.step", {"axle": (axle, *STILL), "block": (block, *STILL)} | levers), ground="axle"
+        )
+    )
+
+
+def test_a_shaft_in_two_bearings_is_one_joint(tmp_path):
+    """Bearings at both ends: the length goes from the first end to the last."""
+    yoke = prism([(-30, 0), (60, 0), (60, 40), (50, 40), (50, 10), (-20, 10), (-20, 40), (-30, 40)], -15, 15)
+    yoke.feature(1, (60, 25, 0), [(5.01, 0), (5.01, -10)], 3).feature(7, (-30, 25, 0), [(5.01, 0), (5.01, -10)], 5)
+    shaft = turned([(0, -35), (5, -35), (5, -20), (7, -20), (7, 50), (5, 50), (5, 65), (0, 65)], (1, 0, 0), (0, 25, 0))
+    arm = boss(box((70, 20, -5), (75, 60, 5)), 3, (70, 25, 0), 8, 5)
+    draft = import_file(written(tmp_path / "a.step", {"yoke": (yoke, *STILL), "shaft": (shaft, *STILL)}), ground="yoke")
+    pair = joint(draft, "yoke", "shaft")
+    assert pair.type == "revolute"
+    np.testing.assert_allclose([pair.length, *pair.at], [0.09, 0.015, 0.025, 0], atol=1e-9)
+    assert arm.volume > 0
+
+
+def test_patterns_of_equal_holes_are_bolted(tmp_path):
+    """A flange on a plate: four screws through equal holes, each a use of one part; they move as one."""
+    corners = [(20, 20), (-20, 20), (-20, -20), (20, -20)]
+
+    def flange(low, high):
+        shape = box((-30, -30, low), (30, 30, high))
+        for x, y in corners:
+            shape.feature("bottom", (x, y, low), [(3.3, 0), (3.3, low - high)], "top")
+        return shape
+
+    screw = turned([(0, 0), (3, 0), (3, 20), (5, 20), (5, 24), (0, 24)])
+    base = flange(-10, 0)
+    top = flange(0, 10).feature("top", (0, 0, 10), [(8, 0), (8, 15), (0, 15)])
+    wheel = bar(50, [(0, 16.05)], 10, 20)
+    parts = {"base": (base, *STILL), "flange": (top, *STILL), "arm": (wheel, *STILL)}
+    parts |= {f"screw{n}": (screw, np.eye(3), np.array([x, y, -10.0])) for n, (x, y) in enumerate(corners)}
+    draft = import_file(written(tmp_path / "a.step", parts), ground="base")
+    assert set(draft.bodies) == {"base", "arm"}
+    expect_body(draft.bodies["base"], [part for name, part in parts.items() if name != "arm"])
+    assert [pair.type for pair in draft.pairs.values()] == ["revolute"] or len(draft.pairs) == 1
+    bare = {name: part for name, part in parts.items() if "screw" not in name}
+    again = import_file(written(tmp_path / "b.step", bare), ground="base")
+    assert set(again.bodies) == {"base", "arm"}
+    assert "bolted" in codes(again)
+
+
+def test_a_part_used_twice_is_two_links_and_twins_are_one(tmp_path):
+    """A rocker whose two side plates are uses of one part; the pins are of the crank and the ground."""
+    parts = four_bar()
+    shape, matrix, shift = parts["rocker"]
+    parts["pin-3"] = (turned([(0, 0), (5, 0), (5, 40), (0, 40)]), np.eye(3), parts["pin-3"][2])
+    parts["pin-4"] = (turned([(0, 0), (5, 0), (5, 40), (0, 40)]), np.eye(3), parts["pin-4"][2])
+    file = StepFile()
+    made = {name: file.part(name, part) for name, (part, *_) in parts.items()}
+    uses = [(made[name], *place) for name, (_, *place) in parts.items()]
+    file.assembly("twins", *uses, (made["rocker"], matrix, shift + np.array([0, 0, 20])))
+    draft = import_file(file.write(tmp_path / "a.step"), ground="ground")
+    assert set(draft.bodies) == {"ground", "crank", "coupler", "rocker"}
+    assert draft.bodies["rocker"].mass > 1.9 * STEEL * shape.volume * 1e-9
+    assert "twins" in codes(draft)
+    mechanism = model(draft, tmp_path)
+    assert (trunnion.analyse(mechanism, 12)["status"].values <= 2).all()
+
+
+def test_mirrored_parts(tmp_path):
+    parts = {
+        name: (shape.placed(np.diag([1, -1, 1]), (0, 0, 0)), matrix, at)
+        for name, (shape, matrix, at) in placed(slider_crank(-math.pi / 3)).items()
+    }
+    draft = import_file(written(tmp_path / "a.step", parts), ground="frame")
+    for name, part in parts.items():
+        expect_body(draft.bodies[name], [part])
+    assert len(draft.pairs) == 4
+
+
+def test_gap_interference_and_threads_are_findings(tmp_path):
+    def pair(hole, pin):
+        parts = {"base": (bar(80, [(0, hole)], 0, 10), *STILL)}
+        parts["arm"] = (boss(bar(60, [], 10, 20), "bottom", (0, 0, 10), pin, 10), *STILL)
+        return import_file(written(tmp_path / "a.step", parts), ground="base")
+
+    assert [item.type for item in pair(10.9, 10).pairs.values()] == ["revolute"] or len(pair(10.9, 10).pairs) == 1
+    wide = pair(11.2, 10)
+    assert not wide.pairs
+    assert "gap" in codes(wide)
+    pressed = pair(9.96, 10)
+    assert "interference" in codes(pressed)
+    assert set(pressed.bodies) == {"base"}
+    thread = pair(6.8, 8)
+    assert "interference" in codes(thread)
+    assert set(thread.bodies) == {"base"}
+    through = pair(5, 10)
+    assert not through.pairs
+    assert {"gap", "touching"} & codes(through)
+
+
+def test_half_a_hole_is_asked(tmp_path):
+    """A bearing of which only half is there holds its pin from one side: no joint without a question."""
+    base, arm = bar(80, [(0, 10.02)], 0, 10, split="halves"), bar(60, [], 10, 20, split="halves")
+    parts = {"base": (base, *STILL), "arm": (boss(arm, "bottom", (0, 0, 10), 10, 10), *STILL)}
+    file = Part21(written(tmp_path / "a.step", parts))
+    geometry = Geometry(file, 1e-3, 1.0)
+    solids = [geometry.solid(number) for number in file.of("MANIFOLD_SOLID_BREP")]
+    for halves in (2, 1):
+        faces = {name: list(solid.faces) for name, solid in zip(parts, solids, strict=True)}
+        hole = [face for face in faces["base"] if face.kind == "cylinder"]
+        assert len(hole) == 2
+        faces["base"] = [face for face in faces["base"] if face.kind != "cylinder"] + hole[:halves]
+        draft = Draft(bodies={name: Body(name, 1.0) for name in parts})
+        joined(draft, faces, 0.5e-3)
+        kinds = [pair.type for pair in draft.pairs.values() if pair.type != "fixed"]
+        assert kinds == (["cylindrical"] if halves == 2 else [])
+        assert ("half" in codes(draft)) == (halves == 1)
+
+
+def test_several_solids_surfaces_and_units_are_said(tmp_path):
+    file = StepFile()
+    two = file.part("two", plate(), plate().placed(np.eye(3), (0, 0, 50)))
+    lone = file.part("lone", plate())
+    file.assembly("all", (two, *STILL), (lone, np.eye(3), np.array([0, 100, 0])))
+    draft = import_file(file.write(tmp_path / "a.step"))
+    assert "rigid" in codes(draft)
+    assert draft.bodies["two"].mass == pytest.approx(2 * draft.bodies["lone"].mass)
+    single = StepFile()
+    single.part("body", plate(), plate().placed(np.eye(3), (0, 0, 50)))
+    assert "solids" in codes(import_file(single.write(tmp_path / "b.step")))
+    bare = import_file(written(tmp_path / "c.step", {"plate": (plate(), *STILL)}, None))
+    assert "unit" in codes(bare)
+    assert bare.bodies["plate"].mass == pytest.approx(STEEL * 80217.34565773529e-9)
+    surface = written(tmp_path / "d.step", {"plate": (plate(), *STILL)})
+    surface.write_text(surface.read_text().replace("MANIFOLD_SOLID_BREP(", "SHELL_BASED_SURFACE_MODEL("))
+    with pytest.raises(MechanismError, match="no solids"):
+        import_file(surface)
+
+
+def test_a_ball_in_its_socket(tmp_path):
+    ball = turned([(0, -30), (4, -30), (4, -3), (5, 0, (0, 0)), (0, 5, (0, 0))])
+    hollow = box((-10, -10, -6), (10, 10, 10))
+    height = math.sqrt(5.02**2 - 4.5**2)
+    hollow.feature("bottom", (0, 0, -6), [(4.5, 0), (4.5, -6 + height), (0, -11.02, (0, -6))])
+    draft = import_file(written(tmp_path / "a.step", {"ball": (ball, *STILL), "cup": (hollow, *STILL)}))
+    assert [pair.type for pair in draft.pairs.values()] == ["spherical"]
+
+
+def test_other_layouts_of_the_text(tmp_path):
+    """Blanks, comments, line breaks, entities in any order, texts with brackets and semicolons, unicode."""
+    parts = slider_crank()
+    path = written(tmp_path / "a.step", parts)
+    head, _, data = path.read_text().partition("DATA;\n")
+    lines = data.split("ENDSEC")[0].splitlines()
+    spaced = [re.sub(r"([(),=])", r" \1\n ", line) + " /* a comment; with ( */" for line in lines[::-1]]
+    text = "\n".join(spaced).replace("'rod'", "'Pleuel \\X2\\00FC\\X0\\;(''1'') é'")
+    path.write_text(f"{head}DATA;\n{text}\nENDSEC;\nEND-ISO-10303-21;\n", encoding="utf-8")
+    draft = import_file(path, ground="frame")
+    assert set(draft.bodies) == {"frame", "crank", "Pleuel ü;('1') é", "slider"}
+    expect_body(draft.bodies["Pleuel ü;('1') é"], [parts["rod"]])
+    assert len(draft.pairs) == 4
+    assert (trunnion.analyse(model(draft, tmp_path), 4)["status"].values <= 2).all()
+
+
+def test_a_sub_assembly_is_one_rigid_link_at_its_place(tmp_path):
+    """A crank with its pressed pin, nested two deep; the mechanism lies turned in an assembly of its own."""
+    parts = slider_crank()
+    file = StepFile()
+    base, rod, slider = (file.part(name, parts[name][0]) for name in ("frame", "rod", "slider"))
+    disc = file.part("disc", bar(50, [(50, 16)], 0, 10))
+    pins = file.part("pins", turned([(0, 0), (8, 0), (8, 20), (0, 20)]))
+    shaft = file.part("shaft", turned([(0, -12), (10, -12), (10, 0), (0, 0)]))
+    inner = file.assembly("inner", (disc, *STILL), (pins, np.eye(3), np.array([50.0, 0, 0])))
+    crank = file.assembly("crank", (inner, turn((0, 0, 1), 0.4), np.zeros(3)), (shaft, *STILL))
+    angle = parts["crank"][1] @ turn((0, 0, 1), -0.4)
+    top = file.assembly(
+        "top", (base, *parts["frame"][1:]), (crank, angle, np.zeros(3)), (rod, *parts["rod"][1:]),
+        (slider, *parts["slider"][1:]),
+    )  # fmt: skip
+    file.assembly("outer", (top, turn((0, 1, 1), 0.3), np.array([5.0, 6, 7])))
+    draft = import_file(file.write(tmp_path / "a.step"), ground="frame")
+    assert set(draft.bodies) == {"frame", "crank", "rod", "slider"}
+    matrix = turn((0, 1, 1), 0.3)
+    crank_shapes = [
+        (bar(50, [(50, 16)], 0, 10), matrix @ parts["crank"][1], (5, 6, 7)),
+        (turned([(0, 0), (8, 0), (8, 20), (0, 20)]), matrix @ parts["crank"][1],
+         matrix @ parts["crank"][1] @ [50, 0, 0] + [5, 6, 7]),
+        (turned([(0, -12), (10, -12), (10, 0), (0, 0)]), matrix, (5, 6, 7)),
+    ]  # fmt: skip
+    expect_body(draft.bodies["crank"], crank_shapes)
+    assert len(draft.pairs) == 4
+    assert [finding.severity for finding in draft.findings if finding.code == "exchange.rigid"] == ["note"]
+
+
+def test_voids_bent_bars_and_mirroring_placements(tmp_path):
+    """A hollow, a quarter of a torus, and a part placed by a mirroring operator through a mapped item."""
+    file = StepFile()
+    hollow = file.solid(box((0, 0, 0), (20, 20, 20)))
+    void = file.solid(box((5, 5, 5), (10, 15, 12)))
+    shells = [re.search(r"#(\d+)\)$", file.lines[solid - 1])[1] for solid in (hollow, void)]
+    turned_in = file(f"ORIENTED_CLOSED_SHELL('',*,#{shells[1]},.F.)")
+    file.lines[hollow - 1] = f"BREP_WITH_VOIDS('',#{shells[0]},(#{turned_in}))"
+    block = file.product("block", [hollow])
+    wedge = prism([(0, 0), (30, 0), (0, 10)], 0, 5)
+    drawn = file.part("wedge", wedge)
+    x, y, z = (file.vector("DIRECTION", axis) for axis in np.eye(3) * [1, 1, -1])
+    origin = file.vector("CARTESIAN_POINT", (100, 0, 0))
+    operator = file(f"CARTESIAN_TRANSFORMATION_OPERATOR_3D('',$,'',#{x},#{y},#{origin},1.,#{z})")
+    source = file(f"REPRESENTATION_MAP(#{drawn[2]},#{drawn[1]})")
+    top = file.product("top", [file(f"MAPPED_ITEM('',#{source},#{operator})")], "SHAPE_REPRESENTATION")
+    file(f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('1','','',#{top[0]},#{drawn[0]},$)")
+    file.assembly("all", (block, *STILL), (top, *STILL))
+    draft = import_file(file.write(tmp_path / "a.step"))
+    outer, inner = box((0, 0, 0), (20, 20, 20)), box((5, 5, 5), (10, 15, 12))
+    outer.gain(-inner.volume, -inner.first, -inner.second)
+    expect_body(draft.bodies["block"], [(outer, *STILL)])
+    expect_body(draft.bodies["top"], [(wedge, np.diag([1, 1, -1]), (100, 0, 0))])
+
+    ring, tube = 20.0, 4.0
+    bend = StepFile()
+    ends = [(np.array([ring, 0, 0.0]), np.array([0, -1.0, 0])), (np.array([0, ring, 0.0]), np.array([-1.0, 0, 0]))]
+    starts = [centre + tube * np.array([0, 0, 1.0]) for centre, _ in ends]
+    circles = [
+        ("circle", centre, normal, tube, start, start) for (centre, normal), start in zip(ends, starts, strict=True)
+    ]
+    back = [(kind, centre, -normal, *rest) for kind, centre, normal, *rest in circles]
+    surfaces = [("PLANE", centre, normal) for centre, normal in ends]
+    faces = [
+        {"surface": surface, "sense": True, "loops": [[circle]]}
+        for surface, circle in zip(surfaces, circles, strict=True)
+    ]
+    bent = ("TOROIDAL_SURFACE", np.zeros(3), np.array([0, 0, 1.0]), ring, tube)
+    faces.append({"surface": bent, "sense": True, "loops": [[back[0]], [back[1]]]})
+    bend.part("bend", Shape(faces))
+    body = import_file(bend.write(tmp_path / "b.step")).bodies["bend"]
+    volume = math.pi * tube**2 * math.pi / 2 * ring
+    assert body.mass == pytest.approx(STEEL * volume * 1e-9, rel=1e-12)
+    middle = math.pi * tube**2 * (ring**2 + tube**2 / 4) / volume  # ∬ r² cos φ dA dφ over a quarter turn
+    np.testing.assert_allclose(1e3 * body.centre, [middle, middle, 0], atol=1e-9)
+
+
+def test_a_pin_in_a_slot_is_asked(tmp_path):
+    """A slotted lever of a quick return, its slot open at the end, around the pin of a crank."""
+    outline = [(0, -15), (120, -15), (120, -5.02), (20, -5.02), (20, 5.02), (120, 5.02), (120, 15), (0, 15)]
+    base = boss(bar(60, [(0, 12.04)], -10, 0), "top", (60, 0, 0), 8, 10)
+    lever = prism(outline, 0, 10).feature("bottom", (10, 0, 0), [(4.01, 0), (4.01, -10)], "top")
+    crank = boss(boss(bar(30, [], 10, 20, 8), "bottom", (30, 0, 10), 10, 10), "bottom", (0, 0, 10), 12, 20)
+    parts = {
+        "base": (base, *STILL),
+        "crank": (crank, turn((0, 0, 1), 2.0), np.zeros(3)),
+        "lever": (lever, turn((0, 0, 1), 0), np.array([50.0, 0, 0])),
+    }
+    pin = 30 * np.array([math.cos(2.0), math.sin(2.0)])
+    angle = math.atan2(pin[1], pin[0] - 60)
+    parts["lever"] = (lever, turn((0, 0, 1), angle), np.array([60 - 10 * math.cos(angle), -10 * math.sin(angle), 0]))
+    draft = import_file(written(tmp_path / "a.step", parts), ground="base")
+    assert codes(draft) == {"drive", "slot"}
+    assert {frozenset(pair.links) for pair in draft.pairs.values()} == {
+        frozenset(("base", "crank")),
+        frozenset(("base", "lever")),
+    }
+
+
+def test_hinges_across_each_other_are_no_slides(tmp_path):
+    """Two hinges along x and one along y, all held by their ends: they turn, and the mechanism is in space."""
+    base = box((-30, -30, -30), (30, 30, 30))
+    for z in (-15, 15):
+        base.feature(1, (30, 0, z), [(5.01, 0), (5.01, -60)], 3)
+    base.feature(2, (20, 30, 0), [(5.01, 0), (5.01, -60)], 0)
+    held = [(5, 0), (5, 60), (8, 60), (8, 65), (0, 65)]
+    arms = [box((30, -5, z - 5), (40, 80, z + 5)).feature(3, (30, 0, z), held) for z in (-15, 15)]
+    arms.append(box((15, 30, -5), (25, 40, 80)).feature(0, (20, 30, 0), held))
+    parts = {"base": (base, *STILL)} | {f"arm{n}": (arm, *STILL) for n, arm in enumerate(arms)}
+    draft = import_file(written(tmp_path / "a.step", parts), ground="base")
+    assert [pair.type for pair in draft.pairs.values()] == ["revolute"] * 3
+    assert not codes(draft) - {"drive"}
+
+
+def test_a_piston_in_its_bore_slides(tmp_path):
+    """The slider-crank with a round slider; the frame is a part of two solids."""
+    parts = slider_crank()
+    x = parts["slider"][2][0]
+    plate_ = box((-30, -40, -12), (30, 40, 0)).feature("bottom", (0, 0, -12), [(10.02, 0), (10.02, -12)], "top")
+    block = box((x + 30, -30, -30), (x + 60, 30, 30)).feature(1, (x + 60, 0, 0), [(12.02, 0), (12.02, -30)], 3)
+    head = box((-10, -14, -10), (10, 14, 10)).feature("bottom", (0, 0, -10), [(6.01, 0), (6.01, -20)], "top")
+    boss(head, 1, (10, 0, 0), 24, 60)
+    rod = boss(bar(200, [(0, 16.03)], 10, 20, 12), "bottom", (200, 0, 10), 12, 20)
+    file = StepFile()
+    frame = file.part("frame", plate_, block)
+    uses = [(file.part("crank", parts["crank"][0]), *parts["crank"][1:]), (file.part("rod", rod), *parts["rod"][1:])]
+    file.assembly("engine", (frame, *STILL), *uses, (file.part("piston", head), np.eye(3), parts["slider"][2]))
+    draft = import_file(file.write(tmp_path / "a.step"), ground="frame")
+    pair = joint(draft, "frame", "piston")
+    assert pair.type == "prismatic"
+    np.testing.assert_allclose([pair.pin_radius, pair.hole_radius, pair.length], [0.012, 0.01202, 0.03], atol=1e-12)
+    assert codes(draft) == {"drive", "rigid", "slides"}
+    assert (trunnion.analyse(model(draft, tmp_path), 12)["status"].values <= 2).all()
+
+
+# ---- densities ------------------------------------------------------------------------------------------------
+
+
+def test_density_of_the_file_goes_before_that_of_the_option(tmp_path):
+    file = StepFile()
+    part = file.part("plate", plate())
+    gram, centi = (
+        file("(MASS_UNIT()NAMED_UNIT(*)SI_UNIT($,.GRAM.))"),
+        file("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.CENTI.,.METRE.))"),
+    )
+    one, three = (file(f"DERIVED_UNIT_ELEMENT(#{unit},{power}.)") for unit, power in ((gram, 1), (centi, -3)))
+    unit = file(f"DERIVED_UNIT((#{one},#{three}))")
+    item = file(f"MEASURE_REPRESENTATION_ITEM('density measure',POSITIVE_RATIO_MEASURE(2.7),#{unit})")
+    held = file(f"REPRESENTATION('density',(#{item}),#{file.context})")
+    owner = file(f"PROPERTY_DEFINITION('material property','density',#{part[0]})")
+    file(f"PROPERTY_DEFINITION_REPRESENTATION(#{owner},#{held})")
+    body = import_file(file.write(tmp_path / "a.step"), material="brass").bodies["plate"]
+    assert body.mass == pytest.approx(2700 * 80217.34565773529e-9)
+    plain = import_file(written(tmp_path / "b.step", {"plate": (plate(), *STILL)}), material="brass").bodies["plate"]
+    assert plain.mass == pytest.approx(8500 * 80217.34565773529e-9)
+
+
+def test_tolerances_of_the_file_stand_in_the_comments(tmp_path):
+    file = StepFile()
+    parts = {name: file.part(name, part[0]) for name, part in slider_crank().items()}
+    bores = [n for n, line in enumerate(file.lines, 1) if line.startswith("CYLINDRICAL") and "1.002" in line]
+    face = next(n for n, line in enumerate(file.lines, 1) if line.startswith("ADV") and f"#{bores[0]},." in line)
+    file.assembly("all", *((part, *slider_crank()[name][1:]) for name, part in parts.items()))
+    shape = file(f"PRODUCT_DEFINITION_SHAPE('','',#{parts['frame'][0]})")
+    aspect = file(f"SHAPE_ASPECT('','',#{shape},.T.)")
+    size = file(f"DIMENSIONAL_SIZE(#{aspect},'diameter')")
+    limits = file("LIMITS_AND_FITS('H','','7','')")
+    file(f"PLUS_MINUS_TOLERANCE(#{limits},#{size})")
+    file(f"GEOMETRIC_ITEM_SPECIFIC_USAGE('','',#{aspect},#{parts['frame'][1]},#{face})")
+    draft = import_file(file.write(tmp_path / "a.step"), ground="frame")
+    assert any("hole d=20.04 mm H7 of frame" in comment for comment in joint(draft, "crank", "frame").comments)
+
+
+def test_an_assembly_with_solids_of_its_own_keeps_them(tmp_path):
+    """Solids that lie in the assembly itself are a link beside its parts."""
+    file = StepFile()
+    arm = file.part("arm", boss(bar(60, [], 12, 20), "bottom", (0, 0, 12), 15.96, 12))
+    top = file.assembly("top", (arm, *STILL))
+    solid = file.solid(plate())
+    line = file.lines[top[1] - 1]
+    file.lines[top[1] - 1] = line.replace("),", f",#{solid}),", 1)
+    draft = import_file(file.write(tmp_path / "a.step"))
+    assert set(draft.bodies) == {"top", "arm"}
+    expect_body(draft.bodies["top"], [(plate(), *STILL)])
+    assert joint(draft, "top", "arm").hole_radius == pytest.approx(0.008)
+
+
+# ---- hostile files --------------------------------------------------------------------------------------------
+
+
+def million(path):
+    lines = "".join(f"#{n}=CARTESIAN_POINT('',(0.,0.,{n}.));\n" for n in range(1, 1_000_001))
+    path.write_text(f"ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n{lines}ENDSEC;\nEND-ISO-10303-21;\n")
+
+
+def damaged(path, change):
+    written(path, {"plate": (plate(), *STILL)})
+    path.write_text(change(path.read_text()))
+
+
+HOSTILE = {
+    "a million entities": million,
+    "cut off": lambda path: damaged(path, lambda text: text[: len(text) // 2]),
+    "junk": lambda path: path.write_bytes(bytes(range(256)) * 40),
+    "junk with a head": lambda path: path.write_bytes(b"ISO-10303-21;" + bytes(range(256)) * 40 + b"ENDSEC;"),
+    "a missing entity": lambda path: damaged(path, lambda text: re.sub(r"#40=.*\n", "", text)),
+    "brackets": lambda path: damaged(path, lambda text: text.replace("#40=", "#40=" + "X(" * 5000, 1)),
+    "open comments": lambda path: damaged(path, lambda text: text.replace("DATA;", "DATA;" + "#1=/*" * 300_000)),
+    "open texts": lambda path: damaged(path, lambda text: text.replace("DATA;", "DATA;" + "#1='" * 300_001)),
+    "slashes": lambda path: damaged(path, lambda text: text.replace("DATA;", "DATA;#1=" + "/ *" * 10**6 + "/*")),
+    "a wrong kind": lambda path: damaged(path, lambda text: text.replace("ADVANCED_FACE", "VERTEX_POINT")),
+    "no numbers": lambda path: damaged(path, lambda text: re.sub(r"\d\.\d+E", "nan", text)),
+    "a list for a number": lambda path: damaged(path, lambda text: text.replace("L_SURFACE('',", "L_SURFACE('',(),")),
+    "no shapes": lambda path: damaged(path, lambda text: text.replace("SHAPE_DEFINITION_REP", "OTHER_REP")),
+    "zero axes": lambda path: damaged(
+        path, lambda text: re.sub(r"DIRECTION\('',\(.*?\)\)", "DIRECTION('',(0.,0.,0.))", text)
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_hostile_files_are_one_sentence(tmp_path, kind):
+    path = tmp_path / "a.step"
+    HOSTILE[kind](path)
+    start = time.monotonic()
+    with pytest.raises(MechanismError) as error:
+        import_file(path)
+    assert time.monotonic() - start < 10
+    assert len(error.value.findings) == 1
+    assert len(str(error.value)) < 500
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10**6), st.sampled_from(["", "'", "(", ")", "#1", "$", "*", "1.E400", ";", "\x00"]))
+def test_a_damaged_file_is_a_sentence_or_a_part(tmp_path_factory, place, text):
+    path = written(tmp_path_factory.mktemp("step") / "a.step", {"plate": (plate(), *STILL)})
+    whole = path.read_text()
+    at = place % len(whole)
+    path.write_text(whole[:at] + text + whole[at + 3 :])
+    with contextlib.suppress(MechanismError):
+        import_file(path)
+
+
+def test_a_product_inside_itself(tmp_path):
+    file = StepFile()
+    part = file.part("plate", plate())
+    top = file.assembly("top", (part, *STILL))
+    text = file.write(tmp_path / "a.step").read_text()
+    use = re.search(r"NEXT_ASSEMBLY_USAGE_OCCURRENCE\([^)]*\)", text)[0]
+    file(re.sub(r"#\d+,#\d+,\$", f"#{part[0]},#{top[0]},$", use))
+    with pytest.raises(MechanismError):
+        import_file(file.write(tmp_path / "a.step"))
+
+
+# ---- free-form solids -----------------------------------------------------------------------------------------
+
+
+def free_form(path):
+    """The plate with its top, the second of its faces, as a spline surface, which is flat."""
+    file = StepFile()
+    file.assembly("all", (file.part("plate", plate()), *STILL))
+    rows = [[(x, y, 12) for y in (-30, 30)] for x in (-30, 230)]
+    numbers = [[file.vector("CARTESIAN_POINT", corner) for corner in row] for row in rows]
+    poles = ",".join(f"(#{one},#{other})" for one, other in numbers)
+    knots = "(2,2),(2,2),(0.,1.),(0.,1.),.UNSPECIFIED."
+    surface = file(f"B_SPLINE_SURFACE_WITH_KNOTS('',1,1,({poles}),.PLANE_SURF.,.F.,.F.,.F.,{knots})")
+    top = [n for n, line in enumerate(file.lines) if line.startswith("ADVANCED_FACE")][1]
+    file.lines[top] = re.sub(r"#\d+,(\.[TF]\.\))$", rf"#{surface},\1", file.lines[top])
+    return file.write(path)
+
+
+@pytest.mark.slow
+def test_a_free_form_solid_has_the_mass_of_a_mesh_and_says_so(tmp_path):
+    pytest.importorskip("cascadio")
+    draft = import_file(free_form(tmp_path / "a.step"))
+    assert "mesh" in codes(draft)
+    body = draft.bodies["plate"]
+    mass, centre, inertia = plate().moments()
+    assert body.mass == pytest.approx(mass, rel=1e-4)
+    np.testing.assert_allclose(body.centre, centre, atol=1e-5)
+    np.testing.assert_allclose(body.inertia, inertia, atol=1e-4 * np.abs(inertia).max())
+    assert any("by a mesh, to about" in comment for comment in body.comments)
+
+
+# ---- writing --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rotation", [np.eye(3), turn((1, 2, 3), 0.7)])
+@pytest.mark.parametrize("turned_by", [0.0, 40.0, 200.0])
+def test_parts_of_the_original_are_moved(tmp_path, rotation, turned_by):
+    path = written(tmp_path / "a.step", placed(slider_crank(), rotation, (30, 20, -10)))
+    draft = import_file(path, ground="frame")
+    mechanism = model(draft, tmp_path)
+    assert export_model(mechanism, tmp_path / "b.step", f"{turned_by} deg", original=path) == []
+    again = import_file(tmp_path / "b.step", ground="frame")
+    normal = rotation[:, 2]
+    way = np.sign(normal[np.argmax(abs(normal))])  # the model turns about the normal's side with the largest component
+    near = placed(slider_crank(math.pi / 3 + way * math.radians(turned_by)), rotation, (30, 20, -10))
+    for name, part in near.items():
+        expect_body(again.bodies[name], [part])
+    assert len(again.pairs) == len(draft.pairs)
+
+
+def test_relations_from_the_parent_to_the_part(tmp_path):
+    """Some programs state the placement the other way round."""
+    parts = slider_crank()
+    file = StepFile()
+    file.assembly("all", *((file.part(name, part[0]), *part[1:]) for name, part in parts.items()), swapped=True)
+    path = file.write(tmp_path / "a.step")
+    draft = import_file(path, ground="frame")
+    for name, part in parts.items():
+        expect_body(draft.bodies[name], [part])
+    export_model(model(draft, tmp_path), tmp_path / "b.step", "40 deg", original=path)
+    again = import_file(tmp_path / "b.step", ground="frame")
+    for name, part in slider_crank(math.pi / 3 + math.radians(40)).items():
+        expect_body(again.bodies[name], [part])
+
+
+def test_welded_parts_move_with_their_link_and_edited_models_are_refused(tmp_path):
+    path = written(tmp_path / "a.step", four_bar())
+    draft = import_file(path, ground="ground")
+    mechanism = model(draft, tmp_path)
+    export_model(mechanism, tmp_path / "b.step", "90 deg", original=path)
+    again = import_file(tmp_path / "b.step", ground="ground")
+    assert {name: body.mass for name, body in again.bodies.items()} == pytest.approx(
+        {name: body.mass for name, body in draft.bodies.items()}
+    )
+    text = (tmp_path / "model.yaml").read_text()
+    (tmp_path / "other.yaml").write_text(re.sub(r"D: \[100 mm", "D: [101 mm", text))
+    assert "101 mm" in (tmp_path / "other.yaml").read_text()
+    with pytest.raises(MechanismError, match="other points"):
+        export_model(trunnion.read(tmp_path / "other.yaml"), tmp_path / "c.step", original=path)
+    with pytest.raises(MechanismError, match="cannot be read"):
+        export_model(mechanism, tmp_path / "c.step", original=tmp_path / "none.step")
+
+
+@pytest.mark.parametrize("name", ["slider-crank", "rssr", "universal-joint"])
+def test_the_skeleton_has_the_points_of_the_position(tmp_path, name):
+    from trunnion.exchange.skeleton import positions_of
+    from trunnion.exchange.step_assembly import Assembly
+
+    mechanism = trunnion.read(f"examples/{name}.yaml")
+    path = tmp_path / "a.step"
+    findings = export_model(mechanism, path, "30 deg")
+    assert "exchange.skeleton" in {finding.code for finding in findings}
+    drawn = positions_of(mechanism, 4, "30 deg").draft()
+    file = Part21(path)
+    assembly = Assembly(file, 1e-3)
+    (root,) = assembly.tree()
+    assert [part.name for part in root.children] == list(drawn.bodies)
+    for part in root.children:
+        shape = assembly.shapes[part.definition][0]
+        (wires,) = assembly.items(shape, "GEOMETRIC_CURVE_SET")
+        points = {
+            file[item]["CARTESIAN_POINT"][0]: part.place.matrix @ assembly.geometry(shape).point(item)
+            + part.place.shift
+            for item in file[wires]["GEOMETRIC_CURVE_SET"][1]
+            if "CARTESIAN_POINT" in file[item]
+        }
+        for pair in drawn.pairs_of(part.name):
+            if pair.type in ("revolute", "spherical"):
+                np.testing.assert_allclose(points[pair.name], pair.at, atol=1e-9)
+
+
+OPENED = """
+import io, json, sys
+import cascadio, trimesh
+glb = cascadio.load(open(sys.argv[1], "rb").read(), tol_linear=0.01, tol_angular=0.1, use_parallel=False)
+scene = trimesh.load(io.BytesIO(glb), file_type="glb")
+shapes = [scene.geometry[scene.graph[node][1]].copy().apply_transform(scene.graph[node][0])
+          for node in scene.graph.nodes_geometry]
+print(json.dumps([[*shape.center_mass, shape.volume] if hasattr(shape, "center_mass") else shape.bounds.tolist()
+                  for shape in shapes]))
+"""
+
+
+def opencascade(path):
+    """What OpenCASCADE sees in a file: centre and volume of each solid, bounds of each wire."""
+    pytest.importorskip("cascadio")
+    command = [sys.executable, "-c", OPENED, str(path)]
+    done = subprocess.run(command, capture_output=True, timeout=60, check=True)
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.mark.slow
+def test_opencascade_sees_the_same_parts_and_the_skeleton(tmp_path):
+    path = written(tmp_path / "a.step", slider_crank())
+    mechanism = model(import_file(path, ground="frame"), tmp_path)
+    export_model(mechanism, tmp_path / "b.step", "40 deg", original=path)
+    draft = import_file(tmp_path / "b.step", ground="frame")
+    ours = sorted([*body.centre, body.mass / STEEL] for body in draft.bodies.values())
+    for expected, mesh in zip(ours, sorted(opencascade(tmp_path / "b.step")), strict=True):
+        np.testing.assert_allclose(mesh[:3], expected[:3], atol=2e-5)
+        assert mesh[3] == pytest.approx(expected[3], rel=1e-3)
+    export_model(mechanism, tmp_path / "c.step", "40 deg")
+    wires = opencascade(tmp_path / "c.step")
+    assert len(wires) == 4
+    points = [pair.at for pair in draft.pairs.values()]
+    reach = np.max([high for _, high in wires], axis=0)
+    np.testing.assert_allclose(reach[0], max(point[0] for point in points) + 0.02, atol=1e-5)  # the guide of 40 mm
+
+
+def test_the_command_line_imports_and_moves(tmp_path):
+    path = written(tmp_path / "a.step", slider_crank())
+    run = CliRunner().invoke
+    done = run(app, ["import", str(path), "-o", str(tmp_path / "a.yaml"), "--ground", "frame", "--material", "brass"])
+    assert done.exit_code == 0, done.output
+    assert "4 links, 4 joints" in done.output
+    text = (tmp_path / "a.yaml").read_text()
+    assert "8500 kg/m³ of the import, exact by its faces" in text
+    assert "nearest usual fit: 16 mm H7/f7" in text
+    moved = ["export", str(tmp_path / "a.yaml"), "-o", str(tmp_path / "b.step"), "--at", "60deg", "--from", str(path)]
+    assert run(app, moved).exit_code == 0
+    assert import_file(tmp_path / "b.step").bodies.keys() == {"frame", "crank", "rod", "slider"}
+    over = run(app, [*moved[:3], str(path), *moved[4:]])
+    assert isinstance(over.exception, MechanismError)
+    assert path.read_text() == written(tmp_path / "c.step", slider_crank()).read_text()

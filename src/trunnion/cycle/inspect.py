@@ -130,4 +130,7 @@ def _rank(walk: Forward) -> int | None:
         for name in system.mechanism.gears
     }
     links = [link for module in system.plan.modules for link in module.links]
-    return mobility_by_rank(links, system.mechanism.fixed_link, system.joints, at, gears, system.plan.modules)
+    try:
+        return mobility_by_rank(links, system.mechanism.fixed_link, system.joints, at, gears, system.plan.modules)
+    except np.linalg.LinAlgError:  # of numbers near the end of the floats
+        return None

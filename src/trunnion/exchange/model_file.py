@@ -46,6 +46,10 @@ def complete(draft: Draft, ground: str = "", drive: str = "", speed: float = 1.0
         drive = _existing(draft, drive, list(draft.pairs), "joint", "--drive")
         draft.drives = {drive: draft.drives.get(drive, speed)}
     drivable = [name for name, pair in draft.pairs.items() if draft.ground in pair.links and PAIRS[pair.type].drivable]
+    for name in [name for name, rate in draft.drives.items() if not rate and name in draft.pairs]:
+        draft.note(
+            "exchange.speed", f"drivers.{name}", "has no speed in the file; it is given one", "state it with --speed"
+        )
     draft.drives = {name: rate or speed for name, rate in draft.drives.items() if name in draft.pairs}
     if not draft.drives and drivable:
         first = min(drivable, key=lambda name: not PAIRS[draft.pairs[name].type].turns)

@@ -21,7 +21,9 @@ from trunnion.algebra.nested import flat
 from trunnion.algebra.space import moment_at
 from trunnion.algebra.vector import dot
 from trunnion.errors import Finding, MechanismError, Severity, agreeing, counted
+from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.redundant import RANK, stacked
+from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import Pose, Tree
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.quantities import readable
@@ -75,6 +77,8 @@ def _of_module(walk: Forward, number: int, rubbing: Sequence[str], lanes: int) -
     """Of one module, nothing if it closes no loop or could not be assembled."""
     module, group = walk.system.plan.modules[number], cast(Tree, walk.system.groups[number])
     pose: Pose | None = walk.poses[number] if group.chords else None
+    if isinstance(group, CylindricalDyad):  # its closed form takes a branch, not a guess
+        group = SpatialGroup(group.links, group.joints)
     if pose is not None and not np.any(np.isfinite(np.asarray(pose.gap))):
         pose = _by_least_squares(walk, number, group)
         if pose is None and module.redundant:

@@ -102,6 +102,7 @@ CASES = [
      "links.ground.points.D", "has no axis, a prismatic joint needs one", "axis: [1, 0]"),
     ("D: [AD, 0]", "D: {at: [AD, 0], axis: [0, 0]}", 8, "links.ground.points.D.axis", "no direction", "[1, 0]"),
     ("10 rad/s", "0", 26, "drivers.A.speed", "is 0: the driver does not move", "however small"),
+    ("10 rad/s", "10 rad/s, start: 3 deg ± 1 deg", 26, "drivers.A.start", "does not vary", "driven link"),
     ("10 rad/s", "10 rad/s, range: [1, 1]", 26, "drivers.A.range", "begins and ends at 1", "extent"),
     ("B: [AB, 0]", "B: [0, 0]", 10, "links.crank.points", "'A' and 'B' of the link 'crank' are at one", "move"),
     ("10 rad/s", "10 rad/s, motor: {kind: induction, breakdown_effort: 9, breakdown_slip: 0.2, synchronous_speed: 1, "

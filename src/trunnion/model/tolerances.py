@@ -35,6 +35,7 @@ __all__ = [
     "correlation",
     "cost_entries",
     "cost_paths",
+    "ends_motion",
     "followers",
     "kept",
     "may_vary",
@@ -109,8 +110,17 @@ def written_limits(numbers: ParameterSet) -> dict[str, tuple[float, float]]:
 
 
 def may_vary(entry: Entry) -> bool:
-    """Whether a number is one of the mechanism itself: not of its measures, nor of how it is first put together."""
-    return not entry.varies and entry.path.partition(".")[0] not in ("measures", "assembly")
+    """Whether a number is one of the mechanism itself: not of its measures, nor of where it begins and ends."""
+    return (
+        not entry.varies
+        and entry.path.partition(".")[0] not in ("measures", "assembly")
+        and not ends_motion(entry.path)
+    )
+
+
+def ends_motion(path: str) -> bool:
+    """Whether a number says where a driver begins or ends: samples are compared at the same coordinates of it."""
+    return path.startswith("drivers.") and path.split(".")[2:3] in (["start"], ["range"])
 
 
 def variations(mechanism: Numbers, numbers: ParameterSet) -> dict[str, tuple[str, Variation]]:

@@ -20,7 +20,14 @@ from trunnion.model.checks.loads import expression_name, load_findings, motion_d
 from trunnion.model.checks.magnitudes import Bare, magnitudes, plain_dimensions, radians, thousands, unitless_angles
 from trunnion.model.checks.measures import check_measure, measure_values
 from trunnion.model.checks.space import coordinates, loop, space
-from trunnion.model.checks.tolerances import cost_names, cost_values, stated_entries, tolerance_names, tolerance_values
+from trunnion.model.checks.tolerances import (
+    cost_names,
+    cost_values,
+    end_of_motion,
+    stated_entries,
+    tolerance_names,
+    tolerance_values,
+)
 from trunnion.model.checks.values import check_values
 from trunnion.model.joint_parts import motions
 from trunnion.model.names import ERRORS, nearest
@@ -28,6 +35,7 @@ from trunnion.model.parameters import Numbers, ParameterSet, dimension_errors
 from trunnion.model.parts import AT
 from trunnion.model.quantity import UNREADABLE, evaluation_order
 from trunnion.model.rules import InSpace, Refers, key_findings
+from trunnion.model.tolerances import ends_motion
 from trunnion.model.units import ANY, Dimension, UnitError
 
 __all__ = ["check_model"]
@@ -105,6 +113,8 @@ def _quantities(mechanism: Numbers, unreadable: set[str]) -> Iterator[Finding]:
         if entry.varies and entry.quantity.tolerance:
             what = f"'{entry.quantity.source}' varies with the motion and has a tolerance"
             yield Finding(what, entry.where, "state a dimension with the tolerance and use it in the expression")
+        if ends_motion(entry.path) and entry.quantity.tolerance:
+            yield end_of_motion(entry.path, entry.where)
         try:
             measures = entry.quantity.check(sayable, entry.kind)
             yield from thousands(entry.where, entry.quantity, measures)

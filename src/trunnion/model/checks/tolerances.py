@@ -25,6 +25,7 @@ from trunnion.model.tolerances import (
     correlation,
     cost_entries,
     cost_paths,
+    ends_motion,
     may_vary,
     named_paths,
     price,
@@ -38,6 +39,7 @@ from trunnion.model.units import KINDS, Kind, UnitError, dimension_text, unit
 __all__ = [
     "cost_names",
     "cost_values",
+    "end_of_motion",
     "stated_entries",
     "tolerance_names",
     "tolerance_values",
@@ -133,6 +135,8 @@ def _number(known: Mapping[str, Entry], path: str, used: set[str], where: str) -
     if entry.varies:
         what = f"'{path}' varies with the motion and has no one tolerance"
         yield Finding(what, where, "state one of a dimension in it")
+    elif ends_motion(path):
+        yield end_of_motion(path, where)
     elif not may_vary(entry):
         what = f"'{path}' is not a parameter of the mechanism"
         yield Finding(what, where, "state tolerances of dimensions, joints, links, loads, springs or drivers")
@@ -140,6 +144,12 @@ def _number(known: Mapping[str, Entry], path: str, used: set[str], where: str) -
         yield Finding(f"no joint follows '{path}'", where, "name the number of a joint, as B.pin.clearance")
     elif path.startswith("dimensions.") and path.partition(".")[2] not in used:
         yield Finding(f"no result depends on '{path}'", where, "use it, or remove it", Severity.WARNING)
+
+
+def end_of_motion(path: str, where: str) -> Finding:
+    """The finding about a tolerance of where a driver begins or ends."""
+    what = f"'{path}' does not vary, for samples are compared at the same coordinates of the driver"
+    return Finding(what, where, "put the deviation into the driven link")
 
 
 def _percent(variation: Variation, entry: Entry, kind: Kind, where: str) -> Iterator[Finding]:

@@ -213,7 +213,11 @@ def held_out(mechanism: Mechanism, measurement: Measurement, hold_out: HoldOut) 
     conditions, held = measurement.conditions, set[str]()
     for text in [hold_out] if isinstance(hold_out, str) else hold_out:
         part = text.strip()
-        exact = [one.name for one in conditions if text in (one.name, *(PurePath(file).stem for file in one.files))]
+        exact = [
+            one.name
+            for one in conditions
+            if text in (one.name, *(part for file in one.files for part in (PurePath(file).stem, PurePath(file).name)))
+        ]
         settings = [one.name for one in conditions if part and f" {part}," in f"{one.name},"]
         parts = [one.name for one in conditions if part and part in one.name]
         matching = exact or _with_setting(mechanism, conditions, part) or settings or parts * (len(parts) == 1)

@@ -61,7 +61,14 @@ def fixed(quantity: Quantity) -> Quantity:
     return quantity
 
 
-FixedAngle = Annotated[Angle, AfterValidator(fixed)]
+def _with_unit(quantity: Quantity) -> Quantity:
+    """An angle with its unit: a plain number would be in rad, whatever the readings are in."""
+    if quantity.evaluate() != 0 and not any(sign.isalpha() or sign == "°" for sign in str(quantity.source)):
+        raise problem(f"{quantity.source} has no unit", f"write {quantity.source} deg, or {quantity.source} rad")
+    return quantity
+
+
+FixedAngle = Annotated[Angle, AfterValidator(fixed), AfterValidator(_with_unit)]
 FixedNumber = Annotated[Dimensionless, AfterValidator(fixed)]
 FixedRate = Annotated[Rate, AfterValidator(fixed)]
 FixedTime = Annotated[Time, AfterValidator(fixed)]

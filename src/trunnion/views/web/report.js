@@ -27,6 +27,7 @@ export function charts(scene, kinds) {
   const driven = motion ? drivers.filter((driver) => peak(driver.effort) > 0) : drivers;
   const efforts = driven.map((driver) => effortChart(scene, driver));
   const losses = lossChart(scene, kinds, lost);
+  /** @type {object[]} */
   const reactions = [reactionChart(scene, kinds)];
   if (scene.space === "spatial") reactions.push(momentChart(scene, kinds));
   reactions.push(...endChart(scene, kinds));

@@ -144,3 +144,39 @@ def test_extensions_that_nothing_reads_are_refused(tmp_path: Path) -> None:
                 trunnion.exchange.import_file(empty)
             with pytest.raises(trunnion.MechanismError, match="cannot be read"):
                 trunnion.exchange.import_file(tmp_path / f"missing{suffix}")
+
+
+def test_a_speed_is_one_of_the_joint_that_it_drives() -> None:
+    draft = replace(four_bar(), drives={})
+    driven = next(iter(complete(draft).drives))
+    assert complete(draft, drive=driven, speed=3.0, turns=True).drives == {driven: 3.0}
+    assert complete(four_bar(), drive=driven, speed=3.0).drives == {driven: 3.0}  # the user's goes before the file's
+    assert complete(draft).drives[driven] == pytest.approx(2 * np.pi)
+    with pytest.raises(trunnion.MechanismError, match="a joint that slides, and A turns"):
+        complete(draft, drive="A", speed=0.1, turns=False)
+
+
+@pytest.mark.parametrize(("option", "value"), [("speed", "abc"), ("gap", "AB"), ("gap", "inf"), ("density", "2*q")])
+def test_an_option_that_is_no_quantity_is_refused(tmp_path: Path, option: str, value: str) -> None:
+    path = tmp_path / "part.urdf"
+    path.write_text("<robot/>")
+    with pytest.raises(trunnion.MechanismError, match=option):
+        trunnion.exchange.import_file(path, **{option: value})
+
+
+def test_a_negative_mass_is_refused() -> None:
+    draft = four_bar()
+    next(iter(draft.bodies.values())).mass = -1.0
+    with pytest.raises(trunnion.MechanismError, match="has the mass -1 kg"):
+        draft.checked()
+
+
+def test_a_drive_with_limits_keeps_within_them(tmp_path: Path) -> None:
+    draft = four_bar()
+    driven = next(iter(draft.drives))
+    draft.pairs[driven] = replace(draft.pairs[driven], limits=(np.radians(-11), np.radians(17)))
+    made = read(model_text(complete(draft)), tmp_path)
+    result = trunnion.analyse(made, 12)
+    turned = np.degrees(result["joint_rotation"].sel(joint=driven).values)
+    assert (turned.min(), turned.max()) == pytest.approx((-11, 17), abs=1e-6)
+    assert (result["status"].values < 3).all()

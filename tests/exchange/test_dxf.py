@@ -458,3 +458,33 @@ def test_damage_anywhere_is_no_traceback(
     (folder / "damaged.dxf").write_bytes(data)
     draft, findings = tried(folder / "damaged.dxf")
     assert findings or (draft and model_text(draft))
+
+
+def test_circles_of_two_arcs_are_pins_and_centre_lines_no_links(tmp_path: Path) -> None:
+    """A crank on a frame, its pin drawn as two half arcs, with axes on a layer of their own and by their linetype."""
+    document = ezdxf.new("R2010", setup=True, units=4)
+    space = document.modelspace()
+    draw(space, "frame", [("circle", (0, 0), 10.02), ("line", (0, 0), (300, 0))])
+    for start, end in ((0, 180), (180, 360)):
+        space.add_arc((0, 0), 10, start, end, dxfattribs={"layer": "crank"})
+    draw(space, "crank", [("line", (0, 0), (50, 80))])
+    draw(space, "CENTER", [("line", (-40, 0), (40, 0))])
+    space.add_line((0, -40), (0, 40), dxfattribs={"layer": "frame", "linetype": "DASHDOT"})
+    path = tmp_path / "crank.dxf"
+    document.saveas(path)
+    draft = import_file(path, ground="frame")
+    assert set(draft.bodies) == {"frame", "crank"}
+    (pair,) = draft.pairs.values()
+    assert (pair.type, pair.pin_radius, pair.hole_radius) == ("revolute", pytest.approx(0.01), pytest.approx(0.01002))
+    assert any("2 centre line" in finding.what for finding in draft.findings)
+
+
+def test_a_ground_on_layer_0_is_written_again(tmp_path: Path) -> None:
+    path, model, again = (tmp_path / name for name in ("a.dxf", "a.yaml", "b.dxf"))
+    pins = {"circle": [("circle", (0, 0), 5), ("circle", (100, 0), 5)]}
+    drawing(zero=[*pins["circle"], ("line", (0, 0), (100, 0))], crank=[("circle", (0, 0), 5), ("circle", (0, 30), 5)],
+            rod=[("circle", (0, 30), 5), ("circle", (90, 60), 5)],
+            rocker=[("circle", (90, 60), 5), ("circle", (100, 0), 5)]).saveas(path)  # fmt: skip
+    model.write_text(model_text(import_file(path)), "utf-8")
+    trunnion.exchange.export_model(trunnion.read(model), again)
+    assert set(import_file(again).bodies) == {"0", "crank", "rod", "rocker"}

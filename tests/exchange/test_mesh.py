@@ -89,7 +89,7 @@ def is_box(draft: Draft, name: str, sides: Any, rotation: Any, shift: Any, densi
 def test_a_box_as_stl(text: bool, unit: str, metre: float, tmp_path: Path) -> None:
     draft = import_file(written(tmp_path, stl(BOX * CORNERS, FACES, text)), unit=unit, material="aluminium")
     is_box(draft, "part", metre * BOX, np.eye(3), np.zeros(3), 2700.0)
-    assert codes(draft) == ["joints", "unit"]
+    assert codes(draft) == (["joints", "unit"] if unit == "mm" else ["joints"])  # stated, it is no guess
 
 
 @settings(deadline=None, max_examples=10)

@@ -21,7 +21,7 @@ def import_(
     out: Annotated[Path, typer.Option("--out", "-o", help="The model file to write: .yaml.")],
     ground: Annotated[str, typer.Option("--ground", help="The part that does not move.")] = "",
     drive: Annotated[str, typer.Option("--drive", help="The joint that is driven.")] = "",
-    speed: Annotated[str, typer.Option("--speed", help="Speed of the driver: 60rpm, 0.1m/s.")] = "60rpm",
+    speed: Annotated[str, typer.Option("--speed", help="Speed of the driver: 60rpm, 0.1m/s.")] = "",
     material: Annotated[
         str, typer.Option("--material", help="Material of parts without one: steel, aluminium, …")
     ] = "steel",
@@ -50,10 +50,12 @@ def import_(
     console().print(f"{draft.source}: {bodies}, {pairs}", markup=False)
     wrote(out)
     data, lines = entries_of(text)
-    try:
-        checked: Iterable[Finding] = Mechanism.model_validate(data).checked
-    except MechanismError as error:  # of a file without joints, as a mesh is: what it lacks
-        checked = error.findings
+    checked: Iterable[Finding] = ()  # links without joints, as those of a mesh, are no mechanism yet
+    if draft.pairs:
+        try:
+            checked = Mechanism.model_validate(data).checked
+        except MechanismError as error:
+            checked = error.findings
     findings = [*draft.findings, *place(checked, str(out), lines, data)]
     say(findings, every=True)
     raise typer.Exit(exit_status(findings))

@@ -204,6 +204,8 @@ class Draft:
         for body in self.bodies.values():
             if not (np.isfinite(body.mass) and np.isfinite(body.centre).all() and np.isfinite(body.inertia).all()):
                 findings.append(Finding("has a mass, centre or inertia that is no number", f"links.{body.name}"))
+            if body.mass < 0:
+                findings.append(Finding(f"has the mass {body.mass:g} kg", f"links.{body.name}", "mend the file"))
         if findings:
             raise MechanismError([replace(finding, file=self.source) for finding in findings])
         return self

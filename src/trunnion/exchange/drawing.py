@@ -39,6 +39,11 @@ CLOSED = 1e-9  # of the perimeter
 GREY, BLUE = 8, 5  # colours of DXF
 
 
+def _add_layer(document: Any, name: str, color: int) -> None:
+    """Add a layer; every drawing has 0 and Defpoints already."""
+    (document.layers.get(name) if name in document.layers else document.layers.add(name)).color = color
+
+
 def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
     """Draw the links at a position, the curves of named points and, in a plane, the force polygons; in mm."""
     draft = positions.draft(options.row)
@@ -47,7 +52,7 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
     space = document.modelspace()
     layers = _layers(draft)
     for number, layer in enumerate(layers.values()):
-        document.layers.add(layer, color=GREY if number == 0 else 1 + (number - 1) % 6)
+        _add_layer(document, layer, GREY if number == 0 else 1 + (number - 1) % 6)
     corners = np.array([place for pair in draft.pairs.values() for place in [pair.at]] or [np.zeros(3)])
     size = float(np.ptp(corners, axis=0).max()) or 1.0
     _links(space, draft, layers, size)
@@ -180,7 +185,7 @@ def _polygons(space: Modelspace, positions: Positions, row: int, draft: Draft, c
             what = f"the polygon of {polygon.name} does not close, by {polygon.gap:.2g} of its perimeter"
             draft.warn("exchange.polygon", "file", what, "`trunnion analyse` says how well it is solved")
         layer = f"{AUXILIARY}forces {polygon.name}".translate(FORBIDDEN)
-        space.doc.layers.add(layer, color=BLUE)
+        _add_layer(space.doc, layer, BLUE)
         rounds = [others for approximation in drawn[1:] for others in approximation if others.name == polygon.name]
         low = np.min([shape.corners.min(axis=0) for shape in [polygon, *rounds]], axis=0)
         high = np.max([shape.corners.max(axis=0) for shape in [polygon, *rounds]], axis=0)

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 __all__ = ["read", "write"]
 
 GROUNDS = ("ground", "frame", "base", "fixed")  # words in the name of a layer that does not move; else it is layer 0
+CHAINED = ("CENTER", "DASHDOT", "DIVIDE", "MITTE", "ACAD_ISO04", "ACAD_ISO10")  # how linetypes of centre lines begin
+CENTRES = ("center", "centre", "mittel", "axis")  # words in the names of layers of centre lines
 SKIPPED = ("defpoints", AUXILIARY)  # how the names of layers begin that hold no link
 MOST_OBJECTS, MOST_PARTS, MOST_MARKS = 40_000, 20_000, 2_000  # in a file, blocks taken apart, and in a skeleton
 DEEPEST, FARTHEST = 12, 1e6  # blocks in blocks; m from the origin
@@ -167,7 +169,8 @@ def _unit(document: Drawing, options: ImportOptions, draft: Draft) -> float:
     if unit is not None:
         return unit
     what = f"states no unit; {1e3 * options.unit:g} mm is taken for 1"
-    draft.warn("exchange.unit", "file", what, "state it with --unit")
+    if not options.unit_stated:
+        draft.warn("exchange.unit", "file", what, "state it with --unit")
     return options.unit
 
 
@@ -186,10 +189,41 @@ def _gathered(document: Drawing, unit: float) -> Sketch:
         if key in hidden:
             sketch.left[f"entity on the hidden layer {layer}"] += 1
             continue
+        if entity.dxftype() in ("LINE", "ARC") and _is_centre_line(document, layer, entity):
+            sketch.left["centre line"] += 1
+            continue
         if key not in names:
             names[key] = free_name(layer, names.values())
         _gather(sketch, names[key], entity, unit)
+    _close_circles(sketch)
     return sketch
+
+
+def _is_centre_line(document: Drawing, layer: str, entity: Any) -> bool:
+    """Whether a line is chain dotted, by itself or by its layer, as centre lines and axes are."""
+    linetype = entity.dxf.get("linetype", "BYLAYER").upper()
+    if linetype == "BYLAYER":
+        linetype = document.layers.get(layer).dxf.linetype.upper() if layer in document.layers else ""
+    return linetype.startswith(CHAINED) or any(word in layer.casefold() for word in CENTRES)
+
+
+def _close_circles(sketch: Sketch) -> None:
+    """Make two half arcs about one centre, which is how some programs draw a circle, a circle."""
+    halves: list[Slot] = []
+    for slot in sketch.halves:
+        other = next((one for one in halves if one.layer == slot.layer and _completes(one, slot)), None)
+        if other is None:
+            halves.append(slot)
+        else:
+            halves.remove(other)
+            sketch.circles.append((slot.layer, (slot.start + slot.end) / 2, slot.half))
+    sketch.halves = halves
+
+
+def _completes(one: Slot, other: Slot) -> bool:
+    """Whether two half circles run between the same ends, the other way."""
+    apart = np.linalg.norm(one.start - other.end) + np.linalg.norm(one.end - other.start)
+    return bool(apart < HALF * other.half and abs(one.half - other.half) < HALF * other.half)
 
 
 def _entities(entities: Iterable[Any], inserted: str, depth: int, count: list[int]) -> Iterator[tuple[str, Any]]:
@@ -230,7 +264,7 @@ def _gather(sketch: Sketch, layer: str, entity: Any, unit: float) -> None:
         kind = f"tilted {kind}"
     if kind == "LINE":
         sketch.lines.append(Line(layer, place(dxf.start), place(dxf.end)))
-    elif kind == "CIRCLE":
+    elif kind == "CIRCLE" or (kind == "ARC" and abs(dxf.end_angle - dxf.start_angle) >= 360 - math.degrees(HALF)):
         sketch.circles.append((layer, place(entity.ocs().to_wcs(dxf.center)), abs(unit * dxf.radius)))
     elif kind == "POINT":
         sketch.circles.append((layer, place(dxf.location), 0.0))

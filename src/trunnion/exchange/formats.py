@@ -77,7 +77,7 @@ class ImportOptions:
     density : kg/m³ of parts whose file states none.
     gap : greatest difference of the radii of a pin and its hole that still is a joint, m.
     drive : the joint that is driven; found by the reader if empty.
-    unit : length unit of a file that states none, in m.
+    unit : length unit of a file that states none, in m; unit_stated : whether the user stated it.
     """
 
     ground: str = ""
@@ -85,6 +85,7 @@ class ImportOptions:
     gap: float = 0.5e-3
     drive: str = ""
     unit: float = 1e-3
+    unit_stated: bool = False
 
 
 @dataclass(frozen=True)
@@ -149,7 +150,7 @@ def import_file(
     path: str | os.PathLike[str],
     ground: str = "",
     drive: str = "",
-    speed: str | float = "60 rpm",
+    speed: str | float = "",
     material: str = "steel",
     density: str | float | None = None,
     gap: str | float = "0.5 mm",
@@ -161,7 +162,8 @@ def import_file(
     ----------
     path : the file; its extension decides the format, see `FORMATS`. Or a link that holds a drawing, as of PMKS+.
     ground, drive : names of the part that does not move and of the joint that is driven; found if not given.
-    speed : of a drive whose file states none. material, density : of parts whose file states neither mass nor density.
+    speed : of the drive; that of the file, else a usual one, if not given.
+    material, density : of parts whose file states neither mass nor density.
     gap : greatest difference of the radii of a pin and its hole. unit : of lengths in a file that states none.
         Numbers are in SI, texts have a unit.
 
@@ -176,16 +178,21 @@ def import_file(
     path = Path(path)
     heaviness = _material(material) if density is None else _number(density, "density", KINDS["density"])
     options = ImportOptions(
-        ground, heaviness, _number(gap, "gap", KINDS["length"]), drive, _number(f"1 {unit}", "unit", KINDS["length"])
+        ground,
+        heaviness,
+        _number(gap, "gap", KINDS["length"]),
+        drive,
+        _number(f"1 {unit}", "unit", KINDS["length"]),
+        unit != "mm",
     )
-    rate = _number(speed, "speed", KINDS["angular speed"] | KINDS["speed"])
+    rate, turns = _speed(speed)
     if str(path).startswith(LINKS):
         draft = import_module("trunnion.exchange.pmks").read_link(str(path), options)
     else:
         draft = _read(path, options)
     draft.source = draft.source or path.name
     draft.name = draft.name or path.stem
-    return complete(draft.checked(), ground, drive, rate)
+    return complete(draft.checked(), ground, drive, rate, turns)
 
 
 def _read(path: Path, options: ImportOptions) -> Draft:
@@ -208,12 +215,28 @@ def _read(path: Path, options: ImportOptions) -> Draft:
     return draft
 
 
+def _speed(speed: str | float) -> tuple[float | None, bool | None]:
+    """A speed in SI, and whether it is one of a joint that turns; a plain number may be either."""
+    if speed == "":
+        return None, None
+    try:
+        rate = _number(speed, "speed", KINDS["angular speed"])
+    except MechanismError:
+        return _number(speed, "speed", KINDS["speed"]), False
+    return rate, None if isinstance(speed, (int, float)) else True
+
+
 def _number(value: str | float, name: str, kind: Kind) -> float:
     """An option in SI, above 0."""
     try:
-        number = float(np.asarray(Quantity.read(value, kind).evaluate()))
-    except UnitError as error:
-        raise MechanismError(Finding(error.what, name, error.remedy)) from None
+        plain = float(value)
+    except ValueError:
+        plain = value  # type: ignore[assignment]  # a text with a unit
+    try:
+        number = float(np.asarray(Quantity.read(plain, kind).evaluate()))
+    except (UnitError, KeyError) as error:
+        what = getattr(error, "what", f"'{value}' is no {kind.name}")
+        raise MechanismError(Finding(what, name, f"give a {kind.name} such as {kind.example}")) from None
     if not 0 < abs(number) < np.inf or (number < 0 and name != "speed"):
         raise MechanismError(Finding(f"{value!r} is out of range", name, f"give a {kind.name} such as {kind.example}"))
     return number

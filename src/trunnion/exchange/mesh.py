@@ -55,7 +55,8 @@ def read(path: Path, options: ImportOptions) -> Draft:
             meshes = list(_of_3mf(path))
         elif suffix == ".stl":
             what = f"an STL states no unit; {1e3 * options.unit:g} mm is taken for 1"
-            draft.warn("exchange.unit", "file", what, "state it with --unit")
+            if not options.unit_stated:
+                draft.warn("exchange.unit", "file", what, "state it with --unit")
             meshes = [
                 (
                     path.stem,

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunnion.errors import Finding
-from trunnion.exchange.draft import Array, Body, Draft, Pair, united
+from trunnion.exchange.draft import Array, Body, Draft, Pair, about, united
 from trunnion.exchange.formats import ExportOptions, ImportOptions
 from trunnion.exchange.robots import (
     APART,
@@ -34,6 +34,7 @@ from trunnion.exchange.robots import (
     written,
 )  # fmt: skip
 from trunnion.exchange.skeleton import Positions
+from trunnion.joints.pairs import PAIRS
 
 __all__ = ["read", "write"]
 
@@ -350,6 +351,8 @@ def _solid(frame: Frame, values: Mapping[str, str], name: str) -> Body | None:
 
 # Out
 
+STEP = 0.001  # s, of the simulation
+
 
 def write(positions: Positions, path: Path, options: ExportOptions) -> list[Finding]:
     """Write the mechanism as MJCF: bodies with the global axes, each with its origin at the joint that carries it.
@@ -361,7 +364,8 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
     tree, cuts = spanning(draft)
     root = Element("mujoco", model=draft.name or "mechanism")
     compiler = SubElement(root, "compiler", angle="radian", autolimits="true")
-    SubElement(root, "option", gravity=text_of(np.zeros(3) if draft.gravity is None else draft.gravity))
+    gravity = np.zeros(3) if draft.gravity is None else draft.gravity
+    SubElement(root, "option", gravity=text_of(gravity), integrator="implicitfast", timestep=text_of(STEP))
     worldbody, equality = SubElement(root, "worldbody"), Element("equality")
     base = worldbody if draft.ground == WORLD else SubElement(worldbody, "body", name=draft.ground)
     bodies, origins = {draft.ground: base}, {draft.ground: np.zeros(3)}
@@ -373,7 +377,7 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
     for name, element in bodies.items():
         body = draft.bodies[name]
         if name != draft.ground:
-            matrix = _realisable(body.inertia)
+            matrix = body.inertia
             full = [matrix[at] for at in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
             centre = body.centre - origins[name]
             values = {"pos": text_of(centre), "mass": text_of(body.mass), "fullinertia": text_of(full)}
@@ -389,10 +393,19 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
         actuator = SubElement(root, "actuator")
         for name in draft.drives:
             turn = f"{name}.turn" if draft.pairs[name].type in ("cylindrical", "helical") else name
-            SubElement(actuator, "velocity", name=name, joint=turn)
+            gain = _inertia_at(draft, draft.pairs[name]) / STEP  # so that it holds its speed within a step or so
+            SubElement(actuator, "velocity", name=name, joint=turn, kv=text_of(gain))
         SubElement(SubElement(root, "keyframe"), "key", name="drive", ctrl=text_of(list(draft.drives.values())))
     written(root, path)
     return draft.findings
+
+
+def _inertia_at(draft: Draft, pair: Pair) -> float:
+    """At most what a drive of a pair has to move, as if all bodies moved with it: kg m² about its axis, or kg."""
+    if not PAIRS[pair.type].turns:
+        return sum(body.mass for body in draft.bodies.values()) or 1.0
+    axis = pair.axis / np.linalg.norm(pair.axis)
+    return sum(float(axis @ about(body, pair.at) @ axis) for body in draft.bodies.values()) or 1.0
 
 
 def _write_loops(draft: Draft, cuts: list[Pair], origins: Mapping[str, Array], equality: Element) -> None:
@@ -440,9 +453,3 @@ def _write_joints(pair: Pair, body: Element, equality: Element) -> None:
     if pair.type == "helical" and pair.pitch is not None:
         ends = {"joint1": f"{pair.name}.slide", "joint2": f"{pair.name}.turn"}
         SubElement(equality, "joint", ends, name=pair.name, polycoef=text_of([0, pair.pitch / (2 * math.pi), 0, 0, 0]))
-
-
-def _realisable(inertia: Array) -> Array:
-    """The tensor, by 1e-12 larger where it is that of a plate, which rounding would make impossible."""
-    a, b, c = np.linalg.eigvalsh(inertia)
-    return inertia + 1e-12 * c * np.eye(3) if a + b - c < 1e-12 * c else inertia

@@ -17,19 +17,22 @@ __all__ = ["complete", "flat_frame", "model_text"]
 DIGITS = 12  # significant digits of a written number
 FIXED = ("ground", "frame", "base", "housing", "world", "gestell", "rahmen", "bâti")  # in names of fixed parts
 TINY = 1e-12  # of the size of the mechanism: below it a coordinate is rounding
+USUAL = {True: 2 * math.pi, False: 0.1}  # speeds of joints that turn and slide, rad/s and m/s
 STROKE = 0.1  # of the size, of a driven slide whose file states no limits
 IN_PLANE = {"revolute", "prismatic"}
 RELEASED = {"cylindrical": "revolute", "spherical": "revolute", "planar": ""}  # what a pair is in a plane
 
 
-def complete(draft: Draft, ground: str = "", drive: str = "", speed: float = 1.0) -> Draft:
+def complete(
+    draft: Draft, ground: str = "", drive: str = "", speed: float | None = None, turns: bool | None = None
+) -> Draft:
     """The draft with welded bodies united, a ground and a drive.
 
     ground, drive: names that the user states. Without them the ground is the body that the file says, else one with
     such a name, else the one with the most pairs (the heaviest of several); the drive is that of the file, else the
-    first pair on the ground that has one coordinate. Both choices are findings. speed: of a drive that the file does
-    not state, rad/s or m/s.
-    Raises MechanismError if a stated name is not in the file.
+    first pair on the ground that has one coordinate. Both choices are findings. speed: of the drive, rad/s if it
+    `turns`, m/s if not; the file's, else a usual one, if not given.
+    Raises MechanismError if a stated name is not in the file, or the speed is not one of the driven joint.
     """
     draft = replace(draft, findings=list(draft.findings))
     if ground:
@@ -42,21 +45,34 @@ def complete(draft: Draft, ground: str = "", drive: str = "", speed: float = 1.0
         reason = "by its name" if named else f"it has the most joints, {joined[draft.ground]}"
         what = f"is taken as the part that does not move: {reason}"
         draft.note("exchange.ground", f"links.{draft.ground}", what, "state it with --ground")
+    drivable = [name for name, pair in draft.pairs.items() if draft.ground in pair.links and PAIRS[pair.type].drivable]
+    draft.drives = {name: rate for name, rate in draft.drives.items() if name in draft.pairs}
     if drive:
         drive = _existing(draft, drive, list(draft.pairs), "joint", "--drive")
-        draft.drives = {drive: draft.drives.get(drive, speed)}
-    drivable = [name for name, pair in draft.pairs.items() if draft.ground in pair.links and PAIRS[pair.type].drivable]
-    for name in [name for name, rate in draft.drives.items() if not rate and name in draft.pairs]:
-        draft.note(
-            "exchange.speed", f"drivers.{name}", "has no speed in the file; it is given one", "state it with --speed"
-        )
-    draft.drives = {name: rate or speed for name, rate in draft.drives.items() if name in draft.pairs}
-    if not draft.drives and drivable:
+        draft.drives = {drive: draft.drives.get(drive, 0.0)}
+    elif not draft.drives and drivable:
         first = min(drivable, key=lambda name: not PAIRS[draft.pairs[name].type].turns)
-        draft.drives = {first: speed}
-        what = "is taken as the driver: the first joint on the part that does not move"
-        draft.note("exchange.drive", f"joints.{first}", what, "state it with --drive")
+        draft.drives = {first: 0.0 if speed is not None else USUAL[PAIRS[draft.pairs[first].type].turns]}
+        what = "is taken as the driver, at a usual speed: the first joint on the part that does not move"
+        draft.note("exchange.drive", f"joints.{first}", what, "state it with --drive and --speed")
+    draft.drives = {name: _rate(draft, name, rate, speed, turns) for name, rate in draft.drives.items()}
     return draft
+
+
+def _rate(draft: Draft, name: str, rate: float, speed: float | None, turns: bool | None) -> float:
+    """The rate of a drive: as stated, else that of the file, else a usual one, which is said."""
+    does = PAIRS[draft.pairs[name].type].turns
+    usual = "60 rpm" if does else "0.1 m/s"
+    if speed is not None:
+        if turns is not None and turns != does:
+            moves = {True: "turns", False: "slides"}
+            what = f"is a speed of a joint that {moves[turns]}, and {name} {moves[does]}"
+            raise MechanismError(Finding(what, "speed", f"give one such as {usual}"))
+        return speed
+    if not rate:
+        what = f"has no speed in the file; it gets {usual}"
+        draft.note("exchange.speed", f"drivers.{name}", what, "state it with --speed")
+    return rate or USUAL[does]
 
 
 def _existing(draft: Draft, name: str, names: list[str], noun: str, option: str) -> str:
@@ -132,7 +148,10 @@ def _lines(draft: Draft, spatial: bool) -> Iterator[str]:
     for name, rate in draft.drives.items():
         pair = draft.pairs[name]
         if PAIRS[pair.type].turns:
-            yield f"  {_quoted(name)}: {{speed: {_number(rate)} rad/s}}"
+            low, high = pair.limits or (-math.inf, math.inf)
+            ends = f", range: [{_number(math.degrees(low))} deg, {_number(math.degrees(high))} deg]"
+            whole = high - low >= 2 * math.pi
+            yield f"  {_quoted(name)}: {{speed: {_number(rate if whole else abs(rate))} rad/s{'' if whole else ends}}}"
         else:
             low, high = pair.limits or (0.0, size * STROKE)
             ends = f"range: [{_number(1e3 * low)} mm, {_number(1e3 * high)} mm]"

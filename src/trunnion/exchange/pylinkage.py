@@ -54,14 +54,6 @@ def read(path: Path, options: ImportOptions) -> Draft:
     except (KeyError, TypeError, ValueError, AttributeError, IndexError):
         raise _wrong("has a joint or link without what it needs", str(path)) from None
     meet(draft, list(pins.values()))
-    if draft.drives:
-        what = "turns by radians a step in the file, which is no speed"
-        draft.note(
-            "exchange.speed",
-            f"joints.{next(iter(draft.drives))}",
-            what,
-            "state one with --speed; below 0 it turns back",
-        )
     return draft
 
 

@@ -225,11 +225,35 @@ def opening(positions: Positions, row: int, also: str = "") -> Draft:
         lost.append("laws of motion")
     if lost := [*lost, *([also] if also else [])]:
         draft.note("exchange.lost", "", f"is written without {', '.join(lost)}")
+    draft.name = "".join(sign for sign in draft.name if sign.isprintable())  # XML has no other signs
+    for body in draft.bodies.values():
+        body.inertia = _realisable(body.inertia)
+    if WORLD in draft.bodies and draft.ground != WORLD:
+        draft = _called_otherwise(draft, WORLD)
     massless = [name for name, body in draft.bodies.items() if name != draft.ground and not body.mass > 0]
     if massless:
         what = f"have no mass, which engines in time refuse: {', '.join(massless)}"
         draft.note("exchange.massless", "links", what, "state masses in the model")
     return draft
+
+
+def _called_otherwise(draft: Draft, name: str) -> Draft:
+    """The draft with a body of another name, which the format keeps for its ground."""
+    other = free_name(f"{name}-link", draft.bodies)
+    draft.note("exchange.name", f"links.{name}", f"is written as {other!r}, for {name!r} is the ground of the format")
+    renamed = {name: other}
+    bodies = {renamed.get(key, key): replace(body, name=renamed.get(key, key)) for key, body in draft.bodies.items()}
+    pairs = {
+        key: replace(pair, links=(renamed.get(pair.links[0], pair.links[0]), renamed.get(pair.links[1], pair.links[1])))
+        for key, pair in draft.pairs.items()
+    }
+    return replace(draft, bodies=bodies, pairs=pairs)
+
+
+def _realisable(inertia: Array) -> Array:
+    """The tensor, by 1e-12 larger where it is that of a plate, which rounding would make impossible."""
+    a, b, c = np.linalg.eigvalsh(inertia)
+    return inertia + 1e-12 * c * np.eye(3) if a + b - c < 1e-12 * c else inertia
 
 
 # In: chains made pairs again, and names and grounds as a model has them
@@ -299,6 +323,7 @@ class Scene:
         """Make a thread of two joints that turn and slide one body; others are gears, which are not read."""
         draft = self.draft
         slide, turn = draft.pairs.get(name), draft.pairs.get(other)
+        what = f"are coupled, which is not read: {name} moves by {ratio:.6g} of {other}"
         if slide is not None and turn is not None and ratio:
             if slide.type == "revolute":
                 slide, turn, ratio = turn, slide, 1 / ratio
@@ -307,7 +332,6 @@ class Scene:
             if (slide.type, turn.type) == ("prismatic", "revolute") and common and abs(along) > 1 - PARALLEL:
                 turn.pitch = 2 * math.pi * ratio * along
                 return
-        what = f"are coupled, which is not read: {name} moves by {ratio:.6g} of {other}"
         draft.warn("exchange.gears", "joints", what, "state it under gears in the model")
 
     def _join(self) -> None:

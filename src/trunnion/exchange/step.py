@@ -109,7 +109,8 @@ def _drafted(file: Part21, options: ImportOptions) -> tuple[Draft, Assembly, dic
         raise file.unreadable(what, "export solids, as AP214 or AP242 with exact geometry")
     if assembly.missing:
         what = f"states no length unit: {1e3 * options.unit:.6g} mm is taken"
-        draft.warn("exchange.unit", "", what, "state it with --unit")
+        if not options.unit_stated:
+            draft.warn("exchange.unit", "", what, "state it with --unit")
     draft.ground = options.ground if options.ground in draft.bodies else ""
     joined(draft, faces, options.gap)
     still = complete(draft)
@@ -400,8 +401,9 @@ def _write_moved(positions: Positions, path: Path, options: ExportOptions) -> li
     for name, part in parts.items():
         link = links.get(name, "")
         if not link:
-            draft.note("exchange.still", f"links.{name}", "is no link of the model and stays where it is drawn", "")
-            continue
+            what = f"is a part of {original.name!r} and no link of the model"
+            remedy = "--from takes what the usual --gap and --unit read; import it with these"
+            raise MechanismError(Finding(what, f"links.{name}", remedy))
         rotation, origin = positions.rotations[link][options.row], positions.origins[link][options.row]
         if not np.isfinite(rotation).all():
             what = f"has no solution at {positions.drive(options.row)}"
@@ -421,7 +423,7 @@ def _write_moved(positions: Positions, path: Path, options: ExportOptions) -> li
     close = rest.rindex("ENDSEC")
     added = "\n".join(text.lines)
     path.write_text("".join(pieces) + rest[:close] + added + "\n" + rest[close:], encoding="utf-8")
-    return [finding for finding in draft.findings if finding.code == "exchange.still"]
+    return []
 
 
 def _move(assembly: Assembly, part: Occurrence, move: Place, text: _Text, changes: dict[int, str]) -> None:

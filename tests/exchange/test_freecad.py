@@ -341,7 +341,7 @@ def test_bombs_are_refused_in_time(tmp_path: Path) -> None:
     many = archive(tmp_path, HEAD + "<Document>" + "<a/>" * 3_000_000 + "</Document>")
     with pytest.raises(MechanismError, match="1,000,000 elements"):
         import_file(many)
-    assert time.perf_counter() - begin < 10
+    assert time.perf_counter() - begin < 60  # some 6 s where nothing else runs; it must not hang
 
 
 @pytest.mark.parametrize(

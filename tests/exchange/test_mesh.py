@@ -222,7 +222,7 @@ def refused(path: Path) -> None:
     start = time.perf_counter()
     with pytest.raises(trunnion.MechanismError) as caught:
         import_file(path)
-    assert time.perf_counter() - start < 10
+    assert time.perf_counter() - start < 60  # some 6 s where nothing else runs; it must not hang
     assert len(caught.value.findings) == 1
 
 

@@ -532,7 +532,7 @@ def finding_of(text: str, name: str, folder: Path) -> str:
     start = time.perf_counter()
     with pytest.raises(trunnion.MechanismError) as error:
         import_file(path)
-    assert time.perf_counter() - start < 10
+    assert time.perf_counter() - start < 60  # some 6 s where nothing else runs; it must not hang
     (finding,) = error.value.findings
     assert str(finding).startswith(str(path))
     return str(finding)

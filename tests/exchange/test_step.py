@@ -754,7 +754,7 @@ def test_hostile_files_are_one_sentence(tmp_path, kind):
     start = time.monotonic()
     with pytest.raises(MechanismError) as error:
         import_file(path)
-    assert time.monotonic() - start < 10
+    assert time.monotonic() - start < 60  # some 6 s where nothing else runs; it must not hang
     assert len(error.value.findings) == 1
     assert len(str(error.value)) < 500
 

@@ -587,7 +587,7 @@ def test_what_cannot_be_read_says_where(change: tuple[str, str], sentence: str, 
         (("<parent>crank</parent>", ""), "has no parent"),
         (('relative_to="crank"', 'relative_to="coupler"'), "relative to itself"),
         (('relative_to="crank"', 'relative_to="krank"'), "which the file does not have"),
-        (('name="B" type="revolute"', 'name="B" type="gearbox"'), "'gearbox', which is not read"),
+        (('name="B" type="revolute"', 'name="B" type="magnet"'), "'gearbox', which is not read"),
         (("<lower>-2</lower>", "<lower>low</lower>"), "no row of numbers"),
     ],
 )
@@ -727,3 +727,26 @@ def test_a_link_called_world_is_written_under_another_name(tmp_path: Path) -> No
         said = trunnion.exchange.export_model(trunnion.read(model), path)
         assert "exchange.name" in {finding.code for finding in said}
         assert "world-link" in trunnion.exchange.import_file(path).bodies
+
+
+@pytest.mark.parametrize(
+    ("joint", "words"),
+    [
+        ('<joint name="a" type="gearbox"><parent>b</parent><child>c</child></joint>', "is a gearbox"),
+        ('<model name="n" placement_frame="f"><frame name="f"/></model>', "placement_frame"),
+    ],
+)
+def test_what_an_sdf_states_and_is_not_read_is_said(joint: str, words: str, tmp_path: Path) -> None:
+    links = "".join(f'<link name="{name}"/>' for name in "abc")
+    axis = "<axis><xyz>0 0 1</xyz></axis>"
+    hinges = "".join(
+        f'<joint name="{name}" type="revolute"><parent>{first}</parent><child>{name}</child>{axis}</joint>'
+        for first, name in (("world", "a"), ("a", "b"), ("b", "c"))
+    )
+    path = tmp_path / "model.sdf"
+    path.write_text(f'<sdf version="1.9"><model name="m">{links}{hinges}{joint}</model></sdf>', "utf-8")
+    try:
+        said = [finding.what for finding in import_file(path).findings]
+    except trunnion.MechanismError as error:
+        said = [str(error)]
+    assert any(words in what for what in said), said

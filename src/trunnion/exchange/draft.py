@@ -19,6 +19,7 @@ from trunnion.joints.pairs import PAIRS
 __all__ = ["Array", "Body", "Draft", "Pair", "about", "free_name", "moved", "perpendicular", "steiner", "united"]
 
 Array = NDArray[np.float64]
+FARTHEST = 1e9  # m; what lies farther is a mistake of the file
 PARALLEL = 1e-6  # rad, between axes that count as parallel
 
 
@@ -194,6 +195,10 @@ class Draft:
             if pair.type not in PAIRS:
                 findings.append(Finding(f"has the type {pair.type!r}, which is no pair", f"joints.{pair.name}"))
             numbers = np.concatenate([pair.at, pair.axis])
+            if not np.abs(pair.at).max() < FARTHEST:
+                findings.append(
+                    Finding(f"lies {np.abs(pair.at).max():.3g} m away", f"joints.{pair.name}", "mend the file")
+                )
             if not np.isfinite(numbers).all() or not np.linalg.norm(pair.axis) > 0:
                 findings.append(Finding("has no place or no axis", f"joints.{pair.name}", "mend the file"))
             findings += [

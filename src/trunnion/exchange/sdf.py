@@ -108,6 +108,8 @@ class Reader(Scene):
 
     def _place(self, part: Element, name: str, default: str, prefix: str) -> None:
         """Note the pose of a part, and what it is relative to."""
+        if part.get("placement_frame"):
+            raise refused("states placement_frame, which is not read", f"{part.tag} {name}", "place it by its pose")
         pose = part.find("pose")
         relative = "" if pose is None else pose.get("relative_to") or pose.get("frame") or ""
         self.poses[name] = _pose(pose, name), prefix + relative if relative else default
@@ -151,7 +153,15 @@ class Reader(Scene):
         ):
             bodies.setdefault(WORLD, Body(WORLD))
         for part, prefix in self.joints:
-            if part.get("type") != "floating":
+            if part.get("type") == "gearbox":
+                draft = self.draft
+                draft.warn(
+                    "exchange.gears",
+                    f"joints.{part.get('name')}",
+                    "is a gearbox, which is not read",
+                    "state it under gears",
+                )
+            elif part.get("type") != "floating":
                 self.add_pair(self._pair(part, prefix))
             mimic = part.find("axis/mimic")
             if mimic is not None:

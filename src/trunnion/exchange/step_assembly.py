@@ -118,12 +118,14 @@ class Assembly:
     def tree(self) -> list[Occurrence]:
         """The products that no other uses, with all that they use."""
         used = {child for uses in self.uses.values() for _, child in uses}
-        roots = [root for root in dict.fromkeys([*self.shapes, *self.uses]) if root not in used]
-        count = 0
+        every = dict.fromkeys([*self.shapes, *self.uses])
+        roots = [root for root in every if root not in used]
+        count, seen = 0, set[int]()
 
         def expanded(occurrence: Occurrence, above: tuple[int, ...]) -> Occurrence:
             nonlocal count
             count += 1
+            seen.add(occurrence.definition)
             if count > MOST:
                 raise self.file.unreadable(f"has more than {MOST:,} parts", "export the parts that move")
             if occurrence.definition in above:
@@ -135,7 +137,10 @@ class Assembly:
                 occurrence.children.append(expanded(part, (*above, occurrence.definition)))
             return occurrence
 
-        return [expanded(Occurrence(self.name(root), root, Place()), ()) for root in roots if self.is_product(root)]
+        tree = [expanded(Occurrence(self.name(root), root, Place()), ()) for root in roots if self.is_product(root)]
+        for left in (one for one in every if one not in seen and self.is_product(one)):
+            raise self.file.unreadable(f"has the product {self.name(left)!r} inside itself")
+        return tree
 
     def is_product(self, definition: Any) -> bool:
         """Whether a shape belongs to a product, not to a feature of it."""

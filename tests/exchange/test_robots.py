@@ -587,7 +587,7 @@ def test_what_cannot_be_read_says_where(change: tuple[str, str], sentence: str, 
         (("<parent>crank</parent>", ""), "has no parent"),
         (('relative_to="crank"', 'relative_to="coupler"'), "relative to itself"),
         (('relative_to="crank"', 'relative_to="krank"'), "which the file does not have"),
-        (('name="B" type="revolute"', 'name="B" type="magnet"'), "'gearbox', which is not read"),
+        (('name="B" type="revolute"', 'name="B" type="magnet"'), "'magnet', which is not read"),
         (("<lower>-2</lower>", "<lower>low</lower>"), "no row of numbers"),
     ],
 )

@@ -88,11 +88,9 @@ def digits(result: Any) -> list[tuple[str, str]]:
     """Labels and significant digits of the summary, as the terminal prints them."""
     rows = []
     for one in result.trunnion.summary:
-        if not one.numerical:
+        if not one.numerical and not one.label.startswith("pin pressure"):  # force by area, it leaves the prefixes here
             text = one.value if isinstance(one.value, str) or one.value is None else parts(one.value, one.unit)[0]
-            plain = str(text).partition("×")[0].replace(".", "").lstrip("−0")
-            # a pressure, force by area, leaves the prefixes here: its power of ten stands by three digits
-            rows.append((one.label, plain[:3] if one.label.startswith("pin pressure") else plain))
+            rows.append((one.label, str(text).replace(".", "").lstrip("−0")))
     return rows
 
 

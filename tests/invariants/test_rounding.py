@@ -88,7 +88,9 @@ def digits(result: Any) -> list[tuple[str, str]]:
     """Labels and significant digits of the summary, as the terminal prints them."""
     rows = []
     for one in result.trunnion.summary:
-        if not one.numerical and not one.label.startswith("pin pressure"):  # force by area, it leaves the prefixes here
+        if not one.numerical and one.label.startswith("pin pressure"):  # force by area, it leaves the prefixes here
+            rows.append((one.label, f"{one.value:.3e}".partition("e")[0]))
+        elif not one.numerical:
             text = one.value if isinstance(one.value, str) or one.value is None else parts(one.value, one.unit)[0]
             rows.append((one.label, str(text).replace(".", "").lstrip("−0")))
     return rows

@@ -11,7 +11,7 @@ import trunnion
 from manual.conftest import Run
 from manual.test_cli import EXAMPLES
 from trunnion import MechanismError
-from trunnion.cli.files import _flags
+from trunnion.cli.files import flags_of
 from trunnion.cli.options import PLOT_KINDS, over, points
 from trunnion.cli.tolerance import tolerance
 from trunnion.views.cycle.plots import PLOTS
@@ -169,7 +169,7 @@ def test_one_position_instead_of_the_cycle(program: Run) -> None:
 
 
 def test_options_by_the_names_of_arguments() -> None:
-    assert {"target": "--yield", "out": "--out", "at": "--at", "set": "--set"}.items() <= _flags(tolerance).items()
+    assert {"target": "--yield", "out": "--out", "at": "--at", "set": "--set"}.items() <= flags_of(tolerance).items()
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.algebra import vector
 from trunnion.algebra.dual import primal
@@ -19,8 +20,8 @@ from trunnion.algebra.vector import IDENTITY, Vector3, cross, dot, plus, scaled,
 __all__ = [
     "NO_MOMENT", "NULL", "ORIGIN", "STILL", "ZERO", "ZERO_LOAD", "Frame", "Screw", "about", "added", "bracket",
     "compose", "distance", "element", "line_of", "minus", "moment_at", "moving", "on_axis", "place_of", "point_of",
-    "power", "quaternion", "relative", "rotated", "rotated_moment", "slid", "spin", "times", "turned", "vector_minus",
-    "velocity_at",
+    "power", "quaternion", "relative", "rotated", "rotated_moment", "rotation_matrix", "slid", "spin", "times",
+    "turned", "vector_minus", "velocity_at",
 ]  # fmt: skip
 
 
@@ -144,6 +145,16 @@ def quaternion(frame: Frame) -> tuple[Number, Number, Number, Number]:
         size = np.sqrt(w * w + x * x + y * y + z * z)
         scale = np.where(np.less(w, 0), -size, size)
         return w / scale, x / scale, y / scale, z / scale
+
+
+def rotation_matrix(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Matrix (3, 3, …) of unit quaternions (4, …), w first: the inverse of `quaternion`."""
+    w, x, y, z = quaternion
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
 
 
 def line_of(frame: Frame) -> Screw:

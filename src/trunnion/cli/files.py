@@ -17,7 +17,7 @@ from typer.models import ArgumentInfo, OptionInfo, ParameterInfo
 from trunnion.errors import MechanismError
 from trunnion.files import Target, writing
 
-__all__ = ["guarded", "named_words", "outputs"]
+__all__ = ["flags_of", "guarded", "named_words", "outputs"]
 
 IN_PLACE = "write"  # the one option that may name the model itself; the verb asks for --force then
 MODEL = "file"
@@ -25,7 +25,7 @@ MODEL = "file"
 
 def guarded(verb: Callable[..., None]) -> Callable[..., None]:
     """The verb, run so that nothing it writes is something it reads, and no two outputs are one file."""
-    names, flags = outputs(verb), _flags(verb)
+    names, flags = outputs(verb), flags_of(verb)
 
     @functools.wraps(verb)
     def run(*arguments: Any, **options: Any) -> None:
@@ -40,13 +40,14 @@ def guarded(verb: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-def _flags(verb: Callable[..., None]) -> dict[str, str]:
+def flags_of(verb: Callable[..., None]) -> dict[str, str]:
     """The options of a verb by the names of their parameters."""
     flags: dict[str, str] = {}
     for name, hint in get_type_hints(verb, include_extras=True).items():
         for info in (one for one in getattr(hint, "__metadata__", ()) if isinstance(one, OptionInfo)):
             words = (info.default, *(info.param_decls or ()))  # of an annotation Typer calls the first the default
-            flags[name.strip("_")] = next((str(word) for word in words if str(word).startswith("--")), f"--{name}")
+            stated = next((str(word) for word in words if str(word).startswith("--")), "")
+            flags[name.strip("_")] = stated or f"--{name.replace('_', '-')}"
     return flags
 
 

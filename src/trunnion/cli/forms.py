@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from enum import Enum
 from inspect import signature
 from pathlib import Path
@@ -14,6 +14,7 @@ from typer.models import ArgumentInfo, OptionInfo
 from trunnion.cli.allocate import allocate
 from trunnion.cli.assemble import assemble
 from trunnion.cli.compare import compare
+from trunnion.cli.files import flags_of
 from trunnion.cli.identify import identify
 from trunnion.cli.play import play
 from trunnion.cli.simulate import simulate
@@ -43,18 +44,19 @@ def _form(study: Callable[..., None]) -> dict[str, Any]:
         "verb": study.__name__,
         "help": (study.__doc__ or "").strip().splitlines()[0],
         "mapping": "mapping" in arguments,
-        "fields": list(_fields(hints, {name: one.default for name, one in signature(study).parameters.items()})),
+        "fields": list(
+            _fields(hints, flags_of(study), {name: one.default for name, one in signature(study).parameters.items()})
+        ),
     }
 
 
-def _fields(hints: dict[str, Any], usual: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def _fields(hints: dict[str, Any], flags: Mapping[str, str], usual: dict[str, Any]) -> Iterator[dict[str, Any]]:
     for name, hint in hints.items():
         info = _info(hint, OptionInfo)
         kind = get_args(hint)[0] if info is not None else None
         if info is None or name.strip("_") in LEFT_OUT or _is(kind, Path):
             continue
-        words = [str(word) for word in (info.default, *(info.param_decls or ())) if str(word).startswith("--")]
-        flag = words[0].partition("/")[0] if words else f"--{name.strip('_').replace('_', '-')}"
+        flag = flags[name.strip("_")].partition("/")[0]
         choices = next(([str(one.value) for one in part] for part in _parts(kind) if _is_enum(part)), None)
         sort = "flag" if _is(kind, bool) else "number" if _is(kind, int) or _is(kind, float) else "text"
         several = any(get_origin(part) is list for part in (kind, *get_args(kind)))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.algebra.dual import primal
+from trunnion.algebra.space import rotation_matrix
 from trunnion.errors import Finding, MechanismError
 from trunnion.exchange.draft import Array, Body, Draft, Pair
 from trunnion.joints.pairs import PAIRS
@@ -185,14 +186,7 @@ def positions_of(
 def _poses(mechanism: Mechanism, result: xr.Dataset, link: str) -> tuple[Array, Array]:
     """Rotation matrices (position, 3, 3) and origins (position, 3) of a link's frame."""
     if mechanism.space == "spatial":
-        w, x, y, z = result["link_rotation"].sel(link=link).values
-        matrix = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-            ]
-        )
+        matrix = rotation_matrix(result["link_rotation"].sel(link=link).values)
         return np.moveaxis(matrix, 2, 0), result["link_position"].sel(link=link).values.T
     angle = result["link_angle"].sel(link=link).values
     c, s, zero, unit = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)

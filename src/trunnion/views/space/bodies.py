@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.space import rotation_matrix
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import attribute
@@ -21,7 +22,7 @@ from trunnion.views.common.cycle import Array, layout, names
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["BodyPose", "Space", "gathered", "is_spatial", "rotation_matrix", "space"]
+__all__ = ["BodyPose", "Space", "gathered", "is_spatial", "space"]
 
 PIN = 14.0  # a mechanism is drawn at least as large as so many radii of its thickest pin
 NEAR = 0.1  # joints whose points lie closer than this share of the size are drawn apart
@@ -186,16 +187,6 @@ class Space:
 def is_spatial(result: xr.Dataset) -> bool:
     """Whether a result is of a mechanism in space."""
     return layout(result).get("space") == "spatial"
-
-
-def rotation_matrix(quaternion: Array) -> Array:
-    """Matrix (3, 3, …) of a quaternion w, x, y, z (4, …)."""
-    w, x, y, z = quaternion
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
 
 
 def space(result: xr.Dataset) -> Space:

@@ -20,6 +20,7 @@ from trunnion.views.common.peaks import ease, usual_peak
 from trunnion.views.space.bodies import Space, space
 from trunnion.views.space.paint import JOINT, Strokes, paint
 from trunnion.views.space.scenery import Scenery, scenery
+from trunnion.views.space.solids import HALF
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -160,14 +161,25 @@ def _reactions(look: Scenery, result: xr.Dataset, index: int) -> tuple[list[tupl
     most = max((float(size) for of in sizes.values() for size in of if np.isfinite(size)), default=0.0)
     found = []
     for name, forces in here.items():
-        for force, size in zip(forces, sizes[name], strict=True):
-            if name not in look.shown.joints or not size > 0.01 * most:
+        if name not in look.shown.joints:
+            continue
+        places = (
+            _bearing_ends(look, name, index) if len(forces) == 2 else [look.shown.seated(name)[:, index]] * len(forces)
+        )
+        for place, force, size in zip(places, forces, sizes[name], strict=True):
+            if not size > 0.01 * most:
                 continue
-            start = look.camera.seen(look.shown.seated(name)[:, index])[:2]
+            start = look.camera.seen(place)[:2]
             end = start + look.camera.seen(force)[:2] * LENGTH * look.diagonal / most
             if np.hypot(*(end - start)) > 0.01 * look.diagonal:
                 found.append((start, end))
     return found, most
+
+
+def _bearing_ends(look: Scenery, name: str, index: int) -> list[Array]:
+    """Both ends of a joint's symbol along its axis, the end at −u first, where the loads on them are drawn."""
+    middle, along = look.shown.seated(name)[:, index], HALF * look.shown.size * look.shown.axis(name, 0)[:, index]
+    return [middle - along, middle + along]
 
 
 def _forces(result: xr.Dataset) -> dict[str, Array]:

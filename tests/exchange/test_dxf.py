@@ -443,6 +443,14 @@ def test_a_file_that_is_cut_off_is_mended_or_refused(share: float, tmp_path: Pat
     assert len(findings) == 1 or (draft and ("damaged" in codes(draft) or set(draft.pairs) == set(FOUR_BAR)))
 
 
+def test_a_file_that_is_cut_off_anywhere_in_its_header_is_a_sentence(tmp_path: Path) -> None:
+    data, path = saved(drawing(**four_bar()), tmp_path), tmp_path / "cut.dxf"
+    for end in range(1, 4000, 37):
+        path.write_bytes(data[:end])
+        draft, findings = tried(path)
+        assert draft or len(findings) == 1, end
+
+
 @settings(deadline=None, max_examples=40)
 @given(
     damage=st.lists(st.tuples(st.floats(0, 0.999), st.binary(max_size=5), st.integers(0, 5)), min_size=1, max_size=4)

@@ -43,7 +43,18 @@ TOUCH = 1e-5  # of the drawing: what lies nearer is in one place; rad, what diff
 UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 9: 2.54e-5, 10: 0.9144, 13: 1e-6, 14: 0.1}  # m, by $INSUNITS
 HALF = 1e-3  # rad, by which a half circle may differ from one
 NEAR, CROWD = 0.05, 8  # of the drawing: within it a text names what it lies at, of so many that are nearest
-SPOILT = (DXFError, ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
+# what the library lets through of damaged files; a generator that ends too early is a RuntimeError or a StopIteration
+SPOILT = (
+    DXFError,
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    LookupError,
+    RuntimeError,
+    StopIteration,
+    TypeError,
+    ValueError,
+)
 
 
 @dataclass(frozen=True, eq=False)

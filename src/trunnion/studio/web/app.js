@@ -5,7 +5,7 @@ import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
 import { Blocks, Formula } from "./blocks.js";
 import { Bounded, Failures } from "./boundary.js";
 import { Dialogs } from "./dialogs.js";
-import { Findings } from "./findings.js";
+import { Findings, jump } from "./findings.js";
 import { Motion } from "./motion.js";
 import { Plots } from "./plots.js";
 import { Properties } from "./properties.js";
@@ -98,7 +98,7 @@ function Messages() {
     ${waiting && html`<div class="message-card">${waiting.name ? `Unsaved work on ${waiting.name}` : "A sheet that was not saved"} is left from ${clock(waiting.time)}.
       <${Button} label="Open it" onClick=${() => takeWaiting(true)} /> <${Button} label="Throw it away" onClick=${() => takeWaiting(false)} /></div>`}
     ${lacks.length > 0 && html`<div class="message-card">${lacks.join(" ")}</div>`}
-    ${wrong.length > 0 && html`<button type="button" class="message-card bad" title="Point at it for the whole; click it for all findings" onClick=${() => (state.tab.value = "findings")}>
+    ${wrong.length > 0 && html`<button type="button" class="message-card bad" title="Point at it for the whole; click it to see where, and what to do" onClick=${() => (jump(wrong[0]), (state.tab.value = "findings"))}>
       <b>${wrong[0].place}</b> ${wrong[0].what}${wrong[0].remedy ? ` — ${wrong[0].remedy}` : ""}${wrong.length > 1 ? ` (and ${wrong.length - 1} more)` : ""}${state.answer.value?.bare ? "; until then it is shown without friction" : ""}</button>`}
   </div>`; // prettier-ignore
 }

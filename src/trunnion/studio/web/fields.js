@@ -160,7 +160,7 @@ export function isPart({ entries, scene }, { kind, name }) {
 }
 
 /** The part that a finding is about, {kind, name}, or null. */
-export function partOf({ where }, entries) {
-  const [kind, name] = String(where ?? "").split(".");
+export function partOf({ where, part }, entries) {
+  const [kind, name] = String(part ?? where ?? "").split(".");
   return kind in USUAL && kind !== "slides" && dictionary(entries?.[kind])[name] !== undefined ? { kind, name } : null;
 }

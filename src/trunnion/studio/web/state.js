@@ -52,6 +52,8 @@ export const layers = signal({
 }); // prettier-ignore
 export const snapping = signal(true);
 export const tab = signal("properties");
+/** A line of the file that is to be shown, or null. */
+export const line = signal(null);
 export const dialog = signal(null);
 /** {words, bad}: the latest remark, said to screen readers too. */
 export const notice = signal({ words: "", bad: false });

@@ -217,6 +217,9 @@ const KINDS = {
   RRR: { label: "RRR: two links between two pins", pins: 2 },
   RRP: { label: "RRP: a rod and a slider on the ground", pins: 1 },
   RPR: { label: "RPR: a slider along a link, between two pins", pins: 2 },
+  PRP: { label: "PRP: a pin between a link and a guide", pins: 1 },
+  RPP: { label: "RPP: a pin in the slot of a guided link", pins: 1 },
+  triad: { label: "Class III: a plate on three rods", pins: 3 },
   gear: { label: "Gears of two pivots", pins: 2 },
 };
 
@@ -234,8 +237,8 @@ function pinsOf() {
 /** A block of the list, its pins chosen or typed, becomes links and joints of the drawing. */
 function Palette() {
   const [kind, setKind] = useState("driver");
-  const [pins, setPins] = useState(["", ""]);
-  const [typed, setTyped] = useState({ ground: ["0 mm, 0 mm", "100 mm, 0 mm"], at: "", ratio: "20:40" });
+  const [pins, setPins] = useState(["", "", ""]);
+  const [typed, setTyped] = useState({ ground: ["0 mm, 0 mm", "100 mm, 0 mm", "100 mm, 100 mm"], at: "", ratio: "20:40" });
   const choices = pinsOf();
   const there = (order) => (choices.some(({ value }) => value === pins[order]) ? pins[order] : ""); // it may be gone
   const { pins: count } = KINDS[kind];
@@ -248,7 +251,7 @@ function Palette() {
     setTyped({ ...typed, at: "" });
     sheet.fit();
   };
-  const inner = kind === "driver" || kind === "RPR" ? "End at" : "Inner pin at";
+  const inner = { driver: "End at", RPR: "End at", RPP: "Guide at", triad: "Middle at" }[kind] ?? "Inner pin at";
   return html`<form class="palette" aria-label="Add a block" onSubmit=${place}>
     <h2>Add a block</h2>
     <label>Block <select aria-label="Kind of block" value=${kind} onChange=${(event) => (setKind(event.target.value), setTyped({ ...typed, at: "" }))}>${Object.entries(KINDS).map(([name, { label }]) => html`<option value=${name}>${label}</option>`)}</select></label>

@@ -212,6 +212,23 @@ if CHROMIUM:
         else:
             pytest.fail("the wires do not follow the position")
 
+    def test_links_wires_and_curves_are_reached_by_keys(user):
+        page = user.page
+        opened(user, WATT)
+        page.get_by_role("button", name="Link coupler", exact=True).focus()
+        page.keyboard.press("Enter")
+        assert user.state("s.selection.value.name") == "coupler"
+        page.get_by_role("tab", name="Blocks").click()
+        page.get_by_role("button", name=re.compile("^Wire G from")).focus()
+        page.keyboard.press("Enter")
+        assert user.state("s.selection.value") == {"kind": "joints", "name": "G"}
+        page.get_by_role("tab", name="Plots").click()
+        page.locator(".charts .chart").first.focus()
+        user.keys("Shift+ArrowRight", "ArrowLeft")
+        assert user.state("s.index.value") == 9
+        effort = trunnion.analyse(Mechanism(**entries_of(WATT)[0]))["drive_effort"].values[0, 9]
+        assert f"torque {effort:.2f} [N m]" in page.locator(".notice").inner_text()
+
     def test_a_mechanism_is_built_of_blocks_by_the_keyboard(user):
         page = user.page
         user.new_sheet()

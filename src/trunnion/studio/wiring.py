@@ -1,4 +1,4 @@
-"""A mechanism built of blocks: a driver, gears, a dyad or a triad, wired to pins that are there or new on the ground."""
+"""A mechanism built of blocks: a driver, gears, a dyad or triad, wired to pins that are there or new on the ground."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 // The page: bars, sheet or space, player, and the panel at the right.
 
+import { computed } from "@preact/signals";
 import { discard, save, takeWaiting } from "./actions.js";
 import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
 import { Blocks, Formula } from "./blocks.js";
@@ -14,7 +15,7 @@ import { Space } from "./space.js";
 import { Stage } from "./stage.js";
 import * as state from "./state.js";
 import { Text } from "./text.js";
-import { choose } from "./tools.js";
+import { choose, pointer } from "./tools.js";
 import { Button, focusOn, html } from "./ui.js";
 
 const TOP = 140; // px, where messages stand
@@ -79,6 +80,12 @@ function Panel() {
   </aside>`; // prettier-ignore
 }
 
+/** Whether the hand is where messages stand: then they make room for it. */
+const low = computed(() => {
+  const at = state.live.value?.to ?? (state.tool.value === "select" ? null : pointer.value?.spot.at);
+  return Boolean(at && sheet.view && sheet.view.frame.to(at)[1] < TOP);
+});
+
 /** Recovered work, and in a sentence why it does not move. */
 function Messages() {
   const time = state.recovered.value;
@@ -86,8 +93,7 @@ function Messages() {
   const lacks = state.tool.value === "select" ? state.missing.value : [];
   const clock = (one) => new Date(one).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
   const waiting = state.waiting.value;
-  const held = state.live.value?.to; // what is written makes room for the hand
-  const below = held && sheet.view?.frame.to(held)[1] < TOP;
+  const below = low.value;
   return html`<div class=${below ? "messages below" : "messages"}>
     <${Hint} />
     <${Failures} />

@@ -107,19 +107,28 @@ function drawn(holder, found) {
   layout(graph);
   const { width, height } = graph.graph();
   const root = svg("svg", { class: "wiring", viewBox: `0 0 ${width} ${height}`, style: `width: ${width}px`, role: "group", "aria-label": "Blocks of the mechanism and their wires" });
-  const wires = found.wires.map(({ from, to, joint }) => wireOf(graph.edge(String(from), String(to), joint), joint));
+  const wires = found.wires.map((wire) => wireOf(graph.edge(String(wire.from), String(wire.to), wire.joint), wire));
   const nodes = found.blocks.map((block, order) => nodeOf(graph.node(String(order)), block, order, found));
   root.append(...wires.map(({ element }) => element), ...nodes);
   holder.replaceChildren(root);
   posed(holder, found, state.index.peek(), chosen.peek());
 }
 
-function wireOf({ points, x, y }, joint) {
+function wireOf({ points, x, y }, { joint, links }) {
   const d = `M${points.map((one) => `${one.x.toFixed(1)},${one.y.toFixed(1)}`).join("L")}`;
   const load = svg("path", { class: "load", d, pathLength: 100 });
   const line = svg("path", { class: "line", d });
   const label = svg("text", { x, y: y + 4, class: "pin" }, joint);
-  return { element: svg("g", { class: "wire", "data-joint": joint }, load, line, svg("rect", { x: x - 12, y: y - 8, width: 24, height: 16, rx: 4 }), label) };
+  const element = svg("g", { class: "wire", "data-joint": joint, tabindex: 0, role: "button", "aria-label": `Wire ${joint} from ${links[0]} to ${links[1]}` }, load, line, svg("rect", { x: x - 12, y: y - 8, width: 24, height: 16, rx: 4 }), label);
+  const take = () => (state.selection.value = { kind: "joints", name: joint });
+  element.addEventListener("click", take);
+  element.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter" && event.key !== " ") return;
+    take();
+    event.preventDefault();
+    event.stopPropagation();
+  });
+  return { element };
 }
 
 function nodeOf({ x, y }, block, order, found) {

@@ -110,10 +110,12 @@ def test_joint_without_which_it_still_locks() -> None:
     """Where all friction together locks early, no single joint need be able to free it: then its multiple is 0."""
     data, options = CASES["slider-crank"]
     mechanism = build(data(), **{**options, "friction": 0.9})
-    margin = brief(mechanism, 8)["locking_margin"].values
+    found = brief(mechanism, 8)
+    # where a joint turns round the margin is that of its sides, the multiples are without the friction of that joint
+    locked = (found["locking_margin"].values < 1) & (found["status"].values != Status.ZERO_SLIP)
     multiple = np.array(list(multiples_of(mechanism, 8).values()))
-    assert np.any(margin < 1)
-    assert np.all(np.nanmin(multiple, axis=0)[margin < 1] < 1)
+    assert np.any(locked)
+    assert np.all(np.nanmin(multiple, axis=0)[locked] < 1)
     assert np.any(multiple == 0)
 
 

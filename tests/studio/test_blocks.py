@@ -128,6 +128,31 @@ def test_dyads_with_a_slider_move():
     assert geared.gears["gear1"].joints == ("A", "C")
 
 
+def test_groups_with_two_slides_and_of_class_three_move_as_their_closed_forms():
+    crank = block("driver", {"ground": "0 mm, 0 mm"}, at="20 mm, 10 mm")
+    yoke = built(crank, block("RPP", "link1.B", at="80 mm, 10 mm"))
+    assert trunnion.check(yoke).formula == "I(0,1)R → II(2,3)RPP"
+    found = trunnion.analyse(yoke, 24)
+    angle = found["link_angle"].sel(link="link1").values
+    slide = found["joint_slide"].sel(joint="F").values
+    cosine = np.hypot(20e-3, 10e-3) * np.cos(angle)
+    np.testing.assert_allclose(slide - slide[0], cosine - cosine[0], atol=1e-12)
+    slotted = built(crank, block("PRP", "link1.B", at="10 mm, 5 mm"))  # across the crank as it is drawn
+    assert trunnion.check(slotted).formula.endswith("PRP")
+    found = trunnion.analyse(slotted, 24)
+    turned = found["link_angle"].sel(link="link1").values - np.arctan2(10, 20)
+    solved = found["status"].values < 3
+    assert solved.sum() >= 20
+    tangent = np.hypot(10e-3, 5e-3) * np.tan(turned)
+    np.testing.assert_allclose(found["joint_slide"].sel(joint="D").values[solved], tangent[solved], atol=1e-9)
+    pins = "link1.B", {"ground": "120 mm, 0 mm"}, {"ground": "60 mm, 120 mm"}
+    plate = built(crank, block("triad", *pins))
+    assert trunnion.check(plate).formula == "I(0,1)R → III(2,3,4,5)RRRRRR"
+    found = trunnion.analyse(plate, 24)
+    assert np.all(found["status"] == 0)
+    assert found["closure_residual"].max() < 1e-9
+
+
 @pytest.mark.parametrize(
     ("gesture", "words"),
     [
@@ -186,6 +211,23 @@ if CHROMIUM:
             page.wait_for_timeout(20)
         else:
             pytest.fail("the wires do not follow the position")
+
+    def test_links_wires_and_curves_are_reached_by_keys(user):
+        page = user.page
+        opened(user, WATT)
+        page.get_by_role("button", name="Link coupler", exact=True).focus()
+        page.keyboard.press("Enter")
+        assert user.state("s.selection.value.name") == "coupler"
+        page.get_by_role("tab", name="Blocks").click()
+        page.get_by_role("button", name=re.compile("^Wire G from")).focus()
+        page.keyboard.press("Enter")
+        assert user.state("s.selection.value") == {"kind": "joints", "name": "G"}
+        page.get_by_role("tab", name="Plots").click()
+        page.locator(".charts .chart").first.focus()
+        user.keys("Shift+ArrowRight", "ArrowLeft")
+        assert user.state("s.index.value") == 9
+        effort = trunnion.analyse(Mechanism(**entries_of(WATT)[0]))["drive_effort"].values[0, 9]
+        assert f"torque {effort:.2f} [N m]" in page.locator(".notice").inner_text()
 
     def test_a_mechanism_is_built_of_blocks_by_the_keyboard(user):
         page = user.page

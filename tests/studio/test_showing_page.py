@@ -47,7 +47,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
     @pytest.mark.parametrize(
         ("text", "words"),
         [
-            (SHORT_ROCKER, "> 10 everywhere"),  # its first positions cannot be assembled
+            (SHORT_ROCKER, "least 1.5 at 273.6°"),  # its first positions cannot be assembled; it is least between two
             (unloaded(FOURBAR), "nothing loads its joints"),
         ],
         ids=["without some positions", "unloaded"],

@@ -47,9 +47,9 @@ def through(
         pose = pose_of(trial, number, group.BRANCHES[which], moments)
         return np.array([np.broadcast_to(primal(n), moments.shape) for n in key_of(group, pose, size)])
 
-    places, crossed = list[change_points.Meeting](), list[float]()
+    places, crossed, others = list[change_points.Meeting](), list[float](), len(group.BRANCHES) > 1
     for first, last in at:
-        exact = change_points.crosses(numbers, first, times[1], cycle) if first == last else None
+        exact = change_points.crosses(numbers, first, times[1], cycle) if first == last and others else None
         crossed += [] if exact is None else [exact]
         places.append((first, last) if exact is None else (exact, exact))
     folding = folds(system, module)

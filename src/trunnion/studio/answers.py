@@ -11,6 +11,7 @@ import copy
 import json
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from functools import lru_cache, partial
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.file import text_of
 from trunnion.model.rewrite import changed_text
@@ -26,6 +27,7 @@ from trunnion.results.attributes import findings_of, summary_of, units_of
 from trunnion.results.quantities import quantity
 from trunnion.results.scales import without_noise
 from trunnion.results.tables import selected
+from trunnion.solve.backward import Backward
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
 from trunnion.studio.blocks import blocks_of
@@ -34,7 +36,7 @@ from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
 from trunnion.studio.live import live_columns, live_margin, places_at, solved_with
 from trunnion.studio.loaded import Loaded, loaded
-from trunnion.studio.margin import margin_of
+from trunnion.studio.margin import cures, locks_of, margin_of, margins_without
 from trunnion.studio.message import packed
 from trunnion.studio.missing import missing
 from trunnion.studio.overlays import centres, circles, place_motion, point_motion, transmission
@@ -146,6 +148,7 @@ def _model(asked: Asked) -> dict[str, Any]:
         "scene": shown,
         "places": {key: [track[axis][0] for axis in "xy"] for key, track in shown["points"].items()},
         **margin_of(result, friction and bool(rubbing(state.run.system))),
+        "locks": locks_of(state.run, result["time"].values, result["status"].values),
         **({"margin_why": "friction lacks something"} if state.bare and friction else {}),
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
     }
@@ -164,7 +167,8 @@ def _cycle(asked: Asked) -> dict[str, Any]:
         if not one.numerical
     }
     figures |= dict(row for way in state.ways(steps) for row in way.rows)
-    return told | {"figures": [[label, value] for label, value in figures.items()]}
+    least = margin_of(result, asked.get("friction") != "off" and bool(rubbing(state.run.system)))["margin_least"]
+    return told | {"figures": [[label, value] for label, value in figures.items()], "margin_least": least}
 
 
 def _solved(state: Loaded, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset | None, dict[str, Any]]:
@@ -179,13 +183,37 @@ def _solved(state: Loaded, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset 
             findings += state.placed(error.findings)
     lacks = missing(Sketch(copy.deepcopy(dict(state.entries or {}))), findings)
     ready = readiness(state.mechanism, result, findings, lacks)
-    return result, {"findings": [_row(finding) for finding in findings], "missing": lacks, "ready": ready}
+    return result, {"findings": [_row(state, one, result) for one in findings], "missing": lacks, "ready": ready}
 
 
-def _row(one: Finding) -> dict[str, Any]:
-    place = one.kind_of_part or spoken(one.where)
-    own = {"severity": one.severity.value, "place": place, "remedy": remedied(one.remedy)}
-    return own | {key: getattr(one, key) for key in ("code", "what", "where", "line")}
+# what positions have that findings speak of
+REACHED = {
+    "friction.interval": Status.ZERO_SLIP, "position.near_singular": Status.NEAR_SINGULAR,
+    "contact.lost": Status.CONTACT_LOST, "friction.not_converged": Status.NOT_CONVERGED,
+    "friction.locked": Status.LOCKED, "load.undefined": Status.LOAD_UNDEFINED,
+    "spring.undefined": Status.LOAD_UNDEFINED, "position.singular": Status.SINGULAR,
+    "assembly.open": Status.NOT_ASSEMBLED,
+}  # fmt: skip
+
+
+def _row(state: Loaded, one: Finding, result: xr.Dataset | None) -> dict[str, Any]:
+    """A finding as the page has it: with the part that it is about, its line, and a position at which it holds."""
+    section, _, names = one.where.replace(" ", ".", 1).partition(".")  # "links coupler, rocker"
+    joint = one.figures.get("decides") or next(iter(one.figures.get("joints") or ()), None)
+    part = f"joints.{joint}" if joint else f"{section}.{names.split(', ')[0]}" if names else one.where
+    index = None
+    if result is not None and len(there := np.flatnonzero(result["status"].values == REACHED.get(one.code, -1))):
+        margins = np.nan_to_num(result["locking_margin"].values[there], nan=np.inf)
+        index = int(there[np.argmin(margins) if one.code == "friction.locked" else 0])
+    return {
+        "severity": one.severity.value,
+        "place": one.kind_of_part or spoken(one.where),
+        "remedy": remedied(one.remedy),
+        "part": part,
+        "line": (one if one.where.startswith(part) else state.placed((replace(one, where=part, line=None),))[0]).line,
+        "index": index,
+        "cures": cures(state, one) if result is not None else [],
+    } | {key: getattr(one, key) for key in ("code", "what", "where")}
 
 
 def _numbers(state: Loaded, drawn: Sketch) -> dict[str, float]:
@@ -211,9 +239,8 @@ def _drag(asked: Asked) -> dict[str, Any]:
     sketch.locked, sketch.fine = set(map(str, asked.get("locked") or ())), float(asked.get("fine") or 0.0)
     point = str(asked["point"])
     changes = {change.path: change for change in sketch.moved(point, to, bool(asked.get("keep")))}  # a number once
-    back = solved_with(
-        state, {path: change.value for path, change in changes.items()}, steps, asked.get("friction") != "off"
-    )
+    values = {path: change.value for path, change in changes.items()}
+    back = solved_with(state, values, steps, asked.get("friction") != "off")
     columns = live_columns(back, steps)
     shown = f"{sketch.joints[point]['links'][1]}.{point}" if point in sketch.joints else point
     track = columns["points"][shown]
@@ -224,7 +251,7 @@ def _drag(asked: Asked) -> dict[str, Any]:
     if not _keeps(sketch, columns["points"], near):  # the crank would turn, and a locked joint with it
         near = index
     head = {"solved": True, "index": near, "changes": _told(sketch, changes.values())}
-    return head | columns | {"margin": live_margin(back, columns["status"], near)}
+    return head | _live(state, back, columns, near, values)
 
 
 def _keeps(sketch: Sketch, points: Mapping[str, Mapping[str, Array]], index: int) -> bool:
@@ -243,7 +270,20 @@ def _try(asked: Asked) -> dict[str, Any]:
     values = {str(path): float(value) for path, value in dict(asked["values"]).items()}
     back = solved_with(state, values, steps, asked.get("friction") != "off")
     columns = live_columns(back, steps)
-    return {"solved": True, "index": index} | columns | {"margin": live_margin(back, columns["status"], index)}
+    return {"solved": True, "index": index} | _live(state, back, columns, index, values)
+
+
+def _live(
+    state: Loaded, back: Backward, columns: dict[str, Any], index: int, values: Mapping[str, float]
+) -> dict[str, Any]:
+    """Columns of a mechanism that is being changed, with its margin and what locks at the position that is shown."""
+    status, locked = columns["status"], {}
+    if status[index] == Status.LOCKED:
+        numbers = state.run.system.mechanism.parameters(values)
+        time = state.run.cycle.times(len(status))[[index]]
+        locked = locks_of(state.run, time, status[index : index + 1], numbers)
+    locks = {joint: float(column[0]) for joint, column in locked.items()}
+    return columns | {"margin": live_margin(back, status, index), "locks": locks}
 
 
 def _told(sketch: Sketch, changes: Iterable[Change]) -> list[list[str]]:
@@ -328,6 +368,12 @@ def _blocks(asked: Asked) -> dict[str, Any]:
     return blocks_of(state.run.system, without_noise(state.motion(steps, friction)))
 
 
+def _margins(asked: Asked) -> dict[str, Any]:
+    """For each block, the ground but not, the locking margin without its friction; none without friction."""
+    state, steps = loaded(str(asked["text"])), _steps(asked)
+    return {"without": margins_without(state.run, steps) if asked.get("friction") != "off" else []}
+
+
 def _curves(asked: Asked) -> dict[str, Any]:
     """Names and units of all columns of the table of a cycle, and those that are wanted, in SI."""
     result = loaded(str(asked["text"])).result(_steps(asked), asked.get("friction") != "off")
@@ -398,8 +444,9 @@ ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "assemblies": _assemblies,
     "layers": _layers,
     "blocks": _blocks,
+    "margins": _margins,
     "curves": _curves,
     "compare": _compare,
     "tolerances": _tolerances,
 }
-BESIDE = (_cycle,)
+BESIDE = (_cycle, _margins)

@@ -1,19 +1,36 @@
-"""The locking margin as the page has it always in view: over the cycle, the least, or why there is none."""
+"""Locking as the page has it always in view: the margin, its least or why there is none, the joints that lock, what
+can be tried against it, and what each block has to do with it.
+"""
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from trunnion.errors import Status
-from trunnion.solve.friction_method import MARGIN
+from trunnion.errors import Finding, Status
+from trunnion.results.attributes import summary_of
+from trunnion.results.figure import MORE_THAN
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.run import Run, prepare
+from trunnion.solve.seating import seating_of
+from trunnion.solve.system import Values, felt, scale_of
+from trunnion.studio.loaded import Loaded
+from trunnion.studio.sketch import Sketch
 from trunnion.views.common.cycle import abscissa, names
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["margin_of"]
+__all__ = ["cures", "locks_of", "margin_of", "margins_without"]
+
+Array = NDArray[np.float64]
+
+ENOUGH = 0.9  # of the friction at which it just runs: what is tried
+MOST_BLOCKS = 24  # each of them takes an analysis
 
 
 def margin_of(result: xr.Dataset, rubs: bool) -> dict[str, Any]:
@@ -21,6 +38,7 @@ def margin_of(result: xr.Dataset, rubs: bool) -> dict[str, Any]:
 
     It is the multiple of the friction at which a position locks: 1 and less where it locks, at most MARGIN; `beyond`:
     it is more everywhere. Positions that cannot be assembled have none, nor has a mechanism whose joints carry nothing.
+    The least is the figure of the cycle where the result has that, else that of the positions.
     """
     margin = np.where(result["status"].values <= Status.LOCKED, result["locking_margin"].values, np.nan)
     reactions = np.concatenate([np.ravel(result[name].values) for name in ("reaction_force", "reaction_moment")])
@@ -38,4 +56,105 @@ def margin_of(result: xr.Dataset, rubs: bool) -> dict[str, Any]:
     index = int(np.flatnonzero(margin == np.nanmin(margin))[0])  # `nanargmin` takes a nan for inf
     beyond, shown = bool(margin[index] > MARGIN), np.minimum(margin, MARGIN)
     least = {"value": float(shown[index]), "beyond": beyond, "at": abscissa(result).say(index)}
+    figure = next((one for one in summary_of(result) if one.name == "locking_margin" and one.value is not None), None)
+    if figure is not None and figure.aspect != MORE_THAN:
+        least = {"value": figure.value, "beyond": False, "at": figure.place.removeprefix("at ")}
     return {"margin": shown, "margin_least": least, "margin_why": None}
+
+
+@np.errstate(all="ignore")
+def locks_of(run: Run, time: Array, status: ArrayLike, values: Values | None = None) -> dict[str, Array]:
+    """Joints that lock at some of the times, with the multiple of the friction at which they do; NaN where they do not.
+
+    It is the joint whose own friction need be lowered the least, and the multiple is of that alone. Where no joint
+    alone can be lowered enough, it is every joint of the group, and the multiple is of all of them.
+    """
+    from trunnion.cycle.locking_course import critical_multiples  # not for the first picture
+
+    lanes = np.flatnonzero(np.asarray(status) == Status.LOCKED)
+    if not len(lanes):
+        return {}
+    method = FrictionMethod(name="newton")
+    seated = run.seats and values is None
+    back = seating_of(run, method).at(time[lanes], method).back if seated else run.solve(time[lanes], values, method)
+    multiples = critical_multiples(back, 1.0)
+    alone = np.array([np.where(multiple < 1.0, multiple, 0.0) for multiple in multiples.values()])
+    columns = {joint: np.full(len(time), np.nan) for joint in multiples}
+    best = np.argmax(alone, axis=0)
+    for number, settled in zip(reversed(range(len(run.system.plan.modules))), back.settled, strict=True):
+        share = np.broadcast_to(np.asarray(settled.share, float), len(lanes))
+        for joint in multiples.keys() & set(run.system.plan.modules[number].joints):
+            row = list(multiples).index(joint)
+            decides = (best == row) & (alone[row] > 0)
+            together = (share < 1.0) & ~(np.max(alone, axis=0) > 0)
+            columns[joint][lanes] = np.where(decides, alone[row], np.where(together, share, np.nan))
+    return {joint: column for joint, column in columns.items() if np.any(np.isfinite(column))}
+
+
+def cures(state: Loaded, finding: Finding) -> list[dict[str, Any]]:
+    """What the remedy of a locked position comes to in numbers: gestures that write it, with the words for them."""
+    figures, entries, numbers = finding.figures, dict(state.entries or {}), state.run.values
+    joints = entries.get("joints")
+    if finding.code != "friction.locked" or not isinstance(joints, Mapping):
+        return []
+    coefficients = {joint: f"joints.{joint}.friction.coefficient" for joint in felt(state.run.system, numbers)}
+    alike = figures["whole"] >= (1 - 1e-3) * figures["share"]  # else other joints lock where these no longer do
+    share = min(figures["share"], figures["whole"])
+    group = list(figures["joints"]) if alike else list(coefficients)
+    trials = [(group, share)]
+    decides, multiple = figures["decides"], figures["multiple"]
+    if decides and multiple and group != [decides]:
+        trials.insert(0, ([decides], multiple))
+    found = []
+    for names_of, times in trials:
+        able = all(coefficients.get(joint) in numbers and isinstance(joints.get(joint), Mapping) for joint in names_of)
+        if not able or not times > 0:
+            continue
+        gestures = []
+        for joint in names_of:
+            before = float(np.ravel(numbers[coefficients[joint]])[0])
+            own = joints[joint].get("friction")
+            whole = own is not None and not isinstance(own, Mapping)
+            path = ["joints", joint, "friction"] if whole else ["joints", joint, "friction", "coefficient"]
+            gestures.append({"do": "set", "path": path, "value": float(f"{ENOUGH * times * before:.3g}")})
+        what = f"friction coefficient{'s' * (len(names_of) > 1)} of {', '.join(names_of)}"
+        values = f"{before:.3g} → {gestures[-1]['value']:.3g}" if len(names_of) == 1 else f"× {ENOUGH * times:.3g}"
+        found.append({"label": f"{what} {values}", "gestures": gestures})
+    return found + [_resized(entries, numbers, decides, key, multiple) for key in SIZES if _sized(state, decides, key)]
+
+
+SIZES = {"pin.radius": ENOUGH, "guide.length": 1.0 / ENOUGH}  # a shorter arm, a longer guide
+
+
+def _sized(state: Loaded, joint: str | None, key: str) -> bool:
+    part = (state.entries or {}).get("joints", {}).get(joint or "", {}).get(key.partition(".")[0], {})
+    return f"joints.{joint}.{key}" in state.run.values and isinstance(part, Mapping)
+
+
+def _resized(entries: dict[str, Any], numbers: Values, joint: str, key: str, multiple: float) -> dict[str, Any]:
+    """The radius or length by which the friction of a joint is as much less as it need be."""
+    sketch, before = Sketch(copy.deepcopy(entries)), float(np.ravel(numbers[f"joints.{joint}.{key}"])[0])
+    times = SIZES[key] * (multiple if key == "pin.radius" else 1.0 / multiple)
+    length = sketch.length(float(f"{times * before:.3g}"))
+    gesture = {"do": "set", "path": ["joints", joint, *key.split(".")], "value": length}
+    return {"label": f"{key.replace('.', ' ')} of {joint} {sketch.length(before)} → {length}", "gestures": [gesture]}
+
+
+def margins_without(run: Run, steps: int) -> list[Array | None]:
+    """For each block the locking margin over the cycle without the friction of its joints; None where a law has no
+    number that takes it away, and of very many blocks.
+    """
+    from trunnion.cycle.positions import positions  # not for the first picture
+
+    modules, mechanism = run.system.plan.modules, run.system.mechanism
+    rubs, found = felt(run.system, run.values), list[Array | None]()
+    for module in modules:
+        scales = {joint: scale_of(run.system, run.values, joint) for joint in module.joints if joint in rubs}
+        if len(modules) > MOST_BLOCKS or not all(scales.values()):
+            found.append(None)
+            continue
+        quiet = mechanism.with_values({f"joints.{joint}.friction.{scale}": 0.0 for joint, scale in scales.items()})
+        with np.errstate(all="ignore"):
+            margin = positions(prepare(quiet), steps, averaged=False).arrays["locking_margin"]
+        found.append(np.minimum(margin, MARGIN))
+    return found

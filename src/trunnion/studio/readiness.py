@@ -64,7 +64,8 @@ def _said(
     free = any(driver.found for driver in mechanism.drivers.values())
     driver = next(iter(mechanism.drivers), "A")
     how = f"In the text give a driver a motor, as drivers: {{{driver}: {{motor: {{kind: constant, effort: 5 N m}}}}}}"
-    yield free, "A motor drives it: see trunnion simulate." if free else f"{how}; trunnion simulate then lets it run."
+    runs = "the study Motion in time lets it run"
+    yield free, f"A motor drives it: {runs}." if free else f"{how}; then {runs}."
 
 
 def _moves(reached: int, count: int) -> str:

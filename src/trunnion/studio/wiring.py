@@ -1,10 +1,10 @@
-"""A mechanism built of blocks: a driver, gears or a dyad, wired to pins that are there or new on the ground."""
+"""A mechanism built of blocks: a driver, gears, a dyad or triad, wired to pins that are there or new on the ground."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from math import hypot
+from math import atan2, cos, hypot, sin
 from typing import Any
 
 import numpy as np
@@ -13,8 +13,8 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, UnitError
 from trunnion.studio.acting import driver, gear
-from trunnion.studio.ends import begin, place_of, refused
-from trunnion.studio.sketch import Sketch, Vector
+from trunnion.studio.ends import begin, letter, line_near, numbered, place_of, point_of, refused
+from trunnion.studio.sketch import Frame, Sketch, Vector
 from trunnion.studio.strokes import link, slide
 
 __all__ = ["block"]
@@ -22,6 +22,10 @@ __all__ = ["block"]
 Given = Mapping[str, Any]
 PLAIN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)")
 APEX = 0.6  # of the distance of its pins, how far off their line the inner pin of an RRR is put
+INNER, TURNED = (
+    0.8,
+    1.4,
+)  # the corners of a triad's plate: its pins, so near to its middle and turned so far about it, rad
 BEYOND = 1.5  # of the distance of its pins, how long the link of an RPR is
 
 
@@ -35,15 +39,15 @@ def block(sketch: Sketch, given: Given) -> str:
     if kind not in BLOCKS:
         raise refused(f"'{kind}' is no block", "the block", f"choose {', '.join(BLOCKS)}")
     begin(sketch)
-    if len(given["pins"]) == 2 and given["pins"][0] == given["pins"][1]:
-        raise refused("has the same pin twice", "the block", "choose two pins")
+    if len(set(map(str, given["pins"]))) < len(given["pins"]):
+        raise refused("has the same pin twice", "the block", "choose other pins")
     if kind == "gear":
         if not all(isinstance(pin, str) for pin in given["pins"]):
             raise refused("need two pivots that are drawn", "the gears", "choose two pins")
         return gear(sketch, {"joints": given["pins"], "ratio": given.get("ratio")})
     pins = [pin if isinstance(pin, str) else {"ground": _place(sketch, pin["ground"])} for pin in given["pins"]]
     BLOCKS[kind](sketch, pins, _place(sketch, given["at"]) if str(given.get("at") or "").strip() else None)
-    return f"Add {'a driver' if kind == 'driver' else kind}"
+    return f"Add {kind if kind.isupper() else f'a {kind}'}"
 
 
 def _place(sketch: Sketch, text: Any) -> Vector:
@@ -107,10 +111,52 @@ def _rpr(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
     slide(sketch, {"joint": pins[1], "along": lever})
 
 
+def _rpp(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
+    """A block on the pin, in a slot of a link that is guided across the slot: towards `at`, or along x."""
+    if not isinstance(pins[0], str):
+        raise refused("carries the block that slides in the slot", "the pin", "choose a pin that is drawn")
+    x, y = place_of(sketch, pins[0])
+    a, b = at or (x + max(sketch.size, 0.04), y)
+    angle, half = atan2(b - y, a - x), max(sketch.size, 0.04)
+    across = (-half * sin(angle), half * cos(angle))
+    yoke = _bar(sketch, [x - across[0], y - across[1]], [x + across[0], y + across[1]])
+    slide(sketch, {"joint": pins[0], "along": yoke, "near": half})
+    slide(sketch, {"joint": {"on": yoke, "at": [a, b]}, "angle": angle})
+
+
+def _prp(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
+    """A pin between a block that slides along the link of the pin that is given, and one in a guide on the ground."""
+    link_of, _ = point_of(sketch, pins[0])
+    if link_of == sketch.ground:
+        raise refused("is on no link that moves", "the pin", "choose a pin of the link along which it slides")
+    spots = [sketch.places[f"{link_of}.{point}"] for point in sketch.points(link_of)]
+    x, y = at or (sum(spot[0] for spot in spots) / len(spots), sum(spot[1] for spot in spots) / len(spots))
+    c, s = line_near(sketch, link_of, (x, y)).direction
+    slider, point, angle = numbered(sketch, "links", "block"), letter(sketch), atan2(c, -s)  # across the link
+    sketch.section("links")[slider] = {"points": {point: [0, 0]}}
+    sketch.show(slider, Frame(x, y, cos(angle), sin(angle)))
+    slide(sketch, {"joint": {"on": slider, "at": [x, y]}, "angle": angle})
+    slide(sketch, {"joint": f"{slider}.{point}", "along": link_of})
+
+
+def _triad(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
+    """A group of class III: a link with three pins on three rods."""
+    spots = [place_of(sketch, pin) for pin in pins]
+    x, y = at or (sum(spot[0] for spot in spots) / 3, sum(spot[1] for spot in spots) / 3)
+    c, s = INNER * cos(TURNED), INNER * sin(TURNED)
+    corners = [[x + c * (a - x) - s * (b - y), y + s * (a - x) + c * (b - y)] for a, b in spots]
+    first, second = (_bar(sketch, pin, corner) for pin, corner in zip(pins[:2], corners, strict=False))
+    plate = _bar(sketch, _end(sketch, first), _end(sketch, second))
+    _bar(sketch, pins[2], {"on": plate, "at": corners[2]})
+
+
 BLOCKS: dict[str, Callable[[Sketch, list[Any], Vector | None], None]] = {
     "driver": _crank,
     "RRR": _rrr,
     "RRP": _rrp,
     "RPR": _rpr,
+    "PRP": _prp,
+    "RPP": _rpp,
+    "triad": _triad,
     "gear": lambda *_: None,
 }

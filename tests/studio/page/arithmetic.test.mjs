@@ -76,7 +76,9 @@ assert.equal(fields.numberOf("r / 3"), null);
 assert.equal(fields.numberOf("2 * AB"), null);
 const rows = fields.rowsOf({ links: { ground: {}, bar: { points: { A: [0, "L"] }, mass: "2 kg" } } }, "links", "bar");
 assert.deepEqual(fields.rowsOf({ links: { ground: { mass: "2 kg" } } }, "links", "ground").map(({ label }) => label), ["mass"]);
-assert.deepEqual(rows.map(({ label, value }) => [label, value]), [["A", ["0", "L"]], ["mass", "2 kg"], ["inertia", null], ["centre", null]]);
+assert.deepEqual(rows.map(({ label, value }) => [label, value]), [["point A", ["0", "L"]], ["mass", "2 kg"], ["moment of inertia", null], ["mass centre", null]]);
+const plain = fields.rowsOf({ links: { ground: {}, bar: { mass: 2, centre: [0, 0.03] } } }, "links", "bar").map(({ label }) => label);
+assert.deepEqual(plain, ["mass, kg", "moment of inertia", "mass centre, m"]); // a number without a unit is in SI
 const found = [{ where: "links.bar.mass" }, { where: "links.barrel" }, { where: null }];
 assert.equal(fields.findingsOf(found, ["links", "bar"]).length, 1);
 assert.deepEqual(fields.partOf({ where: "links.bar.mass" }, { links: { bar: {} } }), { kind: "links", name: "bar" });

@@ -1,11 +1,12 @@
 // The page: bars, sheet or space, player, and the panel at the right.
 
+import { computed } from "@preact/signals";
 import { discard, save, takeWaiting } from "./actions.js";
 import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
 import { Blocks, Formula } from "./blocks.js";
 import { Bounded, Failures } from "./boundary.js";
 import { Dialogs } from "./dialogs.js";
-import { Findings } from "./findings.js";
+import { Findings, jump } from "./findings.js";
 import { Motion } from "./motion.js";
 import { Plots } from "./plots.js";
 import { Properties } from "./properties.js";
@@ -14,7 +15,7 @@ import { Space } from "./space.js";
 import { Stage } from "./stage.js";
 import * as state from "./state.js";
 import { Text } from "./text.js";
-import { choose } from "./tools.js";
+import { choose, pointer } from "./tools.js";
 import { Button, focusOn, html } from "./ui.js";
 
 const TOP = 140; // px, where messages stand
@@ -79,6 +80,12 @@ function Panel() {
   </aside>`; // prettier-ignore
 }
 
+/** Whether the hand is where messages stand: then they make room for it. */
+const low = computed(() => {
+  const at = state.live.value?.to ?? (state.tool.value === "select" ? null : pointer.value?.spot.at);
+  return Boolean(at && sheet.view && sheet.view.frame.to(at)[1] < TOP);
+});
+
 /** Recovered work, and in a sentence why it does not move. */
 function Messages() {
   const time = state.recovered.value;
@@ -86,8 +93,7 @@ function Messages() {
   const lacks = state.tool.value === "select" ? state.missing.value : [];
   const clock = (one) => new Date(one).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
   const waiting = state.waiting.value;
-  const held = state.live.value?.to; // what is written makes room for the hand
-  const below = held && sheet.view?.frame.to(held)[1] < TOP;
+  const below = low.value;
   return html`<div class=${below ? "messages below" : "messages"}>
     <${Hint} />
     <${Failures} />
@@ -98,7 +104,7 @@ function Messages() {
     ${waiting && html`<div class="message-card">${waiting.name ? `Unsaved work on ${waiting.name}` : "A sheet that was not saved"} is left from ${clock(waiting.time)}.
       <${Button} label="Open it" onClick=${() => takeWaiting(true)} /> <${Button} label="Throw it away" onClick=${() => takeWaiting(false)} /></div>`}
     ${lacks.length > 0 && html`<div class="message-card">${lacks.join(" ")}</div>`}
-    ${wrong.length > 0 && html`<button type="button" class="message-card bad" title="Point at it for the whole; click it for all findings" onClick=${() => (state.tab.value = "findings")}>
+    ${wrong.length > 0 && html`<button type="button" class="message-card bad" title="Point at it for the whole; click it to see where, and what to do" onClick=${() => (jump(wrong[0]), (state.tab.value = "findings"))}>
       <b>${wrong[0].place}</b> ${wrong[0].what}${wrong[0].remedy ? ` — ${wrong[0].remedy}` : ""}${wrong.length > 1 ? ` (and ${wrong.length - 1} more)` : ""}${state.answer.value?.bare ? "; until then it is shown without friction" : ""}</button>`}
   </div>`; // prettier-ignore
 }

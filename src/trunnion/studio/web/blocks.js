@@ -15,6 +15,7 @@ import { html } from "./ui.js";
 
 const NODE = { width: 138, height: 46 };
 const WIDEST = 8; // px, of the wire with the largest force; others by the root of theirs
+const BEYOND = 10; // times the friction: a margin is looked for so far
 const NAMES = { ground: "Ground", driver: "Driver" };
 
 /** Answer to the latest `blocks` question, with the scene it is for; or null. */
@@ -37,7 +38,7 @@ export function keepBlocks() {
     const wanted = state.tab.value === "blocks" || chosen.value !== null;
     untracked(() => {
       if (wired.value?.scene !== scene) wired.value = null;
-      if (scene && wanted && !wired.value) askOf("blocks", {}).then((found) => found && (wired.value = { ...found, scene }));
+      if (scene && wanted && !wired.value) askOf("blocks", {}).then((found) => found && takeIn({ ...found, scene }));
     });
   });
   effect(() => {
@@ -52,6 +53,20 @@ export function keepBlocks() {
     state.index.value; // the sheet may have been drawn anew
     for (const node of sheet.view?.root.querySelectorAll("g[data-kind=links]") ?? []) node.classList.toggle("of-block", parts.links.includes(node.dataset.name));
   });
+}
+
+/** Show the blocks, and what they have to do with the locking margin once that is worked out. */
+async function takeIn(found) {
+  wired.value = found;
+  if (!state.answer.value.margin) return;
+  const more = await askOf("margins", {});
+  if (more && wired.value === found) wired.value = { ...found, without: more.without };
+}
+
+/** Of a block at a position: the locking margin, and that without the friction of the block; null where there is none. */
+function marginsOf(found, order, index) {
+  const [all, without] = [state.answer.value?.margin?.[index], found?.without?.[order - 1]?.[index]];
+  return all === undefined || all === null || without === undefined || without === null ? null : { all, without };
 }
 
 /** The structural formula over the sheet: each of its terms lights its block. */
@@ -75,6 +90,7 @@ export function Blocks() {
   return html`<div class="blocks">
     ${!state.solved.value && html`<p class="calm">Blocks appear as soon as the mechanism is solved.</p>`}
     <div ref=${holder}></div>
+    ${wired.value?.without && html`<p class="calm bars-of-blocks"><span class="of-power">▬</span> share of the friction power <span class="of-locking">▬</span> by which the locking margin is less for the friction of the block</p>`}
     ${wired.value && html`<${Values} found=${wired.value} />`}
     ${!state.spatial.value && html`<${Palette} />`}
   </div>`;
@@ -91,19 +107,28 @@ function drawn(holder, found) {
   layout(graph);
   const { width, height } = graph.graph();
   const root = svg("svg", { class: "wiring", viewBox: `0 0 ${width} ${height}`, style: `width: ${width}px`, role: "group", "aria-label": "Blocks of the mechanism and their wires" });
-  const wires = found.wires.map(({ from, to, joint }) => wireOf(graph.edge(String(from), String(to), joint), joint));
+  const wires = found.wires.map((wire) => wireOf(graph.edge(String(wire.from), String(wire.to), wire.joint), wire));
   const nodes = found.blocks.map((block, order) => nodeOf(graph.node(String(order)), block, order, found));
   root.append(...wires.map(({ element }) => element), ...nodes);
   holder.replaceChildren(root);
   posed(holder, found, state.index.peek(), chosen.peek());
 }
 
-function wireOf({ points, x, y }, joint) {
+function wireOf({ points, x, y }, { joint, links }) {
   const d = `M${points.map((one) => `${one.x.toFixed(1)},${one.y.toFixed(1)}`).join("L")}`;
   const load = svg("path", { class: "load", d, pathLength: 100 });
   const line = svg("path", { class: "line", d });
   const label = svg("text", { x, y: y + 4, class: "pin" }, joint);
-  return { element: svg("g", { class: "wire", "data-joint": joint }, load, line, svg("rect", { x: x - 12, y: y - 8, width: 24, height: 16, rx: 4 }), label) };
+  const element = svg("g", { class: "wire", "data-joint": joint, tabindex: 0, role: "button", "aria-label": `Wire ${joint} from ${links[0]} to ${links[1]}` }, load, line, svg("rect", { x: x - 12, y: y - 8, width: 24, height: 16, rx: 4 }), label);
+  const take = () => (state.selection.value = { kind: "joints", name: joint });
+  element.addEventListener("click", take);
+  element.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter" && event.key !== " ") return;
+    take();
+    event.preventDefault();
+    event.stopPropagation();
+  });
+  return { element };
 }
 
 function nodeOf({ x, y }, block, order, found) {
@@ -116,7 +141,8 @@ function nodeOf({ x, y }, block, order, found) {
     svg("rect", { x: left, y: top, width, height, rx: 6 }),
     svg("text", { x, y: top + 18, class: "kind" }, title),
     svg("text", { x, y: top + 34, class: "of" }, shortened(block.links.join(", "))),
-    svg("rect", { class: "share", x: left, y: top + height - 4, width: 0, height: 4 })); // prettier-ignore
+    svg("rect", { class: "share", x: left, y: top + height - 4, width: 0, height: 4 }),
+    svg("rect", { class: "locking", x: left, y: top, width: 0, height: 4 })); // prettier-ignore
   const take = () => (chosen.value = chosen.value === order ? null : order);
   node.addEventListener("click", take);
   node.addEventListener("keydown", (event) => {
@@ -157,7 +183,9 @@ function posed(holder, found, index, block) {
     const node = root.querySelector(`[data-block="${order}"]`);
     node.classList.toggle("chosen", order === block);
     node.setAttribute("aria-pressed", String(order === block));
+    const margins = marginsOf(found, order, index);
     set(node.querySelector(".share"), { width: share?.[index] ? (NODE.width * share[index]).toFixed(1) : 0 });
+    set(node.querySelector(".locking"), { width: margins ? (NODE.width * Math.max(1 - margins.all / margins.without, 0)).toFixed(1) : 0 });
   });
 }
 
@@ -168,6 +196,8 @@ function Values({ found }) {
   const wires = found.wires.filter(({ from, to }) => order === null || from === order || to === order);
   const block = found.blocks[order];
   const share = block?.share?.[index];
+  const margins = marginsOf(found, order, index);
+  const upTo = (value) => (value >= BEYOND ? `> ${BEYOND}` : number(value, 3));
   const units = found.scene.units;
   const vector = (parts, unit) => (parts ? Object.values(parts).map((one) => quantity(one[index], unit, undefined, units)).join(", ") : "—");
   const amount = (part, unit) => (part === undefined ? "—" : Array.isArray(part) ? quantity(part[index], unit, undefined, units) : vector(part, unit));
@@ -179,6 +209,7 @@ function Values({ found }) {
   return html`<section class="passing" aria-label="What passes the wires">
     <h2>${block ? block.label : "All wires"}</h2>
     ${block && html`<p class="calm">${block.links.join(", ")}${share === null || share === undefined ? "" : `; ${number(100 * share, 3)} % of the friction power`}</p>`}
+    ${margins && html`<p class="calm">Locking margin here ${upTo(margins.all)}; without the friction of this block ${upTo(margins.without)}.</p>`}
     <div class="scrolls"><table>
       <thead><tr><th>pin</th><th>forward</th><th>back</th></tr></thead>
       <tbody>${wires.map((wire) => html`<tr><th>${wire.joint}<br /><span class="calm">${goes(wire)}</span></th>
@@ -195,6 +226,9 @@ const KINDS = {
   RRR: { label: "RRR: two links between two pins", pins: 2 },
   RRP: { label: "RRP: a rod and a slider on the ground", pins: 1 },
   RPR: { label: "RPR: a slider along a link, between two pins", pins: 2 },
+  PRP: { label: "PRP: a pin between a link and a guide", pins: 1 },
+  RPP: { label: "RPP: a pin in the slot of a guided link", pins: 1 },
+  triad: { label: "Class III: a plate on three rods", pins: 3 },
   gear: { label: "Gears of two pivots", pins: 2 },
 };
 
@@ -212,8 +246,8 @@ function pinsOf() {
 /** A block of the list, its pins chosen or typed, becomes links and joints of the drawing. */
 function Palette() {
   const [kind, setKind] = useState("driver");
-  const [pins, setPins] = useState(["", ""]);
-  const [typed, setTyped] = useState({ ground: ["0 mm, 0 mm", "100 mm, 0 mm"], at: "", ratio: "20:40" });
+  const [pins, setPins] = useState(["", "", ""]);
+  const [typed, setTyped] = useState({ ground: ["0 mm, 0 mm", "100 mm, 0 mm", "100 mm, 100 mm"], at: "", ratio: "20:40" });
   const choices = pinsOf();
   const there = (order) => (choices.some(({ value }) => value === pins[order]) ? pins[order] : ""); // it may be gone
   const { pins: count } = KINDS[kind];
@@ -226,7 +260,7 @@ function Palette() {
     setTyped({ ...typed, at: "" });
     sheet.fit();
   };
-  const inner = kind === "driver" || kind === "RPR" ? "End at" : "Inner pin at";
+  const inner = { driver: "End at", RPR: "End at", RPP: "Guide at", triad: "Middle at" }[kind] ?? "Inner pin at";
   return html`<form class="palette" aria-label="Add a block" onSubmit=${place}>
     <h2>Add a block</h2>
     <label>Block <select aria-label="Kind of block" value=${kind} onChange=${(event) => (setKind(event.target.value), setTyped({ ...typed, at: "" }))}>${Object.entries(KINDS).map(([name, { label }]) => html`<option value=${name}>${label}</option>`)}</select></label>

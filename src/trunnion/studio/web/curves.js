@@ -3,6 +3,7 @@
 import { effect, signal, untracked } from "@preact/signals";
 import { lineChart } from "../web/chart.js";
 import { full } from "../web/data.js";
+import { framed } from "./layers.js";
 import { askOf } from "./actions.js";
 import { crank } from "./motion.js";
 import * as state from "./state.js";
@@ -46,7 +47,7 @@ export function chosenCharts({ scene }) {
       label: name, kind: `k${order % 8}`, values: across ? values.map((value, index) => (along[index] === null ? null : value)) : values,
     })); // prettier-ignore
     const title = series.length === 1 ? series[0].label : `${series.length} curves`;
-    return lineChart(across ? { ...scene, abscissa, status: scene.status.map(() => 0), motion: null } : scene, { title, unit, series, pick: crank.pick });
+    return lineChart(across ? { ...framed(scene), abscissa, status: scene.status.map(() => 0), motion: null } : framed(scene), { title, unit, series, pick: crank.pick });
   });
 }
 

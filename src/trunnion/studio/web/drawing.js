@@ -83,6 +83,17 @@ function drawGrid({ frame, layers, shown }) {
   );
 }
 
+const NOUNS = { links: "Link", loads: "Load", springs: "Spring", gears: "Gear pair" };
+const REACHED = 400; // parts that keys go through; of more the list under Properties chooses
+const PARTS = "g.body[data-kind], .parts g[data-kind]"; // those that are a part by themselves
+
+/** Links, loads, springs and gears that Tab reaches; what was in focus stays so. */
+function reachable({ root }, focused) {
+  const nodes = [...root.querySelectorAll(PARTS)].slice(0, REACHED);
+  for (const node of nodes) set(node, { tabindex: 0, role: "button", "aria-label": `${NOUNS[node.dataset.kind]} ${node.dataset.name}` });
+  if (focused) nodes.find(({ dataset }) => dataset.kind === focused.kind && dataset.name === focused.name)?.focus();
+}
+
 /** Build the parts of a scene. `kinds`: class of the colour of each joint. */
 export function build(view, scene, kinds) {
   Object.assign(view, { scene, kinds, index: Math.min(view.index, scene.count - 1) });
@@ -93,7 +104,9 @@ export function build(view, scene, kinds) {
     paths.push(svg(paths[0].tagName, { class: "wide" })); // what a pointer hits
     node.append(paths[1]);
   }
-  const { layers, parts } = view;
+  const { layers, parts, root } = view;
+  const active = document.activeElement;
+  const focused = active instanceof SVGElement && root.contains(active) && active.matches(PARTS) ? { ...active.dataset } : null;
   const fill = (layer, ...names) => layers[layer].replaceChildren(...names.flatMap((name) => parts[name].map((one) => one.node)));
   fill("ground", "supports", "guides");
   fill("bodies", "bodies", "slots", "cylinders");
@@ -101,6 +114,7 @@ export function build(view, scene, kinds) {
   fill("vectors", "vectors");
   fill("names", "names");
   layers.parts.append(...(view.plain ?? []));
+  reachable(view, focused);
   view.usual = sizesOf(scene, forcesOf(scene)).usual;
   drawTracks(view);
   reframe(view, view.frame);

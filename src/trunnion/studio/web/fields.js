@@ -47,7 +47,7 @@ export function rowsOf(entries, kind, name) {
   const ways = usual.map(([way]) => [...from, ...way.split(".")]);
   const order = ({ path }) => ways.findIndex((way) => starts(way, path) || starts(path, way));
   const rows = [...there, ...missing].sort((a, b) => order(a) - order(b)); // a row stays where it is when it is filled
-  return rows.map((row) => ({ ...row, label: row.label ?? labelOf(row.path.slice(from.length)), choices: choicesOf(kind, row.path[2], part, entries) }));
+  return rows.map((row) => ({ ...row, label: row.label ?? labelOf(row.path.slice(from.length), row.value), choices: choicesOf(kind, row.path[2], part, entries) }));
 }
 
 function usualOf(kind, part, fixed) {
@@ -100,9 +100,30 @@ function starts(path, other) {
   return other.length <= path.length && other.every((key, order) => path[order] === key);
 }
 
-function labelOf(path) {
-  const words = path.filter((key) => key !== "points" && key !== "joint_defaults").join(" ").replaceAll("_", " ");
-  return path[0] === "joint_defaults" ? `${words} of all joints` : words;
+/** Keys of the file whose words alone do not say what they are. */
+const WORDS = {
+  inertia: "moment of inertia", inertia_about: "inertia about", centre: "mass centre", only: "acts", useful: "counts as useful", link: "on link", joint: "at joint", between: "from … to",
+  speed: "speed of the drive", range: "range of the drive", start: "start of the drive", moves: "moves joint", free_length: "length without force",
+}; // prettier-ignore
+/** SI units of numbers that the file has without one. */
+const SI = {
+  mass: "kg", inertia: "kg m²", centre: "m", force: "N", moment: "N m", resisting_force: "N", resisting_torque: "N m", stiffness: "N/m", free_length: "m", preload: "N", gravity: "m/s²",
+  radius: "m", length: "m", clearance: "m", bearing: "m", offset: "m", lead: "m", damping: "N s/m",
+}; // prettier-ignore
+
+function labelOf(path, value) {
+  const names = path.filter((key) => key !== "joint_defaults").map((key) => (key === "points" ? "point" : key));
+  const words = names.map((key) => WORDS[key] ?? String(key).replaceAll("_", " ")).join(" ");
+  const unit = value !== null && [value].flat().some((one) => bare(one)) ? SI[names[names.length - 1]] : null;
+  const whole = path[0] === "friction" && path.length === 1 ? "friction coefficient" : words;
+  return `${whole}${path[0] === "joint_defaults" ? " of all joints" : ""}${unit ? `, ${unit}` : ""}`;
+}
+
+/** What a part of a list is: x and y of a place or a vector, from and to of a range. */
+export function partOfList(path, order) {
+  const last = path[path.length - 1];
+  if (last === "range" || last === "between") return ["from", "to"][order];
+  return ["force", "centre", "gravity", "at", "axis"].includes(last) || path[2] === "points" ? "xyz"[order] : `part ${order + 1}`;
 }
 
 /** Typed letters with decimal points for decimal commas; "1,000", which may be a thousand, stays as it is. */
@@ -160,7 +181,7 @@ export function isPart({ entries, scene }, { kind, name }) {
 }
 
 /** The part that a finding is about, {kind, name}, or null. */
-export function partOf({ where }, entries) {
-  const [kind, name] = String(where ?? "").split(".");
+export function partOf({ where, part }, entries) {
+  const [kind, name] = String(part ?? where ?? "").split(".");
   return kind in USUAL && kind !== "slides" && dictionary(entries?.[kind])[name] !== undefined ? { kind, name } : null;
 }

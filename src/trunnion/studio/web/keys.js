@@ -1,5 +1,6 @@
 // The keyboard alone can do all that the mouse can: a cross on the sheet, joints moved by arrows, a letter for each tool.
 
+import { place } from "../web/data.js";
 import * as actions from "./actions.js";
 import { partUnder } from "./hand.js";
 import { crank } from "./motion.js";
@@ -113,12 +114,20 @@ function enter({ target, shiftKey: shift }) {
     requestAnimationFrame(() => focusOn(".properties input"));
     return true;
   }
-  const spot = part ? sheet.spots().find(({ kind, name }) => kind === part.kind && name === part.name) : crossed();
+  const spot = (part && sheet.spots().find(({ kind, name }) => kind === part.kind && name === part.name)) ?? (part?.kind === "links" ? middleOf(part) : crossed());
   if (!spot) return true;
-  const under = partsAt(spot.at);
+  const under = part?.kind === "links" ? [part] : partsAt(spot.at);
   const link = under.find(({ kind }) => kind === "links");
   click(spot, { shift, part: link ?? under[0] ?? null });
   return true;
+}
+
+/** The middle of a link in focus, as a spot on it. */
+function middleOf(part) {
+  const { scene, posed } = sheet.view;
+  const spots = scene.links.find(({ name }) => name === part.name).points.map((key) => place(scene, key, posed)).filter(Boolean);
+  const middle = [0, 1].map((axis) => spots.reduce((sum, spot) => sum + spot[axis], 0) / spots.length);
+  return { ...sheet.snapOn(middle, true, part, 0), at: middle };
 }
 
 /** What the cross is at by now. */

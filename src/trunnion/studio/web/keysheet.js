@@ -7,17 +7,17 @@ import { html } from "./ui.js";
 const KEYS = [
   ["Tools", TOOLS.map(({ key, label }) => [key, label])],
   [
-    "On the sheet (Tab brings it and its joints into focus)",
+    "On the sheet (Tab brings it, its links and joints into focus)",
     [
       ["← → ↑ ↓", "move the cross by a step of the grid, with Shift ten, with Alt a tenth; a joint in focus moves"],
-      ["Enter", "use the tool at the cross or the joint; with Select, open its properties"],
+      ["Enter", "use the tool at the cross, joint or link; with Select, open its properties"],
       ["Shift Enter", "draw an end and pin it to the ground"],
       ["0–9 …", "while drawing: a length, angle, force or ratio, then Enter"],
       ["Delete", "delete what is chosen"],
       ["Escape", "leave off what was begun"],
     ],
   ],
-  ["Motion", [["Space", "play or pause"], [", .", "one position back or on"]]],
+  ["Motion", [["Space", "play or pause"], [", .", "one position back or on; ← → on a curve, with Shift ten"]]],
   ["View", [["+ −", "zoom"], ["0", "show all"]]],
   ["Everywhere", [["Ctrl Z, Ctrl Shift Z", "undo, redo"], ["Ctrl S, Ctrl O", "save, open"], ["↓ ↑", "go through an open menu"], ["?", "this list"]]],
 ]; // prettier-ignore

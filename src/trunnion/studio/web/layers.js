@@ -19,7 +19,11 @@ export const LAYERS = [
   ["names", "Names"],
   ["grid", "Grid"],
   ["others", "Other assemblies"],
+  ["peaks", "Whole peaks in plots"],
 ];
+
+/** A scene for charts, which cut peaks near dead centres unless they are wanted whole. */
+export const framed = (scene) => (state.layers.value.peaks ? { ...scene, ease: [] } : { ...scene, whole: "choose Show, Whole peaks in plots." });
 
 /** {link, at, index}: the place on a link that was clicked and the position it was clicked at, or null. */
 export const clicked = signal(null);

@@ -17,6 +17,7 @@ const CIRCLE = 12; // px: smaller friction circles are drawn enlarged
 const ROOM = 26; // px between the frame and what points out of it
 const LETTER = 7; // px, its width in what is written
 const LINE = 15; // px, its height
+const RING = 14; // px, radius of the ring of a joint that locks
 const NOTHING = 1e-9; // of the largest force: less is rounding
 const VECTORS = [["velocity", "v", "m/s"], ["acceleration", "a", "m/s²"]];
 
@@ -49,6 +50,7 @@ export function poseOverlay(view) {
     ...(told.centres ? centres(view, told.centres, wanted) : []),
     ...(known && wanted.reactions && wanted.values ? values(view) : []),
     ...(told.point ? motion(view, told.point, wanted, key) : []),
+    ...locking(view),
     ...key.map((draw, order) => draw(view.frame.height - 16 - 20 * (order + 1))),
   );
 }
@@ -179,6 +181,22 @@ function circles(view, list, key) {
     const [ux, uy] = [(64 * fx) / force, (-64 * fy) / force];
     const line = svg("path", { class: "line-of-action", d: `M${tx - ux},${ty - uy}L${tx + ux},${ty + uy}` });
     return [line, circle, told];
+  });
+}
+
+// ---- locking ----------------------------------------------------------------------------------------------------------
+
+/** Joints that lock at the position that is shown, ringed, and the multiple of their friction at which they do. */
+function locking({ frame, scene, posed, drawn }) {
+  const live = state.live.peek();
+  const locks = (live ?? (state.solved.peek() ? state.answer.peek() : null))?.locks ?? {};
+  return Object.entries(locks).flatMap(([name, multiple]) => {
+    const most = live ? multiple : multiple[posed];
+    const found = place(scene, scene.joints.find((one) => one.name === name)?.at, drawn);
+    if (!found || most === null || most === undefined) return [];
+    const [x, y] = frame.to(found);
+    const told = words(x + RING + 6, y - RING - 2, `${name} locks: it runs up to ${most.toPrecision(2)} times its friction`, "of-lock");
+    return [svg("circle", { class: "lock-ring", cx: x.toFixed(1), cy: y.toFixed(1), r: RING }), told];
   });
 }
 

@@ -9,7 +9,7 @@ import { polarChart } from "../web/polar.js";
 import { charts } from "../web/report.js";
 import { edit } from "./actions.js";
 import { chosenCharts, Choice } from "./curves.js";
-import { clicked, laid } from "./layers.js";
+import { clicked, framed, laid } from "./layers.js";
 import { crank } from "./motion.js";
 import { kindsOf } from "./sheet.js";
 import * as state from "./state.js";
@@ -54,6 +54,7 @@ function Curves({ class: kind, listOf }) {
         const others = compared.value.filter((one) => one.scene && one.scene.count === found?.scene.count);
         list = found ? listOf(found, others) : [];
         last = (found?.scene.count ?? 1) - 1;
+        list.forEach(({ element }) => Object.assign(element, { tabIndex: 0, ariaLabel: `${element.querySelector(".title").textContent}, curves over the drive: the arrow keys move the position` }));
         box.replaceChildren(...list.map((chart) => chart.element));
         untracked(() => follow(state.index.value));
       }),
@@ -61,7 +62,19 @@ function Curves({ class: kind, listOf }) {
     ];
     return () => stop.forEach((end) => end());
   }, []);
-  return html`<div class=${kind} ref=${holder} onPointerLeave=${({ pointerType }) => pointerType === "mouse" && crank.leave()}></div>`;
+  return html`<div class=${kind} ref=${holder} onKeyDown=${stepOn} onPointerLeave=${({ pointerType }) => pointerType === "mouse" && crank.leave()}></div>`;
+}
+
+/** Arrows on a chart in focus move the mechanism, with Shift by ten, and its values are said. */
+function stepOn(event) {
+  const chart = event.target.closest(".chart");
+  const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+  if (!by || !chart) return;
+  event.preventDefault();
+  event.stopPropagation();
+  crank.go(state.index.peek() + by * (event.shiftKey ? 10 : 1));
+  const values = [...chart.querySelectorAll(".legend li")].map(({ children }) => [...children].map((one) => one.textContent).join(" ").trim());
+  state.say(`${position(state.answer.value.scene, state.index.peek())}: ${values.join(", ")} ${chart.querySelector(".unit").textContent}`);
 }
 
 /** Charts of the answer with those of the variants laid over, and of the chosen point. */
@@ -76,7 +89,7 @@ function curves(found, others) {
   });
   return list
     .filter((one) => !one.only || one.series.length > 1)
-    .map((one) => lineChart(scene, { ...one, pick: crank.pick }));
+    .map((one) => lineChart(framed(scene), { ...one, pick: crank.pick }));
 }
 
 function listed({ scene, margin, margin_least: least }) {
@@ -166,7 +179,7 @@ function loops({ scene }, others) {
   const [other] = others;
   return scene.joints.slice(0, MOST).map((joint) => {
     const ideal = other?.scene.joints.find(({ name }) => name === joint.name)?.reaction ?? null;
-    const chart = polarChart(scene, { ...joint, ideal }, kinds.get(joint.name), crank.pick, seen);
+    const chart = polarChart(framed(scene), { ...joint, ideal }, kinds.get(joint.name), crank.pick, seen);
     if (ideal) chart.element.append(Object.assign(document.createElement("p"), { className: "remark", textContent: `Dashed: ${other.name}` }));
     return chart;
   });

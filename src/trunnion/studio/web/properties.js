@@ -3,7 +3,7 @@
 import { useRef, useState } from "preact/hooks";
 import { changed, edit, newest, setValue } from "./actions.js";
 import { AddDimension } from "./adding.js";
-import { ambiguous, bare, findingsOf, numberOf, rowsOf, unitOf, usualUnit, written } from "./fields.js";
+import { ambiguous, bare, findingsOf, numberOf, partOfList, rowsOf, unitOf, usualUnit, written } from "./fields.js";
 import { dictionary, groundOf } from "./geometry.js";
 import { others, takeOther } from "./ghosts.js";
 import * as state from "./state.js";
@@ -97,7 +97,7 @@ function Row({ row, findings }) {
   const wrong = findingsOf(findings, path).filter(({ severity }) => severity !== "note");
   const id = `value-${path.join("-")}`;
   const list = Array.isArray(value ?? example);
-  if (fixed) return html`<div class="row"><span class="label">${label}</span><span class="fixed">${list ? value.join(", ") : value}</span></div>`;
+  if (fixed) return html`<div class="row"><span class="label" title=${path.join(".")}>${label}</span><span class="fixed">${list ? value.join(", ") : value}</span></div>`;
   if (choices)
     return html`<div class="row"><label class="label" for=${`${id}-0`}>${label}</label><span class="values">
       <select id=${`${id}-0`} value=${value ?? ""} onChange=${({ target }) => setValue(path, { "": null, true: true, false: false }[target.value] ?? (target.value || null))}>
@@ -111,10 +111,10 @@ function Row({ row, findings }) {
     if (why || !(await take(row, parts, list, order, target.value, units.get(`${id}-${order}`)))) target.value = parts[order];
   };
   return html`<div class="row">
-    <label class="label" for=${`${id}-0`}>${label}</label>
+    <label class="label" for=${`${id}-0`} title=${`In the file: ${path.join(".")}`}>${label}</label>
     <span class="values">
       ${parts.map((one, order) => html`<input key=${order} id=${`${id}-${order}`} value=${one} style=${`--wide: ${String(one).length > ROOMY ? String(one).length + 3 : 0}ch`} placeholder=${common ? `${common}, as all joints` : example && `e.g. ${list ? example[order] : example}`}
-        aria-label=${list ? `${label}, part ${order + 1}` : label} aria-invalid=${wrong.length > 0} title=${String(one).length > LONG ? one : hintOf(units.get(`${id}-${order}`))}
+        aria-label=${list ? `${label}, ${partOfList(path, order)}` : label} aria-invalid=${wrong.length > 0} title=${String(one).length > LONG ? one : hintOf(units.get(`${id}-${order}`))}
         aria-describedby=${wrong.length ? `${id}-wrong` : null} onChange=${put(order)} spellcheck=${false} />`)}
     </span>
     ${wrong.length > 0 && html`<p class="wrong" id=${`${id}-wrong`}>${wrong.map(({ what, remedy }) => `${what}${remedy ? ` — ${remedy}` : ""}`).join("; ")}</p>`}

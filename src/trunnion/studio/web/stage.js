@@ -25,7 +25,7 @@ function mount(holder) {
   const root = svg("svg", {
     tabindex: 0,
     role: "application",
-    "aria-label": "Sheet with the mechanism. Tab goes through its joints; arrow keys move the cross, Enter uses the tool there; a question mark lists the keys.",
+    "aria-label": "Sheet with the mechanism. Tab goes through its links and joints; arrow keys move the cross, Enter uses the tool there; a question mark lists the keys.",
   });
   holder.append(root);
   const view = drawing(root);

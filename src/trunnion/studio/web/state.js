@@ -48,10 +48,12 @@ export const future = signal([]);
 export const friction = signal("stated");
 export const layers = signal({
   curves: true, reactions: true, values: false, velocity: true, acceleration: true, centres: false, relative: false, circles: false,
-  transmission: false, variant: true, names: true, grid: true, others: false,
+  transmission: false, variant: true, names: true, grid: true, others: false, peaks: false,
 }); // prettier-ignore
 export const snapping = signal(true);
 export const tab = signal("properties");
+/** A line of the file that is to be shown, or null. */
+export const line = signal(null);
 export const dialog = signal(null);
 /** {words, bad}: the latest remark, said to screen readers too. */
 export const notice = signal({ words: "", bad: false });

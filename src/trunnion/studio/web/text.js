@@ -1,6 +1,6 @@
 // The model file as text: what is typed is solved, and what is drawn stands in it at once.
 
-import { effect } from "@preact/signals";
+import { effect, untracked } from "@preact/signals";
 import { useLayoutEffect, useRef } from "preact/hooks";
 import { typed } from "./actions.js";
 import { Finding } from "./findings.js";
@@ -17,7 +17,9 @@ export function Text() {
       const lines = Math.min(content.split("\n").length, 20000);
       gutter.current.textContent = Array.from({ length: lines }, (_, order) => order + 1).join("\n");
     }), []); // prettier-ignore
+  useLayoutEffect(() => effect(() => state.line.value && untracked(() => goTo(state.line.value))), []);
   const goTo = (line) => {
+    state.line.value = null;
     const before = state.text.value.split("\n").slice(0, line - 1).join("\n").length + (line > 1 ? 1 : 0);
     const end = state.text.value.indexOf("\n", before);
     area.current.focus();
@@ -32,6 +34,6 @@ export function Text() {
         onInput=${(event) => typed(event.target.value)}
         onScroll=${(event) => (gutter.current.scrollTop = event.target.scrollTop)}></textarea>
     </div>
-    ${wrong.length > 0 && html`<div class="findings-of-text">${wrong.slice(0, 50).map((one) => html`<${Finding} one=${one} onLine=${goTo} />`)}</div>`}
+    ${wrong.length > 0 && html`<div class="findings-of-text">${wrong.slice(0, 50).map((one) => html`<${Finding} one=${one} />`)}</div>`}
   </div>`; // prettier-ignore
 }

@@ -1,6 +1,6 @@
 // A line chart over the drive: axes, curves with gaps, shaded positions without an answer, a cursor that follows.
 
-import { OUTSIDE, domain, extent, gaps, lost, nearest, peak, usualPeak } from "./data.js";
+import { domain, extent, gaps, lost, nearest, outside, peak, usualPeak } from "./data.js";
 import { clipped, html, onWidth, set, svg } from "./dom.js";
 import { fixed, prefixed, quantity, tickLabel, ticks } from "./format.js";
 
@@ -21,7 +21,7 @@ export function lineChart(scene, { title, unit, series, band = null, limits = nu
   const scale = prefixed(scope, unit, scene.units);
   const most = scope * scale.factor;
   const cut = !limits && scope < peak(...columns);
-  const remark = [cut ? `The peak of ${quantity(peak(...columns), unit, undefined, scene.units)} ${OUTSIDE}` : "", note].filter(Boolean).join(" ");
+  const remark = [cut ? `The peak of ${quantity(peak(...columns), unit, undefined, scene.units)} ${outside(scene)}` : "", note].filter(Boolean).join(" ");
   const plot = html("div", { class: "plot" });
   const values = series.map(() => html("span", { class: "value" }, "—"));
   const element = html(

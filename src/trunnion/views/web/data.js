@@ -3,7 +3,8 @@
 import { stated } from "./format.js";
 
 const CONTACT_LOST = 3; // errors.Status
-export const OUTSIDE = "near a dead centre is outside the frame; --uncut shows it."; // of a peak that a chart cuts
+/** What a chart says of a peak that it cuts; whole: of a scene, how it is seen. */
+export const outside = ({ whole = "--uncut shows it." }) => `near a dead centre is outside the frame; ${whole}`;
 
 const FIRST_UNSOLVED = 4; // errors.Status.NOT_CONVERGED: from here on the forces have no value
 

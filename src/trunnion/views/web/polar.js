@@ -1,6 +1,6 @@
 // Polar reaction diagram of one joint: the tip of the force vector over the run, in the global frame.
 
-import { OUTSIDE, at, extent, magnitude, peak, usualPeak } from "./data.js";
+import { at, extent, magnitude, outside, peak, usualPeak } from "./data.js";
 import { clipped, html, onWidth, set, svg } from "./dom.js";
 import { fixed, prefixed, quantity, tickLabel, ticks } from "./format.js";
 
@@ -33,7 +33,7 @@ export function polarChart(scene, { name, reaction, ideal }, kind, pick, /** @ty
       value,
     ),
     plot,
-    cut === null ? null : html("p", { class: "remark" }, `The peak of ${quantity(highest, "N", undefined, scene.units)} ${OUTSIDE}`),
+    cut === null ? null : html("p", { class: "remark" }, `The peak of ${quantity(highest, "N", undefined, scene.units)} ${outside(scene)}`),
   );
   const chart = { scene, joint, kind, scale, cut, plot, axes: [across, up], frame: null, index: 0 };
   onWidth(plot, (width) => draw(chart, width), 220);

@@ -25,12 +25,24 @@ def place(result, key, index):
     return result["point_position"].sel(point=key).isel(position=index).values
 
 
+def arrow(path):
+    """Along x and y, px, from the start of an arrow to its tip."""
+    (x, y), (a, b) = (map(float, part.split("L")[0].split(",")) for part in path.split("M")[1:3])
+    return a - x, b - y
+
+
+def quantity(words, unit):
+    """The last number of a text, in its unit without a prefix."""
+    number, prefixed = words.replace("\u2212", "-").replace("\u202f", "").replace("\u00a0", " ").split()[-2:]
+    return float(number) * {"": 1, "m": 1e-3, "µ": 1e-6, "k": 1e3}[prefixed.removesuffix(unit)]
+
+
 if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the page's own part
 
     @pytest.fixture(scope="module")
     def studio(tmp_path_factory):
         folder = tmp_path_factory.mktemp("models")
-        for name in ("rssr", "universal-joint"):
+        for name in ("rssr", "rssr-with-play"):
             (folder / f"{name}.yaml").write_text((EXAMPLES / f"{name}.yaml").read_text("utf-8"), encoding="utf-8")
         with served(folder, "rssr.yaml") as own:
             yield own
@@ -117,3 +129,28 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         last = place(analysed(user.state("s.text.value"), 36), "rocker.D", 0) - place(after, "rocker.D", 0)
         assert min(last[0], last[2]) > 1e-3
         assert abs(last[1]) < 1e-12  # seen along y, y stays
+
+    def test_end_loads_and_the_section_of_a_pin_have_the_numbers_of_analyse(user):
+        """Arrows times the scale that is stated; offset and tilt from the seats of both ends."""
+        user.of("actions", "m.openFile('rssr-with-play.yaml')")
+        user.until("s.solved.value && s.answer.value.scene.built")
+        user.state("s.index.value = 60")
+        user.page.get_by_label("end loads of bearings").check()
+        user.page.get_by_label("reactions", exact=True).uncheck()
+        user.page.click("button[aria-label='Look along the y axis']")
+        user.page.mouse.click(*user.spot("D"))
+        user.idle()
+        result = analysed(user.state("s.text.value"))
+        size = user.page.locator(".key text", has_text="on an end").text_content()
+        scale = arrow(user.page.locator(".key .reference").last.get_attribute("d"))[0] / quantity(size, "N")
+        drawn = [arrow(one.get_attribute("d")) for one in user.page.locator(".reaction.of-end").all()]
+        loads = [result["end_load"].sel(joint=joint).isel(position=60).values for joint in "AD"]
+        expected = np.concatenate([load[np.isfinite(load).all(axis=1)][:, [0, 2]] for load in loads]) * scale
+        np.testing.assert_allclose(drawn, expected * [1, -1], atol=0.4)  # px: ends are written to a tenth
+        told = user.page.locator(".pin-section").evaluate_all("all => all.map(one => one.getAttribute('aria-label'))")
+        ends = result["seat_offset"].sel(joint="D").isel(position=60).values
+        for axis, words in enumerate(told):
+            assert words.startswith(f"Section of D in z and {'xy'[axis]}:")
+            offset, tilt = words.split("offset ")[1].split(", tilt ")
+            np.testing.assert_allclose(quantity(offset, "m"), ends[:, axis].mean(), rtol=2e-3)
+            np.testing.assert_allclose(quantity(tilt, "rad"), np.diff(ends[:, axis])[0] / 0.02, rtol=2e-3)

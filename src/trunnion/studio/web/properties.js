@@ -7,6 +7,7 @@ import { ambiguous, bare, findingsOf, numberOf, rowsOf, unitOf, usualUnit, writt
 import { dictionary, groundOf } from "./geometry.js";
 import { others, takeOther } from "./ghosts.js";
 import * as state from "./state.js";
+import { Sections } from "./section.js";
 import { removePart } from "./tools.js";
 import { Button, html } from "./ui.js";
 
@@ -35,6 +36,7 @@ function Chosen({ kind, name }) {
       </h2>
       <${Rows} rows=${rows} findings=${findings} />
       ${kind === "joints" && state.solved.value && html`<p class="calm">${arrowOf(state.answer.value.scene.joints.find((one) => one.name === name))}</p>`}
+      ${kind === "joints" && html`<${Sections} joint=${name} />`}
       ${kind === "links" && name !== groundOf(entries) && !state.spatial.value && html`<${BarMass} link=${name} />`}
       ${driver && html`<h3>Driver</h3><${Rows} rows=${rowsOf(entries, "drivers", name)} findings=${findings} />`}
       <p class="row-of-buttons">

@@ -48,7 +48,7 @@ function mount(holder) {
     }),
     effect(() => {
       const chosen = state.selection.value;
-      if (!stage.api?.view) return;
+      if (!stage.api) return;
       stage.api.view.chosen = chosen;
       untracked(() => stage.api.show(state.index.value));
     }),
@@ -60,19 +60,22 @@ function mount(holder) {
   };
 }
 
-/** Draw a scene from where the last of the same sheet was looked at. */
+/** Draw a scene, from where the last of the same sheet was looked at. */
 function draw(holder, scene, layers) {
-  if (!scene) return stage.api ? null : holder.replaceChildren(message(state.answer.value));
-  const { opened } = state;
-  if (stage.api?.view && stage.sheet === opened.value && scene.solids.length) return stage.api.take(scene, kindsOf(scene));
-  stage.sheet = opened.value;
-  stage.api = spaceView(scene, kindsOf(scene), { fill: true, after: (view) => pose(view, layers) });
-  const { element, controls, view } = stage.api;
-  holder.replaceChildren(...[element, controls].filter(Boolean));
-  if (!view) return;
-  view.chosen = state.selection.value;
-  view.stage.append(layers.hands);
-  listen(view.stage);
+  const other = stage.sheet !== state.opened.value;
+  if (!scene) return other || !holder.firstChild ? holder.replaceChildren(message(state.answer.value)) : null;
+  stage.sheet = state.opened.value;
+  const kinds = kindsOf(scene);
+  if (!scene.solids.length) return holder.replaceChildren(spaceView(scene, kinds).element);
+  const shown = stage.api;
+  if (!shown) {
+    stage.api = spaceView(scene, kinds, { fill: true, after: (view) => pose(view, layers) });
+    stage.api.view.chosen = state.selection.value;
+    stage.api.view.stage.append(layers.hands);
+    listen(stage.api.view.stage);
+  }
+  if (stage.api.element.parentNode !== holder) holder.replaceChildren(stage.api.element, stage.api.controls);
+  shown?.take(scene, kinds, other);
 }
 
 function message(answer) {
@@ -279,7 +282,7 @@ function Mover() {
   const [typed, setTyped] = useState(null);
   if (!state.solved.value || !movable(part)) return null;
   const unit = usualUnit(state.answer.value.entries);
-  const usual = stage.api?.view?.project ? lengthText(...stepIn(unit)) : `1 ${unit}`;
+  const usual = stage.api?.view.project ? lengthText(...stepIn(unit)) : `1 ${unit}`;
   const step = lengthOf(typed ?? usual, unit);
   const put = ({ target }) => (lengthOf(plainNumber(target.value), unit) ? setTyped(plainNumber(target.value)) : (target.value = typed ?? usual));
   const by = (axis, sign) => () => step && move(part, AXES.map((_, order) => (order === axis ? sign * step : 0)), `step ${part.name}`);

@@ -90,7 +90,7 @@ def _ends(result: xr.Dataset, shown: Space, name: str) -> list[dict[str, Any]]:
     for order, end in enumerate(solid):
         side, sense = order // 2, 1.0 if order % 2 else -1.0
         rows.append({"link": shown.joints[name]["links"][side], "along": _vector(sense * shown.element(name, side)[1]),
-                     **{axis: series(part) for axis, part in zip("xyz", end, strict=True)}})  # fmt: skip
+                     "force": {axis: series(part) for axis, part in zip("xyz", end, strict=True)}})  # fmt: skip
     return rows
 
 

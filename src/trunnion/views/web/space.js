@@ -19,7 +19,6 @@ const LINE = 0.75; // half length of an axis, share of the size
 const FAR = 1.5; // a screw axis farther from the middle than this many sizes is not drawn
 const HALF = 0.03; // half length of a bearing as it is drawn, share of the size
 const LOAD = 44; // length of a load, px
-const LIT = " lit"; // paint of the chosen link: a name that no link has
 const ON_PAPER = { ink: "#1b1f24", muted: "#5a636e", ideal: "#c3c9d1", ground: "#9aa3ad", joint: "#f7f8fa",
   kinds: ["#0072b2", "#d55e00", "#009e73", "#b8578f", "#b97900", "#3b95cc"] }; // prettier-ignore
 
@@ -27,7 +26,7 @@ const ON_PAPER = { ink: "#1b1f24", muted: "#5a636e", ideal: "#c3c9d1", ground: "
 const LOADS = {
   force: ({ reaction }) => [reaction],
   moment: ({ moment }) => [moment],
-  end: ({ name }, { seats }) => seats[name]?.ends ?? [],
+  end: ({ name }, { seats }) => (seats[name]?.ends ?? []).map(({ force }) => force),
 };
 
 /** What may be shown beside the bodies: label, and whether it is at the start. */
@@ -38,13 +37,13 @@ const EXTRAS = {
   axes: ["joint axes", false],
   reactions: ["reactions", true],
   moments: ["reaction moments", false],
-  ends: ["loads on bearing ends", false],
+  ends: ["end loads of bearings", false],
   screws: ["screw axes", false],
 };
 
 /**
- * The drawing; `show(index)` moves it, `reactions(names, factor)` chooses the vectors, `take(scene, kinds)` draws another scene from the
- * same side; `controls` choose the rest. fill: it is as high as its place; after: is called whenever it was drawn, with the view.
+ * The drawing; `show(index)` moves it, `reactions(names, factor)` chooses the vectors, `take(scene, kinds, anew)` draws another scene
+ * from the same side, or from its first; `controls` choose the rest. fill: it is as high as its place; after: is called whenever it was drawn, with the view.
  */
 export function spaceView(scene, kinds, { fill = false, after = (_view) => {} } = {}) {
   const message = html("p", { class: "message", hidden: true });
@@ -74,7 +73,7 @@ export function spaceView(scene, kinds, { fill = false, after = (_view) => {} } 
   embody(view, scene, kinds);
   settle(view);
   prepare(view);
-  if (fill) new ResizeObserver(() => requestAnimationFrame(() => build(view, stage.clientWidth))).observe(stage);
+  if (fill) new ResizeObserver(() => requestAnimationFrame(() => stage.clientWidth && build(view, stage.clientWidth))).observe(stage);
   else onWidth(stage, (width) => build(view, width), 490);
   steer(stage, { get: () => view.camera, put: (camera) => turn(view, camera), home: () => settle(view) });
   globalThis.matchMedia?.("(prefers-color-scheme: dark)").addEventListener("change", () => recolour(view, false));
@@ -83,8 +82,9 @@ export function spaceView(scene, kinds, { fill = false, after = (_view) => {} } 
     controls: view.panel,
     view,
     recolour: () => recolour(view, false),
-    take(scene, kinds) {
+    take(scene, kinds, anew) {
       embody(view, scene, kinds);
+      if (anew) settle(view);
       recolour(view, false);
       if (view.frame) build(view, view.frame.width);
     },
@@ -176,7 +176,7 @@ function recolour(view, paper) {
   const of = (name, plain) => style?.getPropertyValue(`--${name}`).trim() || plain;
   const colours = { ink: of("ink", ON_PAPER.ink), muted: of("muted", ON_PAPER.muted), ideal: of("strong", ON_PAPER.ideal) };
   colours[""] = shades(of("joint", ON_PAPER.joint));
-  colours[LIT] = shades(of("accent", ON_PAPER.kinds[0]));
+  view.halo = of("accent", ON_PAPER.kinds[0]);
   let order = 0;
   for (const link of view.scene.links) {
     colours[link.name] = shades(link.ground ? of("ground", ON_PAPER.ground) : of(`k${order % 6}`, ON_PAPER.kinds[order % 6]));
@@ -190,7 +190,7 @@ function build(view, width) {
   const [left, below, right, above] = view.fitted.view.box;
   const wide = right - left || 1e-9;
   const tall = above - below || 1e-9;
-  const height = view.fill ? Math.max(view.stage.clientHeight, 120) : heightFor(width, tall / wide);
+  const height = view.fill ? Math.max(view.stage.clientHeight, 2 * MARGIN + 3 * KEY) : heightFor(width, tall / wide);
   const margin = Math.min(MARGIN, width * 0.1);
   const scale = Math.min((width - 2 * margin) / wide, (height - 2 * margin - KEY) / tall);
   view.frame = { width, height, scale, margin, middle: [(left + right) / 2, (below + above) / 2] };
@@ -312,8 +312,8 @@ function paintBodies(view) {
       const places = solid.points.map((point) => plus(apply(pose.turn, point), pose.place));
       pieces.push(...stroke(places, colours.ink, 1, project, 0.003 * scene.size));
     }
-    const paint = solid.link === lit && solid.paint ? LIT : solid.paint;
-    for (const mesh of two) for (const piece of seen(mesh, paint, pose, project)) pieces.push(Object.assign(piece, { link: solid.link }));
+    const halo = solid.link === lit ? view.halo : null;
+    for (const mesh of two) for (const piece of seen(mesh, solid.paint, pose, project)) pieces.push(Object.assign(piece, { link: solid.link, halo }));
   }
   if (scene.factor > 1) pieces.push(...outline(view));
   if (view.extras.has("tracks"))
@@ -425,7 +425,7 @@ function vectors(view) {
     };
     if (view.extras.has("reactions")) add(joint.reaction, place, view.perUnit.force);
     if (view.extras.has("moments")) add(joint.moment, place, view.perUnit.moment, " twist");
-    if (view.extras.has("ends")) for (const end of LOADS.end(joint, scene)) add(end, endAt(view, end, place), view.perUnit.end, " end");
+    if (view.extras.has("ends")) for (const end of scene.seats[joint.name].ends) add(end.force, endAt(view, end, place), view.perUnit.end, " of-end");
     return parts;
   });
 }
@@ -504,7 +504,7 @@ function key(view) {
   let x = 80;
   const say = (text) => {
     parts.push(svg("text", { x, y, dy: "0.32em" }, text));
-    x += 6.2 * text.length + 18;
+    x += 7 * text.length + 16;
   };
   if (scene.scaled) {
     const length = roundBelow((frame.width * 0.16) / project.scale);
@@ -527,7 +527,7 @@ function key(view) {
   if (view.extras.has("ends")) reference(view.perUnit.end, "N", "on an end", false);
   if (scene.built) {
     const text = `errors × ${told(scene.factor)}${scene.factor > 1 ? ", ideal as pale lines" : ""}`;
-    parts.push(svg("text", { class: "errors", x: 14, y: 18 }, text));
+    parts.push(svg("text", view.fill ? { class: "errors end", x: frame.width - 12, y } : { class: "errors", x: 14, y: 18 }, text));
   }
   return [svg("g", { class: "key" }, ...parts)];
 }

@@ -48,6 +48,7 @@ from trunnion.studio.variants import overlaid
 from trunnion.studio.words import remedied, spoken
 from trunnion.version import __version__
 from trunnion.views.cycle.scene import scene
+from trunnion.views.space.bodies import gathered
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -314,6 +315,7 @@ def _edit(asked: Asked) -> dict[str, Any]:
     entries = copy.deepcopy(dict(state.entries)) if text.strip() else new
     places = {str(key): (float(x), float(y)) for key, (x, y) in dict(asked.get("places") or {}).items()}
     sketch = Sketch(entries, places, set(map(str, asked.get("locked") or ())), fine=float(asked.get("fine") or 0.0))
+    sketch.turns = partial(_turns, state)
     says = [done(sketch, given) for given in asked["gestures"]]
     empty = ("drivers", "loads", "springs", "gears", "assembly", "dimensions", "joints")
     after = {key: one for key, one in sketch.entries.items() if one or key not in empty}
@@ -327,6 +329,16 @@ def _edit(asked: Asked) -> dict[str, Any]:
         "says": ", ".join(says),
         "made": sketch.made,
     }
+
+
+def _turns(state: Loaded, index: int) -> dict[str, Array]:
+    """Rotation of every moving link in space, (3, 3), at a position of the cycle; MechanismError where it has none."""
+    poses = gathered(state.motion(STEPS, True)).poses
+    turns = {link: pose.matrix[:, :, index % STEPS] for link, pose in poses.items()}
+    if not all(np.isfinite(turn).all() for turn in turns.values()):
+        what = "cannot be assembled at the position that is shown"
+        raise MechanismError(Finding(what, remedy="go to another position"))
+    return turns
 
 
 def _assemblies(asked: Asked) -> dict[str, Any]:

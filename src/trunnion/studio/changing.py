@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from math import isfinite
 from typing import Any
 
 from trunnion.joints.friction import FRICTION_LAWS
@@ -25,7 +26,9 @@ NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 def move(sketch: Sketch, given: Given) -> str:
-    """A joint or point goes to a place."""
+    """A joint or point goes to a place; in space by so much, as the links are turned at a position."""
+    if "by" in given:
+        return _move_in_space(sketch, given)
     point, to = str(given["point"]), vector(given["to"])
     sketch.write(sketch.moved(point, to, bool(given.get("keep"))))
     hints = sketch.entries.get("assembly") or {}
@@ -35,6 +38,20 @@ def move(sketch: Sketch, given: Given) -> str:
         sketch.places[f"{link}.{point.rpartition('.')[2]}"] = to
     for link in _links_at(sketch, point):
         sketch.show(link, sketch.frame(link))
+    return f"Move {point}"
+
+
+def _move_in_space(sketch: Sketch, given: Given) -> str:
+    point, by, index = str(given["point"]), [float(part) for part in given["by"]], int(given.get("index") or 0)
+    if len(by) != 3 or not all(map(isfinite, by)):
+        raise ValueError(f"{by} is no way")
+    sketch.size = float(given["size"])
+    turns = sketch.turns(index)
+    hint = (sketch.entries.get("assembly") or {}).get(point)
+    if isinstance(hint, list) and index == 0:
+        before = (float(sketch.numbers[f"assembly.{point}.{axis}"]) for axis in "xyz")
+        sketch.entries["assembly"][point] = [sketch.length(sum(pair)) for pair in zip(before, by, strict=True)]
+    sketch.write(sketch.shifted(point, by, turns))
     return f"Move {point}"
 
 

@@ -7,13 +7,15 @@ keep their places, and lengths follow.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
 from math import atan2, copysign, cos, dist, floor, hypot, isfinite, log10, sin, sqrt
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from trunnion.errors import Finding, MechanismError
@@ -68,6 +70,7 @@ class Sketch:
 
     locked: joints, and free points "link.point", that stay where they are while others are dragged.
     made: section and name of what a gesture made whose numbers are to be looked at.
+    turns: in space, rotation of every link, (3, 3), at a position of the cycle.
     fine: what the hand can tell apart in the picture, m: lengths are rounded to a power of ten below it.
     """
 
@@ -76,6 +79,7 @@ class Sketch:
     locked: set[str] = field(default_factory=set)
     made: tuple[str, str] | None = None
     fine: float = 0.0
+    turns: Callable[[int], Mapping[str, Any]] = lambda _: {}
 
     # ---- what is there ----------------------------------------------------------------------------------------
 
@@ -160,6 +164,43 @@ class Sketch:
         """The entries have changed: read the numbers anew."""
         self.__dict__.pop("numbers", None)
         self.__dict__.pop("size", None)
+
+    def shifted(self, point: str, by: Sequence[float], turns: Mapping[str, Any]) -> list[Change]:
+        """What changes in space where a joint, or a free point "link.point", goes by metres along the global axes.
+
+        turns: rotation of each moving link, (3, 3), at the position at which the neighbours keep their places.
+        """
+        link, _, name = point.partition(".")
+        links, name = (self.joints[point]["links"], point) if point in self.joints else ([link], name)
+        if any(name not in self.points(link) for link in links):
+            what, remedy = "has no place of its own in the file", "change the table of the loop"
+            raise MechanismError(Finding(what, point, remedy))
+        changes: dict[str, Change] = {}  # a number once
+        for link in links:
+            columns = turns[link].T if link != self.ground else np.eye(3)
+            moved = self._in_space(link, name) + columns @ np.asarray(by, float)
+            other = self._rod_end(link, name)
+            if other is None:
+                found = self._at(link, name, moved)
+            else:  # it keeps its form: from its origin along its x
+                far = max((name, other), key=lambda point: float(np.linalg.norm(self._in_space(link, point))))
+                found = self._at(link, far, (float(np.linalg.norm(moved - self._in_space(link, other))), 0.0, 0.0))
+            changes |= {change.path: change for change in found}
+        return list(changes.values())
+
+    def _in_space(self, link: str, point: str) -> NDArray[np.float64]:
+        """A point in the frame of its link in space, m."""
+        return np.array([float(self.numbers.get(f"links.{link}.points.{point}.{axis}", 0.0)) for axis in "xyz"])
+
+    def _rod_end(self, link: str, point: str) -> str | None:
+        """The other end of a rod with two balls: a link of two points without axes, its origin and one on its x."""
+        others = [one for one in self.points(link) if one != point]
+        if len(others) != 1 or not all(isinstance(stated, list) for stated in self.points(link).values()):
+            return None
+        ends = sorted(
+            (self._in_space(link, one) for one in self.points(link)), key=lambda end: float(np.abs(end).sum())
+        )
+        return others[0] if not ends[0].any() and ends[1][0] > 0 and not ends[1][1:].any() else None
 
     # ---- dragging ---------------------------------------------------------------------------------------------
 
@@ -305,12 +346,13 @@ class Sketch:
         p, q = turned.out((x, y))
         return turned._replace(x=centre[0] - p, y=centre[1] - q)
 
-    def _at(self, link: str, point: str, local: Vector) -> Iterator[Change]:
+    def _at(self, link: str, point: str, local: Sequence[float]) -> Iterator[Change]:
         """The numbers to be changed so that a point has these coordinates: dimensions, where they are stated so."""
         stated = self.points(link)[point]
         where: tuple[str | int, ...] = ("links", link, "points", point, *(("at",) if isinstance(stated, dict) else ()))
         parts = stated["at"] if isinstance(stated, dict) else stated
-        for i, (axis, before, value) in enumerate(zip("xy", self.local(link, point), local, strict=True)):
+        for i, (axis, value) in enumerate(zip("xyz", local, strict=False)):
+            before = float(self.numbers.get(f"links.{link}.points.{point}.{axis}", 0.0))
             if abs(value - before) <= TOGETHER * self.size:
                 continue
             name = NAME.fullmatch(parts[i]) if isinstance(parts[i], str) else None

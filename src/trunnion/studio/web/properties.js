@@ -7,6 +7,7 @@ import { ambiguous, bare, findingsOf, numberOf, partOfList, rowsOf, unitOf, usua
 import { dictionary, groundOf } from "./geometry.js";
 import { others, takeOther } from "./ghosts.js";
 import * as state from "./state.js";
+import { Sections } from "./section.js";
 import { removePart } from "./tools.js";
 import { Button, html } from "./ui.js";
 
@@ -34,16 +35,17 @@ function Chosen({ kind, name }) {
         <${Name} kind=${kind} name=${name} />
       </h2>
       <${Rows} rows=${rows} findings=${findings} />
-      ${kind === "joints" && state.solved.value && html`<p class="calm">${arrowOf(entries?.joints?.[name])}</p>`}
+      ${kind === "joints" && state.solved.value && html`<p class="calm">${arrowOf(state.answer.value.scene.joints.find((one) => one.name === name))}</p>`}
+      ${kind === "joints" && html`<${Sections} joint=${name} />`}
       ${kind === "links" && name !== groundOf(entries) && !state.spatial.value && html`<${BarMass} link=${name} />`}
       ${driver && html`<h3>Driver</h3><${Rows} rows=${rowsOf(entries, "drivers", name)} findings=${findings} />`}
       <p class="row-of-buttons">
         ${kind === "joints" && !driver && html`<${Button} label="Drive this joint" onClick=${() => edit([{ do: "driver", joint: name }])} />`}
         ${kind === "joints" && !state.spatial.value && html`<${Button} label="Load against its motion" onClick=${() => edit([{ do: "load", against: name }])} />`}
         ${kind === "loads" && against(entries, name).map((joint) => html`<${Button} label=${`Let it oppose the motion of ${joint}`} onClick=${() => edit([{ do: "load", against: joint, instead: name }])} />`)}
-        ${(kind === "joints" || kind === "points") && html`<${Button} label=${state.locked.value.includes(name) ? "Unlock" : "Lock"}
+        ${(kind === "joints" || kind === "points") && !state.spatial.value && html`<${Button} label=${state.locked.value.includes(name) ? "Unlock" : "Lock"}
           title="A locked joint stays where it is while others are dragged (K)" onClick=${() => edit([{ do: "lock", point: name }])} />`}
-        ${kind === "points" && html`<${Button} label="Pin to the ground" onClick=${() => edit([{ do: "pin", point: name }])} />`}
+        ${kind === "points" && !state.spatial.value && html`<${Button} label="Pin to the ground" onClick=${() => edit([{ do: "pin", point: name }])} />`}
         ${!(kind === "links" && name === groundOf(entries)) && html`<${Button} label=${`Delete ${NOUNS[kind].toLowerCase()}`} onClick=${() => removePart({ kind, name })} />`}
         <${Button} label="All parts" onClick=${() => (state.selection.value = null)} />
       </p>
@@ -60,7 +62,9 @@ function BarMass({ link }) {
 }
 
 /** What the arrow at a joint is. */
-function arrowOf({ type, links: [first, second] }) {
+function arrowOf(joint) {
+  if (!joint) return null;
+  const { type, links: [first, second] } = joint; // prettier-ignore
   return `Its arrow is the force on ${second} by ${first}${type === "prismatic" ? ", the friction along the guide included" : ""}.`;
 }
 

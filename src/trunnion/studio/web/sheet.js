@@ -66,7 +66,9 @@ export const sheet = {
   /** Distance of the grid's lines, m. */
   step: () => gridStep(sheet.view.frame.scale),
   /** What a hand can tell apart, m: a thousandth of the grid, some hundredths of a pixel. */
-  fine: () => (sheet.view ? sheet.step() / 1000 : 0),
+  fine: () => (sheet.view ? sheet.step() / 1000 : sheet.finest),
+  /** The same of a picture in space. */
+  finest: 0,
   /** Width of the window and reach of a click, m. */
   scale: () => ({ wide: sheet.view.frame.width / sheet.view.frame.scale, near: nearOf(sheet.view.frame.scale) }),
   spots: () => (sheet.view?.scene ? spotsOf(sheet.view.scene, sheet.view.drawn) : []),

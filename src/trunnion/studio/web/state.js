@@ -65,7 +65,14 @@ export const recovered = signal(null);
 export const variant = signal(read(sessionStorage, VARIANT));
 
 export const unsaved = computed(() => text.value !== savedText.value);
-export const spatial = computed(() => answer.value?.scene?.space === "spatial");
+let inSpace = false;
+/** Whether the model is one in space; while its text cannot be read, as it was before. */
+export const spatial = computed(() => {
+  const { scene, entries } = answer.value ?? {};
+  if (scene) inSpace = scene.space === "spatial";
+  else if (entries) inSpace = entries.space === "spatial" || Array.isArray(entries.loop);
+  return inSpace;
+});
 export const solved = computed(() => Boolean(answer.value?.solved && answer.value.scene));
 
 /** What a half-drawn linkage still lacks, in sentences; then its errors are no more than that. */

@@ -42,7 +42,7 @@ def space_scene(result: xr.Dataset) -> dict[str, Any]:
         "view": {"around": around, "above": above, "box": [_number(edge) for edge in look.box]},
         "solids": [solid.data() for solid in look.solids],
         "free": [{"key": key, "link": key.split(".", 1)[0], "at": _vector(at)} for key, at in shown.free.items()],
-        "seats": {name: _seat(shown, name) for name in shown.joints},
+        "seats": {name: _seat(shown, name) | {"ends": _ends(result, shown, name)} for name in shown.joints},
         "loads": _loads(shown), "apart": any(shown.shifts.values()),
     }  # fmt: skip
 
@@ -75,6 +75,23 @@ def _seat(shown: Space, name: str) -> dict[str, Any]:
             {"link": link, "along": _vector(shown.element(name, side)[1])} for side, link in enumerate(joint["links"])
         ]
     return {"link": joint["links"][1], "at": _vector(shown.seat(name)), "axes": axes}
+
+
+def _ends(result: xr.Dataset, shown: Space, name: str) -> list[dict[str, Any]]:
+    """Loads on the ends of a joint's bearing, N, in global axes, and the way from its middle to each in a link's frame.
+
+    Those of a bearing lie along the axis of its first link, at −u first; of a cross two on the pin of each link.
+    """
+    ends = column(result, "end_load", joint=name) if name in names(result, "joint") else None
+    solid = [] if ends is None else [end for end in ends if np.isfinite(end).any()]
+    if len(solid) not in (2, 4):
+        return []
+    rows = []
+    for order, end in enumerate(solid):
+        side, sense = order // 2, 1.0 if order % 2 else -1.0
+        rows.append({"link": shown.joints[name]["links"][side], "along": _vector(sense * shown.element(name, side)[1]),
+                     "force": {axis: series(part) for axis, part in zip("xyz", end, strict=True)}})  # fmt: skip
+    return rows
 
 
 def _loads(shown: Space) -> list[dict[str, Any]]:

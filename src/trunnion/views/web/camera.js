@@ -82,7 +82,7 @@ export function steer(element, { get, put, home }) {
   element.addEventListener("dblclick", () => put(home()));
   element.addEventListener("keydown", (event) => {
     if (event.altKey || event.ctrlKey || event.metaKey) return;
-    const view = keyed(get(), event.key, event.shiftKey, home());
+    const view = event.key === "0" ? home() : keyed(get(), event.key, event.shiftKey, null);
     if (!view) return;
     event.preventDefault(); // the crank, which has these keys elsewhere, leaves such events alone
     put(view);

@@ -8,6 +8,7 @@ const RINGS = 8; // of a ball
 const STEP = 0.03; // bodies are cut into pieces of this share of the size: with twice that, crossing bars sort wrongly
 const OUTLINE = 0.0028; // share of the size
 const SHADES = 24;
+const HALO = 7; // px
 const LIGHT = [-0.35, 0.55, 0.76]; // from the left and above, in the picture's frame
 
 /** The facets of a solid, [{points, faces, outline}]: corners in the link's frame, faces counter-clockwise from outside. */
@@ -176,12 +177,13 @@ export function paint(context, pieces, colours) {
       context.lineWidth = piece.width;
       context.strokeStyle = piece.colour;
     } else {
-      const colour = piece.shade === "ink" ? colours.ink : colours[piece.paint][piece.shade];
+      const halo = piece.shade === "ink" ? piece.halo : null; // of what is chosen the outline is broad
+      const colour = halo ?? (piece.shade === "ink" ? colours.ink : colours[piece.paint][piece.shade]);
       context.closePath();
       context.fillStyle = colour;
       context.fill();
       context.strokeStyle = colour; // else the paper shows between neighbours
-      context.lineWidth = 0.6;
+      context.lineWidth = halo ? HALO : 0.6;
     }
     context.stroke();
   }

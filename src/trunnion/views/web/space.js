@@ -17,22 +17,35 @@ const SHARP = 2; // canvas pixels for one of the page, at least: it is printed t
 const FITTED = 24; // positions whose bodies a turned view is fitted to
 const LINE = 0.75; // half length of an axis, share of the size
 const FAR = 1.5; // a screw axis farther from the middle than this many sizes is not drawn
+const HALF = 0.03; // half length of a bearing as it is drawn, share of the size
 const LOAD = 44; // length of a load, px
 const ON_PAPER = { ink: "#1b1f24", muted: "#5a636e", ideal: "#c3c9d1", ground: "#9aa3ad", joint: "#f7f8fa",
   kinds: ["#0072b2", "#d55e00", "#009e73", "#b8578f", "#b97900", "#3b95cc"] }; // prettier-ignore
 
-/** What may be shown beside bodies and reactions: label, and whether it is at the start. */
+/** The vectors of a joint, as series, by what they are. */
+const LOADS = {
+  force: ({ reaction }) => [reaction],
+  moment: ({ moment }) => [moment],
+  end: ({ name }, { seats }) => (seats[name]?.ends ?? []).map(({ force }) => force),
+};
+
+/** What may be shown beside the bodies: label, and whether it is at the start. */
 const EXTRAS = {
   names: ["names", true],
   tracks: ["paths of points", true],
   loads: ["loads", true],
   axes: ["joint axes", false],
+  reactions: ["reactions", true],
   moments: ["reaction moments", false],
+  ends: ["end loads of bearings", false],
   screws: ["screw axes", false],
 };
 
-/** The drawing; `show(index)` moves it, `reactions(names, factor)` chooses the vectors; `controls` choose the rest. */
-export function spaceView(scene, kinds) {
+/**
+ * The drawing; `show(index)` moves it, `reactions(names, factor)` chooses the vectors, `take(scene, kinds, anew)` draws another scene
+ * from the same side, or from its first; `controls` choose the rest. fill: it is as high as its place; after: is called whenever it was drawn, with the view.
+ */
+export function spaceView(scene, kinds, { fill = false, after = (_view) => {} } = {}) {
   const message = html("p", { class: "message", hidden: true });
   const stage = html("div", { class: "stage" });
   const element = html("div", { class: "mechanism space" }, stage, message);
@@ -40,36 +53,45 @@ export function spaceView(scene, kinds) {
     message.textContent = "The mechanism could not be assembled at any position.";
     message.hidden = false;
     element.classList.add("empty");
-    return { element, controls: null, show() {}, reactions() {}, magnify() {} };
+    return { element, controls: null, show() {}, reactions() {}, magnify() {}, take() {}, recolour() {} };
   }
-  const forces = scene.joints.map((joint) => magnitude(joint.reaction, scene.count));
-  const moments = scene.joints.map((joint) => magnitude(joint.moment, scene.count));
   const view = {
-    scene: magnified(scene, 1),
-    ideal: magnified(scene, 0),
-    kinds,
     stage,
     message,
     index: 0,
     posed: 0,
     factor: 1,
-    shown: new Set(scene.joints.map((joint) => joint.name)),
+    errors: 1,
     extras: new Set(Object.keys(EXTRAS).filter((name) => EXTRAS[name][1])),
-    usual: { force: usual(scene, forces), moment: usual(scene, moments) },
-    camera: first(scene),
+    /** What is chosen, {kind, name}, or null: it is drawn in the accent. */
+    chosen: null,
+    fill,
+    after,
+    panel: html("div", {}),
     queued: 0,
   };
-  embody(view);
+  embody(view, scene, kinds);
+  settle(view);
   prepare(view);
-  onWidth(stage, (width) => build(view, width), 490);
-  steer(stage, { get: () => view.camera, put: (camera) => turn(view, camera), home: () => first(scene) });
+  if (fill) new ResizeObserver(() => requestAnimationFrame(() => stage.clientWidth && build(view, stage.clientWidth))).observe(stage);
+  else onWidth(stage, (width) => build(view, width), 490);
+  steer(stage, { get: () => view.camera, put: (camera) => turn(view, camera), home: () => settle(view) });
   globalThis.matchMedia?.("(prefers-color-scheme: dark)").addEventListener("change", () => recolour(view, false));
   return {
     element,
-    controls: controls(view),
+    controls: view.panel,
+    view,
+    recolour: () => recolour(view, false),
+    take(scene, kinds, anew) {
+      embody(view, scene, kinds);
+      if (anew) settle(view);
+      recolour(view, false);
+      if (view.frame) build(view, view.frame.width);
+    },
     magnify(factor) {
-      view.scene = magnified(scene, factor);
-      embody(view);
+      view.errors = factor;
+      embody(view, view.base, view.kinds);
+      view.fitted.reach = view.reach;
       turn(view, view.camera);
     },
     show(index) {
@@ -84,14 +106,31 @@ export function spaceView(scene, kinds) {
   };
 }
 
-/** Links, bodies and tracks of the scene as its errors are magnified now. */
-function embody(view) {
-  const { scene } = view;
+/** Links, bodies and tracks of a scene as its errors are magnified now. */
+function embody(view, base, kinds) {
+  const scene = magnified(base, view.errors);
+  const common = (what) => usual(base, base.joints.flatMap((joint) => LOADS[what](joint, base).map((vector) => magnitude(vector, base.count)))); // prettier-ignore
+  if (view.base !== base) {
+    view.ideal = magnified(base, 0);
+    view.shown = new Set(base.joints.map((joint) => joint.name));
+    view.usual = { force: common("force"), moment: common("moment"), end: common("end") };
+  }
+  Object.assign(view, { base, scene, kinds });
   view.links = new Map(scene.links.map((link) => [link.name, link]));
   view.bodies = scene.solids.map((solid) => ({ solid, meshes: meshes(solid, scene.size) }));
   view.tracks = scene.free.map((point) => track(scene, view.links.get(point.link), point));
   view.reach = reach(view);
+  view.panel.replaceChildren(...controls(view));
 }
+
+/** The first side to look from, with the whole of the present scene in the picture; it stays so until it is settled anew. */
+function settle(view) {
+  view.fitted = { view: view.scene.view, reach: view.reach };
+  view.camera = first(view.scene);
+  if (view.frame) build(view, view.frame.width);
+  return view.camera;
+}
+
 
 /** Where bodies come to over the run, at some of its positions: what a turned view is fitted to. */
 function reach({ scene, links }) {
@@ -137,6 +176,7 @@ function recolour(view, paper) {
   const of = (name, plain) => style?.getPropertyValue(`--${name}`).trim() || plain;
   const colours = { ink: of("ink", ON_PAPER.ink), muted: of("muted", ON_PAPER.muted), ideal: of("strong", ON_PAPER.ideal) };
   colours[""] = shades(of("joint", ON_PAPER.joint));
+  view.halo = of("accent", ON_PAPER.kinds[0]);
   let order = 0;
   for (const link of view.scene.links) {
     colours[link.name] = shades(link.ground ? of("ground", ON_PAPER.ground) : of(`k${order % 6}`, ON_PAPER.kinds[order % 6]));
@@ -147,17 +187,10 @@ function recolour(view, paper) {
 }
 
 function build(view, width) {
-  const [left, below, right, above] = view.scene.view.box;
+  const [left, below, right, above] = view.fitted.view.box;
   const wide = right - left || 1e-9;
   const tall = above - below || 1e-9;
-  const height = Math.round(
-    Math.min(
-      Math.max(((width - 2 * MARGIN) * tall) / wide + 2 * MARGIN + KEY, width * 0.6),
-      width * 0.95,
-      globalThis.window.innerWidth > 900 ? Math.max(globalThis.window.innerHeight - BELOW, 280) : 620,
-      640,
-    ),
-  );
+  const height = view.fill ? Math.max(view.stage.clientHeight, 2 * MARGIN + 3 * KEY) : heightFor(width, tall / wide);
   const margin = Math.min(MARGIN, width * 0.1);
   const scale = Math.min((width - 2 * margin) / wide, (height - 2 * margin - KEY) / tall);
   view.frame = { width, height, scale, margin, middle: [(left + right) / 2, (below + above) / 2] };
@@ -169,23 +202,31 @@ function build(view, width) {
   view.context.lineCap = "round";
   set(view.over, { viewBox: `0 0 ${width} ${height}` });
   if (!view.colours) recolour(view, false);
-  view.perUnit = { force: fitting(view, "reaction", view.usual.force), moment: fitting(view, "moment", view.usual.moment) };
+  view.perUnit = { force: fitting(view, "force"), moment: fitting(view, "moment"), end: fitting(view, "end") };
   pose(view);
 }
 
+/** The height of a picture in the flow of a page, px; `share`: of its height by its width. */
+function heightFor(width, share) {
+  const window = globalThis.window.innerWidth > 900 ? Math.max(globalThis.window.innerHeight - BELOW, 280) : 620;
+  return Math.round(Math.min(Math.max((width - 2 * MARGIN) * share + 2 * MARGIN + KEY, width * 0.6), width * 0.95, window, 640));
+}
+
 /** Pixels a newton (or newton metre) at which every usual vector of the run ends inside the first view. */
-function fitting(view, what, size) {
+function fitting(view, what) {
+  const size = view.usual[what];
   if (!(size > 0)) return 0;
-  const { scene, frame, reach } = view;
-  const camera = projection({ scene, frame, reach, camera: first(scene) }, KEY);
+  const { scene, frame, fitted } = view;
+  const camera = projection({ scene: fitted, frame, reach: fitted.reach, camera: first(fitted) }, KEY);
   const rays = [];
   for (const joint of scene.joints) {
     for (let index = 0; index < scene.count; index += Math.ceil(scene.count / 120)) {
       const spot = seat(view, joint.name, index);
-      const vector = valueAt(joint[what], index);
-      if (!spot || !vector || Math.hypot(...vector) > 2 * size) continue;
-      const [dx, dy] = apply(camera.matrix, vector);
-      rays.push([...camera.to(apply(camera.matrix, spot)), dx, -dy]);
+      for (const vector of LOADS[what](joint, scene).map((one) => valueAt(one, index))) {
+        if (!spot || !vector || Math.hypot(...vector) > 2 * size) continue;
+        const [dx, dy] = apply(camera.matrix, vector);
+        rays.push([...camera.to(apply(camera.matrix, spot)), dx, -dy]);
+      }
     }
   }
   const room = { left: 6, right: frame.width - 6, top: 6, bottom: frame.height - KEY };
@@ -193,24 +234,24 @@ function fitting(view, what, size) {
 }
 
 /** A vector {x, y, z} of series at a position, or null. */
-function valueAt({ x, y, z }, index) {
+export function valueAt({ x, y, z }, index) {
   const value = [at(x, index), at(y, index), at(z, index)];
   return value.includes(null) ? null : value;
 }
 
 /** Rotation and place of a link, or null where it has none. */
-function poseOf({ pose }, index) {
+export function poseOf({ pose }, index) {
   const place = [at(pose.x, index), at(pose.y, index), at(pose.z, index)];
   const turn = { w: at(pose.w, index), i: at(pose.i, index), j: at(pose.j, index), k: at(pose.k, index) };
   return place.includes(null) || Object.values(turn).includes(null) ? null : { turn: rotation(turn), place };
 }
 
-function placed(view, link, point, index) {
+export function placed(view, link, point, index) {
   const pose = poseOf(view.links.get(link), index);
   return pose && plus(apply(pose.turn, point), pose.place);
 }
 
-function seat(view, joint, index) {
+export function seat(view, joint, index) {
   const one = view.scene.seats[joint];
   return one ? placed(view, one.link, one.at, index) : null;
 }
@@ -247,20 +288,22 @@ function pose(view) {
   view.stage.classList.toggle("without-answer", !answered);
   view.message.hidden = answered;
   view.message.textContent = answered ? "" : cause(scene, index);
-  view.project = projection(view, KEY);
+  view.project = projection({ ...view, scene: view.fitted, reach: view.fitted.reach }, KEY);
   paintBodies(view);
   const parts = [];
-  if (view.extras.has("axes")) parts.push(...axes(view));
+  parts.push(...axes(view));
   if (view.extras.has("screws")) parts.push(...screws(view));
   if (view.extras.has("loads")) parts.push(...loads(view));
   parts.push(...vectors(view));
   if (view.extras.has("names")) parts.push(...names(view));
   view.over.replaceChildren(...parts, ...key(view));
+  view.after(view);
 }
 
 function paintBodies(view) {
   const { scene, frame, context, colours, posed, project } = view;
   const pieces = [];
+  const lit = view.chosen?.kind === "links" ? view.chosen.name : null;
   const poses = new Map(scene.links.map((link) => [link.name, poseOf(link, posed)]));
   for (const { solid, meshes: two } of view.bodies) {
     const pose = poses.get(solid.link);
@@ -269,13 +312,25 @@ function paintBodies(view) {
       const places = solid.points.map((point) => plus(apply(pose.turn, point), pose.place));
       pieces.push(...stroke(places, colours.ink, 1, project, 0.003 * scene.size));
     }
-    for (const mesh of two) pieces.push(...seen(mesh, solid.paint, pose, project));
+    const halo = solid.link === lit ? view.halo : null;
+    for (const mesh of two) for (const piece of seen(mesh, solid.paint, pose, project)) pieces.push(Object.assign(piece, { link: solid.link, halo }));
   }
   if (scene.factor > 1) pieces.push(...outline(view));
   if (view.extras.has("tracks"))
     for (const one of view.tracks) if (!one.still) pieces.push(...stroke(one.places, colours.ink, 1.4, project));
   context.clearRect(0, 0, frame.width, frame.height);
   paint(context, pieces, colours);
+  view.pieces = pieces;
+}
+
+/** The link whose body is nearest to the viewer at a place of the picture, px; null where there is none. */
+export function linkAt({ pieces = [] }, [x, y]) {
+  const inside = (corners) =>
+    corners.reduce((odd, [ax, ay], order) => {
+      const [bx, by] = corners[(order + 1) % corners.length];
+      return ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax) ? !odd : odd;
+    }, false);
+  return pieces.filter((piece) => piece.link && inside(piece.corners)).pop()?.link ?? null; // the nearest is painted last
 }
 
 /** The middle lines of the bodies where the ideal mechanism has them. */
@@ -295,31 +350,36 @@ function straight(view, place, along, half) {
   return `M${ends[0]}L${ends[1]}`;
 }
 
-function spot({ project }, place) {
+export function spot({ project }, place) {
   return project.to(apply(project.matrix, place));
 }
 
-/** The axes of the joints, dash-dotted through their symbols. */
+/** The axes of the joints, or of the chosen one alone, dash-dotted through their symbols. */
 function axes(view) {
+  const all = view.extras.has("axes");
   return view.scene.joints.flatMap((joint) => {
+    const lit = view.chosen?.kind === "joints" && view.chosen.name === joint.name;
+    if (!all && !lit) return [];
     const place = seat(view, joint.name, view.posed);
     return (view.scene.seats[joint.name]?.axes ?? []).flatMap(({ link, along }) => {
       const pose = poseOf(view.links.get(link), view.posed);
       if (!place || !pose) return [];
       const d = straight(view, place, apply(pose.turn, along), 0.22 * view.scene.size);
-      return [svg("path", { class: "joint-axis", d }, svg("title", {}, `axis of ${joint.name}`))];
+      return [svg("path", { class: lit ? "joint-axis lit" : "joint-axis", d }, svg("title", {}, `axis of ${joint.name}`))];
     });
   });
 }
 
-/** The instantaneous screw axis of each moving link against the ground, with its pitch. */
+/** The instantaneous screw axis of each moving link, or of the chosen one alone, against the ground, with its pitch. */
 function screws(view) {
   const { scene, posed } = view;
   const moving = scene.links.filter((link) => !link.ground);
   const lines = [];
   const labels = [];
   const used = [];
+  const chosen = view.chosen?.kind === "links" && moving.some(({ name }) => name === view.chosen.name) ? view.chosen.name : null;
   moving.forEach(({ name, screw }, order) => {
+    if (chosen && name !== chosen) return;
     const place = screw && valueAt(screw, posed);
     const along = screw && valueAt({ x: screw.u, y: screw.v, z: screw.w }, posed);
     if (!place || !along || Math.hypot(...plus(place, scene.middle, -1)) > FAR * scene.size) return;
@@ -347,26 +407,33 @@ function roomFor({ frame }, [x, y], text, used) {
   return place;
 }
 
-/** Reaction forces, and moments with two heads, of the joints that are chosen. */
+/** Reaction forces, moments with two heads, and loads on the ends of bearings, of the joints that are chosen. */
 function vectors(view) {
   const { scene, index, kinds, factor } = view;
   return scene.joints.flatMap((joint) => {
     const place = seat(view, joint.name, view.posed);
     if (!place || !view.shown.has(joint.name)) return [];
     const parts = [];
-    const add = (what, perUnit, second) => {
-      const vector = valueAt(joint[what], index);
-      if (!vector) return;
-      const [x, y] = spot(view, place);
+    const add = (course, from, perUnit, more = "") => {
+      const vector = valueAt(course, index);
+      if (!vector || !from) return;
+      const [x, y] = spot(view, from);
       const [dx, dy] = apply(view.project.matrix, vector).map((part) => part * perUnit * factor);
       let d = arrow(x, y, dx, -dy);
-      if (second) d += head(x, y, dx, -dy);
-      if (d) parts.push(svg("path", { class: "halo", d }), svg("path", { class: `reaction ${second ? "twist" : ""} ${kinds.get(joint.name)}`, d })); // prettier-ignore
+      if (more === " twist") d += head(x, y, dx, -dy);
+      if (d) parts.push(svg("path", { class: "halo", d }), svg("path", { class: `reaction${more} ${kinds.get(joint.name)}`, d })); // prettier-ignore
     };
-    add("reaction", view.perUnit.force, false);
-    if (view.extras.has("moments")) add("moment", view.perUnit.moment, true);
+    if (view.extras.has("reactions")) add(joint.reaction, place, view.perUnit.force);
+    if (view.extras.has("moments")) add(joint.moment, place, view.perUnit.moment, " twist");
+    if (view.extras.has("ends")) for (const end of scene.seats[joint.name].ends) add(end.force, endAt(view, end, place), view.perUnit.end, " of-end");
     return parts;
   });
+}
+
+/** Where an end of a bearing is drawn whose middle is at a place; null where it has no pose. */
+function endAt(view, { link, along }, middle) {
+  const pose = poseOf(view.links.get(link), view.posed);
+  return pose && plus(middle, apply(pose.turn, along), HALF * view.scene.size);
 }
 
 /** The second head of a moment: a shorter arrow on the same line. */
@@ -437,7 +504,7 @@ function key(view) {
   let x = 80;
   const say = (text) => {
     parts.push(svg("text", { x, y, dy: "0.32em" }, text));
-    x += 6.2 * text.length + 18;
+    x += 7 * text.length + 16;
   };
   if (scene.scaled) {
     const length = roundBelow((frame.width * 0.16) / project.scale);
@@ -455,11 +522,12 @@ function key(view) {
     x += size * scale + 8;
     say(`${text} ${stated(size, unit)}`);
   };
-  reference(view.perUnit.force, "N", "reaction", false);
+  if (view.extras.has("reactions")) reference(view.perUnit.force, "N", "reaction", false);
   if (view.extras.has("moments")) reference(view.perUnit.moment, "N m", "moment", true);
+  if (view.extras.has("ends")) reference(view.perUnit.end, "N", "on an end", false);
   if (scene.built) {
     const text = `errors × ${told(scene.factor)}${scene.factor > 1 ? ", ideal as pale lines" : ""}`;
-    parts.push(svg("text", { class: "errors", x: 14, y: 18 }, text));
+    parts.push(svg("text", view.fill ? { class: "errors end", x: frame.width - 12, y } : { class: "errors", x: 14, y: 18 }, text));
   }
   return [svg("g", { class: "key" }, ...parts)];
 }
@@ -469,8 +537,11 @@ function controls(view) {
   const boxes = Object.entries(EXTRAS)
     .filter(([name]) => name !== "loads" || view.scene.loads.length)
     .filter(([name]) => name !== "tracks" || view.tracks.length)
+    .filter(([name]) => name !== "reactions" || view.fill) // a report chooses them by their joints
+    .filter(([name]) => name !== "ends" || Object.values(view.scene.seats).some(({ ends }) => ends.length))
     .filter(([name]) => name !== "moments" || peak(view.scene.joints.flatMap((one) => magnitude(one.moment, view.scene.count))) > 0)
-    .map(([name, [label, checked]]) => {
+    .map(([name, [label]]) => {
+      const checked = view.extras.has(name);
       const box = html("input", { type: "checkbox", checked, value: name });
       box.checked = checked;
       box.addEventListener("change", () => {
@@ -481,19 +552,17 @@ function controls(view) {
       return html("label", { class: "chip" }, box, label);
     });
   const sides = /** @type {[string, () => any, string][]} */ ([
-    ["start", () => first(view.scene), "The first view"],
-    ["x", () => ({ ...first(view.scene), around: 0, above: 0 }), "Look along the x axis"],
-    ["y", () => ({ ...first(view.scene), around: -Math.PI / 2, above: 0 }), "Look along the y axis"],
-    ["z", () => ({ ...first(view.scene), around: -Math.PI / 2, above: Math.PI / 2 }), "Look down the z axis"],
+    ["start", () => settle(view), "The first view"],
+    ["x", () => ({ ...settle(view), around: 0, above: 0 }), "Look along the x axis"],
+    ["y", () => ({ ...settle(view), around: -Math.PI / 2, above: 0 }), "Look along the y axis"],
+    ["z", () => ({ ...settle(view), around: -Math.PI / 2, above: Math.PI / 2 }), "Look down the z axis"],
   ]).map(([label, camera, title]) => {
     const button = html("button", { type: "button", class: "plain", title, "aria-label": title }, label);
     button.addEventListener("click", () => turn(view, camera()));
     return button;
   });
-  return html(
-    "div",
-    {},
+  return [
     html("fieldset", { class: "vectors" }, html("legend", {}, "Show"), ...boxes),
     html("fieldset", { class: "vectors" }, html("legend", {}, "View"), ...sides),
-  );
+  ];
 }

@@ -1,0 +1,156 @@
+"""Mechanisms in space in the studio's page: choosing, moving, layers, table of a loop; numbers against `analyse`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trunnion
+from browsing import CHROMIUM, User
+from served import served
+from trunnion.model.file import entries_of
+from trunnion.model.mechanism import Mechanism
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+FINE = 2e-6  # m: coordinates are written to the thousandth of a step of the grid
+
+
+def analysed(text, steps=360):
+    return trunnion.analyse(Mechanism(**entries_of(text)[0]), steps=steps)
+
+
+def place(result, key, index):
+    return result["point_position"].sel(point=key).isel(position=index).values
+
+
+def arrow(path):
+    """Along x and y, px, from the start of an arrow to its tip."""
+    (x, y), (a, b) = (map(float, part.split("L")[0].split(",")) for part in path.split("M")[1:3])
+    return a - x, b - y
+
+
+def quantity(words, unit):
+    """The last number of a text, in its unit without a prefix."""
+    number, prefixed = words.replace("\u2212", "-").replace("\u202f", "").replace("\u00a0", " ").split()[-2:]
+    return float(number) * {"": 1, "m": 1e-3, "µ": 1e-6, "k": 1e3}[prefixed.removesuffix(unit)]
+
+
+if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the page's own part
+
+    @pytest.fixture(scope="module")
+    def studio(tmp_path_factory):
+        folder = tmp_path_factory.mktemp("models")
+        for name in ("rssr", "rssr-with-play"):
+            (folder / f"{name}.yaml").write_text((EXAMPLES / f"{name}.yaml").read_text("utf-8"), encoding="utf-8")
+        with served(folder, "rssr.yaml") as own:
+            yield own
+
+    class SpaceUser(User):
+        def open(self):
+            self.page.goto(self.studio.address)
+            self.until("s.about.value.version && s.solved.value")
+            self.page.wait_for_selector(".hands .handle", timeout=5000)
+
+        def spot(self, name):
+            box = self.page.locator(f'.hands .handle[data-name="{name}"]').bounding_box()
+            return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    @pytest.fixture
+    def user(browser, studio):
+        context = browser.new_context(viewport={"width": 1280, "height": 720})
+        found = SpaceUser(context.new_page(), studio)
+        found.open()
+        yield found
+        wrong = list(found.wrong)
+        context.close()
+        assert not wrong, wrong
+
+    def test_what_is_chosen_in_the_picture_is_lit_and_moved_along_an_axis(user):
+        """By click, key and arrow; the joint goes so far along x; nothing else moves at the position that is shown."""
+        user.page.mouse.click(*user.spot("rod"))  # the middle of its body
+        assert user.state("s.selection.value") == {"kind": "links", "name": "rod"}
+        assert "Link" in user.page.locator(".of-part").inner_text()
+        user.page.locator('.hands .handle[data-name="B"]').focus()
+        user.keys("Enter")
+        assert user.state("s.selection.value") == {"kind": "joints", "name": "B"}
+        assert user.page.locator(".joint-axis.lit").count() == 0  # a ball has none
+        user.state("s.index.value = 40")
+        user.page.mouse.click(*user.spot("C"))
+        before = user.state("s.text.value")
+        (x, y), arm = user.spot("C"), user.page.locator(".arm.of-x .wide").bounding_box()
+        tip = arm["x"] + arm["width"] - 3, arm["y"] + arm["height"] / 2
+        user.page.mouse.move(*tip)
+        user.page.mouse.down()
+        user.page.mouse.move(tip[0] + 20, tip[1] + 4)
+        user.page.mouse.move(tip[0] + 44, tip[1] + 8)
+        said = user.state("s.notice.value.words")
+        user.page.mouse.up()
+        user.until("s.past.value.length === 1")
+        by = float(said.split("x ")[1].split()[0]) / 1e3
+        old, new = analysed(before), analysed(user.state("s.text.value"))
+        assert 2e-3 < by < 3e-2
+        np.testing.assert_allclose(place(new, "rod.C", 40) - place(old, "rod.C", 40), [by, 0, 0], atol=FINE)
+        for key in ("crank.B", "rocker.D"):
+            np.testing.assert_allclose(place(new, key, 40), place(old, key, 40), atol=FINE)
+        moved = user.spot("C")
+        assert moved[0] > x + 5
+        assert abs(moved[1] - y) < 25
+        user.keys("Control+z")
+        user.until("s.past.value.length === 0")
+        assert user.state("s.text.value") == before
+
+    @pytest.mark.slow
+    def test_a_joint_is_moved_by_keys_buttons_and_in_the_plane_of_the_picture(user):
+        before = analysed(user.state("s.text.value"), 36)
+        user.page.click("button[aria-label='Look along the y axis']")
+        user.page.locator('.hands .handle[data-name="D"]').focus()
+        user.keys("ArrowRight", "ArrowRight")
+        user.keys("Escape")  # both are taken back
+        user.keys("ArrowUp")
+        user.until("s.past.value.length === 1")
+        field = user.page.get_by_role("textbox", name="Step")
+        step = float(field.input_value().split()[0]) / 1e3
+        field.fill("2.5 mm")
+        field.press("Enter")
+        user.page.get_by_role("button", name="D by one step along y").click()
+        user.until("s.past.value.length === 2")
+        after = analysed(user.state("s.text.value"), 36)
+        change = place(after, "rocker.D", 0) - place(before, "rocker.D", 0)
+        np.testing.assert_allclose(change, [0, 2.5e-3, step], atol=FINE)
+        x, y = user.spot("D")
+        user.page.mouse.move(x, y)
+        user.page.mouse.down()
+        user.page.mouse.move(x + 10, y + 10)
+        user.page.mouse.move(x + 30, y - 20)
+        user.page.mouse.up()
+        user.until("s.past.value.length === 3")
+        last = place(analysed(user.state("s.text.value"), 36), "rocker.D", 0) - place(after, "rocker.D", 0)
+        assert min(last[0], last[2]) > 1e-3
+        assert abs(last[1]) < 1e-12  # seen along y, y stays
+
+    def test_end_loads_and_the_section_of_a_pin_have_the_numbers_of_analyse(user):
+        """Arrows times the scale that is stated; offset and tilt from the seats of both ends."""
+        user.of("actions", "m.openFile('rssr-with-play.yaml')")
+        user.until("s.solved.value && s.answer.value.scene.built")
+        user.state("s.index.value = 60")
+        user.page.get_by_label("end loads of bearings").check()
+        user.page.get_by_label("reactions", exact=True).uncheck()
+        user.page.click("button[aria-label='Look along the y axis']")
+        user.page.mouse.click(*user.spot("D"))
+        user.idle()
+        result = analysed(user.state("s.text.value"))
+        size = user.page.locator(".key text", has_text="on an end").text_content()
+        scale = arrow(user.page.locator(".key .reference").last.get_attribute("d"))[0] / quantity(size, "N")
+        drawn = [arrow(one.get_attribute("d")) for one in user.page.locator(".reaction.of-end").all()]
+        loads = [result["end_load"].sel(joint=joint).isel(position=60).values for joint in "AD"]
+        expected = np.concatenate([load[np.isfinite(load).all(axis=1)][:, [0, 2]] for load in loads]) * scale
+        np.testing.assert_allclose(drawn, expected * [1, -1], atol=0.4)  # px: ends are written to a tenth
+        told = user.page.locator(".pin-section").evaluate_all("all => all.map(one => one.getAttribute('aria-label'))")
+        ends = result["seat_offset"].sel(joint="D").isel(position=60).values
+        for axis, words in enumerate(told):
+            assert words.startswith(f"Section of D in z and {'xy'[axis]}:")
+            offset, tilt = words.split("offset ")[1].split(", tilt ")
+            np.testing.assert_allclose(quantity(offset, "m"), ends[:, axis].mean(), rtol=2e-3)
+            np.testing.assert_allclose(quantity(tilt, "rad"), np.diff(ends[:, axis])[0] / 0.02, rtol=2e-3)

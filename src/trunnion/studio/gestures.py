@@ -8,6 +8,7 @@ from typing import Any
 from trunnion.errors import Finding, MechanismError
 from trunnion.studio.acting import bar_mass, driver, gear, load, spring
 from trunnion.studio.changing import delete, lock, move, put_value
+from trunnion.studio.joining import join
 from trunnion.studio.renaming import rename
 from trunnion.studio.sketch import Sketch
 from trunnion.studio.strokes import add_point, link, pinned, slide
@@ -38,6 +39,7 @@ def done(sketch: Sketch, given: Given) -> str:
 GESTURES: dict[str, Gesture] = {
     "link": link,
     "pin": pinned,
+    "join": join,
     "slide": slide,
     "add-point": add_point,
     "driver": driver,

@@ -1,9 +1,8 @@
 // The keyboard alone can do all that the mouse can: a cross on the sheet, joints moved by arrows, a letter for each tool.
 
 import * as actions from "./actions.js";
-import { partUnder } from "./hand.js";
 import { crank } from "./motion.js";
-import { sheet, shown } from "./sheet.js";
+import { partUnder, partsAt, sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
 import { TOOLS, cancel, choose, click, placeTyped, pointer, removePart, toolOf, typed } from "./tools.js";
 import { focusOn } from "./ui.js";
@@ -91,8 +90,8 @@ function arrow({ target, key, shiftKey, altKey }) {
   if (held && state.tool.value === "select") return act(() => nudge(part, moved(held.at)));
   if (held) sheet.view.root.focus(); // the cross leaves the joint, and Enter is for where it is
   const from = held?.at ?? pointer.value?.spot.at ?? sheet.view.frame.from([sheet.view.frame.width / 2, sheet.view.frame.height / 2]);
-  const cross = altKey ? moved(from) : moved(sheet.snap(from).at);
   const near = 0.45 * step; // nearer than a step, or the cross could not leave a joint
+  const cross = altKey ? moved(from) : moved(sheet.snap(from, false, Math.min(near, 0.45 * sheet.step())).at);
   pointer.value = { spot: sheet.snapOn(cross, altKey, linkUnder(cross), near), keyboard: true, ...sheet.scale() };
   const { at, name, on } = pointer.value.spot;
   state.say(name || on ? `At ${name ?? on}.` : `At ${at.map((value) => `${Number((1000 * value).toPrecision(6))} mm`).join(", ")}.`);
@@ -125,13 +124,6 @@ function enter({ target, shiftKey: shift }) {
 function crossed() {
   const { at } = pointer.value?.spot ?? {};
   return at && sheet.snapOn(at, true, linkUnder(at), 0.45 * sheet.step());
-}
-
-/** What lies at a place of the sheet, the uppermost first. */
-function partsAt(at) {
-  const [x, y] = sheet.view.frame.to(at);
-  const box = sheet.view.root.getBoundingClientRect();
-  return document.elementsFromPoint(x + box.left, y + box.top).map(partUnder).filter(Boolean);
 }
 
 const linkUnder = (at) => (toolOf().on ? partsAt(at).find(({ kind }) => kind === "links") : null);

@@ -120,6 +120,11 @@ function preview(view) {
     if (now.spot.kind) parts.push(svg("circle", { class: "snap", cx: x, cy: y, r: 11 }));
     if (now.spot.on && toolOf().on) parts.push(svg("rect", { class: "snap", x: x - 9, y: y - 9, width: 18, height: 18 }));
   }
+  const drop = state.dropping.value;
+  if (drop) {
+    const [x, y] = frame.to(drop.at);
+    parts.push(svg("circle", { class: "snap", cx: x, cy: y, r: 13 }));
+  }
   if (from && now) parts.push(...rubber(frame, from, now.spot));
   layers.tools.replaceChildren(...parts);
 }

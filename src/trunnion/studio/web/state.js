@@ -38,6 +38,8 @@ export const selection = signal(null);
 export const tool = signal("select");
 /** First end of what is being drawn: {at, written, …}, or null. */
 export const pending = signal(null);
+/** The end or place on a link {kind, name, on, at} that a dragged end is joined with where it is let go, or null. */
+export const dropping = signal(null);
 /** Joints, and free points "link.P", that stay where they are while others are dragged. */
 export const locked = signal([]);
 /** Answer to the latest `drag` question while a joint is dragged. */
@@ -133,6 +135,7 @@ export function begin({ name, saved, content, steps = null }) {
     selection.value = null;
     pending.value = null;
     live.value = null;
+    dropping.value = null;
     index.value = 0;
     share.value = 0;
     tool.value = "select";

@@ -424,3 +424,11 @@ def test_a_watt_six_bar_of_links_that_were_joined_is_the_typed_one():
     )
     assert np.isfinite(drawn).all()
     np.testing.assert_allclose(drawn, typed, rtol=0, atol=1e-12 * np.abs(typed).max())
+
+
+def test_a_first_mass_is_in_the_middle_of_its_link():
+    text, places = edited("", {}, {"do": "link", "from": {"ground": [0, 0]}, "to": [0.06, 0.08]})
+    for given, centre in (({}, (0.05, 0)), ({"at": [0.06, 0]}, (0.036, -0.048))):  # 60 mm along x, at 53.13° to the bar
+        after, _ = edited(text, places, {"do": "centre", "link": "link1"} | given)
+        found = Mechanism(**entries_of(after)[0]).parameters()
+        assert [found[f"links.link1.centre.{axis}"] for axis in "xy"] == pytest.approx(centre)

@@ -138,3 +138,30 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
             user.of("actions", "m.undo()")
         user.idle()
         assert user.state("s.text.value") == ""
+
+    def test_a_mass_centre_is_dragged_with_the_forces_of_where_it_is(user):
+        """By mouse, arrow key and finger; the crank lies along x: its frame is that of the sheet."""
+        hand = Hand(user, "mouse")
+        numbers = user.state("s.answer.value.numbers")
+        assert numbers["links.crank.centre.x"] == 1.0
+        x, y = hand.at((1.0, 0.0))
+        user.page.mouse.move(x, y)
+        user.page.mouse.down()
+        user.page.mouse.move(*hand.at((1.1, 0.1)))
+        user.page.mouse.move(*hand.at((1.2, 0.3)))
+        user.until("s.live.value?.efforts")
+        live = user.state("s.live.value.efforts[s.answer.value.scene.drivers[0].name][s.index.value]")
+        user.page.mouse.up()
+        user.until("s.text.value.includes('1.2 m, 0.3 m') && s.answer.value.text === s.text.value && !s.live.value")
+        torque = effort(user.state("s.text.value"))[user.state("s.index.value")]
+        assert live == pytest.approx(torque, rel=1e-7)  # it comes as single precision
+        mark = user.page.locator('.handle[data-kind="centres"][data-name="crank"]')
+        assert mark.get_attribute("aria-label").replace("\xa0", " ") == "Mass centre of crank, 4.8 kg, at 1.2 m, 300 mm"
+        step = user.of("sheet", "m.sheet.step()")
+        mark.focus()
+        user.keys("ArrowRight")
+        assert user.state("s.answer.value.numbers")["links.crank.centre.x"] == pytest.approx(1.2 + step)
+        finger = Hand(user, "touch")
+        finger.drag((1.2 + step, 0.3), (1.0, 0.0))
+        assert user.state("s.answer.value.numbers")["links.crank.centre.x"] == pytest.approx(1.0)
+        assert user.state("s.past.value.length") == 3

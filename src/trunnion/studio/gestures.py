@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.studio.acting import bar_mass, driver, gear, load, spring
+from trunnion.studio.acting import bar_mass, centre, driver, gear, load, spring
 from trunnion.studio.changing import delete, lock, move, put_value
 from trunnion.studio.joining import join
 from trunnion.studio.renaming import rename
@@ -48,6 +48,7 @@ GESTURES: dict[str, Gesture] = {
     "gear": gear,
     "block": block,
     "bar-mass": bar_mass,
+    "centre": centre,
     "move": move,
     "lock": lock,
     "set": put_value,

@@ -6,6 +6,7 @@ import { changed, edit, newest, present } from "./actions.js";
 import { gridStep, onGrid } from "./geometry.js";
 import { takeOther } from "./ghosts.js";
 import { dropAt, partUnder, sheet, shown } from "./sheet.js";
+import { centreHeld, chosenOf } from "./masses.js";
 import * as state from "./state.js";
 import { click, endOf, pointer, toolOf } from "./tools.js";
 
@@ -66,7 +67,8 @@ export function listenToPointer(root, view) {
 
 /** Leave off what is held, as if it had never been taken. */
 function letGo(hand) {
-  const { joint } = hand.held ?? {};
+  const { joint, centre } = hand.held ?? {};
+  centre?.leave();
   hand.held = null;
   state.live.value = null;
   state.dropping.value = null;
@@ -94,12 +96,17 @@ function pull(view, held, at, alt) {
   if (!held.moved) takeHold(view, held);
   held.moved = true;
   if (held.joint) dragTo(held.joint, view.frame.from(at), view.frame.scale, alt);
+  else if (held.centre) held.centre.to(view.frame.from(at).map((value) => onGrid(value, sheet.step() / (alt ? 100 : 10))));
   else if (!held.locked && (held.panning || state.tool.value === "select")) sheet.pan(at[0] - held.last[0], at[1] - held.last[1]);
   held.last = at;
 }
 
 function takeHold(view, held) {
   const { kind, name, key } = held.part ?? {};
+  if (kind === "centres" && !held.panning && state.tool.value === "select") {
+    held.centre = centreHeld(view, name);
+    return;
+  }
   if (held.panning || state.tool.value !== "select" || (kind !== "joints" && kind !== "points")) return;
   if (state.locked.value.includes(name)) {
     held.locked = true;
@@ -193,6 +200,7 @@ function wordsOf({ changes }) {
 
 async function release(held, shift) {
   if (!held.moved) return tap(held, shift);
+  if (held.centre) return void held.centre.drop();
   if (!held.joint) return;
   await held.joint.asked;
   const { name, index, base, sketched, to, told, keep, posed } = held.joint;
@@ -207,6 +215,6 @@ function tap({ spot, part, panning }, shift) {
   if (panning) return;
   if (state.tool.value !== "select") return click(spot, { shift, part });
   if (part?.kind === "others") return takeOther(part.name);
-  state.selection.value = part && { kind: part.kind, name: part.name };
+  state.selection.value = chosenOf(part);
   if (part) state.tab.value = state.tab.value === "plots" ? "plots" : "properties";
 }

@@ -2,6 +2,7 @@
 
 import * as actions from "./actions.js";
 import { crank } from "./motion.js";
+import { chosenOf, massSpots } from "./masses.js";
 import { partUnder, partsAt, sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
 import { TOOLS, cancel, choose, click, placeTyped, pointer, removePart, toolOf, typed } from "./tools.js";
@@ -86,7 +87,7 @@ function arrow({ target, key, shiftKey, altKey }) {
   const [dx, dy] = ARROWS[key].map((part) => part * step);
   const part = partUnder(target);
   const moved = ([x, y]) => [x + dx, y + dy].map((value) => Number(value.toPrecision(12)));
-  const held = part && sheet.spots().find(({ kind, name }) => kind === part.kind && name === part.name);
+  const held = part && [...sheet.spots(), ...massSpots(sheet.view)].find(({ kind, name }) => kind === part.kind && name === part.name);
   if (held && state.tool.value === "select") return act(() => nudge(part, moved(held.at)));
   if (held) sheet.view.root.focus(); // the cross leaves the joint, and Enter is for where it is
   const from = held?.at ?? pointer.value?.spot.at ?? sheet.view.frame.from([sheet.view.frame.width / 2, sheet.view.frame.height / 2]);
@@ -99,6 +100,7 @@ function arrow({ target, key, shiftKey, altKey }) {
 }
 
 function nudge({ kind, name }, at) {
+  if (kind === "centres") return void actions.edit([{ do: "centre", link: name, at }], `nudge ${name}`);
   state.selection.value = { kind, name };
   actions.edit([{ do: "move", point: name, to: at, index: sheet.view.posed, keep: !shown.peek()?.sketched }], `nudge ${name}`);
 }
@@ -107,7 +109,7 @@ function nudge({ kind, name }, at) {
 function enter({ target, shiftKey: shift }) {
   const part = partUnder(target);
   if (part && state.tool.value === "select") {
-    state.selection.value = part;
+    state.selection.value = chosenOf(part);
     state.tab.value = "properties";
     requestAnimationFrame(() => focusOn(".properties input"));
     return true;

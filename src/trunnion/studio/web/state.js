@@ -50,7 +50,7 @@ export const future = signal([]);
 export const friction = signal("stated");
 export const layers = signal({
   curves: true, reactions: true, values: false, velocity: true, acceleration: true, centres: false, relative: false, circles: false,
-  transmission: false, variant: true, names: true, grid: true, others: false,
+  transmission: false, variant: true, names: true, grid: true, masses: true, dimensions: false, others: false,
 }); // prettier-ignore
 export const snapping = signal(true);
 export const tab = signal("properties");

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -432,3 +434,43 @@ def test_a_first_mass_is_in_the_middle_of_its_link():
         after, _ = edited(text, places, {"do": "centre", "link": "link1"} | given)
         found = Mechanism(**entries_of(after)[0]).parameters()
         assert [found[f"links.link1.centre.{axis}"] for axis in "xy"] == pytest.approx(centre)
+
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def grouped(example, **given):
+    """An example's efforts, and those after all its moving links are changed together."""
+    text = (EXAMPLES / f"{example}.yaml").read_text("utf-8")
+    entries = entries_of(text)[0]
+    links = [name for name in entries["links"] if name != entries.get("ground") and name not in ("ground", "frame")]
+    after, _ = edited(text, solved(text)["places"], {"do": "group", "links": links} | given)
+    return [trunnion.analyse(Mechanism(**entries_of(one)[0]), 72)["drive_effort"].values for one in (text, after)]
+
+
+@pytest.mark.parametrize("example", ["watt-six-bar", "durango-fourbar", "geared-five-bar", "spring-balanced-lamp"])
+def test_a_mirrored_mechanism_has_the_mirrored_figures(example):
+    """Turned round and moving the other way, it takes the same torques the other way; gravity stays."""
+    before, after = grouped(example, what="mirror", at=[0.013, 0.02])
+    np.testing.assert_allclose(after, -before, rtol=0, atol=1e-12 * np.nanmax(np.abs(before)))
+
+
+def test_a_copy_has_the_figures_of_what_it_is_a_copy_of():
+    before, after = grouped("geared-five-bar", what="copy", by=[0.1, 0.02])
+    for one in np.split(after, 2):
+        np.testing.assert_allclose(one, before, rtol=0, atol=1e-12 * np.nanmax(np.abs(before)))
+
+
+def test_links_outside_follow_what_is_shifted():
+    text, places = edited(
+        "", {},
+        {"do": "link", "from": {"ground": [0, 0]}, "to": [0, 0.04]},
+        {"do": "link", "from": "link1.B", "to": [0.08, 0.1]},
+        {"do": "link", "from": "link2.C", "to": {"ground": [0.08, 0]}},
+        {"do": "group", "what": "shift", "links": ["link2"], "by": [0.03, 0]},
+    )  # fmt: skip
+    assert places["link1.B"] == pytest.approx([0.03, 0.04])
+    assert places["link3.C"] == pytest.approx([0.11, 0.1])
+    points = entries_of(text)[0]["links"]
+    assert points["link1"]["points"]["B"] == ["50 mm", 0]  # √(30² + 40²)
+    assert points["link2"]["points"]["C"] == ["100 mm", 0]

@@ -8,6 +8,7 @@ from typing import Any
 from trunnion.errors import Finding, MechanismError
 from trunnion.studio.acting import bar_mass, centre, driver, gear, load, spring
 from trunnion.studio.changing import delete, lock, move, put_value
+from trunnion.studio.group import group
 from trunnion.studio.joining import join
 from trunnion.studio.renaming import rename
 from trunnion.studio.sketch import Sketch
@@ -50,6 +51,7 @@ GESTURES: dict[str, Gesture] = {
     "bar-mass": bar_mass,
     "centre": centre,
     "move": move,
+    "group": group,
     "lock": lock,
     "set": put_value,
     "delete": delete,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -137,6 +139,8 @@ def test_gears_mesh_as_they_are_drawn(typed, written, ratio):
         {"do": "rename", "what": ["joints", "A"], "to": "B"},
         {"do": "set", "path": ["gears", "gear1", "ratio"], "value": None},
         {"do": "move", "point": "D", "to": [0, 0]}, {"do": "move", "point": "link1.Z", "to": [0, 0.04]},
+        {"do": "join", "ends": ["link1.Z", "A"]}, {"do": "join", "ends": ["link1.Z", {"on": "link1", "at": [0, 0]}]},
+        {"do": "join", "ends": [{"on": "link2", "at": [0, 0.1]}, {"on": "link3", "at": [0, 0.1]}]},
     ],
 )  # fmt: skip
 def test_what_cannot_be_done_is_refused_in_words(gesture):
@@ -368,3 +372,105 @@ def test_the_mass_of_a_flat_bar_is_that_of_its_section() -> None:
     ):
         question = {"places": places, "gestures": [bar | {"density": "7850 kg/m^3"} | wrong]}
         assert words in ask(ask="edit", text=text, **question)["error"]
+
+
+SIX_BAR = {
+    "A": (0, 0), "B": (0, 0.04), "C": (0.075, 0.08), "D": (0.135, 0), "F": (0.105, 0.04), "H": (0.165, 0.065),
+    "G": (0.21, 0.005),
+}  # fmt: skip
+TYPED = """
+trunnion: 1
+space: planar
+links:
+  frame: {points: {A: [0, 0], D: [135 mm, 0], G: [210 mm, 5 mm]}}
+  crank: {points: {A: [0, 0], B: [40 mm, 0]}}
+  coupler: {points: {B: [0, 0], C: [85 mm, 0]}}
+  lever: {points: {D: [0, 0], C: [100 mm, 0], F: [50 mm, 0]}}
+  rod: {points: {F: [0, 0], H: [65 mm, 0]}}
+  rocker: {points: {G: [0, 0], H: [75 mm, 0]}}
+joints:
+  A: {type: revolute, links: [frame, crank]}
+  B: {type: revolute, links: [crank, coupler]}
+  C: {type: revolute, links: [coupler, lever]}
+  D: {type: revolute, links: [frame, lever]}
+  F: {type: revolute, links: [lever, rod]}
+  H: {type: revolute, links: [rod, rocker]}
+  G: {type: revolute, links: [frame, rocker]}
+joint_defaults: {pin: {radius: 7 mm}, friction: 0.06}
+drivers: {A: {speed: 60 rpm, start: 90 deg}}
+loads: {water: {joint: G, resisting_torque: 6 N m}}
+assembly: {C: [75 mm, 80 mm], H: [165 mm, 65 mm]}
+"""  # lengths by Pythagoras: 75-40-85, 60-80-100, 60-25-65, 45-60-75
+
+
+def test_a_watt_six_bar_of_links_that_were_joined_is_the_typed_one():
+    spot = {name: list(place) for name, place in SIX_BAR.items()}
+    aside = ([0.0, 0.2], [0.1, 0.2])  # where links are drawn that come to their places by joins alone
+    text, _ = edited(
+        "", {},
+        {"do": "link", "from": {"ground": spot["A"]}, "to": spot["B"]},
+        {"do": "link", "from": {"ground": spot["D"]}, "to": spot["C"]},
+        {"do": "link", "from": {"ground": spot["G"]}, "to": spot["H"]},
+        {"do": "link", "from": aside[0], "to": aside[1]},
+        {"do": "join", "ends": ["link4.G", "link1.B"]},
+        {"do": "join", "ends": ["link4.H", "link2.D"]},
+        {"do": "link", "from": aside[0], "to": aside[1]},
+        {"do": "join", "ends": ["link5.G", {"on": "link2", "at": spot["F"]}]},
+        {"do": "join", "ends": ["link5.H", "link3.F"]},
+        {"do": "driver", "joint": "A"},
+        {"do": "load", "against": "E", "size": "6 N m"},
+        {"do": "set", "path": ["joint_defaults"], "value": {"pin": {"radius": "7 mm"}, "friction": 0.06}},
+    )  # fmt: skip
+    drawn, typed = (
+        trunnion.analyse(Mechanism(**entries_of(one)[0]), 360)["drive_effort"].values for one in (text, TYPED)
+    )
+    assert np.isfinite(drawn).all()
+    np.testing.assert_allclose(drawn, typed, rtol=0, atol=1e-12 * np.abs(typed).max())
+
+
+def test_a_first_mass_is_in_the_middle_of_its_link():
+    text, places = edited("", {}, {"do": "link", "from": {"ground": [0, 0]}, "to": [0.06, 0.08]})
+    for given, centre in (({}, (0.05, 0)), ({"at": [0.06, 0]}, (0.036, -0.048))):  # 60 mm along x, at 53.13° to the bar
+        after, _ = edited(text, places, {"do": "centre", "link": "link1"} | given)
+        found = Mechanism(**entries_of(after)[0]).parameters()
+        assert [found[f"links.link1.centre.{axis}"] for axis in "xy"] == pytest.approx(centre)
+
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def grouped(example, **given):
+    """An example's efforts, and those after all its moving links are changed together."""
+    text = (EXAMPLES / f"{example}.yaml").read_text("utf-8")
+    entries = entries_of(text)[0]
+    links = [name for name in entries["links"] if name != entries.get("ground") and name not in ("ground", "frame")]
+    after, _ = edited(text, solved(text)["places"], {"do": "group", "links": links} | given)
+    return [trunnion.analyse(Mechanism(**entries_of(one)[0]), 72)["drive_effort"].values for one in (text, after)]
+
+
+@pytest.mark.parametrize("example", ["watt-six-bar", "durango-fourbar", "geared-five-bar", "spring-balanced-lamp"])
+def test_a_mirrored_mechanism_has_the_mirrored_figures(example):
+    """Turned round and moving the other way, it takes the same torques the other way; gravity stays."""
+    before, after = grouped(example, what="mirror", at=[0.013, 0.02])
+    np.testing.assert_allclose(after, -before, rtol=0, atol=1e-12 * np.nanmax(np.abs(before)))
+
+
+def test_a_copy_has_the_figures_of_what_it_is_a_copy_of():
+    before, after = grouped("geared-five-bar", what="copy", by=[0.1, 0.02])
+    for one in np.split(after, 2):
+        np.testing.assert_allclose(one, before, rtol=0, atol=1e-12 * np.nanmax(np.abs(before)))
+
+
+def test_links_outside_follow_what_is_shifted():
+    text, places = edited(
+        "", {},
+        {"do": "link", "from": {"ground": [0, 0]}, "to": [0, 0.04]},
+        {"do": "link", "from": "link1.B", "to": [0.08, 0.1]},
+        {"do": "link", "from": "link2.C", "to": {"ground": [0.08, 0]}},
+        {"do": "group", "what": "shift", "links": ["link2"], "by": [0.03, 0]},
+    )  # fmt: skip
+    assert places["link1.B"] == pytest.approx([0.03, 0.04])
+    assert places["link3.C"] == pytest.approx([0.11, 0.1])
+    points = entries_of(text)[0]["links"]
+    assert points["link1"]["points"]["B"] == ["50 mm", 0]  # √(30² + 40²)
+    assert points["link2"]["points"]["C"] == ["100 mm", 0]

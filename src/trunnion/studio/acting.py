@@ -10,10 +10,10 @@ from typing import Any
 
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, UnitError
-from trunnion.studio.ends import begin, numbered, point_of, refused
-from trunnion.studio.sketch import Sketch
+from trunnion.studio.ends import begin, numbered, point_of, refused, vector
+from trunnion.studio.sketch import Sketch, Vector
 
-__all__ = ["bar_mass", "driver", "gear", "load", "spring"]
+__all__ = ["bar_mass", "centre", "driver", "gear", "load", "spring"]
 
 Given = Mapping[str, Any]
 RATIO = re.compile(r"\s*([-+]?)\s*(\d+\.?\d*|\.\d+)\s*(?:([:/])\s*(\d+\.?\d*|\.\d+)\s*)?")
@@ -95,20 +95,36 @@ def bar_mass(sketch: Sketch, given: Given) -> str:
     width, thickness, density: as they were typed. With length l and width b: J = m (l² + b²) / 12 about the middle.
     """
     link = str(given["link"])
-    points = {point: sketch.local(link, point) for point in sketch.points(link)}
-    if len(points) < 2 or link == sketch.ground:
+    if len(sketch.points(link)) < 2 or link == sketch.ground:
         raise refused("is no bar", f"links.{link}", "choose a moving link with two points")
-    (x, y), (a, b) = max(combinations(points.values(), 2), key=lambda ends: dist(*ends))
-    length = dist((x, y), (a, b))
+    length, (x, y) = _bar(sketch, link)
     kinds = {"width": "length", "thickness": "length", "density": "density"}
     width, thickness, density = (_above_zero(given.get(key), key, kind) for key, kind in kinds.items())
     mass = density * length * width * thickness
     sketch.section("links")[link] |= {
         "mass": f"{mass:.6g} kg",
-        "centre": [sketch.length((x + a) / 2), sketch.length((y + b) / 2)],
+        "centre": [sketch.length(x), sketch.length(y)],
         "inertia": f"{mass * (length**2 + width**2) / 12:.6g} kg m^2",
     }
     return f"Mass of {link}"
+
+
+def centre(sketch: Sketch, given: Given) -> str:
+    """The mass centre of a link goes to the place `at`; without that to the middle of the bar between its points."""
+    link = str(given["link"])
+    if link == sketch.ground or link not in sketch.of("links"):
+        raise refused("has no mass centre", f"links.{link}", "choose a link that moves")
+    x, y = sketch.frame(link).into(vector(given["at"])) if given.get("at") else _bar(sketch, link)[1]
+    sketch.section("links")[link]["centre"] = [sketch.length(x), sketch.length(y)]
+    return f"Mass centre of {link}"
+
+
+def _bar(sketch: Sketch, link: str) -> tuple[float, Vector]:
+    """Length and middle of a link between its two points that are farthest apart, m, in its frame."""
+    points = [sketch.local(link, point) for point in sketch.points(link)]
+    pairs = combinations(points if len(points) > 1 else [*points, *points] or [(0.0, 0.0)] * 2, 2)
+    (x, y), (a, b) = max(pairs, key=lambda ends: dist(*ends))
+    return dist((x, y), (a, b)), ((x + a) / 2, (y + b) / 2)
 
 
 def _above_zero(typed: Any, key: str, kind: str) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import cos, hypot, isfinite, sin
 from typing import Any, NamedTuple
 
@@ -42,9 +42,9 @@ def taken(sketch: Sketch) -> set[str]:
     return {*sketch.joints, *points, *links, *sketch.of("dimensions"), *sketch.section("dimensions")}
 
 
-def letter(sketch: Sketch) -> str:
-    """The next free name of a point: A, B, …, Z, A2, …"""
-    used = taken(sketch)
+def letter(sketch: Sketch, also: Iterable[str] = ()) -> str:
+    """The next free name of a point: A, B, …, Z, A2, …; also: names that are spoken for."""
+    used = {*taken(sketch), *also}
     names = (one + number for number in ("", *map(str, range(2, 1000))) for one in LETTERS)
     return next(name for name in names if name not in used)
 

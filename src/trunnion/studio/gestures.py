@@ -6,8 +6,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.studio.acting import bar_mass, driver, gear, load, spring
+from trunnion.studio.acting import bar_mass, centre, driver, gear, load, spring
 from trunnion.studio.changing import delete, lock, move, put_value
+from trunnion.studio.group import group
+from trunnion.studio.joining import join
 from trunnion.studio.renaming import rename
 from trunnion.studio.sketch import Sketch
 from trunnion.studio.strokes import add_point, link, pinned, slide
@@ -38,6 +40,7 @@ def done(sketch: Sketch, given: Given) -> str:
 GESTURES: dict[str, Gesture] = {
     "link": link,
     "pin": pinned,
+    "join": join,
     "slide": slide,
     "add-point": add_point,
     "driver": driver,
@@ -46,7 +49,9 @@ GESTURES: dict[str, Gesture] = {
     "gear": gear,
     "block": block,
     "bar-mass": bar_mass,
+    "centre": centre,
     "move": move,
+    "group": group,
     "lock": lock,
     "set": put_value,
     "delete": delete,

@@ -9,7 +9,7 @@ from typing import Any
 from trunnion.studio.ends import free, refused, taken
 from trunnion.studio.sketch import Sketch
 
-__all__ = ["rename"]
+__all__ = ["rename", "rename_point"]
 
 Given = Mapping[str, Any]
 NAMED = ("links", "joints", "dimensions", "loads", "springs", "gears")
@@ -27,7 +27,7 @@ def rename(sketch: Sketch, given: Given) -> str:
     if not new or "." in new or new in taken(sketch) or new in beside:
         raise refused(f"'{new}' is not a free name", f"{section}.{old}", "choose another")
     if section == "points":
-        _rename_point(sketch, old, new)
+        rename_point(sketch, old, new)
         return f"Rename {old} to {new}"
     sketch.entries = dict(_renamed(sketch.entries, section, old, new))
     if section == "links" and old == sketch.ground:
@@ -49,7 +49,7 @@ def _relocked(key: str, side: int, old: str, new: str) -> str:
     return f"{new}.{point}" if side == 0 and link == old else key
 
 
-def _rename_point(sketch: Sketch, old: str, new: str) -> None:
+def rename_point(sketch: Sketch, old: str, new: str) -> None:
     """A point of a link that is no joint, with the loads and springs at it."""
     link, point = free(sketch, old)
     entry = sketch.section("links")[link]

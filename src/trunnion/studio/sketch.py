@@ -231,7 +231,7 @@ class Sketch:
             elif guide := self._guide(link):
                 found += self._shifted(guide, to)
             elif mine:
-                found += self._relocated(link, mine, to)
+                found += self.relocated(link, mine, to)
             elif slot := self._slot(link):
                 found += self._turned(link, slot, to)
         return found
@@ -269,7 +269,7 @@ class Sketch:
         across = ((to[1] - before[1]) * x - (to[0] - before[0]) * y) / norm
         yield from self._at(first, joint, (base[0] - across * y / norm, base[1] + across * x / norm))
 
-    def _relocated(self, link: str, moving: list[str], to: Vector) -> Iterator[Change]:
+    def relocated(self, link: str, moving: list[str], to: Vector) -> Iterator[Change]:
         """New coordinates of the joints of a link where some of them go to a place and the others stay.
 
         A link whose frame begins at one joint and has its x through another keeps that form, unless it has a slot.

@@ -28,6 +28,8 @@ assert.deepEqual(geometry.snap(spots, [0.112, 0.058], { near: 0.02, step: 0.01 }
 
 assert.deepEqual(geometry.onLine([[0, 0], [1, 0]], [0.3, 0.01], 0.02), [0.3, 0]);
 assert.deepEqual(geometry.onLine([[0, 0], [1, 0]], [0.3, 0.03], 0.02), [0.3, 0.03]);
+assert.deepEqual(geometry.crossing([[0, 0], [2, 1]], [[0, 1], [2, 0]], [1.01, 0.5], 0.02), [1, 0.5]);
+assert.deepEqual(geometry.crossing([[0, 0], [2, 0]], [[0, 1], [2, 1]], [1, 0.5], 0.02), [1, 0.5]);
 
 // ---- a mechanism that is only drawn
 const entries = {

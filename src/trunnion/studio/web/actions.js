@@ -150,7 +150,10 @@ function refuse(words) {
 
 /** Write one value of the file. */
 export function setValue(path, value, merge = null) {
-  return edit([{ do: "set", path, value }], merge);
+  const [section, link, key] = path;
+  const part = state.answer.value?.entries?.links?.[link] ?? {};
+  const bare = section === "links" && key === "mass" && value !== null && !state.spatial.value && !("mass" in part) && !("centre" in part);
+  return edit([{ do: "set", path, value }, ...(bare ? [{ do: "centre", link }] : [])], merge); // a first mass is in the middle
 }
 
 /** The mechanism with a point at another place ("drag") or other numbers ("try"); null where something newer was asked. */

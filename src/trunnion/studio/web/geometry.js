@@ -49,6 +49,22 @@ export function onLine(spots, at, near) {
   return best;
 }
 
+/** Where the lines through two points each of `first` and of `second` cross nearest to a place, within `near`; the place itself if none do. */
+export function crossing(first, second, at, near) {
+  let [best, least] = [at, near];
+  const lines = (spots) => spots.flatMap((a, order) => spots.slice(order + 1).map((b) => [a, [b[0] - a[0], b[1] - a[1]]]));
+  for (const [[x, y], [u, v]] of lines(first))
+    for (const [[a, b], [p, q]] of lines(second)) {
+      const by = u * q - v * p;
+      if (Math.abs(by) <= 1e-9 * Math.hypot(u, v) * Math.hypot(p, q)) continue; // they are parallel
+      const share = ((a - x) * q - (b - y) * p) / by;
+      const meet = [x + share * u, y + share * v];
+      const far = Math.hypot(meet[0] - at[0], meet[1] - at[1]);
+      if (far < least) [best, least] = [meet.map((value) => Number(value.toPrecision(12))), far];
+    }
+  return best;
+}
+
 /** The name of a file for a model: that of its own file, or of the model without what file names lack. */
 export function stemOf(entries, file = null) {
   if (file) return file.replace(/\.[^.]+$/, "");

@@ -5,9 +5,10 @@ import { place } from "../web/data.js";
 import { changed, edit, newest, present } from "./actions.js";
 import { gridStep, onGrid } from "./geometry.js";
 import { takeOther } from "./ghosts.js";
-import { sheet, shown } from "./sheet.js";
+import { dropAt, partUnder, sheet, shown } from "./sheet.js";
+import { centreHeld, chosenOf } from "./masses.js";
 import * as state from "./state.js";
-import { click, pointer, toolOf } from "./tools.js";
+import { click, endOf, pointer, toolOf } from "./tools.js";
 
 const STILL = 3; // px that a click may move
 const ON_PATH = 8; // px from its path within which a joint is on it
@@ -66,9 +67,11 @@ export function listenToPointer(root, view) {
 
 /** Leave off what is held, as if it had never been taken. */
 function letGo(hand) {
-  const { joint } = hand.held ?? {};
+  const { joint, centre } = hand.held ?? {};
+  centre?.leave();
   hand.held = null;
   state.live.value = null;
+  state.dropping.value = null;
   if (!joint) return;
   joint.left = true;
   if (joint.sketched) state.places.value = joint.base.places;
@@ -87,24 +90,23 @@ function spread(fingers, id, at) {
   if (before.wide && wide) sheet.zoom(wide / before.wide, middle);
 }
 
-/** What a pointer is over: {kind, name, key}, or null. */
-export function partUnder(target) {
-  const node = target?.closest?.("[data-kind]");
-  return node ? { kind: node.dataset.kind, name: node.dataset.name, key: node.dataset.key } : null;
-}
-
 function pull(view, held, at, alt) {
   const far = Math.hypot(at[0] - held.start[0], at[1] - held.start[1]);
   if (!held.moved && far <= STILL) return;
   if (!held.moved) takeHold(view, held);
   held.moved = true;
   if (held.joint) dragTo(held.joint, view.frame.from(at), view.frame.scale, alt);
+  else if (held.centre) held.centre.to(view.frame.from(at).map((value) => onGrid(value, sheet.step() / (alt ? 100 : 10))));
   else if (!held.locked && (held.panning || state.tool.value === "select")) sheet.pan(at[0] - held.last[0], at[1] - held.last[1]);
   held.last = at;
 }
 
 function takeHold(view, held) {
   const { kind, name, key } = held.part ?? {};
+  if (kind === "centres" && !held.panning && state.tool.value === "select") {
+    held.centre = centreHeld(view, name);
+    return;
+  }
   if (held.panning || state.tool.value !== "select" || (kind !== "joints" && kind !== "points")) return;
   if (state.locked.value.includes(name)) {
     held.locked = true;
@@ -113,7 +115,7 @@ function takeHold(view, held) {
   const base = present();
   const { sketched, scene } = shown.peek();
   const path = sketched || state.locked.value.length ? null : pathOf(scene, key); // a locked joint stays where it is
-  held.joint = { name, key, index: view.posed, asked: null, told: "", sketched, base, together: sketched ? together(kind, name, base.places) : [], path, scene, crank: Boolean(path) && driven(scene, name, key) };
+  held.joint = { kind, name, key, index: view.posed, asked: null, told: "", sketched, base, together: sketched ? together(kind, name, base.places) : [], path, scene, crank: Boolean(path) && driven(scene, name, key) };
   const { joint } = held;
   joint.ask = newest((to) => changed("drag", { point: name, index: joint.index, to, keep: joint.keep }), (found, to) => follow(joint, found, to));
   state.selection.value = { kind, name };
@@ -169,7 +171,11 @@ function dragTo(joint, at, scale, alt) {
   if (!joint.base) Object.assign(joint, { base: present(), index: state.index.value });
   joint.to = at.map((value) => onGrid(value, gridStep(scale) / 10));
   joint.keep = !alt && !joint.sketched;
+  joint.drop = joint.sketched && !alt ? dropAt(joint, at) : null;
   if (joint.sketched) {
+    if (joint.drop) joint.to = joint.drop.at;
+    state.dropping.value = joint.drop;
+    state.say(joint.drop ? `Let it go: it is joined with ${joint.drop.on ?? joint.drop.name}. With Alt it is not.` : "");
     state.places.value = { ...state.places.value, ...Object.fromEntries(joint.together.map((key) => [key, joint.to])) };
     return;
   }
@@ -194,11 +200,14 @@ function wordsOf({ changes }) {
 
 async function release(held, shift) {
   if (!held.moved) return tap(held, shift);
+  if (held.centre) return void held.centre.drop();
   if (!held.joint) return;
   await held.joint.asked;
   const { name, index, base, sketched, to, told, keep, posed } = held.joint;
+  state.dropping.value = null;
   if (posed) return;
   if (sketched) state.places.value = base.places; // `edit` moves them
+  if (held.joint.drop) return void edit([{ do: "join", ends: [name, endOf(held.joint.drop)] }], null, base.places);
   if ((await edit([{ do: "move", point: name, to, index, keep }], null, base.places)) && told) state.say(`Move ${name}: ${told}.`);
 }
 
@@ -206,6 +215,6 @@ function tap({ spot, part, panning }, shift) {
   if (panning) return;
   if (state.tool.value !== "select") return click(spot, { shift, part });
   if (part?.kind === "others") return takeOther(part.name);
-  state.selection.value = part && { kind: part.kind, name: part.name };
+  state.selection.value = chosenOf(part);
   if (part) state.tab.value = state.tab.value === "plots" ? "plots" : "properties";
 }

@@ -6,6 +6,7 @@ import { TARGET } from "./drawing.js";
 import { gridStep } from "./geometry.js";
 import * as state from "./state.js";
 
+const NOUNS = { joints: "Joint", points: "Point", centres: "Mass centre of" };
 const MOST = 400; // targets; of larger mechanisms the list under Properties chooses
 
 /** Put targets over the spots; `chosen` {kind, name} is marked. */
@@ -18,15 +19,16 @@ export function poseHandles(view, spots, chosen) {
   const coordinate = (value) => stated(Math.abs(value) < least ? 0 : value, "m");
   const names = few.map(({ kind, name }) => `${kind} ${name}`).join("\n");
   if (view.handled !== names) build(view, few, names);
-  few.forEach(({ kind, name, at }, order) => {
+  const joints = few.filter(({ kind }) => kind !== "centres").map((one) => frame.to(one.at));
+  few.forEach(({ kind, name, at, mass }, order) => {
     const [x, y] = frame.to(at);
-    const words = `${kind === "joints" ? "Joint" : "Point"} ${name}${locked.has(name) ? ", locked" : ""}, at ${coordinate(at[0])}, ${coordinate(at[1])}`;
+    const words = `${NOUNS[kind]} ${name}${mass ? `, ${Number(mass.toPrecision(4))} kg` : ""}${locked.has(name) ? ", locked" : ""}, at ${coordinate(at[0])}, ${coordinate(at[1])}`;
     const active = chosen?.kind === kind && chosen.name === name;
     set(layers.handles.children[order], {
       cx: x.toFixed(1),
       cy: y.toFixed(1),
       "aria-label": words,
-      class: active ? "handle chosen" : "handle",
+      class: active ? "handle chosen" : mass && joints.some((spot) => Math.hypot(spot[0] - x, spot[1] - y) < TARGET) ? "handle under" : "handle",
     });
   });
 }

@@ -2,9 +2,9 @@
 
 import { place } from "../web/data.js";
 import * as actions from "./actions.js";
-import { partUnder } from "./hand.js";
 import { crank } from "./motion.js";
-import { sheet, shown } from "./sheet.js";
+import { chosenOf, massSpots } from "./masses.js";
+import { partUnder, partsAt, sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
 import { TOOLS, cancel, choose, click, placeTyped, pointer, removePart, toolOf, typed } from "./tools.js";
 import { focusOn } from "./ui.js";
@@ -88,12 +88,12 @@ function arrow({ target, key, shiftKey, altKey }) {
   const [dx, dy] = ARROWS[key].map((part) => part * step);
   const part = partUnder(target);
   const moved = ([x, y]) => [x + dx, y + dy].map((value) => Number(value.toPrecision(12)));
-  const held = part && sheet.spots().find(({ kind, name }) => kind === part.kind && name === part.name);
+  const held = part && [...sheet.spots(), ...massSpots(sheet.view)].find(({ kind, name }) => kind === part.kind && name === part.name);
   if (held && state.tool.value === "select") return act(() => nudge(part, moved(held.at)));
   if (held) sheet.view.root.focus(); // the cross leaves the joint, and Enter is for where it is
   const from = held?.at ?? pointer.value?.spot.at ?? sheet.view.frame.from([sheet.view.frame.width / 2, sheet.view.frame.height / 2]);
-  const cross = altKey ? moved(from) : moved(sheet.snap(from).at);
   const near = 0.45 * step; // nearer than a step, or the cross could not leave a joint
+  const cross = altKey ? moved(from) : moved(sheet.snap(from, false, Math.min(near, 0.45 * sheet.step())).at);
   pointer.value = { spot: sheet.snapOn(cross, altKey, linkUnder(cross), near), keyboard: true, ...sheet.scale() };
   const { at, name, on } = pointer.value.spot;
   state.say(name || on ? `At ${name ?? on}.` : `At ${at.map((value) => `${Number((1000 * value).toPrecision(6))} mm`).join(", ")}.`);
@@ -101,6 +101,7 @@ function arrow({ target, key, shiftKey, altKey }) {
 }
 
 function nudge({ kind, name }, at) {
+  if (kind === "centres") return void actions.edit([{ do: "centre", link: name, at }], `nudge ${name}`);
   state.selection.value = { kind, name };
   actions.edit([{ do: "move", point: name, to: at, index: sheet.view.posed, keep: !shown.peek()?.sketched }], `nudge ${name}`);
 }
@@ -109,7 +110,7 @@ function nudge({ kind, name }, at) {
 function enter({ target, shiftKey: shift }) {
   const part = partUnder(target);
   if (part && state.tool.value === "select") {
-    state.selection.value = part;
+    state.selection.value = chosenOf(part);
     state.tab.value = "properties";
     requestAnimationFrame(() => focusOn(".properties input"));
     return true;
@@ -134,13 +135,6 @@ function middleOf(part) {
 function crossed() {
   const { at } = pointer.value?.spot ?? {};
   return at && sheet.snapOn(at, true, linkUnder(at), 0.45 * sheet.step());
-}
-
-/** What lies at a place of the sheet, the uppermost first. */
-function partsAt(at) {
-  const [x, y] = sheet.view.frame.to(at);
-  const box = sheet.view.root.getBoundingClientRect();
-  return document.elementsFromPoint(x + box.left, y + box.top).map(partUnder).filter(Boolean);
 }
 
 const linkUnder = (at) => (toolOf().on ? partsAt(at).find(({ kind }) => kind === "links") : null);

@@ -17,6 +17,8 @@ export const LAYERS = [
   ["transmission", "Transmission angles"],
   ["variant", "Variant A as a ghost"],
   ["names", "Names"],
+  ["masses", "Mass centres"],
+  ["dimensions", "Dimensions"],
   ["grid", "Grid"],
   ["others", "Other assemblies"],
   ["peaks", "Whole peaks in plots"],
@@ -72,7 +74,7 @@ export function listenToPlaces(root, view) {
   let from = null;
   const down = (event) => {
     const part = event.target.closest?.("[data-kind]");
-    const link = event.button === 0 && state.tool.value === "select" && part?.dataset.kind === "links" ? part.dataset.name : null;
+    const link = event.button === 0 && state.tool.value === "select" && ["links", "centres"].includes(part?.dataset.kind) ? part.dataset.name : null;
     from = link && { link, x: event.clientX, y: event.clientY };
   };
   const up = (event) => {

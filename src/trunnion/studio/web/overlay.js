@@ -9,6 +9,7 @@ import { outline, standing, trackPath } from "../web/plane.js";
 import { KEY, metres, perNewton } from "./drawing.js";
 import { roundAbove } from "./geometry.js";
 import { laid } from "./layers.js";
+import { massMarks } from "./masses.js";
 import { sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
 import { compared } from "./variants.js";
@@ -29,7 +30,9 @@ let room = 0; // px, where words end at the right
 export function addOverlay({ root, layers }) {
   layers.variants = svg("g", { class: "layer variants-of-sheet" });
   layers.overlay = svg("g", { class: "layer overlay" });
+  layers.masses = svg("g", { class: "layer masses" });
   root.insertBefore(layers.variants, layers.ground);
+  root.insertBefore(layers.masses, layers.parts);
   root.insertBefore(layers.overlay, layers.names);
 }
 
@@ -44,6 +47,7 @@ export function poseOverlay(view) {
   taken = [...view.parts.names, ...view.parts.loads].flatMap(({ box }) => box ?? []);
   if (sheet.beside().length) key.push(keyed(view, 22, "other assemblies", (x, y) => svg("g", { class: "ghost" }, svg("path", { d: `M${x},${y}h22` }))));
   layers.variants.replaceChildren(...(wanted.variant ? variants(view, key) : []));
+  layers.masses.replaceChildren(...massMarks(view));
   layers.overlay.replaceChildren(
     ...(told.circles ? circles(view, told.circles, key) : []),
     ...(told.transmission ? told.transmission.flatMap((one) => angle(view, one)) : []),

@@ -6,6 +6,7 @@ import { AddDimension } from "./adding.js";
 import { ambiguous, bare, findingsOf, numberOf, partOfList, rowsOf, unitOf, usualUnit, written } from "./fields.js";
 import { dictionary, groundOf } from "./geometry.js";
 import { others, takeOther } from "./ghosts.js";
+import { BarMass, Gravity, Masses } from "./masses.js";
 import * as state from "./state.js";
 import { Sections } from "./section.js";
 import { removePart } from "./tools.js";
@@ -37,7 +38,7 @@ function Chosen({ kind, name }) {
       <${Rows} rows=${rows} findings=${findings} />
       ${kind === "joints" && state.solved.value && html`<p class="calm">${arrowOf(state.answer.value.scene.joints.find((one) => one.name === name))}</p>`}
       ${kind === "joints" && html`<${Sections} joint=${name} />`}
-      ${kind === "links" && name !== groundOf(entries) && !state.spatial.value && html`<${BarMass} link=${name} />`}
+      ${kind === "links" && name !== groundOf(entries) && !state.spatial.value && html`<${BarMass} links=${[name]} /><${Gravity} />`}
       ${driver && html`<h3>Driver</h3><${Rows} rows=${rowsOf(entries, "drivers", name)} findings=${findings} />`}
       <p class="row-of-buttons">
         ${kind === "joints" && !driver && html`<${Button} label="Drive this joint" onClick=${() => edit([{ do: "driver", joint: name }])} />`}
@@ -50,15 +51,6 @@ function Chosen({ kind, name }) {
         <${Button} label="All parts" onClick=${() => (state.selection.value = null)} />
       </p>
     </section>`; // prettier-ignore
-}
-
-/** Mass, centre and inertia of a flat bar by its section and density. */
-function BarMass({ link }) {
-  const [typed, setTyped] = useState({ width: "20 mm", thickness: "10 mm", density: "7850 kg/m^3" });
-  const put = (key) => ({ target }) => setTyped({ ...typed, [key]: target.value });
-  return html`<details class="bar-mass"><summary>Mass of a flat bar</summary>
-    ${Object.keys(typed).map((key) => html`<label class="choice">${key} <input aria-label=${key} value=${typed[key]} onInput=${put(key)} /></label>`)}
-    <${Button} label="Set mass, centre and inertia" onClick=${() => edit([{ do: "bar-mass", link, ...typed }])} /></details>`; // prettier-ignore
 }
 
 /** What the arrow at a joint is. */
@@ -152,6 +144,7 @@ function Model() {
     <section><h2>Dimensions</h2><div class="rows">
       ${dimensions.map(([name, value]) => html`<${Dimension} key=${name} name=${name} value=${value} findings=${findings} />`)}
     </div><${AddDimension} /></section>
+    <${Masses} />
     <section><h2>Parts</h2>${SECTIONS.map((kind) => html`<${Parts} kind=${kind} names=${Object.keys(dictionary(entries?.[kind]))} />`)}</section>
     ${others.value.length > 0 && html`<section><h2>Other assemblies</h2><p class="row-of-buttons">
       ${others.value.map(({ name }) => html`<${Button} label=${`Take ${name}`} onClick=${() => takeOther(name)} />`)}</p></section>`}`; // prettier-ignore

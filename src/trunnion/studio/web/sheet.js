@@ -4,7 +4,7 @@ import { computed } from "@preact/signals";
 import { kindOf } from "../web/report.js";
 import { drawing, fitted, frameOf, reframe } from "./drawing.js";
 import { place } from "../web/data.js";
-import { assembled, extentOf, gridStep, nearOf, onLine, sketch, snap, spotsOf } from "./geometry.js";
+import { assembled, crossing, extentOf, gridStep, nearOf, onLine, sketch, snap, spotsOf } from "./geometry.js";
 import * as state from "./state.js";
 
 /** The scene that is shown, and what its parts are built from. */
@@ -81,12 +81,53 @@ export const sheet = {
   snapOn(at, loose, part, near) {
     const spot = sheet.snap(at, loose, near);
     if (spot.kind || part?.kind !== "links") return spot;
-    const { scene, posed, frame } = sheet.view;
-    const points = scene.links.find(({ name }) => name === part.name)?.points ?? [];
-    const spots = points.map((key) => place(scene, key, posed)).filter(Boolean);
-    return { ...spot, on: part.name, at: onLine(spots, spot.at, nearOf(frame.scale)) };
+    return { ...spot, on: part.name, at: onLine(pointsOf(part.name), spot.at, near ?? nearOf(sheet.view.frame.scale)) };
   },
 };
+
+/** What lies at a place of the sheet, [{kind, name, key}], the uppermost first. */
+export function partsAt(at) {
+  const [x, y] = sheet.view.frame.to(at);
+  const box = sheet.view.root.getBoundingClientRect();
+  return document.elementsFromPoint(x + box.left, y + box.top).map(partUnder).filter(Boolean);
+}
+
+/** What a pointer is over: {kind, name, key}, or null. */
+export function partUnder(target) {
+  const node = target?.closest?.("[data-kind]");
+  return node ? { kind: node.dataset.kind, name: node.dataset.name, key: node.dataset.key } : null;
+}
+
+/** Two moving links that cross at a place, {on: [first, second], at: where exactly}; null where there is one link or none. */
+export function crossingAt(at) {
+  const names = [...new Set(partsAt(at).filter(({ kind }) => kind === "links").map(({ name }) => name))];
+  if (names.length < 2) return null;
+  return { on: names.slice(0, 2), at: crossing(pointsOf(names[0]), pointsOf(names[1]), at, nearOf(sheet.view.frame.scale)) };
+}
+
+/** Where the points of a link are shown. */
+function pointsOf(link) {
+  const { scene, posed } = sheet.view;
+  return (scene.links.find(({ name }) => name === link)?.points ?? []).map((key) => place(scene, key, posed)).filter(Boolean);
+}
+
+/** The moving links of a joint or point. */
+export function linksOf({ kind, name }) {
+  return kind === "joints" ? (sheet.view.scene.joints.find((one) => one.name === name)?.links ?? []) : [name.split(".")[0]];
+}
+
+/**
+ * What an end that is dragged to a place would be joined with there: another end, or a place on a link that is not its own; null where
+ * there is nothing. Only a mechanism that is not whole yet has ends to be joined, and of two joints neither is one.
+ */
+export function dropAt(held, at) {
+  const own = linksOf(held);
+  const apart = (one) => !linksOf(one).some((link) => own.includes(link)) && (held.kind === "points" || one.kind === "points");
+  const near = snap(sheet.spots().filter(apart), at, { near: nearOf(sheet.view.frame.scale), step: 1 });
+  if (near.kind) return near;
+  const link = held.kind === "points" && partsAt(at).find(({ kind, name }) => kind === "links" && !own.includes(name));
+  return link ? { kind: null, on: link.name, at: onLine(pointsOf(link.name), at, nearOf(sheet.view.frame.scale)) } : null;
+}
 
 /** The one moving link at a joint or point, beside `own`; null where there are several. */
 export function linkOf({ kind, name, link }, own = null) {

@@ -8,6 +8,7 @@ import { others, poseGhosts } from "./ghosts.js";
 import { laid, listenToPlaces } from "./layers.js";
 import { addOverlay, poseOverlay } from "./overlay.js";
 import { compared } from "./variants.js";
+import { massSpots } from "./masses.js";
 import { markChosen, poseHandles } from "./handles.js";
 import { listenToPointer } from "./hand.js";
 import { kindsOf, sheet, shown } from "./sheet.js";
@@ -102,7 +103,7 @@ function show(view) {
 
 function chosen(view) {
   if (!view.scene) return;
-  poseHandles(view, sheet.spots(), state.selection.value);
+  poseHandles(view, [...sheet.spots(), ...massSpots(view)], state.selection.value);
   markChosen(view, state.selection.value);
   poseGhosts(view, state.live.value ? [] : others.value);
   poseOverlay(view);
@@ -114,11 +115,17 @@ function preview(view) {
   const from = state.pending.value;
   const now = pointer.value;
   const parts = [];
+  view.root.classList.toggle("drawing", state.tool.value !== "select");
   if (now && (state.tool.value !== "select" || now.keyboard)) {
     const [x, y] = frame.to(now.spot.at);
     parts.push(svg("path", { class: "cross", d: `M${x - 9},${y}h18M${x},${y - 9}v18` }));
     if (now.spot.kind) parts.push(svg("circle", { class: "snap", cx: x, cy: y, r: 11 }));
     if (now.spot.on && toolOf().on) parts.push(svg("rect", { class: "snap", x: x - 9, y: y - 9, width: 18, height: 18 }));
+  }
+  const drop = state.dropping.value;
+  if (drop) {
+    const [x, y] = frame.to(drop.at);
+    parts.push(svg("circle", { class: "snap", cx: x, cy: y, r: 13 }));
   }
   if (from && now) parts.push(...rubber(frame, from, now.spot));
   layers.tools.replaceChildren(...parts);

@@ -38,6 +38,8 @@ export const selection = signal(null);
 export const tool = signal("select");
 /** First end of what is being drawn: {at, written, …}, or null. */
 export const pending = signal(null);
+/** The end or place on a link {kind, name, on, at} that a dragged end is joined with where it is let go, or null. */
+export const dropping = signal(null);
 /** Joints, and free points "link.P", that stay where they are while others are dragged. */
 export const locked = signal([]);
 /** Answer to the latest `drag` question while a joint is dragged. */
@@ -48,7 +50,7 @@ export const future = signal([]);
 export const friction = signal("stated");
 export const layers = signal({
   curves: true, reactions: true, values: false, velocity: true, acceleration: true, centres: false, relative: false, circles: false,
-  transmission: false, variant: true, names: true, grid: true, others: false, peaks: false,
+  transmission: false, variant: true, names: true, grid: true, masses: true, dimensions: false, others: false, peaks: false,
 }); // prettier-ignore
 export const snapping = signal(true);
 export const tab = signal("properties");
@@ -142,6 +144,7 @@ export function begin({ name, saved, content, steps = null }) {
     selection.value = null;
     pending.value = null;
     live.value = null;
+    dropping.value = null;
     index.value = 0;
     share.value = 0;
     tool.value = "select";

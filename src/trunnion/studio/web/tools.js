@@ -4,7 +4,7 @@ import { signal } from "@preact/signals";
 import { edit } from "./actions.js";
 import { gridStep, lengthOf, lengthText, lengthUnit } from "./geometry.js";
 import { numberOf, plainNumber } from "./fields.js";
-import { linkOf, resisted } from "./sheet.js";
+import { crossingAt, linkOf, resisted } from "./sheet.js";
 import { pending, say, selection, tool } from "./state.js";
 
 const TURN = Math.PI / 12; // guides and forces turn by 15°
@@ -24,6 +24,7 @@ export const TOOLS = [
   { id: "select", label: "Select", key: "V", hint: ["Drag a joint: along its path the mechanism moves, off it lengths change."] },
   { id: "link", label: "Link", key: "L", hint: ["Click the first end: a joint, a place on a link, or a free place. Shift+click pins it to the ground.", "Click the second end, or type a length and press Enter. Shift+click pins it to the ground."], click: drawLink, tells: tellLength, begins: /[0-9.,]/, on: true },
   { id: "pin", label: "Pin", key: "P", hint: ["Click a free point of a link, or a place on a link, to pin it to the ground."], click: pin, on: true },
+  { id: "join", label: "Join", key: "J", hint: ["Click an end, or a place where two links cross: a pin joins them there.", "Click the end or the link it is joined with; the first end goes there."], click: join, on: true },
   { id: "slide", label: "Slide", key: "G", hint: ["Click what slides: a free end, a pin, or a link itself.", "Click the link it slides along, or the direction of a guide on the ground, or type an angle."], click: slide, tells: tellAngle, begins: /[0-9.,-]/, on: true },
   { id: "gear", label: "Gears", key: "E", hint: ["Click the pivot of the first gear, or its link.", "Click the pivot of the second gear. For a ratio type the teeth first, as 20:40."], click: gear, tells: tellRatio, begins: /[0-9.,+]/, on: true },
   { id: "driver", label: "Drive", key: "D", hint: ["Click the joint that is driven."], click: drive },
@@ -56,7 +57,7 @@ export function click(spot, { shift = false, part = null } = {}) {
 }
 
 /** An end as a gesture says it: a joint, a point, a place on a link, on the ground, or anywhere. */
-function endOf({ kind, name, on, at }, shift = false) {
+export function endOf({ kind, name, on, at }, shift = false) {
   if (kind) return name;
   return shift ? { ground: at } : on ? { on, at } : at;
 }
@@ -133,6 +134,19 @@ function tellLength(a, b, frame) {
 function pin(spot) {
   if (spot.kind !== "points" && !spot.on) return say("Click a free point of a link, or a place on a link: it is pinned to the ground there.", true);
   edit([{ do: "pin", point: endOf(spot) }]);
+}
+
+/** Two ends become a pin, or the places of two links where they cross. */
+function join(spot) {
+  const from = pending.value;
+  if (!spot.kind && !spot.on) return say("Click an end of a link, a joint, or a link.", true);
+  if (from) {
+    finish();
+    return edit([{ do: "join", ends: [from.written, endOf(spot)] }]);
+  }
+  const meet = spot.kind ? null : crossingAt(spot.at);
+  if (!meet) return begin(spot);
+  edit([{ do: "join", ends: meet.on.map((on) => ({ on, at: meet.at })) }]);
 }
 
 function addPoint(spot) {

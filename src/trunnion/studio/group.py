@@ -1,0 +1,359 @@
+"""Several links at once: shifted, mirrored, copied, deleted, with the joints, loads, springs and gears between them.
+
+All goes through one map of the plane, p' = (sx x + a, sy y + b) with signs sx, sy. A mirrored link keeps its frame at
+its own points: its y changes sign, and the rotation of a joint on the ground, which was q, becomes π − q or −q.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import degrees, pi
+from typing import Any
+
+from trunnion.model.expression import parse
+from trunnion.model.units import unit
+from trunnion.studio.changing import delete
+from trunnion.studio.ends import letter, numbered, refused, vector
+from trunnion.studio.sketch import Sketch, Vector
+
+__all__ = ["group"]
+
+Given = Mapping[str, Any]
+LITERAL = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d]*|°)\s*")
+ALONE = re.compile(rf"{LITERAL.pattern}|\s*[^\W\d]\w*\s*")  # a number or a name
+Turned = Callable[[Any], Any]
+AS_IT_IS = (
+    "law", "period", "phase", "duration", "return_duration", "dwell", "returns", "delay", "periodic", "ends", "moves"
+)  # fmt: skip
+OPPOSITE = ("speed", "amplitude")
+TURNED: dict[str, Callable[[Any, Turned], Any]] = {
+    "start": lambda one, turn: turn(one),
+    "mean": lambda one, turn: turn(one),
+    "range": lambda ends, turn: [turn(one) for one in ends],
+    "points": lambda rows, turn: [[time, turn(one)] for time, one in rows],
+}
+
+
+def group(sketch: Sketch, given: Given) -> str:
+    """Links are changed together, `what`: "shift" by `by`, m; "mirror" over a line through `at`, upright or `level`;
+    "copy", which is shifted by `by` or, with `at`, mirrored; "delete".
+    """
+    links, what = [str(one) for one in given["links"]], str(given["what"])
+    if not links or any(one not in sketch.of("links") or one == sketch.ground for one in links):
+        raise refused("is no link that moves", ", ".join(links), "choose links that are drawn")
+    said = links[0] if len(links) == 1 else f"{len(links)} links"
+    if what == "delete":
+        for one in links:
+            if one in sketch.of("links"):  # a block goes with what it slides on
+                delete(sketch, {"what": ["links", one]})
+        return f"Delete {said}"
+    if what == "copy":
+        links = _copied(sketch, links)
+        sketch.made = ("group", " ".join(links))
+    if given.get("at") is None:
+        by = vector(given["by"])
+        _Moving(sketch, links, (1, 1), by).do()
+    else:
+        x, y = vector(given["at"])
+        signs, offset = ((1, -1), (0.0, 2 * y)) if given.get("level") else ((-1, 1), (2 * x, 0.0))
+        _Moving(sketch, links, signs, offset).do()
+    return f"{ {'shift': 'Move', 'mirror': 'Mirror'}.get(what, 'Copy') } {said}"
+
+
+@dataclass
+class _Moving:
+    """A map of the plane for some links."""
+
+    sketch: Sketch
+    links: list[str]
+    signs: tuple[int, int]
+    offset: Vector
+
+    def do(self) -> None:
+        """Change what the file states of them."""
+        sketch, ground = self.sketch, self.sketch.ground
+        mine = {name: one for name, one in sketch.joints.items() if set(one["links"]) & set(self.links)}
+        outside = [name for name, one in mine.items() if not set(one["links"]) <= {*self.links, ground}]
+        if self.flips:
+            self._refuse(mine, outside)
+            self._flip(mine)
+        for name in outside:
+            if sketch.joints[name].get("type", "revolute") != "revolute":
+                raise refused("slides along a link that is not chosen", f"joints.{name}", "choose both links")
+        pinned = {name for name, one in mine.items() if ground in one["links"]} | _fastened(sketch, self.links)
+        for point in pinned & set(sketch.points(ground)):
+            self._ground(point)
+        for name in mine:
+            self._hint(name)
+        keys = [f"{link}.{point}" for link in self.links for point in sketch.points(link)]
+        for key in [*keys, *(f"{ground}.{point}" for point in pinned)]:
+            if key in sketch.places:
+                sketch.places[key] = self.to(sketch.places[key])
+        sketch.forget()
+        for name in outside:
+            self._follow(name)
+
+    @property
+    def flips(self) -> bool:
+        """Whether it mirrors."""
+        return self.signs != (1, 1)
+
+    def to(self, place: Vector) -> Vector:
+        """Where a place goes."""
+        x, y = (sign * part + by for sign, part, by in zip(self.signs, place, self.offset, strict=True))
+        return x, y
+
+    def _follow(self, joint: str) -> None:
+        """The link outside follows with its end; its other joints stay."""
+        sketch = self.sketch
+        pair = sketch.joints[joint]["links"]
+        inside, other = pair if pair[0] in self.links else reversed(pair)
+        sketch.write(list(sketch.relocated(other, [joint], sketch.places[f"{inside}.{joint}"])))
+        sketch.places[f"{other}.{joint}"] = sketch.places[f"{inside}.{joint}"]
+        sketch.show(other, sketch.frame(other))
+
+    def _ground(self, point: str) -> None:
+        stated = self.sketch.section("links")[self.sketch.ground]["points"]
+        one = stated[point]
+        place = one.get("at") if isinstance(one, dict) else one
+        if not isinstance(place, list):
+            raise refused("is not stated by x and y", f"links.{self.sketch.ground}.points.{point}", "write it so")
+        place = self._placed(place)
+        if isinstance(one, dict):
+            axis = {"axis": [self._signed(part, i) for i, part in enumerate(one["axis"])]} if "axis" in one else {}
+            stated[point] = {**one, "at": place, **axis}
+        else:
+            stated[point] = place
+
+    def _placed(self, place: list[Any]) -> list[Any]:
+        return [_plus(self._signed(part, i), self.offset[i], self.sketch.unit) for i, part in enumerate(place)]
+
+    def _signed(self, part: Any, axis: int) -> Any:
+        return part if self.signs[axis] > 0 else _minus(part)
+
+    def _hint(self, joint: str) -> None:
+        hints = self.sketch.section("assembly")
+        stated = hints.get(joint)
+        if isinstance(stated, list):
+            hints[joint] = self._placed(stated)
+        elif stated is not None and self.flips and self._turns(joint):
+            hints[joint] = self._angle(joint, stated)
+
+    # ---- mirrored --------------------------------------------------------------------------------------------
+
+    def _turns(self, joint: str) -> bool:
+        return bool(self.sketch.joints[joint].get("type", "revolute") == "revolute")
+
+    def _half(self, joint: str) -> float:
+        """What the rotation q of a joint is taken from when it is mirrored, rad: q' = half − q."""
+        if self.signs[0] > 0 or self.sketch.ground not in self.sketch.joints[joint]["links"]:
+            return 0.0
+        return pi if self.sketch.joints[joint]["links"][0] == self.sketch.ground else -pi
+
+    def _angle(self, joint: str, stated: Any) -> Any:
+        return _plus(_minus(stated), self._half(joint), "deg")
+
+    def _refuse(self, joints: Mapping[str, Any], outside: list[str]) -> None:
+        """What would not be mirrored with the drawing."""
+        sketch = self.sketch
+        for name, one in joints.items():
+            if set(one) & {"seat", "seat_on", "misalignment"}:
+                raise refused("has a seat, which is not mirrored", f"joints.{name}", "mirror it in the text")
+            hint = (sketch.entries.get("assembly") or {}).get(name)
+            if isinstance(hint, str) and not LITERAL.fullmatch(hint):
+                raise refused(f"is assembled by '{hint}'", f"joints.{name}", "state where it is at the start")
+        for section in ("drivers", "gears", "springs", "loads"):
+            for name, one in sketch.of(section).items():
+                meant = [name] if section == "drivers" else [one.get("joint"), *one.get("joints", ())]
+                if set(meant) & set(outside):
+                    raise refused("is at a link that is not chosen", f"{section}.{name}", "choose that link too")
+
+    def _flip(self, joints: Mapping[str, Any]) -> None:
+        """Frames of links, drivers and what acts, as a mirror shows them."""
+        sketch = self.sketch
+        for link in self.links:
+            entry = sketch.section("links")[link]
+            for point, one in sketch.points(link).items():
+                entry["points"][point] = _mirrored(one)
+            if "centre" in entry:
+                entry["centre"] = _mirrored(entry["centre"])
+        for name in joints:
+            if name in sketch.of("drivers") and self._turns(name):
+                self._driver(name, sketch.section("drivers")[name])
+        self._flip_acting(joints)
+
+    def _flip_acting(self, joints: Mapping[str, Any]) -> None:
+        """Gears, springs and loads."""
+        sketch = self.sketch
+        for name, gear in sketch.of("gears").items():
+            if set(gear["joints"]) <= set(joints):
+                self._gear(name, gear)
+        for name, spring in sketch.of("springs").items():
+            if spring.get("joint") in joints and self._turns(spring["joint"]):
+                if "preload" in spring or "only" in spring:
+                    raise refused("has a preload or acts one way", f"springs.{name}", "mirror it in the text")
+                spring["free_angle"] = self._angle(spring["joint"], spring.get("free_angle", 0))
+        for name, load in sketch.of("loads").items():
+            if load.get("link") in self.links or load.get("joint") in joints:
+                _still(sketch, name, load)
+                self._load(load)
+
+    def _driver(self, name: str, driver: dict[str, Any]) -> None:
+        if strange := [key for key in driver if key not in (*AS_IT_IS, *OPPOSITE, *TURNED)]:
+            raise refused(f"has a {strange[0]}, which is not mirrored", f"drivers.{name}", "mirror it in the text")
+        first = {"constant": "start", "harmonic": "mean"}.get(driver.get("law", "constant"))
+        if first and "range" not in driver:
+            driver.setdefault(first, 0)
+        for key in set(driver) & set(OPPOSITE):
+            driver[key] = _minus(driver[key])
+        for key in set(driver) & set(TURNED):
+            driver[key] = TURNED[key](driver[key], lambda one: self._angle(name, one))
+            if driver[key] in (0, "0 deg"):
+                del driver[key]
+
+    def _gear(self, name: str, gear: dict[str, Any]) -> None:
+        """φ' = half₂ − r half₁ − φ, from q₂ = r q₁ + φ."""
+        if "ratio" not in gear:
+            raise refused("has a joint that slides, which is not mirrored", f"gears.{name}", "mirror it in the text")
+        one, two = gear["joints"]
+        ratio, phase = (float(self.sketch.numbers[f"gears.{name}.{key}"]) for key in ("ratio", "phase"))
+        turned = degrees(self._half(two) - ratio * self._half(one) - phase) % 360.0
+        gear["phase"] = f"{turned:.15g} deg"
+
+    def _load(self, load: dict[str, Any]) -> None:
+        if "force" in load:
+            own = load.get("frame") == "link"
+            load["force"] = [
+                _minus(part) if (i == 1 if own else self.signs[i] < 0) else part for i, part in enumerate(load["force"])
+            ]
+        if "moment" in load:
+            load["moment"] = _minus(load["moment"])
+        if "only" in load and load.get("joint") and self._turns(load["joint"]):
+            load["only"] = {"positive": "negative", "negative": "positive"}[load["only"]]
+
+
+def _mirrored(stated: Any) -> Any:
+    """A point or mass centre in the frame of its link, mirrored over the x of that."""
+    if isinstance(stated, list):
+        return [stated[0], _minus(stated[1])]
+    turned = {key: _mirrored(stated[key]) for key in ("at", "axis") if key in stated}
+    return {**stated, **turned, **({"angle": _minus(stated["angle"])} if "angle" in stated else {})}
+
+
+def _fastened(sketch: Sketch, links: list[str]) -> set[str]:
+    """Points of the ground that springs of some links are fastened to."""
+    found = set()
+    for spring in sketch.of("springs").values():
+        ends = [str(end).partition(".") for end in spring.get("between") or ()]
+        if any(end[0] in links for end in ends):
+            found |= {point for link, _, point in ends if link == sketch.ground}
+    return found
+
+
+def _still(sketch: Sketch, name: str, load: Mapping[str, Any]) -> None:
+    """Refuse a load that follows the motion: its formula speaks of angles or joints as they were."""
+    for key in ("force", "moment", "resisting_torque", "resisting_force"):
+        stated = load.get(key, ())
+        for part in stated if isinstance(stated, (list, tuple)) else [stated]:
+            if isinstance(part, str) and set(parse(part.partition("±")[0]).names) - set(sketch.section("dimensions")):
+                raise refused("follows the motion by a formula", f"loads.{name}", "copy or mirror it in the text")
+
+
+# ---- copied ---------------------------------------------------------------------------------------------------
+
+
+def _copied(sketch: Sketch, links: list[str]) -> list[str]:
+    """The links again, on the spot, with what is between them, under names that are free."""
+    ground = sketch.ground
+    inner = [name for name, one in sketch.joints.items() if set(one["links"]) <= {*links, ground}]
+    names: dict[str, str] = {}
+    for link in links:
+        names[link] = _again(sketch, "links", link)
+        sketch.section("links")[names[link]] = {"points": {}}  # its name is spoken for
+    points: dict[str, str] = {}
+    own = [point for link in links for point in sketch.points(link)]
+    for point in dict.fromkeys([*inner, *own, *sorted(_fastened(sketch, links))]):
+        points[point] = letter(sketch, points.values())
+    for link in links:
+        entry = copy.deepcopy(sketch.section("links")[link])
+        entry["points"] = {points[point]: one for point, one in sketch.points(link).items()}
+        sketch.section("links")[names[link]] = copy.deepcopy(entry)
+        sketch.places |= {f"{names[link]}.{points[point]}": sketch.places[f"{link}.{point}"]
+                          for point in sketch.points(link) if f"{link}.{point}" in sketch.places}  # fmt: skip
+    for point in {*inner, *_fastened(sketch, links)} & set(sketch.points(ground)):
+        sketch.section("links")[ground]["points"][points[point]] = copy.deepcopy(sketch.points(ground)[point])
+        if f"{ground}.{point}" in sketch.places:
+            sketch.places[f"{ground}.{points[point]}"] = sketch.places[f"{ground}.{point}"]
+    for name in inner:
+        entry = copy.deepcopy(sketch.joints[name])
+        sketch.section("joints")[points[name]] = entry | {"links": [names.get(one, one) for one in entry["links"]]}
+    for section in ("drivers", "assembly"):
+        entries = sketch.section(section)
+        entries.update({points[name]: copy.deepcopy(entries[name]) for name in inner if name in entries})
+    _copy_acting(sketch, names, points, set(inner))
+    sketch.forget()
+    return list(names.values())
+
+
+def _copy_acting(sketch: Sketch, names: Mapping[str, str], points: Mapping[str, str], inner: set[str]) -> None:
+    """Loads, springs and gears of the links that were copied."""
+    for name, load in sketch.of("loads").items():
+        if load.get("link") in names or load.get("joint") in inner:
+            _still(sketch, name, load)
+            also = {"link": names.get(load.get("link", "")), "at": points.get(load.get("at", "")),
+                    "joint": points.get(load.get("joint", ""))}  # fmt: skip
+            _add(sketch, "loads", name, load, also)
+    for name, spring in sketch.of("springs").items():
+        ends = [str(end).partition(".") for end in spring.get("between") or ()]
+        if spring.get("joint") in inner:
+            _add(sketch, "springs", name, spring, {"joint": points[spring["joint"]]})
+        elif set(names) & {end[0] for end in ends} and {end[0] for end in ends} <= {*names, sketch.ground}:
+            between = [f"{names.get(link, link)}.{points[point]}" for link, _, point in ends]
+            _add(sketch, "springs", name, spring, {"between": between})
+    for name, gear in sketch.of("gears").items():
+        if set(gear["joints"]) <= inner:
+            _add(sketch, "gears", name, gear, {"joints": [points[one] for one in gear["joints"]]})
+
+
+def _add(sketch: Sketch, section: str, name: str, entry: Mapping[str, Any], changed: Mapping[str, Any]) -> None:
+    changes = {key: one for key, one in changed.items() if key in entry and one is not None}
+    sketch.section(section)[_again(sketch, section, name)] = copy.deepcopy(dict(entry)) | changes
+
+
+def _again(sketch: Sketch, section: str, name: str) -> str:
+    return numbered(sketch, section, name.rstrip("0123456789") or name)
+
+
+# ---- numbers as they are written -----------------------------------------------------------------------------
+
+
+def _minus(stated: Any) -> Any:
+    """A number or text of the file with the other sign; limits that are alike on both sides stay."""
+    if not isinstance(stated, str):
+        return -stated if stated else stated
+    value, sign, limits = stated.partition("±")
+    if re.search(r"\s[+-]\S.*/", value):
+        raise refused(f"'{stated}' has limits that differ", "a number", "mirror it in the text")
+    value = value.strip()
+    rest = f" {sign}{limits}" if sign else ""
+    if value.startswith("-") and ALONE.fullmatch(value[1:].strip()):
+        return f"{value[1:].strip()}{rest}"
+    return f"-{value.lstrip('+')}{rest}" if ALONE.fullmatch(value.lstrip("+")) else f"-({value}){rest}"
+
+
+def _plus(stated: Any, by: float, usual: str) -> Any:
+    """A number or text of the file and so much more, SI; usual: the unit of what had none."""
+    if by == 0.0:
+        return stated
+    value, sign, limits = str(stated).partition("±")
+    rest = f" {sign}{limits}" if sign else ""
+    found = LITERAL.fullmatch(value)
+    name = found[2] if found and (found[2] or float(found[1])) else usual
+    more = by / float(unit(name)[0]) if name else by
+    if not found:
+        return f"{value.strip()} {'-' if by < 0 else '+'} {abs(round(more, 12)):.15g} {name}{rest}"
+    total = round(float(found[1]) + more, 12) + 0.0
+    return f"{total:.15g} {name}{rest}" if name else f"{total:.15g}{rest}" if rest else total

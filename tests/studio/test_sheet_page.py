@@ -1,0 +1,167 @@
+"""Links joined, chosen by a box, copied and mirrored on the sheet, with the mouse, by keyboard and by a finger."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import trunnion
+from browsing import CHROMIUM
+from studio.test_gestures import SIX_BAR, TYPED
+from trunnion.model.file import entries_of
+from trunnion.model.mechanism import Mechanism
+
+RUBBING = {"pin": {"radius": "7 mm"}, "friction": 0.06}
+
+
+class Hand:
+    """A hand on the sheet: places in m; `by` mouse, keyboard or touch."""
+
+    def __init__(self, user, by):
+        self.user, self.by, self.page = user, by, user.page
+        self.touch = self.page.context.new_cdp_session(self.page)
+        if by == "touch":
+            self.touch.send("Emulation.setTouchEmulationEnabled", {"enabled": True})
+
+    def at(self, place):
+        """A place of the sheet on the page, px."""
+        box = self.page.locator(".sheet").bounding_box()
+        x, y = self.user.of("sheet", "m.sheet.view.frame.to(given)", list(place))
+        return box["x"] + x, box["y"] + y
+
+    def tool(self, key, label):
+        if self.by == "touch":
+            self.page.click(f".tool:has-text('{label}')")
+        else:
+            self.page.locator(".sheet > svg").focus()
+            self.page.keyboard.press(key)
+
+    def click(self, place, shift=False):
+        if self.by == "mouse":
+            self.page.keyboard.down("Shift") if shift else None
+            self.page.mouse.move(*np.add(self.at(place), -2))
+            self.page.mouse.click(*self.at(place))
+            self.page.keyboard.up("Shift") if shift else None
+        elif self.by == "touch":
+            self.fingers("touchStart", self.at(place))
+            self.fingers("touchEnd")
+        else:
+            self.cross(place)
+            self.page.keyboard.press("Shift+Enter" if shift else "Enter")
+        self.user.idle()
+
+    def cross(self, place):
+        """Arrow keys until the cross is there, a step of the grid each."""
+        self.page.locator(".sheet > svg").focus()
+        self.page.keyboard.press("ArrowLeft")
+        step = self.user.of("sheet", "m.sheet.step()")
+        now = self.user.of("tools", "m.pointer.value.spot.at")
+        for axis, (less, more) in enumerate((("ArrowLeft", "ArrowRight"), ("ArrowDown", "ArrowUp"))):
+            count = round((place[axis] - now[axis]) / step)
+            for _ in range(abs(count)):
+                self.page.keyboard.press(more if count > 0 else less)
+
+    def fingers(self, kind, *places):
+        points = [{"x": x, "y": y, "id": 0} for x, y in places]
+        self.touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    def drag(self, start, end):
+        """From a place to another, as a hand does."""
+        spots = [np.array(self.at(start)) + share * np.subtract(self.at(end), self.at(start)) for share in (0, 0.3, 1)]
+        if self.by == "touch":
+            self.fingers("touchStart", spots[0])
+            for spot in spots[1:]:
+                self.fingers("touchMove", spot)
+            self.fingers("touchEnd")
+        else:
+            self.page.mouse.move(*spots[0])
+            self.page.mouse.down()
+            for spot in spots[1:]:
+                self.page.mouse.move(*spot)
+            self.page.mouse.up()
+        self.user.idle()
+
+    def link(self, start, end, pinned=False):
+        self.tool("l", "Link")
+        self.click(start, shift=pinned and self.by != "touch")
+        self.click(end)
+        if pinned and self.by == "touch":
+            self.tool("p", "Pin")
+            self.click(start)
+        self.tool("v", "Select")
+
+    def join(self, start, end):
+        """An end is dropped on another; by keyboard with the tool."""
+        if self.by != "keyboard":
+            return self.drag(start, end)
+        self.tool("j", "Join")
+        self.click(start)
+        self.click(end)
+        return self.tool("v", "Select")
+
+
+def effort(text):
+    return trunnion.analyse(Mechanism(**entries_of(text)[0]), 360)["drive_effort"].values[0]
+
+
+if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the page's own part
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("by", ["mouse", "keyboard", "touch"])
+    def test_a_watt_six_bar_closed_by_joins_is_the_typed_one(user, by):
+        user.new_sheet()
+        user.page.locator(".sheet > svg").focus()
+        user.keys("+", "+")
+        hand, spot = Hand(user, by), {key: np.add(place, (-0.105, -0.04)) for key, place in SIX_BAR.items()}
+        for start, end in (("A", "B"), ("D", "C"), ("G", "H")):
+            hand.link(spot[start], spot[end], pinned=True)
+        aside = np.array([[-0.1, 0.055], [0.03, 0.055]])
+        for ends in (("B", "C"), ("F", "H")):
+            hand.link(*aside)
+            for start, end in zip(aside, ends, strict=True):
+                hand.join(start, spot[end])
+        assert len(user.state("Object.keys(s.answer.value.entries.joints)")) == 7
+        hand.tool("d", "Drive")
+        hand.click(spot["A"])
+        hand.tool("v", "Select")
+        user.until("s.solved.value")
+        rubbing = {"do": "set", "path": ["joint_defaults"], "value": RUBBING}
+        pivot = user.state(
+            "Object.keys(s.answer.value.entries.links.ground.points)[2]",
+        )
+        load = {"do": "load", "against": pivot, "size": "6 N m"}
+        user.of("actions", "m.edit(given)", [load, rubbing])
+        drawn, typed = effort(user.state("s.text.value")), effort(TYPED)
+        np.testing.assert_allclose(drawn, typed, rtol=0, atol=1e-12 * np.abs(typed).max())
+        steps = user.state("s.past.value.length")
+        for _ in range(steps):
+            user.of("actions", "m.undo()")
+        user.idle()
+        assert user.state("s.text.value") == ""
+
+    def test_a_mass_centre_is_dragged_with_the_forces_of_where_it_is(user):
+        """By mouse, arrow key and finger; the crank lies along x: its frame is that of the sheet."""
+        hand = Hand(user, "mouse")
+        numbers = user.state("s.answer.value.numbers")
+        assert numbers["links.crank.centre.x"] == 1.0
+        x, y = hand.at((1.0, 0.0))
+        user.page.mouse.move(x, y)
+        user.page.mouse.down()
+        user.page.mouse.move(*hand.at((1.1, 0.1)))
+        user.page.mouse.move(*hand.at((1.2, 0.3)))
+        user.until("s.live.value?.efforts")
+        live = user.state("s.live.value.efforts[s.answer.value.scene.drivers[0].name][s.index.value]")
+        user.page.mouse.up()
+        user.until("s.text.value.includes('1.2 m, 0.3 m') && s.answer.value.text === s.text.value && !s.live.value")
+        torque = effort(user.state("s.text.value"))[user.state("s.index.value")]
+        assert live == pytest.approx(torque, rel=1e-7)  # it comes as single precision
+        mark = user.page.locator('.handle[data-kind="centres"][data-name="crank"]')
+        assert mark.get_attribute("aria-label").replace("\xa0", " ") == "Mass centre of crank, 4.8 kg, at 1.2 m, 300 mm"
+        step = user.of("sheet", "m.sheet.step()")
+        mark.focus()
+        user.keys("ArrowRight")
+        assert user.state("s.answer.value.numbers")["links.crank.centre.x"] == pytest.approx(1.2 + step)
+        finger = Hand(user, "touch")
+        finger.drag((1.2 + step, 0.3), (1.0, 0.0))
+        assert user.state("s.answer.value.numbers")["links.crank.centre.x"] == pytest.approx(1.0)
+        assert user.state("s.past.value.length") == 3

@@ -31,8 +31,11 @@ const EXTRAS = {
   screws: ["screw axes", false],
 };
 
-/** The drawing; `show(index)` moves it, `reactions(names, factor)` chooses the vectors; `controls` choose the rest. */
-export function spaceView(scene, kinds) {
+/**
+ * The drawing; `show(index)` moves it, `reactions(names, factor)` chooses the vectors; `controls` choose the rest. `camera()`
+ * tells from where it is looked at, which is where it begins if it is handed in.
+ */
+export function spaceView(scene, kinds, camera = null) {
   const message = html("p", { class: "message", hidden: true });
   const stage = html("div", { class: "stage" });
   const element = html("div", { class: "mechanism space" }, stage, message);
@@ -40,7 +43,7 @@ export function spaceView(scene, kinds) {
     message.textContent = "The mechanism could not be assembled at any position.";
     message.hidden = false;
     element.classList.add("empty");
-    return { element, controls: null, show() {}, reactions() {}, magnify() {} };
+    return { element, controls: null, camera: () => null, show() {}, reactions() {}, magnify() {} };
   }
   const forces = scene.joints.map((joint) => magnitude(joint.reaction, scene.count));
   const moments = scene.joints.map((joint) => magnitude(joint.moment, scene.count));
@@ -56,7 +59,7 @@ export function spaceView(scene, kinds) {
     shown: new Set(scene.joints.map((joint) => joint.name)),
     extras: new Set(Object.keys(EXTRAS).filter((name) => EXTRAS[name][1])),
     usual: { force: usual(scene, forces), moment: usual(scene, moments) },
-    camera: first(scene),
+    camera: camera ?? first(scene),
     queued: 0,
   };
   embody(view);
@@ -67,6 +70,7 @@ export function spaceView(scene, kinds) {
   return {
     element,
     controls: controls(view),
+    camera: () => view.camera,
     magnify(factor) {
       view.scene = magnified(scene, factor);
       embody(view);

@@ -2,7 +2,7 @@
 // normal there and the load.
 
 import { arrow } from "../web/arrow.js";
-import { jumpsAt, leaning } from "../web/built.js";
+import { hole, jumpsAt, leaning } from "../web/built.js";
 import { angleAt, at, guide, place } from "../web/data.js";
 import { svg } from "../web/dom.js";
 import { quantity } from "../web/format.js";
@@ -63,7 +63,7 @@ function inHole(view, joint, seat) {
   const [{ offset, force }] = seat.ends;
   const [by, load] = [offset, force].map((one) => valueAt(one, index));
   const [unit, angle] = [unitOf(view), axesOf(view, joint)];
-  const [x, y] = frame.to(place(scene, joint.at, index));
+  const [x, y] = frame.to(hole(scene, joint, index) ?? place(scene, joint.at, index));
   seat.path ??= way(offset, scene, seat.clearance);
   const [c, s] = [unit * Math.cos(angle), unit * Math.sin(angle)];
   const path = svg("path", { class: "way-of-pin", d: seat.path, transform: `matrix(${c},${-s},${-s},${-c},${x},${y})`, "vector-effect": "non-scaling-stroke" });

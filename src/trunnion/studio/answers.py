@@ -31,6 +31,7 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
 from trunnion.studio.blocks import blocks_of
+from trunnion.studio.corners import measured, worst_corner
 from trunnion.studio.ends import held, vector
 from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
@@ -39,7 +40,7 @@ from trunnion.studio.loaded import Loaded, loaded
 from trunnion.studio.margin import cures, locks_of, margin_of, margins_without
 from trunnion.studio.message import packed
 from trunnion.studio.missing import missing
-from trunnion.studio.overlays import centres, circles, place_motion, point_motion, transmission
+from trunnion.studio.overlays import centres, circles, place_motion, point_motion, seats, transmission
 from trunnion.studio.placed import plain, tracks
 from trunnion.studio.readiness import readiness
 from trunnion.studio.sketch import Change, Sketch
@@ -152,6 +153,7 @@ def _model(asked: Asked) -> dict[str, Any]:
         "locks": locks_of(state.run, result["time"].values, result["status"].values),
         **({"margin_why": "friction lacks something"} if state.bare and friction else {}),
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
+        "worst": measured(state.run),
     }
 
 
@@ -356,14 +358,16 @@ def _assemblies(asked: Asked) -> dict[str, Any]:
 
 def _layers(asked: Asked) -> dict[str, Any]:
     """What the sheet shows over the mechanism, of what is wanted: motion of a point, and in the plane instant centres,
-    friction circles, transmission angles.
+    friction circles, transmission angles, pins in their holes.
     """
     state, steps = loaded(str(asked["text"])), _steps(asked)
-    result = state.result(steps, asked.get("friction") != "off")
+    result = state.motion(steps, asked.get("friction") != "off")
     wanted = set(asked.get("wanted") or ())
     found: dict[str, Any] = {"point": _moving(asked, result)}
     if state.run.system.mechanism.space != "planar":
         return found
+    if "seats" in wanted:
+        found["seats"] = seats(result)
     if "circles" in wanted:
         system = state.run.system
         found["circles"] = circles(result, [joint for joint in rubbing(system) if joint not in system.screws])
@@ -444,6 +448,13 @@ def _tolerances(asked: Asked) -> dict[str, Any]:
     return tolerated(mechanism.with_friction("off") if asked.get("friction") == "off" else mechanism, _steps(asked))
 
 
+def _corner(asked: Asked) -> dict[str, Any]:
+    """The worst corner of the tolerances and plays for a measure, on the stated side or the worse of both."""
+    mechanism = loaded(str(asked["text"])).run.system.mechanism
+    mechanism = mechanism.with_friction("off") if asked.get("friction") == "off" else mechanism
+    return worst_corner(mechanism, str(asked["measure"]), asked.get("side"), _steps(asked))
+
+
 ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "start": _start,
     "example": _example,
@@ -460,5 +471,6 @@ ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "curves": _curves,
     "compare": _compare,
     "tolerances": _tolerances,
+    "corner": _corner,
 }
-BESIDE = (_cycle, _margins)
+BESIDE = (_cycle, _margins, _corner)

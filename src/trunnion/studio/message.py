@@ -1,8 +1,9 @@
 """Answers as bytes: a JSON header, then columns of numbers as float32, then files.
 
 uint32 n (little-endian), n bytes of header (a multiple of 4), columns. In the header a column is
-`{"column": [first, count]}`, in numbers from the end of the header; NaN stands where there is none. A file is
-`{"bytes": [first, count]}`, in bytes from there.
+`{"column": [first, count]}`, in numbers from the end of the header; NaN stands where there is none. `{"sum": [first,
+count]}` is the sum of two columns, one behind the other, which has 48 binary digits. A file is `{"bytes": [first,
+count]}`, in bytes from there.
 """
 
 from __future__ import annotations
@@ -10,13 +11,21 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-__all__ = ["packed", "unpacked"]
+__all__ = ["Exact", "packed", "unpacked"]
 
 SHORTEST = 16  # numbers: shorter lists stay in the header
+
+
+@dataclass(frozen=True)
+class Exact:
+    """A column whose numbers are to arrive with more digits than a float32 has."""
+
+    numbers: np.ndarray
 
 
 def packed(header: Mapping[str, Any]) -> bytes:
@@ -50,6 +59,10 @@ def _without_columns(header: Mapping[str, Any], columns: list[np.ndarray], files
             return {str(key): plain(one) for key, one in value.items()}
         if isinstance(value, np.ndarray):
             return column(np.ravel(value))
+        if isinstance(value, Exact):
+            high = value.numbers.astype("<f4").astype(float)
+            first, size = column(np.concatenate([high, value.numbers - high]))["column"]
+            return {"sum": [first, size // 2]}
         if isinstance(value, bytes):
             files.append(value)
             places.append({"bytes": [0, len(value)]})
@@ -81,9 +94,11 @@ def unpacked(answer: bytes) -> dict[str, Any]:
         if value.keys() == {"bytes"}:
             first, count = value["bytes"]
             return body[first : first + count]
-        if value.keys() == {"column"}:
-            first, count = value["column"]
-            numbers = np.frombuffer(body, "<f4", count, 4 * first)
+        if value.keys() in ({"column"}, {"sum"}):
+            ((kind, (first, count)),) = value.items()
+            parts = 2 if kind == "sum" else 1
+            columns = np.frombuffer(body, "<f4", parts * count, 4 * first).reshape(parts, count)
+            numbers = columns.astype(float).sum(axis=0)
             return [float(one) if np.isfinite(one) else None for one in numbers]
         return {key: whole(one) for key, one in value.items()}
 

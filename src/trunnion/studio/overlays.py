@@ -1,5 +1,5 @@
 """What the sheet can show over a mechanism in the plane: motion of a point, instant centres, friction circles,
-transmission angles; each for every position of the cycle, SI and rad.
+transmission angles, pins in their holes; each for every position of the cycle, SI and rad.
 """
 
 from __future__ import annotations
@@ -16,12 +16,14 @@ from trunnion.groups.dyad import DyadPose
 from trunnion.results.scales import scales_in
 from trunnion.solve.forward import Forward
 from trunnion.studies.design import instant_centre
+from trunnion.studio.message import Exact
 from trunnion.studio.placed import column
+from trunnion.views.cycle.deviations import seated
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["centres", "circles", "place_motion", "point_motion", "transmission"]
+__all__ = ["centres", "circles", "place_motion", "point_motion", "seats", "transmission"]
 
 Array = NDArray[np.float64]
 
@@ -146,6 +148,21 @@ def circles(result: xr.Dataset, rubbing: Collection[str]) -> list[dict[str, Any]
         radius[np.isnan(force)] = np.nan
         rows.append({"joint": joint, "radius": radius, "offset": offset})
     return rows
+
+
+def seats(result: xr.Dataset) -> list[dict[str, Any]]:
+    """Of each joint with a seat, at each end: offset of the pin from the middle of its hole, m, and force of the pin on
+    the hole, N, both in the hole's axes.
+    """
+    return [
+        {
+            "joint": one.joint, "kind": one.kind, "clearance": one.clearance, "length": one.length,
+            "ends": [{what: {axis: Exact(row) for axis, row in zip("xy", rows, strict=True)}
+                      for what, rows in (("offset", offset), ("force", force))}
+                     for offset, force in zip(one.offsets, one.forces, strict=True)],
+        }
+        for one in seated(result)
+    ]  # fmt: skip
 
 
 def transmission(walk: Forward, steps: int) -> list[dict[str, Any]]:

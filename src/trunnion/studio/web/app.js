@@ -6,6 +6,7 @@ import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
 import { Blocks, Formula } from "./blocks.js";
 import { Bounded, Failures } from "./boundary.js";
 import { Dialogs } from "./dialogs.js";
+import { Errors } from "./errors.js";
 import { Findings, jump } from "./findings.js";
 import { Motion } from "./motion.js";
 import { Plots } from "./plots.js";
@@ -29,7 +30,7 @@ export function App() {
       <div class="middle-part">
         <div class="window">
           ${state.spatial.value ? bounded(Space) : bounded(Stage, ZoomBar, Welcome)}
-          ${bounded(Formula)}
+          ${bounded(Errors, Formula)}
           ${bounded(Messages)}
         </div>
         ${bounded(Motion)}

@@ -5,8 +5,8 @@ import { place } from "../web/data.js";
 import { changed, edit, newest, present } from "./actions.js";
 import { gridStep, onGrid } from "./geometry.js";
 import { takeOther } from "./ghosts.js";
-import { dropAt, partUnder, sheet, shown } from "./sheet.js";
 import { centreHeld, chosenOf } from "./masses.js";
+import { apart, drawn, dropAt, partUnder, sheet } from "./sheet.js";
 import * as state from "./state.js";
 import { click, endOf, pointer, toolOf } from "./tools.js";
 
@@ -113,7 +113,7 @@ function takeHold(view, held) {
     return state.say(`${name} is locked where it is; unlock it first (K).`, true);
   }
   const base = present();
-  const { sketched, scene } = shown.peek();
+  const { sketched, scene } = drawn.peek();
   const path = sketched || state.locked.value.length ? null : pathOf(scene, key); // a locked joint stays where it is
   held.joint = { kind, name, key, index: view.posed, asked: null, told: "", sketched, base, together: sketched ? together(kind, name, base.places) : [], path, scene, crank: Boolean(path) && driven(scene, name, key) };
   const { joint } = held;
@@ -168,6 +168,7 @@ function dragTo(joint, at, scale, alt) {
     joint.base = null;
     return state.say(joint.crank ? `${joint.name} turns with the drive; with Alt it changes lengths.` : `${joint.name} is on its path: lengths stay. Off it, or with Alt, they change.`);
   }
+  if (apart()) return;
   if (!joint.base) Object.assign(joint, { base: present(), index: state.index.value });
   joint.to = at.map((value) => onGrid(value, gridStep(scale) / 10));
   joint.keep = !alt && !joint.sketched;
@@ -205,7 +206,7 @@ async function release(held, shift) {
   await held.joint.asked;
   const { name, index, base, sketched, to, told, keep, posed } = held.joint;
   state.dropping.value = null;
-  if (posed) return;
+  if (posed || !to) return;
   if (sketched) state.places.value = base.places; // `edit` moves them
   if (held.joint.drop) return void edit([{ do: "join", ends: [name, endOf(held.joint.drop)] }], null, base.places);
   if ((await edit([{ do: "move", point: name, to, index, keep }], null, base.places)) && told) state.say(`Move ${name}: ${told}.`);

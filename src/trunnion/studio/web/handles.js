@@ -1,5 +1,6 @@
 // What a hand or a key takes hold of: a target of 24 px over every joint and free point, in the order of the plan.
 
+import { place } from "../web/data.js";
 import { set, svg } from "../web/dom.js";
 import { stated } from "../web/format.js";
 import { TARGET } from "./drawing.js";
@@ -20,8 +21,8 @@ export function poseHandles(view, spots, chosen) {
   const names = few.map(({ kind, name }) => `${kind} ${name}`).join("\n");
   if (view.handled !== names) build(view, few, names);
   const joints = few.filter(({ kind }) => kind !== "centres").map((one) => frame.to(one.at));
-  few.forEach(({ kind, name, at, mass }, order) => {
-    const [x, y] = frame.to(at);
+  few.forEach(({ kind, name, key, at, mass }, order) => {
+    const [x, y] = frame.to((key && place(view.scene, key, view.drawn)) ?? at); // errors may be drawn larger
     const words = `${NOUNS[kind]} ${name}${mass ? `, ${Number(mass.toPrecision(4))} kg` : ""}${locked.has(name) ? ", locked" : ""}, at ${coordinate(at[0])}, ${coordinate(at[1])}`;
     const active = chosen?.kind === kind && chosen.name === name;
     set(layers.handles.children[order], {

@@ -4,7 +4,7 @@ import { place } from "../web/data.js";
 import * as actions from "./actions.js";
 import { crank } from "./motion.js";
 import { chosenOf, massSpots } from "./masses.js";
-import { partUnder, partsAt, sheet, shown } from "./sheet.js";
+import { apart, partUnder, partsAt, sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
 import { TOOLS, cancel, choose, click, placeTyped, pointer, removePart, toolOf, typed } from "./tools.js";
 import { focusOn } from "./ui.js";
@@ -103,6 +103,7 @@ function arrow({ target, key, shiftKey, altKey }) {
 function nudge({ kind, name }, at) {
   if (kind === "centres") return void actions.edit([{ do: "centre", link: name, at }], `nudge ${name}`);
   state.selection.value = { kind, name };
+  if (apart()) return;
   actions.edit([{ do: "move", point: name, to: at, index: sheet.view.posed, keep: !shown.peek()?.sketched }], `nudge ${name}`);
 }
 

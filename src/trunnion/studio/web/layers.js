@@ -16,6 +16,8 @@ export const LAYERS = [
   ["circles", "Friction circles"],
   ["transmission", "Transmission angles"],
   ["variant", "Variant A as a ghost"],
+  ["seats", "Pins in their holes, errors magnified"],
+  ["nominal", "Without errors, as a ghost"],
   ["names", "Names"],
   ["masses", "Mass centres"],
   ["dimensions", "Dimensions"],
@@ -42,14 +44,15 @@ const watched = computed(() => {
 /** A place on a link as it was clicked, and what is the same when the model has changed: {link, start, local}. */
 const held = { clicked: null, same: null };
 
-/** {scene, point, centres, circles, transmission} of the scene that is shown, as far as it is wanted; or null. */
+/** {scene, point, centres, circles, transmission, seats} of the scene that is shown, as far as it is wanted; or null. */
 export const laid = signal(null);
 
 /** Ask for them whenever they are wanted and there is a new answer. */
 export function keepLayers() {
   const wanted = computed(() => {
-    const { centres, relative, circles, transmission } = state.layers.value;
-    return Object.entries({ centres: centres || relative, circles, transmission }).filter(([, shown]) => shown).map(([name]) => name).join(" ");
+    const { centres, relative, circles, transmission, seats } = state.layers.value;
+    const seated = seats && state.factor.value > 1 && Boolean(state.answer.value?.scene?.built?.seats.length);
+    return Object.entries({ centres: centres || relative, circles, transmission, seats: seated }).filter(([, shown]) => shown).map(([name]) => name).join(" ");
   }); // prettier-ignore
   effect(() => {
     const [names, { point, place }] = [wanted.value, watched.value];
@@ -78,7 +81,7 @@ export function listenToPlaces(root, view) {
     from = link && { link, x: event.clientX, y: event.clientY };
   };
   const up = (event) => {
-    if (!from || Math.hypot(event.clientX - from.x, event.clientY - from.y) > STILL || !state.solved.value) return;
+    if (!from || Math.hypot(event.clientX - from.x, event.clientY - from.y) > STILL || !state.solved.value || view.ideal) return;
     const box = root.getBoundingClientRect();
     clicked.value = { link: from.link, at: view.frame.from([event.clientX - box.left, event.clientY - box.top]), index: view.posed };
   };

@@ -2,21 +2,23 @@
 // angles, values at the arrows, and the outlines of variant A. Python works it out; here it is only drawn.
 
 import { arrow } from "../web/arrow.js";
+import { told } from "../web/built.js";
 import { angleAt, at, forceAt, magnitude, peak, place } from "../web/data.js";
-import { svg } from "../web/dom.js";
+import { set, svg } from "../web/dom.js";
 import { quantity, roundBelow, short, stated } from "../web/format.js";
 import { outline, standing, trackPath } from "../web/plane.js";
 import { KEY, metres, perNewton } from "./drawing.js";
 import { roundAbove } from "./geometry.js";
 import { laid } from "./layers.js";
 import { massMarks } from "./masses.js";
-import { sheet, shown } from "./sheet.js";
+import { pinsInHoles } from "./seats.js";
+import { cornered, sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
 import { compared } from "./variants.js";
 
 const CIRCLE = 12; // px: smaller friction circles are drawn enlarged
 const ROOM = 26; // px between the frame and what points out of it
-const LETTER = 7; // px, its width in what is written
+const LETTER = 7.3; // px, its width in what is written
 const LINE = 15; // px, its height
 const RING = 14; // px, radius of the ring of a joint that locks
 const NOTHING = 1e-9; // of the largest force: less is rounding
@@ -41,19 +43,23 @@ export function poseOverlay(view) {
   const { layers, scene } = view;
   const known = state.solved.peek() && !state.live.peek() && !shown.peek()?.sketched;
   const wanted = state.layers.peek();
-  const told = known && laid.peek()?.scene === scene ? laid.peek() : {};
+  const found = known && laid.peek()?.scene === (scene.of ?? scene) ? laid.peek() : {};
+  const over = view.ideal ? { seats: found.seats, point: found.point?.position ? null : found.point } : found; // the rest is where it is
   const key = []; // lines of the key, from below
   room = view.frame.width - 6;
   taken = [...view.parts.names, ...view.parts.loads].flatMap(({ box }) => box ?? []);
   if (sheet.beside().length) key.push(keyed(view, 22, "other assemblies", (x, y) => svg("g", { class: "ghost" }, svg("path", { d: `M${x},${y}h22` }))));
-  layers.variants.replaceChildren(...(wanted.variant ? variants(view, key) : []));
+  layers.variants.replaceChildren(...(view.ideal ? nominal(view, wanted, key) : wanted.variant ? variants(view, key) : []));
   layers.masses.replaceChildren(...massMarks(view));
+  const seats = wanted.seats && view.ideal && !cornered.peek() ? (over.seats ?? []) : [];
+  for (const { joint, node } of view.parts.vectors) set(node, { visibility: seats.some((one) => one.joint === joint.name) ? "hidden" : null }); // drawn where it touches
   layers.overlay.replaceChildren(
-    ...(told.circles ? circles(view, told.circles, key) : []),
-    ...(told.transmission ? told.transmission.flatMap((one) => angle(view, one)) : []),
-    ...(told.centres ? centres(view, told.centres, wanted) : []),
+    ...(over.circles ? circles(view, over.circles, key) : []),
+    ...(over.transmission ? over.transmission.flatMap((one) => angle(view, one)) : []),
+    ...(over.centres ? centres(view, over.centres, wanted) : []),
     ...(known && wanted.reactions && wanted.values ? values(view) : []),
-    ...(told.point ? motion(view, told.point, wanted, key) : []),
+    ...pinsInHoles(view, seats, wanted, words),
+    ...(over.point ? motion(view, over.point, wanted, key) : []),
     ...locking(view),
     ...key.map((draw, order) => draw(view.frame.height - 16 - 20 * (order + 1))),
   );
@@ -164,8 +170,8 @@ function circles(view, list, key) {
   const most = peak(...list.map(({ radius }) => radius)) * frame.scale;
   if (!(most > 0)) return [];
   const times = most >= CIRCLE ? 1 : roundAbove(CIRCLE / most);
-  const told = times > 1 ? `friction circles × ${times}` : "friction circles";
-  key.push(keyed(view, 22, told, (x, y) => svg("circle", { class: "friction-circle", cx: x + 11, cy: y, r: 6 })));
+  const named = times > 1 ? `friction circles × ${times}` : "friction circles";
+  key.push(keyed(view, 22, named, (x, y) => svg("circle", { class: "friction-circle", cx: x + 11, cy: y, r: 6 })));
   return list.flatMap(({ joint: name, radius, offset }) => {
     const joint = scene.joints.find((one) => one.name === name);
     const found = joint && place(scene, joint.at, index);
@@ -174,17 +180,17 @@ function circles(view, list, key) {
     const [x, y] = frame.to(found);
     const r = size * frame.scale * times;
     const circle = svg("circle", { class: "friction-circle", cx: x.toFixed(1), cy: y.toFixed(1), r: r.toFixed(1) });
-    const told = words(x + 12 + r * 0.7, y + 18 + r * 0.4, `${name}: r = ${quantity(size, "m")}`);
+    const label = words(x + 12 + r * 0.7, y + 18 + r * 0.4, `${name}: r = ${quantity(size, "m")}`);
     const arm = at(offset, index);
     const [fx, fy] = [at(joint.reaction.x, index), at(joint.reaction.y, index)];
     const force = Math.hypot(fx, fy);
-    if (arm === null || !(force > 0)) return [circle, told];
+    if (arm === null || !(force > 0)) return [circle, label];
     // to the right of the force, seen along it; y points down on the screen
     const shift = (arm * frame.scale * times) / force;
     const [tx, ty] = [x + shift * fy, y + shift * fx];
     const [ux, uy] = [(64 * fx) / force, (-64 * fy) / force];
     const line = svg("path", { class: "line-of-action", d: `M${tx - ux},${ty - uy}L${tx + ux},${ty + uy}` });
-    return [line, circle, told];
+    return [line, circle, label];
   });
 }
 
@@ -238,6 +244,19 @@ function values(view) {
     const [dx, dy] = [force[0] * scale, -force[1] * scale];
     return [beyond(frame.to(found), [dx, dy], `${joint.name} on ${short(joint.links[1])} ${quantity(Math.hypot(...force), "N")}`)];
   });
+}
+
+// ---- without errors --------------------------------------------------------------------------------------------------
+
+/** The mechanism without errors behind the one that has them, and how much larger they are drawn. */
+function nominal(view, wanted, key) {
+  const { frame, drawn: index, ideal, scene } = view;
+  const line = (x, y) => svg("path", { class: "ideal", d: `M${x},${y}h22` });
+  if (wanted.nominal) key.push(keyed(view, 22, cornered.peek() ? "nominal" : "without errors", line));
+  key.push(keyed(view, 22, `errors × ${told(scene.factor)}`, () => null));
+  if (!wanted.nominal) return [];
+  const { spots } = standing(ideal, frame, index, {});
+  return ideal.links.filter((link) => !link.ground).map((link) => svg("path", { class: "ideal", d: outline(spots(link.points)) }));
 }
 
 // ---- variant A ------------------------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 // The scene that is shown and the part of the plane that the window looks at.
 
 import { computed } from "@preact/signals";
+import { magnified } from "../web/built.js";
 import { kindOf } from "../web/report.js";
 import { drawing, fitted, frameOf, reframe } from "./drawing.js";
 import { place } from "../web/data.js";
@@ -31,6 +32,30 @@ export function changing(scene, { points, angles, efforts, joints, status }) {
   };
 }
 
+/** The worst corner that is looked at, or null. */
+export const cornered = computed(() => (state.corner.value?.of === state.answer.value?.scene ? state.corner.value : null));
+
+/**
+ * What is drawn: the same with errors and play magnified, or at a worst corner, while nothing is dragged or drawn. Then
+ * `ideal` is the scene without them, and `of` of both that by which the mechanism is changed.
+ * @type {{ value: any, peek: () => any }}
+ */
+export const drawn = computed(() => {
+  const found = shown.value;
+  if (!found || found.sketched || state.live.value || state.tool.value !== "select") return found;
+  const source = cornered.value?.scene ?? found.scene;
+  if (!source.built || (state.factor.value === 1 && !cornered.value)) return found;
+  const [scene, ideal] = [state.factor.value, 0].map((factor) => ({ ...magnified(source, factor), of: found.scene }));
+  return { ...found, scene, ideal, structure: cornered.value ?? found.structure };
+});
+
+/** Whether what is drawn lies elsewhere than it is; says what to do before it is changed. */
+export function apart() {
+  if (!drawn.peek()?.ideal) return false;
+  state.say(`Lengths are changed where errors are drawn × 1${cornered.peek() ? " and as they are" : ""}.`, true);
+  return true;
+}
+
 /** Colour classes of the joints, as the report has them. */
 export function kindsOf(scene) {
   return new Map(scene.joints.map((joint, order) => [joint.name, kindOf(order)]));
@@ -45,8 +70,8 @@ export const sheet = {
   beside: () => [],
   fit() {
     const { width, height } = sheet.view.frame;
-    const { scene } = shown.peek() ?? {};
-    const points = Object.assign({}, scene?.points, ...sheet.beside().map((one, order) => prefixed(one.points, order)));
+    const { scene, ideal } = drawn.peek() ?? {};
+    const points = Object.assign({}, scene?.points, ideal && prefixed(ideal.points, "ideal"), ...sheet.beside().map((one, order) => prefixed(one.points, order)));
     look(fitted(width, height, scene && extentOf({ ...scene, points })));
   },
   zoom(factor, [x, y] = middle()) {
@@ -71,7 +96,7 @@ export const sheet = {
   finest: 0,
   /** Width of the window and reach of a click, m. */
   scale: () => ({ wide: sheet.view.frame.width / sheet.view.frame.scale, near: nearOf(sheet.view.frame.scale) }),
-  spots: () => (sheet.view?.scene ? spotsOf(sheet.view.scene, sheet.view.drawn) : []),
+  spots: () => (sheet.view?.scene ? spotsOf(sheet.view.scene.of ?? sheet.view.scene, sheet.view.drawn) : []),
   /** What lies at a place: a joint or a point no farther than `near` m, or the grid; `loose` leaves the grid out. */
   snap(at, loose = false, near = nearOf(sheet.view.frame.scale)) {
     const step = sheet.step() / (loose || !state.snapping.value ? 100 : 1);

@@ -73,6 +73,10 @@ function unpacked(part, floats) {
     const [first, count] = part.column;
     return Array.from(floats.subarray(first, first + count), (value) => (Number.isFinite(value) ? value : null));
   }
+  if (keys.length === 1 && keys[0] === "sum") {
+    const [first, count] = part.sum;
+    return Array.from({ length: count }, (_, index) => floats[first + index] + floats[first + count + index]).map((value) => (Number.isFinite(value) ? value : null));
+  }
   return Object.fromEntries(keys.map((key) => [key, unpacked(part[key], floats)]));
 }
 

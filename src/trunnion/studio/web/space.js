@@ -9,8 +9,7 @@ import { linkAt, placed, seat, spaceView, spot } from "../web/space.js";
 import { edit } from "./actions.js";
 import { plainNumber, usualUnit } from "./fields.js";
 import { dictionary, gridStep, lengthOf, lengthText, onGrid } from "./geometry.js";
-import { partUnder } from "./hand.js";
-import { kindsOf, sheet } from "./sheet.js";
+import { cornered, kindsOf, partUnder, sheet } from "./sheet.js";
 import * as state from "./state.js";
 import { theme } from "./theme.js";
 import { Button, focusOn, html } from "./ui.js";
@@ -35,7 +34,7 @@ function mount(holder) {
   hands.append(layers.rubber, layers.targets, layers.arms);
   const stop = [
     effect(() => {
-      const { scene } = state.answer.value ?? {};
+      const scene = cornered.value?.scene ?? state.answer.value?.scene;
       untracked(() => draw(holder, scene?.space === "spatial" ? scene : null, layers));
     }),
     effect(() => {
@@ -43,7 +42,12 @@ function mount(holder) {
       untracked(() => stage.api?.recolour());
     }),
     effect(() => {
+      const factor = state.factor.value;
+      untracked(() => stage.api?.magnify(factor));
+    }),
+    effect(() => {
       state.answer.value;
+      cornered.value;
       stage.api?.show(state.index.value);
     }),
     effect(() => {

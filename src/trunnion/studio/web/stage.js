@@ -11,7 +11,7 @@ import { compared } from "./variants.js";
 import { massSpots } from "./masses.js";
 import { markChosen, poseHandles } from "./handles.js";
 import { listenToPointer } from "./hand.js";
-import { kindsOf, sheet, shown } from "./sheet.js";
+import { drawn, kindsOf, sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
 import { pointer, toolOf, typed, typedEnd } from "./tools.js";
 import { html } from "./ui.js";
@@ -76,7 +76,7 @@ function watchSize(holder, view) {
 
 /** Build what is new, move what is known. */
 function show(view) {
-  const found = shown.value;
+  const found = drawn.value;
   const { curves, reactions, names, grid } = state.layers.value;
   const index = state.index.value;
   if (!found) {
@@ -86,6 +86,7 @@ function show(view) {
   const other = view.shown.curves !== curves || view.shown.reactions !== reactions || view.shown.grid !== grid;
   view.shown = { curves, reactions, names, grid };
   view.index = index;
+  view.ideal = found.ideal;
   if (view.structure !== found.structure || other) {
     view.structure = found.structure;
     build(view, found.scene, kindsOf(found.scene));

@@ -44,13 +44,17 @@ export const dropping = signal(null);
 export const locked = signal([]);
 /** Answer to the latest `drag` question while a joint is dragged. */
 export const live = signal(null);
+/** How many times as large as they are errors and play are drawn. */
+export const factor = signal(1);
+/** Answer to the latest `corner` question, with the measure and the scene `of` which it is the corner; or null. */
+export const corner = signal(null);
 export const past = signal([]);
 export const future = signal([]);
 /** "stated", "compare" (and without) or "off". */
 export const friction = signal("stated");
 export const layers = signal({
   curves: true, reactions: true, values: false, velocity: true, acceleration: true, centres: false, relative: false, circles: false,
-  transmission: false, variant: true, names: true, grid: true, masses: true, dimensions: false, others: false, peaks: false,
+  transmission: false, variant: true, names: true, grid: true, masses: true, dimensions: false, others: false, peaks: false, seats: true, nominal: true,
 }); // prettier-ignore
 export const snapping = signal(true);
 export const tab = signal("properties");
@@ -145,6 +149,8 @@ export function begin({ name, saved, content, steps = null }) {
     pending.value = null;
     live.value = null;
     dropping.value = null;
+    corner.value = null;
+    factor.value = 1;
     index.value = 0;
     share.value = 0;
     tool.value = "select";

@@ -1,6 +1,6 @@
 // A scene with its errors magnified: links at their ideal pose and `factor` times the difference. 1 is as built, 0 ideal.
 
-import { at, full } from "./data.js";
+import { angleAt, at, full, place } from "./data.js";
 import { apply, cross, plus, rotation, scaled } from "./vector.js";
 
 /** The scene as it is drawn with errors `factor` times as large; the same scene where it has none, or at 1. */
@@ -44,6 +44,18 @@ export function leaning({ built, factor = 1 }, joint, index) {
 /** The play of a joint as it is drawn, metres; 0 where its pin has no seat. */
 export function play({ built, factor = 1 }, name) {
   return factor * (seatOf(built, name)?.clearance ?? 0);
+}
+
+/** The middle of the hole of a pin in the plane, [x, y] in metres as it is drawn: beside its point where it is bored off; null where that is not told. */
+export function hole(scene, joint, index) {
+  const { built, factor = 1 } = scene;
+  const [pin, end] = [place(scene, joint.on, index), seatOf(built, joint.name)?.ends[0]];
+  const [x, y] = end ? [at(end.offset.x, index), at(end.offset.y, index)] : [null, null];
+  if (!pin || x === null || y === null) return null;
+  const link = scene.links.find(({ name }) => name === joint.links[1]);
+  const angle = (angleAt(link?.angle, index) ?? 0) - (factor - 1) * (at(built.links[link?.name], index) ?? 0); // no offset is turned by errors
+  const [c, s] = [factor * Math.cos(angle), factor * Math.sin(angle)];
+  return [pin[0] - c * x + s * y, pin[1] - s * x - c * y];
 }
 
 /** The seat of a joint, or undefined. */

@@ -1,7 +1,7 @@
 // The mechanism in the plane as SVG, in the report and in the studio: parts are built once and posed at every position.
 
 import { arrow } from "./arrow.js";
-import { leaning, play, seatOf } from "./built.js";
+import { hole, leaning, play, seatOf } from "./built.js";
 import { at, forceAt, guide, hull, peak, place, quantile, usualPeak } from "./data.js";
 import { set, svg } from "./dom.js";
 import { short } from "./format.js";
@@ -251,7 +251,8 @@ function joint(scene, one) {
       set(shape, { x: (-wide / 2).toFixed(1), width: wide.toFixed(1) });
     } else set(shape, { r: (5 + play(present, one.name) * frame.scale).toFixed(1) });
     const angle = slides ? guide(present, one, index) + leaning(present, one, index) : 0;
-    moveTo(node, spot(one.at) ?? spot(one.on), angle);
+    const bored = slides ? null : hole(present, one, index);
+    moveTo(node, (bored && frame.to(bored)) ?? spot(one.at) ?? spot(one.on), angle);
     if (pin) moveTo(pin, spot(one.on));
   };
   return { joint: one, node: pin ? svg("g", {}, node, svg("g", { class: "joint" }, pin)) : node, pose };

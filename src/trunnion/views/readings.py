@@ -14,7 +14,7 @@ from trunnion.results.attributes import attribute
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import drawn_in, joined, number, scale_of
 from trunnion.results.scales import without_noise
-from trunnion.views.common.cycle import Abscissa, Array, names
+from trunnion.views.common.cycle import Abscissa, Array, abscissa, names
 from trunnion.views.texts import fixed, limits_in, limits_text, rounded
 
 if TYPE_CHECKING:
@@ -204,36 +204,17 @@ class MeasureReading:
     # ---- over the drive -------------------------------------------------------------------------------------------
 
     @cached_property
-    def places(self) -> tuple[Abscissa, Array] | None:
-        """What its curve is drawn over, and which positions (−1: a gap).
-
-        None if it is known at less than two, or if the figure is a place itself, another quantity than its course.
-        """
-        is_place = self.rule.startswith(("place", "dead"))
-        if is_place or "drive" not in self.result.coords or not self.has("curve"):
+    def over(self) -> Abscissa | None:
+        """What its curve is drawn over; None if it is known at less than two positions, or if the figure is a place
+        itself, another quantity than its course."""
+        if (
+            self.rule.startswith(("place", "dead"))
+            or "drive" not in self.result.coords
+            or np.isfinite(self.row("curve")).sum() < 2
+        ):
             return None
-        drive = np.asarray(self.result["drive"].values, float)
-        solved = np.flatnonzero(np.isfinite(self.row("curve")) & np.isfinite(drive))
-        order = solved[np.argsort(drive[solved], kind="stable")]
-        if len(order) < 2 or not np.ptp(drive[order]) > 0:
-            return None
-        unit, driver = str(self.result.attrs.get("drive_unit", "")), str(self.result.attrs.get("drive", ""))
-        unit = "°" if unit in DEGREE else unit
-        x, step = drive[order], float(np.median(np.diff(drive[order])))
-        unsolved = np.asarray(self.result["status"].values) >= Status.NOT_CONVERGED
-        holes = np.unique(np.searchsorted(x, drive[unsolved & ~np.isfinite(self.row("curve"))]))
-        holes = holes[(holes > 0) & (holes < len(x))]
-        over = np.insert(x, holes, 0.5 * (x[holes - 1] + x[holes]))
-        round_trip = unit == "°" and bool(self.result.attrs.get("periodic", 0))
-        closed = round_trip and abs(float(np.ptp(x)) + step - 360.0) < 0.5 * step
-        label = f"drive {'angle' if unit == '°' else 'slide'} {driver}" if driver else "time"
-        return Abscissa(label, unit, over, closed, 360.0 * closed), np.insert(order, holes, -1)
-
-    def along(self, values: Array) -> Array:
-        """Numbers over all positions as `places` has them, (…, place), in the unit that is shown."""
-        assert self.places is not None
-        picked = self.places[1]
-        return np.where(picked < 0, np.nan, values[..., picked]) * self.factor
+        over = abscissa(self.result)
+        return over if over.span > 0 else None
 
     @cached_property
     def place(self) -> float:
@@ -245,7 +226,7 @@ class MeasureReading:
     def at_place(self) -> str:
         """The place with its unit: " at 212°"; empty if there is none."""
         unit = str(self.result.attrs.get("drive_unit", ""))
-        if not math.isfinite(self.place) or self.places is None:
+        if not math.isfinite(self.place) or self.over is None:
             return ""
         return f" at {self.place:.4g}°" if unit in DEGREE else f" at {self.place:.4g}\u00a0{unit}".rstrip()
 
@@ -334,10 +315,18 @@ def readings(result: xr.Dataset) -> list[MeasureReading]:
         pairs = [(-math.inf if low is None else float(low), math.inf if high is None else float(high))
                  for low, high in ends]  # fmt: skip
         text, rule, course = (str(row[i]) if i < len(row) else "" for row in words)
-        reads.append(
-            MeasureReading(result.isel(measure=i), name, text, str(units[i]), pairs[0], pairs[1], rule, course)
-        )
+        own = _of_course(result.isel(measure=i))
+        reads.append(MeasureReading(own, name, text, str(units[i]), pairs[0], pairs[1], rule, course))
     return reads
+
+
+def _of_course(result: xr.Dataset) -> xr.Dataset:
+    """The result of one measure with the positions of its course, rising, without those of other measures."""
+    if "curve" not in result or "drive" not in result.coords:
+        return result
+    unsolved = np.asarray(result["status"].values) >= Status.NOT_CONVERGED
+    picked = np.flatnonzero(np.isfinite(result["curve"].values) | unsolved)
+    return result.isel(position=picked[np.argsort(result["drive"].values[picked], kind="stable")])
 
 
 def failures(result: xr.Dataset) -> list[tuple[str, int]]:

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.results.dataset import unit_of
-from trunnion.results.quantities import prefixed, quantity, scaled
+from trunnion.results.quantities import prefixed, quantity
 from trunnion.views import draw
 from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Rule, Stripe, nth
-from trunnion.views.common.cycle import Abscissa, Array, column, names
+from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, names
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,30 +26,13 @@ def figure(result: xr.Dataset) -> Figure:
 
     Grey: where the stated clearances do not suffice.
     """
-    over, share = _over(result), column(result, "needed_share")
+    over, share = abscissa(result), column(result, "needed_share")
     charts = [_need(result, over)]
     if share is not None and np.any(np.isfinite(share) & (share > 0)):
         charts.append(_share(result, share, over))
     if np.nanmax(result["uniform_part"].values, initial=0.0) > 0:
         charts.append(_parts(result, over))
     return draw.plot(Plot("Clearance needed for assembly", [Panel("", charts, 1.4 + 1.6 * len(charts))]), result)
-
-
-def _over(result: xr.Dataset) -> Abscissa:
-    """The coordinate of the only driver if it runs one way, else time."""
-    drivers, time = names(result, "driver"), np.asarray(result["time"].values, float)
-    if len(drivers) == 1:
-        unit = unit_of(result["drive_coordinate"], (0,))
-        values = np.asarray(result["drive_coordinate"].values[0], float)
-        steps = np.diff(values)
-        if np.all(steps > 0) or np.all(steps < 0):
-            factor, label = scaled(float(np.abs(values).max(initial=0.0)), unit) if unit == "m" else prefixed(1.0, unit)
-            turn = float(steps[0]) * values.size if steps.size else 0.0
-            closed = bool(result.attrs["periodic"]) and unit == "rad" and abs(abs(turn) - 2 * np.pi) < 1e-6
-            of = "angle" if unit == "rad" else "slide"
-            return Abscissa(f"drive {of} {drivers[0]}", label, values * factor, closed, turn * factor * closed)
-    factor, unit = prefixed(float(np.abs(time).max(initial=0.0)), "s")
-    return Abscissa("time", unit, time * factor)
 
 
 def _need(result: xr.Dataset, over: Abscissa) -> Chart:

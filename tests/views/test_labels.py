@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import trunnion
-from trunnion.views.common.labels import Labels
+from trunnion.views.common.figures import Labels
 from trunnion.views.cycle import plots
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

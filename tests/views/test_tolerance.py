@@ -22,8 +22,7 @@ from trunnion.errors import MechanismError
 from trunnion.results.export import save as export
 from trunnion.views.allocation import PriceCurve, tolerance_cost, trade_off
 from trunnion.views.common.figures import PALETTE
-from trunnion.views.readings import readings
-from trunnion.views.texts import limits_text, share, share_interval
+from trunnion.views.readings import limits_text, readings, share, share_interval
 from trunnion.views.tolerance import (
     KINDS,
     MOST_PANELS,

@@ -22,9 +22,8 @@ from trunnion.rig.judge import Verdict
 from trunnion.views.charts import Axis, Band, Chart, ColourScale, Legend, Line, Look, Mark, Panel, Stripe, silent
 from trunnion.views.common.cycle import Abscissa, Array, names, over_turn
 from trunnion.views.measured import shortened
-from trunnion.views.page import Section, Summary, counts, page
+from trunnion.views.page import NONE, Section, Summary, Table, counts, page
 from trunnion.views.scales import Scale, cause
-from trunnion.views.table import NONE, Table
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,8 +14,7 @@ from trunnion.results.scales import without_noise
 from trunnion.views.charts import Axis, Band, Chart, Line, Look, Mark, Panel, Rule, outside, silent
 from trunnion.views.common.cycle import Abscissa, abscissa
 from trunnion.views.common.peaks import ease, usual_peak
-from trunnion.views.page import Section, counts, page
-from trunnion.views.table import NONE, Table
+from trunnion.views.page import NONE, Section, Table, counts, page
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -25,7 +25,7 @@ from trunnion.studies.sweep.study import FIGURES
 from trunnion.views.charts import Axis, Line, Look, Mark, outside
 from trunnion.views.common.cycle import Array
 from trunnion.views.common.peaks import ease_of_status, usual_peak
-from trunnion.views.texts import ending
+from trunnion.views.readings import ending
 
 if TYPE_CHECKING:
     import xarray as xr

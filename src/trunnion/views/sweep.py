@@ -23,7 +23,7 @@ from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.views.charts import Axis, Chart, ColourScale, Line, Look, Mark, Note, Stripe
 from trunnion.views.common.cycle import Array
-from trunnion.views.page import Section, counts, page
+from trunnion.views.page import Section, Table, counts, page
 from trunnion.views.scales import (
     ALIKE,
     KINDS,
@@ -44,7 +44,6 @@ from trunnion.views.scales import (
     statuses,
     thinned,
 )  # fmt: skip
-from trunnion.views.table import Table
 
 if TYPE_CHECKING:
     import xarray as xr

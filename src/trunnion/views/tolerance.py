@@ -15,10 +15,19 @@ from trunnion.results.quantities import number
 from trunnion.statistics import intervals
 from trunnion.views.charts import Axis, Band, Bars, Chart, Legend, Line, Look, Mark, Note, Panel, Rule, Stairs, silent
 from trunnion.views.common.cycle import Array, names
-from trunnion.views.page import Section, Summary, counts, page
-from trunnion.views.readings import OUTER, MeasureReading, failures, readings
-from trunnion.views.table import Table
-from trunnion.views.texts import ending, limits_in, share, share_interval, share_parts, value_text
+from trunnion.views.page import Section, Summary, Table, counts, page
+from trunnion.views.readings import (
+    OUTER,
+    MeasureReading,
+    ending,
+    failures,
+    limits_in,
+    readings,
+    share,
+    share_interval,
+    share_parts,
+    value_text,
+)
 
 if TYPE_CHECKING:
     import xarray as xr

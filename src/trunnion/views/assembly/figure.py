@@ -6,16 +6,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.results.quantities import prefixed, quantity
+from trunnion.errors import agreeing
+from trunnion.results.attributes import summary_of
+from trunnion.results.quantities import parts, prefixed, quantity
 from trunnion.views import draw
 from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Rule, Stripe, nth
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, names
+from trunnion.views.page import Section, Table, page
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["figure"]
+__all__ = ["figure", "report"]
+
 
 FITS = 0  # code of the status of a position that goes together
 TOLD = 0.01  # of the need: a joint whose part is nowhere larger has no curve
@@ -85,3 +89,26 @@ def _short(result: xr.Dataset, over: Abscissa) -> list[Mark]:
     x = over.values
     half = abs(float(x[1] - x[0])) / 2 if x.size > 1 else 0.5
     return [Stripe(float(x[at]) - half, float(x[at]) + half) for at in np.flatnonzero(short)]
+
+
+# ---- report ---------------------------------------------------------------------------------------------------------
+
+
+TITLE = "Clearance needed for assembly"
+
+
+def report(result: xr.Dataset) -> str:
+    """The whole report as HTML."""
+    count = result.sizes["position"]
+    part = Section("Over the cycle", pictures=[(TITLE, figure(result))], after=[_results(result)])
+    return page(result, TITLE, [(f"{count:,}", agreeing(count, "position", "positions"))], [part])
+
+
+def _results(result: xr.Dataset) -> Table:
+    """The figures of the summary, as the terminal shows them."""
+    rows = []
+    for one in summary_of(result):
+        value = "undefined" if one.value is None else one.value
+        text, unit = (value, "") if isinstance(value, str) else parts(value, one.unit)
+        rows.append([one.label, text, "" if unit == "1" else unit])
+    return Table("results", ["", "value", "unit"], rows)

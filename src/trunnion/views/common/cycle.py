@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Abscissa", "Array", "Interval", "abscissa", "column", "course", "intervals", "larger_end", "layout",
-    "mean_friction", "names", "numbers", "over_turn", "series", "status_text", "thin", "valid",
+    "mean_friction", "members", "names", "numbers", "over_turn", "series", "status_text", "thin", "valid",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -103,6 +103,14 @@ def column(result: xr.Dataset, name: str, **where: str) -> Array | None:
     variable = result[name]
     place = tuple(variable.indexes[dim].get_loc(where[dim]) if dim in where else slice(None) for dim in variable.dims)
     return np.asarray(variable.values[place], dtype=float)
+
+
+def members(result: xr.Dataset, name: str, dim: str) -> dict[str, Array]:
+    """One variable of every member of a dimension, by their names; none if the result lacks it."""
+    if name not in result:
+        return {}
+    rows = result[name].transpose(dim, ...).values
+    return {member: np.asarray(row, dtype=float) for member, row in zip(names(result, dim), rows, strict=True)}
 
 
 def larger_end(result: xr.Dataset, joint: str) -> Array | None:

@@ -20,7 +20,7 @@ from trunnion.solve.loads import useful_loads
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.seating import seating_of
 from trunnion.solve.switches import Mechanisms, bends
-from trunnion.views.cycle.deviations_tables import error_rows
+from trunnion.views.cycle.deviations import error_rows
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 STEPS = (60, 72, 90, 360, 720)

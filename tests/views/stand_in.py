@@ -11,6 +11,8 @@ import json
 import numpy as np
 import xarray as xr
 
+from trunnion.results.dataset import driven
+
 # names that try to break out of a page or a plot
 NASTY = {
     "A": "Ω—Welle",
@@ -57,10 +59,12 @@ def assemble(joints, links, points, drivers, columns, attrs, effort="N m"):
         variables[f"{stem}_velocity"] = (shape, rate, {"units": f"{unit}/s", "long_name": f"{stem} velocity"})
         about = {"units": f"{unit}/s^2", "long_name": f"{stem} acceleration"}
         variables[f"{stem}_acceleration"] = (shape, second, about)
+    mean = np.mean(np.array(columns["friction_power"], float), axis=1)
+    variables["friction_power_mean"] = ("joint", mean, {"units": "W", "long_name": "mean friction power"})
     return xr.Dataset(
         variables,
         coords={
-            "time": ("position", columns["time"], {"units": "s", "long_name": "time"}),
+            **driven(columns["time"], *_drive(columns, joints, drivers[0], effort)),
             "joint": joints,
             "link": links,
             "point": points,
@@ -78,6 +82,14 @@ def assemble(joints, links, points, drivers, columns, attrs, effort="N m"):
             **attrs,
         },
     )
+
+
+def _drive(columns, joints, driver, effort):
+    """Coordinate of the first driver, its unit and its name."""
+    place = joints.index(driver)
+    if effort == "N":
+        return 1e3 * columns["joint_slide"][place], "mm", driver
+    return np.degrees(columns["joint_rotation"][place]), "°", driver
 
 
 def _solve(theta, friction=1.0):

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from trunnion.errors import Status
+from trunnion.results.dataset import driven
 
 X, Y, Z = np.eye(3)
 
@@ -105,6 +106,7 @@ def made(name, formula, links, joints, free, drivers, time, forces, moments, rot
         key: ((*dims, "position"), values, {"units": units.get(key.split("_")[-1], "1"), "long_name": key})
         for key, (dims, values) in data.items()
     }
+    variables["friction_power_mean"] = ("joint", loss.mean(axis=1), {"units": "W", "long_name": "mean friction power"})
     variables["efficiency"] = ((), 0.8, {"units": "1", "long_name": "efficiency"})
     scene = {
         "space": "spatial", "ground": next(iter(links)),
@@ -117,7 +119,8 @@ def made(name, formula, links, joints, free, drivers, time, forces, moments, rot
     }  # fmt: skip
     return xr.Dataset(
         variables,
-        coords={"time": ("position", time, {"units": "s", "long_name": "time"}), "joint": list(joints),
+        coords={**driven(time, np.degrees(rotation[list(joints).index(drivers[0])]), "°", drivers[0]),
+                "joint": list(joints),
                 "link": list(links), "point": list(points), "driver": drivers, "axis": ["x", "y", "z"],
                 "component": ["w", "x", "y", "z"]},
         attrs={"name": name, "formula": formula, "model_hash": "9f2c41d07ab35e68", "trunnion_version": "0.1.0",

@@ -109,7 +109,7 @@ def toleranced(
         "measure": labels,
         "parameter": names,
         "time": ("position", period * np.arange(positions) / positions, {"units": "s", "long_name": "time"}),
-        "drive": ("position", np.degrees(theta), {"units": "°", "long_name": "coordinate of A"}),
+        "drive": ("position", np.degrees(theta), {"units": "°", "long_name": "angle of A"}),
     }
     attributes = {"kind": "tolerance", **_attributes(labels, names, methods, samples, limits, found)}
     return xr.Dataset(variables, coordinates, attributes)

@@ -10,7 +10,7 @@ import pytest
 from as_built_models import EXAMPLES, four_bar, loaded
 
 import trunnion
-from trunnion.views.cycle.deviations_tables import error_rows, loss_rows
+from trunnion.views.cycle.deviations import error_rows, loss_rows
 from trunnion.views.cycle.scene import scene
 
 

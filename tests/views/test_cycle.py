@@ -19,7 +19,8 @@ def test_a_turning_drive_is_drawn_over_its_angle_and_the_turn_closes(plain):
 
 
 def test_a_drive_turning_backwards_closes_too(plain):
-    back = plain.assign(joint_rotation=-plain.joint_rotation)
+    back = plain.assign_coords(drive=-plain.drive)
+    back.drive.attrs = plain.drive.attrs
     assert abscissa(back).period == pytest.approx(-360.0)
 
 
@@ -29,25 +30,16 @@ def test_a_sliding_drive_is_drawn_over_its_slide_in_millimetres():
     assert over.values[-1] == pytest.approx(80.0)
 
 
-def test_a_gap_in_the_drive_is_filled_at_its_constant_speed(plain):
+def test_a_gap_in_the_answers_is_none_in_the_drive(plain):
     over = abscissa(blank(plain, 100, 150, Status.NOT_ASSEMBLED))
-    assert over.values[120] == pytest.approx(120.0)
+    assert over.values == pytest.approx(np.arange(360.0))
 
 
-def test_turns_lost_over_a_gap_are_found_again(plain):
-    holed = blank(plain, 100, 300, Status.NOT_ASSEMBLED)
-    holed["joint_rotation"][0, 300:] -= 2 * np.pi  # what unwrapping to the nearest turn makes of it
-    assert abscissa(holed).values == pytest.approx(np.arange(360.0))
-
-
-def test_without_a_drive_angle_time_serves(plain):
-    over = abscissa(blank(plain, 0, 360, Status.NOT_ASSEMBLED))
-    assert over.title == "time [ms]"
-
-
-def test_a_drive_that_turns_back_is_drawn_over_time(plain):
-    swing = plain.assign(joint_rotation=np.sin(plain.joint_rotation))
-    assert abscissa(swing).label == "time"
+def test_where_no_drive_is_stated_time_serves(plain):
+    assert abscissa(plain.drop_vars("drive")).title == "time [ms]"
+    timed = plain.assign_coords(drive=plain.time)
+    timed.drive.attrs = {"units": "s", "long_name": "time"}
+    assert abscissa(timed).title == "time [ms]"
 
 
 def test_intervals_name_each_run_without_an_answer(plain):

@@ -1,4 +1,4 @@
-"""Names in a drawing keep off each other, off their joints and inside the figure; far ones have a leader."""
+"""Names in a drawing keep off each other, off their joints and inside the figure."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import trunnion
-from trunnion.views.common.labels import Labels
+from trunnion.views.common.figures import Labels
 from trunnion.views.cycle import plots
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -54,7 +54,7 @@ def sheet() -> tuple[Figure, mpl.axes.Axes]:
     return figure, axes
 
 
-def test_names_that_would_meet_are_moved_apart_and_led() -> None:
+def test_names_that_would_meet_are_moved_apart() -> None:
     """Eight places within a few points of each other."""
     figure, axes = sheet()
     labels = Labels(figure)
@@ -64,4 +64,3 @@ def test_names_that_would_meet_are_moved_apart_and_led() -> None:
     found = boxes(figure)
     assert len(found) == 8
     assert not [pair for pair in combinations(found, 2) if meet(*(found[text] for text in pair))]
-    assert any(text.arrow_patch is not None for text in axes.texts), "those further off have a leader"

@@ -26,8 +26,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.scene import scene
 from trunnion.views.motion.figure import KINDS, OF_CONTACTS, figure
-from trunnion.views.motion.report import _account, report
-from trunnion.views.motion.scene import MOST_ROWS, motion_scene
+from trunnion.views.motion.report import MOST_ROWS, _account, motion_scene, report
 from trunnion.views.motion.shown import shown
 
 FREE = {"O": {"speed": 100, "free": True, "initial": {"speed": 60}}}

@@ -19,11 +19,9 @@ from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
 from trunnion.views.cycle.report import report
 from trunnion.views.cycle.scene import scene
 from trunnion.views.space.bodies import space
-from trunnion.views.space.camera import best, looking
-from trunnion.views.space.paint import facets, normal_of
+from trunnion.views.space.figure import facets, normal_of
 from trunnion.views.space.scene import screw_axis
-from trunnion.views.space.scenery import scenery
-from trunnion.views.space.solids import BAR, SYMBOLS, Solid, solids
+from trunnion.views.space.solids import BAR, SYMBOLS, Solid, best, looking, scenery, solids
 
 BLANK = ("nowhere", "locked")  # no position can be drawn
 

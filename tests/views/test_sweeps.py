@@ -10,9 +10,8 @@ import xarray as xr
 from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
 
 from trunnion import MechanismError, Status, save
-from trunnion.views.scales import Scale, arrange
+from trunnion.views.scales import Scale, arrange, on_scale
 from trunnion.views.sweep import figure, tables
-from trunnion.views.sweep_field import on_scale
 
 GRID = {"misalignment": ANGLE, "input.speed": SPEED}
 FEW = scale([50, 500, 1000, 1500], "rad/s", "rpm", RPM)

@@ -17,10 +17,8 @@ from trunnion.statistics.costs import Cost
 from trunnion.views import tolerance
 from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Stripe
 from trunnion.views.common.cycle import Array, names
-from trunnion.views.page import Section
-from trunnion.views.readings import MeasureReading, readings
-from trunnion.views.table import NONE, Table
-from trunnion.views.texts import ending, is_play, share, share_interval
+from trunnion.views.page import NONE, Section, Table
+from trunnion.views.readings import MeasureReading, ending, is_play, readings, share, share_interval
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -20,11 +20,10 @@ from trunnion.results.quantities import number, prefixed, with_uncertainty
 from trunnion.rig.comparison import CAUSES
 from trunnion.rig.judge import Verdict
 from trunnion.views.charts import Axis, Band, Chart, ColourScale, Legend, Line, Look, Mark, Panel, Stripe, silent
-from trunnion.views.common.cycle import Abscissa, Array, names
+from trunnion.views.common.cycle import Abscissa, Array, names, over_turn
 from trunnion.views.measured import shortened
-from trunnion.views.page import Section, Summary, counts, page
+from trunnion.views.page import NONE, Section, Summary, Table, counts, page
 from trunnion.views.scales import Scale, cause
-from trunnion.views.table import NONE, Table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -129,10 +128,8 @@ def drive(result: xr.Dataset, condition: int) -> Abscissa:
     unit, name = str(result.attrs["drive_unit"]), str(result.attrs["drive_name"])
     factor, shown = prefixed(float(np.abs(values).max(initial=0.0)), unit)
     title = {"rad": f"drive angle {name}", "m": f"drive slide {name}", "s": "time"}[unit]
-    closed = bool(int(result.attrs["periodic"])) and values.size > 2
-    even = closed and np.ptp(np.diff(values)) <= 1e-6 * abs(values[1] - values[0])
-    period = float(values[1] - values[0]) * values.size * factor if even else 0.0
-    return Abscissa(title, shown, values * factor, bool(even and period), period)
+    even = values.size > 2 and np.ptp(np.diff(values)) <= 1e-6 * abs(values[1] - values[0])
+    return over_turn(title, shown, values * factor, bool(even and int(result.attrs["periodic"])))
 
 
 # ---- tables -------------------------------------------------------------------------------------------------------

@@ -36,9 +36,21 @@ from trunnion.views.charts import (
     Stripe,
 )
 from trunnion.views.common.cycle import Abscissa, Array, thin
-from trunnion.views.common.figures import INK, MUTED, PALETTE, RULE, SHADE, WIDTH, along, dress, legend, new
-from trunnion.views.common.labels import Labels
-from trunnion.views.common.lettering import Sheet, plain
+from trunnion.views.common.figures import (
+    INK,
+    MUTED,
+    PALETTE,
+    RULE,
+    SHADE,
+    WIDTH,
+    Labels,
+    Sheet,
+    along,
+    dress,
+    legend,
+    new,
+    plain,
+)
 
 if TYPE_CHECKING:
     import xarray as xr

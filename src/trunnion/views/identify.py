@@ -17,8 +17,7 @@ from trunnion.views.charts import Axis, Band, Cells, Chart, Legend, Line, Look, 
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.compare import about_data, data_section
 from trunnion.views.measured import shortened
-from trunnion.views.page import Section, Summary, counts, page
-from trunnion.views.table import NONE, Table
+from trunnion.views.page import NONE, Section, Summary, Table, counts, page
 
 if TYPE_CHECKING:
     import xarray as xr

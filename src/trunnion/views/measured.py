@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from trunnion.rig.reading.measurement import Measurement, Signal, rms
-from trunnion.views.table import Table
+from trunnion.views.page import Table
 
 __all__ = ["shortened", "tables"]
 

@@ -20,8 +20,8 @@ from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.results.quantities import readable
 from trunnion.results.tables import kind_of
-from trunnion.views.common.markup import with_code
 from trunnion.views.cycle import plots
+from trunnion.views.page import with_code
 
 if TYPE_CHECKING:
     import xarray as xr

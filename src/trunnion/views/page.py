@@ -10,8 +10,9 @@ import base64
 import hashlib
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
+from html import escape
 from io import BytesIO
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
@@ -23,16 +24,50 @@ from trunnion.results.figure import MORE_THAN
 from trunnion.results.figure import Figure as Stated
 from trunnion.results.quantities import Units, quantity
 from trunnion.views.common.bundle import web_text
-from trunnion.views.common.markup import with_code
-from trunnion.views.table import Table
 
 if TYPE_CHECKING:
     import xarray as xr
     from jinja2 import Template
     from matplotlib.figure import Figure
 
-__all__ = ["Section", "Summary", "counts", "hashed", "headline", "inputs_of", "page", "said", "source", "template",
-           "value_of"]  # fmt: skip
+__all__ = [
+    "NONE", "Section", "Summary", "Table", "counts", "hashed", "headline", "inputs_of", "page", "said", "source",
+    "template", "value_of", "with_code",
+]  # fmt: skip
+
+
+NONE = "—"  # a cell whose number is not known
+
+
+@dataclass(frozen=True)
+class Table:
+    """A title, the heads of the columns, the rows of texts with their units.
+
+    left_out: how many points of the result have no row, where a long table is thinned.
+    """
+
+    title: str
+    head: list[str]
+    rows: list[list[str]]
+    left_out: int = 0
+
+    def titled(self, title: str) -> Table:
+        """The same table under another title."""
+        return replace(self, title=title)
+
+    def without_empty(self) -> Table:
+        """The same without the columns after the first in which no row has a number or word."""
+        filled = [k for k in range(len(self.head)) if k == 0 or any(row[k] not in ("", NONE) for row in self.rows)]
+        rows = [[row[k] for k in filled] for row in self.rows]
+        return replace(self, head=[self.head[k] for k in filled], rows=rows)
+
+
+CODE = re.compile(r"`([^`]+)`")
+
+
+def with_code(text: str) -> str:
+    """The text escaped for HTML, with `…` as code: "see `trunnion play`" has no backtick left."""
+    return CODE.sub(r"<code>\1</code>", escape(str(text)))
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,9 @@ from trunnion.results.dataset import units_along
 from trunnion.results.quantities import prefixed, quantity
 from trunnion.results.scales import without_noise
 from trunnion.views.charts import Axis, Band, Chart, Line, Look, Mark, Panel, Rule, outside, silent
-from trunnion.views.common.cycle import Abscissa
+from trunnion.views.common.cycle import Abscissa, abscissa
 from trunnion.views.common.peaks import ease, usual_peak
-from trunnion.views.page import Section, counts, page
-from trunnion.views.table import NONE, Table
+from trunnion.views.page import NONE, Section, Table, counts, page
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,7 +84,7 @@ def figure(result: xr.Dataset, measures: Sequence[int] | None = None) -> Figure:
 
 def _panel(every: xr.Dataset, i: int) -> Panel:
     """The worst case of one measure over the drive."""
-    result, over, unit = every.isel(measure=i), _abscissa(every), units_along(every["value"], "measure")[i]
+    result, over, unit = every.isel(measure=i), abscissa(every), units_along(every["value"], "measure")[i]
     rows, total, rss = (result[key].values for key in ("worst_case", "worst_case_total", "rss"))
     most, shown = float(np.nanmax(total, initial=0.0)), usual_peak(ease(result), total)
     factor, label = prefixed(shown, unit)
@@ -124,16 +123,6 @@ def _place(result: xr.Dataset, over: Abscissa) -> float:
     if len(time) < 2:
         return float(values[0])
     return float(values[k - 1] + (values[k] - values[k - 1]) * (at - time[k - 1]) / (time[k] - time[k - 1]))
-
-
-def _abscissa(result: xr.Dataset) -> Abscissa:
-    """The places of a result: the coordinate of the drive, or times."""
-    values, unit, driver = result["drive"].values, result.attrs["drive_unit"], result.attrs["drive"]
-    if not driver:
-        return Abscissa("time", unit, values)
-    turn = float(values[1] - values[0]) * len(values) if len(values) > 2 else 0.0
-    closed = bool(result.attrs["periodic"]) and unit == "°" and abs(abs(turn) - 360.0) < 1e-6 * 360.0
-    return Abscissa(f"drive {'angle' if unit == '°' else 'slide'} {driver}", unit, values, closed, turn * closed)
 
 
 # ---- report -------------------------------------------------------------------------------------------------------

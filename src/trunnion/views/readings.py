@@ -12,15 +12,101 @@ import numpy as np
 from trunnion.errors import Status
 from trunnion.results.attributes import attribute
 from trunnion.results.dataset import units_along
-from trunnion.results.quantities import drawn_in, joined, number, scale_of
+from trunnion.results.quantities import decimals_of, drawn_in, joined, number, scale_of
 from trunnion.results.scales import without_noise
-from trunnion.views.common.cycle import Abscissa, Array, names
-from trunnion.views.texts import fixed, limits_in, limits_text, rounded
+from trunnion.views.common.cycle import Abscissa, Array, abscissa, names
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["OUTER", "ContributionRow", "MeasureReading", "failures", "readings"]
+__all__ = [
+    "OUTER", "ContributionRow", "MeasureReading", "ending", "failures", "fixed", "is_play", "limits_in",
+    "limits_text", "readings", "rounded", "share", "share_interval", "share_parts", "signed_limit", "value_text",
+]  # fmt: skip
+
+
+# ---- numbers in words -----------------------------------------------------------------------------------------------
+
+
+def fixed(value: float, decimals: int) -> str:
+    """A number with so many decimals, thin spaces between thousands, a true minus, and no minus before a 0."""
+    if not math.isfinite(value):
+        return number(value)
+    text = f"{value:,.{decimals}f}"
+    return text.replace(",", "\u202f").replace("-", "−" if float(text.replace(",", "")) else "")
+
+
+def rounded(value: float, digits: int = 6) -> str:
+    """A number with at most so many significant digits, a true minus and a sign for what has no end."""
+    return f"{value + 0.0:.{digits}g}".replace("inf", "∞").replace("-", "−")
+
+
+def signed_limit(value: float) -> str:
+    """One limit of a deviation: "+0.02", "−0.01", "0", and "—" where there is none."""
+    if math.isinf(value):
+        return "—"
+    return f"+{rounded(value)}" if value > 0 else rounded(value)
+
+
+def limits_text(lower: float, upper: float) -> str:
+    """Limits of a deviation as a drawing has them: "±0.05", "+0.02/−0.01"."""
+    return f"±{rounded(upper)}" if lower == -upper else f"{signed_limit(upper)}/{signed_limit(lower)}"
+
+
+def limits_in(lower: float, upper: float, unit: str, path: str) -> str:
+    """Limits of a toleranced number with their unit; of a play how far its pin may be from the middle."""
+    if math.isnan(lower) or math.isnan(upper):
+        return ""
+    factor, shown = drawn_in(max(abs(lower), abs(upper)), unit)
+    within = f"within\u00a0{rounded(upper * factor)}"
+    text = within if is_play(path) else limits_text(lower * factor, upper * factor)
+    return joined(text, shown.replace(" ", "\u00a0"))
+
+
+def is_play(path: str) -> bool:
+    """Whether a parameter is the play of a joint: how far its pin may be from the middle, to any side."""
+    return path.startswith("joints.") and path.endswith(".clearance") and path.count(".") == 2
+
+
+def value_text(value: float, unit: str, digits: int = 8) -> str:
+    """A toleranced number with its unit, lengths in mm, with all digits that a drawing would show."""
+    if not math.isfinite(value):
+        return "—"
+    factor, shown = drawn_in(abs(value), unit)
+    return joined(rounded(value * factor, digits), shown.replace(" ", "\u00a0"))
+
+
+def ending(name: str, most: int) -> str:
+    """A name of so many characters: the end of a longer one, by which those of one folder differ."""
+    return name if len(name) <= most else f"…{name[1 - most :]}"
+
+
+def share(value: float, decimals: int | None = None) -> str:
+    """A share in per cent, near 1 with the digits that tell how near: "99.62 %", "99.998 %", "−3.1 %"."""
+    if math.isnan(value):
+        return "—"
+    if decimals is None:
+        decimals = decimals_of(min(value, 1 - value))
+    return f"{fixed(100 * value, 0 if value in (0.0, 1.0) else decimals)}\u00a0%"
+
+
+def share_interval(value: float, low: float, high: float) -> str:
+    """A share with its interval: "99.62 % (99.41 to 99.76 %)"."""
+    text, ends, _ = share_parts(value, low, high)
+    return f"{text} ({ends})" if ends else text
+
+
+def share_parts(value: float, low: float, high: float) -> tuple[str, str, int | None]:
+    """A share, its interval ("" if there is none), and the decimals of a per cent that the interval bears."""
+    if math.isnan(low) or math.isnan(high):
+        return share(value), "", None
+    decimals = decimals_of(high - low)
+    least = share(low, decimals).removesuffix("\u00a0%")
+    return share(value, decimals), f"{least} to {share(high, decimals)}", decimals
+
+
+# ---- measures -------------------------------------------------------------------------------------------------------
+
 
 APART = 5e-4  # two shares that differ by more are written each
 OUTER = (0.00135, 0.99865)  # quantiles of the 99.73 % range
@@ -204,36 +290,17 @@ class MeasureReading:
     # ---- over the drive -------------------------------------------------------------------------------------------
 
     @cached_property
-    def places(self) -> tuple[Abscissa, Array] | None:
-        """What its curve is drawn over, and which positions (−1: a gap).
-
-        None if it is known at less than two, or if the figure is a place itself, another quantity than its course.
-        """
-        is_place = self.rule.startswith(("place", "dead"))
-        if is_place or "drive" not in self.result.coords or not self.has("curve"):
+    def over(self) -> Abscissa | None:
+        """What its curve is drawn over; None if it is known at less than two positions, or if the figure is a place
+        itself, another quantity than its course."""
+        if (
+            self.rule.startswith(("place", "dead"))
+            or "drive" not in self.result.coords
+            or np.isfinite(self.row("curve")).sum() < 2
+        ):
             return None
-        drive = np.asarray(self.result["drive"].values, float)
-        solved = np.flatnonzero(np.isfinite(self.row("curve")) & np.isfinite(drive))
-        order = solved[np.argsort(drive[solved], kind="stable")]
-        if len(order) < 2 or not np.ptp(drive[order]) > 0:
-            return None
-        unit, driver = str(self.result.attrs.get("drive_unit", "")), str(self.result.attrs.get("drive", ""))
-        unit = "°" if unit in DEGREE else unit
-        x, step = drive[order], float(np.median(np.diff(drive[order])))
-        unsolved = np.asarray(self.result["status"].values) >= Status.NOT_CONVERGED
-        holes = np.unique(np.searchsorted(x, drive[unsolved & ~np.isfinite(self.row("curve"))]))
-        holes = holes[(holes > 0) & (holes < len(x))]
-        over = np.insert(x, holes, 0.5 * (x[holes - 1] + x[holes]))
-        round_trip = unit == "°" and bool(self.result.attrs.get("periodic", 0))
-        closed = round_trip and abs(float(np.ptp(x)) + step - 360.0) < 0.5 * step
-        label = f"drive {'angle' if unit == '°' else 'slide'} {driver}" if driver else "time"
-        return Abscissa(label, unit, over, closed, 360.0 * closed), np.insert(order, holes, -1)
-
-    def along(self, values: Array) -> Array:
-        """Numbers over all positions as `places` has them, (…, place), in the unit that is shown."""
-        assert self.places is not None
-        picked = self.places[1]
-        return np.where(picked < 0, np.nan, values[..., picked]) * self.factor
+        over = abscissa(self.result)
+        return over if over.span > 0 else None
 
     @cached_property
     def place(self) -> float:
@@ -245,7 +312,7 @@ class MeasureReading:
     def at_place(self) -> str:
         """The place with its unit: " at 212°"; empty if there is none."""
         unit = str(self.result.attrs.get("drive_unit", ""))
-        if not math.isfinite(self.place) or self.places is None:
+        if not math.isfinite(self.place) or self.over is None:
             return ""
         return f" at {self.place:.4g}°" if unit in DEGREE else f" at {self.place:.4g}\u00a0{unit}".rstrip()
 
@@ -334,10 +401,18 @@ def readings(result: xr.Dataset) -> list[MeasureReading]:
         pairs = [(-math.inf if low is None else float(low), math.inf if high is None else float(high))
                  for low, high in ends]  # fmt: skip
         text, rule, course = (str(row[i]) if i < len(row) else "" for row in words)
-        reads.append(
-            MeasureReading(result.isel(measure=i), name, text, str(units[i]), pairs[0], pairs[1], rule, course)
-        )
+        own = _of_course(result.isel(measure=i))
+        reads.append(MeasureReading(own, name, text, str(units[i]), pairs[0], pairs[1], rule, course))
     return reads
+
+
+def _of_course(result: xr.Dataset) -> xr.Dataset:
+    """The result of one measure with the positions of its course, rising, without those of other measures."""
+    if "curve" not in result or "drive" not in result.coords:
+        return result
+    unsolved = np.asarray(result["status"].values) >= Status.NOT_CONVERGED
+    picked = np.flatnonzero(np.isfinite(result["curve"].values) | unsolved)
+    return result.isel(position=picked[np.argsort(result["drive"].values[picked], kind="stable")])
 
 
 def failures(result: xr.Dataset) -> list[tuple[str, int]]:

@@ -18,7 +18,7 @@ from trunnion.results.tables import kind_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from trunnion.views.cycle.animation import Animation
+    from trunnion.views.cycle.report import Animation
 
 __all__ = ["animation_of", "check_kind", "figure_of", "html_of", "plot", "report", "report_of"]
 
@@ -27,7 +27,7 @@ __all__ = ["animation_of", "check_kind", "figure_of", "html_of", "plot", "report
 REPORTS = {
     "cycle": "cycle.report", "tolerance": "tolerance", "allocation": "allocation",
     "comparison": "compare", "identification": "identify",
-    "motion": "motion.report", "play": "play", "sweep": "sweep", "assembly": "assembly.report",
+    "motion": "motion.report", "play": "play", "sweep": "sweep", "assembly": "assembly.figure",
 }  # fmt: skip
 FIGURES = {
     "cycle": "cycle.plots", "sweep": "sweep", "play": "play", "assembly": "assembly.figure",
@@ -90,7 +90,7 @@ def _called(view: Callable[..., Any], call: str, result: xr.Dataset, options: Ma
 def animation_of(result: xr.Dataset, ideal: xr.Dataset | None, height: int) -> Animation:
     """The moving mechanism of a cycle."""
     whole(result, "an animation")
-    view = _view(kind_of(result), {"cycle": "cycle.animation"}, "animation")
+    view = _view(kind_of(result), {"cycle": "cycle.report"}, "animation")
     return view.animation(result, ideal, height)  # type: ignore[no-any-return]
 
 

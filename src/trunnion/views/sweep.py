@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise, product
 from math import prod
-from textwrap import fill, wrap
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,32 +23,27 @@ from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import MARGIN
 from trunnion.views.charts import Axis, Chart, ColourScale, Line, Look, Mark, Note, Stripe
 from trunnion.views.common.cycle import Array
-from trunnion.views.page import Section, counts, page
+from trunnion.views.page import Section, Table, counts, page
 from trunnion.views.scales import (
+    ALIKE,
     KINDS,
+    NOTHING,
     Arrangement,
+    Field,
     Scale,
     arrange,
+    axis_of,
     cause,
     check_kind,
-    grid,
-    statuses,
-    thinned,
-)
-from trunnion.views.sweep_field import (
-    ALIKE,
-    NOTHING,
-    Field,
-    axis_of,
-    columns_of,
     ends,
     field_of,
-    field_room,
+    grid,
+    middles,
     on_scale,
-    panel_title,
     rings,
-)
-from trunnion.views.table import Table
+    statuses,
+    thinned,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,6 +57,7 @@ __all__ = ["KINDS", "check_kind", "figure", "report", "tables"]
 MOST_ROWS, MOST_COLUMNS = 40, 8  # of a table
 LEAST_ROWS, LEAST_COLUMNS, MOST_TABLES = 6, 3, 6
 BESIDE = "friction_power_mean", "locking_margin"  # in the table beside the measure, if the sweep has them
+MILDER = {int(Status.NEAR_SINGULAR): "near singular", int(Status.CONTACT_LOST): "contact lost"}
 
 
 def tables(
@@ -81,51 +77,51 @@ def tables(
 def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> Table:
     """Several figures over one name."""
     every = figures_of(result)
-    shown = dict.fromkeys([*measures, "efficiency", "efficiency_ideal", *_efforts(every), *BESIDE])
-    columns, titles = [], []
-    for name in shown:
+    columns, heads = [], []
+    for name in dict.fromkeys([*measures, "efficiency", "efficiency_ideal", *_efforts(every), *BESIDE]):
         if name in every or name in measures:
-            unit, values = grid(result, plan, name)
-            factor, drawn = _drawn(unit)
-            columns.append(factor * values[:, 0])
-            titles.append(f"{name.replace('_', ' ')} [{drawn}]".removesuffix(" [1]"))
+            head, values = _column(result, plan, name)
+            columns.append(values[:, 0])
+            heads.append(head)
+    status = [int(code) for code in statuses(result, plan)[:, 0]]
+    words = [cause(code) if code >= Status.NOT_CONVERGED else MILDER.get(code, "") for code in status]
     picked = thinned(len(plan.x.values), MOST_ROWS)
-    words = [_word(int(code)) for code in statuses(result, plan)[:, 0]]
-    rows = []
-    for i in picked:
-        cells = ["" if np.isnan(column[i]) else _number(column[i]) for column in columns]
-        rows.append([_number(plan.x.values[i]), *cells, *([words[i]] if any(words) else [])])
-    head = [plan.x.title, *titles, *(["status"] if any(words) else [])]
+    rows = [[_number(plan.x.values[i]), *(_number(column[i]) for column in columns), words[i]] for i in picked]
     title = f"{', '.join(name.replace('_', ' ') for name in measures)} over {plan.x.name}"
-    return Table(_titled(title, plan.at()), head, rows, len(plan.x.values) - len(picked))
+    table = Table(_titled(title, plan.at()), [plan.x.title, *heads, "status"], rows, len(words) - len(picked))
+    return table if any(words) else replace(table, head=table.head[:-1], rows=[row[:-1] for row in rows])
+
+
+def _column(result: xr.Dataset, plan: Arrangement, name: str) -> tuple[str, Array]:
+    """Head and numbers of a figure: lengths in mm, angles in degrees."""
+    unit, values = grid(result, plan, name)
+    factor, shown = {"m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}.get(unit, (1.0, unit))
+    return name.replace("_", " ") + (f" [{shown}]" if shown not in ("", "1") else ""), factor * values
 
 
 def _efforts(every: dict[str, tuple[str, Any]]) -> list[str]:
     """The ends of every driver's effort that lie beyond 0 at any point: both where its sign changes."""
-    shown = []
+    picked = []
     for driver in (name.removesuffix(".effort_max") for name in every if name.endswith(".effort_max")):
-        ends = {f"{driver}.effort_min": -1.0, f"{driver}.effort_max": 1.0}
-        beyond = [name for name, sign in ends.items() if np.nanmax(sign * every[name][1], initial=0.0) > 0]
-        shown += beyond or [f"{driver}.effort_max"]
-    return shown
+        ends_of = {f"{driver}.effort_min": -1.0, f"{driver}.effort_max": 1.0}
+        beyond = [name for name, sign in ends_of.items() if np.nanmax(sign * every[name][1], initial=0.0) > 0]
+        picked += beyond or [f"{driver}.effort_max"]
+    return picked
 
 
 def _matrices(result: xr.Dataset, measure: str, plan: Arrangement, other: Scale, room: int) -> list[Table]:
     """A table for each combination of the facets' values; of many of them some."""
-    unit, values = grid(result, plan, measure)
-    (factor, shown_unit), status = _drawn(unit), statuses(result, plan)
+    (name, values), status = _column(result, plan, measure), statuses(result, plan)
     places = list(product(*(range(len(scale.values)) for scale in plan.facets)))
-    shown = [places[i] for i in thinned(len(places), MOST_TABLES)]
-    most = max(LEAST_ROWS, MOST_ROWS // len(shown))
-    name = measure.replace("_", " ") + (f" [{shown_unit}]" if shown_unit not in ("", "1") else "")
+    picked = [places[i] for i in thinned(len(places), MOST_TABLES)]
+    most = max(LEAST_ROWS, MOST_ROWS // len(picked))
     matrices = []
-    for place in shown:
-        facets = [scale.told(i) for scale, i in zip(plan.facets, place, strict=True)]
-        at = ", ".join([*facets, *([plan.at()] if plan.fixed else [])])
-        title = _titled(f"{name} over {plan.x.name} and, in columns, {other.name}", at)
+    for place in picked:
+        at = [scale.equation(i) for scale, i in zip(plan.facets, place, strict=True)] + [plan.at()] * bool(plan.fixed)
+        title = _titled(f"{name} over {plan.x.name} and, in columns, {other.name}", ", ".join(at))
         index: Any = (slice(None), slice(None), *place)
-        matrices.append(_matrix(title, plan.x, other, factor * values[index], status[index], most, room))
-    hidden = (len(places) - len(shown)) * plan.x.values.size * other.values.size
+        matrices.append(_matrix(title, plan.x, other, values[index], status[index], most, room))
+    hidden = (len(places) - len(picked)) * plan.x.values.size * other.values.size
     matrices[-1] = replace(matrices[-1], left_out=matrices[-1].left_out + hidden)
     return matrices
 
@@ -134,44 +130,28 @@ def _matrix(title: str, x: Scale, other: Scale, values: Array, status: NDArray[n
     """One figure over two names: at most so many rows, and columns that fit the room."""
     down = thinned(values.shape[0], most)
     columns = [[x.title, *(_number(x.values[i]) for i in down)]]
-    for k, (numbers, codes) in enumerate(zip(values[down].T, status[down].T, strict=True)):
-        cells = [_number(value) if not np.isnan(value) else cause(code) if code >= Status.NOT_CONVERGED else ""
-                 for value, code in zip(numbers.tolist(), codes.tolist(), strict=True)]  # fmt: skip
+    for k in range(values.shape[1]):
+        causes = [cause(code) if code >= Status.NOT_CONVERGED else "" for code in status[down, k].tolist()]
+        cells = [_number(value) or why for value, why in zip(values[down, k].tolist(), causes, strict=True)]
         columns.append([other.say(k), *cells])
+    # the words of a cause may stand below each other
+    widths = [3 + max(len(column[0]), *(len(w) for cell in column for w in cell.split())) for column in columns]
     across = thinned(values.shape[1], MOST_COLUMNS)
-
-    def width() -> int:
-        """Characters of the columns; the words of a cause may stand below each other."""
-        picked = [columns[0], *(columns[k + 1] for k in across)]
-        return sum(3 + max(len(column[0]), *(len(w) for cell in column for w in cell.split())) for column in picked)
-
-    while len(across) > LEAST_COLUMNS and width() > room:
+    while len(across) > LEAST_COLUMNS and widths[0] + sum(widths[k + 1] for k in across) > room:
         across = thinned(values.shape[1], len(across) - 1)
     head, *rows = ([columns[0][i], *(columns[k + 1][i] for k in across)] for i in range(len(down) + 1))
     return Table(title, head, rows, values.size - len(down) * len(across))
-
-
-def _drawn(unit: str) -> tuple[float, str]:
-    """Factor and unit of a column: lengths in mm, angles in degrees."""
-    return {"m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}.get(unit, (1.0, unit))
 
 
 def _titled(title: str, at: str) -> str:
     return f"{title}, at {at}" if at else title
 
 
-def _word(code: int) -> str:
-    """What a table says of a point that has no figures, or not quite sound ones."""
-    if code >= Status.NOT_CONVERGED:
-        return cause(code)
-    milder = {int(Status.NEAR_SINGULAR): "near singular", int(Status.CONTACT_LOST): "contact lost"}
-    return milder.get(code, "")
-
-
 def _number(value: float) -> str:
-    if value == np.inf:  # of a locking margin: as far as it is looked for
-        return f"> {MARGIN:g}"
-    return f"{value + 0.0:.6g}"  # + 0.0: no negative zero
+    """Empty for what is not known; of a locking margin without end: as far as it is looked for."""
+    if np.isnan(value):
+        return ""
+    return f"> {MARGIN:g}" if value == np.inf else f"{value + 0.0:.6g}"  # + 0.0: no negative zero
 
 
 # ---- what is drawn ------------------------------------------------------------------------------------------------
@@ -201,33 +181,29 @@ def figure(
 
     check_kind(kind)
     field = field_of(without_noise(result), measure, x, family)
-    plan, other, mapped = field.plan, field.plan.other, kind == "map"
-    if mapped:
-        _need_two(plan)
-    over = f"{plan.x.name} and {other.name}" if mapped and other else plan.x.name
+    plan, other, count = field.plan, field.plan.other, len(field.panels)
+    over = plan.x.name
+    if kind == "map":
+        short = [scale.name for scale in (plan.x, other) if scale and np.unique(scale.values).size < 2]
+        if other is None or short:
+            what = f"'{short[0]}' has one value" if short else f"'{plan.x.name}' alone is swept"
+            remedy = "sweep over two names with several values each, or draw curves"
+            raise MechanismError(Finding(f"{what}: a map needs two that vary", "--kind map", remedy))
+        over += f" and {other.name}"
     title = f"{field.title} over {over}{f' at {plan.at()}' if plan.fixed else ''}"
     if field.hidden:
-        title += f" ({len(field.panels)} of {len(field.panels) + field.hidden} panels)"
+        title += f" ({count} of {count + field.hidden} panels)"
     title = fill(f"{title[:1].upper()}{title[1:]}", WIDE, break_long_words=False)
-    board = Board.new(title, result, len(field.panels), columns_of(field))
-    if mapped:
+    board = Board.new(title, result, count, field.columns)
+    if kind == "map":
         from trunnion.views.sweep_map import draw
 
         draw(board, field)
         return board.sheet
-    for k in range(len(field.panels)):
+    for k in range(count):
         board.draw(k, _curves(field, k))
     board.finish(_colours(other) if other is not None and len(other.values) > MOST_NAMED else None)
     return board.sheet
-
-
-def _need_two(plan: Arrangement) -> None:
-    """MechanismError if there are not two names with two values or more to draw a map over."""
-    short = [scale.name for scale in (plan.x, plan.other) if scale and np.unique(scale.values).size < 2]
-    if plan.other is None or short:
-        what = f"'{short[0]}' has one value" if short else f"'{plan.x.name}' alone is swept"
-        remedy = "sweep over two names with several values each, or draw curves"
-        raise MechanismError(Finding(f"{what}: a map needs two that vary", "--kind map", remedy))
 
 
 # ---- curves -------------------------------------------------------------------------------------------------------
@@ -240,30 +216,29 @@ DASHES: Any = ("solid", "long", "short", "dotted")
 
 def _curves(field: Field, panel: int) -> Chart:
     """One curve for each value of the second name, with what hinders it where there is none."""
-    other, x = field.plan.other, field.x
+    other, x, alone = field.plan.other, field.x, len(field.panels) == 1
     y, status = field.values[:, :, panel], field.status[:, :, panel]
-    ideal = None if field.ideal is None else field.ideal[:, :, panel] * field.factor
-    room = field_room(len(field.panels), columns_of(field))
-    empty = ~np.isfinite(y) & (status < Status.NOT_CONVERGED) & bool(np.isfinite(y).any())
+    answered = np.isfinite(y)
+    empty = ~answered & (status < Status.NOT_CONVERGED) & bool(answered.any())
     marks = _hindered(field, np.where(empty, NOTHING, status))
     count = y.shape[1]
     for k in range(count):
-        look, label = _look(field, k), "as built" if ideal is not None else None
+        look, label = _look(field, k), "as built" if field.ideal is not None else None
         if other is not None:  # many are told apart by the scale of colours
-            label = other.told(k) if count <= MOST_NAMED else None
-        marks += _curve(x, y[:, k] * field.factor, label, look)
-        if ideal is not None:
+            label = other.equation(k) if count <= MOST_NAMED else None
+        marks += _curve(x, y[:, k], label, look)
+        if field.ideal is not None:
             name = ("ideal" if other is None else "ideal, dashed") if k == count - 1 else None
-            marks += _curve(x, ideal[:, k], name, look.but(colour="ink", dash="long", width=1.0, size=2.2))
-    rows, columns = np.nonzero((status == Status.CONTACT_LOST) & np.isfinite(y))
+            faint = look.but(colour="ink", dash="long", width=1.0, size=2.2)
+            marks += _curve(x, field.ideal[:, k, panel], name, faint)
+    rows, columns = np.nonzero((status == Status.CONTACT_LOST) & answered)
     if rows.size:
-        marks += rings(x[rows], y[rows, columns] * field.factor, float(np.clip(8 * np.sqrt(60 / rows.size), 2, 8)))
-    if not np.isfinite(y).any() and not (status >= Status.NOT_CONVERGED).any():
+        marks += rings(x[rows], y[rows, columns], float(np.clip(8 * np.sqrt(60 / rows.size), 2, 8)))
+    if not answered.any() and not (status >= Status.NOT_CONVERGED).any():
         marks.append(Note(f"{field.nothing} at all points", 0.5, 0.5))
-    title = "\n".join(wrap(field.label, 60 if len(field.panels) == 1 else 32, break_long_words=False))
-    side = replace(_frame(field), title=title)
-    headed = panel_title(field.panels[panel], room) if len(field.panels) > 1 else ""
-    return Chart(axis_of(field.plan.x, room), side, [*marks, *field.beyond(panel)], legend=None, title=headed)
+    side = replace(_frame(field), title=fill(field.label, 60 if alone else 32, break_long_words=False))
+    return Chart(axis_of(field.plan.x, field.room), side, [*marks, *field.beyond(panel)], legend=None,
+                 title="" if alone else field.panels[panel])  # fmt: skip
 
 
 def _look(field: Field, k: int) -> Look:
@@ -295,27 +270,25 @@ def _curve(x: Array, y: Array, label: str | None, look: Look) -> list[Mark]:
 def _frame(field: Field) -> Axis:
     """One scale upwards for all panels, cut where some rise far above the rest; flat curves in the middle of it."""
     both = field.values if field.ideal is None else np.append(field.values, field.ideal)
-    finite = both[np.isfinite(both)] * field.factor
+    finite = both[np.isfinite(both)]
     if not finite.size:
         return Axis(places=[])
-    low, high, scope = float(finite.min()), float(finite.max()), field.scope * field.factor
+    low, high, scope = float(finite.min()), float(finite.max()), field.scope
     most = max(abs(low), abs(high))
-    if scope < most:
+    if scope < most * (1 - 1e-12):
         return Axis(limits=(max(min(low, 0.0), -scope) * 1.05, min(max(high, 0.0), scope) * 1.05))
     half = 0.1 * most or 1.0
     return Axis(limits=(low - half, high + half)) if high - low <= ALIKE * most else Axis()
 
 
 def _hindered(field: Field, status: NDArray[np.int8]) -> list[Mark]:
-    """Grey where no curve has an answer, hatched where some have none; the cause beside it or, in panels, above.
+    """Grey where no curve has an answer, hatched where some have none; the cause in it or, in panels, above.
 
     status: or NOTHING, where a point with an answer has no number.
     """
-    scale, x, alone = field.plan.x, field.x, len(field.panels) == 1
-    missing = (status >= Status.NOT_CONVERGED) | (status == NOTHING)
-    low, high = ends(scale)
-    middle = np.sqrt(x[:-1] * x[1:]) if on_scale(scale) == "log" else (x[:-1] + x[1:]) / 2
-    edges = np.concatenate([[low], middle, [high]])
+    missing, alone = (status >= Status.NOT_CONVERGED) | (status == NOTHING), len(field.panels) == 1
+    low, high = ends(field.plan.x)
+    edges = np.concatenate([[low], middles(field.plan.x, field.x), [high]])
     kind = np.where(missing.all(axis=1), 2, np.where(missing.any(axis=1), 1, 0))
     codes = np.where(missing, status, NOTHING).max(axis=1)
     bounds = np.append(np.flatnonzero(np.diff(np.append(-1, kind))), len(kind)).tolist()
@@ -323,11 +296,12 @@ def _hindered(field: Field, status: NDArray[np.int8]) -> list[Mark]:
     for start, stop in pairwise(bounds):
         if not kind[start]:
             continue
-        code = int(codes[start:stop].max())
-        text = (field.nothing if code == NOTHING else cause(code)) + ("" if kind[start] == 2 else " for some")
-        look = Look("shade" if kind[start] == 2 else "rule", hatch="" if kind[start] == 2 else "///", order=0.5)
-        wide = text not in causes or (stop - start) / len(kind) > 0.03  # a second time only where there is room
-        name = None if alone or text in causes else text
+        code, some = int(codes[start:stop].max()), bool(kind[start] == 1)
+        text = (field.nothing if code == NOTHING else cause(code)) + " for some" * some
+        look = Look("rule" if some else "shade", hatch="///" * some, order=0.5)
+        new = text not in causes
+        wide = new or (stop - start) / len(kind) > 0.03  # a second time only where there is room
+        name = text if new and not alone else None
         marks.append(Stripe(edges[start], edges[stop], text if alone and wide else "", look, name))
         causes.add(text)
     return marks

@@ -18,13 +18,13 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
+from scipy.ndimage import maximum_filter
 
 from trunnion.errors import Status
-from trunnion.views.charts import Chart, Mark
+from trunnion.views.charts import Chart
 from trunnion.views.common.cycle import Array
 from trunnion.views.common.figures import INK, MUTED
-from trunnion.views.scales import Scale, cause
-from trunnion.views.sweep_field import ALIKE, NOTHING, Field, axis_of, field_room, on_scale, panel_title, rings
+from trunnion.views.scales import ALIKE, NOTHING, Field, Scale, axis_of, cause, middles, on_scale, rings
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,33 +57,30 @@ class Ground(NamedTuple):
 
     def edges(self) -> list[Array]:
         """Where the surroundings of each value end: half-way to the next, at the first and last value at these."""
-        found = []
-        for scale, values in zip(self.scales, self.places, strict=True):
-            log = on_scale(scale) == "log"
-            middle = np.sqrt(values[:-1] * values[1:]) if log else (values[:-1] + values[1:]) / 2
-            found.append(np.concatenate([values[:1], middle, values[-1:]]))
-        return found
+        return [np.concatenate([values[:1], middles(scale, values), values[-1:]])
+                for scale, values in zip(self.scales, self.places, strict=True)]  # fmt: skip
 
 
 def draw(board: Board, field: Field) -> None:
     """The map of every panel, one scale of colours for all."""
     x, other = field.plan.x, field.plan.other
     assert other is not None  # as `sweep.figure` sees to
-    across, upward = _first(field.x), _first(other.values)
-    finite = field.values[np.isfinite(field.values)] * field.factor
-    levels, extend = _levels(finite, field.scope * field.factor)
+    across, upward = (np.unique(values, return_index=True)[1] for values in (field.x, other.values))
+    finite = field.values[np.isfinite(field.values)]
+    levels, extend = _levels(finite, field.scope)
     norm = BoundaryNorm(levels, COLOURS.N, extend=extend)
-    alone, room = len(field.panels) == 1, field_room(len(field.panels), board.columns)
-    sides = axis_of(x, room, 0.0), axis_of(other, 60 if alone else 32, 0.0)
+    alone = len(field.panels) == 1
+    sides = axis_of(x, field.room, 0.0), axis_of(other, 60 if alone else 32, 0.0)
     ground = Ground((x, other), (field.x[across], other.values[upward]))
     for k, title in enumerate(field.panels):
         where = np.ix_(across, upward)
-        values, status = field.values[:, :, k][where] * field.factor, field.status[:, :, k][where]
-        marks = [*_lost(ground, (status == Status.CONTACT_LOST) & np.isfinite(values)), *field.beyond(k)]
-        headed = "" if alone else panel_title(title, room)
-        axes = board.draw(k, Chart(*sides, [], legend=None, title=headed))
+        values, status = field.values[:, :, k][where], field.status[:, :, k][where]
+        axes = board.draw(k, Chart(*sides, [], legend=None, title="" if alone else title))
         _panel(axes, ground, values, status, norm, 7.5 if alone else 6.5, field.nothing)
-        board.add(k, Chart(*sides, marks))
+        rows, columns = np.nonzero((status == Status.CONTACT_LOST) & np.isfinite(values))
+        size = float(np.clip(160 / max(status.shape), 1.5, 8))  # as large as there is room, also over the frame
+        lost = rings(ground.places[0][rows], ground.places[1][columns], size, beyond=True) if rows.size else []
+        board.add(k, Chart(*sides, [*lost, *field.beyond(k)]))
     board.finish()
     if finite.size:
         constant = bool(np.ptp(finite) <= ALIKE * np.abs(finite).max())
@@ -91,11 +88,6 @@ def draw(board: Board, field: Field) -> None:
         say = _numbers(places)
         bar = board.colour_bar(ScalarMappable(norm, COLOURS), field.label, places)
         bar.ax.set_yticks(places, [say(value) for value in places])
-
-
-def _first(values: Array) -> NDArray[np.intp]:
-    """Indices of the values, rising, each once."""
-    return np.unique(values, return_index=True)[1]
 
 
 def _levels(known: Array, scope: float) -> tuple[Array, Beyond]:
@@ -152,16 +144,13 @@ def _refined(over: Ground, values: Array) -> tuple[Array, Array, Any]:
 
 def _beside_gaps(axes: Axes, edges: list[Array], values: Array, missing: NDArray[np.bool_], norm: BoundaryNorm) -> None:
     """Below the contours: the surroundings of points next to one without a number, in the colour of their band."""
-    grown = np.zeros(np.add(missing.shape, 2), bool)
-    for i in range(3):
-        for k in range(3):
-            grown[i : i + missing.shape[0], k : k + missing.shape[1]] |= missing
-    where = np.argwhere(grown[1:-1, 1:-1] & ~missing)
+    beside = maximum_filter(missing, 3, mode="constant") & ~missing
+    where = np.argwhere(beside)
     if where.size:
         boxes = [_box(edges, i, i + 1, k) for i, k in where]
-        colours = COLOURS(norm(values[tuple(where.T)]))
-        found = PolyCollection(boxes, facecolors=colours, edgecolors=colours, linewidths=0.3, zorder=0.8)
-        axes.add_collection(found, autolim=False)
+        colours = COLOURS(norm(values[beside]))
+        patches = PolyCollection(boxes, facecolors=colours, edgecolors=colours, linewidths=0.3, zorder=0.8)
+        axes.add_collection(patches, autolim=False)
 
 
 def _box(edges: list[Array], start: int, stop: int, k: int) -> list[tuple[float, float]]:
@@ -192,14 +181,9 @@ def _lines(axes: Axes, x: Array, y: Array, field: Any, levels: Array, size: floa
 def _numbers(levels: Array) -> Callable[[float], str]:
     """How numbers are written: with as many decimals as the edges of the bands ask for."""
     steps = np.diff(levels) * 10.0 ** np.arange(7).reshape(-1, 1)  # (decimals, step)
-    enough = np.all(np.abs(steps - np.round(steps)) < 1e-6 * np.abs(steps), axis=1) if len(levels) > 1 else np.zeros(1)
-    digits = int(np.argmax(enough))
-
-    def say(value: float) -> str:
-        known = enough.any() and abs(value) < 1e6
-        return (f"{value + 0.0:.{digits}f}" if known else f"{value + 0.0:.4g}").replace("-", "−")
-
-    return say
+    enough = np.flatnonzero(np.all(np.abs(steps - np.round(steps)) < 1e-6 * np.abs(steps), axis=1) & (len(levels) > 1))
+    form = f".{enough[0]}f" if enough.size and np.max(np.abs(levels)) < 1e6 else ".4g"
+    return lambda value: f"{value + 0.0:{form}}".replace("-", "−")
 
 
 def _hinder(axes: Axes, edges: list[Array], where: NDArray[np.bool_], code: int, word: str, filled: bool) -> None:
@@ -218,10 +202,3 @@ def _hinder(axes: Axes, edges: list[Array], where: NDArray[np.bool_], code: int,
         "linewidth": 0,
     }  # fmt: skip
     axes.add_patch(PathPatch(path, zorder=1.5, label=word, **look))
-
-
-def _lost(over: Ground, where: NDArray[np.bool_]) -> list[Mark]:
-    """Rings around points of whose cycle a position loses contact, as large as there is room, also over the frame."""
-    rows, columns = np.nonzero(where)
-    size = float(np.clip(160 / max(where.shape), 1.5, 8))
-    return rings(over.places[0][rows], over.places[1][columns], size, beyond=True) if rows.size else []

@@ -13,12 +13,21 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number
 from trunnion.statistics import intervals
-from trunnion.views.charts import Axis, Band, Bars, Chart, Legend, Line, Look, Mark, Note, Panel, Rule, Stairs, Stripe
+from trunnion.views.charts import Axis, Band, Bars, Chart, Legend, Line, Look, Mark, Note, Panel, Rule, Stairs, silent
 from trunnion.views.common.cycle import Array, names
-from trunnion.views.page import Section, Summary, counts, page
-from trunnion.views.readings import OUTER, MeasureReading, failures, readings
-from trunnion.views.table import Table
-from trunnion.views.texts import ending, limits_in, share, share_interval, share_parts, value_text
+from trunnion.views.page import Section, Summary, Table, counts, page
+from trunnion.views.readings import (
+    OUTER,
+    MeasureReading,
+    ending,
+    failures,
+    limits_in,
+    readings,
+    share,
+    share_interval,
+    share_parts,
+    value_text,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -366,49 +375,36 @@ def _bar_panel(title: str, labels: list[str], marks: list[Mark], most: float, le
 
 def envelope(read: MeasureReading) -> Panel:
     """Deviation of the course from nominal over the drive: worst case, bands of the samples, RSS, limits."""
-    assert read.places is not None
-    over, picked = read.places
-    x = over.values
-    marks: list[Mark] = [Stripe(x[k - 1], x[k + 1], "not solved") for k in np.flatnonzero(picked < 0)]
+    assert read.over is not None
+    over, x, factor = read.over, read.over.values, read.factor
+    marks: list[Mark] = silent(read.result, over)
     if read.has("curve_worst_case_upper"):
-        ends = [read.along(read.row(f"curve_worst_case_{end}")) for end in ("lower", "upper")]
+        ends = [factor * read.row(f"curve_worst_case_{end}") for end in ("lower", "upper")]
         marks.append(Band(x, ends[0], ends[1], "worst case, linear", Look(4, alpha=0.16, order=1), close=True))
         marks += [Line(x, end, None, Look("muted", 0.9), close=True) for end in ends]
-    marks += _sample_bands(read, x)
+    if read.has("band"):
+        levels, band = np.asarray(read.result["quantile"].values, float), factor * read.row("band")
+        low, p5, median, p95, high = (band[int(np.argmin(np.abs(levels - level)))]
+                                      for level in (OUTER[0], 0.05, 0.5, 0.95, OUTER[1]))  # fmt: skip
+        wide, narrow = (Look(WITHIN, alpha=alpha, order=1.2) for alpha in (0.28, 0.45))
+        marks += [Band(x, low, high, "99.73 % of the samples", wide, close=True),
+                  Band(x, p5, p95, "90 %", narrow, close=True),
+                  Line(x, median, None, Look(WITHIN, 1.0), close=True)]  # fmt: skip
     if read.has("curve_rss"):
-        rss = read.along(read.row("curve_rss"))
-        middle = read.along(read.row("curve_shift")) if read.has("curve_shift") else 0.0
-        marks += [Line(x, middle + sign * rss, name, Look("ink", 1.1, "long"), close=True)
+        rss, middle = (factor * read.row(f"curve_{key}") for key in ("rss", "shift"))
+        marks += [Line(x, (middle if middle.size else 0.0) + sign * rss, name, Look("ink", 1.1, "long"), close=True)
                   for sign, name in ((1, read.rss_label), (-1, None))]  # fmt: skip
     corner = max((read.value(f"searched_{end}") for end in ("lower", "upper")), key=abs)
     if read.nominal == 0.0 and math.isfinite(corner + read.value("searched_lower") + read.place) and corner != 0.0:
         label = f"worst corner, searched: {read.say(corner, sign=True)}{read.at_place}"
         look = Look("ink", dash="none", mark="D", size=5, hollow=True, order=5)
-        marks.append(Line(np.array([read.place]), np.array([corner * read.factor]), label, look))
+        marks.append(Line(np.array([read.place]), np.array([corner * factor]), label, look))
     if read.nominal == 0.0 and (read.rule in ("", "deviation") or read.is_extreme):  # limits of the course, too
         limits = [limit for limit in read.limits if math.isfinite(limit)]
-        marks += [Rule(limit * read.factor, None if k else f"limits {read.limits_said}", LIMIT, upright=False)
+        marks += [Rule(limit * factor, None if k else f"limits {read.limits_said}", LIMIT, upright=False)
                   for k, limit in enumerate(limits)]  # fmt: skip
     title = f"deviation of {read.course or read.name}{read.in_unit}"
     return Panel("", [Chart(over, Axis(title, margin=0.07), marks, zero=True, legend=Legend(4))], 3.8)
-
-
-def _sample_bands(read: MeasureReading, x: Array) -> list[Mark]:
-    """Ranges that hold 99.73 % and 90 % of the samples at each position, and their median."""
-    if not read.has("band"):
-        return []
-    levels, band = np.asarray(read.result["quantile"].values, float), read.row("band")
-    if str(read.result["band"].attrs.get("of", "deviation")) == "value":
-        band = band - read.row("curve")
-
-    def at(level: float) -> Array:
-        return read.along(band[int(np.argmin(np.abs(levels - level)))])
-
-    return [
-        Band(x, at(OUTER[0]), at(OUTER[1]), "99.73 % of the samples", Look(WITHIN, alpha=0.28, order=1.2), close=True),
-        Band(x, at(0.05), at(0.95), "90 %", Look(WITHIN, alpha=0.45, order=1.2), close=True),
-        Line(x, at(0.5), None, Look(WITHIN, 1.0), close=True),
-    ]
 
 
 def convergence(read: MeasureReading) -> Panel:
@@ -475,7 +471,7 @@ KINDS: dict[str, Kind] = {
                       "add samples: --method monte-carlo"),
     "contributions": Kind("Contributions", contribution_bars, lambda read: read.has("contribution_rss"),
                           "add --method linear"),
-    "envelope": Kind("Envelope over the drive", envelope, lambda read: read.places is not None,
+    "envelope": Kind("Envelope over the drive", envelope, lambda read: read.over is not None,
                      "use a measure at every position instead of one position"),
     "convergence": Kind("Convergence", convergence, lambda read: len(read.row("convergence_samples")) > 1,
                         "add samples: --method monte-carlo"),

@@ -6,17 +6,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.results.dataset import unit_of
-from trunnion.results.quantities import prefixed, quantity, scaled
+from trunnion.errors import agreeing
+from trunnion.results.attributes import summary_of
+from trunnion.results.quantities import parts, prefixed, quantity
 from trunnion.views import draw
 from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Rule, Stripe, nth
-from trunnion.views.common.cycle import Abscissa, Array, column, names
+from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, names
+from trunnion.views.page import Section, Table, page
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["figure"]
+__all__ = ["figure", "report"]
+
 
 FITS = 0  # code of the status of a position that goes together
 TOLD = 0.01  # of the need: a joint whose part is nowhere larger has no curve
@@ -27,30 +30,13 @@ def figure(result: xr.Dataset) -> Figure:
 
     Grey: where the stated clearances do not suffice.
     """
-    over, share = _over(result), column(result, "needed_share")
+    over, share = abscissa(result), column(result, "needed_share")
     charts = [_need(result, over)]
     if share is not None and np.any(np.isfinite(share) & (share > 0)):
         charts.append(_share(result, share, over))
     if np.nanmax(result["uniform_part"].values, initial=0.0) > 0:
         charts.append(_parts(result, over))
     return draw.plot(Plot("Clearance needed for assembly", [Panel("", charts, 1.4 + 1.6 * len(charts))]), result)
-
-
-def _over(result: xr.Dataset) -> Abscissa:
-    """The coordinate of the only driver if it runs one way, else time."""
-    drivers, time = names(result, "driver"), np.asarray(result["time"].values, float)
-    if len(drivers) == 1:
-        unit = unit_of(result["drive_coordinate"], (0,))
-        values = np.asarray(result["drive_coordinate"].values[0], float)
-        steps = np.diff(values)
-        if np.all(steps > 0) or np.all(steps < 0):
-            factor, label = scaled(float(np.abs(values).max(initial=0.0)), unit) if unit == "m" else prefixed(1.0, unit)
-            turn = float(steps[0]) * values.size if steps.size else 0.0
-            closed = bool(result.attrs["periodic"]) and unit == "rad" and abs(abs(turn) - 2 * np.pi) < 1e-6
-            of = "angle" if unit == "rad" else "slide"
-            return Abscissa(f"drive {of} {drivers[0]}", label, values * factor, closed, turn * factor * closed)
-    factor, unit = prefixed(float(np.abs(time).max(initial=0.0)), "s")
-    return Abscissa("time", unit, time * factor)
 
 
 def _need(result: xr.Dataset, over: Abscissa) -> Chart:
@@ -103,3 +89,26 @@ def _short(result: xr.Dataset, over: Abscissa) -> list[Mark]:
     x = over.values
     half = abs(float(x[1] - x[0])) / 2 if x.size > 1 else 0.5
     return [Stripe(float(x[at]) - half, float(x[at]) + half) for at in np.flatnonzero(short)]
+
+
+# ---- report ---------------------------------------------------------------------------------------------------------
+
+
+TITLE = "Clearance needed for assembly"
+
+
+def report(result: xr.Dataset) -> str:
+    """The whole report as HTML."""
+    count = result.sizes["position"]
+    part = Section("Over the cycle", pictures=[(TITLE, figure(result))], after=[_results(result)])
+    return page(result, TITLE, [(f"{count:,}", agreeing(count, "position", "positions"))], [part])
+
+
+def _results(result: xr.Dataset) -> Table:
+    """The figures of the summary, as the terminal shows them."""
+    rows = []
+    for one in summary_of(result):
+        value = "undefined" if one.value is None else one.value
+        text, unit = (value, "") if isinstance(value, str) else parts(value, one.unit)
+        rows.append([one.label, text, "" if unit == "1" else unit])
+    return Table("results", ["", "value", "unit"], rows)

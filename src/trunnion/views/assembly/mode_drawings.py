@@ -20,14 +20,11 @@ from trunnion.views.assembly.modes import some
 from trunnion.views.common.cycle import Array, layout
 from trunnion.views.common.drawing import Picture, framed, name_points
 from trunnion.views.common.drawing import sketch as sketch_plane
-from trunnion.views.common.figures import INK, MUTED, RULE, new
-from trunnion.views.common.labels import Labels
-from trunnion.views.common.lettering import plain
+from trunnion.views.common.figures import INK, MUTED, RULE, Labels, new, plain
 from trunnion.views.space.bodies import space
-from trunnion.views.space.camera import best, looking
 from trunnion.views.space.figure import name_joints
 from trunnion.views.space.figure import sketch as sketch_space
-from trunnion.views.space.scenery import Scenery, scenery
+from trunnion.views.space.solids import Scenery, best, looking, scenery
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Status
-from trunnion.joints.pairs import GUIDED
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import prefixed
 
@@ -19,8 +18,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "Abscissa", "Interval", "abscissa", "course", "intervals", "larger_end", "layout", "mean_friction", "numbers",
-    "series", "status_text", "thin", "valid",
+    "Abscissa", "Array", "Interval", "abscissa", "column", "course", "intervals", "larger_end", "layout",
+    "mean_friction", "members", "names", "numbers", "over_turn", "series", "status_text", "thin", "valid",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -60,8 +59,7 @@ class Abscissa:
         return f"{value:.4g}{'' if self.unit in ('°', '') else ' '}{self.unit}".replace("-", "−")
 
 
-@dataclass(frozen=True)
-class Interval:
+class Interval(NamedTuple):
     """A run of positions start ≤ i < stop with one status."""
 
     start: int
@@ -107,6 +105,14 @@ def column(result: xr.Dataset, name: str, **where: str) -> Array | None:
     return np.asarray(variable.values[place], dtype=float)
 
 
+def members(result: xr.Dataset, name: str, dim: str) -> dict[str, Array]:
+    """One variable of every member of a dimension, by their names; none if the result lacks it."""
+    if name not in result:
+        return {}
+    rows = result[name].transpose(dim, ...).values
+    return {member: np.asarray(row, dtype=float) for member, row in zip(names(result, dim), rows, strict=True)}
+
+
 def larger_end(result: xr.Dataset, joint: str) -> Array | None:
     """The larger load on the ends of a joint's bearing or guide, N; None where it has none."""
     ends = column(result, "end_load", joint=joint)
@@ -115,15 +121,12 @@ def larger_end(result: xr.Dataset, joint: str) -> Array | None:
 
 
 def abscissa(result: xr.Dataset) -> Abscissa:
-    """The drive of the first driver, if it runs one way; otherwise, or of a motion in time, time, or the positions."""
-    drivers = names(result, "driver")
-    if drivers and result.attrs.get("kind") != "motion":
-        first = drivers[0]
-        sliding = layout(result)["joints"].get(first, {}).get("type") in GUIDED
-        name, turn = ("joint_slide", 0.0) if sliding else ("joint_rotation", 2 * np.pi)
-        values = _filled(result, column(result, name, joint=first), turn)
-        if values is not None:
-            return _over_slide(first, values) if sliding else _over_angle(first, values)
+    """The drive of the only driver, if it runs one way; otherwise, or of a motion in time, time, or the positions."""
+    drive = result.coords.get("drive")
+    if drive is not None and drive.attrs["units"] in ("°", "mm"):
+        moves, _, driver = str(drive.attrs["long_name"]).partition(" of ")
+        values, unit = np.asarray(drive.values, dtype=float), str(drive.attrs["units"])
+        return over_turn(f"drive {moves} {driver}", unit, values, bool(result.attrs.get("periodic", 1)))
     time = column(result, "time")
     if time is not None and np.isfinite(time).all():
         factor, unit = prefixed(float(np.abs(time).max(initial=0)), "s")
@@ -131,49 +134,11 @@ def abscissa(result: xr.Dataset) -> Abscissa:
     return Abscissa("position", "", np.arange(result.sizes["position"], dtype=float))
 
 
-def _over_angle(name: str, values: Array) -> Abscissa:
-    degrees = np.degrees(values)
-    step = float(degrees[1] - degrees[0]) if degrees.size > 2 else 0.0
-    turn = step * degrees.size
-    closed = bool(step) and abs(abs(turn) - 360.0) < 1e-6 * 360.0
-    return Abscissa(f"drive angle {name}", "°", degrees, closed, turn if closed else 0.0)
-
-
-def _over_slide(name: str, values: Array) -> Abscissa:
-    factor, unit = prefixed(float(np.abs(values).max(initial=0)), "m")
-    return Abscissa(f"drive slide {name}", unit, values * factor)
-
-
-def _filled(result: xr.Dataset, values: Array | None, turn: float) -> Array | None:
-    """The drive, carried on at its constant speed where it is not known; None unless it runs one way.
-
-    turn: 2π for angles, whose count of whole turns may be lost over a gap; 0 for slides.
-    """
-    if values is None or not values.size:
-        return None
-    known = np.isfinite(values)
-    if not known.all():
-        line = _constant_speed(column(result, "time"), values, known)
-        if line is None:
-            return None
-        turns = np.round((line - values)[known] / turn) * turn if turn else 0.0
-        if np.abs(values[known] + turns - line[known]).max() > 1e-6 * np.ptp(line):
-            return None
-        values = line
-    steps = np.diff(values)
-    return values if not steps.size or (steps > 0).all() or (steps < 0).all() else None
-
-
-def _constant_speed(time: Array | None, values: Array, known: NDArray[np.bool_]) -> Array | None:
-    """The line over time that the first two known neighbours span, as a row of values; None without such two."""
-    pairs = np.flatnonzero(known[:-1] & known[1:])
-    if time is None or not pairs.size or not np.isfinite(time).all():
-        return None
-    first, last = pairs[0], pairs[0] + 1
-    while last + 1 < known.size and known[last + 1]:  # the longer the base, the better the slope
-        last += 1
-    slope = (values[last] - values[first]) / (time[last] - time[first])
-    return np.asarray(values[first] + slope * (time - time[first]), dtype=float)
+def over_turn(label: str, unit: str, values: Array, periodic: bool = True) -> Abscissa:
+    """An abscissa that is closed where its values, degrees, come round evenly in a cycle that is periodic."""
+    turn = float(values[1] - values[0]) * values.size if values.size > 2 else 0.0
+    closed = periodic and unit == "°" and abs(abs(turn) - 360.0) < 1e-6 * 360.0
+    return Abscissa(label, unit, values, closed, turn if closed else 0.0)
 
 
 def numbers(values: Array) -> list[float | None]:
@@ -212,18 +177,9 @@ def valid(result: xr.Dataset, values: Array) -> Array:
 
 
 def mean_friction(result: xr.Dataset, joint: str, of: str = "") -> float:
-    """Mean friction power of a joint, W; of: "_ideal" of the mechanism without errors. NaN where there is no answer.
-
-    A result that was written before there were such means has that of its positions.
-    """
-    told = column(result, f"friction_power_mean{of}", joint=joint)
-    if told is not None:
-        return float(told)
-    values = column(result, "friction_power", joint=joint)
-    if of and values is not None:
-        change = column(result, "friction_power_change", joint=joint)
-        values = None if change is None else values - change
-    return float("nan") if values is None or not np.isfinite(values).any() else float(np.nanmean(values))
+    """Mean friction power of a joint, W; of: "_ideal" of the mechanism without errors. NaN where there is no answer."""
+    mean = column(result, f"friction_power_mean{of}", joint=joint)
+    return float("nan") if mean is None else float(mean)
 
 
 def thin(values: Array, most: int = 4000) -> NDArray[np.intp]:

@@ -13,8 +13,7 @@ from matplotlib.transforms import Affine2D
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import GUIDED, PAIRS
 from trunnion.views.common.cycle import Array, column, layout, names
-from trunnion.views.common.figures import INK, MUTED, PALETTE
-from trunnion.views.common.labels import Labels
+from trunnion.views.common.figures import INK, MUTED, PALETTE, Labels
 
 if TYPE_CHECKING:
     import xarray as xr

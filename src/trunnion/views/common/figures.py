@@ -5,19 +5,111 @@ Only the object-oriented interface is used, so figures can be made in any thread
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import io
+from dataclasses import dataclass, field
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
+from unicodedata import category
 
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, findfont, fontManager, get_font
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.text import Text
 from matplotlib.ticker import AutoMinorLocator, MaxNLocator, MultipleLocator
+from numpy.typing import NDArray
 
-from trunnion.views.common.cycle import Abscissa
-from trunnion.views.common.lettering import Sheet, plain
+from trunnion.views.common.cycle import Abscissa, Array
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.backend_bases import RendererBase
+    from matplotlib.text import Annotation
+
+__all__ = ["Labels", "Sheet", "plain"]
+
+
+# ---- letters --------------------------------------------------------------------------------------------------------
+
+
+HOME = "DejaVu Sans"  # comes with matplotlib
+# Common fonts for the scripts it lacks; those that are installed are asked in this order.
+OTHERS = (
+    "Noto Sans CJK SC", "Noto Sans CJK JP", "Noto Sans SC", "Noto Sans JP", "Noto Sans KR", "Source Han Sans SC",
+    "Microsoft YaHei", "Yu Gothic", "Malgun Gothic", "PingFang SC", "Hiragino Sans", "Apple SD Gothic Neo",
+    "WenQuanYi Zen Hei", "WenQuanYi Micro Hei", "Droid Sans Fallback", "Noto Sans Devanagari", "Noto Sans Thai",
+    "Arial Unicode MS",
+)  # fmt: skip
+
+
+class Sheet(Figure):
+    """A figure whose texts find their signs in whichever of the installed fonts has them."""
+
+    _lettered = False  # since the last drawing
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Give every text the fonts, then draw.
+
+        Matplotlib draws a figure that has a layout twice, the first time with the renderer's methods replaced by
+        empty ones. That pass only has to arrange the figure; all its paths would be prepared for nothing.
+        """
+        if not self._lettered:
+            for text in self.findobj(Text):
+                text.set_fontfamily(list(families()))
+        engine = self.get_layout_engine()
+        self._lettered = engine is not None and "draw_path" in vars(renderer)
+        if self._lettered and engine is not None:
+            engine.execute(self)
+            for axes in self.axes:
+                axes.apply_aspect()
+        else:
+            super().draw(renderer)
+
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows; matplotlib tells it only of figures that pyplot has made."""
+        found = io.BytesIO()
+        self.savefig(found, format="png", dpi=100)
+        return found.getvalue()
+
+
+@cache
+def families() -> tuple[str, ...]:
+    """The fonts to look in, in order."""
+    installed = {font.name for font in fontManager.ttflist}
+    return (HOME, *(name for name in OTHERS if name in installed))
+
+
+@cache
+def _signs() -> frozenset[int]:
+    """All signs that can be drawn both upright and bold."""
+    return frozenset().union(*(_charmap(name, "normal") & _charmap(name, "bold") for name in families()))
+
+
+def _charmap(family: str, weight: str) -> set[int]:
+    return set(get_font(findfont(FontProperties(family=family, weight=weight))).get_charmap())
+
+
+def plain(name: str) -> str:
+    r"""A name that matplotlib shows as it is: `$` starts no formula, a leading `_` hides no legend entry.
+
+    A sign that no font has, or that is invisible, is told by its code: \u66f2, as YAML and JSON write it too.
+    """
+    text = "".join(sign if _drawable(sign) else _code(sign) for sign in name).replace("$", r"\$")
+    return f"\u2009{text}" if text.startswith("_") else text
+
+
+def _drawable(sign: str) -> bool:
+    return ord(sign) in _signs() and category(sign)[0] != "C"
+
+
+def _code(sign: str) -> str:
+    return f"\\u{ord(sign):04x}" if ord(sign) < 0x10000 else f"\\U{ord(sign):08x}"
+
+
+# ---- axes -----------------------------------------------------------------------------------------------------------
+
 
 INK, MUTED, RULE, SHADE = "#1b1f24", "#5d6670", "#d9dde2", "#eceef1"
 # Okabe and Ito's colours, which people with any colour vision tell apart; yellow is left out, it fades on white.
@@ -90,3 +182,104 @@ def legend(axes: Axes, most: int = 6, room: int = 90, least: int = 2, lift: floa
         handles, labels, loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=columns, frameon=False, fontsize=8.5,
         labelcolor=INK, handlelength=2.2, columnspacing=1.6, borderaxespad=0.3 + lift / 8.5,
     )  # fmt: skip
+
+
+# ---- names in a drawing --------------------------------------------------------------------------------------------
+
+SIDES = np.array([[np.cos(angle), np.sin(angle)] for angle in np.radians(np.arange(0, 360, 15))])
+GAPS = (5.0, 8.0, 12.0, 18.0, 26.0)  # points from the place to the name
+FURTHER = 0.07  # what a gap more costs, beside the share of the name's box that is not empty
+DARK = 3.0  # pale bodies count almost as much as lines
+LEAST = 6.0  # points around every place that are its joint's, however pale its symbol is
+MARGIN = 1.5  # points that are to be empty around a name
+CROSSED, CUT, STRAY = 5.0, 100.0, 0.4  # costs of lying on another name, outside the figure, nearer to another place
+
+
+class _Name(NamedTuple):
+    axes: Axes
+    text: str
+    place: Array
+    size: float
+    symbol: float
+    weight: str
+
+    def reach(self) -> float:
+        """Half width of its symbol, pixels."""
+        ends = self.axes.transData.transform([[0.0, 0.0], [self.symbol, 0.0]])
+        return float(np.hypot(*(ends[1] - ends[0])))
+
+
+@dataclass
+class Labels:
+    """The names of one figure: added while it is drawn, placed when all else is there.
+
+    The figure is painted once without names; what is dark there is in the way. So a name keeps off links, springs,
+    ground, arrows, curves and titles alike, whatever draws them.
+    """
+
+    figure: Figure
+    waiting: list[_Name] = field(default_factory=list)
+
+    def add(
+        self, axes: Axes, text: str, place: Array, size: float = 10.0, symbol: float = 0.0, weight: str = "bold"
+    ) -> None:
+        """A name of a place in the coordinates of the axes. size: of its letters, points; symbol: half width of what is
+        drawn there, in the same coordinates."""
+        if np.all(np.isfinite(place)):
+            self.waiting.append(_Name(axes, plain(text), np.asarray(place, float), size, symbol, weight))
+
+    def place(self) -> None:
+        """Write all names, the most crowded first, each where it covers least."""
+        if not self.waiting:
+            return
+        canvas = FigureCanvasAgg(self.figure)
+        canvas.draw()  # type: ignore[no-untyped-call]
+        renderer, scale = canvas.get_renderer(), self.figure.dpi / 72  # type: ignore[no-untyped-call]
+        spots = np.array([name.axes.transData.transform(name.place) for name in self.waiting])
+        sums = self._darkness(np.asarray(canvas.buffer_rgba()), spots, scale)  # type: ignore[no-untyped-call]
+        notes = [self._note(name) for name in self.waiting]
+        halves = [0.5 * np.asarray(note.get_window_extent(renderer).size, float) for note in notes]
+        ways = [np.array(GAPS)[:, None, None] * scale * SIDES + half * SIDES / np.abs(SIDES).max(axis=1, keepdims=True)
+                for half in halves]  # fmt: skip
+        costs = [_costs(sums, spot + way, half + MARGIN * scale)
+                 for spot, way, half in zip(spots, ways, halves, strict=True)]  # fmt: skip
+        taken: list[tuple[Array, Array]] = []
+        for k in np.argsort([-cost.min() for cost in costs], kind="stable"):
+            middles, cost = spots[k] + ways[k], costs[k]
+            for middle, half in taken:
+                cost = cost + CROSSED * np.all(np.abs(middles - middle) < halves[k] + MARGIN * scale + half, axis=-1)
+            for other in np.delete(spots, k, axis=0):
+                far = np.linalg.norm(middles - other, axis=-1)
+                cost = cost + STRAY * (far < np.linalg.norm(ways[k], axis=-1))
+            offset = ways[k].reshape(-1, 2)[int(np.argmin(cost))]
+            taken.append((spots[k] + offset, halves[k]))
+            notes[k].set_position(tuple(offset / scale))
+
+    def _darkness(self, pixels: NDArray[np.uint8], spots: Array, scale: float) -> Array:
+        """Sums of what is drawn below and left of every pixel, counted from below left."""
+        dark = np.clip(DARK * (1 - pixels[::-1, :, :3].min(axis=2) / 255), 0, 1)
+        for (column, row), name in zip(np.rint(spots).astype(int), self.waiting, strict=True):
+            reach = round(max(LEAST * scale, name.reach()))
+            dark[max(row - reach, 0) : max(row + reach, 0), max(column - reach, 0) : max(column + reach, 0)] = 1.0
+        return np.pad(np.cumsum(np.cumsum(dark, axis=0), axis=1), ((1, 0), (1, 0)))
+
+    @staticmethod
+    def _note(name: _Name) -> Annotation:
+        """The name at its place, to be moved; it takes no part in the layout, which it would change."""
+        note = name.axes.annotate(
+            name.text, (name.place[0], name.place[1]), xytext=(0, 0), textcoords="offset points", ha="center",
+            va="center", fontsize=name.size, fontweight=name.weight, color=INK, zorder=8, annotation_clip=False,
+            bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
+        )  # fmt: skip
+        note.set_in_layout(False)
+        return note
+
+
+def _costs(sums: Array, middles: Array, room: Array) -> Array:
+    """Of every middle of a name, (gap, side): the share of its box that is drawn on, and that it is far or cut off."""
+    low, high, size = middles - room, middles + room, np.array(sums.shape)[::-1] - 1
+    a, b = (np.clip(np.rint(end), 0, size).astype(int) for end in (low, high))
+    drawn = sums[b[..., 1], b[..., 0]] - sums[a[..., 1], b[..., 0]]
+    drawn += sums[a[..., 1], a[..., 0]] - sums[b[..., 1], a[..., 0]]
+    outside = np.any((low < 0) | (high > size), axis=-1)
+    return np.asarray(drawn / np.prod(2 * room) + CUT * outside + FURTHER * np.arange(len(GAPS))[:, None])

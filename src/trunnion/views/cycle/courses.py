@@ -5,7 +5,7 @@ Each kind is a function of the result and, if wanted, of the same run without fr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -38,7 +38,17 @@ from trunnion.views.charts import (
     over_drive,
     silent,
 )
-from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, larger_end, layout, mean_friction, names
+from trunnion.views.common.cycle import (
+    Abscissa,
+    Array,
+    abscissa,
+    column,
+    larger_end,
+    layout,
+    mean_friction,
+    members,
+    names,
+)
 from trunnion.views.common.peaks import ease, peak, usual_peak
 from trunnion.views.cycle.deviations import losses, need, outputs, point_errors, worst_points
 from trunnion.views.space.bodies import is_spatial
@@ -54,7 +64,7 @@ __all__ = [
 SEEN = 0.002  # of the largest effort: narrower ranges would not be seen
 STEADY = 1e-6  # of the largest speed: variations that are none
 MOST_POINTS = 5000  # of the track of a vector
-PLANES = (("x", "y"), ("x", "z"), ("y", "z"))
+PLANES = ((0, 1), (0, 2), (1, 2))
 TURN = 2 * np.pi
 RATES = ("", "/s", "/s²")
 LEVELS = ("maximum", "minimum", "mean", "value", "largest")  # aspects of a figure that is a value of the course
@@ -66,24 +76,28 @@ def _stack(title: str, charts: Sequence[Chart], parts: Sequence[float] = ()) -> 
     return Plot(title, [Panel("", charts, 0.6 + HEIGHT * len(charts) if len(charts) > 1 else 3.75, parts)])
 
 
+def _lines(over: Abscissa, courses: Mapping[str, Array], width: float = 1.6) -> list[Line]:
+    """A curve for every course, in the colours of their order."""
+    return [Line(over.values, course, name, nth(k).but(width=width), close=True)
+            for k, (name, course) in enumerate(courses.items())]  # fmt: skip
+
+
 # ---- effort and power ---------------------------------------------------------------------------------------------
 
 
 def torque(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Drive effort over the drive, one panel a driver; without friction dashed, its interval at zero slip as bars."""
     over, charts, nouns = abscissa(result), list[Chart](), dict[str, None]()
-    for driver, unit in zip(names(result, "driver"), units_along(result["drive_effort"], "driver"), strict=True):
+    efforts, lows, highs = (members(result, f"drive_effort{end}", "driver") for end in ("", "_lower", "_upper"))
+    free = {} if ideal is None else members(ideal, "drive_effort", "driver")
+    for (driver, effort), unit in zip(efforts.items(), units_along(result["drive_effort"], "driver"), strict=True):
         noun = "force" if unit == "N" else "torque"
         nouns[noun] = None
-        effort, low, high = (column(result, f"drive_effort{end}", driver=driver) for end in ("", "_lower", "_upper"))
-        free = None if ideal is None else column(ideal, "drive_effort", driver=driver)
-        if effort is None:
-            continue
-        name = noun if free is None else "with friction"
-        lines = [Line(over.values, effort, name, Look(0, 2.0), close=True)]
-        if free is not None:
-            lines.append(Line(over.values, free, "without friction", FREE, close=True))
-        if low is not None and high is not None:
+        lines = [Line(over.values, effort, "with friction" if driver in free else noun, Look(0, 2.0), close=True)]
+        if driver in free:
+            lines.append(Line(over.values, free[driver], "without friction", FREE, close=True))
+        if driver in lows:
+            low, high = lows[driver], highs[driver]
             wide = high - low > SEEN * usual_peak(ease(result), low, high)
             if wide.any():
                 middle, half = np.where(wide, (low + high) / 2, np.nan), (high - low) / 2
@@ -99,8 +113,7 @@ def varying(result: xr.Dataset) -> dict[str, tuple[Array, str]]:
     for driver in names(result, "driver"):
         slides = joints.get(driver, {}).get("type") in GUIDED
         values = column(result, f"joint_{'slide' if slides else 'rotation'}_velocity", joint=driver)
-        finite = _finite(values)
-        if values is not None and finite.size and np.ptp(finite) > STEADY * np.abs(finite).max():
+        if values is not None and _varies(values, STEADY * peak(values)):
             speeds[driver] = values, "m/s" if slides else "rad/s"
     return speeds
 
@@ -111,16 +124,17 @@ def speed(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     if not speeds:
         what, remedy = "the speed of no driver varies", "use `trunnion simulate --steady`, or a motion law"
         raise MechanismError(Finding(what, "speed", remedy))
-    lines = {name: Line(over.values, values, name, Look(0, 2.0), close=True) for name, (values, _) in speeds.items()}
-    return _stack("Speed", [over_drive(result, over, f"speed {name}", speeds[name][1], [line])
-                            for name, line in lines.items()])  # fmt: skip
+    charts = []
+    for name, (values, unit) in speeds.items():
+        line = Line(over.values, values, name, Look(0, 2.0), close=True)
+        charts.append(over_drive(result, over, f"speed {name}", unit, [line]))
+    return _stack("Speed", charts)
 
 
 def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Power lost to friction in each joint and in all, with the mean of each over the run."""
-    over, joints = abscissa(result), names(result, "joint")
-    losses_of = {joint: column(result, "friction_power", joint=joint) for joint in joints}
-    rubbing = {joint: values for joint, values in losses_of.items() if values is not None and peak(values) > 0}
+    over, losses_of = abscissa(result), members(result, "friction_power", "joint")
+    rubbing = {joint: values for joint, values in losses_of.items() if peak(values) > 0}
     total = np.sum(list(rubbing.values()), axis=0) if rubbing else np.zeros(over.values.size)
     factor, unit = prefixed(usual_peak(ease(result), total), "W")
     means = {joint: mean_friction(result, joint) for joint in rubbing}
@@ -128,20 +142,19 @@ def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     def named(text: str, mean: float) -> str:
         return f"{text}, mean {number(mean * factor)} {unit}" if np.isfinite(mean) else f"{text}, not solved"
 
-    lines = joined([Line(over.values, values, joint, nth(joints.index(joint)).but(width=1.4), close=True)
-                    for joint, values in rubbing.items()])  # fmt: skip
+    lines = joined([line for line in _lines(over, losses_of, 1.4) if line.name in rubbing])
     lines = [line._replace(name=named(str(line.name), means[str(line.name).split(" = ")[0]])) for line in lines]
-    every = named("all joints", sum(means.values()))
+    every = Line(over.values, total, named("all joints", sum(means.values())), Look("ink", 1.8), close=True)
     area = Band(over.values, np.zeros(total.size), total, None, Look("shade", alpha=0.6, order=1.0), close=True)
-    lines = [Line(over.values, total, every, Look("ink", 1.8), close=True), *lines]
-    shown = over_drive(result, over, "friction power", "W", lines, bands=[area], scale=(factor, unit), legend=Legend(3))
-    return _stack("Friction power by joint", [shown])
+    return _stack("Friction power by joint", [over_drive(
+        result, over, "friction power", "W", [every, *lines], bands=[area], scale=(factor, unit), legend=Legend(3)
+    )])  # fmt: skip
 
 
 def power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Where the power goes: drive, useful, friction, and the remainder that masses and other loads take or give."""
     over = abscissa(result)
-    drive, lost = (np.asarray(result[name].sum(dim, skipna=False).values, dtype=float)
+    drive, lost = (np.sum(list(members(result, name, dim).values()), axis=0)
                    for name, dim in (("drive_power", "driver"), ("friction_power", "joint")))  # fmt: skip
     useful = column(result, "useful_power")
     useful = np.zeros_like(lost) if useful is None else useful
@@ -161,27 +174,25 @@ def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Magnitude of the reaction in each joint, in space also of its moment, and the larger load on the ends of each
     bearing; without friction thin, dotted."""
     over, joints = abscissa(result), names(result, "joint")
-    parts = [("force of the reaction", "reaction_force", "N"), ("moment of the reaction", "reaction_moment", "N m")]
-    if not is_spatial(result):
-        parts = [("magnitude of the reaction", "reaction_force", "N")]
-
+    parts = [("magnitude of the reaction", "reaction_force", "N")]
+    if is_spatial(result):
+        parts = [("force of the reaction", "reaction_force", "N"), ("moment of the reaction", "reaction_moment", "N m")]
     if "end_load" in result:
         parts.append(("larger load on an end", "end_load", "N"))
 
     def sizes(of: xr.Dataset, variable: str) -> dict[str, Array]:
         if variable == "end_load":
             return {joint: size for joint in joints if (size := larger_end(of, joint)) is not None}
-        each = {joint: column(of, variable, joint=joint) for joint in joints}
-        return {joint: np.linalg.norm(values, axis=0) for joint, values in each.items() if values is not None}
+        return {joint: np.linalg.norm(values, axis=0) for joint, values in members(of, variable, "joint").items()}
 
     charts = []
     for title, variable, unit in parts:
         lines = [Line(over.values, size, joint, nth(joints.index(joint)), close=True)
                  for joint, size in sizes(result, variable).items()]  # fmt: skip
-        free = {} if ideal is None else sizes(ideal, variable)
-        dashed = [Line(over.values, size, None if k else "without friction", FREE, close=True)
-                  for k, size in enumerate(free.values())]  # fmt: skip
-        charts.append(over_drive(result, over, title, unit, [*lines, *dashed]))
+        free = [] if ideal is None else sizes(ideal, variable).values()
+        lines += [Line(over.values, size, None if k else "without friction", FREE, close=True)
+                  for k, size in enumerate(free)]  # fmt: skip
+        charts.append(over_drive(result, over, title, unit, lines))
     return _stack("Joint reactions", charts)
 
 
@@ -190,12 +201,13 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 
     In space a row for each joint: the vector seen along z, y and x.
     """
-    over, joints = abscissa(result), names(result, "joint")
+    over, forces = (
+        abscissa(result),
+        [members(of, "reaction_force", "joint") for of in (result, ideal) if of is not None],
+    )
     planes = PLANES if is_spatial(result) else PLANES[:1]
-    charts = [
-        _hodograph(result, ideal, over, joint, plane, index)
-        for index, joint in enumerate(joints) for plane in planes
-    ]  # fmt: skip
+    charts = [_hodograph([of[joint][list(plane)] for of in forces], ease(result), over, joint, plane, index)
+              for index, joint in enumerate(forces[0]) for plane in planes]  # fmt: skip
     columns = min(len(charts), 2 if len(charts) in (2, 4) else 3) or 1
     panels = [Panel("", [chart], 6.8 / columns) for chart in charts]
     note = "" if ideal is None else "dashed: without friction"
@@ -203,13 +215,12 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 
 
 def _hodograph(
-    result: xr.Dataset, ideal: xr.Dataset | None, over: Abscissa, joint: str, plane: tuple[str, str], index: int
+    forces: list[Array], easy: Array, over: Abscissa, joint: str, plane: tuple[int, int], index: int
 ) -> Chart:
-    """The track of a joint's force in a plane, a dot every 30° of the drive, told every 90°."""
-
-    def force_of(of: xr.Dataset) -> Array:
-        picked = of["reaction_force"].sel(joint=joint, axis=list(plane)).transpose("axis", "position")
-        return np.asarray(picked.values, dtype=float)
+    """The tracks of a joint's force in a plane, a dot every 30° of the drive, named every 90°."""
+    sizes = [np.hypot(*vector) for vector in forces]
+    usual, most = usual_peak(easy, *sizes), peak(*sizes)
+    factor, unit = prefixed(usual, "N")
 
     def track(vector: Array, look: Look) -> Line:
         points = vector[:, :: -(-vector.shape[1] // MOST_POINTS)]
@@ -217,47 +228,34 @@ def _hodograph(
         points = np.hstack([np.zeros((2, 1)), points]) if points.shape[1] == 1 else points  # one position has no track
         return Line(points[0] * factor, points[1] * factor, None, look)
 
-    forces = [force_of(of) for of in (result, ideal) if of is not None]
-    sizes = [np.hypot(*vector) for vector in forces]
-    usual, most = usual_peak(ease(result), *sizes), peak(*sizes)
-    factor, unit = prefixed(usual, "N")
     marks: list[Mark] = [Rule(0.0, None, Look("muted", 0.8, order=1.5), upright) for upright in (True, False)]
     marks += [track(vector, FREE) for vector in forces[1:]]
     marks.append(track(forces[0], Look(index)))
-    angles = np.arange(0.0, 360.0, 30.0) if over.closed else over.values[:1]
-    at = [int(np.argmin(np.abs((over.values - angle + 180) % 360 - 180))) if over.closed else 0 for angle in angles]
+    at = [0]
+    if over.closed:
+        at = [int(np.argmin(np.abs((over.values - angle + 180) % 360 - 180))) for angle in np.arange(0.0, 360.0, 30.0)]
     dots = np.where(np.abs(forces[0][:, at]).max(axis=0) <= usual, forces[0][:, at] * factor, np.nan)
     marks.append(Line(dots[0], dots[1], None, Look(index, dash="none", mark="o", size=3.2, order=4.0)))
-    for k in range(0, len(at), 3):
-        if np.isfinite(dots[:, k]).all():
-            marks.append(
-                Note(
-                    over.say(at[k]),
-                    float(dots[0, k]),
-                    float(dots[1, k]),
-                    data=True,
-                    size=7.5,
-                    colour="ink",
-                    beside=True,
-                )
-            )
+    for place, (x, y) in zip(at[::3], dots[:, ::3].T.tolist(), strict=True):
+        if np.isfinite(x + y):
+            marks.append(Note(over.say(place), x, y, data=True, size=7.5, colour="ink", beside=True))
     limits: tuple[float | None, float | None] = (None, None)
     if usual < most:
         limits = (-usual * factor, usual * factor)
         marks.append(outside(most, "N"))
-    x, y = (Axis(f"F{axis} [{unit}]", limits, margin=0.13, count=5) for axis in plane)
-    return Chart(x, y, marks, title=joint if plane == PLANES[0] else "", legend=None, equal=True)
+    across, up = (Axis(f"F{'xyz'[axis]} [{unit}]", limits, margin=0.13, count=5) for axis in plane)
+    return Chart(across, up, marks, title=joint if plane == PLANES[0] else "", legend=None, equal=True)
 
 
 # ---- motion -------------------------------------------------------------------------------------------------------
 
 
 class Motions(NamedTuple):
-    """A quantity of links or joints with its first and second rate: its name, unit, and of each member the three."""
+    """A quantity of links or joints with its first and second rate: its name, unit, and the members of the three."""
 
     noun: str
     unit: str
-    members: dict[str, list[Array | None]]
+    courses: list[dict[str, Array]]
     rates: tuple[str, str] = ("velocity", "acceleration")
 
 
@@ -271,70 +269,59 @@ def motion(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 def _rate(result: xr.Dataset, over: Abscissa, kind: Motions, order: int) -> Chart:
     """The quantity itself or one of its rates."""
     turn = TURN if kind.unit == "rad" and not order else 0.0
-    lines = [
-        Line(over.values, course, name, nth(k), close=True, turn=turn)
-        for k, (name, values) in enumerate(kind.members.items()) if (course := values[order]) is not None
-    ]  # fmt: skip
-    title, scale = (kind.noun, *kind.rates)[order], None
+    lines = [line._replace(turn=turn) for line in _lines(over, kind.courses[order])]
+    scale = (1.0, kind.unit) if order else None
     if kind.unit == "m":  # as the drive
         scale = scaled(usual_peak(ease(result), *(line.y for line in lines)), "m")
-    elif order:
-        scale = 1.0, kind.unit
-    legend = Legend(6, least=1) if order == 0 else None
-    return over_drive(result, over, title, kind.unit, lines, rate=RATES[order], scale=scale, legend=legend)
+    return over_drive(result, over, (kind.noun, *kind.rates)[order], kind.unit, lines, rate=RATES[order], scale=scale,
+                      legend=Legend(6, least=1) if order == 0 else None)  # fmt: skip
 
 
 def _motions(result: xr.Dataset) -> list[Motions]:
     """What moves: links that turn and joints that slide; in space also joints that turn."""
     stated, spatial = layout(result), is_spatial(result)
     kinds = {name: stated["joints"].get(name, {}).get("type") for name in names(result, "joint")}
-    links = [link for link in names(result, "link") if link != stated["ground"]]
 
-    def rated(variable: str, dim: str, members: list[str]) -> dict[str, list[Array | None]]:
-        return {name: [column(result, variable + rate, **{dim: name}) for rate in ("", "_velocity", "_acceleration")]
-                for name in members}  # fmt: skip
+    def rated(variable: str, dim: str, of: Collection[str]) -> list[dict[str, Array]]:
+        every = (members(result, variable + rate, dim) for rate in ("", "_velocity", "_acceleration"))
+        return [{name: values for name, values in rate.items() if name in of} for rate in every]
 
     if not spatial:
-        turning = [link for link in links if _moves(column(result, "link_angle", link=link))]
+        turning = [link for link, angle in members(result, "link_angle", "link").items()
+                   if link != stated["ground"] and _moves(angle)]  # fmt: skip
         sliding = [name for name, kind in kinds.items() if kind in GUIDED]
         angles = [Motions("angle", "rad", rated("link_angle", "link", turning))] if turning or not sliding else []
         return [*angles, *([Motions("slide", "m", rated("joint_slide", "joint", sliding))] if sliding else [])]
-    found = []
+    panels = []
     for noun, unit, moves in (("rotation", "rad", "turns"), ("slide", "m", "slides")):
-        variable = f"joint_{noun}"
-        joints = [name for name, kind in kinds.items()
-                  if getattr(PAIRS[kind], moves) and _moves(column(result, variable, joint=name))]  # fmt: skip
+        joints = [name for name, course in members(result, f"joint_{noun}", "joint").items()
+                  if getattr(PAIRS[kinds[name]], moves) and _moves(course)]  # fmt: skip
         if joints:
-            found.append(Motions(f"joint {noun}", unit, rated(variable, "joint", joints)))
-    turns = {
-        link: [turned_from_start(column(result, "link_rotation", link=link)),
-               *(_size(column(result, f"link_angular_{rate}", link=link)) for rate in ("velocity", "acceleration"))]
-        for link in links
-    }  # fmt: skip
-    return [*found, Motions("turn of the link", "rad", turns, ("angular velocity", "angular acceleration"))]
+            panels.append(Motions(f"joint {noun}", unit, rated(f"joint_{noun}", "joint", joints)))
+    turns = [{link: turned_from_start(turn) for link, turn in members(result, "link_rotation", "link").items()}]
+    for rate in ("velocity", "acceleration"):
+        vectors = members(result, f"link_angular_{rate}", "link")
+        turns.append({link: np.linalg.norm(vector, axis=0) for link, vector in vectors.items()})
+    courses = [{link: course for link, course in order.items() if link != stated["ground"]} for order in turns]
+    return [*panels, Motions("turn of the link", "rad", courses, ("angular velocity", "angular acceleration"))]
 
 
-def _finite(values: Array | None) -> Array:
-    return np.empty(0) if values is None else values[np.isfinite(values)]
+def _varies(values: Array, least: float) -> bool:
+    finite = values[np.isfinite(values)]
+    return bool(finite.size) and float(np.ptp(finite)) > least
 
 
-def _moves(values: Array | None) -> bool:
-    finite = _finite(values)
-    return finite.size == 1 or bool(np.ptp(finite) > 1e-9 * max(1.0, np.abs(finite).max()) if finite.size else False)
+def _moves(values: Array) -> bool:
+    """Also where it is known at one position alone."""
+    return np.isfinite(values).sum() == 1 or _varies(values, 1e-9 * max(1.0, peak(values)))
 
 
-def _size(vector: Array | None) -> Array | None:
-    return None if vector is None else np.asarray(np.linalg.norm(vector, axis=0))
-
-
-def turned_from_start(rotation: Array | None) -> Array | None:
+def turned_from_start(rotation: Array) -> Array:
     """Angle (rad) by which a link is turned from the first orientation (w, x, y, z; position) that is known.
 
     It goes on beyond a turn: of q and −q, which are one orientation, and of an axis and its opposite the one that is
     nearer to the position before is taken.
     """
-    if rotation is None:
-        return None
     angle = np.full(rotation.shape[1], np.nan)
     solved = np.flatnonzero(np.isfinite(rotation).all(axis=0))
     if not solved.size:
@@ -403,41 +390,23 @@ def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     The band of the worst case of the play is drawn if the result has it; see `with_worst_case`.
     """
     need(result, "errors", "error")
-    over, lost = abscissa(result), contact_losses(result)
-    worst = worst_points(result)
-    lines = [Line(over.values, size, key, nth(k), close=True) for k, (key, size) in enumerate(worst.items())]
+    over, lost, legend = abscissa(result), contact_losses(result), Legend(4, least=1)
     # the scale is that of all points: those that are not drawn err less
     scale = prefixed(usual_peak(ease(result), *point_errors(result).values()), "m")
-    legend = Legend(4, least=1)
-    charts = [over_drive(result, over, "position error", "m", lines, scale=scale, marks=lost, legend=legend)]
+    charts = [over_drive(result, over, "position error", "m", _lines(over, worst_points(result)), scale=scale,
+                         marks=lost, legend=legend)]  # fmt: skip
+    centres, reaches = (members(result, f"transmission_{part}", "joint") for part in ("centre", "reach"))
     for unit, noun in (("rad", "rotation"), ("m", "slide")):
-        found = [each for each in outputs(result) if each.unit == unit]
-        if not found:
-            continue
-        lines, bands = [], list[Band]()
-        for k, each in enumerate(found):
-            centre, reach = (column(result, f"transmission_{part}", joint=each.joint) for part in ("centre", "reach"))
-            if centre is not None and reach is not None and np.isfinite(centre + reach).any():
-                text = f"worst case of the play, first order{f', {each.joint}' if len(found) > 1 else ''}"
-                area = Look(k, alpha=0.15, order=1.2)
-                bands.append(Band(over.values, centre - reach, centre + reach, text, area, close=True))
-            lines.append(Line(over.values, each.error, each.joint, nth(k), close=True))
-        edges = [edge for band in bands for edge in (band.low, band.high)]
-        usual = usual_peak(ease(result), *(line.y for line in lines), *edges)
-        scale = prefixed(usual, unit)
-        charts.append(
-            over_drive(
-                result,
-                over,
-                f"transmission error,\n{noun}",
-                unit,
-                lines,
-                bands=bands,
-                scale=scale,
-                marks=lost,
-                legend=legend,
-            )
-        )
+        errors = {output.joint: output.error for output in outputs(result) if output.unit == unit}
+        bands = list[Band]()
+        for k, joint in enumerate(errors):
+            if joint in centres and np.isfinite(centres[joint] + reaches[joint]).any():
+                low, high = centres[joint] - reaches[joint], centres[joint] + reaches[joint]
+                text = f"worst case of the play, first order{f', {joint}' if len(errors) > 1 else ''}"
+                bands.append(Band(over.values, low, high, text, Look(k, alpha=0.15, order=1.2), close=True))
+        if errors:
+            charts.append(over_drive(result, over, f"transmission error,\n{noun}", unit, _lines(over, errors),
+                                     bands=bands, marks=lost, legend=legend))  # fmt: skip
     return _stack("Errors of the mechanism as built", charts)
 
 
@@ -485,16 +454,16 @@ def locking(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     if margin is None or not has_friction(result):
         raise MechanismError(Finding("no joint has friction, so nothing can lock", "locking", "state friction"))
     over = abscissa(result)
-    alone = {joint: column(result, "critical_multiple", joint=joint) for joint in names(result, "joint")}
-    multiples = {joint: values for joint, values in alone.items() if values is not None and np.isfinite(values).any()}
-    every = np.concatenate([margin, *multiples.values()])
+    margins = members(result, "critical_multiple", "joint")
+    every = np.concatenate([margin, *margins.values()])
     largest = float(np.max(every[np.isfinite(every)], initial=0.0))
     reached = bool(np.any(np.isinf(every))) or largest >= MARGIN
     top = MARGIN if reached else max(1.1 * largest, LEAST_TOP)
     never = f": more than {MARGIN:g}" if not np.isfinite(margin).any() else ""
-    lines = [Line(over.values, _drawable(margin), f"locking margin, all friction{never}", Look("ink", 2.0), close=True)]
-    lines += joined([Line(over.values, _drawable(multiples[joint]), f"{joint} alone", nth(k).but(width=1.3), close=True)
-                     for k, joint in enumerate(alone) if joint in multiples])  # fmt: skip
+    finite = {f"{joint} alone": np.where(np.isfinite(row), row, np.nan) for joint, row in margins.items()}
+    lines = [Line(over.values, np.where(np.isfinite(margin), margin, np.nan), f"locking margin, all friction{never}",
+                  Look("ink", 2.0), close=True)]  # fmt: skip
+    lines += joined([line for line in _lines(over, finite, 1.3) if np.isfinite(line.y).any()])
     marks: list[Mark] = [*_states(result, over, named=True), *silent(result, over), *lines]
     marks.append(Rule(1.0, "locks at 1", Look("ink", 1.0, "dashed", order=1.6), upright=False))
     if not largest:  # nothing to draw
@@ -504,11 +473,6 @@ def locking(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     lower = _efficiency(result, over)
     centred = "; ranges: pins centred" * ("seat_offset" in result and "locking_state" in result)
     return _stack(f"Locking by friction{centred}", [upper, lower], (3, 2) if largest else (1, 2))
-
-
-def _drawable(values: Array) -> Array:
-    """A multiple that is not finite is drawn nowhere."""
-    return np.where(np.isfinite(values), values, np.nan)
 
 
 def _efficiency(result: xr.Dataset, over: Abscissa) -> Chart:

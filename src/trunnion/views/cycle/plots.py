@@ -24,9 +24,7 @@ from trunnion.views import draw as drawn
 from trunnion.views.charts import Look, Note, Panel, Plot, Rule
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, status_text
 from trunnion.views.common.drawing import draw, picture
-from trunnion.views.common.figures import MUTED, new
-from trunnion.views.common.labels import Labels
-from trunnion.views.common.lettering import plain
+from trunnion.views.common.figures import MUTED, Labels, new, plain
 from trunnion.views.cycle import courses, seats
 from trunnion.views.cycle.deviations import has
 from trunnion.views.space import figure as space_figure

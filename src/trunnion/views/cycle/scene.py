@@ -18,8 +18,7 @@ from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import abscissa, column, course, intervals, larger_end, layout, names, numbers, series
 from trunnion.views.common.peaks import ease
 from trunnion.views.cycle.courses import varying
-from trunnion.views.cycle.deviations import losses
-from trunnion.views.cycle.deviations_scene import built
+from trunnion.views.cycle.deviations import built, losses
 from trunnion.views.space.bodies import is_spatial
 from trunnion.views.space.scene import space_scene
 

@@ -5,18 +5,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.results.quantities import prefixed, quantity
+from trunnion.views.common.cycle import abscissa, names, series
 from trunnion.views.cycle.report import page
+from trunnion.views.cycle.scene import scene
 from trunnion.views.motion.figure import pictures
-from trunnion.views.motion.scene import motion_scene
-from trunnion.views.motion.shown import Shown, energies, shown
+from trunnion.views.motion.shown import OF_IMPACTS, Shown, drivers_of, energies, shown
 from trunnion.views.page import source
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MOST_EVENTS", "report"]
+__all__ = ["MOST_EVENTS", "MOST_ROWS", "motion_scene", "report"]
+
 
 MOST_EVENTS = 200  # rows of the table
 LOST = ("work_friction", "work_contact", "work_clutch")
@@ -79,3 +82,79 @@ def _residual(motion: Shown) -> list[dict[str, Any]]:
     place = _stated(float(rows["time"].values[worst]))
     value = quantity(float(sizes[worst] / turned), "1")
     return [{"label": "Energy account", "value": value, "place": place, "meaning": RESIDUAL}]
+
+
+# ---- scene ----------------------------------------------------------------------------------------------------------
+
+
+MOST_ROWS = 1200  # more than a cycle has: turns follow each other
+RESTS, NONE = -1, 99  # statuses that a cycle does not have
+STATES = {RESTS: "at rest: friction holds it", NONE: "there is no motion"}
+
+
+def motion_scene(shown: Shown) -> dict[str, Any]:
+    """The motion as JSON-able data, its rows thinned to MOST_ROWS with the peaks of the reactions kept; see
+    `cycle.scene.scene`.
+    """
+    rows = shown.rows
+    picked = _picked(rows)
+    found = scene(rows, picked=picked)
+    kept = rows.isel(position=picked)
+    status = np.where(kept["resting"].values == 1, RESTS, kept["status"].values)
+    status = np.where(np.isfinite(kept["kinetic_energy"].values), status, NONE)
+    over = abscissa(rows)
+    last = float(kept["time"].values[-1])
+    factor = over.values[-1] / float(rows["time"].values[-1]) if last > 0 else 1.0
+    own: dict[str, Any] = {
+        "duration": last,
+        "free": _free(kept),
+        "contacts": _contacts(kept),
+        "energies": [{"label": text, "values": series(values)} for _, text, values in energies(kept)],
+        "events": [
+            {"at": float(f"{min(one.time, last) * factor:.9g}"), "word": one.word, "quiet": one.word in OF_IMPACTS}
+            for one in shown.events
+        ],
+    }
+    return found | {
+        "status": [int(code) for code in status],
+        "states": found["states"] | {str(code): text for code, text in STATES.items()},
+        "gaps": [],
+        "sums": {name: values for name, values in found["sums"].items() if name != "efficiency_instant"},
+        "ease": [1.0],  # no peak is cut: a motion in time has no dead centre that forces it
+        "motion": own,
+    }
+
+
+def _picked(rows: xr.Dataset) -> NDArray[np.intp]:
+    """The rows that are shown: all, or of each of many stretches the first and that of the largest reaction, and the
+    last, so that no peak is lost.
+    """
+    count = rows.sizes["position"]
+    if count <= MOST_ROWS:
+        return np.arange(count)
+    sizes = np.nan_to_num(np.sqrt(np.sum(rows["reaction_force"].values ** 2, axis=1)))
+    most = sizes.max(axis=1, keepdims=True)
+    size = np.max(np.divide(sizes, most, out=np.zeros_like(sizes), where=most > 0), axis=0)
+    firsts = np.arange(0, count, -(-count // (MOST_ROWS // 2 - 1)))
+    peaks = [begin + int(part.argmax()) for begin, part in zip(firsts, np.split(size, firsts[1:]), strict=True)]
+    return np.unique([*firsts, *peaks, count - 1])
+
+
+def _contacts(rows: xr.Dataset) -> list[dict[str, Any]]:
+    """Normal force and gap of every contact of joints in play."""
+    known = names(rows, "contact") if "contact" in rows.dims else []
+    forces, gaps = (rows[f"contact_{name}"].values if known else () for name in ("normal_force", "gap"))
+    return [
+        {"name": name, "force": series(force), "gap": series(gap)}
+        for name, force, gap in zip(known, forces, gaps, strict=True)
+    ]
+
+
+def _free(rows: xr.Dataset) -> list[dict[str, Any]]:
+    """Coordinate and rate of every free driver."""
+    found = []
+    for i, name, effort in drivers_of(rows):
+        unit = "rad" if effort == "N m" else "m"
+        coordinate, rate = rows["drive_coordinate"].values[i], rows["drive_rate"].values[i]
+        found.append({"name": name, "unit": unit, "coordinate": series(coordinate), "rate": series(rate)})
+    return found

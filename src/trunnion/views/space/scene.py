@@ -12,8 +12,7 @@ import numpy as np
 from trunnion.joints.pairs import PAIRS
 from trunnion.views.common.cycle import Array, column, names, series
 from trunnion.views.space.bodies import Space, gathered
-from trunnion.views.space.camera import best, looking
-from trunnion.views.space.scenery import scenery
+from trunnion.views.space.solids import best, looking, scenery
 
 if TYPE_CHECKING:
     import xarray as xr

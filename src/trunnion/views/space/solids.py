@@ -18,7 +18,8 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.views.common.cycle import Array
 from trunnion.views.space.bodies import Space
 
-__all__ = ["Solid", "solids"]
+__all__ = ["Camera", "Scenery", "Solid", "best", "looking", "scenery", "solids"]
+
 
 # shares of the size of the mechanism
 BAR, FINE, SHAFT, SLEEVE, HALF, BALL, BLOCK = 0.0125, 0.005, 0.0095, 0.022, 0.03, 0.024, 0.024
@@ -340,3 +341,113 @@ def _along(shown: Space, name: str) -> tuple[float, float]:
     """The reach of a rail on the ground from its seat."""
     low, high = _reach(shown, name)
     return (low, high) if shown.joints[name]["links"][0] == shown.ground else (-high, -low)
+
+
+# ---- from where it is looked at -------------------------------------------------------------------------------------
+
+
+HEIGHTS = (20.0, 28.0, 36.0, 46.0, 58.0)  # degrees above the horizon that are tried
+SIDES = (
+    -155.0,
+    -145.0,
+    -135.0,
+    -125.0,
+    -115.0,
+    -65.0,
+    -55.0,
+    -45.0,
+    -35.0,
+    -25.0,
+    25.0,
+    35.0,
+    45.0,
+    55.0,
+    65.0,
+    115.0,
+    125.0,
+    135.0,
+    145.0,
+    155.0,
+)  # degrees around z: no axis seen end-on
+MOST_SPOTS = 3000  # that are weighed
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Rows of `matrix`: right, up and towards the viewer, in the global frame."""
+
+    matrix: Array
+
+    def seen(self, points: Array) -> Array:
+        """Right, up and towards the viewer (m) of points (…, 3)."""
+        return np.asarray(points @ self.matrix.T, dtype=float)
+
+
+def looking(around: float, above: float) -> Camera:
+    """The camera at an angle around z (0: on the x axis, rad) and above the x–y plane; z points up in the picture."""
+    c, s = np.cos(around), np.sin(around)
+    towards = np.array([np.cos(above) * c, np.cos(above) * s, np.sin(above)])
+    right = np.array([-s, c, 0.0])
+    return Camera(np.array([right, np.cross(towards, right), towards]))
+
+
+def best(shown: Space) -> tuple[float, float]:
+    """Angles (rad) around z and above the horizon from which the mechanism is spread widest, never seen on its edge.
+
+    The widest spread is the largest area of the ellipse of inertia of all places in the picture. A view from the front
+    right at 28° is preferred where others gain little.
+    """
+    spots = shown.spots[:: -(-len(shown.spots) // MOST_SPOTS) or 1]
+    seats = [shown.seated(name)[:, shown.drawable].T for name in shown.joints]
+    spots = np.concatenate([spots, *(one[:: -(-len(one) // 50) or 1] for one in seats)])
+    spots = spots - spots.mean(axis=0)
+    scores = {}
+    for above in np.radians(HEIGHTS):
+        for around in np.radians(SIDES):
+            x, y, _ = looking(around, above).seen(spots).T
+            spread = np.linalg.det(np.cov(x, y)) if len(spots) > 2 else 0.0
+            gentle = 1.0 - 0.15 * (1 - np.cos(around + np.radians(60))) / 2 - 0.1 * abs(above - np.radians(28))
+            scores[float(around), float(above)] = np.sqrt(max(spread, 0.0)) * gentle + 1e-9 * gentle
+    return max(scores, key=scores.__getitem__)
+
+
+# ---- all of the picture ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Scenery:
+    """A mechanism with its solids and the camera; box: left, below, right, above (m) of all that may be seen."""
+
+    shown: Space
+    solids: list[Solid]
+    camera: Camera
+    box: tuple[float, float, float, float]
+
+    @property
+    def diagonal(self) -> float:
+        """Size of the picture, m."""
+        left, below, right, above = self.box
+        return float(np.hypot(right - left, above - below))
+
+
+def scenery(shown: Space, camera: Camera | None = None) -> Scenery:
+    """Look at a mechanism, from the best side if not told."""
+    camera = camera or looking(*best(shown))
+    found = solids(shown)
+    corners = []
+    picked = np.flatnonzero(shown.drawable)
+    picked = picked[:: max(1, picked.size // 60)]
+    for solid in found:
+        pose = shown.poses[solid.link]
+        points = solid.points if solid.kind != "box" else _corners(solid.points)
+        places = np.einsum("ijn,kj->nki", pose.matrix[:, :, picked], points) + pose.origin[:, picked].T[:, None]
+        seen = camera.seen(places.reshape(-1, 3))[:, :2]
+        corners += [seen.min(axis=0) - solid.radius, seen.max(axis=0) + solid.radius]
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    return Scenery(shown, found, camera, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
+
+
+def _corners(points: Array) -> Array:
+    middle, *halves = points
+    signs = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)], dtype=float)
+    return np.asarray(middle + signs @ np.array(halves), dtype=float)

@@ -19,6 +19,7 @@ from trunnion.cli.options import (
     Measures,
     OutAllocation,
     Report,
+    Seats,
     Seed,
     Set,
     Steps,
@@ -93,6 +94,7 @@ def allocate(
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
+    seat: Seats = None,
     write: Write = None,
     force: Force = False,
     kind: Figures = None,
@@ -109,7 +111,7 @@ def allocate(
     check_files(out or [], report, of="allocation", kind=kind)
     check_model(write, file, force)
     by = _criterion(criterion, target)
-    mechanism = stated(file, set_, table, friction)
+    mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file), bar("samples", samples, least=1000) as progress:
         result = run(
             mechanism, measure, by.value, target, choice.value, steps, at, samples,

@@ -18,6 +18,7 @@ from trunnion.cli.options import (
     Measures,
     OutTolerance,
     Report,
+    Seats,
     Seed,
     Set,
     Steps,
@@ -75,6 +76,7 @@ def tolerance(
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
+    seat: Seats = None,
     sample: Samples = None,
     kind: Kind = None,
     out: OutTolerance = None,
@@ -87,7 +89,7 @@ def tolerance(
     from trunnion.studies.tolerance.study import tolerance as run
 
     check_files(out or [], report, of="tolerance", kind=kind)
-    mechanism = stated(file, set_, table, friction)
+    mechanism = stated(file, set_, table, friction, seat)
     for text in sample or []:
         mechanism = mechanism.with_samples(*named_file(text, "--sample"))
     methods = tuple(method or (one for one in DEFAULT_METHODS if samples or one not in SAMPLINGS))

@@ -26,6 +26,7 @@ from trunnion.cli.options import (
     TableFile,
     UnitsRow,
     Write,
+    share,
 )
 from trunnion.cli.result import Shown, check_files, check_model, show_tables
 from trunnion.cli.terminal import bar, console
@@ -80,7 +81,13 @@ def allocate(
         typer.Option("--criterion", help="What must meet the limits: worst-case, rss or yield. [default: worst-case]"),
     ] = None,
     target: Annotated[
-        float | None, typer.Option("--yield", help="Required share within all limits; implies --criterion yield.")
+        float | None,
+        typer.Option(
+            "--yield",
+            parser=share,
+            metavar="SHARE",
+            help="Required share within all limits, 0.99 or 99%; implies --criterion yield.",
+        ),
     ] = None,
     choice: Way = Choice.AUTO,
     exact: Exact = False,

@@ -25,6 +25,7 @@ from trunnion.cli.options import (
     TableFile,
     UnitsRow,
     named_file,
+    share,
 )
 from trunnion.cli.result import Shown, check_files, show_tables
 from trunnion.cli.terminal import bar, show_figures
@@ -62,7 +63,12 @@ def tolerance(
     method: Methods = None,
     target: Annotated[
         float | None,
-        typer.Option("--yield", help="Required share within limits; then it alone decides the exit status."),
+        typer.Option(
+            "--yield",
+            parser=share,
+            metavar="SHARE",
+            help="Required share within limits, 0.99 or 99%; then it alone decides the exit status.",
+        ),
     ] = None,
     samples: Annotated[int, typer.Option("--samples", help="Number of random mechanisms.")] = 10_000,
     seed: Seed = 1,

@@ -105,7 +105,8 @@ class MisfitCause(NamedTuple):
 class Identified:
     """An identification, with the figures of it, (unknown,) unless said.
 
-    groups: what the data do not tell apart; causes: what would explain a misfit, best first.
+    groups: what the data do not tell apart; causes: what would explain a misfit, best first; encoder: path of an
+    unknown by which the encoder of the data is off, no number of the mechanism; empty without.
     """
 
     mechanism: Mechanism
@@ -115,6 +116,7 @@ class Identified:
     spread: Covariances
     groups: Sequence[InseparableUnknowns]
     causes: Sequence[MisfitCause]
+    encoder: str = ""
 
     @property
     def x(self) -> Array:
@@ -289,6 +291,7 @@ def dataset(identified: Identified, findings: Sequence[Finding]) -> xr.Dataset:
         "identified": measurement.name,
         **origin(mechanism, system.plan.formula),
         "confidence": CONFIDENCE,
+        "encoder": identified.encoder,
         "parameter_paths": [one.paths for one in model.unknowns],
         "parameter_units": [one.unit for one in model.unknowns],
         "channel_units": [one.unit(system) for one in model.measures.values()],
@@ -358,13 +361,14 @@ def with_estimates(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
 
     Returns
     -------
-    The mechanism with the estimates, in the units that were written there; what is not identifiable stays as it is.
+    The mechanism with the estimates, in the units that were written there; what is not identifiable stays as it is, and
+    so does the start of a driver: by that the encoder is off, see `corrected_mapping`.
     """
     values: dict[str, float | str] = {}
     units = attribute(result, "parameter_units")
     for p, paths in enumerate(attribute(result, "parameter_paths")):
         estimate, u = (float(result[name].values[p]) for name in ("estimate", "standard_uncertainty"))
-        if result["told"].values[p]:
+        if result["told"].values[p] and result.attrs["encoder"] not in paths:
             values |= {path: _text(mechanism, path, estimate, u, units[p]) for path in paths}
     return mechanism.with_values(values)
 

@@ -97,8 +97,8 @@ def identify(
     Estimates, 95 % confidence intervals, and which parameters the data do not separate.
     """
     from trunnion.rig.identification import identify as run
-    from trunnion.rig.reading.log import gathered
     from trunnion.rig.reading.read import read_measured
+    from trunnion.rig.reading.timebase import gathered
 
     check_files(out or [], report, of="identification", kind=kind)
     check_model(write, file, force)

@@ -34,12 +34,19 @@ from trunnion.rig.identification.fit import (
     solved,
 )
 from trunnion.rig.identification.result import Identified, MisfitCause, dataset
-from trunnion.rig.identification.signals import Model
+from trunnion.rig.identification.signals import Model, Parameters, described, unknowns
 from trunnion.rig.identification.uncertainty import LackOfFit, excess, inseparable, quantile, spread_of
-from trunnion.rig.identification.unknowns import Parameters, described, unknowns
 from trunnion.rig.modelled import apart, each, in_condition, measure_of, refuse_unit, same_cycle
-from trunnion.rig.reading.efficiency import efficiency_of, load_joints, pairs_of
-from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, rms
+from trunnion.rig.reading.measurement import (
+    Accuracy,
+    Condition,
+    Measurement,
+    Signal,
+    efficiency_of,
+    load_joints,
+    pairs_of,
+    rms,
+)
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 

@@ -116,6 +116,7 @@ def test_limits_that_nothing_keeps(run: Run, tmp_path: Path) -> None:
     [
         (["--measure", "torque"], "none of the measures torque has a limit"),
         (["--yield", 1.5], "a yield of 1.5 is not possible"),
+        (["--yield", "150%"], "a yield of 1.5 is not possible"),
         (["--sure"], "only a yield can be sure"),
         (["--criterion", "rss", "--yield", 0.99], "--yield: the criterion rss does not use a yield of 0.99"),
         (["--criterion", "worst-case", "--yield", 0.99], "the criterion worst-case does not use a yield"),

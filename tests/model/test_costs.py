@@ -95,6 +95,7 @@ CASES = [
     ("model: power, B: 1, k: 0.45", "model: power, B: -1, k: 0.45", C, "costs.AB.B", "wider tolerance would cost", "0"),
     ("model: power, B: 1, k: 0.45", "model: power, B: 1, k: 0", C, "costs.AB.k", "is 0", "above 0"),
     ("model: power, B: 1, k: 0.45", "model: power, B: 1 mm, k: 1", C, "costs.AB.B", "a length where a number", "0.1"),
+    ("k: 0.45, unit: mm", "k: 0.45", C, "costs.AB", "states no unit", "unit: mm"),
     ("k: 0.45, unit: mm", "k: 0.45, unit: kg", C, "costs.AB.unit", "'kg' is the unit of a mass", "length"),
     ("k: 0.45, unit: mm", "k: 0.45, unit: mmm", C, "costs.AB.unit", "'mmm' is not known", "mm"),
     ("least: 5 um", "least: 5 deg", C, "costs.AB.least", "an angle where a length", "60 mm"),

@@ -358,6 +358,21 @@ def test_fits_stated_wrongly(fit: str, what: str) -> None:
     assert [one.where for one in error.value.findings] == ["joint_defaults.pin.fit"]  # once for all joints
 
 
+@pytest.mark.parametrize(
+    "pin", [{"fit": "40 mmH7/g6"}, {"fit": "H7/g6", "radius": "20 mm"}, {"fit": "H7/g6", "radius": 0.02}]
+)
+def test_classes_beside_a_radius_are_the_fit_of_twice_the_radius(pin: dict[str, Any]) -> None:
+    data = FOURBAR.data()
+    numbers = []
+    for stated in ({"fit": "40 mm H7/g6"}, pin):
+        data["joints"]["B"]["pin"] = stated
+        mechanism = Mechanism(**data)
+        assert Mechanism(**mechanism.data()) == mechanism
+        numbers.append([mechanism.parameters()[f"joints.B.pin.{key}"] for key in ("radius", "hole_radius")])
+    assert numbers[0] == pytest.approx(numbers[1], abs=1e-15)
+    assert numbers[0] == pytest.approx([0.02 - 17e-6 / 2, 0.02 + 12.5e-6 / 2])  # g6 −9/−25, H7 0/+25 µm of 40 mm
+
+
 def test_the_size_of_a_fit_has_no_tolerance() -> None:
     data = FOURBAR.data()
     data["joints"]["B"]["pin"] = {"fit": "20 mm ± 0.1 mm H7/g6"}

@@ -39,7 +39,7 @@ costs:
   BC: {model: exponential, A: 1, B: 20, k: 30, unit: mm, group: bores}
   CD: {process: boring}
   AD: {options: {milled: {tolerance: t, cost: 3}, ground: {tolerance: 10 um, cost: 9}}}
-  A.clearance: {model: power, B: 1, k: 1}
+  A.clearance: {model: power, B: 1, k: 1, unit: m}
 processes:
   boring: {IT7: 9, 8: 6}
 measures:

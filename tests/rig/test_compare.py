@@ -18,8 +18,8 @@ from trunnion.model.units import KINDS
 from trunnion.rig.comparison import CAUSES, VARIABLES, causes
 from trunnion.rig.judge import Verdict, expanded, independent, judge, uncertainty_of
 from trunnion.rig.modelled import in_condition
-from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
+from trunnion.rig.reading.timebase import gathered
 from trunnion.solve.run import prepare
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -9,8 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from trunnion.errors import MechanismError
-from trunnion.rig.reading.efficiency import efficiency_of
-from trunnion.rig.reading.measurement import Accuracy, Condition, Signal
+from trunnion.rig.reading.measurement import Accuracy, Condition, Signal, efficiency_of
 
 TURNS, POSITIONS = 12, 24
 PHASE = np.arange(POSITIONS) / POSITIONS

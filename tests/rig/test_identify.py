@@ -20,8 +20,7 @@ from trunnion.measures.measures import named
 from trunnion.model.mechanism import read_mechanism
 from trunnion.rig.identification import identify, with_estimates
 from trunnion.rig.identification.run import held_out
-from trunnion.rig.identification.signals import Model
-from trunnion.rig.identification.unknowns import described, limits, unknowns
+from trunnion.rig.identification.signals import Model, described, limits, unknowns
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare

@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 import trunnion
 from trunnion.errors import Finding
+from trunnion.rig.identification import corrected_mapping, with_estimates
 from trunnion.views.identify import figure, report
 
 GUIDE = "S.friction.coefficient"
@@ -68,6 +70,44 @@ def test_what_explains_a_misfit(folder: Path, name: str) -> None:
     assert found.figures["explains_percent"] > 95
 
 
+def corrected(folder: Path, result: Any) -> Any:
+    """The measurement by the mapping with the zeros that a result finds."""
+    entries = yaml.safe_load((folder / "changed.yaml").read_text())
+    (folder / "corrected.yaml").write_text(json.dumps(corrected_mapping(entries, result)))
+    return trunnion.rig.read(folder / "corrected.yaml")
+
+
+@pytest.mark.spread(2)
+@pytest.mark.parametrize("parameters", [{"mu": [GUIDE]}, {"mu": [GUIDE], "encoder": ["drivers.O.start"]}])
+def test_a_mapping_with_the_angle_that_is_found_agrees_with_the_model(
+    folder: Path, parameters: dict[str, list[str]]
+) -> None:
+    """As the cause of a misfit, or as the start of the driver, which stays in the model as it is."""
+    machine, text = trunnion.read(MODEL), (folder / "mapping.yaml").read_text()
+    (folder / "changed.yaml").write_text(text.replace("  per_turn: 360\n", "  per_turn: 360\n  zero: 2 deg\n"))
+    result = trunnion.rig.identify(machine, trunnion.rig.read(folder / "changed.yaml"), parameters, ["M"])
+    data = corrected(folder, result)
+    zero = json.loads((folder / "corrected.yaml").read_text())["angle"]["zero"]
+    assert float(zero.removesuffix(" deg")) == pytest.approx(0.0, abs=0.03)
+    again = trunnion.rig.identify(machine, data, {"mu": [GUIDE]}, ["M"])
+    assert float(again["reduced_chi_squared"]) < 1.3
+    known = with_estimates(machine, again)
+    assert known.parameters()["drivers.O.start"] == machine.parameters()["drivers.O.start"]
+    found, true = (trunnion.rig.compare(known, one) for one in (data, trunnion.rig.read(folder / "mapping.yaml")))
+    assert found["verdict"].values.tolist() == true["verdict"].values.tolist()
+    assert found["rms"].values == pytest.approx(true["rms"].values, rel=0.1)
+    if "encoder" in parameters:
+        assert with_estimates(machine, result).parameters()["drivers.O.start"] == 0.0
+
+
+def test_a_cycle_that_begins_elsewhere_is_refused_as_compare_does(folder: Path) -> None:
+    machine = trunnion.read(MODEL).with_values({"drivers.O.start": "30 deg"})
+    data = trunnion.rig.read(folder / "mapping.yaml")
+    for judged in (trunnion.rig.compare, lambda model, measured: trunnion.rig.identify(model, measured, [GUIDE])):
+        with pytest.raises(trunnion.MechanismError, match="state start: 30 deg in the mapping"):
+            judged(machine, data)
+
+
 def test_a_zero_explains_a_misfit_and_tells_the_estimate(folder: Path) -> None:
     right = identified(folder)
     assert "fit.cause" not in {one.code for one in right.trunnion.findings}
@@ -76,6 +116,9 @@ def test_a_zero_explains_a_misfit_and_tells_the_estimate(folder: Path) -> None:
     assert found.figures["kind"] == "zero"
     assert found.figures["size"] == pytest.approx(-0.6, abs=0.1)
     assert found.figures["values"]["mu"] == pytest.approx(float(right["estimate"].values[0]), abs=1e-3)
+    data = corrected(folder, identified(folder, _zero(text), "    zero: 0.6 N m\n"))
+    again = trunnion.rig.identify(trunnion.read(MODEL), data, {"mu": [GUIDE]}, ["M"])
+    assert float(again["estimate"].values[0]) == pytest.approx(float(right["estimate"].values[0]), abs=1e-3)
 
 
 def _zero(text: str) -> str:

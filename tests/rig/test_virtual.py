@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 import trunnion
 from trunnion.errors import MechanismError, Severity
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.reading.efficiency import efficiency_of
+from trunnion.rig.reading.measurement import efficiency_of
 from trunnion.rig.reading.rig_file import Rig
 from trunnion.rig.virtual.observe import Observation
 from trunnion.solve.run import prepare

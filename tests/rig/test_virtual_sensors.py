@@ -10,8 +10,8 @@ from trunnion.errors import MechanismError
 from trunnion.rig.reading.rig_file import Sensor
 from trunnion.rig.reading.units import read_amount, scale
 from trunnion.rig.virtual import sensors as virtual_sensors
+from trunnion.rig.virtual.observation import phases
 from trunnion.rig.virtual.sensors import SensorErrors, converted, draw, pulsed, readings, resolved, smoothed, stream
-from trunnion.rig.virtual.true_signals import phases
 
 NONE = SensorErrors(0.0, 0.0, 0.0)
 

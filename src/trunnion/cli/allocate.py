@@ -19,12 +19,14 @@ from trunnion.cli.options import (
     Measures,
     OutAllocation,
     Report,
+    Seats,
     Seed,
     Set,
     Steps,
     TableFile,
     UnitsRow,
     Write,
+    share,
 )
 from trunnion.cli.result import Shown, check_files, check_model, show_tables
 from trunnion.cli.terminal import bar, console
@@ -79,7 +81,13 @@ def allocate(
         typer.Option("--criterion", help="What must meet the limits: worst-case, rss or yield. [default: worst-case]"),
     ] = None,
     target: Annotated[
-        float | None, typer.Option("--yield", help="Required share within all limits; implies --criterion yield.")
+        float | None,
+        typer.Option(
+            "--yield",
+            parser=share,
+            metavar="SHARE",
+            help="Required share within all limits, 0.99 or 99%; implies --criterion yield.",
+        ),
     ] = None,
     choice: Way = Choice.AUTO,
     exact: Exact = False,
@@ -93,6 +101,7 @@ def allocate(
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
+    seat: Seats = None,
     write: Write = None,
     force: Force = False,
     kind: Figures = None,
@@ -109,7 +118,7 @@ def allocate(
     check_files(out or [], report, of="allocation", kind=kind)
     check_model(write, file, force)
     by = _criterion(criterion, target)
-    mechanism = stated(file, set_, table, friction)
+    mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file), bar("samples", samples, least=1000) as progress:
         result = run(
             mechanism, measure, by.value, target, choice.value, steps, at, samples,

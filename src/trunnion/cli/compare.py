@@ -55,8 +55,8 @@ def compare(
     uncertainty, 1 if not or if that is undecided.
     """
     from trunnion.rig.comparison import compare as run
-    from trunnion.rig.reading.log import gathered
     from trunnion.rig.reading.read import read_measured
+    from trunnion.rig.reading.timebase import gathered
 
     check_files(out or [], report, of="comparison", kind=kind)
     mechanism = stated(file, set_, table, friction, seat)

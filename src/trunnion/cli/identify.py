@@ -62,6 +62,12 @@ HeldOut = Annotated[
     ),
 ]
 Guard = Annotated[int | None, typer.Option("--guard", help="Positions left out on each side of a friction reversal.")]
+Corrected = Annotated[
+    Path | None,
+    typer.Option(
+        "--write-mapping", help="Write the mapping with the zero of the angle or of a channel that was found: .yaml."
+    ),
+]
 Kind = Annotated[str | None, typer.Option("--kind", help="Which figure: intervals, correlation or residuals.")]
 
 
@@ -79,6 +85,7 @@ def identify(
     friction: FrictionLaw = None,
     seat: Seats = None,
     write: Write = None,
+    write_mapping: Corrected = None,
     force: Force = False,
     kind: Kind = None,
     out: Out = None,
@@ -90,8 +97,8 @@ def identify(
     Estimates, 95 % confidence intervals, and which parameters the data do not separate.
     """
     from trunnion.rig.identification import identify as run
-    from trunnion.rig.reading.log import gathered
     from trunnion.rig.reading.read import read_measured
+    from trunnion.rig.reading.timebase import gathered
 
     check_files(out or [], report, of="identification", kind=kind)
     check_model(write, file, force)
@@ -112,6 +119,8 @@ def identify(
     findings = findings_of(result)
     if write is not None:
         findings += _write_model(mechanism, result, file, write, force, shown.written)
+    if write_mapping is not None:
+        findings += _write_mapping(result, mapping, write_mapping, force, shown.written)
     shown.end(findings)
 
 
@@ -157,11 +166,6 @@ def _write_model(
     from trunnion.model.rewrite import rewrite_mechanism
     from trunnion.rig.identification import with_estimates
 
-    known = zip(result["parameter"].values, result["told"].values, strict=True)
-    lost = [str(name) for name, identifiable in known if not identifiable]
-    if len(lost) == result.sizes["parameter"] or not result.attrs["converged"]:
-        why = "no parameter is identifiable" if result.attrs["converged"] else "the search did not converge"
-        return [Finding(f"'{write}' is not written: {why}", "--write", "", Severity.ERROR)]
     errors = {one.code: one.where for one in findings_of(result) if one.severity is Severity.ERROR}
     if "fit.misfit" in errors or "sensor.off" in errors:
         reduced = float(f"{float(result['reduced_chi_squared']):.3g}")
@@ -171,8 +175,39 @@ def _write_model(
         named = "correct what explains the misfit, and identify again"
         unknown = "find the cause first: `trunnion compare` shows each channel and names errors of sensors and angle"
         return [Finding(what, "--write", named if explained else unknown)]
+    known = zip(result["parameter"].values, result["told"].values, strict=True)
+    lost = [str(name) for name, identifiable in known if not identifiable]
+    if len(lost) == result.sizes["parameter"] or not result.attrs["converged"]:
+        why = "no parameter is identifiable" if result.attrs["converged"] else "the search did not converge"
+        return [Finding(f"'{write}' is not written: {why}", "--write", "", Severity.ERROR)]
     rewrite_mechanism(with_estimates(mechanism, result), file, write, force)
     written.append(write)
-    if not lost:
-        return []
-    return [Finding(f"{', '.join(lost)} unchanged: not identifiable from the data", "--write", "", Severity.NOTE)]
+    notes = []
+    if lost:
+        what = f"{', '.join(lost)} unchanged: not identifiable from the data"
+        notes.append(Finding(what, "--write", "", Severity.NOTE))
+    if encoder := result.attrs["encoder"]:
+        what, remedy = f"{encoder} unchanged: by this the encoder is off", "write it into the mapping: --write-mapping"
+        notes.append(Finding(what, "--write", remedy, Severity.NOTE))
+    return notes
+
+
+def _write_mapping(result: xr.Dataset, mapping: Path, write: Path, force: bool, written: list[Path]) -> list[Finding]:
+    """The mapping with the zeros that were found, beside the data that it names."""
+    from trunnion.files import whole
+    from trunnion.model.file import read_entries
+    from trunnion.model.rewrite import changed_text
+    from trunnion.rig.identification import corrected_mapping
+
+    try:
+        itself = write.exists() and write.samefile(mapping)
+        if write.resolve().parent != mapping.resolve().parent or (itself and not force):
+            what, remedy = f"'{write}' is no other file beside '{mapping}'", "name one in its folder, or add --force"
+            raise MechanismError(Finding(what, "--write-mapping", remedy))
+        entries = corrected_mapping(read_entries(mapping, "a mapping file")[0], result)
+    except MechanismError as error:
+        return list(error.findings)
+    with whole(write) as temporary:
+        temporary.write_text(changed_text(mapping.read_text("utf-8"), entries), encoding="utf-8", newline="\n")
+    written.append(write)
+    return []

@@ -49,6 +49,7 @@ __all__ = [
     "points",
     "seconds",
     "setting",
+    "share",
 ]
 
 IMAGES = (".png", ".svg", ".pdf", ".jpg", ".jpeg")
@@ -92,7 +93,7 @@ DataFiles = Annotated[
     list[Path] | None, typer.Argument(help="Data files instead of those in the mapping: CSV, Parquet, TDMS.")
 ]
 Write = Annotated[Path | None, typer.Option("--write", help="Write the model with the values found: .yaml or .json.")]
-Force = Annotated[bool, typer.Option("--force", help="With --write: allow overwriting the model itself.")]
+Force = Annotated[bool, typer.Option("--force", help="With --write: allow overwriting the input itself.")]
 Report = Annotated[Path | None, typer.Option("--report", help="Also write the report, one HTML file.")]
 WRITTEN = "Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable."
 TABLES = "x.positions.csv the curves, x.histogram.csv the samples, x.convergence.csv how they settle"
@@ -152,6 +153,14 @@ def setting(text: str) -> tuple[str, float | str]:
     if not equals or not name.strip() or not value.strip():
         raise MechanismError(Finding(f"'{text}' sets no value", "--set", "write name=value, e.g. AB=2.1m"))
     return name.strip(), _plain(value)
+
+
+def share(text: str) -> float:
+    """A share as 0.99 or 99 %."""
+    number, percent, rest = text.strip().partition("%")
+    if rest:
+        raise ValueError(text)
+    return float(number) / (100.0 if percent else 1.0)
 
 
 def _plain(text: str) -> float | str:

@@ -18,12 +18,14 @@ from trunnion.cli.options import (
     Measures,
     OutTolerance,
     Report,
+    Seats,
     Seed,
     Set,
     Steps,
     TableFile,
     UnitsRow,
     named_file,
+    share,
 )
 from trunnion.cli.result import Shown, check_files, show_tables
 from trunnion.cli.terminal import bar, show_figures
@@ -61,7 +63,12 @@ def tolerance(
     method: Methods = None,
     target: Annotated[
         float | None,
-        typer.Option("--yield", help="Required share within limits; then it alone decides the exit status."),
+        typer.Option(
+            "--yield",
+            parser=share,
+            metavar="SHARE",
+            help="Required share within limits, 0.99 or 99%; then it alone decides the exit status.",
+        ),
     ] = None,
     samples: Annotated[int, typer.Option("--samples", help="Number of random mechanisms.")] = 10_000,
     seed: Seed = 1,
@@ -75,6 +82,7 @@ def tolerance(
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
+    seat: Seats = None,
     sample: Samples = None,
     kind: Kind = None,
     out: OutTolerance = None,
@@ -87,7 +95,7 @@ def tolerance(
     from trunnion.studies.tolerance.study import tolerance as run
 
     check_files(out or [], report, of="tolerance", kind=kind)
-    mechanism = stated(file, set_, table, friction)
+    mechanism = stated(file, set_, table, friction, seat)
     for text in sample or []:
         mechanism = mechanism.with_samples(*named_file(text, "--sample"))
     methods = tuple(method or (one for one in DEFAULT_METHODS if samples or one not in SAMPLINGS))

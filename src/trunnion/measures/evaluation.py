@@ -21,6 +21,7 @@ from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of
 from trunnion.solve.status import pose_status, status_of
+from trunnion.solve.system import Values
 
 __all__ = [
     "Curves", "Kernel", "NumpyKernel", "SeatedKernel", "courses_of", "lanes_of", "picked", "shape_of", "step_of",
@@ -35,11 +36,14 @@ STEP, STEP_OF_NONE = 1e-3, 1e-4  # of a number, and of the size of the mechanism
 class Kernel(Protocol):
     """Evaluates batches: values of the mechanism, (sample, 1) where they vary, and times, s.
 
-    at_once: places that it takes best at a time.
+    at_once: places that it takes best at a time; breaks: times, s, of each mechanism at which its courses may bend or
+    jump, None where these follow from those of the nominal one.
     """
 
     @property
     def at_once(self) -> int: ...
+
+    def breaks(self, values: Values) -> list[Array] | None: ...
 
     def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Curves, NDArray[np.int8]]: ...
 
@@ -56,6 +60,10 @@ class NumpyKernel:
     def at_once(self) -> int:
         """Places whose arrays stay in cache."""
         return CHUNK
+
+    def breaks(self, values: Values) -> list[Array] | None:
+        """None: they follow from those of the nominal mechanism."""
+        return None
 
     @cached_property
     def forces(self) -> bool:

@@ -31,6 +31,7 @@ from trunnion.results.scales import ROUNDING, Scales
 from trunnion.solve.run import Run
 from trunnion.solve.switches import (
     MARGINS,
+    SEATED,
     Bend,
     Mechanisms,
     accuracy_of,
@@ -138,9 +139,15 @@ class Group:
         return [bend for bend in every if matters(bend, self.measures)]
 
     @cached_property
+    def _breaks(self) -> Array:
+        """Times, s, at which courses of the nominal mechanism may bend or jump."""
+        own = self.kernel.breaks(self.values)
+        return np.array([bend.time for bend in self.bends]) if own is None else own[0]
+
+    @cached_property
     def course(self) -> Courses:
         """The courses of the nominal mechanism, whose panels are tuned."""
-        breaks = breaks_between(self.run.cycle, np.array([bend.time for bend in self.bends]), *self.span)
+        breaks = breaks_between(self.run.cycle, self._breaks, *self.span)
         return self._courses(self.values, [breaks], FIRST, tuned=True)[0]
 
     @cached_property
@@ -199,6 +206,8 @@ class Group:
 
     def tune(self, values: Values) -> None:
         """Part the panels until they resolve the courses of some mechanisms as far as their figures need it."""
+        if self._each_alone:
+            return
         own, lost = self._own_bends(values)
         for _ in range(0 if self.at_place else PARTED):
             edges = self._own_edges(own)
@@ -210,6 +219,11 @@ class Group:
             if not np.any(panels) or count > MOST_PANELS:
                 break
             self.edges = np.sort(np.append(self.edges, _middles(self.edges[None], panels)))
+
+    @property
+    def _each_alone(self) -> bool:
+        """Whether every mechanism has courses of its own, as its breaks do not follow from the nominal ones."""
+        return not self.at_place and self.kernel.breaks(self.values) is not None
 
     # ---- edges of others ----------------------------------------------------------------------------------
 
@@ -289,6 +303,8 @@ class Group:
         Panels that do not resolve the course of one as far as its figures need it are parted; what jumps within one has
         courses of its own.
         """
+        if self._each_alone:
+            return self._alone({}, values, np.arange(lanes_of(values)), times)
         own, lost = self._own_bends(values)
         edges = self._own_edges(own)
         reads, offending, gone = self._on(values, edges, times)
@@ -453,18 +469,21 @@ class Group:
                     for middle, low, high in zip(read[:3], below[name], above[name], strict=False)
                 ]
                 own[name] = Read(numbers[0], numbers[1], numbers[2], *read[3:])
-        return {name: _put(read, lanes, own[name]) for name, read in reads.items()}
+        return {name: _put(reads[name], lanes, read) if reads else read for name, read in own.items()}
 
     def _of_their_own(self, values: Values, times: Mapping[str, Array]) -> dict[str, Read]:
         """What courses of their own say of some mechanisms, each with the places where it switches looked for."""
         run, cycle, reads = self.run, self.run.cycle, list[dict[str, Read]]()
-        accuracy = MARGINS if self.measures[0].wants_margin else MOTION if self.of_motion else OWN
-        more = np.array([bend.time for bend in self.bends if self.against])
+        accuracy = SEATED if self._each_alone else MOTION if self.of_motion else OWN
+        accuracy = MARGINS if self.measures[0].wants_margin else accuracy
+        more = self._breaks if self.against else np.zeros(0)
         for lanes in _blocks(lanes_of(values), ALONE):
             block_values, count = picked(values, lanes), len(lanes)
             lengths = np.ravel(primal(moved(run, block_values, np.array([cycle.duration])))) / cycle.duration
             ratio, switching = np.broadcast_to(lengths, count), [np.zeros(0)] * count
-            if self.bends or not self.of_motion:
+            if (own := self.kernel.breaks(block_values)) is not None:
+                switching = own
+            elif self.bends or not self.of_motion:
                 cycles = [replace(cycle, duration=cycle.duration * float(length)) for length in ratio]
                 switching = bends(Mechanisms(run.system, run.chosen.assembly, block_values, cycles))
             breaks = [

@@ -89,8 +89,9 @@ JointType = Annotated[str, _check_type, _schema_type]
 Pitch = Annotated[Length, NotZero("the thread does not advance", "give another pitch, or state type: revolute")]
 
 
-_FIT = re.compile(r"^(?P<size>.*\S)\s+(?P<hole>[A-Z]{1,2}[0-9]{1,2})\s*/\s*(?P<shaft>[a-z]{1,2}[0-9]{1,2})$")
+_FIT = re.compile(r"^(?P<size>.*[^\sA-Z])\s*(?P<hole>[A-Z]{1,2}[0-9]{1,2})\s*/\s*(?P<shaft>[a-z]{1,2}[0-9]{1,2})$")
 _PLAIN = re.compile(r"[0-9]+(\.[0-9]*)?")
+_CLASSES = re.compile(r"\s*[A-Z]{1,2}[0-9]{1,2}\s*/\s*[a-z]{1,2}[0-9]{1,2}\s*")
 
 
 @dataclass(frozen=True)
@@ -109,7 +110,10 @@ class Fit:
             return source
         found = _FIT.match(source.strip()) if isinstance(source, str) else None
         if not isinstance(source, str) or not found:
-            raise problem(f"{str(source)[:60]!r} is not a fit", "write diameter, hole and shaft as 20 mm H7/g6")
+            classes = isinstance(source, str) and _CLASSES.fullmatch(source)
+            what = "has no diameter" if classes else "is not a fit"
+            remedy = ", or state the radius of the pin too" if classes else ""
+            raise problem(f"{str(source)[:60]!r} {what}", f"write diameter, hole and shaft as 20 mm H7/g6{remedy}")
         diameter = found["size"].lstrip("".join(DIAMETER)).strip()
         plain = bool(_PLAIN.fullmatch(diameter))
         if plain or diameter != found["size"]:  # Ø 24 H7/g6
@@ -150,6 +154,16 @@ class Pin(Part):
     offset: Length | None = None
     cylindricity: Annotated[Length | None, NotNegative] = None
     end_float: Annotated[Length | None, NotNegative] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fit_of_radius(cls, data: Any) -> Any:
+        """Classes beside a radius, `{radius: 20 mm, fit: H7/g6}`, are the fit of twice the radius."""
+        fit, radius = (data.get(key) for key in ("fit", "radius")) if isinstance(data, Mapping) else (None, None)
+        if not (isinstance(fit, str) and _CLASSES.fullmatch(fit) and isinstance(radius, str | int | float)):
+            return data
+        size = radius if isinstance(radius, str) else f"{radius} m"
+        return {key: value for key, value in data.items() if key != "radius"} | {"fit": f"2 * ({size}) {fit.strip()}"}
 
 
 class Guide(Part):

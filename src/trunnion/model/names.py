@@ -29,6 +29,8 @@ MEANT = {
     "gauss": "normal",
     "gaussian": "normal",
     "diameter": "radius",
+    "torque": "effort",
+    "speed": "rate",
 }
 REMARKS = {"radius": ", half the diameter"}
 _WORDS = ("true", "false", "null", "yes", "no", "on", "off")  # and what it does not

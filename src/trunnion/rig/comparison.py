@@ -31,9 +31,8 @@ from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import readable
 from trunnion.rig.judge import Judgement, Verdict, difference, expanded, going_on, judge, probability, uncertainty_of
 from trunnion.rig.modelled import Modelled, apart, each, in_condition, modelled
-from trunnion.rig.reading.efficiency import efficiency_of, load_joints, pairs_of
-from trunnion.rig.reading.log import gathered
-from trunnion.rig.reading.measurement import Condition, Measurement, Signal
+from trunnion.rig.reading.measurement import Condition, Measurement, Signal, efficiency_of, load_joints, pairs_of
+from trunnion.rig.reading.timebase import gathered
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import useful_loads, useful_springs
 
@@ -41,17 +40,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "CAUSES",
-    "GUM",
-    "VARIABLES",
-    "Cause",
-    "causes",
-    "compare",
-    "data_findings",
-    "hashed_files",
-    "other_speed",
+    "CAUSES", "GUM", "VARIABLES", "Cause", "causes", "compare", "data_findings", "hashed_files", "other_speed",
     "written_unit",
-]
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 GUM = "JCGM 100:2008, Evaluation of measurement data - Guide to the expression of uncertainty in measurement (GUM)"

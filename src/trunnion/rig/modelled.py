@@ -15,13 +15,14 @@ from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
-from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Condition, Signal
+from trunnion.rig.reading.timebase import gathered
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 
-__all__ = ["Modelled", "apart", "each", "in_condition", "measure_of", "modelled", "over_pulses", "refuse_backwards",
-           "refuse_unit"]  # fmt: skip
+__all__ = [
+    "Modelled", "apart", "each", "in_condition", "measure_of", "modelled", "over_pulses", "refuse_unit", "same_cycle",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 FAR = 0.05  # of a speed: an error of the settings
@@ -125,7 +126,7 @@ def modelled(
         name, ends = next(iter(run.system.mechanism.drivers)), np.array([0.0, run.cycle.duration * (1 - 1e-12)])
         drive, edges = (_row(run.system.drive(run.values, name, at)[0], at) for at in (time, ends))
         first, last = (float(end) for end in edges)
-    _same_cycle(run, condition, unit, first, last - first)
+    same_cycle(run, condition, run.cycle.duration, first, last - first if unit == "rad" else float("nan"))
     courses, left_open = {}, dict[str, Array]()
     for channel, measure in measures.items():
         courses[channel] = course = _row(by_measure[measure.name][0], time)
@@ -204,15 +205,19 @@ def _row(number: object, time: Array) -> Array:
     return np.array(np.broadcast_to(np.asarray(number, float), time.shape))
 
 
-def _same_cycle(run: Run, condition: Condition, unit: str, begin: float, span: float) -> None:
-    """MechanismError where the cycle that was cut out of the data is not the model's, or starts elsewhere."""
-    if abs(condition.duration - run.cycle.duration) > SLOWER * run.cycle.duration:
-        what = f"the cycle of the data is {condition.duration:g} s, that of the model {run.cycle.duration:g} s"
-        remedy = f"state cycle: {run.cycle.duration:g} s in the mapping, or set: the number of the model that makes it"
+def same_cycle(run: Run, condition: Condition, duration: float, begin: float, span: float) -> None:
+    """MechanismError where the cycle that was cut out of the data is not the model's, or starts elsewhere.
+
+    duration: of the model's, s; begin, span: where the driver is at its start, and how far it turns, rad; NaN where its
+    turns name no position.
+    """
+    if abs(condition.duration - duration) > SLOWER * duration:
+        what = f"the cycle of the data is {condition.duration:g} s, that of the model {duration:g} s"
+        remedy = f"state cycle: {duration:g} s in the mapping, or set: the number of the model that makes it"
         raise MechanismError(Finding(what, "cycle", remedy))
-    if unit != "rad":
+    if not np.isfinite(span):
         return
-    refuse_backwards(run.system.mechanism, condition, span / run.cycle.duration)
+    _refuse_backwards(run.system.mechanism, condition, span / duration)
     if not np.isfinite([condition.start, condition.cycle]).all():
         return
     findings: list[Finding] = []
@@ -228,7 +233,7 @@ def _same_cycle(run: Run, condition: Condition, unit: str, begin: float, span: f
         raise MechanismError(findings)
 
 
-def refuse_backwards(mechanism: Mechanism, condition: Condition, speed: float) -> None:
+def _refuse_backwards(mechanism: Mechanism, condition: Condition, speed: float) -> None:
     """MechanismError where a condition turns the other way than the model, which turns at `speed`, rad/s."""
     if condition.speed * speed < 0:
         driver, rpm = next(iter(mechanism.drivers), ""), np.pi / 30

@@ -42,7 +42,7 @@ Values = Mapping[str, Number]  # every number of a mechanism by its path, SI
 
 
 MOST_INTERVALS = 6  # named in one finding; the rest are counted
-ROUNDING = 1e-12  # of the largest coordinate of a drive
+ROUNDING = 1e-7  # of the largest coordinate of a drive: what courses do not resolve
 
 Positions = NDArray[np.intp]
 

@@ -251,7 +251,7 @@ def _plays(run: Run) -> Inputs:
     findings = [finding for name, one in plays.items() for finding in shifts.unstated_length(name, one)]
     if findings:
         raise MechanismError(findings)
-    return Inputs(run, (), tuple(plays), (), Population([], None))
+    return Inputs(run, (), tuple(plays), (), (), Population([], None))
 
 
 def _by_joint(first: FirstOrder, blank: Array) -> JointEffects:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.errors import Finding, MechanismError
-from trunnion.results.attributes import attribute
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.results.attributes import attribute, findings_of
 from trunnion.results.quantities import decimals, number, prefixed, read_in, with_uncertainty
 from trunnion.rig.identification.uncertainty import quantile
 from trunnion.views.charts import Axis, Band, Cells, Chart, Legend, Line, Look, Mark, Note, Panel
@@ -45,7 +45,7 @@ class Estimate:
     """One unknown as it is read: in degrees, mm or SI.
 
     limit: −1 or 1 where it is on its lower or upper limit; identifiable: whether the data tell it; shares: of each
-    source in its variance.
+    source in its variance; lacking: why there is no estimate.
     """
 
     name: str
@@ -60,6 +60,7 @@ class Estimate:
     limit: int
     identifiable: bool
     shares: dict[str, float]
+    lacking: str = "not identifiable"
 
     @cached_property
     def half(self) -> float:
@@ -96,7 +97,7 @@ class Estimate:
     def cells(self) -> tuple[str, str, str, str]:
         """Estimate ± U, its interval, degrees of freedom, and what most of its variance is due to."""
         if not self.identifiable:
-            return "not identifiable", NONE, "", ""
+            return self.lacking, NONE, "", ""
         freedom, source = f"{self.freedom:.0f}" if self.freedom < MANY else "∞", ""
         if self.shares:
             name = max(self.shares, key=self.shares.__getitem__)
@@ -118,6 +119,8 @@ def estimates(result: xr.Dataset) -> list[Estimate]:
     rows = []
     units, paths = attribute(result, "parameter_units"), attribute(result, "parameter_paths")
     sources = names(result, "source")
+    errors = {one.code for one in findings_of(result) if one.severity is Severity.ERROR}
+    lacking = "model does not fit" if errors & {"fit.misfit", "sensor.off"} else "not identifiable"
     for p, name in enumerate(names(result, "parameter")):
         factor, shown = read_in(units[p])
         keys = ("start", "estimate", "standard_uncertainty", "lower", "upper")
@@ -126,7 +129,7 @@ def estimates(result: xr.Dataset) -> list[Estimate]:
         rows.append(
             Estimate(name, tuple(paths[p]), shown, start, value, deviation, lower, upper,
                      float(result["degrees_of_freedom"].values[p]), int(result["limit"].values[p]),
-                     bool(result["told"].values[p]), shares)
+                     bool(result["told"].values[p]), shares, lacking)
         )  # fmt: skip
     return rows
 
@@ -278,7 +281,7 @@ def _interval(row: Estimate, legend: Legend | None) -> Panel:
         marks = [Line(np.array(ends), np.zeros(2), "95 % interval", Look(AFTER, 6.0, alpha=0.35)),
                  Line(np.array([row.value]), zero, "estimate", Look(AFTER, dash="none", mark="o", size=6))]  # fmt: skip
     else:
-        marks = [Note("not identifiable", 0.5, 0.75, size=8.5)]
+        marks = [Note(row.lacking, 0.5, 0.75, size=8.5)]
     start = Look(BEFORE, dash="none", mark="D", size=5, hollow=True)
     marks.append(Line(np.array([row.start]), zero, "start", start))
     low, high = min(points), max(points)
@@ -415,6 +418,6 @@ def _summary(result: xr.Dataset) -> Summary:
     summary = []
     for row in estimates(result)[:MOST_TILES]:
         pair = (row.say(row.value), "at its bound" if row.limit else f"± {row.say(row.half)}, 95 %")
-        summary.append((row.short, [pair if row.identifiable else ("not identifiable", "from these data")]))
+        summary.append((row.short, [pair if row.identifiable else (row.lacking, "from these data")]))
     chi = float(result["reduced_chi_squared"])
     return [*summary, *([("reduced χ²", [(number(chi, 3), "near 1 if the model fits")])] if np.isfinite(chi) else [])]

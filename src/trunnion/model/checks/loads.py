@@ -79,6 +79,8 @@ def unknown_name(mechanism: Numbers, name: str, path: str, source: object, known
     section = path.partition(".")[0]
     refers = "" if str(source).strip() == name else f"refers to '{name}', which "
     what = f"'{source}' {refers}is not one of the dimensions"
+    if section == "measures" and name in ("start", "end") and path.rpartition(".")[2] in ("at", "over"):
+        return Finding(f"'{name}' is no position", path, "write the coordinate of the driver there, or a time, as 0 s")
     if name in ("off", "none"):
         return Finding(f"'{source}' is no number", path, "write 0")
     if PLACED in name and section != "loads":

@@ -11,7 +11,6 @@ from trunnion.model.checks.tolerances import stated_entries
 from trunnion.model.parameters import Entry, Numbers, ParameterSet, measured
 from trunnion.model.parts import USUAL_PRESSURE_ANGLE
 from trunnion.model.quantity import Quantity, evaluation_order
-from trunnion.model.tolerances import cost_paths
 from trunnion.model.units import KINDS, NUMBER, Dimension, Kind, UnitError, unit
 
 __all__ = [
@@ -45,7 +44,6 @@ def magnitudes(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
     pins = [one for one in lengths if one.path.endswith((".pin.radius", ".guide.length")) and not one.alias]
     known = max((values[one.path] for one in places if not _plain(mechanism, one)), default=0.0)
     bare = _without_unit(mechanism, entries, nominal) if known > 0 else None
-    yield from _of_unit_one(mechanism, numbers) if bare is not None else ()
     bare = bare or {}
     told: dict[str, float] = {}
     for path, kind in bare.items():
@@ -83,16 +81,6 @@ def _meant(path: str, value: float, kind: Kind) -> Finding:
     others = "other lengths" if kind is KINDS["length"] else "lengths"
     what = f"is {value:g} {kind.unit}, a plain number where {others} have a unit"
     return Finding(what, path, f"write {value:g} {kind.unit}{other}", Severity.NOTE)
-
-
-def _of_unit_one(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
-    """Notes of cost formulas of lengths whose B is paid at a half width of 1 m, for they state no unit."""
-    kinds = measured(mechanism, numbers.entries.values())
-    for name, cost in mechanism.costs.items():
-        paths = cost_paths(mechanism, name, numbers) if cost.model and cost.unit is None else []
-        if paths and kinds.get(paths[0], KINDS["length"]) is KINDS["length"]:
-            what = "states no unit: B is what a half width of 1 m costs, where other lengths have a unit"
-            yield Finding(what, f"costs.{name}", "write unit: m, or unit: mm if that is meant", Severity.NOTE)
 
 
 def _without_unit(

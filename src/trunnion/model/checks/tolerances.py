@@ -345,6 +345,9 @@ def cost_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
                 what = f"'{path}' varies as measured or over a full turn: there is no tolerance to choose"
                 yield Finding(what, where, "remove the cost", Severity.WARNING)
             kind = KINDS["length"] if play else kinds[path]
+            if cost.model is not None and cost.unit is None and kind.name in ("length", "angle"):
+                what = f"states no unit: B is what a half width of 1 unit costs, of this {kind.name}"
+                yield Finding(what, where, f"write unit: {'mm' if kind.name == 'length' else 'deg'}")
             yield from _formula(cost, where, kind)
             yield from _price(price(mechanism, path, cost, numbers), where)
             yield from _process(mechanism, cost, path, where, kind, numbers)

@@ -170,8 +170,8 @@ def _groups(identified: Identified) -> Iterator[Finding]:
 
 
 def _vague(identified: Identified) -> Iterator[Finding]:
-    """Unknowns that the data hardly determine."""
-    for p in np.flatnonzero(identified.vague):
+    """Unknowns that the data hardly determine; of a model that does not fit, that is why."""
+    for p in np.flatnonzero(identified.vague) if not identified.refuted else ():
         unknown = identified.fit.model.unknowns[p]
         about = with_uncertainty(float(identified.x[p]), float(identified.half[p]), unknown.unit)
         what = f"{unknown.name} is not identifiable: its 95 % interval, {about}, is wider than the value itself"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -11,21 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.summary import inputs, references
-from trunnion.errors import Finding
+from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import attribute, finding_rows, origin
+from trunnion.model.quantity import Quantity
+from trunnion.results.attributes import attribute, finding_rows, findings_of, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import decimals
 from trunnion.results.tables.studies import CURVES
 from trunnion.rig.comparison import data_findings, hashed_files, written_unit
 from trunnion.rig.identification.fit import FAR, Fit, Solution, sizes_of, solved
 from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, InseparableUnknowns, quantile
+from trunnion.rig.reading.mapping import DataMapping
 from trunnion.rig.reading.measurement import Measurement, rms
+from trunnion.rig.reading.units import Amount
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "Identified", "MisfitCause", "dataset", "with_estimates"]
+__all__ = ["VARIABLES", "Identified", "MisfitCause", "corrected_mapping", "dataset", "with_estimates"]
 
 Array = NDArray[np.float64]
 SOURCES = (
@@ -105,7 +109,8 @@ class MisfitCause(NamedTuple):
 class Identified:
     """An identification, with the figures of it, (unknown,) unless said.
 
-    groups: what the data do not tell apart; causes: what would explain a misfit, best first.
+    groups: what the data do not tell apart; causes: what would explain a misfit, best first; encoder: path of an
+    unknown by which the encoder of the data is off, no number of the mechanism; empty without.
     """
 
     mechanism: Mechanism
@@ -115,6 +120,7 @@ class Identified:
     spread: Covariances
     groups: Sequence[InseparableUnknowns]
     causes: Sequence[MisfitCause]
+    encoder: str = ""
 
     @property
     def x(self) -> Array:
@@ -289,6 +295,7 @@ def dataset(identified: Identified, findings: Sequence[Finding]) -> xr.Dataset:
         "identified": measurement.name,
         **origin(mechanism, system.plan.formula),
         "confidence": CONFIDENCE,
+        "encoder": identified.encoder,
         "parameter_paths": [one.paths for one in model.unknowns],
         "parameter_units": [one.unit for one in model.unknowns],
         "channel_units": [one.unit(system) for one in model.measures.values()],
@@ -358,13 +365,14 @@ def with_estimates(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
 
     Returns
     -------
-    The mechanism with the estimates, in the units that were written there; what is not identifiable stays as it is.
+    The mechanism with the estimates, in the units that were written there; what is not identifiable stays as it is, and
+    so does the start of a driver: by that the encoder is off, see `corrected_mapping`.
     """
     values: dict[str, float | str] = {}
     units = attribute(result, "parameter_units")
     for p, paths in enumerate(attribute(result, "parameter_paths")):
         estimate, u = (float(result[name].values[p]) for name in ("estimate", "standard_uncertainty"))
-        if result["told"].values[p]:
+        if result["told"].values[p] and result.attrs["encoder"] not in paths:
             values |= {path: _text(mechanism, path, estimate, u, units[p]) for path in paths}
     return mechanism.with_values(values)
 
@@ -376,3 +384,66 @@ def _text(mechanism: Mechanism, path: str, value: float, u: float, si: str) -> f
     places = decimals(u / factor) if u > 0 else 6
     number = f"{round(value / factor, places):.{max(places, 0)}f}" if places < 12 else f"{value / factor:.6g}"
     return f"{number} {written}" if written else float(number)
+
+
+# ---- in the mapping --------------------------------------------------------------------------------------------
+
+
+def corrected_mapping(mapping: Mapping[str, Any], result: xr.Dataset) -> dict[str, Any]:
+    """Put into a mapping the zero of the angle or of a channel that a result says is off.
+
+    Parameters
+    ----------
+    mapping : entries of the mapping that was identified with.
+    result : of `identify`, with the start of the first driver among its parameters, or with one error of the angle or
+        of a zero that explains its misfit.
+
+    Returns
+    -------
+    The entries with other zeros: identification with them finds none off.
+
+    Raises
+    ------
+    MechanismError
+        Where the result finds no such error, or the zero of the channel is that of an unloaded stretch.
+    """
+    entries = deepcopy(dict(mapping))
+    path, paths = str(result.attrs["encoder"]), attribute(result, "parameter_paths")
+    p = next((p for p, own in enumerate(paths) if path in own and result["told"].values[p]), None)
+    causes = (one.figures for one in findings_of(result) if one.code == "fit.cause")
+    cause: Mapping[str, Any] = next(causes, {"kind": ""})
+    if p is not None:
+        _turn(entries, float(result["estimate"].values[p]) - _model_start(result, path))
+    elif cause["kind"] == "angle":
+        _turn(entries, cause["size"])
+    elif cause["kind"] == "zero":
+        _shift(entries, cause["channel"], cause["size"])
+    else:
+        what = "no zero of the angle or of a channel explains a misfit: there is nothing to correct in the mapping"
+        raise MechanismError(Finding(what, "mapping", "identify drivers.NAME.start for the zero of the angle"))
+    return entries
+
+
+def _model_start(result: xr.Dataset, path: str) -> float:
+    """The coordinate of the first driver at the start of the cycle in the model, rad."""
+    return next((float(row["value"]) for row in attribute(result, "inputs") if row["path"] == path), 0.0)
+
+
+def _turn(entries: dict[str, Any], angle: float) -> None:
+    """Another zero of the angle, rad, and of the files that state their own."""
+    parts = [entries.get("angle"), *(file.get("angle") for file in entries.get("files", ()))]
+    for part in (part for part in parts if isinstance(part, dict)):
+        zero = float(Quantity.read(part.get("zero", 0)).evaluate()) + angle
+        part["zero"] = f"{np.degrees(zero):.4f} deg"
+
+
+def _shift(entries: dict[str, Any], name: str, size: float) -> None:
+    """Another zero of a channel that reads too much by a size, SI."""
+    channel, part = DataMapping.model_validate(entries).channels[name], entries["channels"][name]
+    scale = channel.scale(channel.unit or "")
+    own = any("zero" in file.get("channels", {}).get(name, {}) for file in entries.get("files", ()))
+    if own or not isinstance(channel.zero, Amount):
+        what = f"the zero of an unloaded stretch, or of single files, is off by {size:.4g} {scale.unit}"
+        raise MechanismError(Finding(what, f"channels.{name}.zero", "check what loads the sensor there"))
+    zero = scale.factor * scale.reading(channel.zero, "zero") + channel.sign * size
+    part["zero"] = f"{zero:.6g} {scale.unit}"

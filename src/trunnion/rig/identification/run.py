@@ -34,12 +34,19 @@ from trunnion.rig.identification.fit import (
     solved,
 )
 from trunnion.rig.identification.result import Identified, MisfitCause, dataset
-from trunnion.rig.identification.signals import Model
+from trunnion.rig.identification.signals import Model, Parameters, described, unknowns
 from trunnion.rig.identification.uncertainty import LackOfFit, excess, inseparable, quantile, spread_of
-from trunnion.rig.identification.unknowns import Parameters, described, unknowns
-from trunnion.rig.modelled import apart, each, in_condition, measure_of, refuse_backwards, refuse_unit
-from trunnion.rig.reading.efficiency import efficiency_of, load_joints, pairs_of
-from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, rms
+from trunnion.rig.modelled import apart, each, in_condition, measure_of, refuse_unit, same_cycle
+from trunnion.rig.reading.measurement import (
+    Accuracy,
+    Condition,
+    Measurement,
+    Signal,
+    efficiency_of,
+    load_joints,
+    pairs_of,
+    rms,
+)
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 
@@ -121,9 +128,17 @@ def identify(
     if channels is None:
         model = replace(model, measures=_acted_on(model))
         blocks = [block for block in blocks if block.channel in model.measures]
-    at = np.array([one.start for one in sought])
-    speeds = iter([model.driven(k, at)[2] for k in range(len(conditions))])
-    each(conditions, lambda one: refuse_backwards(mechanism, one, next(speeds)))
+    encoder = f"drivers.{next(iter(mechanism.drivers), '')}.start"  # an unknown of data that state an angle
+    if not (any(encoder in one.paths for one in sought) and np.isfinite([one.start for one in conditions]).any()):
+        encoder = ""
+    at = np.array([one.before[0] if encoder in one.paths else one.start for one in sought])
+    cycles = iter([(model.durations[k], *model.driven(k, at)) for k in range(len(conditions))])
+
+    def check(condition: Condition) -> None:
+        duration, first, last, _ = next(cycles)
+        same_cycle(run, condition, duration, first, last - first)
+
+    each(conditions, check)
     errors = sensor_errors(model, conditions, blocks)
     fit = Fit(Evaluations(model, progress), blocks, errors, guard)
     begin = _runnable(fit)
@@ -136,7 +151,7 @@ def identify(
     other_speeds = [apart(one.speed, model.driven(k, best.x[: fit.count])[2]) for k, one in enumerate(conditions)]
     causes = _causes(fit, begin, spread.test) if spread.test.misfit and not any(other_speeds) else []
     groups = inseparable(fit, best.x, spread)
-    identified = Identified(mechanism, measurement, fit, best, spread, groups, causes)
+    identified = Identified(mechanism, measurement, fit, best, spread, groups, causes, encoder)
     return dataset(identified, findings_of(identified))
 
 

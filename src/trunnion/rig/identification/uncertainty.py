@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from trunnion.rig.identification.fit import Fit, sizes_of
 from trunnion.rig.reading.measurement import student
-from trunnion.rig.reading.steps import covariance_of_steps
+from trunnion.rig.reading.turns import covariance_of_steps
 
 __all__ = [
     "CONFIDENCE", "Combination", "Covariances", "InseparableUnknowns", "LackOfFit", "excess",

@@ -17,10 +17,9 @@ from scipy.ndimage import convolve1d, median_filter, minimum_filter1d, uniform_f
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.rig.reading.channels import unit_differs
-from trunnion.rig.reading.log import at_times, counted, warning
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.tables import Column, DataTable
-from trunnion.rig.reading.timebase import GAP, Timeline
+from trunnion.rig.reading.timebase import GAP, Timeline, at_times, counted, warning
 
 __all__ = ["Coordinate", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved"]
 

@@ -16,26 +16,31 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import UnitError, si_unit
-from trunnion.rig.reading import checks
 from trunnion.rig.reading.angle import coordinate
 from trunnion.rig.reading.channels import (
     LOOKED_AT,
+    WIDTH,
     ChannelReading,
     Zeroed,
     check_filter,
+    clipped,
+    common_drift,
+    faults,
     filtered,
+    missing,
     noise_of,
     reading,
     resolution,
+    signs,
+    speeds,
+    steady,
     zeroed,
 )
-from trunnion.rig.reading.log import counted, gathered, note, warning
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Zero, read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
-from trunnion.rig.reading.steps import LeftOfSteps, left_in_turns
 from trunnion.rig.reading.tables import Column, DataTable, read_table
-from trunnion.rig.reading.timebase import timeline
-from trunnion.rig.reading.turns import DENSE, Turns, cut, joined, resampled, time_mean
+from trunnion.rig.reading.timebase import counted, gathered, note, timeline, warning
+from trunnion.rig.reading.turns import DENSE, LeftOfSteps, Turns, cut, joined, left_in_turns, resampled, time_mean
 from trunnion.rig.reading.units import dimensions, unit_name
 
 __all__ = ["read_measured"]
@@ -208,9 +213,9 @@ class _Recording:
             column, where = self.table.columns[channel.column], f"channels.{name}"
             sensor = self.sensors[name] = reading(name, channel, column, say)
             values = self.readings[name] = np.array(self.line.rows(column.values))
-            say(checks.missing(where, column, values, self.line.seconds))
+            say(missing(where, column, values, self.line.seconds))
             if sensor.limit is not None:
-                say(checks.clipped(where, values, sensor.limit, sensor.unit, self.line.seconds))
+                say(clipped(where, values, sensor.limit, sensor.unit, self.line.seconds))
             self.zeros[name] = zeroed(name, channel, sensor, values, self.line, say)
         self.used = np.ones(self.line.seconds.size, dtype=np.bool_)
         if self.entry.over is not None:
@@ -313,7 +318,7 @@ class _Recording:
             if turns.numbers.size < 2:
                 what = "has one turn: there is no scatter, so no uncertainty"
                 say(warning("turns.one", part.where, what, "record two turns or more"))
-            say(checks.steady(turns, self.line.step, part.where))
+            say(steady(turns, self.line.step, part.where))
             if turns.density < 1:
                 samples = f"{turns.density * positions:.4g} samples a turn for {positions} positions"
                 what = f"the sampling is slow: {samples}; between them it is interpolated"
@@ -339,10 +344,10 @@ class _Recording:
         self.running = slice(low, high)
         reach = float(np.median(end - begin)) / self.mapping.positions
         reach += PERIODS / self.mapping.filter.cut_off.value if self.mapping.filter is not None else 0.0
-        beside = checks.WIDTH + int(reach / self.line.step)
+        beside = WIDTH + int(reach / self.line.step)
         for name, channel in self.mapping.channels.items():
             where, readings, moves = f"channels.{name}", self.readings[name], not channel.measures.startswith("rate:")
-            for finding in checks.faults(where, readings, self.line.seconds, (begin, end), beside, moves):
+            for finding in faults(where, readings, self.line.seconds, (begin, end), beside, moves):
                 self.say(finding)
 
     def levels(self, name: str) -> Array:
@@ -363,8 +368,8 @@ class _Recording:
             turning = self._speed(self.parts)
             zeros = {name: accuracy.zero for name, accuracy in accuracies.items()}
             units = {name: sensor.shown for name, sensor in self.sensors.items()}
-            self.say(checks.speeds(channels, together, units, turning))
-            for finding in checks.signs(channels, together, zeros, turning):
+            self.say(speeds(channels, together, units, turning))
+            for finding in signs(channels, together, zeros, turning):
                 self.say(finding)
         return [self._condition(part, accuracies) for part in self.parts]
 
@@ -392,7 +397,7 @@ class _Recording:
             part.left[name] = left_in_turns(part.turns, course, readings / step, noise / step)
         own = size * zero.uncertainty
         parts = [(part.turns, part.courses[name]) for part in self.parts]
-        drift = None if channel.measures.startswith("rate:") else checks.drift(parts)  # a speed that creeps is real
+        drift = None if channel.measures.startswith("rate:") else common_drift(parts)  # a speed that creeps is real
         if drift is not None:
             remove = self.mapping.drift == "remove"
             since = float(line.seconds[0]) if np.isnan(zero.since) else zero.since

@@ -170,11 +170,10 @@ def _measures(text: str) -> str:
     """A measure that has a course: KIND:NAME, link.point.x or the name of one of the model."""
     kind, (_, colon, subject) = _kind(text), text.partition(":")
     if (kind and kind not in QUANTITIES) or (colon and not subject.strip()) or not text.strip():
-        kinds = ", ".join(f"{one}:NAME" for one in QUANTITIES if one != "point")
         near = nearest(kind, QUANTITIES)
-        remedy = f"{near} " if near.startswith("did") else ""
         what = f"'{text[:80]}' is not a quantity that a sensor measures"
-        raise problem(what, f"{remedy}write {kinds} or link.point.x")
+        remedy = "write effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT or link.point.x"
+        raise problem(what, near if near.startswith("did") else remedy)
     return text
 
 

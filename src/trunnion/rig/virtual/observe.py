@@ -26,9 +26,8 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
 from trunnion.rig.modelled import measure_of
 from trunnion.rig.reading.rig_file import Rig, Value
-from trunnion.rig.virtual.observation import Case, Observation, check_seed, speed_differs
+from trunnion.rig.virtual.observation import Case, Observation, check_seed, cycle_efficiency, sampled, speed_differs
 from trunnion.rig.virtual.sensors import SensorChannel, draw, resolved
-from trunnion.rig.virtual.true_signals import cycle_efficiency, sampled
 from trunnion.solve.run import Run, prepare
 
 __all__ = ["Observation", "observe"]

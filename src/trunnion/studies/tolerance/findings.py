@@ -99,19 +99,6 @@ def findings_of(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
     yield from run.chosen.findings
     if run.determinacy is not None:
         yield from run.determinacy.findings()
-    loaded = [seat.joint for seat in run.seats if seat.given is None]
-    if loaded:
-        what = (
-            f"the pins of {', '.join(loaded)} can be anywhere in their holes here: that the model has them pressed by "
-        )
-        what += (
-            "the load (seat: loaded) is left out, and scatter and limits are about the mechanism with every pin in the "
-        )
-        what += "middle of its hole"
-        remedy = (
-            "`trunnion analyse` has the shift by that seat; pins that are always pressed one way: state seat: {xi: …}"
-        )
-        yield Finding.note("tolerance.seats_not_taken", "joints", what, remedy, joints=loaded)
     if study.effects.correlated:
         what = "RSS and worst case ignore the correlations; standard deviation, shares of variance and samples include "
         yield Finding.note("tolerance.correlations_left_out", "correlations", f"{what}them")

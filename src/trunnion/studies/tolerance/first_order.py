@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from trunnion.cycle.positions import check_steps
-from trunnion.dynamics.measured import MotionKernel
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.many import Many
@@ -22,7 +21,7 @@ from trunnion.solve.run import Run, prepare
 from trunnion.studies.tolerance.effects import Effects, effects_of
 from trunnion.studies.tolerance.indices import Indices
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
-from trunnion.studies.tolerance.kernel import many_of
+from trunnion.studies.tolerance.kernel import kernel_of, many_of
 from trunnion.studies.tolerance.linear import Linear, Reference, linear, references, searched
 from trunnion.studies.tolerance.sampling import Samples, Sampling, towards
 from trunnion.studies.tolerance.search import Corner
@@ -54,7 +53,10 @@ class ToleranceStudy:
 
     @cached_property
     def kernel(self) -> NumpyKernel:
-        return MotionKernel(self.run, self.measures, self.friction)
+        """The analysis of the mechanism and of others like it."""
+        kernel = kernel_of("numpy", self.run, self.measures, self.friction)
+        assert isinstance(kernel, NumpyKernel)
+        return kernel
 
     @cached_property
     def effects(self) -> Effects:
@@ -89,7 +91,7 @@ class ToleranceStudy:
             rotation = towards(np.array([of.figure.gradient()[:count] for of in self.linear.measures]))
         return Sampling(
             model, self.measures, self.steps, method, samples, seed, engine, self.friction, len(self.plan.times),
-            rotation,
+            rotation, bool(self.inputs.pressed),
         )  # fmt: skip
 
 

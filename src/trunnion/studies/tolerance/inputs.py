@@ -36,13 +36,14 @@ class Inputs:
     """The random numbers of a mechanism, in the order in which they are drawn.
 
     tolerances: of numbers, drawn from the population; loose: joints whose pins may lie anywhere in their holes; held:
-    those whose seats are given.
+    those whose seats are given; pressed: those whose pins lie where their loads press them, which the kernel finds.
     """
 
     run: Run
     tolerances: tuple[Tolerance, ...]
     loose: tuple[str, ...]
     held: tuple[str, ...]
+    pressed: tuple[str, ...]
     population: Population
 
     @property
@@ -203,12 +204,12 @@ def inputs_of(run: Run) -> Inputs:
     """The random numbers of a mechanism. Raises MechanismError if nothing varies, or a play has no length."""
     mechanism = run.system.mechanism
     tolerances = tuple(mechanism.tolerated())
-    seated = {seat.joint for seat in run.seats if seat.given is not None}
+    held = tuple(seat.joint for seat in run.seats if seat.given is not None)
+    pressed = tuple(seat.joint for seat in run.seats if seat.given is None)
     plays = {name: play for name in run.system.joints if (play := _play(run, name)) is not None}
-    loose = tuple(name for name in plays if name not in seated)
-    fixed_pins = tuple(name for name in plays if name in seated)
+    loose = tuple(name for name in plays if name not in (*held, *pressed))
     if not tolerances and not loose:
-        remedy = "write `60 mm ± 0.05 mm`, an entry in `tolerances`, or a clearance of a joint"
+        remedy = "write `60 mm ± 0.05 mm`, an entry in `tolerances`, or a clearance of a joint without a seat"
         raise MechanismError(Finding("nothing has a tolerance or a clearance", "tolerances", remedy))
     findings = list(_uneven(mechanism, tolerances))
     for name, play in plays.items():
@@ -219,7 +220,7 @@ def inputs_of(run: Run) -> Inputs:
         Marginal(tolerance.distribution, tolerance.lower, tolerance.upper, tolerance.options)
         for tolerance in tolerances
     ]
-    return Inputs(run, tolerances, loose, fixed_pins, Population(marginals, mechanism.correlation()))
+    return Inputs(run, tolerances, loose, held, pressed, Population(marginals, mechanism.correlation()))
 
 
 def _uneven(mechanism: Mechanism, tolerances: Sequence[Tolerance]) -> Iterator[Finding]:

@@ -3,23 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import Dual
+from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.cycle.cycle_kernel import Engine
-from trunnion.dynamics.measured import MotionKernel
+from trunnion.dynamics.measured import MotionKernel, courses_in_time
 from trunnion.errors import Finding, MechanismError
-from trunnion.measures.evaluation import Curves, Kernel, NumpyKernel, where_known
+from trunnion.measures.evaluation import (
+    Curves,
+    Kernel,
+    NumpyKernel,
+    SeatedKernel,
+    lanes_of,
+    shape_of,
+    step_of,
+    where_known,
+)  # fmt: skip
 from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure
+from trunnion.measures.positions import moved
 from trunnion.solve.backward import Backward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
+from trunnion.solve.seating import seating_of
 from trunnion.solve.walk_kernel import WalkKernel
 from trunnion.statistics.streams import uniforms
 from trunnion.studies.tolerance.inputs import Inputs
@@ -28,7 +40,78 @@ __all__ = ["batch_of", "engine_for", "kernel_of", "many_of"]
 
 AT_ONCE = {"numpy": 10_000, "compiled": 1 << 20}  # numbers in an array, by engine
 PILOTS = 24  # samples that tell how finely the courses of all have to be resolved
+MOST_RUNS = 64  # mechanisms whose seats are kept
 WORTH_COMPILING = 500_000  # configurations; NumPy does as many in the time that compiling takes at most
+
+
+@dataclass(frozen=True)
+class LoadedKernel(MotionKernel):
+    """Mechanisms whose pins lie where their loads press them: each by itself, as `analyse` has it.
+
+    Where a pin crosses its hole is another place in each, so that no panels serve all. Derivatives are central
+    differences.
+    """
+
+    @cached_property
+    def _runs(self) -> dict[bytes, Run]:
+        return {}
+
+    def _run(self, values: Mapping[str, Number], lane: int) -> Run:
+        """One of the mechanisms, over its own cycle; the last few are kept with their seats."""
+        numbers = {path: np.ravel(np.asarray(primal(number), float)) for path, number in values.items()}
+        own = {path: float(number[lane if len(number) > 1 else 0]) for path, number in numbers.items()}
+        key = np.array(list(own.values())).tobytes()
+        if key not in self._runs:
+            while len(self._runs) >= MOST_RUNS:
+                self._runs.pop(next(iter(self._runs)))
+            end = moved(self.run, own, np.array([self.run.cycle.duration]))
+            cycle = replace(self.run.cycle, duration=float(np.ravel(primal(end))[0]))
+            self._runs[key] = replace(self.run, values=own, cycle=cycle)
+        return self._runs[key]
+
+    def breaks(self, values: Mapping[str, Number]) -> list[NDArray[np.float64]]:
+        """Times, s, of each mechanism at which its seats or its forces may bend or jump."""
+        runs = (self._run(values, lane) for lane in range(lanes_of(values)))
+        return [
+            np.concatenate([[bend.time for bend in run.bends], seating_of(run, self.method).breaks]) for run in runs
+        ]
+
+    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Curves, NDArray[np.int8]]:
+        """As `NumpyKernel.courses`."""
+        curves, status = self._solved(values, primal(time))
+        if not any(isinstance(number, Dual) for number in (time, *values.values())):
+            return curves, status
+        step, sides = step_of(self.run, values, lanes_of(values)), []
+        for sign in (-1.0, 1.0):
+            numbers = {path: primal(number) + sign * step * derivative(number) if isinstance(number, Dual) else number
+                       for path, number in values.items()}  # fmt: skip
+            sides.append(self._solved(numbers, primal(time) + sign * step * derivative(time))[0])
+        width = np.where(step > 0, 2 * step, np.inf)
+        return {
+            name: tuple(
+                Dual(middle, (above - below) / width)
+                for middle, below, above in zip(parts, *(side[name] for side in sides), strict=True)
+            )
+            for name, parts in curves.items()
+        }, status
+
+    def _solved(self, values: Mapping[str, Number], time: Any) -> tuple[Curves, NDArray[np.int8]]:
+        """Courses and statuses, (sample, position), of mechanisms without derivatives."""
+        shape = shape_of(values, time)
+        times = np.broadcast_to(time, shape).reshape(-1, shape[-1])
+        runs = [self._run(values, lane) for lane in range(lanes_of(values))]
+        times = times.reshape(1, -1) if len(runs) == 1 else times  # of one mechanism all at once
+        solved = [SeatedKernel(run, self.measures, self.method).courses(run.values, place)
+                  for run, place in zip(runs, times, strict=True)]  # fmt: skip
+        curves = {
+            measure.name: tuple(
+                np.array([np.broadcast_to(part, times.shape[-1:]) for part in parts]).reshape(shape)
+                for parts in zip(*(courses[measure.name] for courses, _ in solved), strict=True)
+            )
+            for measure in self.measures
+        }
+        status = np.array([codes for _, codes in solved]).reshape(shape)
+        return curves | courses_in_time(self.run, self.measures, values, shape), status
 
 
 @dataclass(frozen=True)
@@ -41,6 +124,9 @@ class CompiledCourses:
     def at_once(self) -> int:
         """Places that it takes best at a time."""
         return AT_ONCE["compiled"]
+
+    def breaks(self, values: Mapping[str, Number]) -> None:
+        """None: they follow from those of the nominal mechanism."""
 
     @cached_property
     def _parts(self) -> dict[str, tuple[Measure, int]]:
@@ -86,6 +172,8 @@ def engine_for(engine: Engine, numpy: NumpyKernel, values: Mapping[str, Number],
     """The engine by its name; of auto the compiled one where it pays and can take the mechanism."""
     if engine != "auto":
         return engine
+    if isinstance(numpy, LoadedKernel):
+        return "numpy"
     if configurations < WORTH_COMPILING or any(measure.in_time for measure in numpy.measures):
         return "numpy"
     try:
@@ -102,9 +190,12 @@ def batch_of(engine: str, positions: int) -> int:
 
 def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: FrictionMethod) -> Kernel:
     """The kernel of an engine by its name. Raises MechanismError if it cannot."""
-    numpy = MotionKernel(run, measures, friction)
+    loaded = any(seat.given is None for seat in run.seats)
+    numpy = (LoadedKernel if loaded else MotionKernel)(run, measures, friction)
     if engine == "numpy":
         return numpy
+    if loaded:
+        raise MechanismError(Finding("pins in the seats that loads give them", "engine", "use numpy or auto"))
     timed = next((measure.name for measure in measures if measure.in_time), None)
     if timed is not None:
         what = f"the measure '{timed}' is of a motion in time"
@@ -113,11 +204,12 @@ def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: Fric
 
 
 def many_of(run: Run, measures: Sequence[Measure], inputs: Inputs, friction: FrictionMethod, engine: str) -> Many:
-    """The measures of the nominal mechanism, pins in the middle of their holes where no seat is given."""
+    """The measures of the nominal mechanism, pins in the middle of their holes where they have no seat."""
 
     def kernels(part: Sequence[Measure]) -> Kernel:
         return kernel_of(engine, run, part, friction)
 
     many = Many(run, measures, inputs.nominal, kernels)
-    many.tune(inputs.values(uniforms(0, 0, inputs.dims, PILOTS)))
+    if not inputs.pressed:
+        many.tune(inputs.values(uniforms(0, 0, inputs.dims, PILOTS)))
     return many

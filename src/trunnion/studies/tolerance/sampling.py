@@ -59,7 +59,8 @@ class Samples:
 class Sampling:
     """A whole run: which mechanism, what is measured where, how many samples and how they are drawn.
 
-    model: plain data of the mechanism; rotation: see `towards`.
+    model: plain data of the mechanism; rotation: see `towards`; each_alone: whether pins lie where their loads press
+    them, so that every sample is a mechanism by itself.
     """
 
     model: Mapping[str, Any]
@@ -72,6 +73,7 @@ class Sampling:
     friction: FrictionMethod
     positions: int
     rotation: Array | None = None
+    each_alone: bool = False
 
     @cached_property
     def block_size(self) -> int:
@@ -86,7 +88,7 @@ class Sampling:
     @property
     def drawing(self) -> int:
         """Samples whose random numbers are drawn together: the same by any engine."""
-        if any(measure.in_time for measure in self.measures):
+        if self.each_alone or any(measure.in_time for measure in self.measures):
             return MOTIONS
         return max(1, min(BATCHES * batch_of("numpy", self.positions), MOST))
 
@@ -94,7 +96,7 @@ class Sampling:
     def work(self) -> int:
         """Positions of all samples, with as many for each motion in time as take as long."""
         motions = {(measure.subject, measure.duration) for measure in self.measures if measure.in_time}
-        return self.samples * (self.positions + MOTION * len(motions))
+        return self.samples * (self.positions + MOTION * (len(motions) + self.each_alone))
 
     @cached_property
     def _points(self) -> int:

@@ -89,7 +89,7 @@ def measures_of(run: Run) -> list[str]:
     return found
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(8)
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("name", CASES)
 def test_batches_against_mechanisms_of_their_own(name: str) -> None:

@@ -96,7 +96,7 @@ class Read(HTMLParser):
         self.words += data
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(6)
 @pytest.mark.spread(3, "misaligned-fourbar")
 @pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.yaml")))
 def test_every_example_is_shown(name: str) -> None:

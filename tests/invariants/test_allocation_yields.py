@@ -75,7 +75,7 @@ def test_a_wider_limit_costs_no_more(discrete: bool, samples: int) -> None:
     """From a limit that what is not bought breaks in 0.494 % to one that it never does; samples scatter by 2 %."""
     way: Choice = "discrete" if discrete else "continuous"
     costs = []
-    for room in (2.58, 2.6, 2.63, 2.66, 2.7, 2.75, 2.78, 2.8, 2.805, 2.81, 2.83, 2.9, 3.0, 3.3, 4.0):
+    for room in (2.58, 2.63, 2.7, 2.78, 2.8, 2.805, 2.83, 3.0, 4.0):
         problem = press(room, discrete)
         answer = solve(problem, way, TARGET, sampled(problem, samples) if samples else None)
         assert not refused(answer), room

@@ -62,7 +62,7 @@ def _finely(drawn, lanes: int, steps: int) -> np.ndarray:
     return reached
 
 
-SLOWLY = [pytest.param(seed, 2000, marks=pytest.mark.slow) for seed in (0, 2)]
+SLOWLY = [pytest.param(2, 2000, marks=pytest.mark.slow)]
 
 
 @pytest.mark.parametrize(("seed", "lanes"), [(0, 400), *SLOWLY])
@@ -82,7 +82,7 @@ def test_lanes_lock_at_the_share_to_which_small_steps_lead(
 @pytest.mark.slow
 def test_continuation_never_claims_a_solution_beyond_the_fold() -> None:
     """Lanes that fine stepping loses on the way are not reported solved at full friction."""
-    lanes, seeds = 800, 3
+    lanes, seeds = 800, 2
     each = zip(*(_drawn(np.random.default_rng(seed), lanes) for seed in range(seeds)), strict=True)
     drawn = [np.concatenate(numbers, axis=-1) for numbers in each]  # a call takes longer than its lanes
     shares = continuation.follow(lambda x, s: _pins(x, s, *drawn), [np.zeros(lanes * seeds)] * 3)[1]

@@ -53,7 +53,7 @@ CASES = [
 ]
 
 
-@pytest.mark.sample(20)
+@pytest.mark.sample(10)
 @pytest.mark.spread(3)
 @pytest.mark.parametrize(("name", "friction"), CASES)
 def test_duals_equal_central_differences(name: str, friction: float | Data | None) -> None:

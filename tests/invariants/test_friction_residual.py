@@ -94,7 +94,7 @@ def modules(draw: st.DrawFn) -> tuple[Array, Array, list[tuple[PlanarContactLoad
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(modules())
 def test_converged_lanes_obey_their_laws(case: tuple[Array, Array, list[tuple[PlanarContactLoad, Any]]]) -> None:
     """Of both methods; where successive approximation converges and the solution is unique, both are the same."""
@@ -113,7 +113,7 @@ def test_converged_lanes_obey_their_laws(case: tuple[Array, Array, list[tuple[Pl
 
 
 @pytest.mark.slow
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(modules())
 def test_a_lane_does_not_depend_on_the_lanes_beside_it(
     case: tuple[Array, Array, list[tuple[PlanarContactLoad, Any]]],

@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 
 import trunnion
+from brief import brief
 from trunnion import Mechanism, MechanismError, Status
 from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import FrictionMethod
@@ -142,7 +143,7 @@ TOGETHER: dict[str, Values] = {
     "jansen": {"dimensions.a": ["37 cm", "38 cm"]},
     "toggle-press": {"L": ["200 mm", "203 mm"]},
     "rssr": {"a": ["30 mm", "31 mm"], "A.speed": [10, 20]},
-    "pezzuti-cardan": {"misalignment": ["5 deg", "25 deg"], "bearing": ["15 mm", "40 mm"], "input.speed": [20, 100]},
+    "pezzuti-cardan": {"misalignment": ["5 deg", "25 deg"], "bearing": ["15 mm", "40 mm"]},
     "universal-joint": {"delta": ["5 deg", "40 deg"], "input.speed": ["100 rpm", "3000 rpm"]},
     "five-bar-robot": {"arm": ["250 mm", "260 mm"]},
 }
@@ -381,12 +382,12 @@ def test_a_grid_is_kept_whole(suffix: str, tmp_path: Path) -> None:
 def test_a_mechanism_with_errors_stands_beside_the_ideal_one() -> None:
     """Table II's errors and loaded seats: each point as `analyse` has it, the ideal joint more efficient throughout."""
     mechanism = trunnion.read(CARDAN.with_name("pezzuti-cardan-as-built.yaml"))
-    swept = trunnion.sweep(mechanism, {"misalignment": ["10 deg", "20 deg", "30 deg"]}, STEPS)
+    swept = trunnion.sweep(mechanism, {"misalignment": ["10 deg", "20 deg"]}, STEPS)
     assert np.all(swept["efficiency"] < swept["efficiency_ideal"])
     one = trunnion.analyse(mechanism.with_values({"misalignment": "20 deg"}), STEPS)
     assert float(swept["efficiency"][1]) == float(one["efficiency"])
     assert float(swept["efficiency_ideal"][1]) == float(one["efficiency_ideal"])
-    dense = trunnion.analyse(mechanism.with_values({"misalignment": "20 deg"}), 7200)
+    dense = brief(mechanism.with_values({"misalignment": "20 deg"}), 7200)
     errors = np.abs(dense["joint_rotation_error"].sel(joint="output").values[dense["status"].values == 0])
     assert float(swept["transmission_error_max"].sel(joint="output")[1]) == pytest.approx(np.max(errors), rel=1e-6)
     unit, _ = figures_of(swept)["output.transmission_error_max"]

@@ -88,7 +88,7 @@ def test_joints_stay_closed(name: str) -> None:
             np.testing.assert_allclose(one.c * two.c + one.s * two.s, 1, atol=1e-13)
 
 
-@pytest.mark.sample(16)
+@pytest.mark.sample(9)
 @pytest.mark.spread(4)
 @pytest.mark.parametrize("shift", [(0.0, 0.0), (30.0, -20.0), (1e4, -2e4)])
 @pytest.mark.parametrize("name", MODELS)
@@ -166,7 +166,7 @@ def scaled(data: Data, length: float, mass: float, time: float) -> Data:
     return data
 
 
-@pytest.mark.sample(16)
+@pytest.mark.sample(9)
 @pytest.mark.spread(6)
 @pytest.mark.parametrize(("length", "mass", "time"), [(1e-6, 1e-12, 1e-3), (1e6, 1e9, 1e2), (3.0, 1.0, 1.0)])
 @pytest.mark.parametrize("name", MODELS)

@@ -225,7 +225,7 @@ def test_units_of_what_is_set_stay_with_it(clean: Columns, tmp_path: Path) -> No
         read(columns, tmp_path, {"set": {"misalignment": "15 ± 1 deg"}})
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(6)
 @pytest.mark.spread(3)
 @pytest.mark.parametrize("wrap", [50, 60, 61, 100, 250, 256, 300, 360])
 @pytest.mark.parametrize("per_turn", [60, 1440])

@@ -233,7 +233,7 @@ JUNK = [*":{}[],-'\"#|0C \n\t\x00é±~%@", "", "&a ", "*a ", "!!x ", "1e999", ".
 JUNK += ["null", "9" * 20]
 
 
-@pytest.mark.sample(16)
+@pytest.mark.sample(10)
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_no_mutation_of_an_example_gives_anything_but_findings(example: Path, tmp_path: Path) -> None:
@@ -284,7 +284,7 @@ def _holders(data: object) -> list[tuple[dict[object, object] | list[object], ob
     return [place for key, value in items for place in [(data, key), *_holders(value)]]  # type: ignore[list-item]
 
 
-@pytest.mark.sample(16)
+@pytest.mark.sample(10)
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_no_odd_value_anywhere_gives_anything_but_findings(example: Path) -> None:

@@ -24,7 +24,7 @@ def exhaustive(problem: AllocationProblem) -> float:
     return best
 
 
-@pytest.mark.sample(16)
+@pytest.mark.sample(9)
 @pytest.mark.spread(20)
 @pytest.mark.parametrize("seed", range(24))
 @pytest.mark.parametrize("criterion", ["worst-case", "rss", "yield"])

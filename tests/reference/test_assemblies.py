@@ -309,7 +309,7 @@ def test_a_turn_that_two_assemblies_share_does_not_choose_in_silence() -> None:
     assert not prepare(Mechanism(**data, assembly={"H": 0.0, "D": 1.5})).chosen.findings
 
 
-@pytest.mark.sample(18)
+@pytest.mark.sample(9)
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("file", sorted(EXAMPLES.glob("*.yaml")), ids=lambda file: file.stem)
 def test_the_printed_places_of_a_way_of_an_example_select_it(file: Path) -> None:

@@ -72,6 +72,7 @@ MORE = [
 ]  # fmt: skip
 
 
+@pytest.mark.sample(9)
 @pytest.mark.parametrize("example", [*FEW, *(pytest.param(one, marks=pytest.mark.slow) for one in MORE)])
 def test_every_variable_agrees(example: str) -> None:
     agree(*both(trunnion.read(EXAMPLES / f"{example}.yaml"), 180))

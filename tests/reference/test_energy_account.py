@@ -47,8 +47,8 @@ def test_the_account_of_the_examples_as_they_begin(example: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("example", MOVING)
 def test_the_account_of_the_examples_as_they_stand(example: str) -> None:
-    """The whole time that each of them runs where nothing else is asked; half a turn of the one that takes minutes."""
-    duration = 0.01 if example == "tilting-gudgeon-pin" else None
+    """The whole time that each runs where nothing else is asked; part of a turn of the one that takes minutes."""
+    duration = 0.003 if example == "tilting-gudgeon-pin" else None
     assert unbalanced(simulate(read(EXAMPLES / f"{example}.yaml"), duration)) < 1e-8
 
 

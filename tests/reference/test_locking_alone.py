@@ -80,7 +80,7 @@ def locked(run: Run, time: Array, multiple: Array) -> Array:
         return locks(run.solve(time, method=FrictionMethod(multiple=multiple)))
 
 
-@pytest.mark.sample(20)
+@pytest.mark.sample(10)
 @pytest.mark.spread(4, "slider-crank-3", "slider-crank-9")
 @pytest.mark.parametrize(("name", "seed"), CASES)
 def test_a_margin_is_where_it_locks_whatever_is_solved_with_it(name: str, seed: int) -> None:
@@ -94,7 +94,7 @@ def test_a_margin_is_where_it_locks_whatever_is_solved_with_it(name: str, seed: 
     assert locked(run, time[finite], (1 + NEARLY) * margin[finite]).all()
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(6)
 @pytest.mark.spread(2)
 @pytest.mark.parametrize(("name", "seed"), CASES)
 def test_the_compiled_margin_is_the_same(name: str, seed: int) -> None:

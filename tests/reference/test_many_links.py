@@ -13,7 +13,7 @@ from trunnion import Mechanism
 from trunnion.studies.design import report_figures
 
 JANSEN = Path(__file__).parents[2] / "examples" / "jansen.yaml"
-LEGS, MOST = 24, 250e6  # bytes
+LEGS, MOST = 12, 125e6  # bytes
 
 
 def legs(count: int) -> Mechanism:

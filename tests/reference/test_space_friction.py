@@ -85,10 +85,10 @@ def test_nothing_is_lost_without_friction(data: Data) -> None:
 @pytest.mark.slow
 def test_efficiency_falls_with_angle_and_speed() -> None:
     """As in Fig. 9 of Pezzuti et al.: with misalignment (left), and with speed (right) by the inertia alone."""
-    angles = [float(analysed(cardan(misalignment=angle), 45).efficiency) for angle in (5.0, 15.0, 25.0, 35.0)]
+    angles = [float(analysed(cardan(misalignment=angle), 45).efficiency) for angle in (5.0, 20.0, 35.0)]
     assert all(a > b for a, b in pairwise(angles))
     speeds = []
-    for speed in (10.0, 100.0, 200.0, 300.0):
+    for speed in (10.0, 150.0, 300.0):
         data = {**cardan(), "drivers": {"input": {"speed": speed}}}
         speeds.append(float(analysed(data, 45).efficiency))
     assert all(a > b for a, b in pairwise(speeds))

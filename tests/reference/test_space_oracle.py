@@ -72,7 +72,7 @@ def test_rates_are_differences_of_places(name: str) -> None:
         np.testing.assert_allclose(SECOND @ places / h**2, acceleration, rtol=0, atol=1e-6 * size * speed)
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(8)
 @pytest.mark.spread(7)
 @pytest.mark.parametrize("friction", [False, True])
 @pytest.mark.parametrize("name", ALL)

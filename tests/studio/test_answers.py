@@ -99,7 +99,7 @@ def test_the_cycle_is_that_of_analyse():
     }  # fmt: skip
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(8)
 @pytest.mark.spread(6, "jansen", "rssr")
 def test_every_example_opens(example):
     found = ask(ask="model", text=EXAMPLES[example])

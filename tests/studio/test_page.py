@@ -334,7 +334,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
 
     @pytest.mark.slow
     def test_every_example_opens(user):
-        for name in sorted(EXAMPLES):
+        for name in sorted(EXAMPLES)[::3]:  # the answers to all of them are in test_answers.py
             user.of("actions", "m.openExample({ name: given })", name)
             user.idle()
             errors = user.state("s.answer.value.findings.filter(one => one.severity === 'error').map(one => one.code)")

@@ -203,7 +203,7 @@ def test_a_jump_is_a_step_far_above_its_neighbours():
 @pytest.mark.slow
 def test_a_sweep_is_drawn_beside_the_ideal_mechanism(slider, tmp_path):
     mechanism = trunnion.Mechanism.read(EXAMPLES / "pezzuti-cardan-as-built.yaml")
-    swept = trunnion.sweep(mechanism, {"misalignment": ["0 deg", "10 deg", "20 deg"]}, 36)
+    swept = trunnion.sweep(mechanism, {"misalignment": ["0 deg", "20 deg"]}, 18)
     axes = sweep_figure(swept).axes[0]
     built, ideal = (_label(axes, name).get_ydata() for name in ("as built", "ideal"))
     assert built == pytest.approx(swept["efficiency"].values)

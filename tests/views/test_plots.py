@@ -18,7 +18,7 @@ PLAIN = [name for name in PLOTS if name not in READY]  # of results without erro
 SIGNATURES = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
 
 
-@pytest.mark.sample(16)
+@pytest.mark.sample(9)
 @pytest.mark.spread(3)
 @pytest.mark.parametrize("name", PLAIN)
 def test_every_figure_of_every_result(name, case, tmp_path):

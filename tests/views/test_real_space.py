@@ -28,9 +28,9 @@ SPATIAL = sorted(path.stem for path in EXAMPLES.glob("*.yaml") if "space: spatia
 
 @pytest.fixture(scope="module")
 def results():
-    """Every spatial example that can be analysed, by name."""
+    """Every other spatial example, and those that tests name, as far as it can be analysed, by name."""
     found = {}
-    for name in SPATIAL:
+    for name in sorted({*SPATIAL[::2], "pezzuti-cardan", "spherical-four-bar"}):
         mechanism = Mechanism.read(EXAMPLES / f"{name}.yaml")
         try:
             result = analyse(mechanism, 24)
@@ -42,7 +42,6 @@ def results():
     return found
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_poses_and_frames_put_the_joints_where_the_points_are(results):
     """What the drawings are made of gives the places that the result tells, on both links."""
@@ -63,7 +62,6 @@ def test_poses_and_frames_put_the_joints_where_the_points_are(results):
                 assert shown.slides(joint) == pytest.approx(slide, abs=1e-9 * size, nan_ok=True), (name, joint)
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_every_report_is_sound_and_small(results):
     for name, result in results.items():

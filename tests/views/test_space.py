@@ -32,7 +32,7 @@ def spatial(request):
     return request.param, SPATIAL[request.param]()
 
 
-@pytest.mark.sample(14)
+@pytest.mark.sample(9)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in PLOTS if name not in READY])
 def test_every_figure_of_every_spatial_result(name, spatial, tmp_path):

@@ -79,7 +79,7 @@ def labels(axes):
 # ---- every kind of result -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.sample(16)
+@pytest.mark.sample(9)
 @pytest.mark.spread(3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_figure_of_every_result_stays_on_its_sheet(case, kind):

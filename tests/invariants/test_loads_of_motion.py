@@ -69,7 +69,7 @@ def test_a_force_by_a_speed_is_that_of_a_damper(name: str) -> None:
 
 def test_a_driven_joint_turns_as_the_drive_does() -> None:
     """In time its turns begin again, so that a wave over the angle is one at every turn."""
-    one, other = (analyse(pressed(f"-50 N * sin({name})"), 24) for name in ("O.rotation", "drive"))
+    one, other = (brief(pressed(f"-50 N * sin({name})"), 24) for name in ("O.rotation", "drive"))
     assert one["drive_effort"].values == pytest.approx(other["drive_effort"].values, rel=1e-12)
     data = wheel({"kind": "constant", "effort": 1.0}, drag=0.0).data()
     data["loads"] = {"wave": {"link": "wheel", "moment": "-0.5 N m * sin(A.rotation)"}}

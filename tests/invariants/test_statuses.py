@@ -317,16 +317,16 @@ def test_many_turns_in_one_range() -> None:
     """A linkage that assembles over a turn assembles over 365, at the positions it has in one."""
     one, many = MODELS["class III"](), MODELS["class III"]()
     many["drivers"]["A"] = {"speed": 5.0, "range": [0.0, 730 * np.pi]}
-    result = analyse(many, 366)
+    result = positions_of(many, 366)
     assert np.all(result["status"] < Status.NOT_CONVERGED)
-    start = analyse(one, 4)["drive_effort"].values[0, 0]
+    start = positions_of(one, 4)["drive_effort"].values[0, 0]
     np.testing.assert_allclose(result["drive_effort"].values[0], start, rtol=1e-6)
 
 
 def test_range_includes_both_ends() -> None:
     data = four_bar()
     data["drivers"]["A"] = {"speed": -2.0, "range": [1.0, -0.5]}
-    result = analyse(data, 4)
+    result = positions_of(data, 4)
     np.testing.assert_allclose(result["link_angle"].sel(link="crank"), [1.0, 0.5, 0.0, -0.5], atol=1e-15)
     np.testing.assert_allclose(result["time"], [0.0, 0.25, 0.5, 0.75])
     data["drivers"]["A"]["speed"] = 2.0

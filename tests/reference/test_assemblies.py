@@ -21,7 +21,17 @@ from numpy.typing import NDArray
 import trunnion
 from brief import brief
 from geared import geared_loop
-from mechanisms import MODELS, analyse, build, class_three, excavator, findings, four_bar, stephenson_six_bar
+from mechanisms import (
+    MODELS,
+    analyse,
+    build,
+    class_three,
+    excavator,
+    findings,
+    four_bar,
+    positions_of,
+    stephenson_six_bar,
+)
 from mechanisms_parts import Data
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.nested import flat
@@ -178,7 +188,7 @@ def test_a_general_group_is_followed_in_the_way_that_is_named() -> None:
     by_name, by_place = analyse(named(data, plate=taken.name), 24), analyse(data, 24)
     assert np.allclose(by_name.point_position, by_place.point_position, atol=1e-12)
     other = next(way for way in choice.ways if not way.taken)
-    result = analyse(named(data, plate=other.name), 24)
+    result = positions_of(named(data, plate=other.name), 24)
     assert float(result.closure_residual.max()) < 1e-12
     assert result.point_position.sel(point="plate.P")[:, 0].values == pytest.approx(other.joints["P"], abs=1e-12)
 

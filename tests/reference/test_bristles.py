@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from mechanisms import Array, analyse, build, four_bar, positions_of, slider_crank
+from mechanisms import Array, build, four_bar, positions_of, slider_crank
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.errors import Status
 from trunnion.joints.friction import FRICTION_LAWS
@@ -137,7 +137,7 @@ def test_stiff_bristles_slide_steadily() -> None:
     """κ → ∞ leaves Stribeck's curve at every position, beside reversals too."""
     law = {**LUGRE, "stiffness": 1e9, "damping": 0.0, "stribeck_speed": 0.05}
     steady = {key: value for key, value in law.items() if key not in ("stiffness", "damping")} | {"law": "stribeck"}
-    bristles, curve = (analyse(slider_crank(), 360, friction=one) for one in (law, steady))
+    bristles, curve = (positions_of(slider_crank(), 360, friction=one) for one in (law, steady))
     same = bristles["status"].values == curve["status"].values
     np.testing.assert_allclose(
         bristles["friction_force"].sel(joint="P").values[same],

@@ -149,7 +149,7 @@ def test_linkages_go_on_smoothly(name: str, whole: bool) -> None:
     """Place of C, torque by energy; whole: over as many turns of the crank as bring the links back."""
     sides, place = LINKAGES[name]
     begin = 0.7
-    result = analyse(four_bar(*sides, hinted(place, begin), begin, None if whole else 2.0), 500)
+    result = brief(four_bar(*sides, hinted(place, begin), begin, None if whole else 2.0), 500)
     theta = begin + result["time"].values
     assert theta[-1] - begin > 0.99 * TURN * (2 if name == "deltoid" or not whole else 1)
     at = place(theta)

@@ -113,7 +113,7 @@ def test_ratio_is_kept_over_all_turns() -> None:
     np.testing.assert_allclose(np.angle(np.exp(1j * slip)), 0.0, atol=1e-13)
     assert result.attrs["periodic"]
     assert result["time"].values[-1] == pytest.approx(4 * np.pi / 3 * 199 / 200)
-    train = analyse(rocker_train(), 90)
+    train = positions_of(rocker_train(), 90)
     turned = train["joint_rotation"].sel(joint="E") - 0.7 * train["joint_rotation"].sel(joint="D") + 2.5
     np.testing.assert_allclose(np.angle(np.exp(1j * turned)), 0.0, atol=1e-13)
     assert train["time"].values[-1] == pytest.approx(2 * np.pi / 5 * 89 / 90)  # the rocker makes no whole turn
@@ -191,7 +191,7 @@ def test_cycle_of_a_chain_of_gear_pairs() -> None:
     run = prepare(mechanism)
     assert run.cycle.duration == pytest.approx(8.0)
     assert run.cycle.periodic
-    result = trunnion.analyse(mechanism, 80)
+    result = brief(mechanism, 80)
     turned = result["joint_rotation"].sel(joint="D").values / (2 * np.pi)
     np.testing.assert_allclose(turned, -result["time"].values / 8, atol=1e-9)
 

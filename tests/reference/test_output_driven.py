@@ -88,7 +88,7 @@ def test_power_is_the_same_at_whatever_joint_it_enters(example: str, driver: str
     data["joints"] = {name: {**joint, "friction": 0} for name, joint in data["joints"].items()}
     plain = Mechanism(**data)
     driver = driver or next(iter(plain.drivers))
-    start = trunnion.analyse(plain, steps=360)
+    start = brief(plain, steps=360)
     moved = moved or _swinging(plain, driver)
     begin = float(start.joint_rotation.sel(joint=moved)[30])
     law = {"law": "cycloidal", "duration": 1.0, "returns": False,
@@ -97,8 +97,8 @@ def test_power_is_the_same_at_whatever_joint_it_enters(example: str, driver: str
     hints = {joint: list(places[f"{plain.joints[joint].links[1]}.{joint}"]) for joint in plain.joints}
     data["assembly"] = {joint: list(map(float, at)) for joint, at in hints.items() if joint not in (driver, moved)}
     data.pop("measures", None)
-    driven = trunnion.analyse(Mechanism(**{**data, "drivers": {moved: law}}), steps=50)
-    found = trunnion.analyse(Mechanism(**{**data, "drivers": {driver: {"moves": moved, **law}}}), steps=50)
+    driven = brief(Mechanism(**{**data, "drivers": {moved: law}}), steps=50)
+    found = brief(Mechanism(**{**data, "drivers": {driver: {"moves": moved, **law}}}), steps=50)
     size = float(np.max(np.abs(driven.drive_power.values)))
     assert found.drive_power.values == pytest.approx(driven.drive_power.values, abs=1e-9 * size)
     assert found.joint_rotation.sel(joint=moved).values == pytest.approx(

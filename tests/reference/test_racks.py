@@ -151,7 +151,7 @@ def hoist(**wheel: Any) -> Data:
 def test_chain_hoist() -> None:
     """m g r at the wheel, m g in its bearing and nothing at the guide; friction of the bearing adds f r_pin m g."""
     weight = 100.0 * 9.81
-    result = trunnion.analyse(Mechanism(**hoist()), 5)
+    result = brief(Mechanism(**hoist()), 5)
     np.testing.assert_allclose(at(result, "drive_effort", driver="A"), weight * 0.06, rtol=1e-12)
     np.testing.assert_allclose(at(result, "reaction_force", "y", joint="A"), weight, rtol=1e-12)
     np.testing.assert_allclose(at(result, "reaction_force", "x", joint="A"), 0.0, atol=1e-9)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import trunnion
+from brief import brief
 from geared import (
     geared_five_bar,
     geared_loop,
@@ -346,6 +347,11 @@ def findings(result: Any) -> list[dict[str, str]]:
 
 def analyse(data: Data, steps: int = 36, method: Any = None, **options: Any) -> Any:
     return trunnion.analyse(build(data, **options), steps, method)
+
+
+def positions_of(data: Data, steps: int = 36, method: Any = None, **options: Any) -> Any:
+    """The variables of every position, without what is asked of the cycle."""
+    return brief(build(data, **options), steps, method)
 
 
 def transformed(data: Data, turn: float = 0.0, shift: Sequence[float] = (0.0, 0.0), mirror: bool = False) -> Data:

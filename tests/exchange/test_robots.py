@@ -29,7 +29,7 @@ EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
 # no position without play, no driver, two driven slides whose laws a draft does not know, axes that no file holds
 APART = {"indexing-press", "fourbar-in-space", "misaligned-fourbar", "misaligned-hinges", "one-way-clutch"}
 APART |= {"pezzuti-cardan-as-built"}
-MOVING = [path.stem for path in EXAMPLES if path.stem not in APART and not trunnion.read(path).gears]
+MOVING = [path.stem for path in EXAMPLES if path.stem not in APART and "\ngears:" not in path.read_text("utf-8")]
 SUFFIXES = (".mjcf", ".sdf", ".urdf")
 
 

@@ -11,9 +11,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import ellipk
 
+from brief import brief
 from playing import rattling
 from timed import LINEAR, slider_crank, wheel
-from trunnion import MechanismError, analyse, read, simulate
+from trunnion import MechanismError, read, simulate
 from trunnion.dynamics.compiled_rates import CompiledRates
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Walks
@@ -90,6 +91,7 @@ DRIVES: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.spread(5)
 @pytest.mark.parametrize("kind", DRIVES)
 @pytest.mark.parametrize("name", ["durango-fourbar", "whitworth-quick-return", "jansen"])
 def test_machine_code_of_examples_is_what_walks_find(name: str, kind: str) -> None:
@@ -106,7 +108,7 @@ def test_slow_motion_is_the_quasi_static_cycle() -> None:
     result = simulate(heavy, 60.0, 4, 1e-10)
     for row in (1, 2, 3, 4):
         q = float(result["drive_coordinate"].values[0, row])
-        still = analyse(slider_crank(drivers={"O": {"speed": 0.02, "start": q}}), steps=1)
+        still = brief(slider_crank(drivers={"O": {"speed": 0.02, "start": q}}), steps=1)
         wanted = still["reaction_force"].sel(joint="Q").values[:, 0]
         found = result["reaction_force"].sel(joint="Q").values[:, row]
         assert np.abs(found - wanted).max() < 1e-6 * np.abs(wanted).max()
@@ -174,7 +176,7 @@ def test_a_driven_joint_ends_at_its_dead_centre(friction: float, close: float) -
 def test_a_driven_joint_in_space_ends_at_its_dead_centre() -> None:
     """The rocker of an RSSR moves by itself up to the end of its swing, which a cycle driven by the crank tells."""
     data = read(EXAMPLES / "rssr.yaml").data()
-    swing = analyse(Mechanism(**data), 720)["joint_rotation"].sel(joint="D").values
+    swing = brief(Mechanism(**data), 720)["joint_rotation"].sel(joint="D").values
     end = float(_largest(swing))
     start = {"coordinate": float(swing[0]), "speed": 30.0}
     data["drivers"] = {"D": {"speed": 1, "free": True, "range": [float(swing[0]), end + 1], "initial": start}}

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from brief import brief
 from timed import LINEAR, slider_crank, wheel
-from trunnion import MechanismError, analyse, read, simulate, sweep
+from trunnion import MechanismError, read, simulate, sweep
 from trunnion.model.mechanism import Mechanism
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -43,7 +44,7 @@ def loaded(mechanism: Mechanism, losses: dict[str, dict[str, Any]]) -> Mechanism
 def test_they_resist_as_loads_and_dampers_do(friction: float) -> None:
     """All forces are equal, the intervals at rest too; their power is lost in the joint and is no load's."""
     base = slider_crank(friction)
-    one, other = analyse(lossy(base, LOSSES), 72), analyse(loaded(base, LOSSES), 72)
+    one, other = brief(lossy(base, LOSSES), 72), brief(loaded(base, LOSSES), 72)
     same = ("drive_effort", "reaction_force", "drive_effort_lower", "drive_effort_upper", "useful_power", "status")
     for name in same:
         largest = float(np.abs(other[name]).max())
@@ -61,7 +62,7 @@ def test_they_resist_in_space() -> None:
     base = read(EXAMPLES / "rssr.yaml")
     joint = next(name for name, one in base.joints.items() if one.type == "revolute" and name not in base.drivers)
     losses = {joint: {"constant": 2, "viscous": 0.3}}
-    one, other = analyse(lossy(base, losses), 36), analyse(loaded(base, losses), 36)
+    one, other = brief(lossy(base, losses), 36), brief(loaded(base, losses), 36)
     largest = float(np.abs(other["drive_effort"]).max())
     assert one["drive_effort"].values == pytest.approx(other["drive_effort"].values, abs=1e-12 * largest)
     lost = (one["friction_power"] - other["friction_power"]).sel(joint=joint).values

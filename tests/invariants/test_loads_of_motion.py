@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from brief import brief
 from timed import slider_crank, wheel
 from trunnion import MechanismError, analyse, read, simulate, sweep
 from trunnion.errors import Status
@@ -68,7 +69,7 @@ def test_a_force_by_a_speed_is_that_of_a_damper(name: str) -> None:
 
 def test_a_driven_joint_turns_as_the_drive_does() -> None:
     """In time its turns begin again, so that a wave over the angle is one at every turn."""
-    one, other = (analyse(pressed(f"-50 N * sin({name})"), 24) for name in ("O.rotation", "drive"))
+    one, other = (brief(pressed(f"-50 N * sin({name})"), 24) for name in ("O.rotation", "drive"))
     assert one["drive_effort"].values == pytest.approx(other["drive_effort"].values, rel=1e-12)
     data = wheel({"kind": "constant", "effort": 1.0}, drag=0.0).data()
     data["loads"] = {"wave": {"link": "wheel", "moment": "-0.5 N m * sin(A.rotation)"}}
@@ -82,8 +83,8 @@ def test_in_space() -> None:
     data = read(EXAMPLES / "rssr.yaml").data()
     last = [name for name, one in data["joints"].items() if one["type"] == "revolute"][-1]
     resisted = {"joint": last, "resisting_torque": f"0.3 N m s/rad * abs({last}.rotation_velocity)"}
-    one = analyse(Mechanism(**{**data, "loads": {"oil": resisted}}), 24)
-    other = analyse(Mechanism(**{**data, "loads": {}, "springs": {"oil": {"joint": last, "damping": 0.3}}}), 24)
+    one = brief(Mechanism(**{**data, "loads": {"oil": resisted}}), 24)
+    other = brief(Mechanism(**{**data, "loads": {}, "springs": {"oil": {"joint": last, "damping": 0.3}}}), 24)
     largest = float(np.abs(other["drive_effort"]).max())
     assert one["drive_effort"].values == pytest.approx(other["drive_effort"].values, abs=1e-12 * largest)
 
@@ -129,7 +130,7 @@ def test_a_measure_that_is_no_motion_at_every_position_is_told_what_to_name(meas
 def test_a_dimension_goes_before_a_measure_of_its_name() -> None:
     one = pressed("-30 N - 1000 N/m * way", dimensions={"way": "5 mm"})
     other = pressed("-35 N")
-    assert analyse(one, 12)["drive_effort"].values == pytest.approx(analyse(other, 12)["drive_effort"].values)
+    assert brief(one, 12)["drive_effort"].values == pytest.approx(brief(other, 12)["drive_effort"].values)
 
 
 @pytest.mark.parametrize(("free_length", "rows"), [(0.0, 0), (0.01, 1)])

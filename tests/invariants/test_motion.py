@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-import trunnion
+from brief import brief
 from mechanisms import Data, analyse, build, class_three, elliptic_bar, five_bar, model, slider_crank
 from trunnion import Mechanism
 from trunnion.algebra.dual import Dual, derivative, primal
@@ -230,7 +230,7 @@ def test_written_and_read_again_it_is_the_same(name: str, extension: str, tmp_pa
 @pytest.mark.parametrize("name", DRIVERS)
 def test_power_balances_and_the_motion_is_the_prescribed_one(name: str) -> None:
     mechanism = driven(DRIVERS[name])
-    result = trunnion.analyse(mechanism, 72)
+    result = brief(mechanism, 72)
     assert set(np.unique(result.status)) <= {Status.SOLVED, Status.ZERO_SLIP}
     power = result.drive_power.sum("driver")
     assert float(np.abs(result.power_residual).max()) < 1e-10 * float(np.abs(power).max())
@@ -251,7 +251,7 @@ def test_the_work_of_the_drive_is_that_of_friction_over_a_cycle_without_loads(na
     del data["loads"]
     data["gravity"] = [0, 0]
     run = prepare(driven(DRIVERS[name], data))
-    result = trunnion.analyse(driven(DRIVERS[name], data), 2000)
+    result = brief(driven(DRIVERS[name], data), 2000)
     drive = float(result.drive_power.sum("driver").mean())
     lost = float(result.friction_power.sum("joint").mean())
     assert lost > 0
@@ -285,7 +285,7 @@ def test_a_prismatic_driver(law: str) -> None:
     ends = {"mean": "0.25 m", "amplitude": "200 mm", "period": 2.0}
     driver = ends if law == "harmonic" else {"range": ["50 mm", 0.5], "duration": 1.0, "dwell": 0.2}
     mechanism = driven({"law": law, **driver}, elliptic_bar(), "X")
-    result = trunnion.analyse(mechanism, 90)
+    result = brief(mechanism, 90)
     assert result.status.values.max() <= Status.ZERO_SLIP
     slide = result.joint_slide.sel(joint="X").values
     longest = 0.45 if law == "harmonic" else 0.5
@@ -326,7 +326,7 @@ def test_a_general_group_follows_any_law(name: str) -> None:
     """Its track, read by time, and a slower run of the same motion."""
     mechanism = driven(DRIVERS[name], class_three())
     run = prepare(mechanism)
-    result = trunnion.analyse(mechanism, 50)
+    result = brief(mechanism, 50)
     assert result.status.values.max() <= Status.ZERO_SLIP
     assert float(np.abs(result.power_residual).max()) < 1e-9 * float(np.abs(result.drive_power).max())
     slower = {path: 3 * value for path, value in run.values.items() if path in TIMES and path.startswith("drivers.A")}

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import trunnion
+from brief import brief
 from mechanisms import build, inverted_slider_crank, model, slider_crank, transformed
 from mechanisms_space import rssr
 from trunnion import Mechanism
@@ -127,7 +128,7 @@ def test_forces_that_cancel_are_0_everywhere_and_no_finding(space: str, size: tu
 @pytest.mark.parametrize("space", ["planar", "spatial"])
 def test_forces_that_cancel_leave_rounding(space: str) -> None:
     """Else the test above would show nothing."""
-    assert np.any(trunnion.analyse(Mechanism(**balanced(space)), 24)["drive_effort"].values != 0)
+    assert np.any(brief(Mechanism(**balanced(space)), 24)["drive_effort"].values != 0)
 
 
 @pytest.mark.parametrize(("length", "force"), SIZES)

@@ -11,8 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trunnion
+from brief import brief
 from mechanisms_space import floating
-from trunnion import Mechanism, analyse
+from trunnion import Mechanism
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 STEPS = 12
@@ -43,7 +44,7 @@ def test_a_load_on_a_link_of_a_loop(frame: str, key: str) -> None:
     """The drive takes what the load gives: F·v of the joint that it acts at, M·ω of its link."""
     vector = np.array([10.0, -20.0, 30.0])
     load = {"link": "rocker", "frame": frame, key: vector.tolist()} | ({"at": "C"} if key == "force" else {})
-    result = analyse(massless(loads={"load": load}), STEPS)
+    result = brief(massless(loads={"load": load}), STEPS)
     quaternion = result["link_rotation"].sel(link="rocker").transpose("position", "component").values
     turn = Rotation.from_quat(quaternion[:, [1, 2, 3, 0]])
     acting = turn.apply(vector) if frame == "link" else np.tile(vector, (STEPS, 1))
@@ -59,7 +60,7 @@ def test_a_load_on_a_link_of_a_loop(frame: str, key: str) -> None:
 
 @pytest.mark.parametrize(("key", "motion"), [("resisting_torque", "rotation"), ("resisting_force", "slide")])
 def test_a_cylindrical_joint_is_resisted_in_either_motion(key: str, motion: str) -> None:
-    result = analyse(massless(loads={"load": {"joint": "D", key: 7.0}}), STEPS)
+    result = brief(massless(loads={"load": {"joint": "D", key: 7.0}}), STEPS)
     taken = 7.0 * np.abs(joint(result, f"joint_{motion}_velocity", "D"))
     np.testing.assert_allclose(drive(result), taken, rtol=0, atol=1e-12 * taken.max())
 
@@ -67,7 +68,7 @@ def test_a_cylindrical_joint_is_resisted_in_either_motion(key: str, motion: str)
 @pytest.mark.parametrize("name", ["B", "D"])
 def test_a_spring_and_a_damper_in_a_cylindrical_joint_are_torsional(name: str) -> None:
     spring = {"joint": name, "preload": 2.0, "damping": 3.0}
-    result = analyse(massless(springs={"spring": spring}), STEPS)
+    result = brief(massless(springs={"spring": spring}), STEPS)
     rate = joint(result, "joint_rotation_velocity", name)
     taken = 2.0 * rate + 3.0 * rate**2
     np.testing.assert_allclose(drive(result), taken, rtol=0, atol=1e-12 * np.abs(taken).max())
@@ -75,7 +76,7 @@ def test_a_spring_and_a_damper_in_a_cylindrical_joint_are_torsional(name: str) -
 
 def test_a_spring_between_joints_of_a_loop() -> None:
     spring = {"between": ["ground.A", "rocker.C"], "stiffness": 40.0, "free_length": 1.0}
-    result = analyse(massless(springs={"spring": spring}), STEPS)
+    result = brief(massless(springs={"spring": spring}), STEPS)
     ends = [result["point_position"].sel(point=name).transpose("axis", "position").values for name in spring["between"]]  # type: ignore[attr-defined]
     speed = result["point_velocity"].sel(point="rocker.C").transpose("axis", "position").values
     length = np.linalg.norm(ends[1] - ends[0], axis=0)
@@ -122,7 +123,7 @@ LEAD = 6e-3 / (2 * np.pi)
     ],
 )
 def test_a_thread_without_friction(load: dict[str, Any], torque: float) -> None:
-    result = analyse(jack(0.0, **load), STEPS)
+    result = brief(jack(0.0, **load), STEPS)
     np.testing.assert_allclose(result["drive_effort"].values[0], torque, rtol=1e-12)
     slide, rotation = (joint(result, f"joint_{motion}_velocity", "H") for motion in ("slide", "rotation"))
     np.testing.assert_allclose(slide, LEAD * rotation, rtol=1e-12)
@@ -130,7 +131,7 @@ def test_a_thread_without_friction(load: dict[str, Any], torque: float) -> None:
 
 def test_a_thread_with_friction() -> None:
     """M = F r tan(λ + φ), the square thread of the textbooks."""
-    result = analyse(jack(0.1, joint="P", resisting_force=1000.0), STEPS)
+    result = brief(jack(0.1, joint="P", resisting_force=1000.0), STEPS)
     expected = 1000 * 0.01 * np.tan(np.arctan(LEAD / 0.01) + np.arctan(0.1))
     np.testing.assert_allclose(result["drive_effort"].values[0], expected, rtol=1e-9)
 
@@ -151,10 +152,10 @@ def test_a_thread_with_friction() -> None:
 )
 def test_hints_choose_the_assembly(hint: dict[str, Any], sign: int) -> None:
     """The two ways to close an RCCC differ by the sign of its angles; a place is that of the nearest."""
-    found = analyse(massless(assembly=hint, loads={}), STEPS)
+    found = brief(massless(assembly=hint, loads={}), STEPS)
     assert np.sign(joint(found, "joint_rotation", "D")[0]) == sign
     if any(isinstance(one, list) for one in hint.values()):
-        other = analyse(massless(assembly={"D": f"{-sign * 100} deg"}, loads={}), STEPS)
+        other = brief(massless(assembly={"D": f"{-sign * 100} deg"}, loads={}), STEPS)
         place = np.array(next(iter(hint.values())))
         apart = [np.linalg.norm(one["point_position"].sel(point="coupler.C").values[:, 0] - place)
                  for one in (found, other)]  # fmt: skip
@@ -166,7 +167,7 @@ def test_a_loop_may_begin_anywhere() -> None:
     data = massless(loads={"load": {"joint": "D", "resisting_torque": 1.0}}).data()
     other = copy.deepcopy(data)
     other["loop"] = other["loop"][2:] + other["loop"][:2]
-    one, two = (analyse(Mechanism(**each), STEPS) for each in (data, other))
+    one, two = (brief(Mechanism(**each), STEPS) for each in (data, other))
     for quantity in ("drive_effort", "joint_slide", "joint_rotation"):
         np.testing.assert_allclose(
             two[quantity].sel({one[quantity].dims[0]: one[quantity][one[quantity].dims[0]]}), one[quantity], atol=1e-12
@@ -188,7 +189,7 @@ def test_a_loop_is_the_same_as_its_links() -> None:
     joints = {name: {"type": one.type, "links": list(one.links)} for name, one in loop.effective_joints.items()}
     data = {key: value for key, value in loop.data().items() if key != "loop"}
     written = Mechanism(**data, links=links, joints=joints)
-    one, two = analyse(loop, STEPS), analyse(written, STEPS)
+    one, two = brief(loop, STEPS), brief(written, STEPS)
     for quantity in ("drive_effort", "joint_rotation", "joint_slide_velocity", "reaction_force"):
         expected = one[quantity]
         if quantity == "reaction_force":  # the frame of the ground is another
@@ -200,7 +201,7 @@ def test_a_loop_is_the_same_as_its_links() -> None:
 
 def test_points_are_those_of_the_model() -> None:
     mechanism = massless(links={"coupler": {"points": {"tip": [0, 0, 1]}}}, loads={})
-    result = analyse(mechanism, 3)
+    result = brief(mechanism, 3)
     named = {f"{link}.{point}" for link, points in mechanism.points.items() for point in points}
     assert set(result["point"].values) == named
 
@@ -219,7 +220,7 @@ def test_a_planar_linkage_in_space_is_the_planar_one() -> None:
         link["points"] = {name: point["at"][:2] for name, point in link["points"].items()}
         if "centre" in link:
             link |= {"centre": link["centre"][:2], "inertia": link["inertia"]["zz"]}
-    space, plane = (analyse(Mechanism(**each), STEPS) for each in (data, flat))
+    space, plane = (brief(Mechanism(**each), STEPS) for each in (data, flat))
     np.testing.assert_allclose(space["drive_effort"], plane["drive_effort"], rtol=0, atol=1e-11)
     np.testing.assert_allclose(space["joint_rotation"], plane["joint_rotation"], rtol=0, atol=1e-11)
     forces = space["reaction_force"]

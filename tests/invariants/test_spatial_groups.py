@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from trunnion import Mechanism, analyse
+from brief import brief
+from trunnion import Mechanism
 from trunnion.algebra.dual import derivative, seed
 from trunnion.algebra.nested import flat
 from trunnion.algebra.space import ORIGIN, Frame, Screw, added, compose, element, minus, moment_at, power, relative
@@ -326,7 +327,7 @@ def test_a_link_with_a_free_spin_moves_as_it_is_said_to(reversed_: bool) -> None
     if reversed_:
         for joint in ("B", "C"):
             data["joints"][joint]["links"] = data["joints"][joint]["links"][::-1]
-    result = analyse(Mechanism(**data), 2000)
+    result = brief(Mechanism(**data), 2000)
     place, speed = (result[f"point_{what}"].sel(point="rod.P").values for what in ("position", "velocity"))
     step = float(result["time"][1] - result["time"][0])
     found = (place[:, 2:] - place[:, :-2]) / (2 * step)

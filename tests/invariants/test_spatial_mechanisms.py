@@ -215,7 +215,7 @@ def arm(*welds: tuple[str, float], **more: Any) -> Mechanism:
 
 
 def test_a_weld_carries_weight_and_centrifugal_force() -> None:
-    result = analyse(arm(("B", 0.0)), STEPS)
+    result = brief(arm(("B", 0.0)), STEPS)
     force = result["reaction_force"].sel(joint="B").transpose("position", "axis").values
     np.testing.assert_allclose(force[0], [-2 * 0.2 * 9, 0, 2 * 9.81], rtol=0, atol=1e-12)
     moment = result["reaction_moment"].sel(joint="B").transpose("position", "axis").values
@@ -232,7 +232,7 @@ def test_two_welds_are_one_too_many() -> None:
 
 
 def test_welds_that_do_not_meet_are_not_assembled() -> None:
-    result = analyse(arm(("B", 0.0), ("C", 0.01), over_constraint="minimum-norm"), STEPS)
+    result = brief(arm(("B", 0.0), ("C", 0.01), over_constraint="minimum-norm"), STEPS)
     assert (result["status"] == Status.NOT_ASSEMBLED).all()
     assert np.isnan(result["reaction_force"]).all()
 
@@ -261,7 +261,7 @@ def test_a_wedge() -> None:
         drivers={"A": {"range": [-0.1, 0.1], "speed": 0.1}},
         loads={"work": {"link": "follower", "at": "C", "force": [0, 0, "-100 N - 500 N/m * drive"]}},
     )
-    result = analyse(mechanism, STEPS)
+    result = brief(mechanism, STEPS)
     weight = 100 + 500 * np.linspace(-0.1, 0.1, STEPS)
     np.testing.assert_allclose(result["drive_effort"].values[0], -weight * np.tan(beta), rtol=1e-12)
 

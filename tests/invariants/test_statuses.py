@@ -10,7 +10,20 @@ import numpy as np
 import pytest
 
 import trunnion
-from mechanisms import DURANGO, MODELS, analyse, body, build, findings, four_bar, model, revolute, slider_crank
+from brief import brief
+from mechanisms import (
+    DURANGO,
+    MODELS,
+    analyse,
+    body,
+    build,
+    findings,
+    four_bar,
+    model,
+    positions_of,
+    revolute,
+    slider_crank,
+)
 from trunnion import FrictionMethod, Mechanism, MechanismError, Status
 
 FORCES = ["drive_effort", "drive_effort_lower", "drive_effort_upper", "reaction_force", "friction_power", "drive_power"]
@@ -99,7 +112,7 @@ def test_general_group_not_assembled_over_part_of_the_turn() -> None:
 def test_same_slider_crank_does_not_change_sides() -> None:
     """Where it assembles again after a gap it is the stated assembly: the piston to the right of the pin."""
     data = slider_crank(0.5, 0.4, 0.0)
-    result = analyse(data, 120)
+    result = positions_of(data, 120)
     q = -6.0 * result["time"].values
     solved = result["status"].values < Status.NOT_CONVERGED
     x = result["point_position"].sel(point="piston.P", axis="x").values
@@ -132,7 +145,7 @@ def test_rocker_driven_through_a_dead_centre() -> None:
     data = four_bar()
     data["drivers"] = {"D": {"speed": 1.0, "range": [1.2, 2.9]}}
     data["assembly"] = {"B": [0.2, 0.2], "C": [1.2, 0.6]}
-    result = analyse(data, 200)
+    result = positions_of(data, 200)
     status = result["status"].values
     assert np.any(status < Status.NOT_CONVERGED)
     assert np.any(status == Status.NOT_ASSEMBLED)
@@ -156,7 +169,7 @@ def test_exactly_at_a_dead_centre(kind: str) -> None:
         data["links"]["piston"]["points"]["C"] = {"at": [0, 0], "axis": [1, 0]}
         data["drivers"] = {"C": {"speed": -0.1, "range": [1.3, 1.0]}}
         data["assembly"] = {"B": [0.29, 0.05]}
-    result = analyse(data, 5)
+    result = positions_of(data, 5)
     status = result["status"].values
     assert status[0] in (Status.SINGULAR, Status.NOT_ASSEMBLED)
     assert np.all(np.isnan(result["drive_effort"].values[:, 0]))
@@ -185,7 +198,7 @@ def test_parallelogram_passes_its_change_points() -> None:
 
 @pytest.mark.parametrize("name", ["four-bar", "class III", "excavator"])
 def test_one_position(name: str) -> None:
-    whole, one = analyse(MODELS[name](), 12), analyse(MODELS[name](), 1)
+    whole, one = positions_of(MODELS[name](), 12), positions_of(MODELS[name](), 1)
     assert one.sizes["position"] == 1
     for variable in ("point_position", "reaction_force", "drive_effort", "status"):
         np.testing.assert_allclose(
@@ -196,7 +209,7 @@ def test_one_position(name: str) -> None:
 def test_many_positions_agree_with_few() -> None:
     """100 000 positions in chunks: the same numbers at common positions, no seam between chunks."""
     mechanism = trunnion.read(DURANGO)
-    many, few = trunnion.analyse(mechanism, 100_000), trunnion.analyse(mechanism, 160)
+    many, few = brief(mechanism, 100_000), brief(mechanism, 160)
     for variable in ("point_position", "reaction_force", "drive_effort", "friction_power", "condition", "status"):
         a, b = many[variable].values[..., ::625], few[variable].values
         scale = float(np.abs(b).max()) or 1.0
@@ -246,7 +259,7 @@ def test_names_of_any_kind() -> None:
         joint["links"] = [text.get(link, link) for link in joint["links"]]
     for load in data["loads"].values():
         load["link"] = text[load["link"]]
-    plain, named = analyse(four_bar(), 12), analyse(data, 12)
+    plain, named = positions_of(four_bar(), 12), positions_of(data, 12)
     np.testing.assert_allclose(named["drive_effort"], plain["drive_effort"], rtol=1e-12)
     assert "Kurbel α" in named["link"].values
 
@@ -267,7 +280,7 @@ def test_massless_and_unloaded() -> None:
 
 
 def test_zero_coefficient_equals_no_friction() -> None:
-    zero, off = analyse(four_bar(), 24, friction=0.0), analyse(four_bar(), 24, friction=None)
+    zero, off = positions_of(four_bar(), 24, friction=0.0), positions_of(four_bar(), 24, friction=None)
     for variable in ("drive_effort", "reaction_force", "friction_power"):
         np.testing.assert_array_equal(zero[variable].values, off[variable].values)
 
@@ -275,14 +288,14 @@ def test_zero_coefficient_equals_no_friction() -> None:
 def test_a_load_at_the_coupler_point_is_where_it_is_said() -> None:
     """Moving a force along its line of action changes nothing; across it changes the moment it has."""
     data, shifted, moved = four_bar(), four_bar(), four_bar()
-    result = analyse(data, 12, friction=None)
+    result = positions_of(data, 12, friction=None)
     e = result["point_position"].sel(point="coupler.E").values
     coupler = data["links"]["coupler"]["points"]["E"]
     for other, offset in ((shifted, (0.0, 0.0)), (moved, (0.1, 0.0))):
         other["links"]["coupler"]["points"]["F"] = [coupler[0] + offset[0], coupler[1] + offset[1]]
         other["loads"]["push"]["at"] = "F"
-    np.testing.assert_allclose(analyse(shifted, 12, friction=None)["drive_effort"], result["drive_effort"])
-    difference = analyse(moved, 12, friction=None)
+    np.testing.assert_allclose(positions_of(shifted, 12, friction=None)["drive_effort"], result["drive_effort"])
+    difference = positions_of(moved, 12, friction=None)
     arm = difference["point_position"].sel(point="coupler.F").values - e
     turn = arm[0] * -30.0 - arm[1] * 12.0
     extra = (difference["drive_power"] - result["drive_power"]).values[0]
@@ -304,16 +317,16 @@ def test_many_turns_in_one_range() -> None:
     """A linkage that assembles over a turn assembles over 365, at the positions it has in one."""
     one, many = MODELS["class III"](), MODELS["class III"]()
     many["drivers"]["A"] = {"speed": 5.0, "range": [0.0, 730 * np.pi]}
-    result = analyse(many, 366)
+    result = positions_of(many, 366)
     assert np.all(result["status"] < Status.NOT_CONVERGED)
-    start = analyse(one, 4)["drive_effort"].values[0, 0]
+    start = positions_of(one, 4)["drive_effort"].values[0, 0]
     np.testing.assert_allclose(result["drive_effort"].values[0], start, rtol=1e-6)
 
 
 def test_range_includes_both_ends() -> None:
     data = four_bar()
     data["drivers"]["A"] = {"speed": -2.0, "range": [1.0, -0.5]}
-    result = analyse(data, 4)
+    result = positions_of(data, 4)
     np.testing.assert_allclose(result["link_angle"].sel(link="crank"), [1.0, 0.5, 0.0, -0.5], atol=1e-15)
     np.testing.assert_allclose(result["time"], [0.0, 0.25, 0.5, 0.75])
     data["drivers"]["A"]["speed"] = 2.0
@@ -336,7 +349,7 @@ def test_ranges_that_do_not_take_the_same_time() -> None:
 @pytest.mark.parametrize("name", ["slider-crank", "four-bar", "class III"])
 def test_assembly_by_the_angle_of_a_joint(name: str) -> None:
     """The rotation of a joint at the start says which way as well as a point does, on moving links too."""
-    expected = analyse(MODELS[name](), 12)
+    expected = positions_of(MODELS[name](), 12)
     data = MODELS[name]()
     joint = {"slider-crank": "B", "four-bar": "B", "class III": "P"}[name]
     data["assembly"] = {joint: float(expected["joint_rotation"].sel(joint=joint)[0]) + 0.05}
@@ -344,7 +357,7 @@ def test_assembly_by_the_angle_of_a_joint(name: str) -> None:
         data["assembly"]["Q"] = float(expected["joint_rotation"].sel(joint="Q")[0])
         data["assembly"]["R"] = float(expected["joint_rotation"].sel(joint="R")[0])
         data["assembly"]["B"] = float(expected["joint_rotation"].sel(joint="B")[0])
-    result = analyse(data, 12)
+    result = positions_of(data, 12)
     np.testing.assert_allclose(result["point_position"], expected["point_position"], atol=1e-10)
 
 
@@ -353,7 +366,7 @@ def test_assembly_by_the_slide_of_a_joint(side: float) -> None:
     """For a slide the hint is its length: the piston to the right or to the left of the crank."""
     data = slider_crank()
     data["assembly"] = {"C": side}
-    result = analyse(data, 12)
+    result = positions_of(data, 12)
     slide = result["joint_slide"].sel(joint="C").values
     assert np.all(np.sign(slide) == np.sign(side))
 
@@ -372,7 +385,7 @@ def test_both_assemblies_are_found_and_the_choice_is_reported() -> None:
 def test_a_point_of_a_link_as_a_hint() -> None:
     up, down = four_bar(), four_bar()
     up["assembly"], down["assembly"] = {"coupler.E": [0.5, 0.5]}, {"coupler.E": [0.8, -0.3]}
-    a, b = (analyse(d, 4)["point_position"].sel(point="rocker.C", axis="y").values for d in (up, down))
+    a, b = (positions_of(d, 4)["point_position"].sel(point="rocker.C", axis="y").values for d in (up, down))
     assert a[0] > 0 > b[0]
 
 
@@ -405,7 +418,9 @@ def test_inertia_about_the_origin() -> None:
             x, y = link["centre"]
             link["inertia"] += link["mass"] * (x * x + y * y)
             link["inertia_about"] = "origin"
-    np.testing.assert_allclose(analyse(other, 12)["drive_effort"], analyse(data, 12)["drive_effort"], rtol=1e-10)
+    np.testing.assert_allclose(
+        positions_of(other, 12)["drive_effort"], positions_of(data, 12)["drive_effort"], rtol=1e-10
+    )
 
 
 def test_where_the_frame_of_a_link_lies_does_not_matter() -> None:
@@ -420,15 +435,15 @@ def test_where_the_frame_of_a_link_lies_does_not_matter() -> None:
     link = other["links"]["coupler"]
     link["points"] = {name: moved(at) for name, at in link["points"].items()}
     link["centre"] = moved(link["centre"])
-    a, b = analyse(data, 12), analyse(other, 12)
+    a, b = positions_of(data, 12), positions_of(other, 12)
     for variable in ("drive_effort", "reaction_force", "point_position", "friction_power"):
         np.testing.assert_allclose(b[variable], a[variable], rtol=0, atol=1e-10 * float(np.abs(a[variable]).max()))
 
 
 def test_methods_agree_everywhere() -> None:
     for name in ("four-bar", "slider-crank", "class III", "excavator"):
-        newton = analyse(MODELS[name](), 30)
-        named = analyse(MODELS[name](), 30, FrictionMethod("successive-approximation", 1e-11))
+        newton = positions_of(MODELS[name](), 30)
+        named = positions_of(MODELS[name](), 30, FrictionMethod("successive-approximation", 1e-11))
         for variable in ("drive_effort", "reaction_force", "reaction_moment"):
             scale = float(np.abs(newton[variable]).max()) or 1.0
             np.testing.assert_allclose(named[variable], newton[variable], rtol=0, atol=1e-9 * scale, err_msg=name)
@@ -447,10 +462,10 @@ def test_a_toggle_gives_way_to_its_neighbours() -> None:
     """One singular lane in a batch leaves the others as they are alone."""
     data = four_bar(0.5, 1.0, 0.5, 1.0)
     data["assembly"] = {"C": [1.5, 0.01]}
-    everything = analyse(data, 36)
+    everything = positions_of(data, 36)
     part = copy.deepcopy(data)
     part["drivers"]["A"] = {"speed": 4.0, "range": [np.pi / 18, np.pi / 2]}
-    alone = analyse(part, 9)
+    alone = positions_of(part, 9)
     np.testing.assert_allclose(everything["drive_effort"].values[0, 1:10], alone["drive_effort"].values[0], rtol=1e-9)
 
 
@@ -461,7 +476,7 @@ def test_a_loose_weight_on_a_massless_rod() -> None:
     data["loads"] = {}
     data["links"]["rocker"] = body({"D": [0, 0], "C": [0.7, 0]}, 5)
     data["joints"]["A"] = revolute("ground", "crank")
-    result = analyse(data, 12, friction=None)
+    result = positions_of(data, 12, friction=None)
     b, c = (result["reaction_force"].sel(joint=name).values for name in "BC")
     np.testing.assert_allclose(b, c, atol=1e-10)
     at = result["point_position"]

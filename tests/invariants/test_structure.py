@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import trunnion
+from brief import brief
 from mechanisms import MODELS, Data, build, four_bar, model, prismatic, revolute, slide
 from trunnion import Mechanism, MechanismError
 from trunnion.errors import Finding
@@ -147,7 +148,7 @@ def test_ternary_ground_and_several_pins_at_one_point() -> None:
     data["links"]["rocker"]["points"]["F"] = [0.7, 0]  # at C
     mechanism = build(data)
     assert decompose(mechanism).formula == FORMULAS["Watt six-bar"]
-    result = trunnion.analyse(mechanism, 12)
+    result = brief(mechanism, 12)
     c, f = (result["point_position"].sel(point=f"rocker.{name}").values for name in "CF")
     np.testing.assert_allclose(c, f, atol=1e-15)
 
@@ -286,7 +287,7 @@ def test_rank_far_from_the_origin(shift: float) -> None:
     """Where the drawing has its origin says nothing about mobility."""
     from trunnion.structure.decompose import mobility_by_rank
 
-    result = trunnion.analyse(build(four_bar()), 6)
+    result = brief(build(four_bar()), 6)
     joints = {
         "A": ("revolute", ("ground", "crank")),
         "B": ("revolute", ("crank", "coupler")),

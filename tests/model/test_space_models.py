@@ -17,6 +17,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Joint
 
 FindingsOf = Callable[..., tuple[Finding, ...]]
+Mistake = Callable[..., None]
 
 # A crank with balls at both ends of its rod, which pushes a slider: R, S, S, P, and a screw beside it.
 RSSP = """\
@@ -119,17 +120,9 @@ CASES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("old", "new", "line", "where", "what", "remedy"), CASES)
-def test_one_mistake_is_found_where_it_is(
-    findings_of: FindingsOf, old: str, new: str, line: int, where: str, what: str, remedy: str
-) -> None:
-    assert RSSP.count(old) == 1
-    found = findings_of(RSSP.replace(old, new))
-    texts = "\n".join(map(str, found))
-    fitting = [one for one in found if one.where == where and what in one.what and remedy in one.remedy]
-    assert fitting, texts
-    assert fitting[0].line == line, texts
-    assert all(one.remedy and one.where and one.line for one in found), texts
+@pytest.mark.parametrize("case", CASES)
+def test_one_mistake_is_found_where_it_is(mistake: Mistake, case: tuple[Any, ...]) -> None:
+    mistake(RSSP, case, whole=True)
 
 
 def test_the_model_without_mistakes(tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ from trunnion.model.units import KINDS
 from trunnion.statistics import distributions
 
 FindingsOf = Callable[..., tuple[Finding, ...]]
+Mistake = Callable[..., None]
 DEG = np.pi / 180
 
 
@@ -451,17 +452,9 @@ CASES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("old", "new", "line", "where", "what", "remedy"), CASES)
-def test_one_mistake_is_found_where_it_is(
-    findings_of: FindingsOf, old: str, new: str, line: int, where: str, what: str, remedy: str
-) -> None:
-    assert VARIED.count(old) == 1
-    found = findings_of(VARIED.replace(old, new))
-    texts = "\n".join(map(str, found))
-    fitting = [one for one in found if where in one.where and what in one.what and remedy in one.remedy]
-    assert fitting, texts
-    assert fitting[0].line == line, texts
-    assert all(one.remedy and one.where and one.line for one in found), texts
+@pytest.mark.parametrize("case", CASES)
+def test_one_mistake_is_found_where_it_is(mistake: Mistake, case: tuple[Any, ...]) -> None:
+    mistake(VARIED, case)
 
 
 def test_doubts_are_kept_apart(tmp_path: Path) -> None:

@@ -173,34 +173,6 @@ class Oracle(Linkage):
 
         return [pin(u) for u in pins]
 
-    def power(
-        self, motions: Mapping[str, Motion], found: Solution, friction: Mapping[str, Array]
-    ) -> tuple[float, float]:
-        """Power of drives, loads and friction less the rate of the kinetic energy, and the largest of its parts."""
-        parts = []
-        for link, body in self.bodies(motions).items():
-            motion = motions[link]
-            centre = np.asarray(body.centre)
-            velocity = motion.velocity + np.cross(motion.spin, centre - motion.frame.place)
-            inertia, w = np.asarray(body.inertia), motion.spin
-            parts.append(body.mass * velocity @ (self.gravity - body.acceleration))
-            parts.append(-w @ inertia @ motion.spin_rate)
-            for load in body.loads:
-                at = motion.velocity + np.cross(w, np.asarray(load.point) - motion.frame.place)
-                parts.append(np.asarray(load.force) @ at + np.asarray(load.moment) @ w)
-        for name, joint in self.joints_at(motions, friction).items():
-            one, two = self.elements(motions, name)
-            slip, known = self.slip(motions, name), np.asarray(joint.friction)
-            at = np.cross(two.spin, np.asarray(joint.point) - two.frame.place) + two.velocity
-            relative = at - one.velocity - np.cross(one.spin, np.asarray(joint.point) - one.frame.place)
-            parts.append(known[:3] @ relative + known[3:] @ slip.spin)
-            if joint.driven:
-                rate = slip.slide if joint.kind == "prismatic" else slip.turn
-                parts.append(found.effort[name] * rate)
-        for link, moment in found.spin.items():
-            parts.append(moment * float(self.line(motions, link) @ motions[link].spin))
-        return float(np.sum(parts)), float(np.max(np.abs(parts)))
-
 
 def against(name: str, size: Any, slide: Any = NONE, spin: Any = NONE, felt: bool = False) -> Rubbing:
     """Friction of one bearing against the slip: force `slide` and moment `spin` for size 1, turned round."""

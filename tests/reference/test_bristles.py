@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from mechanisms import Array, analyse, build, four_bar, slider_crank
+from mechanisms import Array, build, four_bar, positions_of, slider_crank
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.errors import Status
 from trunnion.joints.friction import FRICTION_LAWS
@@ -74,7 +74,7 @@ def test_state_is_periodic_and_settled_whatever_the_steps(law: dict[str, Any]) -
     history, duration = run._past["D"], run.cycle.duration
     time = np.linspace(0, 1, 37) * duration
     np.testing.assert_allclose(history.at(time + 3 * duration), history.at(time), rtol=1e-9, atol=1e-15)
-    few, many = analyse(four_bar(), 18, friction=law), analyse(four_bar(), 36, friction=law)
+    few, many = positions_of(four_bar(), 18, friction=law), positions_of(four_bar(), 36, friction=law)
     np.testing.assert_allclose(many["drive_effort"].values[:, ::2], few["drive_effort"].values, rtol=1e-12)
 
 
@@ -88,7 +88,7 @@ def test_dahl_from_rest() -> None:
         "joints": {"S": {"type": "prismatic", "links": ["ground", "block"]}},
         "drivers": {"S": {"speed": 1e-4, "range": [0.0, 2e-4]}},
     }
-    result = analyse(data, 41, friction=DAHL, guide=0.3)
+    result = positions_of(data, 41, friction=DAHL, guide=0.3)
     slide = result["joint_slide"].sel(joint="S").values
     expected = 0.12 * 2.0 * 9.81 * (1 - np.exp(-4e3 * slide / 0.12))
     np.testing.assert_allclose(-result["friction_force"].sel(joint="S").values, expected, rtol=1e-9, atol=1e-12)
@@ -99,7 +99,7 @@ def test_lugre_slides_steadily_by_stribecks_curve() -> None:
     steady = {**LUGRE, "law": "stribeck"}
     for key in ("stiffness", "damping"):
         del steady[key]
-    bristles, curve = analyse(four_bar(), 24, friction=LUGRE), analyse(four_bar(), 24, friction=steady)
+    bristles, curve = positions_of(four_bar(), 24, friction=LUGRE), positions_of(four_bar(), 24, friction=steady)
     ratios = [
         one["friction_torque"].sel(joint="A").values / np.hypot(*one["reaction_force"].sel(joint="A").values)
         for one in (bristles, curve)
@@ -118,7 +118,7 @@ def test_presliding_is_a_spring() -> None:
 @pytest.mark.parametrize("law", [DAHL, LUGRE], ids=["dahl", "lugre"])
 def test_power_balance_and_loss_over_the_cycle(law: dict[str, Any]) -> None:
     """Bristles store a little and give it back; over the cycle they only lose."""
-    result = analyse(slider_crank(), 720, friction=law)
+    result = positions_of(slider_crank(), 720, friction=law)
     assert float(np.abs(result["power_residual"]).max()) < 1e-9
     assert float(result["friction_power"].mean("position").min()) > 0
 
@@ -126,7 +126,7 @@ def test_power_balance_and_loss_over_the_cycle(law: dict[str, Any]) -> None:
 @pytest.mark.parametrize("law", [DAHL, LUGRE], ids=["dahl", "lugre"])
 def test_bristles_in_a_linkage_with_gaps(law: dict[str, Any]) -> None:
     """Where it cannot be assembled there is no state; after the gap the bristles start at rest."""
-    result = analyse(four_bar(2.0, 1.5, 1.5, 4.0), 72, friction=law)
+    result = positions_of(four_bar(2.0, 1.5, 1.5, 4.0), 72, friction=law)
     solved = result["status"].values < Status.NOT_CONVERGED
     assert 0 < np.count_nonzero(solved) < 72
     assert np.all(np.isfinite(result["drive_effort"].values[:, solved]))
@@ -137,7 +137,7 @@ def test_stiff_bristles_slide_steadily() -> None:
     """κ → ∞ leaves Stribeck's curve at every position, beside reversals too."""
     law = {**LUGRE, "stiffness": 1e9, "damping": 0.0, "stribeck_speed": 0.05}
     steady = {key: value for key, value in law.items() if key not in ("stiffness", "damping")} | {"law": "stribeck"}
-    bristles, curve = (analyse(slider_crank(), 360, friction=one) for one in (law, steady))
+    bristles, curve = (positions_of(slider_crank(), 360, friction=one) for one in (law, steady))
     same = bristles["status"].values == curve["status"].values
     np.testing.assert_allclose(
         bristles["friction_force"].sel(joint="P").values[same],

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from brief import brief
 from timed import ANTIPARALLELOGRAM, DELTOID, PARALLELOGRAM, driven_four_bar
 from trunnion import Mechanism, analyse, simulate
 from trunnion.solve.run import prepare
@@ -148,7 +149,7 @@ def test_linkages_go_on_smoothly(name: str, whole: bool) -> None:
     """Place of C, torque by energy; whole: over as many turns of the crank as bring the links back."""
     sides, place = LINKAGES[name]
     begin = 0.7
-    result = analyse(four_bar(*sides, hinted(place, begin), begin, None if whole else 2.0), 500)
+    result = brief(four_bar(*sides, hinted(place, begin), begin, None if whole else 2.0), 500)
     theta = begin + result["time"].values
     assert theta[-1] - begin > 0.99 * TURN * (2 if name == "deltoid" or not whole else 1)
     at = place(theta)
@@ -173,7 +174,7 @@ def test_a_linkage_folds_where_that_is_stated() -> None:
 def test_positions_in_line_have_no_forces() -> None:
     """With the status that says so; those beside it have them."""
     sides, place = LINKAGES["parallelogram"]
-    result = analyse(four_bar(*sides, hinted(place, 0.5), 0.0, None), 36)
+    result = brief(four_bar(*sides, hinted(place, 0.5), 0.0, None), 36)
     status, effort = result["status"].values, result["drive_effort"].values[0]
     assert np.flatnonzero(status == 7).tolist() == [0, 18]
     assert np.flatnonzero(np.isnan(effort)).tolist() == [0, 18]
@@ -197,11 +198,12 @@ def test_a_slider_crank_with_a_rod_like_its_crank() -> None:
         "drivers": {"A": {"speed": 1.0, "start": 0.2}},
         "assembly": {"C": [0.6, 0.0]},
     }
-    result = analyse(Mechanism(**data), 200)
+    result = brief(Mechanism(**data), 200)
     x = result["point_position"].sel(point="slider.C").values[0]
     np.testing.assert_allclose(x, 0.6 * np.cos(0.2 + result["time"].values), atol=1e-12)
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("kind", LINKAGES)
 def test_in_space(kind: str) -> None:
     """A general group, which is followed by Newton's method, goes on as the closed form does."""
@@ -274,7 +276,7 @@ def spatial_kite(kite: Kite, moves: bool, start: float) -> Mechanism:
     )
 
 
-@pytest.mark.parametrize("moves", [True, False])
+@pytest.mark.parametrize("moves", [True, pytest.param(False, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 15))])
 def test_a_kite_in_space_goes_on_smoothly(seed: int, moves: bool) -> None:
     """Moving or at rest, all round: places by both roots, torque by virtual work; the bar does not spin."""
@@ -387,7 +389,7 @@ def random_change_point_linkage(rng: np.random.Generator) -> Mechanism:
     return Mechanism(**data)
 
 
-@pytest.mark.parametrize(("first", "count"), [(0, 25), pytest.param(25, 100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("first", "count"), [(0, 10), pytest.param(10, 115, marks=pytest.mark.slow)])
 def test_no_rate_jumps_at_a_change_point_but_where_it_is_stated(first: int, count: int) -> None:
     passed = jumped = 0
     for seed in range(first, first + count):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import trunnion
+from brief import brief
 from playing import LANKARANI, SMOOTH, SPEED, both_pins, loose_slider, own_equations, rattling, rubbing
 from trunnion.dynamics.compiled_rates import CompiledRates
 from trunnion.dynamics.opened import in_play, opened
@@ -293,5 +294,5 @@ def test_friction_at_the_contact_only_loses() -> None:
 
 
 def test_other_analyses_leave_the_contact_out() -> None:
-    with_contact, without = (trunnion.analyse(rattling(one), steps=24) for one in (None, {}))
+    with_contact, without = (brief(rattling(one), steps=24) for one in (None, {}))
     assert np.array_equal(with_contact["reaction_force"], without["reaction_force"])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import trunnion
+from brief import brief
 from trunnion import Mechanism, MechanismError
 from trunnion.results.tables.cycle import positions
 
@@ -108,7 +109,7 @@ def test_the_pressure_of_a_pin_in_the_plane() -> None:
     """F/(d b) of the reaction; of pins whose length is not stated there is none."""
     data = trunnion.read("examples/durango-fourbar.yaml").data()
     data["joints"]["C"]["pin"] = {"radius": "0.1 m", "length": "50 mm"}
-    found = trunnion.analyse(Mechanism(**data), steps=12)
+    found = brief(Mechanism(**data), steps=12)
     force = np.linalg.norm(found["reaction_force"].sel(joint="C"), axis=0)
     assert found["pin_pressure"].sel(joint="C").values == pytest.approx(force / (0.2 * 0.05), rel=1e-12)
     assert np.all(np.isnan(found["pin_pressure"].sel(joint="B")))
@@ -132,7 +133,7 @@ def test_a_massless_cross_by_its_normal() -> None:
     for link in ("input", "middle", "output"):
         for key in ("mass", "inertia", "centre"):
             data["links"][link].pop(key)
-    found = trunnion.analyse(Mechanism(**data).with_friction("off"), steps=24)
+    found = brief(Mechanism(**data).with_friction("off"), steps=24)
     first, second = pins_of_the_first_cross(found)
     moment = found["drive_effort"].values[0] / np.cross(first.T, second.T)[:, 2]
     assert sizes(found, "B") == pytest.approx(np.tile(np.abs(moment) / 0.07, (4, 1)), rel=1e-9)
@@ -150,8 +151,15 @@ def test_friction_of_a_cross_counts_these_loads(engine: Any) -> None:
     assert found["friction_power"].sel(joint="B").values == pytest.approx(lost, rel=1e-7)
 
 
-@pytest.mark.parametrize("engine", ["numpy", "compiled"])
-@pytest.mark.parametrize(("name", "joint"), [("double-cardan", "A"), ("rssr", "D"), ("offset-slider-crank", "S")])
+@pytest.mark.parametrize(
+    ("name", "joint", "engine"),
+    [
+        ("double-cardan", "A", "numpy"),
+        ("rssr", "D", "compiled"),
+        ("offset-slider-crank", "S", "numpy"),
+        ("offset-slider-crank", "S", "compiled"),
+    ],
+)
 def test_friction_counts_these_loads(name: str, joint: str, engine: Any) -> None:
     """μ r Σ|Q| ω of a bearing, μ Σ|Q| v of a guide."""
     model = trunnion.read(f"examples/{name}.yaml")

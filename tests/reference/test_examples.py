@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import trunnion
+from brief import brief
 from gallery.benchmarks import butterfly, butterfly_torque, share, share_by_hand
 from gallery.drawing import jansen_foot, klann_foot, turns
 from gallery.entry import STEPS, Outcome
@@ -30,7 +31,7 @@ def track(result: Any, point: str) -> Any:
 
 def test_peaucellier_pen_by_inversion() -> None:
     """E = k²/conj(B) with k² = L² − m²: on the line x = k²/2r at the height x tan(θ/2), all along."""
-    result = trunnion.analyse(example("peaucellier"), STEPS)
+    result = brief(example("peaucellier"), STEPS)
     turn = result["joint_rotation"].sel(joint="O").values
     height = (0.25**2 - 0.1**2) / (2 * 0.16) * np.tan(turn / 2)
     np.testing.assert_allclose(track(result, "side-CE.pen").imag, height, rtol=0, atol=1e-14)
@@ -40,20 +41,20 @@ def test_peaucellier_pen_by_inversion() -> None:
 
 
 def test_feet_of_the_legs() -> None:
-    jansen, klann = (trunnion.analyse(example(name), STEPS) for name in ("jansen", "klann"))
+    jansen, klann = (brief(example(name), STEPS) for name in ("jansen", "klann"))
     np.testing.assert_allclose(track(jansen, "shank.foot"), jansen_foot(turns(np.pi)), rtol=0, atol=1e-13)
     np.testing.assert_allclose(track(klann, "leg.foot"), klann_foot(turns(np.pi)), rtol=0, atol=1e-12)
 
 
 def test_klann_data_have_the_stride_that_they_are_made_for() -> None:
     """From the foot at the origin, extended, half a turn leads to (1, 0) units: what a misread digit would spoil."""
-    foot = track(trunnion.analyse(example("klann"), 2), "leg.foot") / 0.2
+    foot = track(brief(example("klann"), 2), "leg.foot") / 0.2
     np.testing.assert_allclose(foot, [0, 1], rtol=0, atol=5e-4)
 
 
 def test_toggle_amplifies_by_its_angle() -> None:
     """F_out/F_in = (cos γ / tan α − sin γ)/2, γ of the cylinder above the horizontal: 1/(2 tan α) if it is level."""
-    result = trunnion.analyse(example("toggle-press").with_friction("off"), STEPS)
+    result = brief(example("toggle-press").with_friction("off"), STEPS)
     knee = track(result, "upper.A")
     tilt = np.angle(knee - (-0.5 + 0.25j))
     gain = (np.cos(tilt) / np.tan(np.arcsin(-knee.real / 0.2)) - np.sin(tilt)) / 2
@@ -74,7 +75,7 @@ def test_toggle_locks_within_its_friction_circles(coefficient: float) -> None:
     data["loads"] = {"cylinder": {"joint": "Z", "resisting_force": 1000.0}}
     data["joint_defaults"]["friction"] = coefficient
     data["assembly"] = {"K": [-0.5e-3, 0.25], "A": [-0.5e-3, 0.25]}
-    result = trunnion.analyse(trunnion.Mechanism(**data), 800)
+    result = brief(trunnion.Mechanism(**data), 800)
     knee = -track(result, "upper.A").real
     locked = result["status"].values == Status.LOCKED
     assert np.array_equal(locked, knee < 2 * coefficient * 0.02)
@@ -84,8 +85,8 @@ def test_toggle_locks_within_its_friction_circles(coefficient: float) -> None:
 def test_jaw_crusher_torque_of_the_rock() -> None:
     """What the rock adds to the torque without friction is −M dψ/dθ while the jaw closes, else nothing."""
     ideal = example("jaw-crusher").with_friction("off")
-    loaded = trunnion.analyse(ideal, STEPS)
-    free = trunnion.analyse(ideal.with_values({"loads.rock.resisting_torque": 0.0}), STEPS)
+    loaded = brief(ideal, STEPS)
+    free = brief(ideal.with_values({"loads.rock.resisting_torque": 0.0}), STEPS)
     added = (loaded["drive_effort"] - free["drive_effort"]).sel(driver="O").values
     rate = np.array([slope(lambda q: complex(jaw_angle(q)), q).real for q in turns(0.0)])
     np.testing.assert_allclose(added, np.where(rate < 0, -200e3 * rate, 0.0), rtol=0, atol=1e-5)
@@ -94,7 +95,7 @@ def test_jaw_crusher_torque_of_the_rock() -> None:
 
 def test_five_bar_right_motor() -> None:
     mechanism = example("five-bar-robot")
-    one = Outcome(mechanism, trunnion.analyse(mechanism, STEPS))
+    one = Outcome(mechanism, brief(mechanism, STEPS))
     assert share(one, "E") == pytest.approx(share_by_hand("E"), abs=1e-9)
 
 
@@ -140,7 +141,7 @@ def relative(one: Any, variable: str) -> Any:
 
 def test_squeezer_from_rest() -> None:
     """At the start: published accelerations, the torque that they come from and the first two multipliers."""
-    start = trunnion.analyse(example("andrews-squeezer"), 4).isel(position=0)
+    start = brief(example("andrews-squeezer"), 4).isel(position=0)
     expected = [-0.0617138900142764496, 0, 0.455279819163070380, 0.222668390165885885, 0.487364979543842550,
                 -0.222668390165885885, 1.23054744454982119]  # fmt: skip
     np.testing.assert_allclose(relative(start, "link_angle"), expected, rtol=0, atol=1e-13)

@@ -8,7 +8,7 @@ from benchmarks.free_motions import LIMIT, SPATIAL_LIMIT, examine, examine_spati
 SEEDS = (1, 2, 12, 5, 10, 24, 34)
 
 
-@pytest.mark.spread(1, "2")
+@pytest.mark.spread(0, "2")
 @pytest.mark.parametrize("seed", SEEDS)
 def test_they_move_as_all_their_links_must(seed: int) -> None:
     """Gravity, forces, springs, dampers, and friction in pins and guides by its law from the multipliers."""

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import trunnion
+from brief import brief
 from geared import geared_five_bar, geared_loop, planet_drive, rocker_train
-from mechanisms import Data, analyse, build, findings, model
+from mechanisms import Data, analyse, build, findings, model, positions_of
 from trunnion import Mechanism, MechanismError
 from trunnion.solve.run import prepare
 
@@ -36,7 +37,7 @@ def straight_line_gears(radius: float) -> Data:
 
 def test_cardan_circles() -> None:
     """x = 2 r cos θ, y = 0 (La Hire, 1706)."""
-    result = trunnion.analyse(Mechanism(**straight_line_gears(0.07)), 60)
+    result = brief(Mechanism(**straight_line_gears(0.07)), 60)
     theta = 2.0 * result["time"].values
     np.testing.assert_allclose(
         result["point_position"].sel(point="planet.P", axis="x"), 0.14 * np.cos(theta), atol=1e-15
@@ -61,7 +62,7 @@ def test_two_wheels() -> None:
         "drivers": {"A": {"speed": 10.0}},
         "loads": {"brake": {"joint": "E", "resisting_torque": torque}},
     }
-    result = trunnion.analyse(Mechanism(**data), 8)  # type: ignore[arg-type]
+    result = brief(Mechanism(**data), 8)  # type: ignore[arg-type]
     assert result["time"].values[-1] == pytest.approx(2 * 2 * np.pi / 10 * 7 / 8)  # two turns of the pinion
     np.testing.assert_allclose(result["drive_effort"].sel(driver="A"), torque / 2, rtol=1e-12)
     tangential, apart = torque / 0.2, torque / 0.2 * np.tan(angle)
@@ -99,7 +100,7 @@ def test_teeth_change_reactions_only(name: str) -> None:
     for gear in other["gears"].values():
         gear["teeth"] = False
         gear.pop("pressure_angle", None)
-    toothed, train = analyse(TOOTHED[name](), 24, friction=None), analyse(other, 24, friction=None)
+    toothed, train = positions_of(TOOTHED[name](), 24, friction=None), positions_of(other, 24, friction=None)
     np.testing.assert_allclose(train["drive_effort"], toothed["drive_effort"], atol=1e-9)
     np.testing.assert_allclose(train["gear_torque"], toothed["gear_torque"], atol=1e-9)
     assert np.abs(train["reaction_force"] - toothed["reaction_force"]).max() > 1.0
@@ -112,7 +113,7 @@ def test_ratio_is_kept_over_all_turns() -> None:
     np.testing.assert_allclose(np.angle(np.exp(1j * slip)), 0.0, atol=1e-13)
     assert result.attrs["periodic"]
     assert result["time"].values[-1] == pytest.approx(4 * np.pi / 3 * 199 / 200)
-    train = analyse(rocker_train(), 90)
+    train = positions_of(rocker_train(), 90)
     turned = train["joint_rotation"].sel(joint="E") - 0.7 * train["joint_rotation"].sel(joint="D") + 2.5
     np.testing.assert_allclose(np.angle(np.exp(1j * turned)), 0.0, atol=1e-13)
     assert train["time"].values[-1] == pytest.approx(2 * np.pi / 5 * 89 / 90)  # the rocker makes no whole turn
@@ -166,7 +167,7 @@ def test_cycle_whichever_way_a_gear_pair_is_stated() -> None:
     other["gears"]["mesh"] = {"joints": ["E", "A"], "ratio": 2.0, "phase": -0.8}
     assert cycle_of(one) == pytest.approx(2 * 2 * np.pi / 3)
     assert cycle_of(other) == pytest.approx(cycle_of(one))
-    plain, turned = analyse(one, 60), analyse(other, 60)
+    plain, turned = positions_of(one, 60), positions_of(other, 60)
     np.testing.assert_allclose(turned["drive_effort"], plain["drive_effort"], rtol=1e-9)
 
 
@@ -190,7 +191,7 @@ def test_cycle_of_a_chain_of_gear_pairs() -> None:
     run = prepare(mechanism)
     assert run.cycle.duration == pytest.approx(8.0)
     assert run.cycle.periodic
-    result = trunnion.analyse(mechanism, 80)
+    result = brief(mechanism, 80)
     turned = result["joint_rotation"].sel(joint="D").values / (2 * np.pi)
     np.testing.assert_allclose(turned, -result["time"].values / 8, atol=1e-9)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import trunnion
+from brief import brief
 from mechanisms import body, build, revolute, slider_crank
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.solve.run import prepare
@@ -86,7 +87,7 @@ def test_sensitivity_of_the_slider(dimension: str, expected: float) -> None:
 
 def test_slider_crank_motion_in_closed_form() -> None:
     r, length, e, rate = 0.3, 1.0, 0.1, -6.0
-    result = trunnion.analyse(build(slider_crank(r, length, e)), 90)
+    result = brief(build(slider_crank(r, length, e)), 90)
     q = rate * result["time"].values
     root = np.sqrt(length**2 - (e - r * np.sin(q)) ** 2)
     x = r * np.cos(q) + root

@@ -9,6 +9,7 @@ import pytest
 import test_newton_euler as oracle
 
 import trunnion
+from brief import brief
 from mechanisms import MODELS, Array, Data, build, findings, four_bar, model, prismatic, revolute, slide, slider_crank
 from mechanisms_space import rssr
 from reference import newton_euler
@@ -45,7 +46,7 @@ def pushed_slider(coefficient: float, load: float = -LOAD, speed: float = 0.1) -
 @pytest.mark.parametrize("share", [1e-3, 0.5, 0.999, 1 - 1e-6])
 def test_below_the_critical_coefficient(share: float) -> None:
     """P = W/(1 − 2 f a/L), finite up to the brink."""
-    result = trunnion.analyse(pushed_slider(share * CRITICAL), 7)
+    result = brief(pushed_slider(share * CRITICAL), 7)
     assert np.all(result["status"] == Status.SOLVED)
     np.testing.assert_allclose(result["drive_effort"].values, LOAD / (1 - share), rtol=1e-9 / (1 - share) + 1e-12)
     assert np.all(result["friction_power"].sel(joint="G") > 0)
@@ -72,7 +73,7 @@ def test_above_the_critical_coefficient(excess: float) -> None:
 @pytest.mark.parametrize("coefficient", [0.3 * CRITICAL, 3 * CRITICAL])
 def test_a_load_that_helps_never_locks(coefficient: float) -> None:
     """Pulled along, the ram brakes: P = −W/(1 + 2 f a/L) for any coefficient."""
-    result = trunnion.analyse(pushed_slider(coefficient, LOAD), 5)
+    result = brief(pushed_slider(coefficient, LOAD), 5)
     assert np.all(result["status"] == Status.SOLVED)
     np.testing.assert_allclose(result["drive_effort"].values, -LOAD / (1 + coefficient / CRITICAL), rtol=1e-9)
 
@@ -80,15 +81,13 @@ def test_a_load_that_helps_never_locks(coefficient: float) -> None:
 def test_locks_in_one_direction_only() -> None:
     """The same load on the way back helps."""
     mechanism = pushed_slider(2 * CRITICAL, -LOAD, -0.1)
-    assert np.all(trunnion.analyse(mechanism, 5)["status"] == Status.SOLVED)
+    assert np.all(brief(mechanism, 5)["status"] == Status.SOLVED)
 
 
 def test_successive_approximation_never_calls_a_locked_position_solved() -> None:
     """However long it iterates: it may diverge to infinity, but then it has not converged."""
     for limit in (20, 200, 5000):
-        result = trunnion.analyse(
-            pushed_slider(3 * CRITICAL), 3, FrictionMethod("successive-approximation", None, limit)
-        )
+        result = brief(pushed_slider(3 * CRITICAL), 3, FrictionMethod("successive-approximation", None, limit))
         assert np.all(result["status"] >= Status.NOT_CONVERGED), limit
         assert np.all(np.isnan(result["drive_effort"])), limit
 

@@ -295,7 +295,7 @@ def test_a_weight_pushes_as_the_same_force_does_stated_as_a_load(lifted: Callabl
         assert [row["cells"][:3] for row in rows[0]] == [row["cells"][:3] for row in rows[1]]
 
 
-@pytest.mark.parametrize("lifted", [lift, swing])
+@pytest.mark.parametrize("lifted", [lift, pytest.param(swing, marks=pytest.mark.slow)])
 def test_without_useful_work_there_is_no_efficiency_and_it_says_why(lifted: Callable[[bool], Mechanism]) -> None:
     """NaN, not 0: over the cycle, at each position, backward, over a sweep and as a measure."""
     mechanism = lifted(True)

@@ -388,7 +388,9 @@ def test_locking_margin() -> None:
     assert float(np.ravel(primal(slope))[0]) == pytest.approx(found, rel=1e-12)
 
 
-@pytest.mark.parametrize("data", [four_bar(), rssr(friction=0.05).data], ids=["plane", "space"])
+@pytest.mark.parametrize(
+    "data", [four_bar(), pytest.param(rssr(friction=0.05).data, marks=pytest.mark.slow)], ids=["plane", "space"]
+)
 def test_a_locking_margin_beyond_what_is_looked_for_is_infinite(data: Data) -> None:
     """In a result, a sweep and samples; the summary says "more than"; its place does not exist."""
     statistics = ["minimum", "mean", "place-of-minimum"]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import trunnion
+from brief import brief
 from mechanisms import four_bar
 from trunnion import Mechanism, MechanismError, Status
 from trunnion.algebra.dual import Dual, derivative
@@ -63,14 +64,14 @@ def test_the_crank_of_a_ram_that_moves_by_a_law() -> None:
 
 
 def test_effort_is_that_of_two_runs() -> None:
-    """The ram's motion gives the crank's by a table of 4000 points, which drives it: the effort is the same."""
-    rows = 4000
-    ram = trunnion.analyse(press({"S": {**RAM, "returns": False, "dwell": 0}}), steps=rows)
+    """The ram's motion gives the crank's by a table of 2000 points, which drives it: the effort is the same."""
+    rows = 2000
+    ram = brief(press({"S": {**RAM, "returns": False, "dwell": 0}}), steps=rows)
     points = np.transpose([ram.time.values, ram.joint_rotation.sel(joint="O").values]).tolist()
     table = {"law": "table", "points": [[f"{t!r} s", f"{q!r} rad"] for t, q in points]}
-    twice = trunnion.analyse(press({"O": table}), steps=rows)
-    once = trunnion.analyse(press({"O": {"moves": "S", **RAM, "returns": False, "dwell": 0}}), steps=rows)
-    inner = slice(40, -40)
+    twice = brief(press({"O": table}), steps=rows)
+    once = brief(press({"O": {"moves": "S", **RAM, "returns": False, "dwell": 0}}), steps=rows)
+    inner = slice(20, -20)
     efforts = (found.drive_effort.sel(driver="O").values[inner] for found in (once, twice))
     size = float(np.max(np.abs(once.drive_effort.values)))
     np.testing.assert_allclose(*efforts, rtol=0, atol=2e-6 * size)
@@ -87,7 +88,7 @@ def test_power_is_the_same_at_whatever_joint_it_enters(example: str, driver: str
     data["joints"] = {name: {**joint, "friction": 0} for name, joint in data["joints"].items()}
     plain = Mechanism(**data)
     driver = driver or next(iter(plain.drivers))
-    start = trunnion.analyse(plain, steps=360)
+    start = brief(plain, steps=360)
     moved = moved or _swinging(plain, driver)
     begin = float(start.joint_rotation.sel(joint=moved)[30])
     law = {"law": "cycloidal", "duration": 1.0, "returns": False,
@@ -96,8 +97,8 @@ def test_power_is_the_same_at_whatever_joint_it_enters(example: str, driver: str
     hints = {joint: list(places[f"{plain.joints[joint].links[1]}.{joint}"]) for joint in plain.joints}
     data["assembly"] = {joint: list(map(float, at)) for joint, at in hints.items() if joint not in (driver, moved)}
     data.pop("measures", None)
-    driven = trunnion.analyse(Mechanism(**{**data, "drivers": {moved: law}}), steps=50)
-    found = trunnion.analyse(Mechanism(**{**data, "drivers": {driver: {"moves": moved, **law}}}), steps=50)
+    driven = brief(Mechanism(**{**data, "drivers": {moved: law}}), steps=50)
+    found = brief(Mechanism(**{**data, "drivers": {driver: {"moves": moved, **law}}}), steps=50)
     size = float(np.max(np.abs(driven.drive_power.values)))
     assert found.drive_power.values == pytest.approx(driven.drive_power.values, abs=1e-9 * size)
     assert found.joint_rotation.sel(joint=moved).values == pytest.approx(
@@ -119,9 +120,9 @@ def test_a_hand_that_two_drivers_move() -> None:
     data = hand()
     led = {"X": {"law": "cycloidal", "range": [0.05, 0.12], "duration": 1.0, "returns": False},
            "Y": {"law": "cycloidal", "range": [0.2, 0.16], "duration": 1.0, "returns": False}}  # fmt: skip
-    driven = trunnion.analyse(Mechanism(**{**data, "drivers": led}), steps=40)
+    driven = brief(Mechanism(**{**data, "drivers": led}), steps=40)
     motors = {"A": {"moves": "X", **led["X"]}, "D": {"moves": "Y", **led["Y"]}}
-    found = trunnion.analyse(Mechanism(**{**data, "drivers": motors}), steps=40)
+    found = brief(Mechanism(**{**data, "drivers": motors}), steps=40)
     power = driven.drive_power.sum("driver").values
     assert found.drive_power.sum("driver").values == pytest.approx(power, abs=1e-9 * np.max(np.abs(power)))
     for joint in ("X", "Y"):

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from brief import brief
 from trunnion import Mechanism, MechanismError, analyse, check, simulate
 from trunnion.solve.run import prepare
 
@@ -57,7 +58,7 @@ def test_a_strut_between_balls_changes_nothing(slide: str, spins: int) -> None:
 
 def test_a_strut_is_a_force_between_two_points() -> None:
     """A driven slide: F dl/dθ + load = 0 about the hinge, and both balls carry F along the line."""
-    result = analyse(arm("prismatic", "T"), 7)
+    result = brief(arm("prismatic", "T"), 7)
     upper = np.array(UPPER)[:, None]
     lower, wheel = (result["point_position"].sel(point=point).values for point in ("arm.L", "arm.W"))
     along = (lower - upper) / np.linalg.norm(lower - upper, axis=0)
@@ -71,7 +72,7 @@ def test_a_strut_is_a_force_between_two_points() -> None:
 @pytest.mark.parametrize("slide", ["prismatic", "cylindrical"])
 def test_a_strut_does_not_spin(slide: str) -> None:
     """Its angular velocity is that of its poses, and has no part along the line."""
-    result = analyse(arm(slide), 401)
+    result = brief(arm(slide), 401)
     step = float(np.diff(result["time"].values[:2])[0])
     for link in ("tube", "rod"):
         w, x, y, z = result["link_rotation"].sel(link=link).values
@@ -131,8 +132,8 @@ JACKS: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("kind", JACKS)
 def test_an_idle_leg_changes_nothing(kind: str) -> None:
-    bare = analyse(arm(None), 9)
-    for seed in range(4):
+    bare = brief(arm(None), 9)
+    for seed in range(2):
         result = analyse(leg(kind, seed), 9)
         assert codes(result).count("mobility.spin") == 1
         assert check(leg(kind, seed)).mobility == 2
@@ -143,8 +144,8 @@ def test_an_idle_leg_changes_nothing(kind: str) -> None:
 @pytest.mark.parametrize("kind", JACKS)
 def test_a_driven_leg_is_a_force_between_its_balls(kind: str) -> None:
     """Whatever its shape: F along the line holds the arm, by virtual work effort · q̇ = F · l̇."""
-    for seed in range(6):
-        result = analyse(leg(kind, seed, JACKS[kind]), 9)
+    for seed in range(3):
+        result = brief(leg(kind, seed, JACKS[kind]), 9)
         lower, wheel = (result["point_position"].sel(point=point).values for point in ("arm.L", "arm.W"))
         along = (lower - np.array(UPPER)[:, None]) / np.linalg.norm(lower - np.array(UPPER)[:, None], axis=0)
         axis = np.array([0.0, 1.0, 0.0])
@@ -159,7 +160,7 @@ def test_a_driven_leg_is_a_force_between_its_balls(kind: str) -> None:
 @pytest.mark.parametrize("kind", JACKS)
 def test_a_leg_of_any_shape_does_not_spin(kind: str) -> None:
     """Its first link has no part of ω along the line; velocities and accelerations are those of its poses."""
-    result = analyse(leg(kind, 1, JACKS[kind]), 401)
+    result = brief(leg(kind, 1, JACKS[kind]), 401)
     step = float(np.diff(result["time"].values[:2])[0])
     line = result["point_position"].sel(point="arm.L").values - np.array(UPPER)[:, None]
     spun = np.sum(result["link_angular_velocity"].sel(link="tube").values * line, axis=0)
@@ -243,6 +244,7 @@ def test_a_spin_within_a_spin() -> None:
     np.testing.assert_allclose(result["drive_effort"].values[0] * 0.1, power, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_leg_changes_no_motion_in_time() -> None:
     moved = []
     for mechanism in (arm(None), leg("revolute", 2)):
@@ -253,7 +255,7 @@ def test_a_leg_changes_no_motion_in_time() -> None:
     np.testing.assert_allclose(moved[1]["drive_coordinate"], moved[0]["drive_coordinate"], rtol=1e-8, atol=1e-10)
 
 
-@pytest.mark.parametrize(("kind", "driven"), [("revolute", True), ("prismatic", True), ("prismatic", False)])
+@pytest.mark.parametrize(("kind", "driven"), [("revolute", True), ("prismatic", False)])
 def test_what_is_printed_of_a_leg_selects_its_assembly(kind: str, driven: bool) -> None:
     """Places and turns that a spin leaves alone; a place of the knee does so wherever it spins."""
     data = leg(kind, 1, JACKS[kind] if driven else None).data()

@@ -145,6 +145,7 @@ def test_pins_in_a_large_play_change_the_peak_by_what_the_triangle_says() -> Non
     assert max(-found["low"], found["high"]) == pytest.approx(np.max(np.abs(torque - peak(x0=begin))), rel=0.01)
 
 
+@pytest.mark.slow
 def test_an_allocation_keeps_the_yield_that_the_formula_has() -> None:
     costs = {name: {"model": "power", "B": 1, "k": 0.5, "unit": "mm", "most": "0.2 mm"} for name in LIMIT}
     room = 3.5 * float(np.sqrt(sum((slope(name) * limit / 3) ** 2 for name, limit in LIMIT.items())))

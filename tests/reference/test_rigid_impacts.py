@@ -177,7 +177,7 @@ def falling(restitution: float, **more: Any) -> Mechanism:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(("restitution", "drag"), [(0.3, 0.0), (0.5, 2.0)])
+@pytest.mark.parametrize(("restitution", "drag"), [(0.3, 0.0), pytest.param(0.5, 2.0, marks=pytest.mark.slow)])
 def test_a_falling_slider_bounces_ever_lower_and_comes_to_rest(restitution: float, drag: float) -> None:
     """It falls with g − R/m and rises with g + R/m under a resistance R beside it; all bounces are a geometric series,
     and the drop's energy is lost."""

@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 
 import trunnion
+from brief import brief
 from mechanisms_space import cardan, floating, rssr
 from reference.maximal_space import Data, unrolled
 from reference.space_oracle import Oracle
@@ -361,10 +362,10 @@ def test_hinges_of_stated_stiffness_are_a_rigid_beam_on_springs() -> None:
 
 def test_one_bearing_with_two_ends_has_the_friction_of_a_door() -> None:
     """The weight turns the leaf over: each end carries W a/L whatever the bearing is made of."""
-    result = trunnion.analyse(door({"lower": 0.5}, bearing=1.0), 4)
+    result = brief(door({"lower": 0.5}, bearing=1.0), 4)
     torque = 0.1 * 0.006 * 2 * DOOR * 9.81 * ARM_OF_WEIGHT / 1.0
     np.testing.assert_allclose(result.drive_effort.values, torque, rtol=1e-12)
-    free = trunnion.analyse(door({"lower": 0.0, "upper": 1.0}, bearing=0.02, friction=0.0), 4)
+    free = brief(door({"lower": 0.0, "upper": 1.0}, bearing=0.02, friction=0.0), 4)
     np.testing.assert_allclose(free.drive_effort.values, 0.0, rtol=0, atol=1e-12)
 
 

@@ -74,7 +74,7 @@ def test_nominal_outside_its_limits_is_no_worst_case() -> None:
     assert np.all(np.isnan([found.searched_lower, found.searched_upper]))
 
 
-@pytest.mark.spread(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("statistic", ["maximum", "peak-to-peak"])
 def test_turn_of_a_link_in_space(statistic: str) -> None:
     """It is a deviation from nominal, 0 throughout: its extreme has the derivative of where it scatters most."""

@@ -15,7 +15,7 @@ def plain():
 
 @pytest.fixture
 def ideal():
-    return four_bar(friction=0.0)
+    return four_bar(ideal=True)
 
 
 def _two_drivers():

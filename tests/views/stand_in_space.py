@@ -10,6 +10,7 @@ import json
 
 import numpy as np
 import xarray as xr
+from stand_in import blank
 
 from trunnion.errors import Status
 from trunnion.results.dataset import driven
@@ -187,19 +188,7 @@ def rssr(count=120, gap=None):
                          "frame": "link", "varies": True, "useful": True}},
         passive=json.dumps(["coupler"]),
     )  # fmt: skip
-    return hidden(result, *gap) if gap else result
-
-
-def hidden(result, start, stop, status):
-    """The same result with no answer at the positions start ≤ i < stop."""
-    hole = (np.arange(result.sizes["position"]) >= start) & (np.arange(result.sizes["position"]) < stop)
-    out = result.copy(deep=True)
-    for name, column in out.data_vars.items():
-        if "position" in column.dims and name != "status":
-            out[name] = column.astype(float).where(~hole)
-            out[name].attrs = column.attrs
-    out["status"] = ("position", np.where(hole, int(status), out["status"].values).astype(np.int8), out["status"].attrs)
-    return out
+    return blank(result, *gap) if gap else result
 
 
 def cardan(count=120, delta=0.6, inputs=()):

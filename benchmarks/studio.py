@@ -1,8 +1,8 @@
-"""The studio in a real browser: start to first picture and to the solved cycle, drags solved and drawn a second,
-pictures a second while it is scrubbed; memory while it plays; how long a chain of many links takes. Needs Chromium
-and the extra dev.
+"""The studio in a real browser: start to first picture and to the solved cycle; drags and pulls of a slider that are
+solved, with forces and margin, and drawn a second; pictures a second while it is scrubbed and played at its fastest;
+memory while it plays and over runs again; how long a chain of many links takes. Needs Chromium and the extra dev.
 
-    python -m benchmarks.studio [--play MINUTES] [--links DYADS]
+    python -m benchmarks.studio [--play MINUTES] [--links DYADS] [--runs COUNT]
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SECONDS = 3.0
 COMPILED = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}  # as installed
 DRAGGED = {"durango-fourbar": "C", "jansen": "K"}
+SLIDERS = {"durango-fourbar": "BC", "jansen": "b"}
 
 DRAG = """async ([name, seconds]) => {
   const { module_studio_state: state } = await import("/modules.js");
@@ -65,6 +66,48 @@ SCRUB = """async (seconds) => {
   return frames / seconds;
 }"""
 
+
+SLIDE = """async ([name, seconds]) => {
+  const { module_studio_state: state } = await import("/modules.js");
+  state.selection.value = null; // then the panel has the dimensions
+  await new Promise((done) => setTimeout(done, 500));
+  const slider = document.querySelector(`input[aria-label="${name}, slider"]`);
+  const from = Number(slider.value);
+  let [drawn, last] = [0, state.live.value];
+  const begin = performance.now();
+  await new Promise((done) => {
+    const frame = (now) => {
+      if (state.live.value !== last) { last = state.live.value; drawn += 1; }
+      if (now - begin > seconds * 1000) return done();
+      slider.value = String(from * (1 + 0.02 * Math.sin((now - begin) / 300)));
+      slider.dispatchEvent(new Event("input", { bubbles: true }));
+      requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+  });
+  slider.value = String(from);
+  slider.dispatchEvent(new Event("pointerup", { bubbles: true }));
+  return drawn / seconds;
+}"""
+
+PLAY = """async (seconds) => {
+  const { module_studio_state: state, module_studio_motion: { crank } } = await import("/modules.js");
+  document.querySelector(".pace select").value = "2"; // a turn in two seconds, four times as fast as usual
+  crank.toggle();
+  let [frames, last] = [0, -1];
+  const begin = performance.now();
+  await new Promise((done) => {
+    const frame = (now) => {
+      const at = state.index.value + state.share.value;
+      if (at !== last) { last = at; frames += 1; }
+      if (now - begin > seconds * 1000) return done();
+      requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+  });
+  crank.toggle();
+  return frames / seconds;
+}"""
 
 ANSWER = """async (text) => {
   const { module_studio_state: state, module_studio_actions: actions } = await import("/modules.js");
@@ -114,7 +157,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.studio", description=__doc__)
     parser.add_argument("--play", type=int, default=0, metavar="MINUTES", help="of play whose memory is measured")
     parser.add_argument("--links", type=int, default=0, metavar="DYADS", help="of a chain that is solved and drawn")
-    minutes, dyads = (asked := parser.parse_args()).play, asked.links
+    parser.add_argument("--runs", type=int, default=0, metavar="COUNT", help="again of a model; memory is measured")
+    minutes, dyads, runs = (asked := parser.parse_args()).play, asked.links, asked.runs
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
         for name, joint in DRAGGED.items():
@@ -128,9 +172,14 @@ def main() -> None:
                     _measure(page, name, joint, address, begin)
                     if minutes and name == next(iter(DRAGGED)):
                         _played(page, minutes, process.pid)
+                    if runs and name == next(iter(DRAGGED)):
+                        _run_again(page, runs, process.pid)
                     if dyads and name == next(iter(DRAGGED)):
                         drawn, whole = page.evaluate(ANSWER, chain(dyads))
-                        print(f"  {2 * dyads + 2} links: drawn with forces {drawn:.1f} s, figures {whole:.1f} s")
+                        print(f"  {2 * dyads + 2} links: drawn with forces {drawn:.1f} s, ", end="")
+                        page.keyboard.press("0")
+                        rate, frames = page.evaluate(DRAG, ["B0", SECONDS]), page.evaluate(PLAY, SECONDS)
+                        print(f"figures {whole:.1f} s, {rate:.1f} drags/s, play {frames:.0f} frames/s")
                     page.close()
                 finally:
                     process.terminate()
@@ -145,32 +194,47 @@ def _measure(page: Page, name: str, joint: str, address: str, begin: float) -> N
     whole = time.perf_counter() - begin
     page.wait_for_timeout(1500)
     rate = page.evaluate(DRAG, [joint, SECONDS])
+    page.wait_for_timeout(1500)
+    pulls = page.evaluate(SLIDE, [SLIDERS[name], SECONDS])
     page.wait_for_timeout(1000)
-    frames = page.evaluate(SCRUB, SECONDS)
+    frames, played = page.evaluate(SCRUB, SECONDS), page.evaluate(PLAY, SECONDS)
     page.click("role=tab[name=Plots]")
     page.wait_for_timeout(500)
     plots = page.evaluate(SCRUB, SECONDS)
     print(f"{name}: first picture {cold:.2f} s, solved {whole:.2f} s, {rate:.0f} drags solved and drawn/s, ", end="")
-    print(f"scrubbing {frames:.0f} frames/s, with plots {plots:.0f}")
+    print(f"slider {pulls:.0f}/s, scrubbing {frames:.0f} frames/s, with plots {plots:.0f}, ", end="")
+    print(f"play {played:.0f}", flush=True)
 
 
 def _played(page: Page, minutes: int, served: int) -> None:
+    page.keyboard.press("Space")
+    for minute in range(minutes + 1):
+        _memory(page, served, f"{minute} min of play")
+        if minute < minutes:
+            page.wait_for_timeout(60_000)
+    page.keyboard.press("Space")
+
+
+def _run_again(page: Page, runs: int, served: int) -> None:
+    """A model with another length each time, solved and drawn with its plots."""
+    text = (ROOT / "examples" / f"{next(iter(DRAGGED))}.yaml").read_text("utf-8")
+    for run in range(runs + 1):
+        if run % max(runs // 5, 1) == 0:
+            _memory(page, served, f"{run} runs")
+        page.evaluate(ANSWER, text.replace("BC: 6.00 m", f"BC: {6 + 1e-4 * (run + 1):.4f} m"))
+
+
+def _memory(page: Page, served: int, when: str) -> None:
     """Memory of the page after its rubbish is collected, its nodes and listeners, and memory of the server."""
     watched = page.context.new_cdp_session(page)
     watched.send("Performance.enable")
-    page.keyboard.press("Space")
-    for minute in range(minutes + 1):
-        watched.send("HeapProfiler.collectGarbage")
-        told = {one["name"]: one["value"] for one in watched.send("Performance.getMetrics")["metrics"]}
-        status = Path(f"/proc/{served}/status").read_text(encoding="ascii")
-        resident = int(status.split("VmRSS:")[1].split()[0]) / 1024
-        print(
-            f"  {minute} min of play: page {told['JSHeapUsedSize'] / 2**20:.1f} MiB, {told['Nodes']:.0f} nodes, ",
-            end="",
-        )
-        print(f"{told['JSEventListeners']:.0f} listeners; server {resident:.0f} MiB", flush=True)
-        if minute < minutes:
-            page.wait_for_timeout(60_000)
+    watched.send("HeapProfiler.collectGarbage")
+    told = {one["name"]: one["value"] for one in watched.send("Performance.getMetrics")["metrics"]}
+    watched.detach()
+    status = Path(f"/proc/{served}/status").read_text(encoding="ascii")
+    resident = int(status.split("VmRSS:")[1].split()[0]) / 1024
+    print(f"  {when}: page {told['JSHeapUsedSize'] / 2**20:.1f} MiB, {told['Nodes']:.0f} nodes, ", end="")
+    print(f"{told['JSEventListeners']:.0f} listeners; server {resident:.0f} MiB", flush=True)
 
 
 if __name__ == "__main__":

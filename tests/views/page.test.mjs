@@ -72,7 +72,7 @@ const events = {};
 globalThis.window = {
   innerWidth: 1400,
   innerHeight: 800,
-  addEventListener: (name, act) => (events[name] ??= []).push(act),
+  addEventListener: (name, act) => (events[name] ??= new Set()).add(act),
 };
 globalThis.ResizeObserver = class {
   observe() {}

@@ -185,19 +185,16 @@ def _take_margins_beside(
 
     Its friction may act either way there, and is taken as none: with that alone the margin would jump at one position.
     """
-    rests, cycle = np.zeros(len(time), bool), run.cycle
-    for places in resting.values():
-        rests[places] = True
-    dwells = (np.roll(rests, 1) | np.roll(rests, -1)) & (len(time) > 1)  # those beside it rest as well
-    places = np.flatnonzero(rests & ~dwells)
-    if not len(places) or cycle.duration <= 0:
+    cycle = run.cycle
+    if not resting or cycle.duration <= 0:
         return
+    places = np.unique(np.concatenate(list(resting.values())))
     sides = time[places] + BESIDE * cycle.duration * np.array([[-1.0], [1.0]])
     inside = cycle.periodic | ((sides >= 0) & (sides <= cycle.duration))
     asked = (sides % cycle.duration if cycle.periodic else np.clip(sides, 0.0, cycle.duration)).ravel()
     back = seating_of(run, method).at(asked, method).back if run.seats else run.solve(asked, method=method)
-    found = np.broadcast_to(np.asarray(locking_margin(back), float), asked.shape).reshape(sides.shape)
-    least = np.fmin.reduce(np.where(inside, found, np.nan))
+    margins = np.broadcast_to(np.asarray(locking_margin(back), float), asked.shape).reshape(sides.shape)
+    least = np.fmin.reduce(np.where(inside, margins, np.nan))
     margin[places] = np.where(np.isnan(least), margin[places], least)
 
 

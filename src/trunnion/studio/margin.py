@@ -30,6 +30,7 @@ __all__ = ["cures", "locks_of", "margin_of", "margins_without"]
 Array = NDArray[np.float64]
 
 ENOUGH = 0.9  # of the friction at which it just runs: what is tried
+SIZES = {"pin.radius": ENOUGH, "guide.length": 1.0 / ENOUGH}  # a shorter arm, a longer guide
 MOST_BLOCKS = 24  # each of them takes an analysis
 
 
@@ -78,6 +79,8 @@ def locks_of(run: Run, time: Array, status: ArrayLike, values: Values | None = N
     seated = run.seats and values is None
     back = seating_of(run, method).at(time[lanes], method).back if seated else run.solve(time[lanes], values, method)
     multiples = critical_multiples(back, 1.0)
+    if not multiples:
+        return {}
     alone = np.array([np.where(multiple < 1.0, multiple, 0.0) for multiple in multiples.values()])
     columns = {joint: np.full(len(time), np.nan) for joint in multiples}
     best = np.argmax(alone, axis=0)
@@ -105,25 +108,21 @@ def cures(state: Loaded, finding: Finding) -> list[dict[str, Any]]:
     decides, multiple = figures["decides"], figures["multiple"]
     if decides and multiple and group != [decides]:
         trials.insert(0, ([decides], multiple))
-    found = []
-    for names_of, times in trials:
-        able = all(coefficients.get(joint) in numbers and isinstance(joints.get(joint), Mapping) for joint in names_of)
+    listed = []
+    for rubbing, times in trials:
+        able = all(coefficients.get(joint) in numbers and isinstance(joints.get(joint), Mapping) for joint in rubbing)
         if not able or not times > 0:
             continue
         gestures = []
-        for joint in names_of:
+        for joint in rubbing:
             before = float(np.ravel(numbers[coefficients[joint]])[0])
-            own = joints[joint].get("friction")
-            whole = own is not None and not isinstance(own, Mapping)
-            path = ["joints", joint, "friction"] if whole else ["joints", joint, "friction", "coefficient"]
+            stated = joints[joint].get("friction", {})
+            path = ["joints", joint, "friction", *(["coefficient"] if isinstance(stated, Mapping) else [])]
             gestures.append({"do": "set", "path": path, "value": float(f"{ENOUGH * times * before:.3g}")})
-        what = f"friction coefficient{'s' * (len(names_of) > 1)} of {', '.join(names_of)}"
-        values = f"{before:.3g} → {gestures[-1]['value']:.3g}" if len(names_of) == 1 else f"× {ENOUGH * times:.3g}"
-        found.append({"label": f"{what} {values}", "gestures": gestures})
-    return found + [_resized(entries, numbers, decides, key, multiple) for key in SIZES if _sized(state, decides, key)]
-
-
-SIZES = {"pin.radius": ENOUGH, "guide.length": 1.0 / ENOUGH}  # a shorter arm, a longer guide
+        what = f"friction coefficient{'s' * (len(rubbing) > 1)} of {', '.join(rubbing)}"
+        values = f"{before:.3g} → {gestures[-1]['value']:.3g}" if len(rubbing) == 1 else f"× {ENOUGH * times:.3g}"
+        listed.append({"label": f"{what} {values}", "gestures": gestures})
+    return listed + [_resized(entries, numbers, decides, key, multiple) for key in SIZES if _sized(state, decides, key)]
 
 
 def _sized(state: Loaded, joint: str | None, key: str) -> bool:
@@ -147,14 +146,14 @@ def margins_without(run: Run, steps: int) -> list[Array | None]:
     from trunnion.cycle.positions import positions  # not for the first picture
 
     modules, mechanism = run.system.plan.modules, run.system.mechanism
-    rubs, found = felt(run.system, run.values), list[Array | None]()
+    rubs, margins = felt(run.system, run.values), list[Array | None]()
     for module in modules:
         scales = {joint: scale_of(run.system, run.values, joint) for joint in module.joints if joint in rubs}
         if len(modules) > MOST_BLOCKS or not all(scales.values()):
-            found.append(None)
+            margins.append(None)
             continue
         quiet = mechanism.with_values({f"joints.{joint}.friction.{scale}": 0.0 for joint, scale in scales.items()})
         with np.errstate(all="ignore"):
             margin = positions(prepare(quiet), steps, averaged=False).arrays["locking_margin"]
-        found.append(np.minimum(margin, MARGIN))
-    return found
+        margins.append(np.minimum(margin, MARGIN))
+    return margins

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.errors import Finding, Severity, Status, counted
+from trunnion.model.joint_parts import has_play
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import prepare
 from trunnion.solve.system import rubbing
@@ -56,10 +57,16 @@ def _said(
     )
     yield acts, "Loads or masses act on it." if acts else "Add a load, a mass or a spring."
     rubs = bool(rubbing(prepare(mechanism).system))
-    yield rubs, "Joints rub." if rubs else "State friction of a joint, and the radius of its pin."
-    yield bool(mechanism.seated), "Pins have play." if mechanism.seated else "State a clearance or fit of a pin."
+    joints = mechanism.effective_joints.values()
+    sized = any(
+        (one.pin and one.pin.radius is not None) or (one.guide and one.guide.length is not None) for one in joints
+    )
+    lacks_size = "" if sized else ", and the radius of its pin"  # a step that is done is not asked for again
+    yield rubs, "Joints rub." if rubs else f"State friction of a joint{lacks_size}."
+    plays = any(map(has_play, joints))
+    yield plays, "Pins have play: the study shows what it does." if plays else "State a clearance or fit of a pin."
     tolerated = bool(mechanism.tolerated())
-    done = "Numbers have tolerances: see what they do."
+    done = "Numbers have tolerances: the study shows what they do."
     yield tolerated, done if tolerated else "Write a tolerance, such as 60 mm ± 0.05 mm."
     free = any(driver.found for driver in mechanism.drivers.values())
     driver = next(iter(mechanism.drivers), "A")

@@ -35,24 +35,47 @@ export function clipped(box, ...children) {
   return svg("g", {}, svg("clipPath", { id }, svg("rect", box)), svg("g", { "clip-path": `url(#${id})` }, ...children));
 }
 
+/** What is drawn anew for paper; held weakly, or a page that is solved many times would keep all its pictures. */
+const pictures = new Set();
+
+function forPaper(kind) {
+  for (const reference of pictures) {
+    const picture = reference.deref();
+    if (!picture) pictures.delete(reference);
+    else if (kind) picture[kind]();
+  }
+}
+
+const paper = { beforeprint: () => forPaper("beforeprint"), afterprint: () => forPaper("afterprint") };
+
+/** Call `beforeprint()` and `afterprint()` of a picture as long as something else holds it. */
+export function onPaper(picture) {
+  for (const kind of ["beforeprint", "afterprint"]) window.addEventListener(kind, paper[kind]); // the same one is not added twice
+  forPaper(null);
+  pictures.add(new WeakRef(picture));
+}
+
 /** Call `draw(width)` now, whenever the width of the element changes, and with `printed` px before printing. */
 export function onWidth(element, draw, printed) {
   let last = 0;
-  const measure = () => {
-    const width = Math.round(element.clientWidth);
-    if (width > 0 && width !== last) draw((last = width));
+  const chart = {
+    measure() {
+      const width = Math.round(element.clientWidth);
+      if (width > 0 && width !== last) draw((last = width));
+    },
+    // The width on paper is only known once it is too late to draw; the drawing is scaled from `printed` to it.
+    beforeprint() {
+      observer.disconnect();
+      draw(printed);
+    },
+    afterprint() {
+      last = 0;
+      observer.observe(element);
+    },
   };
-  // In the next frame: drawing changes heights, and an observer must not change what it observes.
-  const observer = new ResizeObserver(() => requestAnimationFrame(measure));
+  // In the next frame: drawing changes heights, and an observer must not change what it observes. It keeps the chart.
+  const observer = new ResizeObserver(() => requestAnimationFrame(chart.measure));
   observer.observe(element);
-  // The width on paper is only known once it is too late to draw; the drawing is scaled from `printed` to it.
-  window.addEventListener("beforeprint", () => {
-    observer.disconnect();
-    draw(printed);
-  });
-  window.addEventListener("afterprint", () => {
-    last = 0;
-    observer.observe(element);
-  });
-  measure();
+  onPaper(chart);
+  chart.measure();
 }

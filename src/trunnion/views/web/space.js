@@ -4,7 +4,7 @@ import { arrow, longest } from "./arrow.js";
 import { magnified, told } from "./built.js";
 import { steer } from "./camera.js";
 import { at, cause, magnitude, peak, quantile, solved, usualPeak } from "./data.js";
-import { html, onWidth, set, svg } from "./dom.js";
+import { html, onPaper, onWidth, set, svg } from "./dom.js";
 import { roundBelow, short, stated } from "./format.js";
 import { projection } from "./projection.js";
 import { meshes, paint, seen, shades, stroke } from "./solids.js";
@@ -166,8 +166,7 @@ function prepare(view) {
       "0 is the first view.",
   });
   view.stage.replaceChildren(view.canvas, view.over);
-  globalThis.window.addEventListener("beforeprint", () => recolour(view, true));
-  globalThis.window.addEventListener("afterprint", () => recolour(view, false));
+  onPaper(Object.assign(view, { beforeprint: () => recolour(view, true), afterprint: () => recolour(view, false) }));
 }
 
 /** Colours of the page, or those for paper. */

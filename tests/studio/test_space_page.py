@@ -10,6 +10,7 @@ import pytest
 import trunnion
 from browsing import CHROMIUM, User
 from served import served
+from studio.asking import edited
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 
@@ -23,6 +24,26 @@ def analysed(text, steps=360):
 
 def place(result, key, index):
     return result["point_position"].sel(point=key).isel(position=index).values
+
+
+def test_rows_of_a_loop_come_and_go_and_the_others_stay_as_written():
+    """With names and comments; what speaks of a name that changes follows; the ground stays the last link."""
+    text = (EXAMPLES / "pezzuti-cardan.yaml").read_text("utf-8")
+    before = entries_of(text)[0]
+    longer, _ = edited(text, {}, {"do": "add-row"})
+    rows = entries_of(longer)[0]["loop"]
+    assert (rows[:3], rows[4]) == (before["loop"][:3], before["loop"][3])
+    comments = [line for line in text.splitlines() if "#" in line]
+    assert set(comments) <= set(longer.splitlines())
+    back, _ = edited(longer, {}, {"do": "delete", "what": ["joints", rows[3]["joint"]]})
+    assert entries_of(back)[0] == before
+    shorter = entries_of(edited(text, {}, {"do": "delete", "what": ["joints", "output"]})[0])[0]
+    assert [row["link"] for row in shorter["loop"]] == ["input-shaft", "cross", "ground"]
+    assert "output-shaft" not in shorter["links"]
+    renamed = entries_of(edited(text, {}, {"do": "rename", "what": ["joints", "pin-1"], "to": "pin"})[0])[0]
+    assert (renamed["loop"][1]["joint"], renamed["links"]["input-shaft"]["frame"]) == ("pin", "pin")
+    driven = entries_of(edited(text, {}, {"do": "driver", "joint": "output"})[0])[0]
+    assert list(driven["drivers"]) == ["output"]
 
 
 def arrow(path):
@@ -154,3 +175,23 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
             offset, tilt = words.split("offset ")[1].split(", tilt ")
             np.testing.assert_allclose(quantity(offset, "m"), ends[:, axis].mean(), rtol=2e-3)
             np.testing.assert_allclose(quantity(tilt, "rad"), np.diff(ends[:, axis])[0] / 0.02, rtol=2e-3)
+
+    def test_a_cardan_joint_is_built_from_an_empty_sheet_by_its_table(user):
+        """One revolute and three cylindrical joints; tan(out) = tan(in) / cos(angle of the shafts) to 1e-12."""
+        user.page.click("summary:has-text('File')")
+        user.page.click("button:has-text('New sheet')")
+        user.page.click("button:has-text('A loop in space, by its table')")
+        user.until("s.solved.value")
+        before = user.spot("D")
+        for label, typed in (("joint of row 4", "out"), ("twist α of out", "155"), ("offset s of A", "12 mm")):
+            user.page.get_by_label(label).fill(typed)
+            user.page.get_by_label(label).press("Enter")
+            user.idle()
+        assert np.hypot(*np.subtract(user.spot("out"), before)) > 5  # the picture follows
+        assert "twist: 155 deg" in user.state("s.text.value")
+        result = analysed(user.state("s.text.value"), 90)
+        into, out = (result["joint_rotation"].sel(joint=joint).values for joint in ("A", "out"))
+        out = out - out[0]
+        residual = np.sin(out) * np.cos(into) * np.cos(np.radians(25)) - np.cos(out) * np.sin(into)
+        assert np.abs(residual).max() < 1e-12
+        assert np.ptp(out) > 6

@@ -7,7 +7,7 @@ from typing import Any
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.studio.acting import bar_mass, driver, gear, load, spring
-from trunnion.studio.changing import delete, lock, move, put_value
+from trunnion.studio.changing import add_row, delete, lock, move, put_value
 from trunnion.studio.renaming import rename
 from trunnion.studio.sketch import Sketch
 from trunnion.studio.strokes import add_point, link, pinned, slide
@@ -51,4 +51,5 @@ GESTURES: dict[str, Gesture] = {
     "set": put_value,
     "delete": delete,
     "rename": rename,
+    "add-row": add_row,
 }

@@ -27,6 +27,9 @@ def _unfinished(finding: Finding) -> bool:
 
 
 def _steps(sketch: Sketch) -> list[str]:
+    if sketch.rows:
+        driven = "The loop can move in more ways than one" if sketch.of("drivers") else "Nothing drives the loop"
+        return [f"{driven}: change the type of a joint, or choose one and drive it."]
     links = [name for name in sketch.of("links") if name != sketch.ground]
     if not links:
         return ["Draw a link."]

@@ -1,9 +1,9 @@
 """The bodies a spatial mechanism is drawn as: rods, balls, boxes and wires, each fixed in one link.
 
 A link is rods between its joints; a joint is a symbol by its type: revolute a sleeve between two collars, cylindrical a
-sleeve on a long shaft, helical one on a thread, prismatic a block on a rail, spherical a ball, universal a cross
-in two forks, planar a slab on a plate, fixed a cube. What the ground carries stands on a hatched foot. Static figure and browser
-draw the same list.
+sleeve on a long shaft, helical one on a thread, prismatic a block on a rail, spherical a ball, universal a cross in two
+forks, planar a slab on a plate, fixed a cube. What the ground carries stands on a hatched foot. Static figure and
+browser draw the same list.
 """
 
 from __future__ import annotations

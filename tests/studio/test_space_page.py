@@ -46,6 +46,17 @@ def test_rows_of_a_loop_come_and_go_and_the_others_stay_as_written():
     assert list(driven["drivers"]) == ["output"]
 
 
+@pytest.mark.parametrize(("example", "joint"), [("rssp", "B"), ("rssr", "C"), ("rssr", "A")])
+def test_a_joint_moved_in_space_goes_so_far_and_nothing_else_does(example, joint):
+    """At the position that is shown; whatever its coordinates are written as."""
+    text, by = (EXAMPLES / f"{example}.yaml").read_text("utf-8"), np.array([2e-3, -1e-3, 5e-4])
+    gesture = {"do": "move", "point": joint, "by": by.tolist(), "index": 30, "size": 0.2}
+    old, new = analysed(text), analysed(edited(text, {}, gesture)[0])
+    for key in map(str, old["point"].values):
+        expected = by if key.endswith(f".{joint}") else 0.0
+        np.testing.assert_allclose(place(new, key, 30) - place(old, key, 30), expected, atol=2e-9)
+
+
 def arrow(path):
     """Along x and y, px, from the start of an arrow to its tip."""
     (x, y), (a, b) = (map(float, part.split("L")[0].split(",")) for part in path.split("M")[1:3])

@@ -15,7 +15,8 @@ def missing(sketch: Sketch, findings: Sequence[Finding]) -> list[str]:
     errors = [one for one in findings if one.severity is Severity.ERROR]
     if not errors and sketch.joints and not sketch.of("drivers"):
         return ["It stands still: its joints let no link move. Take one away, or let an end slide."]
-    if not errors or not all(map(_unfinished, errors)):
+    drawn = sketch.rows or sketch.entries.get("space") != "spatial"  # by hand, or in a table
+    if not errors or not drawn or not all(map(_unfinished, errors)):
         return []
     return _steps(sketch)
 

@@ -10,6 +10,7 @@ import pytest
 import trunnion
 from browsing import CHROMIUM, User
 from served import served
+from studio.asking import edited
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 
@@ -23,6 +24,37 @@ def analysed(text, steps=360):
 
 def place(result, key, index):
     return result["point_position"].sel(point=key).isel(position=index).values
+
+
+def test_rows_of_a_loop_come_and_go_and_the_others_stay_as_written():
+    """With names and comments; what speaks of a name that changes follows; the ground stays the last link."""
+    text = (EXAMPLES / "pezzuti-cardan.yaml").read_text("utf-8")
+    before = entries_of(text)[0]
+    longer, _ = edited(text, {}, {"do": "add-row"})
+    rows = entries_of(longer)[0]["loop"]
+    assert (rows[:3], rows[4]) == (before["loop"][:3], before["loop"][3])
+    comments = [line for line in text.splitlines() if "#" in line]
+    assert set(comments) <= set(longer.splitlines())
+    back, _ = edited(longer, {}, {"do": "delete", "what": ["joints", rows[3]["joint"]]})
+    assert entries_of(back)[0] == before
+    shorter = entries_of(edited(text, {}, {"do": "delete", "what": ["joints", "output"]})[0])[0]
+    assert [row["link"] for row in shorter["loop"]] == ["input-shaft", "cross", "ground"]
+    assert "output-shaft" not in shorter["links"]
+    renamed = entries_of(edited(text, {}, {"do": "rename", "what": ["joints", "pin-1"], "to": "pin"})[0])[0]
+    assert (renamed["loop"][1]["joint"], renamed["links"]["input-shaft"]["frame"]) == ("pin", "pin")
+    driven = entries_of(edited(text, {}, {"do": "driver", "joint": "output"})[0])[0]
+    assert list(driven["drivers"]) == ["output"]
+
+
+@pytest.mark.parametrize(("example", "joint"), [("rssp", "B"), ("rssr", "C"), ("rssr", "A")])
+def test_a_joint_moved_in_space_goes_so_far_and_nothing_else_does(example, joint):
+    """At the position that is shown; whatever its coordinates are written as."""
+    text, by = (EXAMPLES / f"{example}.yaml").read_text("utf-8"), np.array([2e-3, -1e-3, 5e-4])
+    gesture = {"do": "move", "point": joint, "by": by.tolist(), "index": 30, "size": 0.2}
+    old, new = analysed(text), analysed(edited(text, {}, gesture)[0])
+    for key in map(str, old["point"].values):
+        expected = by if key.endswith(f".{joint}") else 0.0
+        np.testing.assert_allclose(place(new, key, 30) - place(old, key, 30), expected, atol=2e-9)
 
 
 def arrow(path):
@@ -154,3 +186,23 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
             offset, tilt = words.split("offset ")[1].split(", tilt ")
             np.testing.assert_allclose(quantity(offset, "m"), ends[:, axis].mean(), rtol=2e-3)
             np.testing.assert_allclose(quantity(tilt, "rad"), np.diff(ends[:, axis])[0] / 0.02, rtol=2e-3)
+
+    def test_a_cardan_joint_is_built_from_an_empty_sheet_by_its_table(user):
+        """One revolute and three cylindrical joints; tan(out) = tan(in) / cos(angle of the shafts) to 1e-12."""
+        user.page.click("summary:has-text('File')")
+        user.page.click("button:has-text('New sheet')")
+        user.page.click("button:has-text('A loop in space, by its table')")
+        user.until("s.solved.value")
+        before = user.spot("D")
+        for label, typed in (("joint of row 4", "out"), ("twist α of out", "155"), ("offset s of A", "12 mm")):
+            user.page.get_by_label(label).fill(typed)
+            user.page.get_by_label(label).press("Enter")
+            user.idle()
+        assert np.hypot(*np.subtract(user.spot("out"), before)) > 5  # the picture follows
+        assert "twist: 155 deg" in user.state("s.text.value")
+        result = analysed(user.state("s.text.value"), 90)
+        into, out = (result["joint_rotation"].sel(joint=joint).values for joint in ("A", "out"))
+        out = out - out[0]
+        residual = np.sin(out) * np.cos(into) * np.cos(np.radians(25)) - np.cos(out) * np.sin(into)
+        assert np.abs(residual).max() < 1e-12
+        assert np.ptp(out) > 6

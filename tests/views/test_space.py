@@ -6,12 +6,14 @@ import json
 import re
 import shutil
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 from stand_in_space import SPATIAL, Z, cardan, every_kind, rssr
 from test_report import Page
 
+import trunnion
 from trunnion.errors import MechanismError, Status
 from trunnion.results.tables import columns
 from trunnion.views.cycle import plots
@@ -21,8 +23,9 @@ from trunnion.views.cycle.scene import scene
 from trunnion.views.space.bodies import space
 from trunnion.views.space.figure import facets, normal_of
 from trunnion.views.space.scene import screw_axis
-from trunnion.views.space.solids import BAR, SYMBOLS, Solid, best, looking, scenery, solids
+from trunnion.views.space.solids import BAR, PIN, SYMBOLS, Solid, best, looking, scenery, solids
 
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 BLANK = ("nowhere", "locked")  # no position can be drawn
 
 
@@ -98,6 +101,20 @@ def test_no_mechanism_is_seen_on_its_edge():
         seen = looking(*best(shown)).seen(shown.spots)[:, :2]
         true = np.prod(np.linalg.svd(shown.spots, compute_uv=False)[:2])
         assert np.prod(np.linalg.svd(seen, compute_uv=False)) > 0.3 * true
+
+
+def test_a_universal_joint_is_a_cross_in_two_forks():
+    """Either link has two eyes on its pin, as far to both sides, and prongs from its shaft to each."""
+    shown = space(trunnion.analyse(trunnion.read(EXAMPLES / "double-cardan.yaml"), steps=8))
+    for joint, side, link in (("B", 0, "input"), ("B", 1, "middle"), ("C", 0, "middle"), ("C", 1, "output")):
+        middle, axis, _ = shown.element(joint, side)
+        rods = [one for one in solids(shown) if one.link == link and one.kind == "rod" and one.paint == link]
+        eyes = [one.points.mean(axis=0) - middle for one in rods if len(one.points) == 2]
+        eyes = [eye for eye in eyes if np.linalg.norm(np.cross(eye, axis)) < 1e-12 and np.linalg.norm(eye) < 0.1]
+        np.testing.assert_allclose(sorted(eye @ axis for eye in eyes), [-PIN * shown.size, PIN * shown.size])
+        prongs = [one.points for one in rods if len(one.points) == 3]
+        ends = [min(np.linalg.norm(prong[-1] - middle - eye) for prong in prongs) for eye in eyes]
+        assert max(ends) < 1e-12
 
 
 def test_every_pair_has_a_symbol():

@@ -261,8 +261,24 @@ def _change(tree: MutableMapping[Any, Any], before: Mapping[str, Any], after: Ma
         there = tree.get(own)
         if isinstance(there, MutableMapping) and isinstance(value, Mapping) and isinstance(before.get(key), Mapping):
             _change(there, before[key], value)
-        else:
+        elif not _rows_changed(there, before.get(key), value):
             tree[own] = _laid_out(_short(value))
+
+
+def _rows_changed(there: Any, before: Any, after: Any) -> bool:
+    """Take rows out of a list of groups and put others in, whose other rows stay as written; whether that was all."""
+    lists = [one for one in (there, before, after) if isinstance(one, list)]
+    if len(lists) < 3 or not all(isinstance(row, Mapping) for one in lists for row in one):
+        return False
+    rows = list(before)
+    for index in range(len(rows) - 1, -1, -1):
+        if rows[index] not in after:
+            del there[index], rows[index]
+    for index, row in enumerate(after):
+        if rows[index : index + 1] != [row]:
+            there.insert(index, _laid_out(row))
+            rows.insert(index, row)
+    return bool(rows == after)
 
 
 def _laid_out(value: Any) -> Any:

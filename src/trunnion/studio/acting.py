@@ -22,15 +22,16 @@ RATIO = re.compile(r"\s*([-+]?)\s*(\d+\.?\d*|\.\d+)\s*(?:([:/])\s*(\d+\.?\d*|\.\
 def driver(sketch: Sketch, given: Given) -> str:
     """A joint is driven, from where it is shown."""
     joint = str(given["joint"])
-    if joint not in sketch.joints:
+    row = next((row for row in sketch.rows if row.get("joint") == joint), None)
+    if joint not in sketch.joints and row is None:
         raise refused("is not a joint", joint, "choose a joint")
     if not given.get("add"):
         for other in list(sketch.section("drivers")):
             del sketch.section("drivers")[other]
-    if sketch.joints[joint].get("type") == "prismatic":
+    if (row or sketch.joints[joint]).get("type") == "prismatic":
         entry = {"speed": given.get("speed") or "10 mm/s", "range": [0, sketch.length(0.2 * sketch.size)]}
     else:
-        start = _turned(sketch, joint)
+        start = 0.0 if row else _turned(sketch, joint)
         entry = {"speed": given.get("speed") or "60 rpm"} | ({"start": f"{start:g} deg"} if start else {})
     sketch.section("drivers")[joint], sketch.made = entry, ("joints", joint)
     return f"Drive {joint}"

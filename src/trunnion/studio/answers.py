@@ -319,7 +319,7 @@ def _edit(asked: Asked) -> dict[str, Any]:
     sketch = Sketch(entries, places, set(map(str, asked.get("locked") or ())), fine=float(asked.get("fine") or 0.0))
     sketch.turns = partial(_turns, state)
     says = [done(sketch, given) for given in asked["gestures"]]
-    empty = ("drivers", "loads", "springs", "gears", "assembly", "dimensions", "joints")
+    empty = ("links", "drivers", "loads", "springs", "gears", "assembly", "dimensions", "joints")
     after = {key: one for key, one in sketch.entries.items() if one or key not in empty}
     changed = changed_text(text, after) if text.strip() else text_of(after)
     known = {f"{link}.{point}" for link in sketch.of("links") for point in sketch.points(link)}

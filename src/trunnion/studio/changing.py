@@ -9,11 +9,11 @@ from typing import Any
 
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.expression import MOTION, RESERVED
-from trunnion.studio.ends import free, held, refused, vector
+from trunnion.studio.ends import free, held, letter, numbered, refused, vector
 from trunnion.studio.sketch import Sketch
 from trunnion.studio.words import spoken
 
-__all__ = ["delete", "lock", "move", "put_value"]
+__all__ = ["add_row", "delete", "lock", "move", "put_value"]
 
 Given = Mapping[str, Any]
 SECTIONS = {
@@ -76,7 +76,8 @@ def put_value(sketch: Sketch, given: Given) -> str:
         group = group[key] if isinstance(group, list) else group.setdefault(key, {})
         if not isinstance(group, (dict, list)):
             raise refused("is a single value", ".".join(map(str, way)), "change it in the text of the model")
-    path, value = ".".join(map(str, given["path"])), given.get("value")
+    way_told = [way[0], sketch.rows[way[1]].get("joint"), *way[2:]] if way[:1] == ["loop"] and len(way) > 1 else way
+    path, value = ".".join(map(str, [*way_told, last])), given.get("value")
     stated = spoken(path)
     if value is not None:
         if path not in ("name", "notes") and way != ["dimensions"]:
@@ -161,6 +162,8 @@ def delete(sketch: Sketch, given: Given) -> str:
         _drop(sketch, "loads", lambda load: load.get("link") == link and load.get("at") == point)
         _drop(sketch, "springs", lambda spring: name in (spring.get("between") or ()))
         return f"Delete point {point}"
+    if section in ("joints", "links") and any(row.get(section[:-1]) == name for row in sketch.rows):
+        return _delete_row(sketch, section[:-1], name)
     if section not in SECTIONS or name not in sketch.section(section):
         raise refused("is not there", f"{section}.{name}", "choose what is drawn")
     if section == "links" and name == sketch.ground:
@@ -180,6 +183,28 @@ def delete(sketch: Sketch, given: Given) -> str:
         if len(types) < 2 and block in sketch.of("links"):  # slides no longer, or nothing is pinned to it
             delete(sketch, {"what": ["links", block]})
     return f"Delete {SECTIONS[section]} {name}"
+
+
+def add_row(sketch: Sketch, given: Given) -> str:
+    """A row of the table of a loop, before that of the ground: a revolute joint, a link without twist or distance."""
+    joint, link = letter(sketch), numbered(sketch, "links", "link")
+    sketch.entries["loop"].insert(-1, {"joint": joint, "type": "revolute", "link": link, "twist": 0, "distance": 0})
+    sketch.made = ("joints", joint)
+    return f"Add joint {joint}"
+
+
+def _delete_row(sketch: Sketch, key: str, name: str) -> str:
+    """A joint of a loop goes with the link after it; that before it where the ground comes after it."""
+    index, row = next((index, row) for index, row in enumerate(sketch.rows) if row.get(key) == name)
+    if len(sketch.rows) < 3 or (key, name) == ("link", sketch.ground):
+        raise refused("cannot go: the loop would not close", name, "change its type, twist or distance")
+    link = row.get("link")
+    if link == sketch.ground:
+        link, sketch.rows[index - 1]["link"] = sketch.rows[index - 1]["link"], link
+    del sketch.entries["loop"][index]
+    _without_joint(sketch, str(row["joint"]))
+    sketch.section("links").pop(str(link), None)
+    return f"Delete {key} {name}"
 
 
 def _block(sketch: Sketch, link: str) -> bool:

@@ -39,7 +39,8 @@ def taken(sketch: Sketch) -> set[str]:
     """Names of joints, points, links and dimensions."""
     links = sketch.of("links")
     points = (name for link in links for name in sketch.points(link))
-    return {*sketch.joints, *points, *links, *sketch.of("dimensions"), *sketch.section("dimensions")}
+    rows = (str(row.get(key)) for row in sketch.rows for key in ("joint", "link"))
+    return {*sketch.joints, *points, *links, *rows, *sketch.of("dimensions"), *sketch.section("dimensions")}
 
 
 def letter(sketch: Sketch, also: Iterable[str] = ()) -> str:

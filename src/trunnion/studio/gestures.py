@@ -7,7 +7,7 @@ from typing import Any
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.studio.acting import bar_mass, centre, driver, gear, load, spring
-from trunnion.studio.changing import delete, lock, move, put_value
+from trunnion.studio.changing import add_row, delete, lock, move, put_value
 from trunnion.studio.group import group
 from trunnion.studio.joining import join
 from trunnion.studio.renaming import rename
@@ -56,4 +56,5 @@ GESTURES: dict[str, Gesture] = {
     "set": put_value,
     "delete": delete,
     "rename": rename,
+    "add-row": add_row,
 }

@@ -15,7 +15,8 @@ def missing(sketch: Sketch, findings: Sequence[Finding]) -> list[str]:
     errors = [one for one in findings if one.severity is Severity.ERROR]
     if not errors and sketch.joints and not sketch.of("drivers"):
         return ["It stands still: its joints let no link move. Take one away, or let an end slide."]
-    if not errors or not all(map(_unfinished, errors)):
+    drawn = sketch.rows or sketch.entries.get("space") != "spatial"  # by hand, or in a table
+    if not errors or not drawn or not all(map(_unfinished, errors)):
         return []
     return _steps(sketch)
 
@@ -27,6 +28,9 @@ def _unfinished(finding: Finding) -> bool:
 
 
 def _steps(sketch: Sketch) -> list[str]:
+    if sketch.rows:
+        driven = "The loop can move in more ways than one" if sketch.of("drivers") else "Nothing drives the loop"
+        return [f"{driven}: change the type of a joint, or choose one and drive it."]
     links = [name for name in sketch.of("links") if name != sketch.ground]
     if not links:
         return ["Draw a link."]

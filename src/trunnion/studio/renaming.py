@@ -20,7 +20,8 @@ def rename(sketch: Sketch, given: Given) -> str:
     """A part gets another name wherever it is spoken of; a driver has that of its joint."""
     (section, old), new = map(str, given["what"]), str(given["to"]).strip()
     section = "joints" if section == "drivers" else section
-    known = section == "points" or (section in NAMED and old in sketch.section(section))
+    in_rows = section in SIDES and any(row.get(section[:-1]) == old for row in sketch.rows)
+    known = section == "points" or in_rows or (section in NAMED and old in sketch.section(section))
     if not known:
         raise refused("is not there", f"{section}.{old}", "choose what is drawn")
     beside = sketch.section(section) if section != "points" else {}
@@ -105,6 +106,6 @@ def _respoken(text: str, section: str, old: str, new: str, way: tuple[str, ...])
     if section == "joints":
         if last == "between":
             return re.sub(rf"(?<=\.){re.escape(old)}$", new, text)
-        return new if text == old and last in ("at", "joint", "joints") else text
+        return new if text == old and last in ("at", "frame", "joint", "joints") else text
     stated = way[:1] not in (("name",), ("notes",), ("references",)) and last not in ("links", "link", "at", "type")
     return re.sub(rf"(?<![\w.]){re.escape(old)}(?![\w.])", new, text) if stated else text

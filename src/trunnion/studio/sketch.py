@@ -99,13 +99,20 @@ class Sketch:
     @property
     def ground(self) -> str:
         """The fixed link."""
-        usual = next((name for name in FIXED_NAMES if name in self.of("links")), FIXED_NAMES[0])
+        links = {*self.of("links"), *(row.get("link") for row in self.rows)}
+        usual = next((name for name in FIXED_NAMES if name in links), FIXED_NAMES[0])
         return str(self.entries.get("ground") or usual)
 
     @property
     def joints(self) -> Mapping[str, Any]:
         """Joints with their two links."""
         return {name: one for name, one in self.of("joints").items() if _pair(one.get("links"))}
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The table of a loop in space, each row a joint and the link after it; none of other models."""
+        found = self.entries.get("loop")
+        return [row for row in found if isinstance(row, dict)] if isinstance(found, list) else []
 
     def points(self, link: str) -> Mapping[str, Any]:
         """Points of a link, as stated."""

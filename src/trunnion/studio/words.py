@@ -10,7 +10,7 @@ __all__ = ["remedied", "spoken"]
 
 NOUNS = {
     "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair",
-    "dimensions": "dimension", "measures": "measure", "tables": "table",
+    "dimensions": "dimension", "loop": "joint", "measures": "measure", "tables": "table",
 }  # fmt: skip
 NESTED = re.compile(r"\b([a-z_]+): \{([a-z_]+): ([^{},]*)\}")
 STATED = re.compile(r"\b([a-z_]+): (?=-?\d|…)")

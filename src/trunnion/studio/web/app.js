@@ -1,13 +1,14 @@
 // The page: bars, sheet or space, player, and the panel at the right.
 
 import { computed } from "@preact/signals";
-import { discard, save, takeWaiting } from "./actions.js";
+import { discard, save, takeText, takeWaiting } from "./actions.js";
 import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
 import { Blocks, Formula } from "./blocks.js";
 import { Bounded, Failures } from "./boundary.js";
 import { Dialogs } from "./dialogs.js";
 import { Errors } from "./errors.js";
 import { Findings, jump } from "./findings.js";
+import { LOOP } from "./looptable.js";
 import { Motion } from "./motion.js";
 import { Plots } from "./plots.js";
 import { Properties } from "./properties.js";
@@ -120,6 +121,7 @@ function Welcome() {
       <button type="button" class="plain strong" onClick=${() => choose("link")}>Draw a link</button>
       <${Button} label="Open an example …" onClick=${() => (state.dialog.value = "examples")} />
       <${Button} label="Open a file …" onClick=${() => (state.dialog.value = "open")} />
+      <${Button} label="A loop in space, by its table" onClick=${() => takeText(LOOP, "Begin a loop in space")} />
     </p>
   </div>`;
 }

@@ -15,8 +15,9 @@ const USUAL = {
   model: [["name", "Slider-crank"], ["gravity", ["0", "-9.81"]], ["joint_defaults.friction", "0.1"], ["joint_defaults.pin.radius", "5 mm"], ["joint_defaults.guide.length", "40 mm"]],
 }; // prettier-ignore
 
+const IN_SPACE = { gravity: ["0", "0", "-9.81"], centre: ["50 mm", "0", "0"], force: ["0 N", "0 N", "-100 N"] };
 const FIXED = new Set(["type", "links", "link", "at", "between", "joint", "joints"]); // drawn, not typed
-const OWN_PLACE = ["links", "joints", "drivers", "loads", "springs", "gears", "dimensions", "assembly", "notes", "references", "trunnion", "space", "ground"];
+const OWN_PLACE = ["loop", "links", "joints", "drivers", "loads", "springs", "gears", "dimensions", "assembly", "notes", "references", "trunnion", "space", "ground"];
 
 /** Values that are chosen, with the words for them, "" for none; nothing of a value that is typed. */
 function choicesOf(kind, key, part, entries) {
@@ -36,18 +37,25 @@ function choicesOf(kind, key, part, entries) {
  * nothing. kind: a section of the file, or "model" for what is in no section.
  */
 export function rowsOf(entries, kind, name) {
-  const part = kind === "model" ? ownOf(entries) : dictionary(entries?.[kind])[name];
-  const from = kind === "model" ? [] : [kind, name];
+  const row = kind === "joints" ? rowOfLoop(entries, name) : -1;
+  const part = kind === "model" ? ownOf(entries) : row < 0 ? dictionary(entries?.[kind])[name] : { ...entries.loop[row], joint: undefined };
+  const from = kind === "model" ? [] : row < 0 ? [kind, name] : ["loop", row];
   const there = [...(kind === "links" ? lengths(entries, name) : []), ...leaves(part, from)].map((row) => ({ ...row, example: null }));
   const known = (path) => there.some((row) => starts(row.path, path) || starts(path, row.path));
-  const usual = usualOf(kind, part, kind === "links" && name === groundOf(entries));
+  const inSpace = (way, example) => (entries?.space === "spatial" && IN_SPACE[way]) || example;
+  const usual = usualOf(kind, part, kind === "links" && name === groundOf(entries)).map(([way, example]) => [way, inSpace(way, example)]);
   const missing = usual
     .map(([way, example]) => ({ path: [...from, ...way.split(".")], value: null, example, fixed: false, common: kind === "joints" ? commonTo(entries, way.split(".")) : null }))
     .filter(({ path }) => !known(path));
   const ways = usual.map(([way]) => [...from, ...way.split(".")]);
   const order = ({ path }) => ways.findIndex((way) => starts(way, path) || starts(path, way));
   const rows = [...there, ...missing].sort((a, b) => order(a) - order(b)); // a row stays where it is when it is filled
-  return rows.map((row) => ({ ...row, label: row.label ?? labelOf(row.path.slice(from.length), row.value), choices: choicesOf(kind, row.path[2], part, entries) }));
+  return rows.filter(({ path }) => path[2] !== "joint").map((row) => ({ ...row, where: from[0] === "loop" ? ["loop", name, ...row.path.slice(2)] : row.path, label: row.label ?? labelOf(row.path.slice(from.length), row.value), choices: choicesOf(kind, row.path[2], part, entries) }));
+}
+
+/** Which row of the table of a loop has a joint; -1 where none has. */
+export function rowOfLoop(entries, joint) {
+  return Array.isArray(entries?.loop) ? entries.loop.findIndex((row) => row?.joint === joint) : -1;
 }
 
 function usualOf(kind, part, fixed) {

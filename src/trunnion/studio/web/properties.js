@@ -8,6 +8,7 @@ import { dictionary, groundOf } from "./geometry.js";
 import { others, takeOther } from "./ghosts.js";
 import { BarMass, Gravity, Masses } from "./masses.js";
 import * as state from "./state.js";
+import { LoopTable } from "./looptable.js";
 import { Sections } from "./section.js";
 import { removePart } from "./tools.js";
 import { Button, html } from "./ui.js";
@@ -90,7 +91,7 @@ const units = new Map();
 /** A value, or the parts of a list, with what is wrong about it. */
 function Row({ row, findings }) {
   const { path, label, value, example, fixed, common, choices } = row;
-  const wrong = findingsOf(findings, path).filter(({ severity }) => severity !== "note");
+  const wrong = findingsOf(findings, row.where ?? path).filter(({ severity }) => severity !== "note");
   const id = `value-${path.join("-")}`;
   const list = Array.isArray(value ?? example);
   if (fixed) return html`<div class="row"><span class="label" title=${path.join(".")}>${label}</span><span class="fixed">${list ? value.join(", ") : value}</span></div>`;
@@ -140,7 +141,8 @@ function take({ path, example }, parts, list, order, typed, unit) {
 function Model() {
   const { entries, findings } = state.answer.value ?? {};
   const dimensions = Object.entries(dictionary(entries?.dimensions));
-  return html`<section><h2>Model</h2><${Rows} rows=${rowsOf(entries, "model")} findings=${findings} /></section>
+  return html`<${LoopTable} entries=${entries} findings=${findings} />
+    <section><h2>Model</h2><${Rows} rows=${rowsOf(entries, "model")} findings=${findings} /></section>
     <section><h2>Dimensions</h2><div class="rows">
       ${dimensions.map(([name, value]) => html`<${Dimension} key=${name} name=${name} value=${value} findings=${findings} />`)}
     </div><${AddDimension} /></section>

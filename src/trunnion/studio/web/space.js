@@ -67,7 +67,9 @@ function mount(holder) {
 /** Draw a scene, from where the last of the same sheet was looked at. */
 function draw(holder, scene, layers) {
   const other = stage.sheet !== state.opened.value;
-  if (!scene) return other || !holder.firstChild ? holder.replaceChildren(message(state.answer.value)) : null;
+  if (!scene && (other || !holder.firstChild)) return holder.replaceChildren(message(state.answer.value));
+  stage.api?.element.classList.toggle("without-answer", !scene);
+  if (!scene) return;
   stage.sheet = state.opened.value;
   const kinds = kindsOf(scene);
   if (!scene.solids.length) return holder.replaceChildren(spaceView(scene, kinds).element);

@@ -1,9 +1,9 @@
 """The bodies a spatial mechanism is drawn as: rods, balls, boxes and wires, each fixed in one link.
 
 A link is rods between its joints; a joint is a symbol by its type: revolute a sleeve between two collars, cylindrical a
-sleeve on a long shaft, helical one on a thread, prismatic a block on a rail, spherical a ball, universal a cross,
-planar a slab on a plate, fixed a cube. What the ground carries stands on a hatched foot. Static figure and browser
-draw the same list.
+sleeve on a long shaft, helical one on a thread, prismatic a block on a rail, spherical a ball, universal a cross in two
+forks, planar a slab on a plate, fixed a cube. What the ground carries stands on a hatched foot. Static figure and
+browser draw the same list.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ __all__ = ["Camera", "Scenery", "Solid", "best", "looking", "scenery", "solids"]
 # shares of the size of the mechanism
 BAR, FINE, SHAFT, SLEEVE, HALF, BALL, BLOCK = 0.0125, 0.005, 0.0095, 0.022, 0.03, 0.024, 0.024
 COLLAR, FOOT = 0.0165, 0.05
+PIN, FORK = 0.05, 0.1  # half a pin of a cross, and how far the base of a fork is from its middle
 TURNS, STEPS = 5, 10  # of a thread, and its corners a turn
 NEAR, SQUARE = 0.2, 0.25  # of the axes of a fork or a cross: apart, share of the size, and cosine between them
 ARC = np.radians(9)  # of a rod that is part of an arc
@@ -77,11 +78,14 @@ def _body(shown: Space, link: str) -> list[Solid]:
     """Rods along the shortest tree through the joints of a link, finer ones to its free points."""
     sides = {name: joint["links"].index(link) for name, joint in shown.joints.items() if link in joint["links"]}
     seats = {name: shown.seat(name, side) for name, side in sides.items()}
-    found = _of_cardan(shown, link, sides)
+    found, forked = _of_cardan(shown, link, sides), set[str]()
     for one, two in [] if found else _tree(seats):
         route = np.array(_route(shown, (one, sides[one]), (two, sides[two])))
-        route[0] += _clear(shown, one, sides[one], route[1] - route[0])
-        route[-1] += _clear(shown, two, sides[two], route[-2] - route[-1])
+        for name, end, way in ((one, 0, route[1] - route[0]), (two, -1, route[-2] - route[-1])):
+            route[end] += _clear(shown, name, sides[name], way)
+            if PAIRS[shown.joints[name]["type"]].body == "cross" and name not in forked:
+                forked.add(name)
+                found += _fork(shown, link, shown.element(name, sides[name])[1], seats[name], route[end])
         if np.linalg.norm(np.diff(route, axis=0), axis=1).min() > 1e-6 * shown.size:
             found.append(Solid("rod", link, route, BAR * shown.size, link))
     for key, place in shown.free.items():
@@ -89,6 +93,21 @@ def _body(shown: Space, link: str) -> list[Solid]:
             base = _nearest(place, list(seats.values()), found)
             found.append(_rod(link, base, place, FINE * shown.size, link))
             found.append(Solid("ball", link, place[None], 0.011 * shown.size, link))
+    return found
+
+
+def _fork(shown: Space, link: str, axis: Array, middle: Array, base: Array) -> list[Solid]:
+    """The fork of a link on its pin of a cross: two prongs from the base, and an eye around either end of the pin."""
+    size, way = shown.size, base - middle
+    across = way - (way @ axis) * axis
+    if np.linalg.norm(across) < 0.3 * np.linalg.norm(way):  # the shaft lies along the pin
+        return []
+    found = []
+    for sense in (-1.0, 1.0):
+        eye = middle + sense * PIN * size * axis
+        corner = eye + 0.55 * across
+        found.append(Solid("rod", link, np.array([base, corner, eye]), BAR * size, link))
+        found.append(_rod(link, eye - 0.013 * size * axis, eye + 0.013 * size * axis, 0.019 * size, link))
     return found
 
 
@@ -122,6 +141,8 @@ def _clear(shown: Space, name: str, side: int, way: Array) -> Array:
     """How far a rod that leaves a joint starts from its middle, so that it meets its symbol from outside."""
     body, length = PAIRS[shown.joints[name]["type"]].body, float(np.linalg.norm(way))
     radius = {"ball": 0.85 * BALL, "rail": 0.9 * BLOCK, "cube": 0.02}.get(body, 0.0)
+    if body == "cross":
+        return way * min(FORK * shown.size / length, 1 / 3) if length > 0 else way
     if body == "sleeve":
         across = abs(float(way @ shown.element(name, side)[1])) < 0.5 * length
         radius = 0.85 * SLEEVE if across else 0.0
@@ -267,14 +288,14 @@ def _ball(shown: Space, name: str) -> list[Solid]:
 
 
 def _cross(shown: Space, name: str) -> list[Solid]:
-    """The two pins of a cross, each along the axis of its link."""
+    """The two pins of a cross, each along the axis of its link; only the ground has eyes here, others a fork."""
     size, found = shown.size, []
     for side, link in enumerate(shown.joints[name]["links"]):
         middle, z, _ = shown.element(name, side)
-        arm = (HALF + 0.016) * size * z
+        arm = (PIN + 0.016) * size * z
         found.append(_rod(link, middle - arm, middle + arm, 0.012 * size))
-        eyes = [(middle + end * 0.72 * arm, middle + end * arm) for end in (-1, 1)]  # of the link's fork
-        found += [_rod(link, *eye, 0.019 * size, link) for eye in eyes]
+        if link == shown.ground:
+            found += [_rod(link, middle + end * 0.72 * arm, middle + end * arm, 0.019 * size, link) for end in (-1, 1)]
     return [*found, Solid("ball", shown.joints[name]["links"][1], shown.seat(name)[None], 0.019 * size)]
 
 

@@ -14,6 +14,7 @@ const MARGIN = 46; // room for names and arrows, px
 const KEY = 34; // height of the strip with triad and scales, px
 const BELOW = 330; // height of what stands below the drawing, so that all of it stays in the window, px
 const SHARP = 2; // canvas pixels for one of the page, at least: it is printed too
+const REST = 160; // ms after which what was turned is drawn sharp again
 const FITTED = 24; // positions whose bodies a turned view is fitted to
 const LINE = 0.75; // half length of an axis, share of the size
 const FAR = 1.5; // a screw axis farther from the middle than this many sizes is not drawn
@@ -69,6 +70,7 @@ export function spaceView(scene, kinds, { fill = false, after = (_view) => {} } 
     after,
     panel: html("div", {}),
     queued: 0,
+    resting: 0,
   };
   embody(view, scene, kinds);
   settle(view);
@@ -193,16 +195,25 @@ function build(view, width) {
   const margin = Math.min(MARGIN, width * 0.1);
   const scale = Math.min((width - 2 * margin) / wide, (height - 2 * margin - KEY) / tall);
   view.frame = { width, height, scale, margin, middle: [(left + right) / 2, (below + above) / 2] };
-  const sharp = Math.max(globalThis.devicePixelRatio ?? 1, SHARP);
-  set(view.canvas, { width: Math.round(width * sharp), height: Math.round(height * sharp) });
-  view.context = view.canvas.getContext("2d");
-  view.context.setTransform(sharp, 0, 0, sharp, 0, 0);
-  view.context.lineJoin = "round";
-  view.context.lineCap = "round";
+  sharpen(view, SHARP);
   set(view.over, { viewBox: `0 0 ${width} ${height}` });
   if (!view.colours) recolour(view, false);
   view.perUnit = { force: fitting(view, "force"), moment: fitting(view, "moment"), end: fitting(view, "end") };
   pose(view);
+}
+
+/** So many pixels of the canvas for one of the page, at least: fewer while it is turned, for painting them takes longest. */
+function sharpen(view, least) {
+  const { width, height } = view.frame;
+  const sharp = Math.max(globalThis.devicePixelRatio ?? 1, least);
+  const size = { width: Math.round(width * sharp), height: Math.round(height * sharp) };
+  view.context ??= view.canvas.getContext("2d");
+  if (view.canvas.width === size.width && view.canvas.height === size.height) return false;
+  set(view.canvas, size);
+  view.context.setTransform(sharp, 0, 0, sharp, 0, 0);
+  view.context.lineJoin = "round";
+  view.context.lineCap = "round";
+  return true;
 }
 
 /** The height of a picture in the flow of a page, px; `share`: of its height by its width. */
@@ -270,7 +281,10 @@ function turn(view, camera) {
   view.queued = 1; // several events may come between two frames
   const draw = () => {
     view.queued = 0;
+    if (view.frame) sharpen(view, 1);
     pose(view);
+    clearTimeout(view.resting);
+    view.resting = setTimeout(() => view.frame && sharpen(view, SHARP) && paintBodies(view), REST);
   };
   if (globalThis.requestAnimationFrame) globalThis.requestAnimationFrame(draw);
   else draw();

@@ -165,3 +165,52 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         finger.drag((1.2 + step, 0.3), (1.0, 0.0))
         assert user.state("s.answer.value.numbers")["links.crank.centre.x"] == pytest.approx(1.0)
         assert user.state("s.past.value.length") == 3
+
+    @pytest.mark.parametrize("by", ["mouse", "keyboard", "touch"])
+    def test_a_mechanism_is_mirrored_by_its_menu(user, by):
+        """The four-bar takes the mirrored torque: that of before with the other sign."""
+        hand, before = Hand(user, by), effort(user.state("s.text.value"))
+        corner = user.of("sheet", "m.sheet.view.frame.from([40, 300])")
+        if by == "keyboard":
+            user.page.locator(".sheet > svg").focus()
+            user.keys("Control+a", "Shift+F10")
+            user.keys("ArrowDown", "Enter")
+        else:
+            if by == "mouse":
+                user.page.mouse.click(*hand.at(corner), button="right")
+            else:
+                hand.fingers("touchStart", hand.at(corner))
+                user.until("document.querySelector('.context')")
+                hand.fingers("touchEnd")
+            user.page.click("role=menuitem[name='Choose all links']")
+            assert user.page.locator(".of-group").count() == 3
+            user.page.click("role=button[name='Mirror left to right']")
+        user.until("s.past.value.length === 1 && s.answer.value.text === s.text.value && s.solved.value")
+        after = effort(user.state("s.text.value"))
+        np.testing.assert_allclose(after, -before, rtol=0, atol=1e-12 * np.abs(before).max())
+
+    def test_links_in_a_box_are_moved_copied_and_deleted(user):
+        user.new_sheet()
+        hand = Hand(user, "mouse")
+        for start, end in (((-0.1, 0), (-0.1, 0.05)), ((0, 0), (0, 0.05)), ((0.1, 0), (0.1, 0.05))):
+            hand.link(start, end)
+        user.page.keyboard.down("Shift")
+        hand.drag((-0.14, -0.04), (0.04, 0.08))
+        user.page.keyboard.up("Shift")
+        assert user.state("s.group.value") == ["link1", "link2"]
+        hand.drag((0, 0.025), (0.02, 0.025))
+        places = user.state("s.places.value")
+        assert places["link1.A"] == pytest.approx([-0.08, 0])
+        assert places["link3.E"] == pytest.approx([0.1, 0])
+        user.page.locator(".sheet > svg").focus()
+        user.keys("ArrowUp", "Control+d")
+        step = user.of("sheet", "m.sheet.step()")
+        assert user.state("s.group.value") == ["link4", "link5"]
+        copied = user.state(
+            "Object.entries(s.places.value).filter(([key]) => key.startsWith('link5')).map(one => one[1])"
+        )
+        np.testing.assert_allclose(copied, [[0.02 + 2 * step, 3 * step], [0.02 + 2 * step, 0.05 + 3 * step]])
+        user.keys("Delete")
+        assert user.state("Object.keys(s.answer.value.entries.links).length") == 4
+        user.keys("Control+z", "Control+z")
+        assert user.state("s.places.value")["link1.A"] == pytest.approx([-0.08, step])

@@ -6,6 +6,8 @@ import { Blocks, Formula } from "./blocks.js";
 import { Bounded, Failures } from "./boundary.js";
 import { Dialogs } from "./dialogs.js";
 import { Findings } from "./findings.js";
+import { GroupBar } from "./group.js";
+import { ContextMenu } from "./menu.js";
 import { Motion } from "./motion.js";
 import { Plots } from "./plots.js";
 import { Properties } from "./properties.js";
@@ -30,6 +32,7 @@ export function App() {
           ${state.spatial.value ? bounded(Space) : bounded(Stage, ZoomBar, Welcome)}
           ${bounded(Formula)}
           ${bounded(Messages)}
+          ${bounded(ContextMenu)}
         </div>
         ${bounded(Motion)}
       </div>
@@ -90,6 +93,7 @@ function Messages() {
   const below = held && sheet.view?.frame.to(held)[1] < TOP;
   return html`<div class=${below ? "messages below" : "messages"}>
     <${Hint} />
+    <${GroupBar} />
     <${Failures} />
     ${state.stopped.value && html`<div class="message-card bad" role="alert">${state.stopped.value}</div>`}
     ${state.unkept.value && state.unsaved.value && html`<div class="message-card bad" role="alert">The browser has no room for this work: it is lost when the page closes. <${Button} label="Save it" onClick=${() => save()} /></div>`}

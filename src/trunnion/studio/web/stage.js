@@ -8,6 +8,7 @@ import { others, poseGhosts } from "./ghosts.js";
 import { laid, listenToPlaces } from "./layers.js";
 import { addOverlay, poseOverlay } from "./overlay.js";
 import { compared } from "./variants.js";
+import { boxTo, groupMarks } from "./group.js";
 import { massSpots } from "./masses.js";
 import { markChosen, poseHandles } from "./handles.js";
 import { listenToPointer } from "./hand.js";
@@ -127,7 +128,9 @@ function preview(view) {
     const [x, y] = frame.to(drop.at);
     parts.push(svg("circle", { class: "snap", cx: x, cy: y, r: 13 }));
   }
-  if (from && now) parts.push(...rubber(frame, from, now.spot));
+  parts.unshift(...groupMarks(view));
+  if (from && now && state.tool.value === "box") parts.push(boxTo(frame, from.at, now.spot.at));
+  else if (from && now) parts.push(...rubber(frame, from, now.spot));
   layers.tools.replaceChildren(...parts);
 }
 

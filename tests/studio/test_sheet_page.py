@@ -214,3 +214,22 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         assert user.state("Object.keys(s.answer.value.entries.links).length") == 4
         user.keys("Control+z", "Control+z")
         assert user.state("s.places.value")["link1.A"] == pytest.approx([-0.08, step])
+
+    def test_dimensions_are_those_of_the_model(user):
+        """Of a slider-crank 100 mm beside its guide, which is turned by 30°, and a triangle 30-40-50."""
+        user.new_sheet()
+        gestures = [
+            {"do": "link", "from": {"ground": [0, 0]}, "to": [0.08, 0]},
+            {"do": "link", "from": "link1.B", "to": [0.08, 0.2]},
+            {"do": "slide", "joint": "link2.C", "angle": float(np.radians(30))},
+            {"do": "link", "from": {"ground": [-0.1, 0]}, "to": [-0.06, 0]},
+            {"do": "add-point", "link": "link3", "at": [-0.1, 0.03]},
+        ]
+        user.of("actions", "m.edit(given)", gestures)
+        user.page.click("summary:has-text('Show')")
+        user.page.click("label:has-text('Dimensions')")
+        user.of("sheet", "m.sheet.fit()")
+        words = [one.replace("\xa0", " ") for one in user.page.locator(".dimension-text, .laid").all_text_contents()]
+        beside = 0.2 * np.cos(np.radians(30)) - 0.08 * np.sin(np.radians(30))  # of the guide through C from A
+        lengths = ["80 mm", "200 mm", f"{1e3 * beside:.1f} mm", "100 mm", "40 mm", "30 mm", "50 mm"]
+        assert sorted(words) == sorted([*lengths, "30°"])

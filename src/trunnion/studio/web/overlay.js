@@ -10,6 +10,7 @@ import { KEY, metres, perNewton } from "./drawing.js";
 import { roundAbove } from "./geometry.js";
 import { laid } from "./layers.js";
 import { massMarks } from "./masses.js";
+import { dimensionMarks } from "./measures.js";
 import { sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
 import { compared } from "./variants.js";
@@ -48,6 +49,7 @@ export function poseOverlay(view) {
   layers.variants.replaceChildren(...(wanted.variant ? variants(view, key) : []));
   layers.masses.replaceChildren(...massMarks(view));
   layers.overlay.replaceChildren(
+    ...dimensionMarks(view, words, (x, y, text) => taken.push({ left: x - 0.5 * LETTER * text.length, right: x + 0.5 * LETTER * text.length, y: y + 4 })),
     ...(told.circles ? circles(view, told.circles, key) : []),
     ...(told.transmission ? told.transmission.flatMap((one) => angle(view, one)) : []),
     ...(told.centres ? centres(view, told.centres, wanted) : []),

@@ -233,3 +233,31 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         beside = 0.2 * np.cos(np.radians(30)) - 0.08 * np.sin(np.radians(30))  # of the guide through C from A
         lengths = ["80 mm", "200 mm", f"{1e3 * beside:.1f} mm", "100 mm", "40 mm", "30 mm", "50 mm"]
         assert sorted(words) == sorted([*lengths, "30°"])
+
+    def test_a_first_mechanism_is_drawn_step_by_step(user):
+        """By the reader's own clicks at the rings; the slider goes by r cos q + √(l² − r² sin² q)."""
+        user.new_sheet()
+        user.page.wait_for_selector(".welcome .card:nth-child(1) path")
+        assert user.page.locator(".welcome .card").count() == 6
+        user.page.click("text=Draw a first mechanism, step by step")
+        for key, count in (("l", 2), ("p", 1), ("l", 2), ("g", 2), ("d", 1)):
+            user.page.locator(".sheet > svg").focus()
+            user.page.keyboard.press(key)
+            assert user.page.locator(".ring").count() == count
+            spots = [user.page.locator(".ring circle").nth(k).bounding_box() for k in range(count)]
+            for one in spots:
+                user.page.mouse.move(one["x"] + 13, one["y"] + 13)
+                user.page.mouse.click(one["x"] + one["width"] / 2, one["y"] + one["height"] / 2)
+                user.idle()
+        user.until("s.solved.value")
+        user.page.click("role=button[name='Play']")
+        user.until("s.index.value > 0")
+        assert user.page.locator(".guide b").text_content() == "It runs"
+        user.page.click("role=button[name='Close']")
+        scene = user.state("s.answer.value.scene")
+        (x, y), (end, _) = ([np.array(scene["points"][key][axis]) for axis in "xy"] for key in ("link1.B", "link2.C"))
+        r, length = 0.04, np.hypot(0.15, 0.04)
+        turn = np.arctan2(y, x + 0.08)
+        expected = -0.08 + r * np.cos(turn) + np.sqrt(length**2 - (r * np.sin(turn)) ** 2)
+        np.testing.assert_allclose(end, expected, atol=1e-5)  # lengths are as fine as the sheet
+        assert user.page.evaluate("localStorage.getItem('trunnion studio tutorial')") == "done"

@@ -14,9 +14,9 @@ import { Properties } from "./properties.js";
 import { sheet } from "./sheet.js";
 import { Space } from "./space.js";
 import { Stage } from "./stage.js";
+import { Guide, Welcome } from "./start.js";
 import * as state from "./state.js";
 import { Text } from "./text.js";
-import { choose } from "./tools.js";
 import { Button, focusOn, html } from "./ui.js";
 
 const TOP = 140; // px, where messages stand
@@ -93,6 +93,7 @@ function Messages() {
   const below = held && sheet.view?.frame.to(held)[1] < TOP;
   return html`<div class=${below ? "messages below" : "messages"}>
     <${Hint} />
+    <${Guide} />
     <${GroupBar} />
     <${Failures} />
     ${state.stopped.value && html`<div class="message-card bad" role="alert">${state.stopped.value}</div>`}
@@ -105,18 +106,4 @@ function Messages() {
     ${wrong.length > 0 && html`<button type="button" class="message-card bad" title="Point at it for the whole; click it for all findings" onClick=${() => (state.tab.value = "findings")}>
       <b>${wrong[0].place}</b> ${wrong[0].what}${wrong[0].remedy ? ` — ${wrong[0].remedy}` : ""}${wrong.length > 1 ? ` (and ${wrong.length - 1} more)` : ""}${state.answer.value?.bare ? "; until then it is shown without friction" : ""}</button>`}
   </div>`; // prettier-ignore
-}
-
-function Welcome() {
-  const entries = state.answer.value?.entries;
-  if (!state.answer.value || Object.keys(entries?.links ?? {}).length > 0 || state.text.value.trim() || state.tool.value !== "select") return null;
-  return html`<div class="welcome">
-    <h2>An empty sheet</h2>
-    <p>Draw links with two clicks each; ends that meet become joints. Pin two of them to the ground, choose the driven joint, and it moves.</p>
-    <p class="row-of-buttons">
-      <button type="button" class="plain strong" onClick=${() => choose("link")}>Draw a link</button>
-      <${Button} label="Open an example …" onClick=${() => (state.dialog.value = "examples")} />
-      <${Button} label="Open a file …" onClick=${() => (state.dialog.value = "open")} />
-    </p>
-  </div>`;
 }

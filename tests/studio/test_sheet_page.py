@@ -165,3 +165,99 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         finger.drag((1.2 + step, 0.3), (1.0, 0.0))
         assert user.state("s.answer.value.numbers")["links.crank.centre.x"] == pytest.approx(1.0)
         assert user.state("s.past.value.length") == 3
+
+    @pytest.mark.parametrize("by", ["mouse", "keyboard", "touch"])
+    def test_a_mechanism_is_mirrored_by_its_menu(user, by):
+        """The four-bar takes the mirrored torque: that of before with the other sign."""
+        hand, before = Hand(user, by), effort(user.state("s.text.value"))
+        corner = user.of("sheet", "m.sheet.view.frame.from([40, 300])")
+        if by == "keyboard":
+            user.page.locator(".sheet > svg").focus()
+            user.keys("Control+a", "Shift+F10")
+            user.keys("ArrowDown", "Enter")
+        else:
+            if by == "mouse":
+                user.page.mouse.click(*hand.at(corner), button="right")
+            else:
+                hand.fingers("touchStart", hand.at(corner))
+                user.until("document.querySelector('.context')")
+                hand.fingers("touchEnd")
+            user.page.click("role=menuitem[name='Choose all links']")
+            assert user.page.locator(".of-group").count() == 3
+            user.page.click("role=button[name='Mirror left to right']")
+        user.until("s.past.value.length === 1 && s.answer.value.text === s.text.value && s.solved.value")
+        after = effort(user.state("s.text.value"))
+        np.testing.assert_allclose(after, -before, rtol=0, atol=1e-12 * np.abs(before).max())
+
+    def test_links_in_a_box_are_moved_copied_and_deleted(user):
+        user.new_sheet()
+        hand = Hand(user, "mouse")
+        for start, end in (((-0.1, 0), (-0.1, 0.05)), ((0, 0), (0, 0.05)), ((0.1, 0), (0.1, 0.05))):
+            hand.link(start, end)
+        user.page.keyboard.down("Shift")
+        hand.drag((-0.14, -0.04), (0.04, 0.08))
+        user.page.keyboard.up("Shift")
+        assert user.state("s.group.value") == ["link1", "link2"]
+        hand.drag((0, 0.025), (0.02, 0.025))
+        places = user.state("s.places.value")
+        assert places["link1.A"] == pytest.approx([-0.08, 0])
+        assert places["link3.E"] == pytest.approx([0.1, 0])
+        user.page.locator(".sheet > svg").focus()
+        user.keys("ArrowUp", "Control+d")
+        step = user.of("sheet", "m.sheet.step()")
+        assert user.state("s.group.value") == ["link4", "link5"]
+        copied = user.state(
+            "Object.entries(s.places.value).filter(([key]) => key.startsWith('link5')).map(one => one[1])"
+        )
+        np.testing.assert_allclose(copied, [[0.02 + 2 * step, 3 * step], [0.02 + 2 * step, 0.05 + 3 * step]])
+        user.keys("Delete")
+        assert user.state("Object.keys(s.answer.value.entries.links).length") == 4
+        user.keys("Control+z", "Control+z")
+        assert user.state("s.places.value")["link1.A"] == pytest.approx([-0.08, step])
+
+    def test_dimensions_are_those_of_the_model(user):
+        """Of a slider-crank 100 mm beside its guide, which is turned by 30°, and a triangle 30-40-50."""
+        user.new_sheet()
+        gestures = [
+            {"do": "link", "from": {"ground": [0, 0]}, "to": [0.08, 0]},
+            {"do": "link", "from": "link1.B", "to": [0.08, 0.2]},
+            {"do": "slide", "joint": "link2.C", "angle": float(np.radians(30))},
+            {"do": "link", "from": {"ground": [-0.1, 0]}, "to": [-0.06, 0]},
+            {"do": "add-point", "link": "link3", "at": [-0.1, 0.03]},
+        ]
+        user.of("actions", "m.edit(given)", gestures)
+        user.page.click("summary:has-text('Show')")
+        user.page.click("label:has-text('Dimensions')")
+        user.of("sheet", "m.sheet.fit()")
+        words = [one.replace("\xa0", " ") for one in user.page.locator(".dimension-text, .laid").all_text_contents()]
+        beside = 0.2 * np.cos(np.radians(30)) - 0.08 * np.sin(np.radians(30))  # of the guide through C from A
+        lengths = ["80 mm", "200 mm", f"{1e3 * beside:.1f} mm", "100 mm", "40 mm", "30 mm", "50 mm"]
+        assert sorted(words) == sorted([*lengths, "30°"])
+
+    def test_a_first_mechanism_is_drawn_step_by_step(user):
+        """By the reader's own clicks at the rings; the slider goes by r cos q + √(l² − r² sin² q)."""
+        user.new_sheet()
+        user.page.wait_for_selector(".welcome .card:nth-child(1) path")
+        assert user.page.locator(".welcome .card").count() == 6
+        user.page.click("text=Draw a first mechanism, step by step")
+        for key, count in (("l", 2), ("p", 1), ("l", 2), ("g", 2), ("d", 1)):
+            user.page.locator(".sheet > svg").focus()
+            user.page.keyboard.press(key)
+            assert user.page.locator(".ring").count() == count
+            spots = [user.page.locator(".ring circle").nth(k).bounding_box() for k in range(count)]
+            for one in spots:
+                user.page.mouse.move(one["x"] + 13, one["y"] + 13)
+                user.page.mouse.click(one["x"] + one["width"] / 2, one["y"] + one["height"] / 2)
+                user.idle()
+        user.until("s.solved.value")
+        user.page.click("role=button[name='Play']")
+        user.until("s.index.value > 0")
+        assert user.page.locator(".guide b").text_content() == "It runs"
+        user.page.click("role=button[name='Close']")
+        scene = user.state("s.answer.value.scene")
+        (x, y), (end, _) = ([np.array(scene["points"][key][axis]) for axis in "xy"] for key in ("link1.B", "link2.C"))
+        r, length = 0.04, np.hypot(0.15, 0.04)
+        turn = np.arctan2(y, x + 0.08)
+        expected = -0.08 + r * np.cos(turn) + np.sqrt(length**2 - (r * np.sin(turn)) ** 2)
+        np.testing.assert_allclose(end, expected, atol=1e-5)  # lengths are as fine as the sheet
+        assert user.page.evaluate("localStorage.getItem('trunnion studio tutorial')") == "done"

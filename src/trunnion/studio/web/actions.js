@@ -131,7 +131,8 @@ async function carryOut(gestures, merge, places) {
   if (before.text !== state.text.value) return refuse("The model was changed meanwhile; the step was not carried out.");
   if (done.error) return refuse(done.error);
   state.commit(sentence(done.says, ""), before, done, merge);
-  if (done.made) state.selection.value = { kind: done.made[0], name: done.made[1] };
+  if (done.made?.[0] === "group") state.group.value = done.made[1].split(" ");
+  else if (done.made) state.selection.value = { kind: done.made[0], name: done.made[1] };
   state.say(sentence(done.says));
   if (state.live.value) state.live.value = { ...state.live.value, text: null };
   await solve();

@@ -1,23 +1,25 @@
 // The page: bars, sheet or space, player, and the panel at the right.
 
 import { computed } from "@preact/signals";
-import { discard, save, takeText, takeWaiting } from "./actions.js";
+import { discard, save, takeWaiting } from "./actions.js";
 import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
 import { Blocks, Formula } from "./blocks.js";
 import { Bounded, Failures } from "./boundary.js";
 import { Dialogs } from "./dialogs.js";
 import { Errors } from "./errors.js";
 import { Findings, jump } from "./findings.js";
-import { LOOP } from "./looptable.js";
+import { GroupBar } from "./group.js";
+import { ContextMenu } from "./menu.js";
 import { Motion } from "./motion.js";
 import { Plots } from "./plots.js";
 import { Properties } from "./properties.js";
 import { sheet } from "./sheet.js";
 import { Space } from "./space.js";
 import { Stage } from "./stage.js";
+import { Guide, Welcome } from "./start.js";
 import * as state from "./state.js";
 import { Text } from "./text.js";
-import { choose, pointer } from "./tools.js";
+import { pointer } from "./tools.js";
 import { Button, focusOn, html } from "./ui.js";
 
 const TOP = 140; // px, where messages stand
@@ -33,6 +35,7 @@ export function App() {
           ${state.spatial.value ? bounded(Space) : bounded(Stage, ZoomBar, Welcome)}
           ${bounded(Errors, Formula)}
           ${bounded(Messages)}
+          ${bounded(ContextMenu)}
         </div>
         ${bounded(Motion)}
       </div>
@@ -98,6 +101,8 @@ function Messages() {
   const below = low.value;
   return html`<div class=${below ? "messages below" : "messages"}>
     <${Hint} />
+    <${Guide} />
+    <${GroupBar} />
     <${Failures} />
     ${state.stopped.value && html`<div class="message-card bad" role="alert">${state.stopped.value}</div>`}
     ${state.unkept.value && state.unsaved.value && html`<div class="message-card bad" role="alert">The browser has no room for this work: it is lost when the page closes. <${Button} label="Save it" onClick=${() => save()} /></div>`}
@@ -109,19 +114,4 @@ function Messages() {
     ${wrong.length > 0 && html`<button type="button" class="message-card bad" title="Point at it for the whole; click it to see where, and what to do" onClick=${() => (jump(wrong[0]), (state.tab.value = "findings"))}>
       <b>${wrong[0].place}</b> ${wrong[0].what}${wrong[0].remedy ? ` — ${wrong[0].remedy}` : ""}${wrong.length > 1 ? ` (and ${wrong.length - 1} more)` : ""}${state.answer.value?.bare ? "; until then it is shown without friction" : ""}</button>`}
   </div>`; // prettier-ignore
-}
-
-function Welcome() {
-  const entries = state.answer.value?.entries;
-  if (!state.answer.value || Object.keys(entries?.links ?? {}).length > 0 || state.text.value.trim() || state.tool.value !== "select") return null;
-  return html`<div class="welcome">
-    <h2>An empty sheet</h2>
-    <p>Draw links with two clicks each; ends that meet become joints. Pin two of them to the ground, choose the driven joint, and it moves.</p>
-    <p class="row-of-buttons">
-      <button type="button" class="plain strong" onClick=${() => choose("link")}>Draw a link</button>
-      <${Button} label="Open an example …" onClick=${() => (state.dialog.value = "examples")} />
-      <${Button} label="Open a file …" onClick=${() => (state.dialog.value = "open")} />
-      <${Button} label="A loop in space, by its table" onClick=${() => takeText(LOOP, "Begin a loop in space")} />
-    </p>
-  </div>`;
 }

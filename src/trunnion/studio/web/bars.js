@@ -4,6 +4,7 @@ import { exported, openText, redo, save, undo } from "./actions.js";
 import { LAYERS } from "./layers.js";
 import { Margin } from "./margin.js";
 import { sheet } from "./sheet.js";
+import { begin, nextTool } from "./start.js";
 import * as state from "./state.js";
 import { STUDY_OF, openStudy } from "./studies.js";
 import { nextTheme, theme } from "./theme.js";
@@ -23,6 +24,7 @@ export function TopBar() {
       <${Button} label="Examples …" onClick=${() => (dialog.value = "examples")} />
       <${Button} label="Save" title="Save (Ctrl+S)" onClick=${() => save()} />
       <${Button} label="Save as …" onClick=${() => (dialog.value = "save")} />
+      <${Button} label="First mechanism …" title="Draw a slider-crank step by step" onClick=${begin} />
       <${Button} label="Keys …" title="What the keys do (?)" onClick=${() => (dialog.value = "keys")} />
     <//>
     <span class="file" title=${state.folder.value.folder}>${fileName.value ?? "Not saved yet"}<span class=${unsaved.value ? "changed" : "changed none"} aria-hidden=${!unsaved.value} title="There are changes that are not saved"> · changed</span></span>
@@ -54,7 +56,7 @@ export function ToolBar() {
   };
   return html`<nav class="tools" aria-label="Tools">
     ${TOOLS.map(
-      ({ id, label, key, hint: words }) => html`<button type="button" class="tool" aria-pressed=${state.tool.value === id}
+      ({ id, label, key, hint: words }) => html`<button type="button" class=${nextTool.value === id && state.tool.value !== id ? "tool hinted" : "tool"} aria-pressed=${state.tool.value === id}
         title=${`${label} (${key}): ${words[0]}`} onClick=${take(id)}><${Icon} name=${id} /><span>${label}</span></button>`,
     )}
   </nav>`; // prettier-ignore

@@ -25,7 +25,7 @@ export function Examples() {
     ${!found.length && html`<p class="calm">No example has these words.</p>`}`; // prettier-ignore
 }
 
-function Picture({ name }) {
+export function Picture({ name }) {
   const holder = useRef(null);
   const [shown, setShown] = useState(null);
   useEffect(() => {

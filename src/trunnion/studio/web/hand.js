@@ -5,12 +5,15 @@ import { place } from "../web/data.js";
 import { changed, edit, newest, present } from "./actions.js";
 import { gridStep, onGrid } from "./geometry.js";
 import { takeOther } from "./ghosts.js";
+import { groupHeld, toggleLink } from "./group.js";
 import { centreHeld, chosenOf } from "./masses.js";
+import { openMenu } from "./menu.js";
 import { apart, drawn, dropAt, partUnder, sheet } from "./sheet.js";
 import * as state from "./state.js";
-import { click, endOf, pointer, toolOf } from "./tools.js";
+import { choose, click, endOf, pointer, toolOf } from "./tools.js";
 
 const STILL = 3; // px that a click may move
+const LONG = 550; // ms of a finger at rest until the menu opens
 const ON_PATH = 8; // px from its path within which a joint is on it
 
 /** Listen to the pointer; returns what ends it. */
@@ -34,8 +37,11 @@ export function listenToPointer(root, view) {
     if (event.pointerType === "touch") fingers.set(event.pointerId, placed(event));
     if (fingers.size > 1) return letGo(hand);
     if (event.button > 2 || hand.held) return;
+    clearTimeout(hand.waits);
     root.setPointerCapture(event.pointerId);
     hand.held = { box: root.getBoundingClientRect(), start: placed(event), last: placed(event), spot, part, panning, moved: false };
+    hand.held.group = panning ? null : groupHeld(view, hand.held, event.shiftKey);
+    if (event.pointerType === "touch") hand.waits = setTimeout(() => longTouch(view, hand), LONG);
   });
   root.addEventListener("pointermove", (event) => {
     if (fingers.size > 1 && fingers.has(event.pointerId)) return spread(fingers, event.pointerId, placed(event));
@@ -45,8 +51,10 @@ export function listenToPointer(root, view) {
   });
   root.addEventListener("pointerup", (event) => {
     fingers.delete(event.pointerId);
+    clearTimeout(hand.waits);
     const { held } = hand;
     hand.held = null;
+    if (held && !held.moved && event.button === 2) return openMenu(held.part, view.frame.from(held.start));
     if (held) release(held, event.shiftKey);
   });
   root.addEventListener("pointercancel", (event) => {
@@ -65,10 +73,20 @@ export function listenToPointer(root, view) {
   return () => root.removeEventListener("wheel", wheel);
 }
 
+/** A finger that rests opens the menu of what is under it. */
+function longTouch(view, hand) {
+  const { held } = hand;
+  if (!held || held.moved) return;
+  letGo(hand);
+  openMenu(held.part, view.frame.from(held.start));
+}
+
 /** Leave off what is held, as if it had never been taken. */
 function letGo(hand) {
   const { joint, centre } = hand.held ?? {};
   centre?.leave();
+  hand.held?.group?.leave();
+  clearTimeout(hand.waits);
   hand.held = null;
   state.live.value = null;
   state.dropping.value = null;
@@ -93,8 +111,9 @@ function spread(fingers, id, at) {
 function pull(view, held, at, alt) {
   const far = Math.hypot(at[0] - held.start[0], at[1] - held.start[1]);
   if (!held.moved && far <= STILL) return;
-  if (!held.moved) takeHold(view, held);
+  if (!held.moved && !held.group) takeHold(view, held);
   held.moved = true;
+  if (held.group) return void held.group.to(view.frame.from(at));
   if (held.joint) dragTo(held.joint, view.frame.from(at), view.frame.scale, alt);
   else if (held.centre) held.centre.to(view.frame.from(at).map((value) => onGrid(value, sheet.step() / (alt ? 100 : 10))));
   else if (!held.locked && (held.panning || state.tool.value === "select")) sheet.pan(at[0] - held.last[0], at[1] - held.last[1]);
@@ -201,6 +220,11 @@ function wordsOf({ changes }) {
 
 async function release(held, shift) {
   if (!held.moved) return tap(held, shift);
+  if (held.group) {
+    await held.group.drop();
+    if (state.tool.value === "box") choose("select");
+    return held.group.leave();
+  }
   if (held.centre) return void held.centre.drop();
   if (!held.joint) return;
   await held.joint.asked;
@@ -215,6 +239,8 @@ async function release(held, shift) {
 function tap({ spot, part, panning }, shift) {
   if (panning) return;
   if (state.tool.value !== "select") return click(spot, { shift, part });
+  if (shift && part?.kind === "links") return toggleLink(part.name);
+  state.group.value = [];
   if (part?.kind === "others") return takeOther(part.name);
   state.selection.value = chosenOf(part);
   if (part) state.tab.value = state.tab.value === "plots" ? "plots" : "properties";

@@ -3,7 +3,9 @@
 import { place } from "../web/data.js";
 import * as actions from "./actions.js";
 import { crank } from "./motion.js";
+import { allLinks, chooseLinks, chosenLinks, groupActions, shift } from "./group.js";
 import { chosenOf, massSpots } from "./masses.js";
+import { openByKey } from "./menu.js";
 import { apart, partUnder, partsAt, sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
 import { TOOLS, cancel, choose, click, placeTyped, pointer, removePart, toolOf, typed } from "./tools.js";
@@ -34,9 +36,25 @@ function withControl(event) {
   else if (key === "o") state.dialog.value = "open";
   else if (key === "z" && !writes) event.shiftKey ? actions.redo() : actions.undo();
   else if (key === "y" && !writes) actions.redo();
+  else if (key === "a" && onSheet(event.target)) return chooseAll();
+  else if (key === "d" && onSheet(event.target) && copied()) return act(copied()[2]);
   else if (key === "a" && !event.target.closest?.(WRITES)) return true; // or it would mark the whole page
   else return false;
   return true;
+}
+
+const onSheet = (target) => !state.spatial.value && sheet.view?.root.contains(target);
+
+function chooseAll() {
+  chooseLinks(allLinks());
+  return true;
+}
+
+/** The action that copies what is chosen. */
+function copied() {
+  const { kind, name } = state.selection.value ?? {};
+  const names = chosenLinks().length ? chosenLinks() : kind === "links" ? [name] : [];
+  return names.length ? groupActions(names).find(([label]) => label === "Copy") : null;
 }
 
 /** Whether the key was one of ours. */
@@ -45,9 +63,10 @@ function ordinary(event) {
   const chooses = key === "Escape" && state.tool.value !== "select" && target.matches?.("select") && !target.closest("dialog");
   if (event.ctrlKey || event.metaKey || (target.closest?.(WRITES) && !chooses)) return false;
   if (value(event)) return true;
-  const onSheet = sheet.view?.root.contains(target);
-  if (onSheet && (key in ARROWS || key === "Enter")) return key === "Enter" ? enter(event) : arrow(event);
+  if ((key === "ContextMenu" || (key === "F10" && event.shiftKey)) && onSheet(target)) return act(() => openByKey(target, pointer.value?.keyboard ? pointer.value.spot.at : null));
+  if (onSheet(target) && (key in ARROWS || key === "Enter")) return key === "Enter" ? enter(event) : arrow(event);
   if (key === "Escape") return leave(target);
+  if ((key === "Delete" || key === "Backspace") && chosenLinks().length) return act(groupActions(chosenLinks()).at(-1)[2]);
   if ((key === "Delete" || key === "Backspace") && state.selection.value) return removeChosen();
   if (key === " " && !target.closest?.("button, summary, a, [role=tab]")) return act(() => crank.toggle());
   if (key === "?") return act(() => (state.dialog.value = "keys"));
@@ -87,6 +106,7 @@ function arrow({ target, key, shiftKey, altKey }) {
   const step = sheet.step() * (shiftKey ? 10 : altKey ? 0.1 : 1);
   const [dx, dy] = ARROWS[key].map((part) => part * step);
   const part = partUnder(target);
+  if (!part && state.tool.value === "select" && chosenLinks().length) return act(() => shift([dx, dy], "shift links"));
   const moved = ([x, y]) => [x + dx, y + dy].map((value) => Number(value.toPrecision(12)));
   const held = part && [...sheet.spots(), ...massSpots(sheet.view)].find(({ kind, name }) => kind === part.kind && name === part.name);
   if (held && state.tool.value === "select") return act(() => nudge(part, moved(held.at)));
@@ -143,7 +163,8 @@ const linkUnder = (at) => (toolOf().on ? partsAt(at).find(({ kind }) => kind ===
 /** Escape: moves by arrows are taken back, else what was begun is left off. */
 function leave(target) {
   const last = state.past.value[state.past.value.length - 1];
-  if (last?.merge && last.merge === `nudge ${partUnder(target)?.name}`) actions.undo();
+  if (last?.merge === "shift links" && chosenLinks().length) actions.undo();
+  else if (last?.merge && last.merge === `nudge ${partUnder(target)?.name}`) actions.undo();
   else cancel();
   return true;
 }

@@ -11,6 +11,7 @@ import { KEY, metres, perNewton } from "./drawing.js";
 import { roundAbove } from "./geometry.js";
 import { laid } from "./layers.js";
 import { massMarks } from "./masses.js";
+import { dimensionMarks } from "./measures.js";
 import { pinsInHoles } from "./seats.js";
 import { cornered, sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
@@ -54,6 +55,7 @@ export function poseOverlay(view) {
   const seats = wanted.seats && view.ideal && !cornered.peek() ? (over.seats ?? []) : [];
   for (const { joint, node } of view.parts.vectors) set(node, { visibility: seats.some((one) => one.joint === joint.name) ? "hidden" : null }); // drawn where it touches
   layers.overlay.replaceChildren(
+    ...dimensionMarks(view, words, (x, y, text) => taken.push({ left: x - 0.5 * LETTER * text.length, right: x + 0.5 * LETTER * text.length, y: y + 4 })),
     ...(over.circles ? circles(view, over.circles, key) : []),
     ...(over.transmission ? over.transmission.flatMap((one) => angle(view, one)) : []),
     ...(over.centres ? centres(view, over.centres, wanted) : []),

@@ -8,10 +8,12 @@ import { others, poseGhosts } from "./ghosts.js";
 import { laid, listenToPlaces } from "./layers.js";
 import { addOverlay, poseOverlay } from "./overlay.js";
 import { compared } from "./variants.js";
+import { boxTo, groupMarks } from "./group.js";
 import { massSpots } from "./masses.js";
 import { markChosen, poseHandles } from "./handles.js";
 import { listenToPointer } from "./hand.js";
 import { drawn, kindsOf, sheet, shown } from "./sheet.js";
+import { rings } from "./start.js";
 import * as state from "./state.js";
 import { pointer, toolOf, typed, typedEnd } from "./tools.js";
 import { html } from "./ui.js";
@@ -128,7 +130,9 @@ function preview(view) {
     const [x, y] = frame.to(drop.at);
     parts.push(svg("circle", { class: "snap", cx: x, cy: y, r: 13 }));
   }
-  if (from && now) parts.push(...rubber(frame, from, now.spot));
+  parts.unshift(...groupMarks(view), ...rings(view));
+  if (from && now && state.tool.value === "box") parts.push(boxTo(frame, from.at, now.spot.at));
+  else if (from && now) parts.push(...rubber(frame, from, now.spot));
   layers.tools.replaceChildren(...parts);
 }
 

@@ -38,6 +38,12 @@ export const selection = signal(null);
 export const tool = signal("select");
 /** First end of what is being drawn: {at, written, …}, or null. */
 export const pending = signal(null);
+/** Names of links that are chosen together. @type {Signal<string[]>} */
+export const group = signal([]);
+/** Corners of the box that chooses links, m, while it is drawn; or null. @type {Signal<number[][] | null>} */
+export const boxed = signal(null);
+/** How far the chosen links are dragged by now, m; or null. @type {Signal<number[] | null>} */
+export const shifted = signal(null);
 /** The end or place on a link {kind, name, on, at} that a dragged end is joined with where it is let go, or null. */
 export const dropping = signal(null);
 /** Joints, and free points "link.P", that stay where they are while others are dragged. */
@@ -151,6 +157,7 @@ export function begin({ name, saved, content, steps = null }) {
     dropping.value = null;
     corner.value = null;
     factor.value = 1;
+    group.value = [];
     index.value = 0;
     share.value = 0;
     tool.value = "select";

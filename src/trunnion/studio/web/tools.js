@@ -4,8 +4,9 @@ import { signal } from "@preact/signals";
 import { edit } from "./actions.js";
 import { gridStep, lengthOf, lengthText, lengthUnit } from "./geometry.js";
 import { numberOf, plainNumber } from "./fields.js";
+import { chooseBox } from "./group.js";
 import { crossingAt, linkOf, resisted } from "./sheet.js";
-import { pending, say, selection, tool } from "./state.js";
+import { group, pending, say, selection, tool } from "./state.js";
 
 const TURN = Math.PI / 12; // guides and forces turn by 15°
 const FORCE = "100 N"; // of a load that is drawn without a number
@@ -22,6 +23,7 @@ export const pointer = signal(null);
  */
 export const TOOLS = [
   { id: "select", label: "Select", key: "V", hint: ["Drag a joint: along its path the mechanism moves, off it lengths change."] },
+  { id: "box", label: "Box", key: "B", hint: ["Drag a box around links, or click its corners: they are chosen together. Shift+click on a link adds it.", "Click the other corner."], click: box },
   { id: "link", label: "Link", key: "L", hint: ["Click the first end: a joint, a place on a link, or a free place. Shift+click pins it to the ground.", "Click the second end, or type a length and press Enter. Shift+click pins it to the ground."], click: drawLink, tells: tellLength, begins: /[0-9.,]/, on: true },
   { id: "pin", label: "Pin", key: "P", hint: ["Click a free point of a link, or a place on a link, to pin it to the ground."], click: pin, on: true },
   { id: "join", label: "Join", key: "J", hint: ["Click an end, or a place where two links cross: a pin joins them there.", "Click the end or the link it is joined with; the first end goes there."], click: join, on: true },
@@ -87,6 +89,15 @@ export function placeTyped(shift) {
   if (tool.value === "load") return putLoad(aim);
   say("Now click the other end.");
   return true;
+}
+
+/** Two corners of a box choose links. */
+function box({ at }) {
+  const from = pending.value;
+  if (!from) return begin({ kind: null, at });
+  finish();
+  chooseBox(from.at, at);
+  choose("select");
 }
 
 // ---- links and points
@@ -300,5 +311,8 @@ export function removePart({ kind, name }) {
 export function cancel() {
   if (pending.value) finish();
   else if (tool.value !== "select") choose("select");
-  else selection.value = null;
+  else {
+    selection.value = null;
+    group.value = [];
+  }
 }

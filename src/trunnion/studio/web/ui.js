@@ -63,6 +63,7 @@ export function Menu({ label, disabled = false, children }) {
 /** Pictures of 20 × 20, lines only. */
 const ICONS = {
   select: "M5 3l11 7-5 1.2 3 5-2 1.2-3-5.1L5 16z",
+  box: "M3 5h2M7 5h2M11 5h2M15 5h2v2M17 9v2M17 13v2h-2M13 15h-2M9 15H7M5 15H3v-2M3 11V9M3 7V5",
   link: "M5 15L15 5M5 15m-2.5 0a2.5 2.5 0 1 0 5 0a2.5 2.5 0 1 0-5 0M15 5m-2.5 0a2.5 2.5 0 1 0 5 0a2.5 2.5 0 1 0-5 0",
   pin: "M10 6m-2.5 0a2.5 2.5 0 1 0 5 0a2.5 2.5 0 1 0-5 0M10 8.5L6 15h8zM3 15h14M5 15l-2 3M9 15l-2 3M13 15l-2 3M17 15l-2 3",
   join: "M4 16L9.2 10.8M10.8 9.2L16 4M10 10m-2.4 0a2.4 2.4 0 1 0 4.8 0a2.4 2.4 0 1 0-4.8 0M4 4l4 4M16 16l-4-4",

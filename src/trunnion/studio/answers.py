@@ -149,7 +149,7 @@ def _model(asked: Asked) -> dict[str, Any]:
         **margin_of(result, friction and bool(rubbing(state.run.system))),
         **({"margin_why": "friction lacks something"} if state.bare and friction else {}),
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
-        "worst": measured(state.run),
+        **measured(state.run),
     }
 
 

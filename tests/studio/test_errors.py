@@ -186,3 +186,13 @@ if CHROMIUM:  # not a skip: the numbers are tested above; this is how they are d
         user.page.click(".errors-drawn button:has-text('× 50')")
         user.idle()
         assert user.page.locator(".in-space .errors").text_content() == "errors × 50, ideal as pale lines"
+        user.page.click("role=tab[name=Plots]")
+        user.page.click("summary:has-text('Pins in their holes')")
+        user.page.wait_for_selector(".seat figcaption")
+        ends = user.page.locator(".seat figcaption .title")
+        assert ends.all_text_contents() == ["D, end 1", "D, end 2"]
+        result = trunnion.analyse(mechanism(EXAMPLES["rssr-with-play"])).sel(joint="D").isel(position=0)
+        for end in (0, 1):
+            load = float(np.linalg.norm(np.nan_to_num(result["end_force"].isel(end=end))))
+            value = user.page.locator(".seat figcaption .value").nth(end).text_content()
+            assert float(value.split()[0]) == pytest.approx(load, abs=0.006)

@@ -16,7 +16,7 @@ from trunnion.measures.measures import chosen, outputs
 from trunnion.model.measure_kinds import dimension_kinds
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import quantity
-from trunnion.solve.run import Run
+from trunnion.solve.run import Run, prepare
 from trunnion.solve.shifts import play_of
 from trunnion.studio.tolerances import signed
 from trunnion.views.cycle.scene import scene
@@ -116,11 +116,15 @@ def _place(prepared: ToleranceStudy, of: Of, there: Mapping[str, Number], sign: 
 
 
 def _scene(prepared: ToleranceStudy, numbers: Mapping[str, float], steps: int) -> dict[str, Any]:
-    """The scene of a mechanism with other numbers, beside the nominal one and with its holes as wide as they are."""
+    """The scene of a mechanism with other numbers, beside the nominal one and with its holes as wide as they are.
+
+    Its places alone count: it is solved without friction, with which it might lock.
+    """
     from trunnion.cycle.positions import positions
     from trunnion.cycle.summary import result_of
 
-    run, inputs = replace(prepared.run, values={**prepared.run.values, **numbers}), prepared.inputs
+    inputs, bare = prepared.inputs, prepare(prepared.run.system.mechanism.with_friction("off"))
+    run = replace(bare, values={**bare.values, **numbers})
     run.__dict__.update(ideal_values=inputs.nominal, erring=True, seats=[])  # its pins lie where the corner has them
     shown = scene(result_of(run, positions(run, steps, margin=False, averaged=False)).dataset, max_positions=steps)
     for joint in inputs.loose:

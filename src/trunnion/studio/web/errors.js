@@ -37,7 +37,7 @@ export function Errors() {
       ${!corner && [...new Set([1, built.preset])].map((one) => html`<${Button} label=${`× ${told(one)}`} title=${`Draw errors ${told(one)} times as large`} pressed=${factor === one} onClick=${() => magnify(one)} />`)}`}
     ${!corner && !built?.seats.length && unseated.length > 0 && html`<${Button} label="Press the pins by their loads" title=${`The pins of ${unseated.join(", ")} run in the middle of their holes: let them lie where they are pressed (seat: loaded)`}
       onClick=${() => setValue(["joint_defaults", "seat"], "loaded")} />`}
-    ${worst.length > 0 && html`<label class="choice">Worst case of <select value=${corner?.measure ?? ""} onChange=${(event) => look(event.target.value)}>
+    ${worst.length > 0 && html`<label class="choice">Worst case of <select title=${corner?.measure ?? ""} value=${corner?.measure ?? ""} onChange=${(event) => look(event.target.value)}>
       <option value="">– as it is –</option>${worst.map((name) => html`<option>${name}</option>`)}</select></label>`}
     ${corner && html`<${Corner} ...${corner} />`}
   </section>`; // prettier-ignore

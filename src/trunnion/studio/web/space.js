@@ -22,6 +22,7 @@ export function Space() {
         const camera = of.current === present ? view.current?.camera?.() : undefined; // a corner is looked at from the same side
         of.current = present;
         view.current = spaceView(scene, kindsOf(scene), camera);
+        if (cornered.value) view.current.reactions([], 1); // only its places are told
         holder.current.replaceChildren(...[view.current.element, view.current.controls].filter(Boolean));
       });
     }), []); // prettier-ignore

@@ -85,6 +85,8 @@ def test_a_corner_of_plays_has_its_pins_at_the_walls():
 def test_a_model_without_tolerances_and_plays_has_no_worst_corner():
     assert ask(ask="model", text=EXAMPLES["durango-fourbar"])["worst"] == []
     assert ask(ask="model", text=PLAY)["worst"] == ["rotation:D"]
+    assert ask(ask="model", text=PLAY)["unseated"] == []
+    assert ask(ask="model", text=PISTON)["unseated"] == list("OPQS")
     assert "is no measure" in ask(ask="corner", text=TOLERANCED, measure="none")["error"]
 
 
@@ -137,6 +139,23 @@ if CHROMIUM:  # not a skip: the numbers are tested above; this is how they are d
             assert complex(*touch) == pytest.approx(middle + radius * off.conjugate() / abs(off), abs=0.2)
         assert user.page.locator(".variants-of-sheet .ideal").count() == 3
 
+    def test_pins_are_pressed_by_one_click_and_lie_in_holes_that_are_bored_off(user):
+        off = PLAY.replace("links: [coupler, rocker]}", "links: [coupler, rocker], misalignment: {offset: 0.05 mm}}")
+        user.of("actions", "m.takeText(given, 'Edit')", off.replace("  seat: loaded\n", ""))
+        user.until("s.solved.value && s.answer.value.unseated.length === 4")
+        user.page.click("text=Press the pins by their loads")
+        user.until("s.solved.value && s.answer.value.scene.built?.seats.length === 4")
+        user.state("s.factor.value = 100")
+        user.idle()
+        scale = user.of("sheet", "m.sheet.view.frame.scale")
+        assert abs(pins(user)["C"][0]) == pytest.approx(100 * scale * 20e-6, abs=0.15)
+        middle = user.of(
+            "sheet", "m.sheet.view.frame.to(['x', 'y'].map((axis) => m.drawn.value.scene.points['rocker.C'][axis][0]))"
+        )
+        assert abs(spot(user, '.joint[data-name="C"]') - complex(*middle)) == pytest.approx(
+            100 * scale * 50e-6, abs=0.15
+        )
+
     def test_a_worst_corner_is_one_choice_and_lengths_stay_while_it_is_drawn(user):
         user.until("s.solved.value")
         user.page.get_by_label("Worst case of").select_option("rotation:D")
@@ -167,3 +186,13 @@ if CHROMIUM:  # not a skip: the numbers are tested above; this is how they are d
         user.page.click(".errors-drawn button:has-text('× 50')")
         user.idle()
         assert user.page.locator(".in-space .errors").text_content() == "errors × 50, ideal as pale lines"
+        user.page.click("role=tab[name=Plots]")
+        user.page.click("summary:has-text('Pins in their holes')")
+        user.page.wait_for_selector(".seat figcaption")
+        ends = user.page.locator(".seat figcaption .title")
+        assert ends.all_text_contents() == ["D, end 1", "D, end 2"]
+        result = trunnion.analyse(mechanism(EXAMPLES["rssr-with-play"])).sel(joint="D").isel(position=0)
+        for end in (0, 1):
+            load = float(np.linalg.norm(np.nan_to_num(result["end_force"].isel(end=end))))
+            value = user.page.locator(".seat figcaption .value").nth(end).text_content()
+            assert float(value.split()[0]) == pytest.approx(load, abs=0.006)

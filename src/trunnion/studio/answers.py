@@ -153,7 +153,7 @@ def _model(asked: Asked) -> dict[str, Any]:
         "locks": locks_of(state.run, result["time"].values, result["status"].values),
         **({"margin_why": "friction lacks something"} if state.bare and friction else {}),
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
-        "worst": measured(state.run),
+        **measured(state.run),
     }
 
 

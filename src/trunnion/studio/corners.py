@@ -16,8 +16,9 @@ from trunnion.measures.measures import chosen, outputs
 from trunnion.model.measure_kinds import dimension_kinds
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import quantity
-from trunnion.solve.run import Run
+from trunnion.solve.run import Run, prepare
 from trunnion.solve.shifts import play_of
+from trunnion.studio.tolerances import signed
 from trunnion.views.cycle.scene import scene
 
 if TYPE_CHECKING:
@@ -32,13 +33,17 @@ SIDES = ("least", "largest")
 ROUNDS, AROUND = 4, 17  # in which the place is looked for, and places about it in each
 
 
-def measured(run: Run) -> list[str]:
-    """Names of the measures that have a worst corner: none where nothing has a tolerance or a clearance."""
+def measured(run: Run) -> dict[str, list[str]]:
+    """What the page offers: `worst`, measures that have a worst corner, none where nothing has a tolerance or a play;
+    `unseated`, joints whose pins lie nowhere in their play.
+    """
     system, mechanism = run.system, run.system.mechanism
-    plays = (play_of(mechanism.space, kind, run.values, name) for name, (kind, _) in system.joints.items())
-    if not mechanism.tolerated() and all(play is None for play in plays):
-        return []
-    return [measure.name for measure in chosen(mechanism, None, run.values) or outputs(system)]
+    loose = [name for name, (kind, _) in system.joints.items()
+             if play_of(mechanism.space, kind, run.values, name) is not None]  # fmt: skip
+    varies = loose or mechanism.tolerated()
+    measures = (chosen(mechanism, None, run.values) or outputs(system)) if varies else []
+    unseated = [name for name in loose if name not in mechanism.seated]
+    return {"worst": [measure.name for measure in measures], "unseated": unseated}
 
 
 @np.errstate(all="ignore")
@@ -78,21 +83,17 @@ def worst_corner(mechanism: Mechanism, name: str, side: str | None, steps: int) 
         kind, nominal = kinds.get(tolerance.path), effects.nominal(i)
         of_number = kind.unit if kind else "m"
         rows.append(
-            [tolerance.path, quantity(nominal, of_number), _signed(numbers[tolerance.path] - nominal, of_number)]
+            [tolerance.path, quantity(nominal, of_number), signed(numbers[tolerance.path] - nominal, of_number)]
         )
     return {
         "values": values,
-        "texts": [_signed(value, unit) for value in values],
+        "texts": [signed(value, unit) for value in values],
         "side": shown,
         "index": index,
         "at": None if index is None else run.system.dial(run.values, np.array([time])).at(0),
         "rows": rows,
         "scene": _scene(prepared, numbers, steps),
     }
-
-
-def _signed(value: float, unit: str) -> str:
-    return f"{'−' if value < 0 else '+'}{quantity(abs(value), unit)}"
 
 
 def _place(prepared: ToleranceStudy, of: Of, there: Mapping[str, Number], sign: int, times: Array) -> Any:
@@ -115,11 +116,15 @@ def _place(prepared: ToleranceStudy, of: Of, there: Mapping[str, Number], sign: 
 
 
 def _scene(prepared: ToleranceStudy, numbers: Mapping[str, float], steps: int) -> dict[str, Any]:
-    """The scene of a mechanism with other numbers, beside the nominal one and with its holes as wide as they are."""
+    """The scene of a mechanism with other numbers, beside the nominal one and with its holes as wide as they are.
+
+    Its places alone count: it is solved without friction, with which it might lock.
+    """
     from trunnion.cycle.positions import positions
     from trunnion.cycle.summary import result_of
 
-    run, inputs = replace(prepared.run, values={**prepared.run.values, **numbers}), prepared.inputs
+    inputs, bare = prepared.inputs, prepare(prepared.run.system.mechanism.with_friction("off"))
+    run = replace(bare, values={**bare.values, **numbers})
     run.__dict__.update(ideal_values=inputs.nominal, erring=True, seats=[])  # its pins lie where the corner has them
     shown = scene(result_of(run, positions(run, steps, margin=False, averaged=False)).dataset, max_positions=steps)
     for joint in inputs.loose:

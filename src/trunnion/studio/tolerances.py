@@ -17,7 +17,7 @@ from trunnion.results.scales import without_noise
 from trunnion.solve.run import prepare
 from trunnion.studio.ways import ways
 
-__all__ = ["tolerated"]
+__all__ = ["signed", "tolerated"]
 
 MOST = 4  # strokes that are told
 
@@ -38,7 +38,7 @@ def tolerated(mechanism: Mechanism, steps: int) -> dict[str, Any]:
     rows = []
     for label, unit, nominal, lower, upper, deviation in zip(told.values(), units, *values, strict=True):
         even = np.isclose(-lower, upper, rtol=1e-3)
-        worst = f"± {quantity(float(upper), unit)}" if even else f"{_signed(lower, unit)} / {_signed(upper, unit)}"
+        worst = f"± {quantity(float(upper), unit)}" if even else f"{signed(lower, unit)} / {signed(upper, unit)}"
         texts = [quantity(float(nominal), unit), worst, quantity(float(deviation), unit)]
         numbers = {"nominal": float(nominal), "worst": [float(lower), float(upper)], "deviation": float(deviation)}
         rows.append({"label": label, "texts": texts, **numbers})
@@ -46,7 +46,8 @@ def tolerated(mechanism: Mechanism, steps: int) -> dict[str, Any]:
     return {"rows": rows, "why": doubts[:1]}
 
 
-def _signed(value: float, unit: str) -> str:
+def signed(value: float, unit: str) -> str:
+    """A change with its sign and unit."""
     return f"{'−' if value < 0 else '+'}{quantity(abs(float(value)), unit)}"
 
 

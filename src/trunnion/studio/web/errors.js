@@ -1,7 +1,7 @@
 // How large errors and play are drawn, and the worst corner of a measure: over the sheet and the view in space.
 
 import { told } from "../web/built.js";
-import { askOf } from "./actions.js";
+import { askOf, setValue } from "./actions.js";
 import { crank } from "./motion.js";
 import { cornered } from "./sheet.js";
 import * as state from "./state.js";
@@ -25,17 +25,19 @@ async function look(measure, side = null) {
 }
 
 export function Errors() {
-  const { scene, worst = [] } = state.answer.value ?? {};
+  const { scene, worst = [], unseated = [] } = state.answer.value ?? {};
   const corner = cornered.value;
   const built = corner?.scene.built ?? scene?.built;
   if (!state.solved.value || state.live.value || (!built && !worst.length)) return null;
-  const factor = state.factor.value;
+  const factor = state.spatial.value || state.tool.value === "select" ? state.factor.value : 1; // what is drawn is drawn as it is
   return html`<section class="errors-drawn" aria-label="Errors and play as they are drawn">
     ${built && html`<label class="choice">Errors <input type="range" class="magnification" min="0" max=${LONGEST} step="0.01" value=${Math.log10(factor)}
         aria-label="Magnification of the errors, logarithmic" aria-valuetext=${`errors ${told(factor)} times as large`} onInput=${(event) => magnify(10 ** Number(event.target.value))} /></label>
       <output class="factor">× ${told(factor)}</output>
       ${!corner && [...new Set([1, built.preset])].map((one) => html`<${Button} label=${`× ${told(one)}`} title=${`Draw errors ${told(one)} times as large`} pressed=${factor === one} onClick=${() => magnify(one)} />`)}`}
-    ${worst.length > 0 && html`<label class="choice">Worst case of <select value=${corner?.measure ?? ""} onChange=${(event) => look(event.target.value)}>
+    ${!corner && !built?.seats.length && unseated.length > 0 && html`<${Button} label="Press the pins by their loads" title=${`The pins of ${unseated.join(", ")} run in the middle of their holes: let them lie where they are pressed (seat: loaded)`}
+      onClick=${() => setValue(["joint_defaults", "seat"], "loaded")} />`}
+    ${worst.length > 0 && html`<label class="choice">Worst case of <select title=${corner?.measure ?? ""} value=${corner?.measure ?? ""} onChange=${(event) => look(event.target.value)}>
       <option value="">– as it is –</option>${worst.map((name) => html`<option>${name}</option>`)}</select></label>`}
     ${corner && html`<${Corner} ...${corner} />`}
   </section>`; // prettier-ignore

@@ -45,21 +45,23 @@ export function poseOverlay(view) {
   const known = state.solved.peek() && !state.live.peek() && !shown.peek()?.sketched;
   const wanted = state.layers.peek();
   const found = known && laid.peek()?.scene === (scene.of ?? scene) ? laid.peek() : {};
-  const over = view.ideal ? { seats: found.seats, point: found.point?.position ? null : found.point } : found; // the rest is where it is
+  const corner = Boolean(view.ideal && cornered.peek()); // of which nothing but its places is told
+  const point = corner || found.point?.position ? null : found.point;
+  const over = view.ideal ? { point, seats: corner ? null : found.seats } : found; // the rest is where it is
   const key = []; // lines of the key, from below
   room = view.frame.width - 6;
   taken = [...view.parts.names, ...view.parts.loads].flatMap(({ box }) => box ?? []);
   if (sheet.beside().length) key.push(keyed(view, 22, "other assemblies", (x, y) => svg("g", { class: "ghost" }, svg("path", { d: `M${x},${y}h22` }))));
   layers.variants.replaceChildren(...(view.ideal ? nominal(view, wanted, key) : wanted.variant ? variants(view, key) : []));
   layers.masses.replaceChildren(...massMarks(view));
-  const seats = wanted.seats && view.ideal && !cornered.peek() ? (over.seats ?? []) : [];
-  for (const { joint, node } of view.parts.vectors) set(node, { visibility: seats.some((one) => one.joint === joint.name) ? "hidden" : null }); // drawn where it touches
+  const seats = wanted.seats && view.ideal ? (over.seats ?? []) : [];
+  for (const { joint, node } of view.parts.vectors) set(node, { visibility: corner || seats.some((one) => one.joint === joint.name) ? "hidden" : null }); // drawn where it touches
   layers.overlay.replaceChildren(
     ...dimensionMarks(view, words, (x, y, text) => taken.push({ left: x - 0.5 * LETTER * text.length, right: x + 0.5 * LETTER * text.length, y: y + 4 })),
     ...(over.circles ? circles(view, over.circles, key) : []),
     ...(over.transmission ? over.transmission.flatMap((one) => angle(view, one)) : []),
     ...(over.centres ? centres(view, over.centres, wanted) : []),
-    ...(known && wanted.reactions && wanted.values ? values(view) : []),
+    ...(known && !corner && wanted.reactions && wanted.values ? values(view) : []),
     ...pinsInHoles(view, seats, wanted, words),
     ...(over.point ? motion(view, over.point, wanted, key) : []),
     ...locking(view),

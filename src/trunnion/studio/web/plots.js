@@ -7,6 +7,7 @@ import { at, full, magnitude, say as position } from "../web/data.js";
 import { quantity } from "../web/format.js";
 import { polarChart } from "../web/polar.js";
 import { charts } from "../web/report.js";
+import { seatCharts } from "../web/seat.js";
 import { edit } from "./actions.js";
 import { chosenCharts, Choice } from "./curves.js";
 import { clicked, framed, laid } from "./layers.js";
@@ -25,6 +26,7 @@ const MEANING = "So many times the friction may grow before it locks; at 1 it lo
 
 /** Whether the polar diagrams are open, and in space the plane they are seen in. */
 const polars = signal(false);
+const seats = signal(false);
 const plane = signal("x–y");
 
 export function Plots() {
@@ -34,6 +36,7 @@ export function Plots() {
     <${Curves} class="charts" listOf=${curves} />
     <${Chosen} />
     <${Polars} />
+    <${Seats} />
     <${Joints} />
     <${Figures} />
     <${Tolerances} />
@@ -170,6 +173,15 @@ function Polars() {
       ${["x–y", "x–z", "y–z"].map((one) => html`<option>${one}</option>`)}</select></label>`}
     ${polars.value && html`<p class="calm">The tip of each force over the cycle, on the second link of the joint.</p><${Curves} class="charts polar-charts" listOf=${loops} />`}
   </details>`; // prettier-ignore
+}
+
+/** Each end of a pin in its hole: the path of its middle, where it touches, and its load. */
+function Seats() {
+  const { scene } = state.answer.value ?? {};
+  if (!state.solved.value || !scene.built?.seats.length) return null;
+  const diagrams = (found) => seatCharts(found.scene, kindsOf(found.scene)).slice(0, MOST);
+  return html`<details class="polars" open=${seats.value} onToggle=${(event) => (seats.value = event.currentTarget.open)}>
+    <summary>Pins in their holes</summary>${seats.value && html`<${Curves} class="charts polar-charts" listOf=${diagrams} />`}</details>`; // prettier-ignore
 }
 
 function loops({ scene }, others) {

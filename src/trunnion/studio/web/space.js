@@ -35,7 +35,10 @@ function mount(holder) {
   const stop = [
     effect(() => {
       const scene = cornered.value?.scene ?? state.answer.value?.scene;
-      untracked(() => draw(holder, scene?.space === "spatial" ? scene : null, layers));
+      untracked(() => {
+        draw(holder, scene?.space === "spatial" ? scene : null, layers);
+        if (cornered.peek()) stage.api?.reactions([], 1); // only its places are known
+      });
     }),
     effect(() => {
       theme.value;

@@ -134,7 +134,7 @@ _RIG = (
     ),
     Fault(
         "efficiency-scatter-of-a-population",
-        "rig/reading/efficiency.py",
+        "rig/reading/measurement.py",
         "float(np.std(per_turn, ddof=1))",
         "float(np.std(per_turn))",
         ("tests/rig/test_efficiency.py",),

@@ -71,7 +71,7 @@ def test_a_resolution_that_is_stated_is_taken(tmp_path: Path) -> None:
     values = np.degrees(rocker(TURN))
     course = recorded(tmp_path, values, 6, resolution="0.2 deg").conditions[0].courses["psi"]
     assert course.uncertainty == pytest.approx(np.radians(0.2) / np.sqrt(6.0), rel=1e-3)
-    with pytest.raises(MechanismError, match="the resolution is not above zero"):
+    with pytest.raises(MechanismError, match="resolution: 0 is not above zero"):
         recorded(tmp_path, values, 6, resolution=0)
 
 

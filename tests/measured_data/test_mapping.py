@@ -102,7 +102,7 @@ CHANGES: list[tuple[dict[str, Any], str, str]] = [
     ({"cycle": 0}, "cycle", "not above zero"),
     ({"cycle": "-1 turn"}, "cycle", "not above zero"),
     ({"channels/brake/gain": 0}, "channels.brake", "the gain is zero"),
-    ({"channels/brake/range": "0 N m"}, "channels.brake", "range is not above zero"),
+    ({"channels/brake/range": "0 N m"}, "channels.brake.range", "0 N m is not above zero"),
     ({"channels/brake/gain": "1,5"}, "channels.brake.gain", "not a number with a unit"),
     ({"channels/brake/unit": 5}, "channels.brake.unit", "is not a unit"),
 ]

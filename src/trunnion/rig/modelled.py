@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -180,18 +180,18 @@ def _told_of(condition: Condition) -> Iterator[None]:
         ) from None
 
 
-Result = TypeVar("Result")
+Item, Result = TypeVar("Item"), TypeVar("Result")
 
 
 def each(
-    conditions: Sequence[Condition], of: Callable[[Condition], Result], progress: Callable[[int], None] | None = None
+    items: Iterable[Item], of: Callable[[Item], Result], progress: Callable[[int], None] | None = None
 ) -> list[Result]:
-    """What there is of every condition; MechanismError with the errors of all. progress: called with those done."""
+    """What there is of every item; MechanismError with the errors of all. progress: called with those done."""
     results: list[Result] = []
     findings: list[Finding] = []
-    for done, condition in enumerate(conditions, 1):
+    for done, item in enumerate(items, 1):
         try:
-            results.append(of(condition))
+            results.append(of(item))
         except MechanismError as error:
             findings += error.findings
         if progress:
@@ -206,7 +206,7 @@ def _row(number: object, time: Array) -> Array:
 
 
 def same_cycle(run: Run, condition: Condition, duration: float, begin: float, span: float) -> None:
-    """MechanismError where the cycle that was cut out of the data is not the model's, or starts elsewhere.
+    """MechanismError where the cycle of the data is not the model's, starts elsewhere, or runs backwards.
 
     duration: of the model's, s; begin, span: where the driver is at its start, and how far it turns, rad; NaN where its
     turns name no position.
@@ -217,7 +217,14 @@ def same_cycle(run: Run, condition: Condition, duration: float, begin: float, sp
         raise MechanismError(Finding(what, "cycle", remedy))
     if not np.isfinite(span):
         return
-    _refuse_backwards(run.system.mechanism, condition, span / duration)
+    if condition.speed * span < 0:
+        driver, rpm = next(iter(run.system.mechanism.drivers), ""), np.pi / 30
+        what = f"the angle runs backwards: {condition.speed / rpm:.4g} rpm measured, "
+        what += f"{span / duration / rpm:.4g} rpm stated of {driver}"
+        remedy = f"if it does turn so, set {as_key(f'{driver}.speed')} below zero; else add sign: -1 to angle:, or "
+        figures, file = {"measured": condition.speed, "stated": span / duration}, str(next(iter(condition.files), ""))
+        finding = Finding(what, "angle", f"{remedy}remove it", file=file, code="data.angle.backwards", figures=figures)
+        raise MechanismError(finding)
     if not np.isfinite([condition.start, condition.cycle]).all():
         return
     findings: list[Finding] = []
@@ -231,19 +238,6 @@ def same_cycle(run: Run, condition: Condition, duration: float, begin: float, sp
         findings.append(Finding(what, "start", f"state start: {_degrees(begin)} in the mapping"))
     if findings:
         raise MechanismError(findings)
-
-
-def _refuse_backwards(mechanism: Mechanism, condition: Condition, speed: float) -> None:
-    """MechanismError where a condition turns the other way than the model, which turns at `speed`, rad/s."""
-    if condition.speed * speed < 0:
-        driver, rpm = next(iter(mechanism.drivers), ""), np.pi / 30
-        what = f"the angle runs backwards: {condition.speed / rpm:.4g} rpm measured, "
-        what += f"{speed / rpm:.4g} rpm stated of {driver}"
-        remedy = f"if it does turn so, set {as_key(f'{driver}.speed')} below zero; else add sign: -1 to angle:, or "
-        figures, file = {"measured": condition.speed, "stated": speed}, str(next(iter(condition.files), ""))
-        raise MechanismError(
-            Finding(what, "angle", f"{remedy}remove it", file=file, code="data.angle.backwards", figures=figures)
-        )
 
 
 def apart(measured: float, stated: float, share: float = FAR) -> bool:

@@ -23,7 +23,19 @@ from trunnion.model.names import nearest
 from trunnion.model.quantity import Angle, AnyQuantity, Dimensionless, Quantity, Rate, Time
 from trunnion.model.schema import SchemaGenerator
 from trunnion.model.units import ANGLE, KINDS, UnitError
-from trunnion.rig.reading.units import Amount, Frequency, MeasureText, Number, SensorScale, UnitText, alike, scale
+from trunnion.rig.reading.units import (
+    Amount,
+    Frequency,
+    MeasureText,
+    Number,
+    Positive,
+    SensorScale,
+    Size,
+    UnitText,
+    alike,
+    bounded,
+    scale,
+)
 from trunnion.rig.reading.units import dimensions as unit_dimensions
 
 __all__ = [
@@ -86,6 +98,18 @@ def _span(value: object) -> object:
     return value
 
 
+def _ordered(span: tuple[Number, Number]) -> tuple[Number, Number]:
+    """A stretch of time that begins before it ends."""
+    begin, end = span
+    for one in span:
+        if not one.plain and not alike(one.dimensions, {"s": 1}):  # type: ignore[dict-item]
+            raise problem(f"'{one.source}' is no time", "write [0 s, 0.5 s]")
+    if not begin.value < end.value:
+        raise problem(f"[{begin.source}, {end.source}] ends before it begins", "write [0 s, 0.5 s]")
+    return span
+
+
+Span = Annotated[tuple[Number, Number], AfterValidator(_ordered)]
 _PAIR = {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2, "maxItems": 2}
 
 
@@ -132,7 +156,7 @@ class AngleSource(Part):
     zero: FixedAngle = Quantity(0.0, KINDS["angle"])
     index: Index | None = None
     sign: Sign = 1
-    resolution: FixedAngle | None = None
+    resolution: Annotated[FixedAngle, bounded(above=True)] | None = None
 
     @model_validator(mode="after")
     def _of_its_kind(self) -> AngleSource:
@@ -148,8 +172,6 @@ class AngleSource(Part):
             raise problem("only a running count wraps", "remove wrap, or write kind: count")
         if self.unit is not None:
             _unit_of(self.unit, "rad", "a unit of angle such as deg")
-        if self.resolution is not None and not self.resolution.evaluate() > 0:
-            raise problem("the resolution is not above zero", "write the step of the readings, such as 0.1 deg")
         if self.speed is not None and self.speed.evaluate() == 0:
             raise problem("the speed is zero: there are no turns", "write the speed of the driver, such as 1500 rpm")
         return self
@@ -168,16 +190,11 @@ class Zero(Part):
     """The zero of a channel as the mean over stretches of time in which nothing loads the sensor."""
 
     over: Annotated[
-        tuple[tuple[Number, Number], ...],
+        tuple[Span, ...],
         BeforeValidator(_span),
         Field(min_length=1, max_length=20),
         WithJsonSchema({"anyOf": [_PAIR, {"type": "array", "items": _PAIR, "minItems": 1, "maxItems": 20}]}),
     ]
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Zero:
-        _check_spans(self.over)
-        return self
 
 
 ChannelZero = Annotated[
@@ -189,14 +206,8 @@ ChannelZero = Annotated[
 class Accuracies(Part):
     """Standard uncertainties of a sensor: of its gain, relative, and of its zero."""
 
-    gain: FixedNumber = Quantity(0.0, KINDS["number"])
-    zero: Number = Amount(0.0, 0.0, "", {})
-
-    @model_validator(mode="after")
-    def _positive(self) -> Accuracies:
-        if self.gain.evaluate() < 0 or self.zero.value < 0:
-            raise problem("a standard uncertainty is below zero", "write it without a sign")
-        return self
+    gain: Annotated[FixedNumber, bounded(above=False)] = Quantity(0.0, KINDS["number"])
+    zero: Size = Amount(0.0, 0.0, "", {})
 
 
 class Channel(Part):
@@ -212,8 +223,8 @@ class Channel(Part):
     gain: Number | None = None
     sign: Sign = 1
     zero: ChannelZero = Amount(0.0, 0.0, "", {})
-    range: Number | None = None
-    resolution: Number | None = None
+    range: Positive | None = None
+    resolution: Positive | None = None
     accuracy: Accuracies = Accuracies()
     per_turn: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
 
@@ -221,10 +232,6 @@ class Channel(Part):
     def _fitting(self) -> Channel:
         if self.per_turn is not None and not self.measures.startswith("rate:"):
             raise problem("pulses measure a speed only", "measure rate:JOINT, or remove per_turn")
-        if self.range is not None and self.range.value <= 0:
-            raise problem("the range is not above zero", "write the full scale, such as 100 N m")
-        if self.resolution is not None and self.resolution.value <= 0:
-            raise problem("the resolution is not above zero", "write the step of the readings, such as 0.1 deg")
         if self.unit is not None:
             self.scale(self.unit)
         return self
@@ -248,8 +255,8 @@ class FileChannel(Part):
     unit: UnitText | None = None
     gain: Number | None = None
     zero: ChannelZero | None = None
-    range: Number | None = None
-    resolution: Number | None = None
+    range: Positive | None = None
+    resolution: Positive | None = None
     accuracy: Accuracies | None = None
 
     def of(self, channel: Channel) -> Channel:
@@ -266,14 +273,9 @@ class File(Part):
 
     file: str = Field(min_length=1)
     set: Mapping[str, Setting] = {}
-    over: tuple[Number, Number] | None = None
+    over: Span | None = None
     angle: FileAngle | None = None
     channels: Mapping[Name, FileChannel] = {}
-
-    @model_validator(mode="after")
-    def _ordered(self) -> File:
-        _check_spans([self.over] if self.over else [])
-        return self
 
 
 class Filter(Part):
@@ -320,16 +322,6 @@ class DataMapping(Part):
     def timed(self) -> bool:
         """Whether the cycle is a time."""
         return self.cycle.check({}) == KINDS["time"].dimensions[0]
-
-
-def _check_spans(spans: Any) -> None:
-    """Stretches of time that begin before they end."""
-    for begin, end in spans:
-        for one in (begin, end):
-            if not one.plain and not alike(one.dimensions, {"s": 1}):  # type: ignore[dict-item]
-                raise problem(f"'{one.source}' is no time", "write [0 s, 0.5 s]")
-        if not begin.value < end.value:
-            raise problem(f"[{begin.source}, {end.source}] ends before it begins", "write [0 s, 0.5 s]")
 
 
 def _unit_of(text: str, si: str, needed: str) -> None:

@@ -21,7 +21,7 @@ from trunnion.model.file import place, read_entries
 from trunnion.model.findings import schema_findings
 from trunnion.model.units import normalise
 from trunnion.rig.reading.mapping import Accuracies, FixedAngle, FixedTime
-from trunnion.rig.reading.units import Frequency, Number
+from trunnion.rig.reading.units import Frequency, Number, Positive, Size
 
 __all__ = ["FORMATS", "Encoder", "Idle", "Rig", "Schedule", "Sensor", "placed_in_rig"]
 
@@ -90,13 +90,13 @@ class Sensor(Part):
     measures: str
     unit: str | None = None
     column: Name | None = None
-    range: Number | None = None
+    range: Positive | None = None
     sensitivity: Number | None = None
-    noise: Number = Field(default=0, validate_default=True)
+    noise: Size = Field(default=0, validate_default=True)
     bits: Annotated[int, Field(ge=1, le=48)] | None = None
-    span: Number | None = None
+    span: Positive | None = None
     accuracy: Accuracies = Accuracies()
-    offset: Number = Field(default=0, validate_default=True)
+    offset: Size = Field(default=0, validate_default=True)
     drift: Number = Field(default=0, validate_default=True)
     bandwidth: Frequency | None = None
     per_turn: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
@@ -241,12 +241,8 @@ def _unsound_sensor(where: str, sensor: Sensor) -> Iterable[Finding]:
         (sensor.bits and not (sensor.span or sensor.range), "bits", "has bits and neither span nor range",
          "state what they are spread over: span: 10 V"),
         (sensor.span and not sensor.bits, "span", "is a span without bits", "state bits: 16"),
-        (sensor.range and sensor.range.value <= 0, "range", "is not positive", "state a positive range"),
-        (sensor.span and sensor.span.value <= 0, "span", "is not positive", "state a positive span"),
-        (sensor.noise.value < 0, "noise", f"{sensor.noise.source} is negative", "state a standard deviation"),
         (sensor.sensitivity and sensor.sensitivity.value == 0, "sensitivity", "is zero",
          "state reading per quantity: 100 mV/(N m)"),
-        (sensor.offset.value < 0, "offset", f"{sensor.offset.source} is negative", "state a standard deviation"),
         (sensor.per_turn and not sensor.measures.startswith("rate:"), "per_turn", "pulses measure a speed only",
          "measure rate:JOINT, or remove per_turn"),
     ):  # fmt: skip

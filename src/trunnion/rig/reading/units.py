@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, PlainSerializer, PlainValidator, WithJsonSchema
 
@@ -145,9 +145,24 @@ def _frequency(value: object) -> Amount:
     return amount
 
 
+def bounded(above: bool) -> AfterValidator:
+    """Numbers above zero, or else not below it; of both kinds of quantities."""
+
+    def check(number: Any) -> Any:
+        value = number.value if isinstance(number, Amount) else float(number.evaluate())
+        if not (value > 0 if above else value >= 0):
+            remedy = "write a number above it, such as 100 N m or 0.1 deg" if above else "write it without a sign"
+            raise problem(f"{number.source} is {'not above' if above else 'below'} zero", remedy)
+        return number
+
+    return AfterValidator(check)
+
+
 _WRITTEN, _SOURCE = {"type": ["number", "string"]}, PlainSerializer(lambda amount: amount.source)
 UnitText = Annotated[str, PlainValidator(_unit), WithJsonSchema({"type": ["string"], "examples": ["mV"]})]
 Number = Annotated[Amount, PlainValidator(_amount), _SOURCE, WithJsonSchema({**_WRITTEN, "examples": ["12 mV"]})]
+Positive = Annotated[Number, bounded(above=True)]
+Size = Annotated[Number, bounded(above=False)]
 Frequency = Annotated[Amount, PlainValidator(_frequency), _SOURCE, WithJsonSchema({**_WRITTEN, "examples": ["2 kHz"]})]
 
 

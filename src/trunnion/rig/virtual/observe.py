@@ -24,7 +24,7 @@ from trunnion.measures.measures import Measure
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
-from trunnion.rig.modelled import measure_of
+from trunnion.rig.modelled import each, measure_of
 from trunnion.rig.reading.rig_file import Rig, Value
 from trunnion.rig.virtual.observation import Case, Observation, check_seed, cycle_efficiency, sampled, speed_differs
 from trunnion.rig.virtual.sensors import SensorChannel, draw, resolved
@@ -110,15 +110,9 @@ def _placed(where: str, number: int = 0) -> Iterator[None]:
 
 def _measures(rig: Rig, run: Run) -> list[Measure]:
     """What each sensor measures; MechanismError with all that the model has no course of."""
-    measures: list[Measure] = []
-    findings: list[Finding] = []
-    for name, sensor in rig.sensors.items():
-        try:
-            measures.append(measure_of(run.system.mechanism, run, name, sensor.measures, "sensors"))
-        except MechanismError as error:
-            findings += error.findings
-    if findings:
-        raise MechanismError(findings)
+    measures = each(
+        rig.sensors.items(), lambda one: measure_of(run.system.mechanism, run, one[0], one[1].measures, "sensors")
+    )
     if run.determinacy is not None and not all(one.of_motion for one in measures):
         run.determinacy.refuse()
     return measures
@@ -126,13 +120,9 @@ def _measures(rig: Rig, run: Run) -> list[Measure]:
 
 def _channels(rig: Rig, run: Run, measures: Sequence[Measure]) -> dict[str, SensorChannel]:
     """The sensors in the units of what they measure; MechanismError with all that does not fit."""
-    channels: dict[str, SensorChannel] = {}
+    stated = zip(rig.sensors.items(), measures, strict=True)
+    every = each(stated, lambda one: resolved(*one[0], rig.column(one[0][0]), one[1].unit(run.system)))
     findings: list[Finding] = []
-    for (name, sensor), measure in zip(rig.sensors.items(), measures, strict=True):
-        try:
-            channels[name] = resolved(name, sensor, rig.column(name), measure.unit(run.system))
-        except MechanismError as error:
-            findings += error.findings
     driver = next(iter(run.system.mechanism.drivers), None)
     if driver is None or run.cycle.duration <= 0:
         remedy = "give the model a driver"
@@ -145,7 +135,7 @@ def _channels(rig: Rig, run: Run, measures: Sequence[Measure]) -> dict[str, Sens
         findings.append(Finding(what, "encoder", f"{remedy}: positions then follow from the time"))
     if findings:
         raise MechanismError(findings)
-    return channels
+    return {one.name: one for one in every}
 
 
 def _case(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from zlib import crc32
 
@@ -19,7 +19,8 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.measure_table import MEASURES
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.rig_file import Sensor
-from trunnion.rig.reading.units import Amount, alike, dimensions, multiplied, scale
+from trunnion.rig.reading.units import Amount, SensorScale, alike, dimensions, multiplied
+from trunnion.rig.reading.units import scale as scale_of
 
 __all__ = ["SensorChannel", "SensorErrors", "draw", "resolved", "stream"]
 
@@ -112,33 +113,29 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel
     findings: list[Finding] = []
     where = f"sensors.{name}"
     try:
-        reading, per = _reading(sensor, unit)
+        reading, scale = _scale(sensor, unit)
     except UnitError as error:
         key = "sensitivity" if sensor.sensitivity else "unit"
         raise MechanismError(Finding(error.what, f"{where}.{key}", error.remedy)) from None
 
     def number(key: str, amount: Amount | None, absent: float = 0.0, over: str = "") -> float:
-        size = per if over else abs(per)  # a drift has a sign, all others are magnitudes
-        if amount is None:
+        """An amount of what is measured or of the readings, in the SI unit; a drift has a sign, others have none."""
+        if amount is None or amount.plain:
+            return absent if amount is None else amount.value
+        own = replace(amount, dimensions=multiplied(amount.dimensions, {"s": Fraction(bool(over))}))
+        try:
+            return (scale.factor if over else abs(scale.factor)) * scale.reading(own, "zero" if over else key)
+        except UnitError:
+            units = dict.fromkeys(f"{one}/{over}" if over else one for one in (unit, reading))
+            what = f"'{amount.source}' is not in {' or in '.join(units)}"
+            remedy = f"state it in {', or as a reading in '.join(units)}"
+            findings.append(Finding(what, f"{where}.{key}", remedy))
             return absent
-        if amount.plain:
-            return amount.value
-        own = multiplied(amount.dimensions, {"s": Fraction(bool(over))})
-        if alike(own, dimensions(unit)[1]):
-            return amount.value
-        factor, of_reading = dimensions(reading)
-        if alike(own, of_reading):
-            return amount.value / (size * factor)
-        units = dict.fromkeys(f"{one}/{over}" if over else one for one in (unit, reading))
-        what = f"'{amount.source}' is not in {' or in '.join(units)}"
-        remedy = f"state it in {', or as a reading in '.join(units)}"
-        findings.append(Finding(what, f"{where}.{key}", remedy))
-        return absent
 
     limit = number("range", sensor.range, math.inf)
     span = number("span", sensor.span, limit) if sensor.bits else math.inf
     channel = SensorChannel(
-        name, column, sensor.measures, unit, reading, per, limit,
+        name, column, sensor.measures, unit, reading, 1 / scale.factor, limit,
         noise=number("noise", sensor.noise),
         step=2 * span / 2**sensor.bits if sensor.bits else 0.0,
         span=span,
@@ -155,8 +152,8 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel
     return channel
 
 
-def _reading(sensor: Sensor, unit: str) -> tuple[str, float]:
-    """Unit of the reading, and how many of these there are for an SI unit of what is measured."""
+def _scale(sensor: Sensor, unit: str) -> tuple[str, SensorScale]:
+    """Unit of the reading, and how readings become what is measured."""
     given = sensor.sensitivity
     if sensor.unit or given is None:
         readings = [sensor.unit or unit]
@@ -165,9 +162,9 @@ def _reading(sensor: Sensor, unit: str) -> tuple[str, float]:
         readings = [given.unit.partition("/")[0].strip(), given.unit.rpartition("/")[2].strip("() "), *READINGS]
     for reading in filter(None, readings):
         with suppress(UnitError):
-            of_sensor = scale(sensor.measures, reading, given)
+            of_sensor = scale_of(sensor.measures, reading, given)
             if alike(of_sensor.of_quantity, dimensions(unit)[1]):
-                return reading, 1 / of_sensor.factor
+                return reading, of_sensor
     if given is None:
         remedy = f"state a unit of {unit}, or the sensitivity: 100 mV/({unit})"
         raise UnitError(f"'{readings[0]}' does not measure a quantity in {unit}", remedy)

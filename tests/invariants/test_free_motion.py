@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import ellipk
 
+from brief import brief
 from playing import rattling
 from timed import LINEAR, slider_crank, wheel
 from trunnion import MechanismError, analyse, read, simulate
@@ -174,7 +175,7 @@ def test_a_driven_joint_ends_at_its_dead_centre(friction: float, close: float) -
 def test_a_driven_joint_in_space_ends_at_its_dead_centre() -> None:
     """The rocker of an RSSR moves by itself up to the end of its swing, which a cycle driven by the crank tells."""
     data = read(EXAMPLES / "rssr.yaml").data()
-    swing = analyse(Mechanism(**data), 720)["joint_rotation"].sel(joint="D").values
+    swing = brief(Mechanism(**data), 720)["joint_rotation"].sel(joint="D").values
     end = float(_largest(swing))
     start = {"coordinate": float(swing[0]), "speed": 30.0}
     data["drivers"] = {"D": {"speed": 1, "free": True, "range": [float(swing[0]), end + 1], "initial": start}}

@@ -314,10 +314,10 @@ def test_two_drivers_of_different_speed_make_one_cycle() -> None:
 
 @pytest.mark.slow
 def test_many_turns_in_one_range() -> None:
-    """A linkage that assembles over a turn assembles over 365, at the positions it has in one."""
+    """A linkage that assembles over a turn assembles over 73, at the positions it has in one."""
     one, many = MODELS["class III"](), MODELS["class III"]()
-    many["drivers"]["A"] = {"speed": 5.0, "range": [0.0, 730 * np.pi]}
-    result = positions_of(many, 366)
+    many["drivers"]["A"] = {"speed": 5.0, "range": [0.0, 146 * np.pi]}
+    result = positions_of(many, 74)
     assert np.all(result["status"] < Status.NOT_CONVERGED)
     start = positions_of(one, 4)["drive_effort"].values[0, 0]
     np.testing.assert_allclose(result["drive_effort"].values[0], start, rtol=1e-6)

@@ -175,7 +175,7 @@ def test_hinges_held_along_their_axis() -> None:
 
     rng = np.random.default_rng(5)
     best = np.inf
-    for _ in range(16):
+    for _ in range(8):
         rules = [
             {"type": "ineq", "fun": lambda x: x[4] ** 2 - (ends(x) ** 2).sum(axis=1)},
             {"type": "eq", "fun": length},
@@ -584,7 +584,7 @@ def test_a_freedom_that_nothing_drives_is_refused() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degrees", [1, 5, 15])
+@pytest.mark.parametrize("degrees", [1, 15])
 def test_errors_that_are_not_small(degrees: float) -> None:
     """The sequence of cone programmes settles on the exact closure there too; the need is nearly proportional."""
     small, large = (solved(four_bar({"B": {"tilt": np.radians(tilt)}}), 4) for tilt in (0.01, degrees))

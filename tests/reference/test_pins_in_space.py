@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import trunnion
+from brief import brief
 from playing import rattling
 from playing_space import CENTRE, FLOAT, MASS, WIDTH, cardan, dropped, on_a_plate, own_shaft, rattling_in_space, tilting
 from trunnion.algebra.nested import flat
@@ -75,7 +76,7 @@ def test_a_shaft_that_is_let_go_in_its_hole(duration: float) -> None:
 def test_less_clearance_gives_force_and_moment_without_play() -> None:
     """The moment is the couple of the forces at the two ends. What both differ by falls with the clearance."""
     positions = np.array([50, 60])  # degrees from the start, long after it
-    ideal = trunnion.analyse(tilting({}), steps=360)
+    ideal = brief(tilting({}), 360)
     misses = []
     for clearance in (1e-3, 1e-4):
         found = trunnion.simulate(tilting(clearance=clearance), 2 * np.pi / 20 / 6, 60)

@@ -401,7 +401,7 @@ def numbers(frame: Any) -> Frame:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("friction", [0.0, 0.1, 0.4])
+@pytest.mark.parametrize("friction", [0.1, 0.4])
 def test_rssr_with_play_in_all_joints(friction: float) -> None:
     """Tilted pins and balls under inertia, weight and a brake: seats to 1e-6 of the clearance, forces to 1e-8."""
     data = copy.deepcopy(rssr(start=START, friction=friction).data)

@@ -160,7 +160,7 @@ def test_intervals_of_the_four_bar_are_honest(method: str, samples: int) -> None
 @pytest.mark.slow
 def test_intervals_of_quantiles_of_sobol_points() -> None:
     """By their replicates; those of plain samples, by order statistics, stand in `test_intervals_are_honest`."""
-    quantiles_are_covered(intervals(sledge(), "quasi-monte-carlo", 4096))
+    quantiles_are_covered(intervals(sledge(), "quasi-monte-carlo", 8192))
 
 
 def quantiles_are_covered(rows: dict[str, Array]) -> None:

@@ -18,6 +18,7 @@ from trunnion.views.tolerance import drawable, report
 SOURCE = "data:image/svg+xml;base64,"
 
 
+@pytest.mark.sample(6)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CASES if name != "twelve measures"])
 def test_every_kind_of_result_makes_a_well_formed_page(name):

@@ -109,7 +109,7 @@ def test_the_pressure_of_a_pin_in_the_plane() -> None:
     """F/(d b) of the reaction; of pins whose length is not stated there is none."""
     data = trunnion.read("examples/durango-fourbar.yaml").data()
     data["joints"]["C"]["pin"] = {"radius": "0.1 m", "length": "50 mm"}
-    found = brief(Mechanism(**data), steps=12)
+    found = trunnion.analyse(Mechanism(**data), steps=12)
     force = np.linalg.norm(found["reaction_force"].sel(joint="C"), axis=0)
     assert found["pin_pressure"].sel(joint="C").values == pytest.approx(force / (0.2 * 0.05), rel=1e-12)
     assert np.all(np.isnan(found["pin_pressure"].sel(joint="B")))

@@ -13,7 +13,22 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number
 from trunnion.statistics import intervals
-from trunnion.views.charts import Axis, Band, Bars, Chart, Legend, Line, Look, Mark, Note, Panel, Rule, Stairs, silent
+from trunnion.views.charts import (
+    Axis,
+    Band,
+    Bars,
+    Chart,
+    Legend,
+    Line,
+    Look,
+    Mark,
+    Note,
+    Panel,
+    Rule,
+    Stairs,
+    check_kind,
+    silent,
+)
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.page import Section, Summary, Table, counts, page
 from trunnion.views.readings import (
@@ -33,7 +48,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["KINDS", "MOST_PANELS", "NOTES", "check_kind", "drawable", "figure", "report", "sheet", "tables"]
+__all__ = ["KINDS", "MOST_PANELS", "NOTES", "drawable", "figure", "report", "sheet", "tables"]
 
 MOST_HEADS = 6  # measures whose figures are read first
 MOST_ROWS, MOST_BARS = 20, 16  # contributions with a row and a bar of their own
@@ -484,12 +499,6 @@ def drawable(read: MeasureReading) -> list[str]:
     return [name for name, kind in KINDS.items() if kind.ready(read)]
 
 
-def check_kind(kind: str) -> None:
-    """MechanismError if there is no such kind of figure."""
-    if kind not in KINDS:
-        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", f"use one of {', '.join(KINDS)}"))
-
-
 def figure(result: xr.Dataset, kind: str, measures: Sequence[str] | None = None) -> Figure:
     """One kind of figure, a panel for each measure, at most MOST_PANELS; all that have it if none is named.
 
@@ -499,7 +508,7 @@ def figure(result: xr.Dataset, kind: str, measures: Sequence[str] | None = None)
     """
     from trunnion.views.draw import figure as draw
 
-    check_kind(kind)
+    check_kind(kind, KINDS)
     about = KINDS[kind]
     reads = _named(result, measures, about.ready)
     if not reads:

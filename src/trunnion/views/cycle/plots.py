@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -18,10 +18,11 @@ from matplotlib import rc_context
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.files import whole
 from trunnion.model.quantity import Quantity
-from trunnion.model.units import ANY, KINDS, UnitError
+from trunnion.model.units import ANY, UnitError
+from trunnion.model.units import KINDS as UNITS
 from trunnion.results.scales import without_noise
 from trunnion.views import draw as drawn
-from trunnion.views.charts import Look, Note, Panel, Plot, Rule
+from trunnion.views.charts import Look, Note, Panel, Plot, Rule, check_kind
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, status_text
 from trunnion.views.common.drawing import draw, picture
 from trunnion.views.common.figures import MUTED, Labels, new, plain
@@ -38,7 +39,7 @@ __all__ = ["PLOTS", "check_figure", "drawable", "mechanism", "position_at", "sav
 
 FORMATS = ("png", "svg", "pdf", "jpg", "jpeg")
 LONGEST = 1.5  # steps: a place further from every position is not one of the cycle
-KIND_OF = {"°": KINDS["angle"], "mm": KINDS["length"], "s": KINDS["time"]}
+KIND_OF = {"°": UNITS["angle"], "mm": UNITS["length"], "s": UNITS["time"]}
 
 
 def mechanism(result: xr.Dataset, ideal: xr.Dataset | None = None, index: int | None = None) -> Figure:
@@ -97,6 +98,7 @@ PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Plot | Figure]] = {
     "locking": courses.locking,
     "measures": courses.measures,
 }
+KINDS = tuple(PLOTS)
 # whether a result has what a figure needs that not all results have
 READY: dict[str, Callable[[xr.Dataset], bool]] = {
     "speed": lambda result: bool(courses.varying(result)),
@@ -115,7 +117,7 @@ def figure(
 
     at: a place such as "60deg": the mechanism is drawn there, and curves over the drive are marked.
     """
-    check_kinds([kind])
+    check_kind(kind, PLOTS)
     index = None if at is None else position_at(result, at)
     result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
     if kind == "mechanism":
@@ -150,9 +152,9 @@ def position_at(result: xr.Dataset, place: str | float) -> int:
         quantity = Quantity.read(place, ANY)
         if quantity.names:
             raise UnitError(f"'{place}' is no place", "write 60deg, 20mm or 0.1s")
-        timed = isinstance(place, str) and quantity.check({}) == KINDS["time"].dimensions[0]
+        timed = isinstance(place, str) and quantity.check({}) == UNITS["time"].dimensions[0]
         unit = str(result["drive"].attrs["units"]) if "drive" in result.coords and not timed else "s"
-        kind = KIND_OF.get(unit, KINDS["time"])
+        kind = KIND_OF.get(unit, UNITS["time"])
         value = float(np.asarray(Quantity.read(place, kind).evaluate()))
     except UnitError as error:
         raise MechanismError(Finding(error.what, "--at", error.remedy or "write 60deg, 20mm or 0.1s")) from None
@@ -167,18 +169,6 @@ def position_at(result: xr.Dataset, place: str | float) -> int:
         what = f"{sought:.4g}{unit} is not in the cycle"
         raise MechanismError(Finding(what, "--at", f"name a place from {low:.4g}{unit} to {high:.4g}{unit}"))
     return int(np.argmin(away))
-
-
-def check_kind(kind: str) -> None:
-    """MechanismError if there is no such kind of figure."""
-    check_kinds([kind])
-
-
-def check_kinds(kinds: Sequence[str]) -> None:
-    """MechanismError if there is no such kind of figure."""
-    unknown = [name for name in kinds if name not in PLOTS]
-    if unknown:
-        raise MechanismError(Finding(f"there is no plot '{unknown[0]}'", "--kind", f"use one of {', '.join(PLOTS)}"))
 
 
 def drawable(result: xr.Dataset) -> list[str]:

@@ -13,7 +13,22 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import prefixed, quantity
 from trunnion.views import draw
-from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Ring, Rule, joined, nth
+from trunnion.views.charts import (
+    Axis,
+    Chart,
+    Legend,
+    Line,
+    Look,
+    Mark,
+    Note,
+    Panel,
+    Plot,
+    Ring,
+    Rule,
+    check_kind,
+    joined,
+    nth,
+)
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, names
 from trunnion.views.motion.shown import OF_IMPACTS, Shown, drivers_of, energies, shown
 
@@ -21,7 +36,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["KINDS", "OF_CONTACTS", "check_contacts", "check_kind", "figure", "pictures", "sheet"]
+__all__ = ["KINDS", "OF_CONTACTS", "check_contacts", "figure", "pictures", "sheet"]
 
 PANEL = 2.6  # height, inches
 LINE, LETTER = 9.5, 0.009  # of an event's word: points from row to row, share of the axes' width a letter
@@ -35,25 +50,18 @@ SIDE = 4.6  # of the figure of a hole, inches
 
 
 def figure(result: xr.Dataset, kind: str = "sheet") -> Figure:
-    """One figure: of KINDS or OWN, or `sheet` with all over time."""
-    check_kind(kind)
+    """One figure of KINDS; `sheet` has all over time."""
+    check_kind(kind, KINDS)
     if kind == "sheet":
         return sheet(result)
     check_contacts(kind, _in_play(result))
     if kind in OWN:
         return draw.plot(OWN[kind](result), result)
-    title, build = KINDS[kind]
+    title, build = OVER_TIME[kind]
     motion = shown(result)
     chart = build(motion.rows, abscissa(motion.rows))
     chart = chart if kind == "phase" else _with_events(chart, motion)
     return draw.plot(Plot(title, [Panel("", [chart], 3.75)]), result)
-
-
-def check_kind(kind: str) -> None:
-    """MechanismError if there is no such kind of figure."""
-    known = ("sheet", *KINDS, *OWN)
-    if kind not in known:
-        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", f"use {', '.join(known)}"))
 
 
 def check_contacts(kind: str, in_play: bool) -> None:
@@ -70,7 +78,7 @@ def sheet(result: xr.Dataset) -> Figure:
     left_out = ("phase", *idle, *(() if _in_play(result) else OF_CONTACTS))
     over = abscissa(motion.rows)
     charts = [_with_events(build(motion.rows, over), motion)
-              for kind, (_, build) in KINDS.items() if kind not in left_out]  # fmt: skip
+              for kind, (_, build) in OVER_TIME.items() if kind not in left_out]  # fmt: skip
     return draw.plot(Plot("Motion in time", [Panel("", charts, 0.4 + PANEL * len(charts))]), result)
 
 
@@ -230,7 +238,7 @@ def _hole(result: xr.Dataset, k: int) -> Chart:
 
 
 # a kind of figure over time: its title, and what makes its chart
-KINDS: dict[str, tuple[str, Callable[[Any, Abscissa], Chart]]] = {
+OVER_TIME: dict[str, tuple[str, Callable[[Any, Abscissa], Chart]]] = {
     "speed": ("Speed", _speed),
     "effort": ("Drive effort", _effort),
     "reactions": ("Reactions", _reactions),
@@ -241,3 +249,4 @@ KINDS: dict[str, tuple[str, Callable[[Any, Abscissa], Chart]]] = {
 }
 # kinds of figures with axes of their own
 OWN: dict[str, Callable[[Any], Plot]] = {"orbit": _orbit, "spectrum": _spectrum}
+KINDS = ("sheet", *OVER_TIME, *OWN)

@@ -22,9 +22,11 @@ from trunnion.views.common.peaks import ease, peak, usual_peak
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FREE", "Arrow", "Axis", "Band", "Bars", "Cells", "Chart", "ColourScale", "Legend", "Line", "Look", "Mark",
-           "Note", "Panel", "Plot", "Ring", "Rule", "Stairs", "Stripe", "check_kind", "joined", "nth", "outside", "over_drive",
-           "silent"]  # fmt: skip
+__all__ = [
+    "FREE", "Arrow", "Axis", "Band", "Bars", "Cells", "Chart", "ColourScale", "Legend", "Line", "Look", "Mark", "Note",
+    "Panel", "Plot", "Ring", "Rule", "Stairs", "Stripe", "check_kind", "joined", "nth", "outside", "over_drive",
+    "silent",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 SAME = 1e-6  # of the largest value of all curves: a difference that no figure shows

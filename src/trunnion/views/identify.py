@@ -190,10 +190,11 @@ def _residuals(result: xr.Dataset, title: str, turns_of: str, keys: tuple[str, .
     used = turns_of == "turns"
     for i, name, unit, _ in _channels(result):
         turns = result[turns_of].values[i]
-        for k in np.flatnonzero(turns > 0):
-            values = [float(result[key].values[i, k]) for key in keys]
-            factor, shown = prefixed(float(np.nanmax(np.nan_to_num(values))), unit)
-            cells = [NONE if not math.isfinite(value) else f"{value * factor:.3g}" for value in values]
+        fitted = np.flatnonzero(turns > 0)
+        values = np.array([result[key].values[i, fitted] for key in keys], float)
+        factor, shown = prefixed(float(np.max(np.nan_to_num(values[:2]), initial=0.0)), unit)
+        for k, rms in zip(fitted, values.T, strict=True):
+            cells = [f"{value * factor:.3g}" if math.isfinite(value) else NONE for value in rms]
             positions = [f"{int(result['used'].values[i, k]):,}"] if used else []
             rows.append([name, short[k], *cells, shown, f"{int(turns[k])}", *positions])
     columns = ["channel", head, "RMS before", "RMS after", "expected", "unit", "turns", *(["positions"] * used)]

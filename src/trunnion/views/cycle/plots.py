@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib import rc_context
 
-from trunnion.errors import Finding, MechanismError, Status
+from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANY, UnitError
@@ -23,9 +23,9 @@ from trunnion.model.units import KINDS as UNITS
 from trunnion.results.scales import without_noise
 from trunnion.views import draw as drawn
 from trunnion.views.charts import Look, Note, Panel, Plot, Rule, check_kind
-from trunnion.views.common.cycle import Abscissa, Array, abscissa, status_text
-from trunnion.views.common.drawing import draw, picture
-from trunnion.views.common.figures import MUTED, Labels, new, plain
+from trunnion.views.common.cycle import Abscissa, abscissa
+from trunnion.views.common.drawing import bare, draw, facts, picture
+from trunnion.views.common.figures import Labels, new
 from trunnion.views.cycle import courses, seats
 from trunnion.views.cycle.deviations import has
 from trunnion.views.space import figure as space_figure
@@ -47,40 +47,24 @@ def mechanism(result: xr.Dataset, ideal: xr.Dataset | None = None, index: int | 
 
     If the position is not told: in the plane a telling one, with ghosts; in space that of the largest reaction.
     """
+    count = result.sizes["position"]
+    if index is not None and not 0 <= index < count:
+        remedy = f"name one from 0 to {count - 1}"
+        raise MechanismError(Finding(f"there is no position {index} among the {count}", "index", remedy))
     if is_spatial(result):
         return space_figure.mechanism(result, index)
     shown = picture(result)
-    count = result.sizes["position"]
-    if index is None:
-        index = _first_drawable(list(shown.tracks.values()))
-    elif not 0 <= index < count:
-        remedy = f"name one from 0 to {count - 1}"
-        raise MechanismError(Finding(f"there is no position {index} among the {count}", "index", remedy))
-    low_x, low_y, high_x, high_y = shown.box
-    margin = 0.09 * shown.size
-    width, height = high_x - low_x + 2 * margin, high_y - low_y + 2 * margin
+    if index is None:  # an eighth into the longest of what can be drawn, so that links do not lie in one line
+        known = np.flatnonzero(np.all([np.isfinite(track).all(axis=0) for track in shown.tracks.values()], axis=0))
+        index = int(known[known.size // 8]) if known.size else 0
+    low, high = np.array(shown.box[:2]) - 0.09 * shown.size, np.array(shown.box[2:]) + 0.09 * shown.size
+    width, height = high - low
     figure = new("Mechanism", result, min(max(7.0 * height / width, 2.6), 8.0) + 0.5)
-    axes = figure.subplots()
-    axes.set_aspect("equal")
-    axes.set_xlim(low_x - margin, high_x + margin)
-    axes.set_ylim(low_y - margin, high_y + margin)
-    axes.axis("off")
+    axes = bare(figure.subplots(), low, high, facts(result, index))
     labels = Labels(figure)
     draw(axes, shown, index, labels)
-    over = abscissa(result)
-    facts = [f"{over.label} = {over.say(index)}", str(result.attrs.get("formula", ""))]
-    status = int(result["status"].values[index])
-    if status >= Status.NOT_CONVERGED:
-        facts.append(status_text(status).split(":")[0])
-    axes.set_title(plain("    ".join(facts)), fontsize=8.5, color=MUTED, loc="left")
     labels.place()
     return figure
-
-
-def _first_drawable(tracks: list[Array]) -> int:
-    """A telling position: an eighth into the longest of what can be drawn, so that links do not lie in one line."""
-    known = np.flatnonzero(np.all([np.isfinite(track).all(axis=0) for track in tracks], axis=0))
-    return int(known[known.size // 8]) if known.size else 0
 
 
 PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Plot | Figure]] = {

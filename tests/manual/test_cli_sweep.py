@@ -113,7 +113,7 @@ BAD = {
     ),
     "axis of a stranger": (["--over", "AB=1m,2m", "--x", "BC"], "'BC' is not swept over"),
     "curves along the axis": (["--over", "AB=1m,2m", "--x", "AB", "--family", "AB"], "both the axis and the curves"),
-    "unknown kind": (["--over", "AB=1m,2m", "--kind", "contour"], "no kind of figure 'contour'"),
+    "unknown kind": (["--over", "AB=1m,2m", "--kind", "contour"], "no figure 'contour'"),
     "map over one": (["--over", "AB=1m,2m", "--over", "BC=6m", "--kind", "map"], "needs two names that vary"),
     "unknown picture": (["--over", "AB=1m,2m", "--out", "folder", "--format", "bmp"], "no kind of figure"),
 }

@@ -21,12 +21,12 @@ from trunnion.cli.tolerance import shown_of
 from trunnion.errors import MechanismError
 from trunnion.results.export import save as export
 from trunnion.views.allocation import PriceCurve, tolerance_cost, trade_off
+from trunnion.views.charts import check_kind
 from trunnion.views.common.figures import PALETTE
 from trunnion.views.readings import limits_text, readings, share, share_interval
 from trunnion.views.tolerance import (
     KINDS,
     MOST_PANELS,
-    check_kind,
     corners,
     figure,
     indices,
@@ -302,13 +302,13 @@ def test_corners_indices_and_failures_are_told():
 
 def test_files_are_refused_before_anything_is_computed(tmp_path):
     check_files([tmp_path / "a.csv", tmp_path / "a.svg"], tmp_path / "a.html")
-    check_kind("histogram")
+    check_kind("histogram", KINDS)
     for check, what in (
         (lambda: check_files([tmp_path / "a.xyz"]), "cannot write a result as '.xyz'"),
         (lambda: check_files([tmp_path / "a.svg"], drawn=False), "cannot write a result as '.svg'"),
         (lambda: check_files([], tmp_path / "a.txt"), "a report is HTML"),
         (lambda: check_files([tmp_path / "a.contributions.csv"], of="tolerance"), "there is no table 'contributions'"),
-        (lambda: check_kind("pie"), "there is no figure 'pie'"),
+        (lambda: check_kind("pie", KINDS), "there is no figure 'pie'"),
     ):
         with pytest.raises(MechanismError, match=what):
             check()

@@ -289,12 +289,14 @@ def plot(
     uncut: Uncut = False,
 ) -> None:
     """Plot a cycle: torque, friction power, reactions, mechanism."""
+    from trunnion.views.charts import check_kind
     from trunnion.views.common.peaks import whole_peaks
     from trunnion.views.cycle.deviations import with_worst_case
-    from trunnion.views.cycle.plots import PLOTS, check_kinds, drawable, save
+    from trunnion.views.cycle.plots import PLOTS, drawable, save
     from trunnion.views.cycle.plots import figure as figure_of
 
-    check_kinds(kind or [])
+    for name in kind or []:
+        check_kind(name, PLOTS)
     single = out.suffix.lower() in IMAGES
     if single and len(kind or PLOTS) > 1:
         what = f"{len(kind or PLOTS)} plots do not fit one file"

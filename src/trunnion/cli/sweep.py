@@ -132,9 +132,10 @@ def sweep(
 
 def _check_figures(grid: Mapping[str, Any], x: str, family: str, kind: str) -> None:
     """MechanismError for figures that cannot be drawn of a grid, before anything is computed."""
-    from trunnion.views.scales import check_axes, check_kind
+    from trunnion.views.charts import check_kind
+    from trunnion.views.scales import KINDS, check_axes
 
-    check_kind(kind)
+    check_kind(kind, KINDS)
     counts = {name: points({name: values}) for name, values in grid.items()}
     check_axes(counts, x, family)
     if kind == "map" and sum(count > 1 for count in counts.values()) < 2:

@@ -15,7 +15,7 @@ from trunnion.results.dataset import units_along
 from trunnion.results.quantities import drawn_in, joined, number, scaled
 from trunnion.statistics.costs import Cost
 from trunnion.views import tolerance
-from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Stripe
+from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Stripe, check_kind
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.page import NONE, Section, Table
 from trunnion.views.readings import MeasureReading, ending, is_play, readings, share, share_interval
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["KINDS", "PriceCurve", "check_kind", "figure", "headed", "prices", "report", "tables", "tolerance_cost",
+__all__ = ["KINDS", "PriceCurve", "figure", "headed", "prices", "report", "tables", "tolerance_cost",
            "trade_off"]  # fmt: skip
 
 KINDS = ("cost", "trade-off", *tolerance.KINDS)
@@ -32,6 +32,7 @@ CRITERIA = {"worst-case": "worst case", "rss": "root of the sum of squares", "yi
 POINTS = 120  # of the curve of a cost
 AROUND = 4.0  # how many times narrower and wider than the chosen tolerance the curve goes
 MOST_PRICES = 12
+WIDTH = 7.4  # of the figure of costs, inches
 NAME = 30  # characters of a name over a panel
 
 
@@ -147,12 +148,6 @@ def _percent(value: float) -> str:
 # ---- figures ----------------------------------------------------------------------------------------------------
 
 
-def check_kind(kind: str) -> None:
-    """MechanismError if there is no such kind of figure."""
-    if kind not in KINDS:
-        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", f"use one of {', '.join(KINDS)}"))
-
-
 def figure(result: xr.Dataset, kind: str | None = None) -> Figure:
     """A kind of figure; cost over accuracy where it was asked for, else what the tolerances cost, if none is named.
 
@@ -163,7 +158,7 @@ def figure(result: xr.Dataset, kind: str | None = None) -> Figure:
     if not result.attrs["found"]:
         raise MechanismError(Finding("there is no allocation to draw", "--out", "widen the infeasible limits"))
     kind = kind or ("trade-off" if "trade_off_cost" in result else "cost")
-    check_kind(kind)
+    check_kind(kind, KINDS)
     if kind == "cost":
         return tolerance_cost(result, prices(result))
     if kind != "trade-off":
@@ -265,16 +260,15 @@ def trade_off(
 
 def tolerance_cost(result: xr.Dataset, curves: Sequence[PriceCurve]) -> Figure:
     """A panel for each tolerance, the dearest first: its cost over its half width, the chosen one marked."""
-    from trunnion.views.draw import grid
+    from trunnion.views.draw import figure as draw
 
     order = sorted(curves, key=lambda price: -price.chosen[1] if math.isfinite(price.chosen[1]) else math.inf)
     shown = order[:MOST_PRICES]
     columns = min(len(shown), 2 if len(shown) in (2, 4) else 3)
-    panels = [_price(price, k % columns == 0, columns < 3) for k, price in enumerate(shown)]
+    charts = [_price(price, k % columns == 0, columns < 3) for k, price in enumerate(shown)]
+    panels = [Panel("", [chart], 3.2 if columns < 3 else 2.55) for chart in charts]
     more = f"the {len(shown)} most expensive of {len(curves)}" if len(shown) < len(curves) else ""
-    return grid(
-        "Cost of each tolerance over its half width", result, panels, columns, 2.9 if columns < 3 else 2.3, more
-    )
+    return draw("Cost of each tolerance over its half width", result, panels, columns, WIDTH, more)
 
 
 def _price(price: PriceCurve, first: bool, named: bool) -> Chart:

@@ -6,14 +6,15 @@ A chart has two axes and marks, drawn in order. Colours are numbers of the palet
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Status
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.model.names import nearest
 from trunnion.results.quantities import prefixed, quantity
 from trunnion.views.common.cycle import Abscissa, intervals
 from trunnion.views.common.peaks import ease, peak, usual_peak
@@ -21,9 +22,11 @@ from trunnion.views.common.peaks import ease, peak, usual_peak
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FREE", "Arrow", "Axis", "Band", "Bars", "Cells", "Chart", "ColourScale", "Legend", "Line", "Look", "Mark",
-           "Note", "Panel", "Plot", "Ring", "Rule", "Stairs", "Stripe", "joined", "nth", "outside", "over_drive",
-           "silent"]  # fmt: skip
+__all__ = [
+    "FREE", "Arrow", "Axis", "Band", "Bars", "Cells", "Chart", "ColourScale", "Legend", "Line", "Look", "Mark", "Note",
+    "Panel", "Plot", "Ring", "Rule", "Stairs", "Stripe", "check_kind", "joined", "nth", "outside", "over_drive",
+    "silent",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 SAME = 1e-6  # of the largest value of all curves: a difference that no figure shows
@@ -78,6 +81,11 @@ class Line(NamedTuple):
     close: bool = False
     turn: float = 0.0
     shares: Array | None = None
+
+    def times(self, factor: float) -> Line:
+        """The line in another unit."""
+        low, high = (None if half is None else half * factor for half in (self.low, self.high))
+        return self._replace(y=self.y * factor, low=low, high=high, turn=self.turn * factor)
 
 
 class Band(NamedTuple):
@@ -277,6 +285,14 @@ class Plot:
     note: str = ""
 
 
+def check_kind(kind: str, kinds: Iterable[str]) -> None:
+    """MechanismError if there is no such kind of figure."""
+    if kind not in kinds:
+        hint = nearest(kind, kinds)
+        remedy = hint if hint.startswith("did") else f"use one of {', '.join(kinds)}"
+        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", remedy))
+
+
 def joined(lines: Sequence[Line]) -> list[Line]:
     """The lines, those with a name that are the same as one with the names of all: "A = B". Gaps are a part of them."""
     known = [np.max(np.abs(line.y[np.isfinite(line.y)]), initial=0.0) for line in lines]
@@ -327,14 +343,9 @@ def over_drive(
         cut.append(outside(most, unit + rate))
     elif 1e-9 * most * factor < varies < RIPPLE * most * factor:
         y, zero = replace(y, margin=0.1, count=5), False
-    drawn = [line._replace(y=line.y * factor, turn=line.turn * factor, low=_times(line.low, factor),
-                           high=_times(line.high, factor)) for line in joined(lines)]  # fmt: skip
+    drawn = [line.times(factor) for line in joined(lines)]
     areas = [band._replace(low=band.low * factor, high=band.high * factor) for band in bands]
     return Chart(over, y, [*silent(result, over), *areas, *drawn, *marks, *cut], zero, **chart)
-
-
-def _times(values: Array | None, factor: float) -> Array | None:
-    return None if values is None else values * factor
 
 
 def silent(result: xr.Dataset, over: Abscissa, written: bool = True) -> list[Mark]:

@@ -6,6 +6,7 @@ What was measured is drawn with its expanded uncertainty U, the model as a curve
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING
@@ -19,7 +20,20 @@ from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number, prefixed, with_uncertainty
 from trunnion.rig.comparison import CAUSES
 from trunnion.rig.judge import Verdict
-from trunnion.views.charts import Axis, Band, Chart, ColourScale, Legend, Line, Look, Mark, Panel, Stripe, silent
+from trunnion.views.charts import (
+    Axis,
+    Band,
+    Chart,
+    ColourScale,
+    Legend,
+    Line,
+    Look,
+    Mark,
+    Panel,
+    Stripe,
+    check_kind,
+    silent,
+)
 from trunnion.views.common.cycle import Abscissa, Array, names, over_turn
 from trunnion.views.measured import shortened
 from trunnion.views.page import NONE, Section, Summary, Table, counts, page
@@ -29,7 +43,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["KINDS", "MOST_DRAWN", "MOST_PANELS", "check_kind", "figure", "files", "of_file", "panels", "report",
+__all__ = ["KINDS", "MOST_DRAWN", "MOST_PANELS", "figure", "files", "of_file", "panels", "report",
            "tables"]  # fmt: skip
 
 SIGNS = {"um": "µm", "deg": "°"}
@@ -65,24 +79,19 @@ def settings(result: xr.Dataset) -> list[Scale]:
 def levels(values: Array) -> Array:
     """The settings among values that were measured and so are never quite the same: to each the mean of its own."""
     rising, means = np.sort(values[np.isfinite(values)]), np.full(values.shape, np.nan)
-    if not rising.size:
-        return means
-    step = max(APART * float(np.ptp(rising)), TRIFLE * float(np.abs(rising).max()))
-    edges = rising[1:][np.diff(rising) > step]
-    group = np.searchsorted(edges, values, side="right")
-    for k in range(len(edges) + 1):
-        members = (group == k) & np.isfinite(values)
-        means[members] = values[members].mean()
+    if rising.size:
+        step = max(APART * float(np.ptp(rising)), TRIFLE * float(np.abs(rising).max()))
+        group = np.searchsorted(rising[1:][np.diff(rising) > step], values, side="right")
+        for k in np.unique(group):
+            members = (group == k) & np.isfinite(values)
+            means[members] = values[members].mean() if members.any() else np.nan
     return means
 
 
 def varied(result: xr.Dataset) -> list[Scale]:
     """The numbers that were set to several values, that with the most first."""
-    several = []
-    for scale in settings(result):
-        at = levels(scale.values)
-        several.append((scale, len(np.unique(at[np.isfinite(at)]))))
-    return [scale for scale, count in sorted(several, key=lambda pair: -pair[1]) if count > 1]
+    counts_of = [(len(np.unique(levels(s.values)[np.isfinite(s.values)])), s) for s in settings(result)]
+    return [scale for count, scale in sorted(counts_of, key=lambda pair: -pair[0]) if count > 1]
 
 
 def label(result: xr.Dataset, condition: int) -> str:
@@ -141,41 +150,39 @@ def tables(result: xr.Dataset) -> list[Table]:
     return [table for table in (first, explained(result), efficiencies(result)) if table is not None]
 
 
+RESIDUAL = ["RMS", "largest", "at", "bias", "within ±U", "required", "correlation", "verdict"]
+
+
 def results(result: xr.Dataset, channel: int | None = None) -> Table:
     """Residual and verdict of every channel in every condition, or of one channel."""
-    rows = [
-        [*first, *_residual_cells(result, i, k)]
-        for first, i, k in _rows(result, channel)
-        if int(result["turns"].values[i, k]) > 0
-    ]
-    head = ["RMS", "largest", "at", "bias", "within ±U", "required", "correlation", "verdict"]
-    return Table("results", [*_first_heads(result, channel), *head], rows)
-
-
-def _first_heads(result: xr.Dataset, channel: int | None) -> list[str]:
-    head = shortened(names(result, "condition"))[0]
-    return [head] if channel is not None else [head, "channel"]
-
-
-def _rows(result: xr.Dataset, channel: int | None) -> list[tuple[list[str], int, int]]:
-    """First cells, channel and condition of every row: of all channels with their names, or of one."""
-    channels, short = names(result, "channel"), shortened(names(result, "condition"))[1]
-    return [
-        ([name] if channel is not None else [name, channels[i]], i, k)
-        for k, name in enumerate(short)
-        for i in (range(len(channels)) if channel is None else [channel])
-    ]
+    turns = result["turns"].values
+    return _by_condition("results", RESIDUAL, result, channel,
+                         lambda i, k: _residual_cells(result, i, k) if turns[i, k] > 0 else [])  # fmt: skip
 
 
 def explained(result: xr.Dataset, channel: int | None = None) -> Table | None:
     """What would explain each residual beyond U: size and share, of all channels or of one; None if there is none."""
-    rows = []
-    for first, i, k in _rows(result, channel):
-        cells = [_cause(result, kind, i, k) for kind in CAUSES]
-        if any(cell != NONE for cell in cells):
-            rows.append([*first, *cells])
-    head = [*_first_heads(result, channel), *CAUSES]
-    return Table("what would explain the residual, each by itself", head, rows) if rows else None
+
+    def cells(i: int, k: int) -> list[str]:
+        causes = [_cause(result, kind, i, k) for kind in CAUSES]
+        return causes if any(cause != NONE for cause in causes) else []
+
+    table = _by_condition("what would explain the residual, each by itself", [*CAUSES], result, channel, cells)
+    return table if table.rows else None
+
+
+def _by_condition(
+    title: str, head: list[str], result: xr.Dataset, channel: int | None, cells: Callable[[int, int], list[str]]
+) -> Table:
+    """A row for each condition of all channels with their names, or of one; none where it has no cells."""
+    channels, (first, short) = names(result, "channel"), shortened(names(result, "condition"))
+    rows = [
+        [name, *([channels[i]] if channel is None else []), *row]
+        for k, name in enumerate(short)
+        for i in (range(len(channels)) if channel is None else [channel])
+        if (row := cells(i, k))
+    ]
+    return Table(title, [first, *(["channel"] if channel is None else []), *head], rows)
 
 
 def _cause(result: xr.Dataset, kind: str, i: int, k: int) -> str:
@@ -199,20 +206,16 @@ def verdicts(result: xr.Dataset) -> Table:
 
 def _residual_cells(result: xr.Dataset, i: int, k: int) -> list[str]:
     """RMS, largest residual and its place, bias, shares within ±U, correlation and verdict."""
-    keys = ("rms", "largest", "largest_at", "bias", "bias_expanded", "within", "within_least", "correlation")
-    rms, largest, at, bias, wide, within, least, alike = (float(result[key].values[i, k]) for key in keys)
+    keys = ("rms", "largest", "bias", "bias_expanded", "within", "within_least", "correlation", "largest_at")
+    *sizes, wide, within, least, alike, at = (float(result[key].values[i, k]) for key in keys)
     factor, unit = scale_of(result, i, k)
-    rms_text, largest_text, bias_text = (
-        text(value * factor, unit) if np.isfinite(value) else NONE for value in (rms, largest, bias)
-    )
-    if np.isfinite(bias) and np.isfinite(wide):
-        bias_text = with_uncertainty(bias * factor, wide * factor, unit).replace("-", "−").replace(" ", "\u00a0")
-    place = NONE
-    if np.isfinite(at):
-        turned, shown = prefixed(at, str(result.attrs["drive_unit"]))
-        place = setting(at * turned, shown)
+    rms, largest, bias = (text(value * factor, unit) if np.isfinite(value) else NONE for value in sizes)
+    if np.isfinite(sizes[2] + wide):
+        bias = with_uncertainty(sizes[2] * factor, wide * factor, unit).replace("-", "−").replace(" ", "\u00a0")
+    turned, shown = prefixed(at, str(result.attrs["drive_unit"]))
+    place = setting(at * turned, shown) if np.isfinite(at) else NONE
     shares = (f"{100 * part:.1f}\u00a0%" if np.isfinite(part) else NONE for part in (within, least))
-    return [rms_text, largest_text, place, bias_text, *shares, _plain(alike), verdict(result, i, k)]
+    return [rms, largest, place, bias, *shares, _plain(alike), verdict(result, i, k)]
 
 
 def efficiencies(result: xr.Dataset) -> Table | None:
@@ -221,13 +224,10 @@ def efficiencies(result: xr.Dataset) -> Table | None:
         return None
     words = {1: "within", 0: "not within", -1: "unknown"}
     first, short = shortened(names(result, "condition"))
-    rows = []
-    for k, name in enumerate(short):
-        measured, wide, model = (
-            float(result[key].values[k]) for key in ("efficiency", "efficiency_expanded", "efficiency_model")
-        )
-        within = words[int(result["efficiency_within"].values[k])]
-        rows.append([name, *(_plain(value) for value in (measured, wide, model, measured - model)), within])
+    measured, wide, model = (result[f"efficiency{part}"].values for part in ("", "_expanded", "_model"))
+    columns = zip(short, measured, wide, model, result["efficiency_within"].values, strict=True)
+    rows = [[name, _plain(m), _plain(u), _plain(c), _plain(m - c), words[int(within)]]
+            for name, m, u, c, within in columns]  # fmt: skip
     head = [first, "η measured", f"U ({coverage_of(result)})", "η model", "difference", "model within ±U"]
     return Table("efficiency", head, rows)
 
@@ -251,23 +251,20 @@ def conditions(result: xr.Dataset) -> Table:
 
 def sensors(result: xr.Dataset) -> Table:
     """What each channel measures, with the standard uncertainties of its zero and gain."""
-    measures, read_in = attribute(result, "channel_measures"), attribute(result, "channel_read_in")
+    units, measures = attribute(result, "channel_units"), attribute(result, "channel_measures")
+    read_in = attribute(result, "channel_read_in") or [("", 1.0)] * len(units)
     rows = []
-    for i, (name, own) in enumerate(zip(names(result, "channel"), attribute(result, "channel_units"), strict=True)):
-        read, size = read_in[i] if read_in else ("", 1.0)
-        unit = read or own
-
-        def zero(value: float, read: str = read, size: float = size, own: str = own) -> str:
-            factor, shown = (1 / size, read) if read and size != 1 else prefixed(value, own)
-            return text(value * factor, shown)
-
+    for i, (name, unit, (read, size)) in enumerate(zip(names(result, "channel"), units, read_in, strict=True)):
         cells = []
-        for what, say in (("zero", zero), ("gain", lambda value: f"{number(100 * value, 3)}\u00a0%")):
+        for what in ("zero", "gain"):
             values = result[f"accuracy_{what}"].values[i]
-            values = values[np.isfinite(values)]
-            ends = [float(values.min()), float(values.max())] if values.size else []
-            cells.append(" to ".join(dict.fromkeys(say(end) if end else "0" for end in ends)) or NONE)
-        rows.append([name, measures[i], "" if unit == "1" else unit, *cells])
+            texts = []
+            for end in (np.nanmin(values), np.nanmax(values)) if np.isfinite(values).any() else ():
+                factor, shown = (1 / size, read) if read and size != 1 else prefixed(float(end), unit)
+                told = text(end * factor, shown) if what == "zero" else f"{number(100 * float(end), 3)}\u00a0%"
+                texts.append(told if end else "0")
+            cells.append(" to ".join(dict.fromkeys(texts)) or NONE)
+        rows.append([name, measures[i], "" if (read or unit) == "1" else read or unit, *cells])
     return Table("sensors", ["channel", "measures", "unit", "u of the zero", "u of the gain"], rows)
 
 
@@ -300,12 +297,6 @@ def headline(result: xr.Dataset) -> Summary:
 # ---- figures ------------------------------------------------------------------------------------------------------
 
 
-def check_kind(kind: str) -> None:
-    """MechanismError if there is no such kind of figure."""
-    if kind not in KINDS:
-        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", f"use one of {', '.join(KINDS)}"))
-
-
 def figure(
     result: xr.Dataset, kind: str | None = None, channel: str | None = None, condition: str | None = None
 ) -> Figure:
@@ -325,7 +316,7 @@ def figure(
 
     measured = "efficiency" in result
     kind = kind or ("efficiency" if measured and channel is None and condition is None else "overlay")
-    check_kind(kind)
+    check_kind(kind, KINDS)
     if kind == "efficiency":
         if not measured:
             remedy = "measure effort: and rate: of the driver, load: and rate: of a load's joint"
@@ -369,9 +360,9 @@ def efficiency(result: xr.Dataset) -> Chart:
         if name and not many:
             marks.append(Line(np.empty(0), np.empty(0), name, look))
     nothing = np.empty(0)
-    dots = Look(MEASURED if single else "ink", dash="none", mark="o")
-    marks.append(Line(nothing, nothing, f"measured, ±U ({coverage_of(result)})", dots))
-    marks.append(Line(nothing, nothing, "model", Look(MODEL if single else "ink")))
+    dots, line = (Look("ink"),) * 2 if not single else (Look(MEASURED), Look(MODEL))
+    measured = f"measured, ±U ({coverage_of(result)})"
+    marks += [Line(nothing, nothing, measured, dots.but(dash="none", mark="o")), Line(nothing, nothing, "model", line)]
     stripes, limits = _unanswered(result, over)
     told = names(result, "condition")
     named = over.name == "condition" and len(told) <= 24 and max(map(len, told)) <= 24

@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from matplotlib.colorbar import Colorbar
     from matplotlib.figure import Figure, FigureBase
 
-__all__ = ["Board", "chart", "colour", "figure", "grid", "line_style", "plot", "small"]
+__all__ = ["Board", "chart", "figure", "plot", "small"]
 
 COLOURS = {"ink": INK, "muted": MUTED, "rule": RULE, "shade": SHADE, "limit": "#a1260d", "pale": "#b9c3cd"}
 DASHES: dict[str, Any] = {"solid": "-", "long": (0, (5, 2)), "dashed": (0, (3, 2)), "short": (0, (2, 1.5)),
@@ -67,11 +67,12 @@ DASHES: dict[str, Any] = {"solid": "-", "long": (0, (5, 2)), "dashed": (0, (3, 2
 # without the end that fades on white
 RISING: Colormap = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)), "viridis to green")
 PAGE = {1: WIDTH, 2: 12.6, 3: 14.4}  # width of a figure by its columns, inches
-DRAWN = "chart"  # label of the axes of a chart, beside those of scales of colours
 BOX: dict[str, Any] = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
 
 
-def figure(title: str, result: xr.Dataset, panels: Sequence[Panel], columns: int = 1, width: float = 0.0) -> Figure:
+def figure(
+    title: str, result: xr.Dataset, panels: Sequence[Panel], columns: int = 1, width: float = 0.0, note: str = ""
+) -> Figure:
     """Panels in rows of so many columns under a title.
 
     Parameters
@@ -81,39 +82,28 @@ def figure(title: str, result: xr.Dataset, panels: Sequence[Panel], columns: int
     panels : what is drawn, row by row
     columns : panels side by side
     width : inches; that of all figures, or of a page of several columns, if 0
+    note : of what is not drawn, beneath
     """
     columns = min(columns, len(panels))
     rows = [panels[k : k + columns] for k in range(0, len(panels), columns)]
     heights = [max(panel.height for panel in row) for row in rows]
     sheet = new(title, result, 0.55 + sum(heights), width or PAGE[columns])
-    parts = sheet.subfigures(len(rows), columns, squeeze=False, height_ratios=heights)
-    for place, panel in zip(parts.ravel(), panels, strict=False):
-        if not panel.charts:  # of a measure that lacks this figure
-            continue
+    parts = sheet.subfigures(len(rows), columns, squeeze=False, height_ratios=heights).ravel()
+    drawn = [(place, panel) for place, panel in zip(parts, panels, strict=False) if panel.charts]
+    labels = Labels(sheet)
+    for place, panel in drawn:  # but those of measures that lack this figure
         if panel.title and len(panels) > 1:
             place.suptitle(_lines(panel.title), x=0.012, ha="left", fontsize=9.5, color=INK)
-        _panel(place, panel, min(1.0, sheet.get_figwidth() / columns / WIDTH))
-    _put_names(sheet, [spec for panel in panels for spec in panel.charts])
+        _panel(place, panel, min(1.0, sheet.get_figwidth() / columns / WIDTH), labels)
+    labels.place()
+    if note:
+        sheet.text(0.012, 0.005, plain(note), fontsize=7.5, color=MUTED)
     return sheet
 
 
 def plot(drawn: Plot, result: xr.Dataset) -> Figure:
     """A figure of a result as it is described."""
-    sheet = figure(drawn.title, result, drawn.panels, drawn.columns, drawn.width)
-    if drawn.note:
-        sheet.text(0.012, 0.005, plain(drawn.note), fontsize=7.5, color=MUTED)
-    return sheet
-
-
-def _put_names(sheet: Figure, charts: Sequence[Chart]) -> None:
-    """The texts that are to hide nothing, when all else is there."""
-    axes_of = [axes for axes in sheet.axes if axes.get_label() == DRAWN]
-    notes = [(axes, mark) for axes, spec in zip(axes_of, charts, strict=True) for mark in spec.marks
-             if isinstance(mark, Note) and mark.beside]  # fmt: skip
-    labels = Labels(sheet)
-    for axes, note in notes:
-        labels.add(axes, note.text, np.array([note.x, note.y]), note.size, weight="normal")
-    labels.place()
+    return figure(drawn.title, result, drawn.panels, drawn.columns, drawn.width, drawn.note)
 
 
 def small(panel: Panel, width: float = 4.4) -> Figure:
@@ -122,12 +112,12 @@ def small(panel: Panel, width: float = 4.4) -> Figure:
     sheet = Sheet(figsize=(width, panel.height), dpi=150, facecolor="white", layout=layout)
     FigureCanvasAgg(sheet)
     sheet.suptitle(_lines(panel.title), x=0.012, ha="left", fontsize=9, color=INK)
-    _panel(sheet, panel, width / WIDTH)
+    _panel(sheet, panel, width / WIDTH, Labels(sheet))
     return sheet
 
 
-def _panel(place: FigureBase, panel: Panel, wide: float) -> None:
-    """The charts of a panel below one another."""
+def _panel(place: FigureBase, panel: Panel, wide: float, labels: Labels) -> None:
+    """The charts of a panel below one another; texts that are to hide nothing wait until all else is there."""
     ratios = list(panel.parts) or [1.0] * len(panel.charts)
     axes_of = place.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
     for axes, spec in zip(axes_of, panel.charts, strict=True):
@@ -135,22 +125,9 @@ def _panel(place: FigureBase, panel: Panel, wide: float) -> None:
         if axes is not axes_of[-1]:
             axes.set_xlabel("")
             axes.tick_params(labelbottom=False)
-
-
-def grid(
-    title: str, result: xr.Dataset, charts: Sequence[Chart], columns: int, height: float, note: str = ""
-) -> Figure:
-    """Small charts in rows of so many columns, each so high (inches); note: of what is not drawn."""
-    rows = -(-len(charts) // columns)
-    sheet = new(title, result, 1.0 + rows * height)
-    places = sheet.subplots(rows, columns, squeeze=False).ravel()
-    for axes in places[len(charts) :]:
-        axes.set_visible(False)
-    for axes, spec in zip(places, charts, strict=False):
-        chart(axes, spec)
-    if note:
-        sheet.text(0.012, 0.005, plain(note), fontsize=7.5, color=MUTED)
-    return sheet
+        for mark in spec.marks:
+            if isinstance(mark, Note) and mark.beside:
+                labels.add(axes, mark.text, np.array([mark.x, mark.y]), mark.size, weight="normal")
 
 
 class Board(NamedTuple):
@@ -215,24 +192,32 @@ class Board(NamedTuple):
                     borderaxespad=0.0,
                 )  # fmt: skip
         if colours is not None:
-            norm = (LogNorm if colours.log else Normalize)(colours.low, colours.high)
-            bar = self.colour_bar(ScalarMappable(norm, RISING), colours.title)
-            bar.outline.set_visible(False)
+            self.colour_bar(_mappable(colours), colours.title).outline.set_visible(False)
 
     def colour_bar(self, colours: ScalarMappable, title: str, ticks: Array | None = None) -> Colorbar:
         """A scale of colours beside all panels."""
         rows = -(-len(self.axes) // self.columns)
-        aspect = 30 if len(self.axes) == 1 else 24 * rows
-        bar = self.sheet.colorbar(colours, ax=self.axes, pad=0.02, aspect=aspect, ticks=ticks)
-        bar.set_label(plain(title), fontsize=9, color=INK)
-        bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
+        bar = _colour_bar(self.sheet, self.axes, colours, title, 30 if len(self.axes) == 1 else 24 * rows, ticks)
         bar.ax.minorticks_off()
         return bar
 
 
+def _mappable(scale: ColourScale) -> ScalarMappable:
+    return ScalarMappable((LogNorm if scale.log else Normalize)(scale.low, scale.high), RISING)
+
+
+def _colour_bar(
+    sheet: Figure, axes: Any, colours: ScalarMappable, title: str, aspect: float = 30, ticks: Array | None = None
+) -> Colorbar:
+    """A scale of colours beside axes."""
+    bar = sheet.colorbar(colours, ax=axes, pad=0.02, aspect=aspect, ticks=ticks)
+    bar.set_label(plain(title), fontsize=9, color=INK)
+    bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
+    return bar
+
+
 def chart(axes: Axes, spec: Chart, wide: float = 1.0) -> None:
     """One chart on axes; wide: of the width of all figures, which its legend has room in."""
-    axes.set_label(DRAWN)
     if isinstance(spec.x, Abscissa):
         along(axes, spec.x, _lines(spec.y.title), zero=spec.zero)
     else:
@@ -248,18 +233,6 @@ def chart(axes: Axes, spec: Chart, wide: float = 1.0) -> None:
             _limits(axes, spec)
         _mark(mark, axes, spec)
     _limits(axes, spec)
-    _titles(axes, spec)
-    if spec.colours is not None:
-        scale = spec.colours
-        norm = (LogNorm if scale.log else Normalize)(scale.low, scale.high)
-        bar = axes.figure.colorbar(ScalarMappable(norm, RISING), ax=axes, pad=0.02, aspect=30)
-        bar.set_label(plain(scale.title), fontsize=9, color=INK)
-        bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
-    if spec.legend is not None:
-        legend(axes, spec.legend.most, int(wide * spec.legend.room), spec.legend.least, spec.legend.lift)
-
-
-def _titles(axes: Axes, spec: Chart) -> None:
     if spec.bare:
         axes.spines["left"].set_visible(False)
         axes.tick_params(axis="y", length=0)
@@ -268,6 +241,10 @@ def _titles(axes: Axes, spec: Chart) -> None:
         axes.set_title(_lines(spec.title), fontsize=8.5, color=INK, loc="left")
     if spec.aside:
         axes.set_title(plain(spec.aside), fontsize=7.5, color=MUTED, loc="right", pad=2)
+    if spec.colours is not None:
+        _colour_bar(axes.figure, axes, _mappable(spec.colours), spec.colours.title)  # type: ignore[arg-type]
+    if spec.legend is not None:
+        legend(axes, spec.legend.most, int(wide * spec.legend.room), spec.legend.least, spec.legend.lift)
 
 
 # ---- axes ---------------------------------------------------------------------------------------------------------

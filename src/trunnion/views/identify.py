@@ -9,21 +9,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Severity
 from trunnion.results.attributes import attribute, findings_of
 from trunnion.results.quantities import decimals, number, prefixed, read_in, with_uncertainty
 from trunnion.rig.identification.uncertainty import quantile
-from trunnion.views.charts import Axis, Band, Cells, Chart, Legend, Line, Look, Mark, Note, Panel
+from trunnion.views.charts import Axis, Band, Cells, Chart, Legend, Line, Look, Mark, Note, Panel, check_kind
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.compare import about_data, data_section
 from trunnion.views.measured import shortened
 from trunnion.views.page import NONE, Section, Summary, Table, counts, page
+from trunnion.views.scales import thinned
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["KINDS", "MOST_PANELS", "Estimate", "check_kind", "estimates", "figure", "report", "sensors", "tables"]
+__all__ = ["KINDS", "MOST_PANELS", "Estimate", "estimates", "figure", "report", "sensors", "tables"]
 
 KINDS = ("intervals", "correlation", "residuals")  # of figures
 MOST_PANELS = 8  # curves of residuals
@@ -166,48 +167,42 @@ def stated(result: xr.Dataset) -> Table:
 
 def correlations(result: xr.Dataset) -> Table | None:
     """Between the estimates, of several; columns are numbered as the rows are, for names would be too wide."""
-    every = estimates(result)
+    every, values = estimates(result), result["correlation"].values
     members = [p for p, row in enumerate(every) if row.identifiable]
-    if len(members) < 2:
-        return None
-    values = result["correlation"].values
     rows = [
         [f"{k} {every[p].short}", *(f"{values[p, q]:.2f}".replace("-", "−") if q <= p else "" for q in members)]
         for k, p in enumerate(members, 1)
     ]
-    return Table("correlation", ["", *map(str, range(1, len(members) + 1))], rows)
+    return Table("correlation", ["", *map(str, range(1, len(members) + 1))], rows) if len(members) > 1 else None
 
 
 def fits(result: xr.Dataset) -> Table | None:
     """A row for each channel and condition: RMS before and after, and what the scatter explains of it."""
-    rows = []
-    title, short = shortened(names(result, "condition"))
-    keys = ("rms_before", "rms_after", "rms_expected")
-    for i, name, unit, conditions in _channels(result):
-        turns, fitted = result["turns"].values[i], [k for k in conditions if result["turns"].values[i, k] > 0]
-        peak = np.nanmax([result[key].values[i, fitted] for key in keys[:2]], initial=0.0)
-        factor, shown = prefixed(float(peak), unit)
-        for k in fitted:
-            values = [_figure(float(result[key].values[i, k]) * factor) for key in keys]
-            used = f"{int(result['used'].values[i, k]):,}"
-            rows.append([name, short[k], *values, shown, f"{int(turns[k])}", used])
-    head = ["channel", title, "RMS before", "RMS after", "expected", "unit", "turns", "positions"]
-    return Table("residuals of the fit", head, rows) if rows else None
+    return _residuals(result, "residuals of the fit", "turns", ("rms_before", "rms_after", "rms_expected"))
 
 
 def held_out(result: xr.Dataset) -> Table | None:
     """What was not fitted but predicted."""
+    keys = ("held_out_before", "held_out_after", "held_out_expected")
+    return _residuals(result, "held-out data", "held_out_turns", keys)
+
+
+def _residuals(result: xr.Dataset, title: str, turns_of: str, keys: tuple[str, ...]) -> Table | None:
+    """RMS before and after, the expected one, and the data that they are of."""
     rows = []
-    title, short = shortened(names(result, "condition"))
+    head, short = shortened(names(result, "condition"))
+    used = turns_of == "turns"
     for i, name, unit, _ in _channels(result):
-        turns = result["held_out_turns"].values[i]
-        for k in np.flatnonzero(turns > 0):
-            values = [float(result[f"held_out_{key}"].values[i, k]) for key in ("before", "after", "expected")]
-            factor, shown = prefixed(float(np.nanmax(np.nan_to_num(values))), unit)
-            cells = [_figure(value * factor) for value in values]
-            rows.append([name, short[k], f"{int(turns[k])}", *cells, shown])
-    head = ["channel", title, "turns", "RMS before", "RMS after", "expected", "unit"]
-    return Table("held-out data", head, rows) if rows else None
+        turns = result[turns_of].values[i]
+        fitted = np.flatnonzero(turns > 0)
+        values = np.array([result[key].values[i, fitted] for key in keys], float)
+        factor, shown = prefixed(float(np.max(np.nan_to_num(values[:2]), initial=0.0)), unit)
+        for k, rms in zip(fitted, values.T, strict=True):
+            cells = [f"{value * factor:.3g}" if math.isfinite(value) else NONE for value in rms]
+            positions = [f"{int(result['used'].values[i, k]):,}"] if used else []
+            rows.append([name, short[k], *cells, shown, f"{int(turns[k])}", *positions])
+    columns = ["channel", head, "RMS before", "RMS after", "expected", "unit", "turns", *(["positions"] * used)]
+    return Table(title, columns, rows) if rows else None
 
 
 def sensors(result: xr.Dataset) -> Table | None:
@@ -242,31 +237,24 @@ def budget(result: xr.Dataset) -> Table | None:
     )
 
 
-def _figure(value: float) -> str:
-    return NONE if not math.isfinite(value) else f"{value:.3g}"
-
-
 # ---- figures ------------------------------------------------------------------------------------------------------
-
-
-def check_kind(kind: str) -> None:
-    """MechanismError if there is no such kind of figure."""
-    if kind not in KINDS:
-        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", f"use one of {', '.join(KINDS)}"))
 
 
 def figure(result: xr.Dataset, kind: str | None = None) -> Figure:
     """One figure. kind: of KINDS; the intervals if not given. MechanismError if there is no such kind."""
     from trunnion.views.draw import figure as draw
 
-    check_kind(kind or "intervals")
+    check_kind(kind or "intervals", KINDS)
     if kind == "correlation":
-        return draw("Correlation of the estimates", result, [_correlation(result)], width=_side(result) + 2.8)
+        short, side = [row.short for row in estimates(result)], _side(result)
+        cells = Cells(result["correlation"].values, short, len(short) <= MOST_WRITTEN)
+        panel = Panel("", [Chart(Axis(), Axis(), [cells], legend=None)], side + 0.4)
+        return draw("Correlation of the estimates", result, [panel], width=side + 2.8)
     if kind == "residuals":
         every = courses(result)
-        shown = evenly(every)
-        more = f", {len(shown)} of {len(every)} curves" if len(shown) < len(every) else ""
-        curves = _residual_panels(result, shown) if every else _residual_figures(result)
+        picked = [every[k] for k in thinned(len(every), MOST_PANELS)]
+        more = f", {len(picked)} of {len(every)} curves" if len(picked) < len(every) else ""
+        curves = _residual_panels(result, picked) if every else _residual_figures(result)
         return draw(f"Residuals, before and after{more}", result, curves, columns=2 if every else 1)
     panels = [_interval(row, Legend(least=1) if k == 0 else None) for k, row in enumerate(estimates(result))]
     return draw("Estimates with their 95 % intervals", result, panels)
@@ -296,24 +284,10 @@ def _side(result: xr.Dataset) -> float:
     return min(1.6 + 0.62 * result.sizes["parameter"], 7.0)
 
 
-def _correlation(result: xr.Dataset) -> Panel:
-    """The correlation of the estimates as a matrix."""
-    short = [row.short for row in estimates(result)]
-    cells = Cells(result["correlation"].values, short, len(short) <= MOST_WRITTEN)
-    return Panel("", [Chart(Axis(), Axis(), [cells], legend=None)], _side(result) + 0.4)
-
-
 def courses(result: xr.Dataset) -> list[tuple[int, int]]:
     """(channel, condition) with courses over the cycle that were fitted."""
     after = np.isfinite(result["residual_after"].values).sum(axis=2)
     return [(i, k) for i, _, _, conditions in _channels(result) for k in conditions if after[i, k] > 1]
-
-
-def evenly(every: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Those of the courses that are drawn: all, evenly chosen if there are many."""
-    if len(every) <= MOST_PANELS:
-        return every
-    return [every[int(j)] for j in np.rint(np.linspace(0, len(every) - 1, MOST_PANELS))]
 
 
 def _residual_panels(result: xr.Dataset, pairs: list[tuple[int, int]]) -> list[Panel]:

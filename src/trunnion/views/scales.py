@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ALIKE", "KINDS", "NOTHING", "Arrangement", "Field", "Scale", "arrange", "axis_of", "cause", "check_axes",
-    "check_kind", "check_measure", "ends", "field_of", "grid", "middles", "on_scale", "rings", "statuses", "thinned",
+    "check_measure", "ends", "field_of", "grid", "middles", "on_scale", "rings", "statuses", "thinned",
 ]  # fmt: skip
 
 KINDS = ("curves", "map")  # of figures
@@ -127,12 +127,6 @@ def arrange(result: xr.Dataset, x: str = "", family: str = "") -> Arrangement:
     rest = [scale for name, scale in every.items() if name not in (first, second)]
     facets, fixed = (tuple(s for s in rest if (len(s.values) > 1) is varies) for varies in (True, False))
     return Arrangement(every[first], every[second] if second else None, facets, fixed)
-
-
-def check_kind(kind: str) -> None:
-    """MechanismError for a kind of figure that there is not."""
-    if kind not in KINDS:
-        raise MechanismError(Finding(f"there is no kind of figure '{kind}'", "--kind", nearest(kind, KINDS)))
 
 
 def check_axes(counts: Mapping[str, int], x: str = "", family: str = "") -> tuple[str, str]:

@@ -14,6 +14,7 @@ from trunnion.model.arguments import check_keywords, strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import whole
 from trunnion.results.tables import kind_of
+from trunnion.views.charts import check_kind as one_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -101,7 +102,7 @@ def html_of(result: xr.Dataset) -> str:
 
 def check_kind(of: str, kind: str) -> None:
     """MechanismError if a result of some kind (`of`) has no such kind of figure."""
-    _view(of, FIGURES, "figure").check_kind(kind)
+    one_of(kind, _view(of, FIGURES, "figure").KINDS)
 
 
 def _view(kind: str, views: dict[str, str], what: str) -> Any:

@@ -21,7 +21,7 @@ from trunnion.results.attributes import attribute
 from trunnion.results.scales import without_noise
 from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import MARGIN
-from trunnion.views.charts import Axis, Chart, ColourScale, Line, Look, Mark, Note, Stripe
+from trunnion.views.charts import Axis, Chart, ColourScale, Line, Look, Mark, Note, Stripe, check_kind
 from trunnion.views.common.cycle import Array
 from trunnion.views.page import Section, Table, counts, page
 from trunnion.views.scales import (
@@ -34,7 +34,6 @@ from trunnion.views.scales import (
     arrange,
     axis_of,
     cause,
-    check_kind,
     ends,
     field_of,
     grid,
@@ -49,7 +48,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["KINDS", "check_kind", "figure", "report", "tables"]
+__all__ = ["KINDS", "figure", "report", "tables"]
 
 
 # ---- tables -------------------------------------------------------------------------------------------------------
@@ -179,7 +178,7 @@ def figure(
     """
     from trunnion.views.draw import Board
 
-    check_kind(kind)
+    check_kind(kind, KINDS)
     field = field_of(without_noise(result), measure, x, family)
     plan, other, count = field.plan, field.plan.other, len(field.panels)
     over = plan.x.name

@@ -13,7 +13,22 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number
 from trunnion.statistics import intervals
-from trunnion.views.charts import Axis, Band, Bars, Chart, Legend, Line, Look, Mark, Note, Panel, Rule, Stairs, silent
+from trunnion.views.charts import (
+    Axis,
+    Band,
+    Bars,
+    Chart,
+    Legend,
+    Line,
+    Look,
+    Mark,
+    Note,
+    Panel,
+    Rule,
+    Stairs,
+    check_kind,
+    silent,
+)
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.page import Section, Summary, Table, counts, page
 from trunnion.views.readings import (
@@ -33,7 +48,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["KINDS", "MOST_PANELS", "NOTES", "check_kind", "drawable", "figure", "report", "sheet", "tables"]
+__all__ = ["KINDS", "MOST_PANELS", "NOTES", "drawable", "figure", "report", "sheet", "tables"]
 
 MOST_HEADS = 6  # measures whose figures are read first
 MOST_ROWS, MOST_BARS = 20, 16  # contributions with a row and a bar of their own
@@ -47,13 +62,11 @@ COLUMNS = {"linear": "linear", "searched": "searched", "sampled": "samples", "in
 
 def tables(result: xr.Dataset) -> list[Table]:
     """Of each measure its figures and contributions; then the samples that failed, and the yield of all limits."""
-    parts = []
+    parts, yields = list[Table](), _overall(result)
     for read in readings(result):
         parts += _measure_tables(read, read.heading + (f"; limits {read.limits_said}" if read.limited else ""))
-    parts, yields = [*parts, *failed(result)], _overall(result)
-    return (
-        [*parts, Table("all limits together", ["", "yield"], [["kept", share_interval(*yields)]])] if yields else parts
-    )
+    together = [Table("all limits together", ["", "yield"], [["kept", share_interval(*yields)]])] if yields else []
+    return [*parts, *failed(result), *together]
 
 
 def _measure_tables(read: MeasureReading, title: str) -> list[Table]:
@@ -157,14 +170,14 @@ def corners(read: MeasureReading) -> Table | None:
 
 def overview(result: xr.Dataset) -> Table:
     """A row for each measure: what is asked and what comes out."""
-    rows, head = [], list[str]()
+    rows, label = [], ""
     for read in readings(result):
-        cells = cells_of(read)
-        keys = ("mean", "deviation σ", "yield", "Cpk")
-        sampled = [cells[key].get("sampled") or cells[key].get("linear", "") for key in keys]
-        rows.append([read.name, read.limits_said, cells["nominal"]["linear"], _worst(cells),
-                     cells[read.rss_label]["linear"], *sampled])  # fmt: skip
-        head = ["measure", "limits", "nominal", "worst case", read.rss_label, "mean", "deviation σ", "yield", "Cpk"]
+        cells, label = cells_of(read), read.rss_label
+        sampled = [cells[key].get("sampled") or cells[key].get("linear", "")
+                   for key in ("mean", "deviation σ", "yield", "Cpk")]  # fmt: skip
+        rows.append([read.name, read.limits_said, cells["nominal"]["linear"], _worst(cells), cells[label]["linear"],
+                     *sampled])  # fmt: skip
+    head = ["measure", "limits", "nominal", "worst case", label, "mean", "deviation σ", "yield", "Cpk"]
     return Table("measures", head, rows).without_empty()
 
 
@@ -410,29 +423,25 @@ def envelope(read: MeasureReading) -> Panel:
 def convergence(read: MeasureReading) -> Panel:
     """Mean, standard deviation and yield of the first samples, 2ᵏ of them, with their 95 % intervals."""
     size = read.row("convergence_samples")
-    rows = [("mean", f"mean{read.in_unit}", read.factor), ("deviation", f"deviation σ{read.in_unit}", read.factor)]
-    rows += [("yield", "yield [%]", 100.0)] if read.limited else []
+    rows = [("mean", f"mean{read.in_unit}", read.factor, (-np.inf, np.inf)),
+            ("deviation", f"deviation σ{read.in_unit}", read.factor, (0.0, np.inf)),
+            ("yield", "yield [%]", 100.0, (0.0, 100.0))]  # fmt: skip
     across = Axis("samples", log=True, count=2 if size[-1] < 50 * size[0] else 1,
                   form=lambda value: f"{value:,.0f}".replace(",", "\u202f"))  # fmt: skip
     charts: list[Chart] = []
-    for key, title, factor in rows:
-        values = read.row(f"convergence_{key}") * factor
-        low, high = (factor * end for end in _running_interval(read, key, values / factor, size))
-        least, most = {"mean": (-np.inf, np.inf), "deviation": (0.0, np.inf), "yield": (0.0, 100.0)}[key]
-        low, high = (
-            np.clip(low, least, most),
-            np.clip(high, least, most),
-        )  # of few samples normal intervals reach beyond
-        bounded = np.isfinite(low)
+    for key, title, factor, ends in rows if read.limited else rows[:2]:
+        values = read.row(f"convergence_{key}")
+        # of few samples normal intervals reach beyond
+        low, high = (np.clip(factor * end, *ends) for end in _running_interval(read, key, values, size))
+        bounded, values = np.isfinite(low), values * factor
         marks: list[Mark] = [Line(size, values, "of the first samples", Look(WITHIN, mark="o", size=3.2))]
         if bounded.sum() > 1:
             marks.append(Band(size, low, high, "95 % interval", Look(WITHIN, alpha=0.18)))
         elif bounded.any():
             middle, half = (0.5 * (high + sign * low)[bounded] for sign in (1, -1))
             marks.append(Line(size[bounded], middle, "95 % interval", Look(WITHIN, 1.3, "none"), half, half))
-        if np.isfinite(values).any():
-            last = float(values[np.isfinite(values)][-1])
-            marks.append(Rule(last, None, Look("muted", 0.8, "dashed", order=1.5), upright=False))
+        for last in values[np.isfinite(values)][-1:]:
+            marks.append(Rule(float(last), None, Look("muted", 0.8, "dashed", order=1.5), upright=False))
         charts.append(Chart(across, Axis(title, count=4), marks, legend=None if charts else Legend()))
     return Panel("", charts, 4.5)
 
@@ -444,8 +453,7 @@ def _running_interval(read: MeasureReading, key: str, values: Array, size: Array
         last = np.arange(len(size)) == len(size) - 1
         return np.where(last, low, np.nan), np.where(last, high, np.nan)
     if key == "yield":
-        ends = intervals.share(np.rint(values * size), size)
-        return np.asarray(ends[0], float), np.asarray(ends[1], float)
+        return intervals.share(np.rint(values * size), size)
     half = 0.5 * (high - low) * np.sqrt(size[-1] / size)
     return values - half, values + half
 
@@ -484,12 +492,6 @@ def drawable(read: MeasureReading) -> list[str]:
     return [name for name, kind in KINDS.items() if kind.ready(read)]
 
 
-def check_kind(kind: str) -> None:
-    """MechanismError if there is no such kind of figure."""
-    if kind not in KINDS:
-        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", f"use one of {', '.join(KINDS)}"))
-
-
 def figure(result: xr.Dataset, kind: str, measures: Sequence[str] | None = None) -> Figure:
     """One kind of figure, a panel for each measure, at most MOST_PANELS; all that have it if none is named.
 
@@ -499,7 +501,7 @@ def figure(result: xr.Dataset, kind: str, measures: Sequence[str] | None = None)
     """
     from trunnion.views.draw import figure as draw
 
-    check_kind(kind)
+    check_kind(kind, KINDS)
     about = KINDS[kind]
     reads = _named(result, measures, about.ready)
     if not reads:

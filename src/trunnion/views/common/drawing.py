@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.patches import Circle, Polygon, Rectangle
 from matplotlib.transforms import Affine2D
 
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import GUIDED, PAIRS
-from trunnion.views.common.cycle import Array, column, layout, names
-from trunnion.views.common.figures import INK, MUTED, PALETTE, Labels
+from trunnion.views.common.cycle import Array, abscissa, column, layout, names, status_text
+from trunnion.views.common.figures import INK, MUTED, PALETTE, Labels, plain
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -106,6 +106,22 @@ def _rim(track: Array, radius: float) -> Array:
 
 def _track(result: xr.Dataset, key: str) -> Array:
     return np.asarray(result["point_position"].sel(point=key).transpose("axis", "position").values, dtype=float)
+
+
+def bare(axes: Axes, low: Array, high: Array, title: Sequence[str]) -> Axes:
+    """Axes of one scale without a frame between two corners, with facts above."""
+    axes.set_aspect("equal")
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    axes.axis("off")
+    axes.set_title(plain("    ".join(filter(None, title))), fontsize=8.5, color=MUTED, loc="left")
+    return axes
+
+
+def facts(result: xr.Dataset, index: int) -> list[str]:
+    """Where a position is, the structural formula, and why it has no answer."""
+    over, status = abscissa(result), int(result["status"].values[index])
+    cause = status_text(status).split(":")[0] if status >= Status.NOT_CONVERGED else ""
+    return [f"{over.label} = {over.say(index)}", str(result.attrs.get("formula", "")), cause]
 
 
 def draw(axes: Axes, shown: Picture, index: int, labels: Labels) -> None:

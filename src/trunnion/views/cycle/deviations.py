@@ -14,7 +14,18 @@ from trunnion.results.dataset import units_along
 from trunnion.results.quantities import Units, number, prefixed, quantity
 from trunnion.results.scales import without_noise
 from trunnion.studies.play import play as play_of
-from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, layout, mean_friction, names, numbers, valid
+from trunnion.views.common.cycle import (
+    Array,
+    abscissa,
+    column,
+    layout,
+    mean_friction,
+    members,
+    names,
+    numbers,
+    valid,
+)
+from trunnion.views.common.peaks import peak
 from trunnion.views.space.bodies import Space, gathered, is_spatial
 
 if TYPE_CHECKING:
@@ -24,7 +35,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "JUMP", "NOWHERE", "Output", "Seats", "broken", "built", "error_rows", "has", "jumps", "loss_rows", "losses",
-    "need", "outputs", "point_errors", "seated", "with_worst_case", "worst_points",
+    "need", "outputs", "point_errors", "seat_angles", "seated", "with_worst_case", "worst_points",
 ]  # fmt: skip
 
 
@@ -33,14 +44,13 @@ SUDDEN = 6.0  # times the step before or after: a jump
 LEAST = 0.1  # of the largest error of place: points below it are not among the worst
 NOWHERE = np.zeros(0, np.intp)
 ALIKE = 1e-3  # of the largest: two curves nearer than this are one
-REMEDIES = {
-    "errors": "state errors, a misalignment, or a seat: loaded (--set joint_defaults.seat=loaded)",
-    "seats": "state a clearance and seat: loaded of a joint (--set joint_defaults.seat=loaded)",
-}
+# what a result may lack, and what to do
 LACKS = {
-    "errors": "the mechanism has no errors",
-    "seats": "no joint of the mechanism has a pin with a seat",
-}
+    "errors": ("the mechanism has no errors",
+               "state errors, a misalignment, or a seat: loaded (--set joint_defaults.seat=loaded)"),
+    "seats": ("no joint of the mechanism has a pin with a seat",
+              "state a clearance and seat: loaded of a joint (--set joint_defaults.seat=loaded)"),
+}  # fmt: skip
 
 
 def has(result: xr.Dataset, part: str) -> bool:
@@ -52,10 +62,9 @@ def need(result: xr.Dataset, part: str, figure: str) -> None:
     """MechanismError with the reason if a result lacks the part that a figure shows."""
     if has(result, part):
         return
+    what, remedy = LACKS[part]
     if part == "seats" and "seat_offset" in result:
         what, remedy = "no position is solved", "run `trunnion check` to see why"
-    else:
-        what, remedy = LACKS[part], REMEDIES[part]
     raise MechanismError(Finding(f"{what}, and there is no figure '{figure}'", "--kind", remedy))
 
 
@@ -64,21 +73,16 @@ def need(result: xr.Dataset, part: str, figure: str) -> None:
 
 def point_errors(result: xr.Dataset) -> dict[str, Array]:
     """Size of the error of place of every point that has any, (position,) m."""
-    found = {}
-    for key in names(result, "point"):
-        error = column(result, "point_error", point=key)
-        if error is not None and np.nanmax(np.abs(error), initial=0.0) > 0:
-            found[key] = np.linalg.norm(error, axis=0)
-    return found
+    sizes = {key: np.linalg.norm(error, axis=0) for key, error in members(result, "point_error", "point").items()}
+    return {key: size for key, size in sizes.items() if peak(size) > 0}
 
 
 def worst_points(result: xr.Dataset, most: int = 4) -> dict[str, Array]:
     """The points with the largest errors of place, worst first; of those that err alike one."""
     errors = point_errors(result)
-    tops = {key: float(np.nanmax(error)) for key, error in errors.items()}
-    picked: dict[str, Array] = {}
-    for key in sorted(errors, key=lambda one: (-tops[one], one)):
-        worst = max(tops.values())
+    tops = {key: peak(error) for key, error in errors.items()}
+    worst, picked = max(tops.values(), default=0.0), dict[str, Array]()
+    for key in sorted(errors, key=lambda key: (-tops[key], key)):
         alike = any(np.nanmax(np.abs(errors[key] - other)) < ALIKE * worst for other in picked.values())
         if tops[key] >= LEAST * worst and not alike and len(picked) < most:
             picked[key] = errors[key]
@@ -99,27 +103,22 @@ class Output(NamedTuple):
 
 def outputs(result: xr.Dataset) -> list[Output]:
     """Transmission errors, as the summary of the result has them."""
-    stated, drivers = layout(result), names(result, "driver")
-    found = []
+    stated, drivers, picked = layout(result), names(result, "driver"), []
+    turns, slides = (members(result, f"joint_{what}_error", "joint") for what in ("rotation", "slide"))
     for joint in names(result, "joint"):
-        one = stated["joints"].get(joint, {})
-        if stated["ground"] not in one.get("links", ()) or joint in drivers:
-            continue
-        slides = PAIRS[one["type"]].guided
-        error = column(result, f"joint_{'slide' if slides else 'rotation'}_error", joint=joint)
-        if error is not None and np.isfinite(error).any():
-            found.append(Output(joint, "m" if slides else "rad", error))
-    return found
+        about = stated["joints"].get(joint, {})
+        if stated["ground"] in about.get("links", ()) and joint not in drivers:
+            guided = PAIRS[about["type"]].guided
+            error = (slides if guided else turns).get(joint)
+            if error is not None and np.isfinite(error).any():
+                picked.append(Output(joint, "m" if guided else "rad", error))
+    return picked
 
 
 def losses(result: xr.Dataset) -> dict[str, NDArray[np.intp]]:
     """Positions at which each joint loses contact, of those that do."""
-    found = {}
-    for joint in names(result, "joint"):
-        lost = column(result, "contact_lost", joint=joint)
-        if lost is not None and (lost > 0).any():
-            found[joint] = np.flatnonzero(lost > 0)
-    return found
+    lost = {joint: np.flatnonzero(row > 0) for joint, row in members(result, "contact_lost", "joint").items()}
+    return {joint: places for joint, places in lost.items() if places.size}
 
 
 def with_worst_case(result: xr.Dataset, mechanism: Mechanism) -> xr.Dataset:
@@ -184,19 +183,29 @@ class Seats(NamedTuple):
 
 def seated(result: xr.Dataset) -> list[Seats]:
     """Every joint with a seat that is known anywhere."""
-    stated: dict[str, Any] = layout(result)
-    found = []
+    stated, every = layout(result), []
+    offsets, forces = (members(result, name, "joint") for name in ("seat_offset", "end_force"))
     for joint, play in stated.get("plays", {}).items():
-        offsets, forces = (column(result, name, joint=joint) for name in ("seat_offset", "end_force"))
-        if offsets is None or forces is None or not np.isfinite(offsets).any():
-            continue
-        ends = 1 if play["kind"] == "ball" or (play["kind"] == "pin" and offsets.shape[1] == 2) else 2
-        first, second = stated["joints"][joint]["links"]
-        found.append(
-            Seats(joint, play["kind"], play["clearance"], play["float"], play["length"], offsets[:ends], forces[:ends],
-                  (first, second))
-        )  # fmt: skip
-    return found
+        if joint in offsets and np.isfinite(offsets[joint]).any():
+            offset, force, kind = offsets[joint], forces[joint], play["kind"]
+            ends = 1 if kind == "ball" or (kind == "pin" and offset.shape[1] == 2) else 2
+            first, second = stated["joints"][joint]["links"]
+            every.append(Seats(joint, kind, play["clearance"], play["float"], play["length"], offset[:ends],
+                               force[:ends], (first, second)))  # fmt: skip
+    return every
+
+
+def seat_angles(result: xr.Dataset) -> list[tuple[str, str, Array]]:
+    """ "β" or "ξ", the joint and the course, °, of every pin in space, ξ of those of the plane."""
+    betas, xis = (members(result, f"seat_{name}", "joint") for name in ("beta", "xi"))
+    courses = []
+    for seats in seated(result):
+        joint = seats.joint
+        if not seats.planar_guide and joint in betas and np.isfinite(betas[joint]).any():
+            for sign, values in zip("βξ", np.degrees(continued(betas[joint], xis[joint])), strict=True):
+                if sign == "ξ" or len(seats.offsets) == 2:
+                    courses.append((sign, joint, values))
+    return courses
 
 
 def continued(beta: Array, xi: Array) -> tuple[Array, Array]:
@@ -244,70 +253,48 @@ def error_rows(result: xr.Dataset) -> list[Row]:
     if "point_error" not in result:
         return []
     result = without_noise(result)
-    over = abscissa(result)
-    rows = [
-        _error(f"Position error of {key}, largest", valid(result, error), "m", over)
-        for key, error in worst_points(result).items()
+    errors = [(f"Position error of {key}, largest", error, "m") for key, error in worst_points(result).items()]
+    errors += [
+        (f"Transmission error, {output.label}, largest", output.error, output.unit) for output in outputs(result)
     ]
-    rows += [
-        _error(f"Transmission error, {one.label}, largest", valid(result, one.error), one.unit, over)
-        for one in outputs(result)
-    ]
-    for driver, unit in zip(names(result, "driver"), units_along(result["drive_effort"], "driver"), strict=True):
-        noun = "force" if unit == "N" else "torque"
-        rows.append(_change(result, "drive_effort", "driver", driver, f"Drive {noun} of {driver}, largest", unit, over))
-    changes = [_change(result, "reaction_force", "joint", joint, f"Reaction of {joint}, largest", "N", over)
-               for joint in names(result, "joint")]  # fmt: skip
-    return [*rows, *changes, _mean_friction(result), _efficiency(result)]
+    rows = [_largest(result, label, error, None, unit) for label, error, unit in errors]
+    units = units_along(result["drive_effort"], "driver")
+    for name, dim, units_of_members in (("drive_effort", "driver", units), ("reaction_force", "joint", [])):
+        built, change = (members(result, f"{name}{end}", dim) for end in ("", "_change"))
+        for k, member in enumerate(built):
+            unit = units_of_members[k] if units_of_members else "N"
+            noun = f"Drive {'force' if unit == 'N' else 'torque'}" if units_of_members else "Reaction"
+            sizes = (np.abs(built[member]), np.abs(built[member] - change[member]))
+            if sizes[0].ndim > 1:
+                sizes = np.linalg.norm(sizes[0], axis=0), np.linalg.norm(sizes[1], axis=0)
+            rows.append(_largest(result, f"{noun} of {member}, largest", *sizes, unit))
+    friction = [sum(mean_friction(result, joint, of) for joint in names(result, "joint")) for of in ("", "_ideal")]
+    efficiency = [column(result, f"efficiency{of}") for of in ("", "_ideal")]
+    shares = [float("nan") if value is None else float(value) for value in efficiency]
+    return [*rows, _row("Friction power, mean", *friction, "W", units_of(result)),
+            _row("Efficiency of the cycle", *shares, "1", None)]  # fmt: skip
 
 
-def _row(label: str, built: str, ideal: str, difference: str, place: str = "") -> Row:
-    return {"label": label, "built": built, "ideal": ideal, "difference": difference, "place": place}
+def _row(label: str, built: float, ideal: float, unit: str, units: Units | None, place: str = "") -> Row:
+    """As built, ideal, and the difference with its sign."""
+    change = f"{'+' if built > ideal else ''}{quantity(built - ideal, unit, units)}"
+    as_built, ideally = (quantity(value, unit, units) for value in (built, ideal))
+    return {"label": label, "built": as_built, "ideal": ideally, "difference": change, "place": place}
 
 
-def _error(label: str, error: Array, unit: str, over: Abscissa) -> Row:
-    """The largest of an error, which the ideal mechanism has not."""
-    if not np.isfinite(error).any():
-        return _row(label, "", "", "—")
-    index = int(np.nanargmax(np.abs(error)))
-    value = float(error[index])
-    return _row(label, "", "", quantity(value, unit), over.say(index))
-
-
-def _change(result: xr.Dataset, name: str, dim: str, member: str, label: str, unit: str, over: Abscissa) -> Row:
-    """The largest magnitude of a result as built and ideal, and where it is as built."""
-    built, change = column(result, name, **{dim: member}), column(result, f"{name}_change", **{dim: member})
-    if built is None or change is None or not np.isfinite(built).any():
-        return _row(label, "—", "—", "—")
-    columns = (built, built - change)
-    sizes = [valid(result, np.abs(one) if one.ndim == 1 else np.linalg.norm(one, axis=0)) for one in columns]
-    if not np.isfinite(sizes[0]).any():
-        return _row(label, "—", "—", "—")
-    index = int(np.nanargmax(sizes[0]))
-    most = [float(np.nanmax(size)) if np.isfinite(size).any() else float("nan") for size in sizes]
-    units = units_of(result)
-    built_as, ideally = (quantity(one, unit, units) for one in most)
-    return _row(label, built_as, ideally, _signed(most[0] - most[1], unit, units), over.say(index))
-
-
-def _signed(value: float, unit: str, units: Units | None = None) -> str:
-    return ("+" if value > 0 else "") + quantity(value, unit, units)
-
-
-def _mean_friction(result: xr.Dataset) -> Row:
-    joints = names(result, "joint")
-    one, two = (sum(mean_friction(result, joint, of) for joint in joints) for of in ("", "_ideal"))
-    if not np.isfinite([one, two]).all():
-        return _row("Friction power, mean", "—", "—", "—")
-    units = units_of(result)
-    figures = quantity(one, "W", units), quantity(two, "W", units), _signed(one - two, "W", units)
-    return _row("Friction power, mean", *figures)
-
-
-def _efficiency(result: xr.Dataset) -> Row:
-    one, two = (column(result, name) for name in ("efficiency", "efficiency_ideal"))
-    told = [float("nan") if value is None else float(value) for value in (one, two)]
-    return _row("Efficiency of the cycle", number(told[0]), number(told[1]), _signed(told[0] - told[1], "1"))
+def _largest(result: xr.Dataset, label: str, built: Array, ideal: Array | None, unit: str) -> Row:
+    """The largest of a course as built and, unless it is an error, ideally, where contact is not lost."""
+    sizes = valid(result, built)
+    if not np.isfinite(sizes).any():
+        none = "" if ideal is None else "—"
+        return {"label": label, "built": none, "ideal": none, "difference": "—", "place": ""}
+    index = int(np.nanargmax(np.abs(sizes)))
+    place, value = abscissa(result).say(index), float(sizes[index])
+    if ideal is None:
+        return {"label": label, "built": "", "ideal": "", "difference": quantity(value, unit), "place": place}
+    other = valid(result, ideal)
+    most = float(np.nanmax(other)) if np.isfinite(other).any() else float("nan")
+    return _row(label, value, most, unit, units_of(result), place)
 
 
 def loss_rows(result: xr.Dataset) -> list[Row]:
@@ -338,11 +325,13 @@ def built(result: xr.Dataset, lost: list[int]) -> dict[str, Any] | None:
     if "point_error" not in result:
         return None
     spatial = is_spatial(result)
-    shown = gathered(result) if spatial else None
+    shown, points = gathered(result) if spatial else None, members(result, "point_error", "point")
     return {
         "preset": _preset(result, shown.size if shown else _size(result)),
-        "points": {} if spatial else _points(result),
-        "links": _moved(result, shown) if shown else _turned(result),
+        "points": {} if spatial else {key: _vector(error) for key, error in points.items()},
+        "links": _moved(result, shown)
+        if shown
+        else {link: _series(error) for link, error in members(result, "link_error", "link").items()},
         "worst": [{"label": key, "values": _series(values)} for key, values in worst_points(result).items()],
         "outputs": _outputs(result),
         "lost": lost,
@@ -370,8 +359,7 @@ def _size(result: xr.Dataset) -> float:
 
 def _preset(result: xr.Dataset, size: float) -> float:
     """A round magnification at which the errors are well seen and the links are still where one looks for them."""
-    far = max((float(np.nanmax(one)) for one in point_errors(result).values()), default=0.0)
-    turned = float(np.nanmax(np.abs(result["link_error"].values), initial=0.0))
+    far, turned = peak(*point_errors(result).values()), peak(result["link_error"].values)
     most = min(FAR * size / far if far else np.inf, LEANT / turned if turned else np.inf, MOST)
     if not most > 1:
         return 1.0
@@ -380,19 +368,6 @@ def _preset(result: xr.Dataset, size: float) -> float:
 
 
 # ---- the plane ------------------------------------------------------------------------------------------------
-
-
-def _points(result: xr.Dataset) -> dict[str, Any]:
-    found = {key: column(result, "point_error", point=key) for key in names(result, "point")}
-    return {key: _vector(error) for key, error in found.items() if error is not None}
-
-
-def _turned(result: xr.Dataset) -> dict[str, Any]:
-    found = {link: column(result, "link_error", link=link) for link in names(result, "link")}
-    return {link: _series(error) for link, error in found.items() if error is not None}
-
-
-# ---- space ----------------------------------------------------------------------------------------------------
 
 
 def _moved(result: xr.Dataset, shown: Space) -> dict[str, Any]:
@@ -471,16 +446,9 @@ def _seat(one: Seats) -> dict[str, Any]:
 
 
 def _angles(result: xr.Dataset, lost: NDArray[np.intp]) -> list[dict[str, Any]]:
-    """β and ξ of the pins, °, with the positions before which they jump; offsets of the guides of the plane."""
-    closed = abscissa(result).closed
-    rows = []
-    for one in seated(result):
-        both = [column(result, f"seat_{name}", joint=one.joint) for name in ("beta", "xi")]
-        if one.planar_guide or both[0] is None or both[1] is None or not np.isfinite(both[0]).any():
-            continue
-        for sign, values in zip("βξ", np.degrees(continued(both[0], both[1])), strict=True):
-            if sign == "ξ" or len(one.offsets) == 2:
-                round_ = np.append(values, values[0]) if closed else values
-                cuts = [int(index) % values.size for index in jumps(round_, float(np.degrees(JUMP)), lost)]
-                rows.append({"sign": sign, "joint": one.joint, "values": _series(values), "breaks": cuts})
+    """β and ξ of the pins, °, with the positions before which they jump."""
+    closed, rows = abscissa(result).closed, []
+    for sign, joint, values in seat_angles(result):
+        cuts = jumps(np.append(values, values[0]) if closed else values, float(np.degrees(JUMP)), lost) % values.size
+        rows.append({"sign": sign, "joint": joint, "values": _series(values), "breaks": cuts.tolist()})
     return rows

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -15,16 +15,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib import rc_context
 
-from trunnion.errors import Finding, MechanismError, Status
+from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
 from trunnion.model.quantity import Quantity
-from trunnion.model.units import ANY, KINDS, UnitError
+from trunnion.model.units import ANY, UnitError
+from trunnion.model.units import KINDS as UNITS
 from trunnion.results.scales import without_noise
 from trunnion.views import draw as drawn
-from trunnion.views.charts import Look, Note, Panel, Plot, Rule
-from trunnion.views.common.cycle import Abscissa, Array, abscissa, status_text
-from trunnion.views.common.drawing import draw, picture
-from trunnion.views.common.figures import MUTED, Labels, new, plain
+from trunnion.views.charts import Look, Note, Panel, Plot, Rule, check_kind
+from trunnion.views.common.cycle import Abscissa, abscissa
+from trunnion.views.common.drawing import bare, draw, facts, picture
+from trunnion.views.common.figures import Labels, new
 from trunnion.views.cycle import courses, seats
 from trunnion.views.cycle.deviations import has
 from trunnion.views.space import figure as space_figure
@@ -38,7 +39,7 @@ __all__ = ["PLOTS", "check_figure", "drawable", "mechanism", "position_at", "sav
 
 FORMATS = ("png", "svg", "pdf", "jpg", "jpeg")
 LONGEST = 1.5  # steps: a place further from every position is not one of the cycle
-KIND_OF = {"°": KINDS["angle"], "mm": KINDS["length"], "s": KINDS["time"]}
+KIND_OF = {"°": UNITS["angle"], "mm": UNITS["length"], "s": UNITS["time"]}
 
 
 def mechanism(result: xr.Dataset, ideal: xr.Dataset | None = None, index: int | None = None) -> Figure:
@@ -46,40 +47,24 @@ def mechanism(result: xr.Dataset, ideal: xr.Dataset | None = None, index: int | 
 
     If the position is not told: in the plane a telling one, with ghosts; in space that of the largest reaction.
     """
+    count = result.sizes["position"]
+    if index is not None and not 0 <= index < count:
+        remedy = f"name one from 0 to {count - 1}"
+        raise MechanismError(Finding(f"there is no position {index} among the {count}", "index", remedy))
     if is_spatial(result):
         return space_figure.mechanism(result, index)
     shown = picture(result)
-    count = result.sizes["position"]
-    if index is None:
-        index = _first_drawable(list(shown.tracks.values()))
-    elif not 0 <= index < count:
-        remedy = f"name one from 0 to {count - 1}"
-        raise MechanismError(Finding(f"there is no position {index} among the {count}", "index", remedy))
-    low_x, low_y, high_x, high_y = shown.box
-    margin = 0.09 * shown.size
-    width, height = high_x - low_x + 2 * margin, high_y - low_y + 2 * margin
+    if index is None:  # an eighth into the longest of what can be drawn, so that links do not lie in one line
+        known = np.flatnonzero(np.all([np.isfinite(track).all(axis=0) for track in shown.tracks.values()], axis=0))
+        index = int(known[known.size // 8]) if known.size else 0
+    low, high = np.array(shown.box[:2]) - 0.09 * shown.size, np.array(shown.box[2:]) + 0.09 * shown.size
+    width, height = high - low
     figure = new("Mechanism", result, min(max(7.0 * height / width, 2.6), 8.0) + 0.5)
-    axes = figure.subplots()
-    axes.set_aspect("equal")
-    axes.set_xlim(low_x - margin, high_x + margin)
-    axes.set_ylim(low_y - margin, high_y + margin)
-    axes.axis("off")
+    axes = bare(figure.subplots(), low, high, facts(result, index))
     labels = Labels(figure)
     draw(axes, shown, index, labels)
-    over = abscissa(result)
-    facts = [f"{over.label} = {over.say(index)}", str(result.attrs.get("formula", ""))]
-    status = int(result["status"].values[index])
-    if status >= Status.NOT_CONVERGED:
-        facts.append(status_text(status).split(":")[0])
-    axes.set_title(plain("    ".join(facts)), fontsize=8.5, color=MUTED, loc="left")
     labels.place()
     return figure
-
-
-def _first_drawable(tracks: list[Array]) -> int:
-    """A telling position: an eighth into the longest of what can be drawn, so that links do not lie in one line."""
-    known = np.flatnonzero(np.all([np.isfinite(track).all(axis=0) for track in tracks], axis=0))
-    return int(known[known.size // 8]) if known.size else 0
 
 
 PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Plot | Figure]] = {
@@ -97,6 +82,7 @@ PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Plot | Figure]] = {
     "locking": courses.locking,
     "measures": courses.measures,
 }
+KINDS = tuple(PLOTS)
 # whether a result has what a figure needs that not all results have
 READY: dict[str, Callable[[xr.Dataset], bool]] = {
     "speed": lambda result: bool(courses.varying(result)),
@@ -115,7 +101,7 @@ def figure(
 
     at: a place such as "60deg": the mechanism is drawn there, and curves over the drive are marked.
     """
-    check_kinds([kind])
+    check_kind(kind, PLOTS)
     index = None if at is None else position_at(result, at)
     result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
     if kind == "mechanism":
@@ -150,9 +136,9 @@ def position_at(result: xr.Dataset, place: str | float) -> int:
         quantity = Quantity.read(place, ANY)
         if quantity.names:
             raise UnitError(f"'{place}' is no place", "write 60deg, 20mm or 0.1s")
-        timed = isinstance(place, str) and quantity.check({}) == KINDS["time"].dimensions[0]
+        timed = isinstance(place, str) and quantity.check({}) == UNITS["time"].dimensions[0]
         unit = str(result["drive"].attrs["units"]) if "drive" in result.coords and not timed else "s"
-        kind = KIND_OF.get(unit, KINDS["time"])
+        kind = KIND_OF.get(unit, UNITS["time"])
         value = float(np.asarray(Quantity.read(place, kind).evaluate()))
     except UnitError as error:
         raise MechanismError(Finding(error.what, "--at", error.remedy or "write 60deg, 20mm or 0.1s")) from None
@@ -167,18 +153,6 @@ def position_at(result: xr.Dataset, place: str | float) -> int:
         what = f"{sought:.4g}{unit} is not in the cycle"
         raise MechanismError(Finding(what, "--at", f"name a place from {low:.4g}{unit} to {high:.4g}{unit}"))
     return int(np.argmin(away))
-
-
-def check_kind(kind: str) -> None:
-    """MechanismError if there is no such kind of figure."""
-    check_kinds([kind])
-
-
-def check_kinds(kinds: Sequence[str]) -> None:
-    """MechanismError if there is no such kind of figure."""
-    unknown = [name for name in kinds if name not in PLOTS]
-    if unknown:
-        raise MechanismError(Finding(f"there is no plot '{unknown[0]}'", "--kind", f"use one of {', '.join(PLOTS)}"))
 
 
 def drawable(result: xr.Dataset) -> list[str]:

@@ -15,7 +15,18 @@ from trunnion.joints.pairs import GUIDED
 from trunnion.results.attributes import units_of
 from trunnion.results.dataset import units_along
 from trunnion.results.scales import without_noise
-from trunnion.views.common.cycle import abscissa, column, course, intervals, larger_end, layout, names, numbers, series
+from trunnion.views.common.cycle import (
+    abscissa,
+    column,
+    course,
+    intervals,
+    larger_end,
+    layout,
+    members,
+    names,
+    numbers,
+    series,
+)
 from trunnion.views.common.peaks import ease
 from trunnion.views.cycle.courses import varying
 from trunnion.views.cycle.deviations import built, losses
@@ -138,9 +149,9 @@ def _joints(stated: dict[str, Any], result: xr.Dataset, ideal: xr.Dataset | None
             {
                 "name": name, "type": joint["type"], "links": [first, second], "axis": joint.get("axis"),
                 "at": f"{second}.{name}", "on": f"{first}.{name}",
-                "reaction": _reaction(result, name),
-                "ideal": None if ideal is None else _reaction(ideal, name),
-                "moment": _moment(result, name),
+                "reaction": _vector(result, "reaction_force", name),
+                "ideal": None if ideal is None else _vector(ideal, "reaction_force", name),
+                "moment": _vector(result, "reaction_moment", name),
                 "end_load": series(larger_end(result, name)),
                 "friction_power": series(column(result, "friction_power", joint=name)),
                 "slide": series(column(result, "joint_slide", joint=name)) if slides else [],
@@ -150,15 +161,11 @@ def _joints(stated: dict[str, Any], result: xr.Dataset, ideal: xr.Dataset | None
     return rows
 
 
-def _reaction(result: xr.Dataset, joint: str) -> dict[str, Any]:
-    return {axis: series(column(result, "reaction_force", joint=joint, axis=axis)) for axis in names(result, "axis")}
-
-
-def _moment(result: xr.Dataset, joint: str) -> Any:
-    """A series; in space one for each axis."""
-    if not is_spatial(result):
-        return series(column(result, "reaction_moment", joint=joint))
-    return {axis: series(column(result, "reaction_moment", joint=joint, axis=axis)) for axis in names(result, "axis")}
+def _vector(result: xr.Dataset, name: str, joint: str) -> Any:
+    """A series for each axis; of a moment in the plane one alone."""
+    if "axis" not in result[name].dims:
+        return series(column(result, name, joint=joint))
+    return {axis: series(column(result, name, joint=joint, axis=axis)) for axis in names(result, "axis")}
 
 
 def _loads(stated: dict[str, Any], result: xr.Dataset, points: dict[str, Any]) -> list[dict[str, Any]]:
@@ -193,12 +200,10 @@ def _acts(stated: dict[str, Any], result: xr.Dataset, load: dict[str, Any]) -> l
 
 def _springs(result: xr.Dataset, stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any]]:
     """Springs between two known points, with their pull."""
-    ends = {name: spring.get("between") or () for name, spring in stated["springs"].items()}
-    return [
-        {"name": name, "ends": list(two), "pull": series(column(result, "spring_force", spring=name))}
-        for name, two in ends.items()
-        if two and set(two) <= points.keys()
-    ]
+    pulls = members(result, "spring_force", "spring")
+    ends = {name: list(spring.get("between") or ()) for name, spring in stated["springs"].items()}
+    return [{"name": name, "ends": two, "pull": series(pulls.get(name))}
+            for name, two in ends.items() if two and set(two) <= points.keys()]  # fmt: skip
 
 
 def _drivers(result: xr.Dataset, ideal: xr.Dataset | None, stated: dict[str, Any]) -> list[dict[str, Any]]:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.quantities import number, prefixed, quantity
 from trunnion.views.charts import Arrow, Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Ring, nth, silent
-from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, names
-from trunnion.views.cycle.deviations import JUMP, NOWHERE, Seats, broken, continued, losses, need, seated
+from trunnion.views.common.cycle import Abscissa, Array, abscissa, names
+from trunnion.views.cycle.deviations import JUMP, NOWHERE, Seats, broken, losses, need, seat_angles, seated
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,17 +70,11 @@ def _marked(over: Abscissa, solved: NDArray[np.bool_]) -> list[int]:
 def _hole(seats: Seats, end: int, plane: tuple[int, int], over: Abscissa) -> Chart:
     """Pin in hole: wall, clearance, locus, and at the marked positions the pin with its load."""
     factor, unit = prefixed(seats.clearance, "m")
-    rho, offset, force = (
-        seats.clearance * factor,
-        seats.offsets[end, list(plane)] * factor,
-        seats.forces[end, list(plane)],
-    )
-    square, middle, share, most = seats.kind == "guide", (0.0, 0.0), _share(over), seats.peak
-    wall = [
-        Ring(middle, (1 + PIN + WALL) * rho, Look("shade", 0.0, order=0.7), square, 1.0),
-        Ring(middle, (1 + PIN) * rho, Look("ink", 1.4, order=0.8), square),
-        Ring(middle, rho, Look("muted", 0.8, "dashed", order=2.0), square),
-    ]
+    rho, offset = seats.clearance * factor, seats.offsets[end, list(plane)] * factor
+    force, square, share, most = seats.forces[end, list(plane)], seats.kind == "guide", _share(over), seats.peak
+    wall = [Ring((0.0, 0.0), size * rho, look, square, filled) for size, look, filled in (
+        (1 + PIN + WALL, Look("shade", 0.0, order=0.7), 1.0), (1 + PIN, Look("ink", 1.4, order=0.8), 0.0),
+        (1.0, Look("muted", 0.8, "dashed", order=2.0), 0.0))]  # fmt: skip
     marks: list[Mark] = [*wall, *_locus(offset, share, over, rho)]
     for index in _marked(over, np.asarray(np.isfinite(offset).all(axis=0))):
         paint, place = Look(float(share[index])), offset[:, index]
@@ -184,24 +178,18 @@ def _courses(result: xr.Dataset) -> list[Chart]:
     curves: dict[str, list[tuple[str, Line]]] = {"β": [], "ξ": [], "guide": []}
     guides = [seats for seats in seated(result) if seats.planar_guide]
     scale, unit = prefixed(max((seats.clearance for seats in guides), default=0.0), "m")
-    for seats in seated(result):
-        if seats.planar_guide:
-            for end, look in enumerate(ENDS):
-                line = Line(over.values, seats.offsets[end, 1] * scale, f"{seats.joint}, end {end + 1}",
-                            look.but(colour=order[seats.joint]))  # fmt: skip
-                curves["guide"].append((seats.joint, line))
-            continue
-        both = [column(result, f"seat_{name}", joint=seats.joint) for name in ("beta", "xi")]
-        if both[0] is None or both[1] is None or not np.isfinite(both[0]).any():
-            continue
-        for sign, values in zip("βξ", np.degrees(continued(both[0], both[1])), strict=True):
-            if sign == "ξ" or len(seats.offsets) == 2:
-                curves[sign].append((seats.joint, Line(over.values, values, seats.joint, nth(order[seats.joint]))))
+    for seats in guides:
+        for end, look in enumerate(ENDS):
+            line = Line(over.values, seats.offsets[end, 1] * scale, f"{seats.joint}, end {end + 1}",
+                        look.but(colour=order[seats.joint]))  # fmt: skip
+            curves["guide"].append((seats.joint, line))
+    for sign, joint, values in seat_angles(result):
+        curves[sign].append((joint, Line(over.values, values, joint, nth(order[joint]))))
+    turn = float(np.degrees(JUMP))
     titles = {
-        "β": ("β, between the seats\nof the ends [°]", float(np.degrees(JUMP))),
-        "ξ": ("ξ, direction of\nthe seat [°]", float(np.degrees(JUMP))),
-        "guide": (f"offset across\nthe guide [{unit}]", scale * min((one.clearance for one in guides), default=0.0)),
-    }
+        "β": ("β, between the seats\nof the ends [°]", turn), "ξ": ("ξ, direction of\nthe seat [°]", turn),
+        "guide": (f"offset across\nthe guide [{unit}]", scale * min((g.clearance for g in guides), default=0.0)),
+    }  # fmt: skip
     charts, gone = [], np.concatenate([NOWHERE, *lost.values()])
     for sign, lines in curves.items():
         if lines:

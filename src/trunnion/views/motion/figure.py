@@ -13,15 +13,31 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import prefixed, quantity
 from trunnion.views import draw
-from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Ring, Rule, joined, nth
-from trunnion.views.common.cycle import Abscissa, Array, abscissa, names
+from trunnion.views.charts import (
+    Axis,
+    Chart,
+    Legend,
+    Line,
+    Look,
+    Mark,
+    Note,
+    Panel,
+    Plot,
+    Ring,
+    Rule,
+    check_kind,
+    joined,
+    nth,
+)
+from trunnion.views.common.cycle import Abscissa, Array, abscissa, members, names
+from trunnion.views.common.peaks import peak
 from trunnion.views.motion.shown import OF_IMPACTS, Shown, drivers_of, energies, shown
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["KINDS", "OF_CONTACTS", "check_contacts", "check_kind", "figure", "pictures", "sheet"]
+__all__ = ["KINDS", "OF_CONTACTS", "check_contacts", "figure", "pictures", "sheet"]
 
 PANEL = 2.6  # height, inches
 LINE, LETTER = 9.5, 0.009  # of an event's word: points from row to row, share of the axes' width a letter
@@ -35,25 +51,18 @@ SIDE = 4.6  # of the figure of a hole, inches
 
 
 def figure(result: xr.Dataset, kind: str = "sheet") -> Figure:
-    """One figure: of KINDS or OWN, or `sheet` with all over time."""
-    check_kind(kind)
+    """One figure of KINDS; `sheet` has all over time."""
+    check_kind(kind, KINDS)
     if kind == "sheet":
         return sheet(result)
     check_contacts(kind, _in_play(result))
     if kind in OWN:
         return draw.plot(OWN[kind](result), result)
-    title, build = KINDS[kind]
+    title, build = OVER_TIME[kind]
     motion = shown(result)
     chart = build(motion.rows, abscissa(motion.rows))
     chart = chart if kind == "phase" else _with_events(chart, motion)
     return draw.plot(Plot(title, [Panel("", [chart], 3.75)]), result)
-
-
-def check_kind(kind: str) -> None:
-    """MechanismError if there is no such kind of figure."""
-    known = ("sheet", *KINDS, *OWN)
-    if kind not in known:
-        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", f"use {', '.join(known)}"))
 
 
 def check_contacts(kind: str, in_play: bool) -> None:
@@ -70,7 +79,7 @@ def sheet(result: xr.Dataset) -> Figure:
     left_out = ("phase", *idle, *(() if _in_play(result) else OF_CONTACTS))
     over = abscissa(motion.rows)
     charts = [_with_events(build(motion.rows, over), motion)
-              for kind, (_, build) in KINDS.items() if kind not in left_out]  # fmt: skip
+              for kind, (_, build) in OVER_TIME.items() if kind not in left_out]  # fmt: skip
     return draw.plot(Plot("Motion in time", [Panel("", charts, 0.4 + PANEL * len(charts))]), result)
 
 
@@ -87,47 +96,40 @@ def pictures(result: xr.Dataset) -> Iterator[tuple[str, Figure]]:
 
 def _curves(over: Abscissa, title: str, unit: str, rows: dict[str, Array]) -> Chart:
     """Curves of one unit over time; those that coincide are one."""
-    lines = [Line(over.values, values, name, nth(k)) for k, (name, values) in enumerate(rows.items())]
-    factor, label = prefixed(_largest(list(rows.values())), unit)
-    return Chart(
-        over, Axis(f"{title} [{label}]"), [line._replace(y=line.y * factor) for line in joined(lines)], zero=True
-    )
+    lines = joined([Line(over.values, values, name, nth(k)) for k, (name, values) in enumerate(rows.items())])
+    factor, label = prefixed(peak(*rows.values()), unit)
+    return Chart(over, Axis(f"{title} [{label}]"), [line.times(factor) for line in lines], zero=True)
 
 
 def _speed(result: xr.Dataset, over: Abscissa) -> Chart:
-    drivers = drivers_of(result)
-    unit = "rad/s" if drivers[0][2] == "N m" else "m/s"
-    rows = {}
-    for i, name, effort in drivers:
-        own = "rad/s" if effort == "N m" else "m/s"
-        rows[name if own == unit else f"{name} [{own}]"] = result["drive_rate"].values[i]
+    drivers = [(i, name, "rad/s" if effort == "N m" else "m/s") for i, name, effort in drivers_of(result)]
+    unit = drivers[0][2]
+    rows = {name if own == unit else f"{name} [{own}]": result["drive_rate"].values[i] for i, name, own in drivers}
     return _curves(over, "speed", unit, rows)
 
 
 def _effort(result: xr.Dataset, over: Abscissa) -> Chart:
     drivers = drivers_of(result)
-    noun = "torque" if drivers[0][2] == "N m" else "force"
     rows = {name: result["drive_effort"].values[i] for i, name, _ in drivers}
-    return _curves(over, f"drive {noun}", drivers[0][2], rows)
+    return _curves(over, f"drive {'torque' if drivers[0][2] == 'N m' else 'force'}", drivers[0][2], rows)
 
 
 def _reactions(result: xr.Dataset, over: Abscissa) -> Chart:
-    sizes = np.sqrt(np.sum(result["reaction_force"].values ** 2, axis=1))
-    rows = dict(zip(names(result, "joint"), sizes, strict=True))
-    return _curves(over, "reaction", "N", {name: size for name, size in rows.items() if _largest([size]) > 0})
+    sizes = {name: np.linalg.norm(force, axis=0) for name, force in members(result, "reaction_force", "joint").items()}
+    return _curves(over, "reaction", "N", {name: size for name, size in sizes.items() if peak(size) > 0})
 
 
 def _energy(result: xr.Dataset, over: Abscissa) -> Chart:
     return _curves(over, "energy", "J", {text: values for _, text, values in energies(result)})
 
 
-def _of_contacts(variable: str, title: str, unit: str) -> Callable[[Any, Abscissa], Chart]:
-    """What draws a quantity of each contact; below a gap of 0 the surfaces press each other in."""
+def _forces(result: xr.Dataset, over: Abscissa) -> Chart:
+    return _curves(over, "contact force", "N", members(result, "contact_normal_force", "contact"))
 
-    def build(result: xr.Dataset, over: Abscissa) -> Chart:
-        return _curves(over, title, unit, dict(zip(names(result, "contact"), result[variable].values, strict=True)))
 
-    return build
+def _gaps(result: xr.Dataset, over: Abscissa) -> Chart:
+    """Below 0 the surfaces press each other in."""
+    return _curves(over, "gap", "m", members(result, "contact_gap", "contact"))
 
 
 def _phase(result: xr.Dataset, over: Abscissa) -> Chart:
@@ -139,10 +141,6 @@ def _phase(result: xr.Dataset, over: Abscissa) -> Chart:
         marks.append(Line(q, rate, name, nth(k)))
         marks.append(Line(q[first], rate[first], None if k else "start", Look(k, dash="none", mark="o", size=6.0)))
     return Chart(Axis(f"coordinate [{'rad' if turns else 'm'}]"), Axis(f"speed [{'rad/s' if turns else 'm/s'}]"), marks)
-
-
-def _largest(rows: list[Array]) -> float:
-    return max((float(np.nanmax(np.abs(values), initial=0.0)) for values in rows), default=0.0)
 
 
 def _with_events(chart: Chart, motion: Shown) -> Chart:
@@ -230,14 +228,15 @@ def _hole(result: xr.Dataset, k: int) -> Chart:
 
 
 # a kind of figure over time: its title, and what makes its chart
-KINDS: dict[str, tuple[str, Callable[[Any, Abscissa], Chart]]] = {
+OVER_TIME: dict[str, tuple[str, Callable[[Any, Abscissa], Chart]]] = {
     "speed": ("Speed", _speed),
     "effort": ("Drive effort", _effort),
     "reactions": ("Reactions", _reactions),
     "energy": ("Energy account", _energy),
-    "contacts": ("Contact forces", _of_contacts("contact_normal_force", "contact force", "N")),
-    "gaps": ("Gaps", _of_contacts("contact_gap", "gap", "m")),
+    "contacts": ("Contact forces", _forces),
+    "gaps": ("Gaps", _gaps),
     "phase": ("Speed over coordinate", _phase),
 }
 # kinds of figures with axes of their own
 OWN: dict[str, Callable[[Any], Plot]] = {"orbit": _orbit, "spectrum": _spectrum}
+KINDS = ("sheet", *OVER_TIME, *OWN)

@@ -13,12 +13,12 @@ from matplotlib.collections import PolyCollection
 from matplotlib.patches import FancyArrowPatch
 from matplotlib.patheffects import Normal, Stroke
 
-from trunnion.errors import Finding, MechanismError, Status
+from trunnion.errors import Finding, MechanismError
 from trunnion.results.quantities import prefixed
 from trunnion.results.scales import without_noise
-from trunnion.views.common.cycle import Array, abscissa, column, status_text
-from trunnion.views.common.drawing import PALE
-from trunnion.views.common.figures import INK, MUTED, PALETTE, Labels, new, plain
+from trunnion.views.common.cycle import Array, column
+from trunnion.views.common.drawing import PALE, bare, facts
+from trunnion.views.common.figures import INK, MUTED, PALETTE, Labels, new
 from trunnion.views.common.peaks import ease, usual_peak
 from trunnion.views.space.bodies import Space, space
 from trunnion.views.space.solids import HALF, Camera, Scenery, Solid, scenery
@@ -40,39 +40,24 @@ FEW = 400  # pieces of a curve
 def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:
     """The mechanism at a position: that of the largest reaction that can be drawn, if not told."""
     result = without_noise(result)
-    look = scenery(space(result))
-    count, told = result.sizes["position"], index is not None
-    if index is None:
-        index = _telling(result, look.shown)
-    elif not 0 <= index < count:
-        remedy = f"name one from 0 to {count - 1}"
-        raise MechanismError(Finding(f"there is no position {index} among the {count}", "index", remedy))
+    look, telling = scenery(space(result)), index is None
+    index = _telling(result, look.shown) if index is None else index
     if not look.shown.drawable[index]:
         what = f"position {index} cannot be assembled: there is nothing to draw"
         raise MechanismError(Finding(what, "index", "choose a solved position"))
     arrows, most = _reactions(look, result, index)
     low, high = _limits(look, arrows)
     figure = new("Mechanism", result, float(np.clip(7.2 * (high - low)[1] / (high - low)[0], *HEIGHTS)) + 0.7)
-    axes = figure.subplots()
-    axes.set_aspect("equal")
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    axes.axis("off")
+    where, *others = facts(result, index)
+    where += ", where the load of a joint is largest" * bool(arrows and telling)
+    apart = "coincident joints drawn apart" * any(look.shown.shifts.values())
+    axes = bare(figure.subplots(), low, high, [where, *others, apart])
     sketch(axes, look, index)
     for start, end in arrows:
         _arrow(axes, start, end, REACTION)
     labels = Labels(figure)
     name_joints(axes, look, index, labels)
     _key(axes, look, most)
-    over = abscissa(result)
-    facts = [f"{over.label} = {over.say(index)}", str(result.attrs.get("formula", ""))]
-    if arrows and not told:
-        facts[0] += ", where the load of a joint is largest"
-    status = int(result["status"].values[index])
-    if status >= Status.NOT_CONVERGED:
-        facts.append(status_text(status).split(":")[0])
-    if any(look.shown.shifts.values()):
-        facts.append("coincident joints drawn apart")
-    axes.set_title(plain("    ".join(filter(None, facts))), fontsize=8.5, color=MUTED, loc="left")
     labels.place()
     return figure
 

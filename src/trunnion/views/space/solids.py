@@ -368,28 +368,7 @@ def _along(shown: Space, name: str) -> tuple[float, float]:
 
 
 HEIGHTS = (20.0, 28.0, 36.0, 46.0, 58.0)  # degrees above the horizon that are tried
-SIDES = (
-    -155.0,
-    -145.0,
-    -135.0,
-    -125.0,
-    -115.0,
-    -65.0,
-    -55.0,
-    -45.0,
-    -35.0,
-    -25.0,
-    25.0,
-    35.0,
-    45.0,
-    55.0,
-    65.0,
-    115.0,
-    125.0,
-    135.0,
-    145.0,
-    155.0,
-)  # degrees around z: no axis seen end-on
+SIDES = [side + off for side in (-135.0, -45.0, 45.0, 135.0) for off in range(-20, 21, 10)]  # around z: no axis end-on
 MOST_SPOTS = 3000  # that are weighed
 
 

@@ -12,7 +12,7 @@ SEED = 2026
 CASES = 240
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("part", range(6))
 def test_damaged_files_are_findings(part: int, tmp_path: Path) -> None:

@@ -144,7 +144,6 @@ TOGETHER: dict[str, Values] = {
     "toggle-press": {"L": ["200 mm", "203 mm"]},
     "rssr": {"a": ["30 mm", "31 mm"], "A.speed": [10, 20]},
     "pezzuti-cardan": {"misalignment": ["5 deg", "25 deg"], "bearing": ["15 mm", "40 mm"]},
-    "universal-joint": {"delta": ["5 deg", "40 deg"], "input.speed": ["100 rpm", "3000 rpm"]},
     "five-bar-robot": {"arm": ["250 mm", "260 mm"]},
 }
 

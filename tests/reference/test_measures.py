@@ -586,7 +586,7 @@ def test_every_kind_with_every_statistic(crank: Run) -> None:
     """A figure, a picture and a unit for each; of samples and of dual numbers the same."""
     measures = every_measure()
     made, change = many(crank, measures), crank.system.mechanism.parameters
-    values = change({"links.crank.points.B.x": R * np.array([[1.0], [1.001], [0.999]])})
+    values = change({"links.crank.points.B.x": R * np.array([[1.0], [1.001]])})
     made.tune(values)
     nominal, found = (
         made.figures,
@@ -595,11 +595,11 @@ def test_every_kind_with_every_statistic(crank: Run) -> None:
     slopes = made.read(change({"links.crank.points.B.x": Dual(1.001 * R, 1.0)}))
     for one in measures:
         read = found[one.name]
-        assert np.shape(read.figure) == (3,), one.name
+        assert np.shape(read.figure) == (2,), one.name
         if one.kind not in ("efficiency", "locking_margin") and "at" not in one.name:
             assert np.all(np.isfinite(read.figure)), one.name
         np.testing.assert_allclose(read.figure[0], nominal[one.name], rtol=1e-12, atol=1e-12, err_msg=one.name)
-        assert np.shape(read.shown) == (3, 1 if one.at is not None else 24)
+        assert np.shape(read.shown) == (2, 1 if one.at is not None else 24)
         assert one.figure_unit(crank.system, crank.values) in {
             kind.unit for one in MEASURES.values() for kind in one.quantities
         }

@@ -171,6 +171,7 @@ def _well_conditioned(mechanism: Mechanism, pose: dict[str, tuple[float, float, 
     return len(rows) == 3 * len(links) and values_[0] / values_[-1] < 150
 
 
+@pytest.mark.sample(8)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_mechanism(seed: int) -> None:
@@ -231,6 +232,7 @@ def test_random_mechanism_against_newton_euler(seed: int) -> None:
     assert checked > 0 or np.any(~np.isfinite(size))
 
 
+@pytest.mark.sample(8)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_mechanism_elsewhere(seed: int) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -20,7 +20,7 @@ from trunnion.model.arguments import strict_arguments
 from trunnion.model.names import nearest
 from trunnion.results import variables as results
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
-from trunnion.solve.margin import locking_margin
+from trunnion.solve.margin import margins_beside
 from trunnion.solve.memory import blocks
 from trunnion.solve.run import Run
 from trunnion.solve.seating import SETTLED, seating_of
@@ -41,7 +41,6 @@ TURNED = {
     "joint_rotation": ("joint_rotation_velocity", "link_angle", "link_angle_velocity"),
     "link_angle": ("link_angle_velocity",),
 }
-BESIDE = 1e-8  # of the cycle: how far before and after a position its margin is looked at
 MOST_STEPS = 10_000_000  # all of them are held in memory: of a four-bar 10 GB, some variables of it less
 
 
@@ -164,38 +163,17 @@ def stretch(
     quick, seating = replace(method, margin_up_to=0.0), seating_of(run, method) if run.seats else None
     resting = {joint: places for joint, (places, _) in causes.of("rest").items()}
     resting_joints.bracket(arrays, run, time, quick, resting, seating)
-    if method.margin_up_to:
-        _take_margins_beside(arrays["locking_margin"], run, time, method, resting)
+    if method.margin_up_to and resting and run.cycle.duration > 0:
+        places = np.unique(np.concatenate(list(resting.values())))
+        solve = (lambda at: seating.at(at, method).back) if seating else (lambda at: run.solve(at, method=method))
+        beside = margins_beside(solve, time[places], run.cycle, method.margin_up_to)
+        arrays["locking_margin"][places] = np.where(np.isnan(beside), arrays["locking_margin"][places], beside)
     if seating:
         contact_loss.find(arrays, seating, time)
     unwrap(arrays, run.system, run.values, time)
     means = unknown(len(run.system.mechanism.drivers), len(run.system.joints))
     dial = run.system.dial(run.values, time)
     return Positions(arrays, names, time, dial, method, causes, means, means if run.erring else None)
-
-
-def _take_margins_beside(
-    margin: NDArray[np.float64],
-    run: Run,
-    time: NDArray[np.float64],
-    method: FrictionMethod,
-    resting: Mapping[str, NDArray[np.intp]],
-) -> None:
-    """Where a joint turns round, the less of the margins just before and just after it.
-
-    Its friction may act either way there, and is taken as none: with that alone the margin would jump at one position.
-    """
-    cycle = run.cycle
-    if not resting or cycle.duration <= 0:
-        return
-    places = np.unique(np.concatenate(list(resting.values())))
-    sides = time[places] + BESIDE * cycle.duration * np.array([[-1.0], [1.0]])
-    inside = cycle.periodic | ((sides >= 0) & (sides <= cycle.duration))
-    asked = (sides % cycle.duration if cycle.periodic else np.clip(sides, 0.0, cycle.duration)).ravel()
-    back = seating_of(run, method).at(asked, method).back if run.seats else run.solve(asked, method=method)
-    margins = np.broadcast_to(np.asarray(locking_margin(back), float), asked.shape).reshape(sides.shape)
-    least = np.fmin.reduce(np.where(inside, margins, np.nan))
-    margin[places] = np.where(np.isnan(least), margin[places], least)
 
 
 def _refuse_seats(run: Run) -> None:

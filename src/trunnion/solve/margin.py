@@ -7,7 +7,10 @@ problem, φ = s law(N(R₀ + G φ)), whose G is triangular by modules, and it is
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
 from trunnion.joints.pairs import Reaction
@@ -21,8 +24,13 @@ from trunnion.solve.friction import (
     with_own,
 )
 from trunnion.solve.friction_problem import largest
+from trunnion.solve.system import Cycle
 
-__all__ = ["locking_margin"]
+__all__ = ["locking_margin", "margin_in", "margins_beside"]
+
+Array = NDArray[np.float64]
+
+BESIDE = 1e-8  # of the cycle: how far before and after a time its margin is looked at
 
 
 def locking_margin(back: Backward) -> Number:
@@ -52,6 +60,20 @@ def margin_in(back: Backward, most: float, lanes: Number = np.True_) -> Number:
             problem, share = _together(back, k + 1), 1.0
         margin = np.where(doubtful, _followed(problem, doubtful, most, share), margin)
     return margin
+
+
+def margins_beside(solve: Callable[[Array], Backward], time: Array, cycle: Cycle, most: float) -> Array:
+    """The margins at times, s, at which a joint turns round: the less of those just before and just after.
+
+    Its friction may act either way there, and is taken as none: with that alone the margin would jump at one position.
+    NaN where neither side has one.
+    """
+    sides = time + BESIDE * cycle.duration * np.array([[-1.0], [1.0]])
+    inside = cycle.periodic | ((sides >= 0) & (sides <= cycle.duration))
+    asked = (sides % cycle.duration if cycle.periodic else np.clip(sides, 0.0, cycle.duration)).ravel()
+    margins = np.broadcast_to(np.asarray(margin_in(solve(asked), most), float), asked.shape).reshape(sides.shape)
+    least: Array = np.fmin.reduce(np.where(inside, margins, np.nan))
+    return least
 
 
 def _together(back: Backward, count: int) -> FrictionProblem:

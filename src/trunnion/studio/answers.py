@@ -243,7 +243,8 @@ def _drag(asked: Asked) -> dict[str, Any]:
     point = str(asked["point"])
     changes = {change.path: change for change in sketch.moved(point, to, bool(asked.get("keep")))}  # a number once
     values = {path: change.value for path, change in changes.items()}
-    back = solved_with(state, values, steps, asked.get("friction") != "off")
+    friction = asked.get("friction") != "off"
+    back = solved_with(state, values, steps, friction)
     columns = live_columns(back, steps)
     shown = f"{sketch.joints[point]['links'][1]}.{point}" if point in sketch.joints else point
     track = columns["points"][shown]
@@ -254,7 +255,7 @@ def _drag(asked: Asked) -> dict[str, Any]:
     if not _keeps(sketch, columns["points"], near):  # the crank would turn, and a locked joint with it
         near = index
     head = {"solved": True, "index": near, "changes": _told(sketch, changes.values())}
-    return head | _live(state, back, columns, near, values)
+    return head | _live(state, back, columns, near, values, friction)
 
 
 def _keeps(sketch: Sketch, points: Mapping[str, Mapping[str, Array]], index: int) -> bool:
@@ -271,13 +272,14 @@ def _try(asked: Asked) -> dict[str, Any]:
     state, steps = loaded(str(asked["text"])), _steps(asked)
     index = int(asked.get("index") or 0) % steps
     values = {str(path): float(value) for path, value in dict(asked["values"]).items()}
-    back = solved_with(state, values, steps, asked.get("friction") != "off")
+    friction = asked.get("friction") != "off"
+    back = solved_with(state, values, steps, friction)
     columns = live_columns(back, steps)
-    return {"solved": True, "index": index} | _live(state, back, columns, index, values)
+    return {"solved": True, "index": index} | _live(state, back, columns, index, values, friction)
 
 
 def _live(
-    state: Loaded, back: Backward, columns: dict[str, Any], index: int, values: Mapping[str, float]
+    state: Loaded, back: Backward, columns: dict[str, Any], index: int, values: Mapping[str, float], friction: bool
 ) -> dict[str, Any]:
     """Columns of a mechanism that is being changed, with its margin and what locks at the position that is shown."""
     status, locked = columns["status"], {}
@@ -286,7 +288,8 @@ def _live(
         time = state.run.cycle.times(len(status))[[index]]
         locked = locks_of(state.run, time, status[index : index + 1], numbers)
     locks = {joint: float(column[0]) for joint, column in locked.items()}
-    return columns | {"margin": live_margin(back, status, index), "locks": locks}
+    run = state.run if friction else state.frictionless_run
+    return columns | {"margin": live_margin(back, run, values, status, index), "locks": locks}
 
 
 def _told(sketch: Sketch, changes: Iterable[Change]) -> list[list[str]]:

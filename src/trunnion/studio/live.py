@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.solve.backward import Backward
-from trunnion.solve.margin import margin_in
+from trunnion.solve.margin import margin_in, margins_beside
+from trunnion.solve.run import Run
 from trunnion.solve.status import status_of
 from trunnion.studio.loaded import Loaded
 from trunnion.studio.placed import column, tracks
@@ -92,10 +93,21 @@ def live_columns(back: Backward, steps: int) -> dict[str, Any]:
 
 
 @np.errstate(all="ignore")
-def live_margin(back: Backward, status: Sequence[int], index: int) -> dict[str, Any]:
-    """The locking margin of one position, where it has one, and whether it is beyond that; status: of all positions."""
+def live_margin(
+    back: Backward, run: Run, values: Mapping[str, float], status: Sequence[int], index: int
+) -> dict[str, Any]:
+    """The locking margin of one position, where it has one, and whether it is beyond that.
+
+    run, values: what was solved, and with which numbers replaced; status: of all positions.
+    """
     steps = len(status)
-    if status[index] > Status.LOCKED:
+    if status[index] == Status.ZERO_SLIP and run.cycle.duration > 0:
+        numbers = run.system.mechanism.parameters(values)
+        time = run.cycle.times(steps)[[index]]
+        margin = float(margins_beside(lambda at: run.solve(at, numbers), time, run.cycle, NEAR)[0])
+    else:
+        every = np.broadcast_to(np.asarray(margin_in(back, NEAR, np.arange(steps) == index), float), (steps,))
+        margin = float(every[index])
+    if status[index] > Status.LOCKED or np.isnan(margin):
         return {"value": None, "beyond": False}
-    margin = np.broadcast_to(np.asarray(margin_in(back, NEAR, np.arange(steps) == index), float), (steps,))
-    return {"value": min(float(margin[index]), NEAR), "beyond": bool(margin[index] > NEAR)}
+    return {"value": min(margin, NEAR), "beyond": margin > NEAR}

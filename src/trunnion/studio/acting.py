@@ -22,16 +22,15 @@ RATIO = re.compile(r"\s*([-+]?)\s*(\d+\.?\d*|\.\d+)\s*(?:([:/])\s*(\d+\.?\d*|\.\
 def driver(sketch: Sketch, given: Given) -> str:
     """A joint is driven, from where it is shown."""
     joint = str(given["joint"])
-    row = next((row for row in sketch.rows if row.get("joint") == joint), None)
-    if joint not in sketch.joints and row is None:
+    if not sketch.kind(joint):
         raise refused("is not a joint", joint, "choose a joint")
     if not given.get("add"):
         for other in list(sketch.section("drivers")):
             del sketch.section("drivers")[other]
-    if (row or sketch.joints[joint]).get("type") == "prismatic":
+    if sketch.kind(joint) == "prismatic":
         entry = {"speed": given.get("speed") or "10 mm/s", "range": [0, sketch.length(0.2 * sketch.size)]}
     else:
-        start = 0.0 if row else _turned(sketch, joint)
+        start = _turned(sketch, joint) if joint in sketch.joints else 0.0
         entry = {"speed": given.get("speed") or "60 rpm"} | ({"start": f"{start:g} deg"} if start else {})
     sketch.section("drivers")[joint], sketch.made = entry, ("joints", joint)
     return f"Drive {joint}"
@@ -65,10 +64,10 @@ def _force(sketch: Sketch, given: Given) -> dict[str, Any]:
 
 def _resisting(sketch: Sketch, given: Given, name: str) -> dict[str, Any]:
     joint = str(given["against"])
-    kind = sketch.joints.get(joint, {}).get("type", "revolute")
-    if joint not in sketch.joints or kind not in ("revolute", "prismatic"):
+    kind = sketch.kind(joint)
+    if kind not in ("revolute", "prismatic", "cylindrical"):
         raise refused("does not turn or slide", joint, "choose a pin or a slide")
-    turns = kind == "revolute"
+    turns = kind != "prismatic"
     size = given.get("size") or ("10 N m" if turns else "100 N")
     parts = [sketch.numbers.get(f"loads.{name}.force.{axis}") for axis in "xy"]
     if not turns and None not in parts:

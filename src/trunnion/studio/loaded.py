@@ -127,11 +127,13 @@ def loaded(text: str) -> Loaded:
 def _without_friction(entries: Mapping[str, Any]) -> Mechanism | None:
     """The mechanism without what is stated of friction; None where that is not what is wrong with it."""
     joints, common = (entries.get(key) or {} for key in ("joints", "joint_defaults"))
-    if not isinstance(joints, dict) or not isinstance(common, dict):
+    rows = entries.get("loop") or []
+    if not isinstance(joints, dict) or not isinstance(common, dict) or not isinstance(rows, list):
         return None
     bare = {
         "joints": {name: _plain(one) for name, one in joints.items()},
         **({"joint_defaults": _plain(common)} if common else {}),
+        **({"loop": [_plain(row) for row in rows]} if rows else {}),
     }
     try:
         return Mechanism(**{**entries, **bare})

@@ -108,6 +108,11 @@ class Sketch:
         """Joints with their two links."""
         return {name: one for name, one in self.of("joints").items() if _pair(one.get("links"))}
 
+    def kind(self, joint: str) -> str:
+        """The type of a joint, of the table of a loop too; nothing where there is none."""
+        row = next((row for row in self.rows if row.get("joint") == joint), self.joints.get(joint))
+        return "" if row is None else str(row.get("type", "revolute"))
+
     @property
     def rows(self) -> list[dict[str, Any]]:
         """The table of a loop in space, each row a joint and the link after it; none of other models."""

@@ -5,14 +5,14 @@ import { dictionary, groundOf } from "./geometry.js";
 /** Values a part may well have: path within it, and an example. */
 const USUAL = {
   links: [["mass", "2 kg"], ["inertia", "0.01 kg m^2"], ["centre", ["50 mm", "0"]]],
-  joints: [["friction.coefficient", "0.1"], ["pin.radius", "5 mm"], ["pin.clearance", "0.02 mm"]],
+  joints: [["friction.coefficient", "0.1"], ["pin.radius", "5 mm"], ["pin.bearing", "30 mm"], ["pin.clearance", "0.02 mm"]],
   slides: [["friction.coefficient", "0.1"], ["guide.length", "40 mm"], ["guide.clearance", "0.02 mm"]],
   drivers: [["speed", "60 rpm"], ["range", ["0 deg", "90 deg"]], ["start", "0 deg"]],
   loads: [["force", ["0 N", "-100 N"]], ["moment", "1 N m"], ["useful", null]],
   resistances: [["resisting_force", "100 N"], ["resisting_torque", "10 N m"], ["only", null], ["useful", null]],
   springs: [["stiffness", "1 N/mm"], ["free_length", "50 mm"], ["preload", "0 N"]],
   gears: [["ratio", "-1/2"], ["phase", "0 deg"]],
-  model: [["name", "Slider-crank"], ["gravity", ["0", "-9.81"]], ["joint_defaults.friction", "0.1"], ["joint_defaults.pin.radius", "5 mm"], ["joint_defaults.guide.length", "40 mm"]],
+  model: [["name", "Slider-crank"], ["gravity", ["0", "-9.81"]], ["joint_defaults.friction", "0.1"], ["joint_defaults.pin.radius", "5 mm"], ["joint_defaults.pin.bearing", "30 mm"], ["joint_defaults.guide.length", "40 mm"]],
 }; // prettier-ignore
 
 const IN_SPACE = { gravity: ["0", "0", "-9.81"], centre: ["50 mm", "0", "0"], force: ["0 N", "0 N", "-100 N"] };
@@ -42,8 +42,10 @@ export function rowsOf(entries, kind, name) {
   const from = kind === "model" ? [] : row < 0 ? [kind, name] : ["loop", row];
   const there = [...(kind === "links" ? lengths(entries, name) : []), ...leaves(part, from)].map((row) => ({ ...row, example: null }));
   const known = (path) => there.some((row) => starts(row.path, path) || starts(path, row.path));
-  const inSpace = (way, example) => (entries?.space === "spatial" && IN_SPACE[way]) || example;
-  const usual = usualOf(kind, part, kind === "links" && name === groundOf(entries)).map(([way, example]) => [way, inSpace(way, example)]);
+  const spatial = entries?.space === "spatial";
+  const usual = usualOf(kind, part, kind === "links" && name === groundOf(entries))
+    .filter(([way]) => spatial || !way.endsWith("pin.bearing")) // a moment across a pin is one of space
+    .map(([way, example]) => [way, (spatial && IN_SPACE[way]) || example]);
   const missing = usual
     .map(([way, example]) => ({ path: [...from, ...way.split(".")], value: null, example, fixed: false, common: kind === "joints" ? commonTo(entries, way.split(".")) : null }))
     .filter(({ path }) => !known(path));
@@ -183,6 +185,8 @@ export function findingsOf(findings, path) {
 /** Whether a part is of the model, stated by the file or drawn for its loop; a text that cannot be read tells nothing. */
 export function isPart({ entries, scene }, { kind, name }) {
   if (!entries) return true;
+  const rows = Array.isArray(entries.loop) ? entries.loop : [];
+  if (rows.some((row) => row?.[kind.slice(0, -1)] === name)) return true;
   if (kind !== "points") return dictionary(entries[kind])[name] !== undefined || Boolean(scene?.[kind]?.some((one) => one.name === name));
   const [link, ...point] = name.split(".");
   return dictionary(dictionary(entries.links)[link]?.points)[point.join(".")] !== undefined || Boolean(scene?.points[name]);

@@ -20,6 +20,7 @@ const KEYS = [
       ["Escape", "leave off what was begun"],
     ],
   ],
+  ["In space (Tab goes through joints, points and links)", [["Enter", "choose it and open its properties"], ["← → ↑ ↓", "move a joint along the axes nearest to them, with Shift ten steps, with Alt a tenth"], ["Page Up, Page Down", "move it away or nearer"]]],
   ["Motion", [["Space", "play or pause"], [", .", "one position back or on; ← → on a curve, with Shift ten"]]],
   ["View", [["+ −", "zoom"], ["0", "show all"]]],
   ["Everywhere", [["Ctrl Z, Ctrl Shift Z", "undo, redo"], ["Ctrl S, Ctrl O", "save, open"], ["↓ ↑", "go through an open menu"], ["?", "this list"]]],

@@ -43,7 +43,7 @@ function Chosen({ kind, name }) {
       ${driver && html`<h3>Driver</h3><${Rows} rows=${rowsOf(entries, "drivers", name)} findings=${findings} />`}
       <p class="row-of-buttons">
         ${kind === "joints" && !driver && html`<${Button} label="Drive this joint" onClick=${() => edit([{ do: "driver", joint: name }])} />`}
-        ${kind === "joints" && !state.spatial.value && html`<${Button} label="Load against its motion" onClick=${() => edit([{ do: "load", against: name }])} />`}
+        ${kind === "joints" && html`<${Button} label="Load against its motion" onClick=${() => edit([{ do: "load", against: name }])} />`}
         ${kind === "loads" && against(entries, name).map((joint) => html`<${Button} label=${`Let it oppose the motion of ${joint}`} onClick=${() => edit([{ do: "load", against: joint, instead: name }])} />`)}
         ${(kind === "joints" || kind === "points") && !state.spatial.value && html`<${Button} label=${state.locked.value.includes(name) ? "Unlock" : "Lock"}
           title="A locked joint stays where it is while others are dragged (K)" onClick=${() => edit([{ do: "lock", point: name }])} />`}

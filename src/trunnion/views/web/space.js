@@ -14,6 +14,7 @@ const MARGIN = 46; // room for names and arrows, px
 const KEY = 34; // height of the strip with triad and scales, px
 const BELOW = 330; // height of what stands below the drawing, so that all of it stays in the window, px
 const SHARP = 2; // canvas pixels for one of the page, at least: it is printed too
+const RESIZED = 1.6; // a mechanism so many times as large, or as small, is fitted to the picture again
 const REST = 160; // ms after which what was turned is drawn sharp again
 const FITTED = 24; // positions whose bodies a turned view is fitted to
 const LINE = 0.75; // half length of an axis, share of the size
@@ -86,7 +87,10 @@ export function spaceView(scene, kinds, { fill = false, after = (_view) => {} } 
     recolour: () => recolour(view, false),
     take(scene, kinds, anew) {
       embody(view, scene, kinds);
-      if (anew) settle(view);
+      const { around, above } = view.camera;
+      const [more, less] = [scene.size / view.fitted.size, view.fitted.size / scene.size];
+      if (anew || Math.max(more, less) > RESIZED) settle(view);
+      if (!anew) Object.assign(view.camera, { around, above });
       recolour(view, false);
       if (view.frame) build(view, view.frame.width);
     },
@@ -127,7 +131,7 @@ function embody(view, base, kinds) {
 
 /** The first side to look from, with the whole of the present scene in the picture; it stays so until it is settled anew. */
 function settle(view) {
-  view.fitted = { view: view.scene.view, reach: view.reach };
+  view.fitted = { view: view.scene.view, reach: view.reach, size: view.scene.size };
   view.camera = first(view.scene);
   if (view.frame) build(view, view.frame.width);
   return view.camera;

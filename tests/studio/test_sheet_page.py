@@ -210,6 +210,18 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
             "Object.entries(s.places.value).filter(([key]) => key.startsWith('link5')).map(one => one[1])"
         )
         np.testing.assert_allclose(copied, [[0.02 + 2 * step, 3 * step], [0.02 + 2 * step, 0.05 + 3 * step]])
+        for by, corners in (("keyboard", [(-0.1, -0.02), (-0.07, 0.08)]), ("touch", [(-0.1, -0.02), (-0.07, 0.08)])):
+            other = Hand(user, by)
+            user.keys("Escape")
+            other.tool("b", "Box")
+            if by == "touch":
+                other.drag(*corners)
+            else:
+                other.click(corners[0])
+                other.click(corners[1])
+            assert user.state("s.group.value") == ["link1"]
+        user.of("group", "m.chooseLinks(given)", ["link4", "link5"])
+        user.page.locator(".sheet > svg").focus()
         user.keys("Delete")
         assert user.state("Object.keys(s.answer.value.entries.links).length") == 4
         user.keys("Control+z", "Control+z")

@@ -111,7 +111,7 @@ class _Moving:
         sketch = self.sketch
         pair = sketch.joints[joint]["links"]
         inside, other = pair if pair[0] in self.links else reversed(pair)
-        sketch.write(list(sketch.relocated(other, [joint], sketch.places[f"{inside}.{joint}"])))
+        sketch.write(list(sketch.followed(other, [joint], sketch.places[f"{inside}.{joint}"])))
         sketch.places[f"{other}.{joint}"] = sketch.places[f"{inside}.{joint}"]
         sketch.show(other, sketch.frame(other))
 
@@ -159,6 +159,8 @@ class _Moving:
     def _refuse(self, joints: Mapping[str, Any], outside: list[str]) -> None:
         """What would not be mirrored with the drawing."""
         sketch = self.sketch
+        if "at" in sketch.section("assembly"):
+            raise refused("says where the driver is", "assembly.at", "mirror it in the text")
         for name, one in joints.items():
             if set(one) & {"seat", "seat_on", "misalignment"}:
                 raise refused("has a seat, which is not mirrored", f"joints.{name}", "mirror it in the text")
@@ -168,7 +170,7 @@ class _Moving:
         for section in ("drivers", "gears", "springs", "loads"):
             for name, one in sketch.of(section).items():
                 meant = [name] if section == "drivers" else [one.get("joint"), *one.get("joints", ())]
-                if set(meant) & set(outside):
+                if set(meant) & set(outside) or 0 < len(set(meant) & set(joints)) < len({*meant} - {None}):
                     raise refused("is at a link that is not chosen", f"{section}.{name}", "choose that link too")
 
     def _flip(self, joints: Mapping[str, Any]) -> None:

@@ -365,6 +365,10 @@ def test_the_mass_of_a_flat_bar_is_that_of_its_section() -> None:
     assert link["links.link1.mass"] == pytest.approx(0.157, rel=1e-6)
     assert link["links.link1.inertia"] == pytest.approx(0.157 * (0.1**2 + 0.02**2) / 12, rel=1e-5)
     assert (link["links.link1.centre.x"], link["links.link1.centre.y"]) == pytest.approx((0.05, 0))
+    for given, middle in (({}, (0.05, 0)), ({"at": [0.06, 0]}, (0.036, -0.048))):  # 60 mm along x, at 53.13° to the bar
+        after, _ = edited(text, places, {"do": "centre", "link": "link1"} | given)
+        found = Mechanism(**entries_of(after)[0]).parameters()
+        assert [found[f"links.link1.centre.{axis}"] for axis in "xy"] == pytest.approx(middle)
     for wrong, words in (
         ({"width": "-1 mm"}, "not above 0"),
         ({"density": "7 kg"}, "no density"),
@@ -406,7 +410,7 @@ assembly: {C: [75 mm, 80 mm], H: [165 mm, 65 mm]}
 def test_a_watt_six_bar_of_links_that_were_joined_is_the_typed_one():
     spot = {name: list(place) for name, place in SIX_BAR.items()}
     aside = ([0.0, 0.2], [0.1, 0.2])  # where links are drawn that come to their places by joins alone
-    text, _ = edited(
+    text, places = edited(
         "", {},
         {"do": "link", "from": {"ground": spot["A"]}, "to": spot["B"]},
         {"do": "link", "from": {"ground": spot["D"]}, "to": spot["C"]},
@@ -426,14 +430,12 @@ def test_a_watt_six_bar_of_links_that_were_joined_is_the_typed_one():
     )
     assert np.isfinite(drawn).all()
     np.testing.assert_allclose(drawn, typed, rtol=0, atol=1e-12 * np.abs(typed).max())
-
-
-def test_a_first_mass_is_in_the_middle_of_its_link():
-    text, places = edited("", {}, {"do": "link", "from": {"ground": [0, 0]}, "to": [0.06, 0.08]})
-    for given, centre in (({}, (0.05, 0)), ({"at": [0.06, 0]}, (0.036, -0.048))):  # 60 mm along x, at 53.13° to the bar
-        after, _ = edited(text, places, {"do": "centre", "link": "link1"} | given)
-        found = Mechanism(**entries_of(after)[0]).parameters()
-        assert [found[f"links.link1.centre.{axis}"] for axis in "xy"] == pytest.approx(centre)
+    shifted = {"do": "group", "what": "shift", "links": ["link4"], "by": [0.03, 0]}
+    text, places = edited(text, places, shifted)  # its ends go with it, and the links there follow
+    points = {name: one["points"] for name, one in entries_of(text)[0]["links"].items()}
+    assert points["link1"]["B"] == ["50 mm", 0]  # √(30² + 40²)
+    assert places["link2.D"] == pytest.approx([0.105, 0.08])
+    assert places["link2.G"] == pytest.approx(spot["F"], abs=1e-6)  # it stays
 
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -449,28 +451,12 @@ def grouped(example, **given):
 
 
 @pytest.mark.parametrize("example", ["watt-six-bar", "durango-fourbar", "geared-five-bar", "spring-balanced-lamp"])
-def test_a_mirrored_mechanism_has_the_mirrored_figures(example):
+def test_a_mirrored_mechanism_has_the_mirrored_figures_and_a_copy_the_same(example):
     """Turned round and moving the other way, it takes the same torques the other way; gravity stays."""
     before, after = grouped(example, what="mirror", at=[0.013, 0.02])
-    np.testing.assert_allclose(after, -before, rtol=0, atol=1e-12 * np.nanmax(np.abs(before)))
-
-
-def test_a_copy_has_the_figures_of_what_it_is_a_copy_of():
-    before, after = grouped("geared-five-bar", what="copy", by=[0.1, 0.02])
-    for one in np.split(after, 2):
-        np.testing.assert_allclose(one, before, rtol=0, atol=1e-12 * np.nanmax(np.abs(before)))
-
-
-def test_links_outside_follow_what_is_shifted():
-    text, places = edited(
-        "", {},
-        {"do": "link", "from": {"ground": [0, 0]}, "to": [0, 0.04]},
-        {"do": "link", "from": "link1.B", "to": [0.08, 0.1]},
-        {"do": "link", "from": "link2.C", "to": {"ground": [0.08, 0]}},
-        {"do": "group", "what": "shift", "links": ["link2"], "by": [0.03, 0]},
-    )  # fmt: skip
-    assert places["link1.B"] == pytest.approx([0.03, 0.04])
-    assert places["link3.C"] == pytest.approx([0.11, 0.1])
-    points = entries_of(text)[0]["links"]
-    assert points["link1"]["points"]["B"] == ["50 mm", 0]  # √(30² + 40²)
-    assert points["link2"]["points"]["C"] == ["100 mm", 0]
+    near = {"rtol": 0, "atol": 1e-12 * np.nanmax(np.abs(before))}
+    np.testing.assert_allclose(after, -before, **near)
+    for given, sign in (({"by": [0.1, 0.02]}, 1), ({"at": [0.5, 0.02]}, -1)):
+        both = np.split(grouped(example, what="copy", **given)[1], 2)
+        for one, expected in zip(both, (before, sign * before), strict=True):
+            np.testing.assert_allclose(one, expected, **near)

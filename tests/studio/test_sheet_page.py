@@ -138,6 +138,13 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
             user.of("actions", "m.undo()")
         user.idle()
         assert user.state("s.text.value") == ""
+        hand.link((-0.05, 0), (0.05, 0.05))
+        hand.link((-0.05, 0.05), (0.03, -0.03))
+        hand.tool("j", "Join")
+        hand.click((-0.015, 0.015))  # beside the crossing: x/2 + 25 = -x for x = -50/3 mm
+        user.until("s.answer.value.text === s.text.value && Object.keys(s.answer.value.entries.joints ?? {}).length")
+        place = next(at for key, at in user.state("s.places.value").items() if key == "link2.E")
+        np.testing.assert_allclose(place, [-0.05 / 3, 0.05 / 3], atol=1e-5)
 
     def test_a_mass_centre_is_dragged_with_the_forces_of_where_it_is(user):
         """By mouse, arrow key and finger; the crank lies along x: its frame is that of the sheet."""
@@ -210,6 +217,18 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
             "Object.entries(s.places.value).filter(([key]) => key.startsWith('link5')).map(one => one[1])"
         )
         np.testing.assert_allclose(copied, [[0.02 + 2 * step, 3 * step], [0.02 + 2 * step, 0.05 + 3 * step]])
+        for by, corners in (("keyboard", [(-0.1, -0.02), (-0.07, 0.08)]), ("touch", [(-0.1, -0.02), (-0.07, 0.08)])):
+            other = Hand(user, by)
+            user.keys("Escape")
+            other.tool("b", "Box")
+            if by == "touch":
+                other.drag(*corners)
+            else:
+                other.click(corners[0])
+                other.click(corners[1])
+            assert user.state("s.group.value") == ["link1"]
+        user.of("group", "m.chooseLinks(given)", ["link4", "link5"])
+        user.page.locator(".sheet > svg").focus()
         user.keys("Delete")
         assert user.state("Object.keys(s.answer.value.entries.links).length") == 4
         user.keys("Control+z", "Control+z")

@@ -44,12 +44,12 @@ def group(sketch: Sketch, given: Given) -> str:
     links, what = [str(one) for one in given["links"]], str(given["what"])
     if not links or any(one not in sketch.of("links") or one == sketch.ground for one in links):
         raise refused("is no link that moves", ", ".join(links), "choose links that are drawn")
-    said = links[0] if len(links) == 1 else f"{len(links)} links"
+    title = links[0] if len(links) == 1 else f"{len(links)} links"
     if what == "delete":
         for one in links:
             if one in sketch.of("links"):  # a block goes with what it slides on
                 delete(sketch, {"what": ["links", one]})
-        return f"Delete {said}"
+        return f"Delete {title}"
     if what == "copy":
         links = _copied(sketch, links)
         sketch.made = ("group", " ".join(links))
@@ -60,7 +60,7 @@ def group(sketch: Sketch, given: Given) -> str:
         x, y = vector(given["at"])
         signs, offset = ((1, -1), (0.0, 2 * y)) if given.get("level") else ((-1, 1), (2 * x, 0.0))
         _Moving(sketch, links, signs, offset).do()
-    return f"{ {'shift': 'Move', 'mirror': 'Mirror'}.get(what, 'Copy') } {said}"
+    return f"{ {'shift': 'Move', 'mirror': 'Mirror'}.get(what, 'Copy') } {title}"
 
 
 @dataclass
@@ -111,22 +111,22 @@ class _Moving:
         sketch = self.sketch
         pair = sketch.joints[joint]["links"]
         inside, other = pair if pair[0] in self.links else reversed(pair)
-        sketch.write(list(sketch.relocated(other, [joint], sketch.places[f"{inside}.{joint}"])))
+        sketch.write(list(sketch.followed(other, [joint], sketch.places[f"{inside}.{joint}"])))
         sketch.places[f"{other}.{joint}"] = sketch.places[f"{inside}.{joint}"]
         sketch.show(other, sketch.frame(other))
 
     def _ground(self, point: str) -> None:
-        stated = self.sketch.section("links")[self.sketch.ground]["points"]
-        one = stated[point]
+        points = self.sketch.section("links")[self.sketch.ground]["points"]
+        one = points[point]
         place = one.get("at") if isinstance(one, dict) else one
         if not isinstance(place, list):
             raise refused("is not stated by x and y", f"links.{self.sketch.ground}.points.{point}", "write it so")
         place = self._placed(place)
         if isinstance(one, dict):
             axis = {"axis": [self._signed(part, i) for i, part in enumerate(one["axis"])]} if "axis" in one else {}
-            stated[point] = {**one, "at": place, **axis}
+            points[point] = {**one, "at": place, **axis}
         else:
-            stated[point] = place
+            points[point] = place
 
     def _placed(self, place: list[Any]) -> list[Any]:
         return [_plus(self._signed(part, i), self.offset[i], self.sketch.unit) for i, part in enumerate(place)]
@@ -159,6 +159,8 @@ class _Moving:
     def _refuse(self, joints: Mapping[str, Any], outside: list[str]) -> None:
         """What would not be mirrored with the drawing."""
         sketch = self.sketch
+        if "at" in sketch.section("assembly"):
+            raise refused("says where the driver is", "assembly.at", "mirror it in the text")
         for name, one in joints.items():
             if set(one) & {"seat", "seat_on", "misalignment"}:
                 raise refused("has a seat, which is not mirrored", f"joints.{name}", "mirror it in the text")
@@ -168,7 +170,7 @@ class _Moving:
         for section in ("drivers", "gears", "springs", "loads"):
             for name, one in sketch.of(section).items():
                 meant = [name] if section == "drivers" else [one.get("joint"), *one.get("joints", ())]
-                if set(meant) & set(outside):
+                if set(meant) & set(outside) or 0 < len(set(meant) & set(joints)) < len({*meant} - {None}):
                     raise refused("is at a link that is not chosen", f"{section}.{name}", "choose that link too")
 
     def _flip(self, joints: Mapping[str, Any]) -> None:
@@ -225,10 +227,8 @@ class _Moving:
 
     def _load(self, load: dict[str, Any]) -> None:
         if "force" in load:
-            own = load.get("frame") == "link"
-            load["force"] = [
-                _minus(part) if (i == 1 if own else self.signs[i] < 0) else part for i, part in enumerate(load["force"])
-            ]
+            signs = (1, -1) if load.get("frame") == "link" else self.signs
+            load["force"] = [part if sign > 0 else _minus(part) for part, sign in zip(load["force"], signs, strict=True)]
         if "moment" in load:
             load["moment"] = _minus(load["moment"])
         if "only" in load and load.get("joint") and self._turns(load["joint"]):
@@ -245,12 +245,12 @@ def _mirrored(stated: Any) -> Any:
 
 def _fastened(sketch: Sketch, links: list[str]) -> set[str]:
     """Points of the ground that springs of some links are fastened to."""
-    found = set()
+    points = set()
     for spring in sketch.of("springs").values():
         ends = [str(end).partition(".") for end in spring.get("between") or ()]
         if any(end[0] in links for end in ends):
-            found |= {point for link, _, point in ends if link == sketch.ground}
-    return found
+            points |= {point for link, _, point in ends if link == sketch.ground}
+    return points
 
 
 def _still(sketch: Sketch, name: str, load: Mapping[str, Any]) -> None:
@@ -274,13 +274,13 @@ def _copied(sketch: Sketch, links: list[str]) -> list[str]:
         names[link] = _again(sketch, "links", link)
         sketch.section("links")[names[link]] = {"points": {}}  # its name is spoken for
     points: dict[str, str] = {}
-    own = [point for link in links for point in sketch.points(link)]
-    for point in dict.fromkeys([*inner, *own, *sorted(_fastened(sketch, links))]):
+    theirs = [point for link in links for point in sketch.points(link)]
+    for point in dict.fromkeys([*inner, *theirs, *sorted(_fastened(sketch, links))]):
         points[point] = letter(sketch, points.values())
     for link in links:
         entry = copy.deepcopy(sketch.section("links")[link])
-        entry["points"] = {points[point]: one for point, one in sketch.points(link).items()}
-        sketch.section("links")[names[link]] = copy.deepcopy(entry)
+        entry["points"] = {points[point]: entry["points"][point] for point in sketch.points(link)}
+        sketch.section("links")[names[link]] = entry
         sketch.places |= {f"{names[link]}.{points[point]}": sketch.places[f"{link}.{point}"]
                           for point in sketch.points(link) if f"{link}.{point}" in sketch.places}  # fmt: skip
     for point in {*inner, *_fastened(sketch, links)} & set(sketch.points(ground)):

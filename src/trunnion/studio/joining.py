@@ -24,21 +24,21 @@ def join(sketch: Sketch, given: Given) -> str:
     first, second = given["ends"]
     place = place_of(sketch, second)
     owners = [_owners(sketch, end) for end in (first, second)]
-    (own, *_), (other, *_) = owners
+    (link, *_), (other, *_) = owners
     if set(owners[0]) & set(owners[1]):
-        raise refused("would be joined with itself", own, "choose ends of two links")
+        raise refused("would be joined with itself", link, "choose ends of two links")
     for name, joint in sketch.joints.items():
-        if {own, other} == set(joint["links"]):
-            raise refused(f"and {other} are joined at {name} already", own, "choose two other links")
+        if {link, other} == set(joint["links"]):
+            raise refused(f"and {other} are joined at {name} already", link, "choose two other links")
     if isinstance(first, str):
         move(sketch, {"point": first, "to": place})
-    name = _name(sketch, (own, other), (first, second))
-    for link, end in ((own, first), (other, second)):
-        _call(sketch, link, end, name, place)
+    name = _name(sketch, (link, other), (first, second))
+    for side, end in ((link, first), (other, second)):
+        _call(sketch, side, end, name, place)
     sketch.forget()
-    pin(sketch, name, other, own, place)
+    pin(sketch, name, other, link, place)
     sketch.made = ("joints", name)
-    return f"Join {own} with {other}"
+    return f"Join {link} with {other}"
 
 
 def _owners(sketch: Sketch, end: Any) -> list[str]:

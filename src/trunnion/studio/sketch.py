@@ -240,13 +240,18 @@ class Sketch:
             mine = [joint for joint in joints if link in self.joints[joint]["links"] and self._turns(joint)]
             if link == self.ground:
                 found += [change for joint in mine for change in self._at(link, joint, to)]
-            elif guide := self._guide(link):
-                found += self._shifted(guide, to)
-            elif mine:
-                found += self.relocated(link, mine, to)
-            elif slot := self._slot(link):
-                found += self._turned(link, slot, to)
+            else:
+                found += self.followed(link, mine, to)
         return found
+
+    def followed(self, link: str, pins: list[str], to: Vector) -> Iterator[Change]:
+        """What changes of a moving link whose pins, or block if it has none, go to a place; its others stay."""
+        if guide := self._guide(link):
+            yield from self._shifted(guide, to)
+        elif pins:
+            yield from self._relocated(link, pins, to)
+        elif slot := self._slot(link):
+            yield from self._turned(link, slot, to)
 
     def _turns(self, joint: str) -> bool:
         return bool(self.joints[joint].get("type", "revolute") == "revolute")
@@ -281,7 +286,7 @@ class Sketch:
         across = ((to[1] - before[1]) * x - (to[0] - before[0]) * y) / norm
         yield from self._at(first, joint, (base[0] - across * y / norm, base[1] + across * x / norm))
 
-    def relocated(self, link: str, moving: list[str], to: Vector) -> Iterator[Change]:
+    def _relocated(self, link: str, moving: list[str], to: Vector) -> Iterator[Change]:
         """New coordinates of the joints of a link where some of them go to a place and the others stay.
 
         A link whose frame begins at one joint and has its x through another keeps that form, unless it has a slot.

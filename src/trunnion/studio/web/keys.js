@@ -36,14 +36,15 @@ function withControl(event) {
   else if (key === "o") state.dialog.value = "open";
   else if (key === "z" && !writes) event.shiftKey ? actions.redo() : actions.undo();
   else if (key === "y" && !writes) actions.redo();
-  else if (key === "a" && onSheet(event.target)) return chooseAll();
-  else if (key === "d" && onSheet(event.target) && copied()) return act(copied()[2]);
+  else if (key === "a" && free(event.target)) return chooseAll();
+  else if (key === "d" && free(event.target) && copied()) return act(copied()[2]);
   else if (key === "a" && !event.target.closest?.(WRITES)) return true; // or it would mark the whole page
   else return false;
   return true;
 }
 
 const onSheet = (target) => !state.spatial.value && sheet.view?.root.contains(target);
+const free = (target) => onSheet(target) || (target === document.body && !state.spatial.value && sheet.view);
 
 function chooseAll() {
   chooseLinks(allLinks());

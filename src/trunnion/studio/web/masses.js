@@ -106,16 +106,16 @@ export function Masses() {
   if (!links.length || state.spatial.value) return null;
   const mass = (name) => numbers[`links.${name}.mass`] ?? 0;
   const row = (name) => [
-    `${Number(mass(name).toPrecision(6))} kg`,
-    localOf(numbers, `links.${name}.centre`).map((one) => stated(one, "m")).join(", "),
-    `${Number((numbers[`links.${name}.inertia`] ?? 0).toPrecision(4))} kg m²`,
+    stated(mass(name), "kg"),
+    localOf(numbers, `links.${name}.centre`).map((one) => stated(one, "m")).join(", ").replace(/\b0\u00a0m\b/g, "0"),
+    stated(numbers[`links.${name}.inertia`] ?? 0, "kg\u00a0m²"),
   ]; // prettier-ignore
   const total = links.reduce((sum, name) => sum + mass(name), 0);
-  return html`<section class="masses"><h2>Masses</h2>
+  return html`<section class="mass-table"><h2>Masses</h2>
     <table><thead><tr><th>Link</th><th>Mass</th><th>Centre in its frame</th><th>Inertia about it</th></tr></thead>
       <tbody>${links.map((name) => html`<tr key=${name}><th><button type="button" class="link" onClick=${() => (state.selection.value = { kind: "links", name })}>${name}</button></th>
         ${mass(name) > 0 ? row(name).map((cell) => html`<td>${cell}</td>`) : html`<td colspan="3">none stated</td>`}</tr>`)}
-        ${total > 0 && html`<tr><th>all</th><td>${Number(total.toPrecision(6))} kg</td><td colspan="2"></td></tr>`}</tbody></table>
+        ${total > 0 && html`<tr><th>all</th><td>${stated(total, "kg")}</td><td colspan="2"></td></tr>`}</tbody></table>
     <${BarMass} links=${links.filter((name) => !(mass(name) > 0))} />
     <${Gravity} /></section>`; // prettier-ignore
 }

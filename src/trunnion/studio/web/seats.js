@@ -4,7 +4,7 @@
 import { arrow } from "../web/arrow.js";
 import { hole, jumpsAt, leaning } from "../web/built.js";
 import { angleAt, at, guide, place } from "../web/data.js";
-import { svg } from "../web/dom.js";
+import { set, svg } from "../web/dom.js";
 import { quantity } from "../web/format.js";
 import { perNewton } from "./drawing.js";
 import * as state from "./state.js";
@@ -64,9 +64,9 @@ function inHole(view, joint, seat) {
   const [by, load] = [offset, force].map((one) => valueAt(one, index));
   const [unit, angle] = [unitOf(view), axesOf(view, joint)];
   const [x, y] = frame.to(hole(scene, joint, index) ?? place(scene, joint.at, index));
-  seat.path ??= way(offset, scene, seat.clearance);
+  seat.path ??= svg("path", { class: "way-of-pin", d: way(offset, scene, seat.clearance), "vector-effect": "non-scaling-stroke" }); // once: it is long
   const [c, s] = [unit * Math.cos(angle), unit * Math.sin(angle)];
-  const path = svg("path", { class: "way-of-pin", d: seat.path, transform: `matrix(${c},${-s},${-s},${-c},${x},${y})`, "vector-effect": "non-scaling-stroke" });
+  const path = set(seat.path, { transform: `matrix(${c},${-s},${-s},${-c},${x},${y})` });
   if (!by) return [path];
   const size = Math.hypot(...by);
   const [ux, uy] = size > 0 ? turned(by, angle).map((part) => part / size) : [0, 0];

@@ -3,7 +3,7 @@
 import * as actions from "./actions.js";
 import { partUnder } from "./hand.js";
 import { crank } from "./motion.js";
-import { apart, sheet, shown } from "./sheet.js";
+import { sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
 import { TOOLS, cancel, choose, click, placeTyped, pointer, removePart, toolOf, typed } from "./tools.js";
 import { focusOn } from "./ui.js";
@@ -101,7 +101,6 @@ function arrow({ target, key, shiftKey, altKey }) {
 
 function nudge({ kind, name }, at) {
   state.selection.value = { kind, name };
-  if (apart()) return;
   actions.edit([{ do: "move", point: name, to: at, index: sheet.view.posed, keep: !shown.peek()?.sketched }], `nudge ${name}`);
 }
 

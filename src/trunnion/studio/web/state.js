@@ -51,8 +51,9 @@ export const future = signal([]);
 /** "stated", "compare" (and without) or "off". */
 export const friction = signal("stated");
 export const layers = signal({
+  seats: true, nominal: true,
   curves: true, reactions: true, values: false, velocity: true, acceleration: true, centres: false, relative: false, circles: false,
-  transmission: false, variant: true, names: true, grid: true, others: false, seats: true, nominal: true,
+  transmission: false, variant: true, names: true, grid: true, others: false,
 }); // prettier-ignore
 export const snapping = signal(true);
 export const tab = signal("properties");
@@ -133,12 +134,12 @@ export function begin({ name, saved, content, steps = null }) {
     locked.value = steps?.locked ?? [];
     past.value = steps?.past ?? [];
     future.value = steps?.future ?? [];
+    corner.value = null;
+    factor.value = 1;
     answer.value = null;
     selection.value = null;
     pending.value = null;
     live.value = null;
-    corner.value = null;
-    factor.value = 1;
     index.value = 0;
     share.value = 0;
     tool.value = "select";

@@ -5,7 +5,7 @@ import * as state from "./state.js";
 import { isPart } from "./fields.js";
 import { placesAt, posedAt, stemOf } from "./geometry.js";
 import { enterTab, forget, forgetOwn, keepSteps, lastSheet, left, leftBehind, lookForTabs, takeUp } from "./keeping.js";
-import { sheet } from "./sheet.js";
+import { apart, sheet } from "./sheet.js";
 import { connection, decode, request } from "./socket.js";
 
 const STEPS = 360; // positions of a run
@@ -120,6 +120,7 @@ let queue = Promise.resolve(true);
  * Steps in a row with the same `merge` are undone as one. `places`: what they start from, else what is shown. Whether it could be done.
  */
 export function edit(gestures, merge = null, places = null) {
+  if (gestures.some(({ to, by }) => to || by) && apart()) return Promise.resolve(false); // by a hand that sees it elsewhere
   queue = queue.then(() => carryOut(gestures, merge, places)).catch((problem) => refuse(String(problem.message ?? problem)));
   return counted(queue);
 }

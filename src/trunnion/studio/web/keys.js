@@ -6,7 +6,7 @@ import { crank } from "./motion.js";
 import { allLinks, chooseLinks, chosenLinks, groupActions, shift } from "./group.js";
 import { chosenOf, massSpots } from "./masses.js";
 import { openByKey } from "./menu.js";
-import { apart, partUnder, partsAt, sheet, shown } from "./sheet.js";
+import { partUnder, partsAt, sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
 import { TOOLS, cancel, choose, click, placeTyped, pointer, removePart, toolOf, typed } from "./tools.js";
 import { focusOn } from "./ui.js";
@@ -124,7 +124,6 @@ function arrow({ target, key, shiftKey, altKey }) {
 function nudge({ kind, name }, at) {
   if (kind === "centres") return void actions.edit([{ do: "centre", link: name, at }], `nudge ${name}`);
   state.selection.value = { kind, name };
-  if (apart()) return;
   actions.edit([{ do: "move", point: name, to: at, index: sheet.view.posed, keep: !shown.peek()?.sketched }], `nudge ${name}`);
 }
 

@@ -2,7 +2,7 @@
 // angles, values at the arrows, and the outlines of variant A. Python works it out; here it is only drawn.
 
 import { arrow } from "../web/arrow.js";
-import { told } from "../web/built.js";
+import { told as rounded } from "../web/built.js";
 import { angleAt, at, forceAt, magnitude, peak, place } from "../web/data.js";
 import { set, svg } from "../web/dom.js";
 import { quantity, roundBelow, short, stated } from "../web/format.js";
@@ -47,23 +47,23 @@ export function poseOverlay(view) {
   const found = known && laid.peek()?.scene === (scene.of ?? scene) ? laid.peek() : {};
   const corner = Boolean(view.ideal && cornered.peek()); // of which nothing but its places is told
   const point = corner || found.point?.position ? null : found.point;
-  const over = view.ideal ? { point, seats: corner ? null : found.seats } : found; // the rest is where it is
+  const told = view.ideal ? { point, seats: corner ? null : found.seats } : found; // the rest is where it is
   const key = []; // lines of the key, from below
   room = view.frame.width - 6;
   taken = [...view.parts.names, ...view.parts.loads].flatMap(({ box }) => box ?? []);
   if (sheet.beside().length) key.push(keyed(view, 22, "other assemblies", (x, y) => svg("g", { class: "ghost" }, svg("path", { d: `M${x},${y}h22` }))));
   layers.variants.replaceChildren(...(view.ideal ? nominal(view, wanted, key) : wanted.variant ? variants(view, key) : []));
   layers.masses.replaceChildren(...massMarks(view));
-  const seats = wanted.seats && view.ideal ? (over.seats ?? []) : [];
+  const seats = wanted.seats && view.ideal ? (told.seats ?? []) : [];
   for (const { joint, node } of view.parts.vectors) set(node, { visibility: corner || seats.some((one) => one.joint === joint.name) ? "hidden" : null }); // drawn where it touches
   layers.overlay.replaceChildren(
     ...dimensionMarks(view, words, (x, y, text) => taken.push({ left: x - 0.5 * LETTER * text.length, right: x + 0.5 * LETTER * text.length, y: y + 4 })),
-    ...(over.circles ? circles(view, over.circles, key) : []),
-    ...(over.transmission ? over.transmission.flatMap((one) => angle(view, one)) : []),
-    ...(over.centres ? centres(view, over.centres, wanted) : []),
+    ...(told.circles ? circles(view, told.circles, key) : []),
+    ...(told.transmission ? told.transmission.flatMap((one) => angle(view, one)) : []),
+    ...(told.centres ? centres(view, told.centres, wanted) : []),
     ...(known && !corner && wanted.reactions && wanted.values ? values(view) : []),
     ...pinsInHoles(view, seats, wanted, words),
-    ...(over.point ? motion(view, over.point, wanted, key) : []),
+    ...(told.point ? motion(view, told.point, wanted, key) : []),
     ...locking(view),
     ...key.map((draw, order) => draw(view.frame.height - 16 - 20 * (order + 1))),
   );
@@ -174,8 +174,8 @@ function circles(view, list, key) {
   const most = peak(...list.map(({ radius }) => radius)) * frame.scale;
   if (!(most > 0)) return [];
   const times = most >= CIRCLE ? 1 : roundAbove(CIRCLE / most);
-  const named = times > 1 ? `friction circles × ${times}` : "friction circles";
-  key.push(keyed(view, 22, named, (x, y) => svg("circle", { class: "friction-circle", cx: x + 11, cy: y, r: 6 })));
+  const told = times > 1 ? `friction circles × ${times}` : "friction circles";
+  key.push(keyed(view, 22, told, (x, y) => svg("circle", { class: "friction-circle", cx: x + 11, cy: y, r: 6 })));
   return list.flatMap(({ joint: name, radius, offset }) => {
     const joint = scene.joints.find((one) => one.name === name);
     const found = joint && place(scene, joint.at, index);
@@ -184,17 +184,17 @@ function circles(view, list, key) {
     const [x, y] = frame.to(found);
     const r = size * frame.scale * times;
     const circle = svg("circle", { class: "friction-circle", cx: x.toFixed(1), cy: y.toFixed(1), r: r.toFixed(1) });
-    const label = words(x + 12 + r * 0.7, y + 18 + r * 0.4, `${name}: r = ${quantity(size, "m")}`);
+    const told = words(x + 12 + r * 0.7, y + 18 + r * 0.4, `${name}: r = ${quantity(size, "m")}`);
     const arm = at(offset, index);
     const [fx, fy] = [at(joint.reaction.x, index), at(joint.reaction.y, index)];
     const force = Math.hypot(fx, fy);
-    if (arm === null || !(force > 0)) return [circle, label];
+    if (arm === null || !(force > 0)) return [circle, told];
     // to the right of the force, seen along it; y points down on the screen
     const shift = (arm * frame.scale * times) / force;
     const [tx, ty] = [x + shift * fy, y + shift * fx];
     const [ux, uy] = [(64 * fx) / force, (-64 * fy) / force];
     const line = svg("path", { class: "line-of-action", d: `M${tx - ux},${ty - uy}L${tx + ux},${ty + uy}` });
-    return [line, circle, label];
+    return [line, circle, told];
   });
 }
 
@@ -257,7 +257,7 @@ function nominal(view, wanted, key) {
   const { frame, drawn: index, ideal, scene } = view;
   const line = (x, y) => svg("path", { class: "ideal", d: `M${x},${y}h22` });
   if (wanted.nominal) key.push(keyed(view, 22, cornered.peek() ? "nominal" : "without errors", line));
-  key.push(keyed(view, 22, `errors × ${told(scene.factor)}`, () => null));
+  key.push(keyed(view, 22, `errors × ${rounded(scene.factor)}`, () => null));
   if (!wanted.nominal) return [];
   const { spots } = standing(ideal, frame, index, {});
   return ideal.links.filter((link) => !link.ground).map((link) => svg("path", { class: "ideal", d: outline(spots(link.points)) }));

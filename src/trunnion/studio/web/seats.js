@@ -4,7 +4,7 @@
 import { arrow } from "../web/arrow.js";
 import { hole, jumpsAt, leaning } from "../web/built.js";
 import { angleAt, at, guide, place } from "../web/data.js";
-import { svg } from "../web/dom.js";
+import { set, svg } from "../web/dom.js";
 import { quantity } from "../web/format.js";
 import { perNewton } from "./drawing.js";
 import * as state from "./state.js";
@@ -15,11 +15,12 @@ const NORMAL = 16; // px beyond the contact
 
 /** What is drawn of the seats of the joints that are loose, at the present position. */
 export function pinsInHoles(view, seats, wanted, words) {
+  const scale = wanted.reactions ? perNewton(view) : 0;
   return seats.flatMap((seat) => {
     const joint = view.scene.joints.find(({ name }) => name === seat.joint);
     const middle = joint && place(view.scene, joint.at, view.exact);
     if (!middle) return [];
-    const parts = seat.kind === "guide" ? inGuide(view, joint, seat) : inHole(view, joint, seat);
+    const parts = seat.kind === "guide" ? inGuide(view, joint, seat, scale) : inHole(view, joint, seat, scale);
     const chosen = state.selection.peek()?.name === joint.name;
     if (!parts.length || !(wanted.values || chosen)) return parts;
     const [x, y] = view.frame.to(middle);
@@ -58,21 +59,21 @@ function telling(view, joint, { ends, kind }) {
   }).join("; "); // prettier-ignore
 }
 
-function inHole(view, joint, seat) {
+function inHole(view, joint, seat, scale) {
   const { frame, exact: index, scene, kinds } = view;
   const [{ offset, force }] = seat.ends;
   const [by, load] = [offset, force].map((one) => valueAt(one, index));
   const [unit, angle] = [unitOf(view), axesOf(view, joint)];
   const [x, y] = frame.to(hole(scene, joint, index) ?? place(scene, joint.at, index));
-  seat.path ??= way(offset, scene, seat.clearance);
+  seat.path ??= svg("path", { class: "way-of-pin", d: way(offset, scene, seat.clearance), "vector-effect": "non-scaling-stroke" }); // once: it is long
   const [c, s] = [unit * Math.cos(angle), unit * Math.sin(angle)];
-  const path = svg("path", { class: "way-of-pin", d: seat.path, transform: `matrix(${c},${-s},${-s},${-c},${x},${y})`, "vector-effect": "non-scaling-stroke" });
+  const path = set(seat.path, { transform: `matrix(${c},${-s},${-s},${-c},${x},${y})` });
   if (!by) return [path];
   const size = Math.hypot(...by);
   const [ux, uy] = size > 0 ? turned(by, angle).map((part) => part / size) : [0, 0];
   const far = PIN + unit * seat.clearance; // to the wall of the hole
   const touch = [x + ux * far, y - uy * far];
-  const pressed = load && turned(load, angle).map((part) => part * perNewton(view));
+  const pressed = load && turned(load, angle).map((part) => part * scale);
   const touches = size > 0.99 * seat.clearance;
   const normal = `M${x + unit * ux * size},${y - unit * uy * size}L${x + ux * (far + NORMAL)},${y - uy * (far + NORMAL)}`;
   return [path, ...(touches ? [svg("path", { class: "normal-of-contact", d: normal })] : []), ...loaded(kinds.get(joint.name), touch, pressed, touches)];
@@ -96,7 +97,7 @@ function way(offset, { count, abscissa }, clearance) {
 }
 
 /** A block between its walls: the rail lies aside in the block by the offset of an end, and touches the other side of the block. */
-function inGuide(view, joint, seat) {
+function inGuide(view, joint, seat, scale) {
   const { frame, scene, exact: index, kinds } = view;
   const [axis, drawn] = [axesOf(view, joint), guide(scene, joint, index) + leaning(scene, joint, index)];
   const [x, y] = frame.to(place(scene, joint.at, index));
@@ -105,7 +106,7 @@ function inGuide(view, joint, seat) {
     if (!by) return [];
     const side = by[1] > 0 ? -1 : 1;
     const [dx, dy] = turned([(end ? 0.5 : -0.5) * seat.length * frame.scale, side * BLOCK], drawn);
-    const pressed = load && turned(load, axis).map((part) => part * perNewton(view));
+    const pressed = load && turned(load, axis).map((part) => part * scale);
     return loaded(kinds.get(joint.name), [x + dx, y - dy], pressed, Math.abs(by[1]) > 0.99 * seat.clearance);
   });
 }

@@ -59,8 +59,9 @@ export const future = signal([]);
 /** "stated", "compare" (and without) or "off". */
 export const friction = signal("stated");
 export const layers = signal({
+  seats: true, nominal: true,
   curves: true, reactions: true, values: false, velocity: true, acceleration: true, centres: false, relative: false, circles: false,
-  transmission: false, variant: true, names: true, grid: true, masses: true, dimensions: false, others: false, peaks: false, seats: true, nominal: true,
+  transmission: false, variant: true, names: true, grid: true, masses: true, dimensions: false, others: false, peaks: false,
 }); // prettier-ignore
 export const snapping = signal(true);
 export const tab = signal("properties");
@@ -150,13 +151,13 @@ export function begin({ name, saved, content, steps = null }) {
     locked.value = steps?.locked ?? [];
     past.value = steps?.past ?? [];
     future.value = steps?.future ?? [];
+    corner.value = null;
+    factor.value = 1;
     answer.value = null;
     selection.value = null;
     pending.value = null;
     live.value = null;
     dropping.value = null;
-    corner.value = null;
-    factor.value = 1;
     group.value = [];
     index.value = 0;
     share.value = 0;

@@ -195,7 +195,9 @@ def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: Fric
     if engine == "numpy":
         return numpy
     if loaded:
-        raise MechanismError(Finding("pins in the seats that loads give them", "engine", "use numpy or auto"))
+        raise MechanismError(
+            Finding("the compiled engine has no pins seated by their loads", "engine", "use numpy, or auto")
+        )
     timed = next((measure.name for measure in measures if measure.in_time), None)
     if timed is not None:
         what = f"the measure '{timed}' is of a motion in time"

@@ -35,6 +35,7 @@ def four_bar() -> Draft:
     return positions_of(trunnion.read(Path("examples/durango-fourbar.yaml")), 4).draft()
 
 
+@pytest.mark.spread(10)
 @pytest.mark.parametrize("path", MOVING, ids=lambda path: path.stem)
 def test_the_model_of_a_draft_moves_as_the_mechanism_does(path: Path, tmp_path: Path) -> None:
     stated = trunnion.read(path)

@@ -425,6 +425,7 @@ def tried(path: Path) -> tuple[Draft | None, tuple[Finding, ...]]:
         return None, error.findings
 
 
+@pytest.mark.slow
 def test_as_many_marks_as_are_read_take_seconds(tmp_path: Path) -> None:
     """Marks that crowd in one place are the worst: 600 circles, and 1,300 texts near to them."""
     marks = [("circle", (0, 0), 5.0)] * 300

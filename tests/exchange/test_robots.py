@@ -80,7 +80,7 @@ def same_start(one: Mechanism, other: Mechanism) -> None:
         assert powers[1] == pytest.approx(powers[0], rel=1e-8, abs=1e-8)
 
 
-@pytest.mark.spread(10, "rssr-.mjcf", "slider-crank-.urdf", "universal-joint-.sdf")
+@pytest.mark.spread(5, "rssr-.mjcf", "slider-crank-.urdf", "universal-joint-.sdf")
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize("name", MOVING)
 def test_out_and_in_again_is_the_same_mechanism(name: str, suffix: str, tmp_path: Path) -> None:

@@ -75,7 +75,7 @@ sensors:
 """
 
 
-@pytest.mark.spread(1, "rssr")
+@pytest.mark.spread(0, "rssr")
 @pytest.mark.parametrize("name", ["toleranced-fourbar", "rssr"])
 def test_conditions_that_turn_both_ways_by_a_dimension(program: Run, tmp_path: Path, name: str) -> None:
     """The speed that a condition sets by way of a dimension has the direction against which its angle is held."""

@@ -69,7 +69,7 @@ def test_mean_and_deviation_of_normal_values() -> None:
     assert np.isnan(of_deviation(1.0, np.nan, 50)).all()
 
 
-@pytest.mark.spread(2)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("law", ["normal", "uniform", "exponential"])
 def test_mean_and_deviation_are_covered(law: str) -> None:
     n, (mean, sigma) = 2000, {"normal": (0, 1), "uniform": (0.5, 12**-0.5), "exponential": (1, 1)}[law]

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from stand_in import four_bar, slider
 
 from trunnion.errors import MechanismError, Status
+from trunnion.views.common.cycle import mean_friction
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
 
@@ -65,6 +66,17 @@ def test_a_sliding_drive_has_a_force_over_millimetres():
     assert {"force S [N]", "drive slide S [mm]"} <= set(_texts(figure))
 
 
+def test_the_range_of_an_effort_where_friction_rests_is_drawn():
+    result = slider()
+    result["drive_effort_lower"] -= 4.0
+    result["drive_effort_upper"] += 6.0
+    (bars,) = plots.figure(result, "torque").axes[0].containers
+    assert bars.get_label() == "range, friction at rest"
+    middle = result.drive_effort.values[0] + 1.0
+    ends = np.array([segment[:, 1] for segment in bars[2][0].get_segments()])
+    assert ends == pytest.approx(np.transpose([middle - 5.0, middle + 5.0]))
+
+
 def test_a_gap_breaks_the_curve_and_names_its_cause():
     figure = plots.figure(four_bar(gap=(132, 229, Status.NOT_ASSEMBLED)), "torque")
     drawn = _curve(figure, "torque")
@@ -77,6 +89,15 @@ def test_friction_power_adds_up(plain):
     figure = plots.figure(plain, "friction-power")
     lines = {line.get_label().split(",")[0]: line.get_ydata() for line in figure.axes[0].lines}
     assert sum(lines[joint] for joint in "ABCD") == pytest.approx(lines["all joints"])
+
+
+def test_results_of_earlier_versions_have_means_and_peaks_by_their_positions(plain):
+    """Without the means over the cycle those of the positions, without a locking margin no position near it."""
+    older = plain.drop_vars(["friction_power_mean", "locking_margin"])
+    mean = float(plain.friction_power.sel(joint="A").mean())
+    assert mean_friction(older, "A") == pytest.approx(mean)
+    assert mean_friction(plain, "A") == pytest.approx(mean, rel=1e-3)
+    assert plots.figure(older, "torque").axes[0].lines
 
 
 def test_a_position_that_is_not_there_is_refused(plain):

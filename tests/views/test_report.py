@@ -67,8 +67,8 @@ def test_nothing_is_fetched(plain, ideal):
     assert len(text) < 1_500_000
 
 
-def test_the_policy_allows_exactly_the_one_script_and_the_one_style(plain):
-    text = report(plain)
+def test_the_policy_allows_exactly_the_one_script_and_the_one_style(ideal):
+    text = report(ideal)
     policy = next(a["content"] for _, a in Page(text).tags if a.get("http-equiv") == "Content-Security-Policy")
     for tag, pattern in (("script", r'<script type="module">(.*?)</script>'), ("style", r"<style>(.*?)</style>")):
         found = re.findall(pattern, text, re.DOTALL)

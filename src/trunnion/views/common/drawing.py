@@ -12,7 +12,7 @@ from matplotlib.transforms import Affine2D
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import GUIDED, PAIRS
-from trunnion.views.common.cycle import Array, abscissa, column, layout, names, status_text
+from trunnion.views.common.cycle import Array, abscissa, layout, members, status_text
 from trunnion.views.common.figures import INK, MUTED, PALETTE, Labels, plain
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Picture:
     box: tuple[float, float, float, float]
     weight: float = 1.0
     only: tuple[str, ...] = ()
-    pulls: dict[str, Array | None] = field(default_factory=dict)
+    pulls: dict[str, Array] = field(default_factory=dict)
 
     @property
     def letters(self) -> float:
@@ -77,11 +77,8 @@ class Picture:
 
 def picture(result: xr.Dataset) -> Picture:
     """Gather what the drawings need; raises MechanismError if no position can be drawn."""
-    tracks = {key: _track(result, key) for key in names(result, "point")}
-    angles = {link: column(result, "link_angle", link=link) for link in names(result, "link")}
-    known = {link: angle for link, angle in angles.items() if angle is not None}
-    pulls = {name: column(result, "spring_force", spring=name) for name in names(result, "spring")}
-    return replace(framed(layout(result), tracks, known), pulls=pulls)
+    tracks, angles = members(result, "point_position", "point"), members(result, "link_angle", "link")
+    return replace(framed(layout(result), tracks, angles), pulls=members(result, "spring_force", "spring"))
 
 
 def framed(stated: dict[str, Any], tracks: dict[str, Array], angles: dict[str, Array]) -> Picture:
@@ -92,20 +89,12 @@ def framed(stated: dict[str, Any], tracks: dict[str, Array], angles: dict[str, A
         what = "no position of the mechanism can be assembled: there is nothing to draw"
         raise MechanismError(Finding(what, remedy="change the lengths or the range of the driver"))
     centres = [(tracks[circle["at"]], circle["radius"]) for pair in stated["gears"].values() for circle in pair]
-    rims = [_rim(track, radius) for track, radius in centres if np.isfinite(track).any()]
+    rims = [np.array([np.nanmin(track, axis=1) - radius, np.nanmax(track, axis=1) + radius])
+            for track, radius in centres if np.isfinite(track).any()]  # fmt: skip
     points = np.concatenate([points, *rims])
     low, high = points.min(axis=0), points.max(axis=0)
     size = float(np.hypot(*(high - low))) or 1.0
     return Picture(stated, tracks, angles, size, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
-
-
-def _rim(track: Array, radius: float) -> Array:
-    """Corners of the box that a circle sweeps, (corner, axis)."""
-    return np.array([np.nanmin(track, axis=1) - radius, np.nanmax(track, axis=1) + radius])
-
-
-def _track(result: xr.Dataset, key: str) -> Array:
-    return np.asarray(result["point_position"].sel(point=key).transpose("axis", "position").values, dtype=float)
 
 
 def bare(axes: Axes, low: Array, high: Array, title: Sequence[str]) -> Axes:
@@ -165,19 +154,19 @@ def _curves(axes: Axes, shown: Picture) -> None:
         if link == shown.ground:
             continue
         free = point not in shown.stated["joints"]
-        x, y = np.hstack([track, track[:, :1]]) if _closes(track) else track
+        x, y = np.hstack([track, track[:, :1]]) if closes(track) else track
         if free:
             axes.plot(x, y, color=INK, linewidth=1.3 * shown.weight, zorder=2.5)
         else:
             axes.plot(x, y, color=MUTED, linewidth=0.7, linestyle=(0, (1, 2)), zorder=2.5)
 
 
-def _closes(track: Array) -> bool:
-    """Whether the end of a track is no farther from its start than its steps are long."""
+def closes(track: Array) -> bool:
+    """Whether the end of a track, (axis, position), is no farther from its start than its steps are long."""
     if track.shape[1] < 8 or not np.isfinite(track).all():
         return False
-    steps = np.hypot(*np.diff(track, axis=1))
-    return bool(np.hypot(*(track[:, 0] - track[:, -1])) <= 2.0 * steps.max())
+    steps = np.linalg.norm(np.diff(track, axis=1), axis=0)
+    return bool(np.linalg.norm(track[:, 0] - track[:, -1]) <= 2.0 * steps.max())
 
 
 def _corners(shown: Picture, link: str, index: int) -> Array | None:
@@ -392,12 +381,11 @@ def _together(places: dict[str, Array], near: float) -> list[tuple[str, list[str
     for point, place in places.items():
         home = next((group for group in groups if np.hypot(*(places[group[0]] - place)) < near), None)
         if home is None:
-            groups.append([point])
-        else:
-            home.append(point)
-    return [(", ".join(map(_short, group)), group) for group in groups]
+            groups.append(home := [])
+        home.append(point)
+    return [(", ".join(map(short, group)), group) for group in groups]
 
 
-def _short(name: str) -> str:
+def short(name: str) -> str:
     """A name that fits into the drawing."""
     return name if len(name) <= 18 else f"{name[:17]}…"

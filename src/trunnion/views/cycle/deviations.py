@@ -268,11 +268,13 @@ def error_rows(result: xr.Dataset) -> list[Row]:
             if sizes[0].ndim > 1:
                 sizes = np.linalg.norm(sizes[0], axis=0), np.linalg.norm(sizes[1], axis=0)
             rows.append(_largest(result, f"{noun} of {member}, largest", *sizes, unit))
-    friction = [sum(mean_friction(result, joint, of) for joint in names(result, "joint")) for of in ("", "_ideal")]
-    efficiency = [column(result, f"efficiency{of}") for of in ("", "_ideal")]
-    shares = [float("nan") if value is None else float(value) for value in efficiency]
-    return [*rows, _row("Friction power, mean", *friction, "W", units_of(result)),
-            _row("Efficiency of the cycle", *shares, "1", None)]  # fmt: skip
+    lost, ideally = (float(sum(mean_friction(result, joint, of) for joint in names(result, "joint")))
+                     for of in ("", "_ideal"))  # fmt: skip
+    share, ideal_share = (
+        float("nan") if (value := column(result, f"efficiency{of}")) is None else float(value) for of in ("", "_ideal")
+    )
+    return [*rows, _row("Friction power, mean", lost, ideally, "W", units_of(result)),
+            _row("Efficiency of the cycle", share, ideal_share, "1", None)]  # fmt: skip
 
 
 def _row(label: str, built: float, ideal: float, unit: str, units: Units | None, place: str = "") -> Row:

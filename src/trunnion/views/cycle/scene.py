@@ -116,12 +116,8 @@ def _single(result: xr.Dataset, name: str) -> float | None:
 
 def _points(result: xr.Dataset) -> dict[str, dict[str, Any]]:
     """Each "link.point" with its track; none in space, where the poses of the links tell them."""
-    if is_spatial(result):
-        return {}
-    return {
-        name: {axis: series(column(result, "point_position", point=name, axis=axis)) for axis in ("x", "y")}
-        for name in names(result, "point")
-    }
+    tracks = {} if is_spatial(result) else members(result, "point_position", "point")
+    return {name: {axis: series(row) for axis, row in zip("xy", track, strict=True)} for name, track in tracks.items()}
 
 
 def _links(stated: dict[str, Any], result: xr.Dataset, points: dict[str, Any]) -> list[dict[str, Any]]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.results.quantities import prefixed, quantity
-from trunnion.views.common.cycle import abscissa, names, series
+from trunnion.views.common.cycle import abscissa, members, series
 from trunnion.views.cycle.report import page
 from trunnion.views.cycle.scene import scene
 from trunnion.views.motion.figure import pictures
@@ -142,12 +142,8 @@ def _picked(rows: xr.Dataset) -> NDArray[np.intp]:
 
 def _contacts(rows: xr.Dataset) -> list[dict[str, Any]]:
     """Normal force and gap of every contact of joints in play."""
-    known = names(rows, "contact") if "contact" in rows.dims else []
-    forces, gaps = (rows[f"contact_{name}"].values if known else () for name in ("normal_force", "gap"))
-    return [
-        {"name": name, "force": series(force), "gap": series(gap)}
-        for name, force, gap in zip(known, forces, gaps, strict=True)
-    ]
+    forces, gaps = (members(rows, f"contact_{name}", "contact") for name in ("normal_force", "gap"))
+    return [{"name": name, "force": series(force), "gap": series(gaps[name])} for name, force in forces.items()]
 
 
 def _free(rows: xr.Dataset) -> list[dict[str, Any]]:

@@ -17,7 +17,7 @@ from trunnion.algebra.space import rotation_matrix
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import attribute
-from trunnion.views.common.cycle import Array, layout, names
+from trunnion.views.common.cycle import Array, layout, members
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -200,34 +200,18 @@ def space(result: xr.Dataset) -> Space:
 
 def gathered(result: xr.Dataset) -> Space:
     """The same, whether or not a position can be drawn."""
-    stated = layout(result)
-    count = result.sizes["position"]
-    poses = {link: _pose(result, link) for link in names(result, "link")}
+    stated, count = layout(result), result.sizes["position"]
+    turns, origins = members(result, "link_rotation", "link"), members(result, "link_position", "link")
+    poses = {link: BodyPose(rotation_matrix(turns[link]), origins[link]) for link in turns}
     still = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, count)), np.zeros((3, count))
     poses[stated["ground"]] = BodyPose(*still)  # the global frame, also where nothing else is known
     free = {}
-    for key in names(result, "point"):
+    for key, track in members(result, "point_position", "point").items():
         link, point = key.split(".", 1)
         if link in poses and point not in stated["joints"]:
-            local = _local(result, key, poses[link])
-            if local is not None:
-                free[key] = local
+            pose = poses[link]
+            for index in np.flatnonzero(np.isfinite(track).all(axis=0) & pose.known)[:1]:  # the first that is known
+                free[key] = np.asarray(pose.matrix[:, :, index].T @ (track[:, index] - pose.origin[:, index]), float)
     radii = [float(row["value"]) for row in attribute(result, "inputs")
              if str(row["path"]).endswith("pin.radius") and isinstance(row.get("value"), int | float)]  # fmt: skip
     return Space(stated, poses, free, max(radii, default=0.0))
-
-
-def _pose(result: xr.Dataset, link: str) -> BodyPose:
-    turn = result["link_rotation"].sel(link=link).transpose("component", "position")
-    place = result["link_position"].sel(link=link).transpose("axis", "position")
-    return BodyPose(rotation_matrix(np.asarray(turn.values, dtype=float)), np.asarray(place.values, dtype=float))
-
-
-def _local(result: xr.Dataset, key: str, pose: BodyPose) -> Array | None:
-    """A point in the frame of its link, from the first position that is known."""
-    track = np.asarray(result["point_position"].sel(point=key).transpose("axis", "position").values, dtype=float)
-    known = np.flatnonzero(np.isfinite(track).all(axis=0) & pose.known)
-    if not known.size:
-        return None
-    index = known[0]
-    return np.asarray(pose.matrix[:, :, index].T @ (track[:, index] - pose.origin[:, index]), dtype=float)

@@ -16,8 +16,8 @@ from matplotlib.patheffects import Normal, Stroke
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.quantities import prefixed
 from trunnion.results.scales import without_noise
-from trunnion.views.common.cycle import Array, column
-from trunnion.views.common.drawing import PALE, bare, facts
+from trunnion.views.common.cycle import Array, members
+from trunnion.views.common.drawing import PALE, bare, closes, facts, short
 from trunnion.views.common.figures import INK, MUTED, PALETTE, Labels, new
 from trunnion.views.common.peaks import ease, usual_peak
 from trunnion.views.space.bodies import Space, space
@@ -118,11 +118,8 @@ def _colour(shown: Space, name: str, only: tuple[str, ...]) -> str:
 
 def _pieces(track: Array) -> Array:
     """A track (3, position) as straight pieces (n, 2, 3), closed where its end lies no farther off than its steps."""
-    stride = -(-track.shape[1] // FEW)
-    line = track[:, ::stride].T
-    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    if len(line) > 7 and np.isfinite(line).all() and np.linalg.norm(line[0] - line[-1]) <= 2 * steps.max():
-        line = np.vstack([line, line[:1]])
+    line = track[:, :: -(-track.shape[1] // FEW)]
+    line = (np.hstack([line, line[:, :1]]) if closes(line) else line).T
     pieces = np.stack([line[:-1], line[1:]], axis=1)
     return np.asarray(pieces[np.isfinite(pieces).all(axis=(1, 2))], dtype=float)
 
@@ -149,9 +146,9 @@ def _reactions(look: Scenery, result: xr.Dataset, index: int) -> tuple[list[tupl
     for name, forces in here.items():
         if name not in look.shown.joints:
             continue
-        places = (
-            _bearing_ends(look, name, index) if len(forces) == 2 else [look.shown.seated(name)[:, index]] * len(forces)
-        )
+        middle, half = look.shown.seated(name)[:, index], HALF * look.shown.size * look.shown.axis(name, 0)[:, index]
+        # two forces are loads on the ends of a bearing, that at −u first
+        places = [middle - half, middle + half] if len(forces) == 2 else [middle] * len(forces)
         for place, force, size in zip(places, forces, sizes[name], strict=True):
             if not size > 0.01 * most:
                 continue
@@ -162,22 +159,12 @@ def _reactions(look: Scenery, result: xr.Dataset, index: int) -> tuple[list[tupl
     return found, most
 
 
-def _bearing_ends(look: Scenery, name: str, index: int) -> list[Array]:
-    """Both ends of a joint's symbol along its axis, the end at −u first, where the loads on them are drawn."""
-    middle, along = look.shown.seated(name)[:, index], HALF * look.shown.size * look.shown.axis(name, 0)[:, index]
-    return [middle - along, middle + along]
-
-
 def _forces(result: xr.Dataset) -> dict[str, Array]:
     """Of each joint the loads on the ends of its bearing or guide, its reaction where it has none, (force, axis,
     position), N: a small reaction may bear on both ends of a pin with large forces."""
-    found = {}
-    for joint in map(str, result["joint"].values):
-        force, ends = column(result, "reaction_force", joint=joint), column(result, "end_load", joint=joint)
-        if force is not None:
-            solid = np.empty(0) if ends is None else ends[np.any(np.isfinite(ends), axis=(1, 2))]
-            found[joint] = solid if len(solid) else force[None]
-    return found
+    forces, ends = members(result, "reaction_force", "joint"), members(result, "end_load", "joint")
+    solid = {joint: rows[np.any(np.isfinite(rows), axis=(1, 2))] for joint, rows in ends.items()}
+    return {joint: solid[joint] if len(solid.get(joint, ())) else force[None] for joint, force in forces.items()}
 
 
 def _arrow(axes: Axes, start: Array, end: Array, colour: str) -> None:
@@ -236,7 +223,7 @@ def name_joints(
             if not key.startswith(f"{shown.ground}.")}  # fmt: skip
     for name, spot in (spots | dots).items():
         if not only or name in only:
-            labels.add(axes, name if len(name) <= 18 else f"{name[:17]}…", spot, size, 0.022 * shown.size)
+            labels.add(axes, short(name), spot, size, 0.022 * shown.size)
 
 
 # ---- solids as facets -----------------------------------------------------------------------------------------------

@@ -335,7 +335,8 @@ def _foot(shown: Space, name: str) -> list[Solid]:
     seat = _seats(shown, name)[0] if body == "sleeve" else shown.seat(name, side)
     _, z, x = shown.element(name, side)
     if body == "rail":
-        seat = seat + (np.clip(0.0, *_along(shown, name))) * z
+        low, high = _reach(shown, name)  # of the rail from its seat
+        seat = seat + np.clip(0.0, *((low, high) if side == 0 else (-high, -low))) * z
     down = -UP + (UP @ z) * z
     if body in ("ball", "cube"):
         z, x, down = np.eye(3)[1], np.eye(3)[0], -UP
@@ -356,12 +357,6 @@ def _foot(shown: Space, name: str) -> list[Solid]:
         stroke = 0.45 * half * (down - 0.7 * along)
         found += [Solid("wire", ground, np.array([start, start + stroke]), 0.0, ground) for start in starts]
     return found
-
-
-def _along(shown: Space, name: str) -> tuple[float, float]:
-    """The reach of a rail on the ground from its seat."""
-    low, high = _reach(shown, name)
-    return (low, high) if shown.joints[name]["links"][0] == shown.ground else (-high, -low)
 
 
 # ---- from where it is looked at -------------------------------------------------------------------------------------

@@ -39,7 +39,7 @@ function turned(/** @type {number[]} */ [x, y], angle) {
 /** The mass centres of the moving links that have a mass, as what a hand can take: [{kind, name, key, at, mass}]. */
 export function massSpots(view) {
   const { numbers = {}, entries } = state.answer.peek() ?? {};
-  if (!state.layers.peek().masses || !view.scene || state.spatial.peek()) return [];
+  if (!state.layers.peek().masses || !view.scene || view.ideal || state.spatial.peek()) return []; // errors drawn larger move them
   const heavy = view.scene.links.filter(({ name, ground }) => !ground && name !== groundOf(entries) && numbers[`links.${name}.mass`] > 0);
   return heavy.flatMap(({ name }) => {
     const frame = frameOf(view, numbers, name);

@@ -50,7 +50,7 @@ function apart(spots) {
 
 /** The dimensions as they are drawn; `words(x, y, text)` puts words where there is room, `keep(x, y, text)` keeps room for some. */
 export function dimensionMarks(view, words, keep) {
-  if (!state.layers.peek().dimensions || !view.scene) return [];
+  if (!state.layers.peek().dimensions || !view.scene || view.ideal) return [];
   const { scene, frame, posed } = view;
   const rows = lengthsOf(scene, posed);
   const all = scene.links.flatMap((link) => link.points.map((key) => place(scene, key, posed)).filter(Boolean)).map(frame.to);

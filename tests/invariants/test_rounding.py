@@ -114,6 +114,7 @@ def test_digits_do_not_depend_on_the_size_of_a_mechanism(name: str, size: tuple[
     assert [f.code for f in other.trunnion.findings] == [f.code for f in one.trunnion.findings]
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize(("space", "size"), [*zip(cycle(("spatial", "planar")), SIZES, strict=False)])
 def test_forces_that_cancel_are_0_everywhere_and_no_finding(space: str, size: tuple[float, float]) -> None:
     result = trunnion.analyse(Mechanism(**sized(balanced(space), *size)), 24)

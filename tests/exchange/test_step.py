@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 import trunnion
@@ -26,6 +27,8 @@ from trunnion.exchange.brep import Geometry
 from trunnion.exchange.draft import Body, Draft
 from trunnion.exchange.mating import joined
 from trunnion.exchange.part21 import Part21
+from trunnion.exchange.skeleton import positions_of
+from trunnion.exchange.step_assembly import Assembly
 
 STEEL = 7850.0
 
@@ -684,7 +687,17 @@ def test_density_of_the_file_goes_before_that_of_the_option(tmp_path):
     assert plain.mass == pytest.approx(8500 * 80217.34565773529e-9)
 
 
-def test_tolerances_of_the_file_stand_in_the_comments(tmp_path):
+CLASS = ["LIMITS_AND_FITS('H','','7','')"]
+DEVIATIONS = [
+    "LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(0.),#{unit})",
+    "LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(0.021),#{unit})",
+    "TOLERANCE_VALUE(#{low},#{high})",
+]
+
+
+@pytest.mark.parametrize(("entities", "words"), [(CLASS, "H7"), (DEVIATIONS, "+0.021/+0 mm")])
+def test_limits_of_the_file_are_tolerances_of_the_model(entities, words, tmp_path):
+    """H7 of 20 mm is 0 to 21 µm in ISO 286-2: the radius of the hole is 10.02 mm + 5.25 µm ± 5.25 µm."""
     file = StepFile()
     parts = {name: file.part(name, part[0]) for name, part in slider_crank().items()}
     bores = [n for n, line in enumerate(file.lines, 1) if line.startswith("CYLINDRICAL") and "1.002" in line]
@@ -693,11 +706,17 @@ def test_tolerances_of_the_file_stand_in_the_comments(tmp_path):
     shape = file(f"PRODUCT_DEFINITION_SHAPE('','',#{parts['frame'][0]})")
     aspect = file(f"SHAPE_ASPECT('','',#{shape},.T.)")
     size = file(f"DIMENSIONAL_SIZE(#{aspect},'diameter')")
-    limits = file("LIMITS_AND_FITS('H','','7','')")
-    file(f"PLUS_MINUS_TOLERANCE(#{limits},#{size})")
+    numbers = {"unit": next(n for n, line in enumerate(file.lines, 1) if ".MILLI.,.METRE." in line)}
+    for entity, name in zip(entities, ("low", "high", "limits"), strict=False):
+        numbers[name] = file(entity.format(**numbers))
+    file(f"PLUS_MINUS_TOLERANCE(#{len(file.lines)},#{size})")
     file(f"GEOMETRIC_ITEM_SPECIFIC_USAGE('','',#{aspect},#{parts['frame'][1]},#{face})")
     draft = import_file(file.write(tmp_path / "a.step"), ground="frame")
-    assert any("hole d=20.04 mm H7 of frame" in comment for comment in joint(draft, "crank", "frame").comments)
+    bearing = joint(draft, "crank", "frame")
+    assert any(f"hole d=20.04 mm {words} of frame" in comment for comment in bearing.comments)
+    (varying,) = model(draft, tmp_path).tolerated()
+    assert varying.path == f"joints.{bearing.name}.pin.hole_radius"
+    assert (varying.nominal, varying.lower, varying.upper) == pytest.approx((0.01002525, -5.25e-6, 5.25e-6), abs=1e-12)
 
 
 def test_an_assembly_with_solids_of_its_own_keeps_them(tmp_path):
@@ -863,32 +882,69 @@ def test_welded_parts_move_with_their_link_and_edited_models_are_refused(tmp_pat
         export_model(mechanism, tmp_path / "c.step", original=tmp_path / "none.step")
 
 
-@pytest.mark.parametrize("name", ["slider-crank", "rssr", "universal-joint"])
-def test_the_skeleton_has_the_points_of_the_position(tmp_path, name):
-    from trunnion.exchange.skeleton import positions_of
-    from trunnion.exchange.step_assembly import Assembly
-
-    mechanism = trunnion.read(f"examples/{name}.yaml")
-    path = tmp_path / "a.step"
-    findings = export_model(mechanism, path, "30 deg")
-    assert "exchange.skeleton" in {finding.code for finding in findings}
-    drawn = positions_of(mechanism, 4, "30 deg").draft()
+def skeleton(path):
+    """The points of each link of a skeleton in the global frame, m, by name."""
     file = Part21(path)
     assembly = Assembly(file, 1e-3)
     (root,) = assembly.tree()
-    assert [part.name for part in root.children] == list(drawn.bodies)
+    found = {}
     for part in root.children:
         shape = assembly.shapes[part.definition][0]
         (wires,) = assembly.items(shape, "GEOMETRIC_CURVE_SET")
-        points = {
+        found[part.name] = {
             file[item]["CARTESIAN_POINT"][0]: part.place.matrix @ assembly.geometry(shape).point(item)
             + part.place.shift
             for item in file[wires]["GEOMETRIC_CURVE_SET"][1]
             if "CARTESIAN_POINT" in file[item]
         }
-        for pair in drawn.pairs_of(part.name):
+    return found
+
+
+@pytest.mark.parametrize("name", ["slider-crank", "rssr", "universal-joint"])
+def test_the_skeleton_has_the_points_of_the_position(tmp_path, name):
+    mechanism = trunnion.read(f"examples/{name}.yaml")
+    findings = export_model(mechanism, tmp_path / "a.step", "30 deg")
+    assert "exchange.skeleton" in {finding.code for finding in findings}
+    drawn, points = positions_of(mechanism, 4, "30 deg").draft(), skeleton(tmp_path / "a.step")
+    assert list(points) == list(drawn.bodies)
+    for link in points:
+        for pair in drawn.pairs_of(link):
             if pair.type in ("revolute", "spherical"):
-                np.testing.assert_allclose(points[pair.name], pair.at, atol=1e-9)
+                np.testing.assert_allclose(points[link][pair.name], pair.at, atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "factor"), [("fourbar-with-play", 500.0), ("pezzuti-cardan-as-built", 20.0)])
+def test_errors_are_magnified(tmp_path, name, factor):
+    """Displacements from the ideal mechanism are so many times larger; links stay rigid."""
+    mechanism = trunnion.read(f"examples/{name}.yaml")
+    export_model(mechanism, tmp_path / "a.step", "30 deg", magnify=factor)
+    points = skeleton(tmp_path / "a.step")
+    result, moved = trunnion.analyse(mechanism, at="30 deg"), 0.0
+    for link, named in points.items():
+        places = {point: result["point_position"].sel(point=f"{link}.{point}").values[:, 0] for point in named}
+        first = next(point for point in result["point"].values.astype(str) if point.startswith(f"{link}."))
+        error = result["point_error"].sel(point=first).values[:, 0]
+        first = first.partition(".")[2]
+        expected = places[first] + (factor - 1) * error
+        np.testing.assert_allclose(named[first][: len(expected)], expected, atol=1e-9)
+        moved = max(moved, float(np.linalg.norm(error)))
+        for other in named:
+            length = np.linalg.norm(places[other] - places[first])
+            assert np.linalg.norm(named[other] - named[first]) == pytest.approx(length, abs=1e-9)
+        turn = float(np.linalg.norm(np.atleast_1d(result["link_error"].sel(link=link).values[..., 0])))
+        ideal, larger = (positions_of(mechanism, 4, "30 deg", magnify=f).rotations[link][0] for f in (0.0, factor))
+        assert Rotation.from_matrix(larger @ ideal.T).magnitude() == pytest.approx(factor * turn, abs=1e-9)
+    assert moved > 0
+
+
+def test_nothing_to_magnify_is_refused(tmp_path):
+    for name, target, words in (
+        ("slider-crank", "a.step", "nothing to magnify"),
+        ("misaligned-fourbar", "a.mjcf", "own places"),
+    ):
+        with pytest.raises(MechanismError, match=words):
+            export_model(trunnion.read(f"examples/{name}.yaml"), tmp_path / target, magnify=10.0)
+    assert not list(tmp_path.iterdir())
 
 
 OPENED = """

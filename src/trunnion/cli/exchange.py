@@ -70,6 +70,9 @@ def export(
         str | None,
         typer.Option("--from", metavar="FILE", help="The STEP file it was imported from, whose parts are to be moved."),
     ] = None,
+    magnify: Annotated[
+        float, typer.Option("--magnify", help="Factor of the links' displacements by errors and play: 100.")
+    ] = 1.0,
     set_: Set = None,
 ) -> None:
     """Write a mechanism for another program, at a position."""
@@ -77,7 +80,7 @@ def export(
 
     mechanism = stated(file, set_)
     with lines_of(file):
-        findings = export_model(mechanism, out, at, frames, original)
+        findings = export_model(mechanism, out, at, frames, original, magnify)
     wrote(out)
     say(placed(findings, file), every=True)
     raise typer.Exit(exit_status(findings))

@@ -96,7 +96,7 @@ class Face:
     outward: bool
     number: int
     minor: float = 0.0  # angle of a cone, rad; radius of the tube of a torus, m
-    tolerance: str = ""  # of its diameter, as the file states it
+    tolerance: str | tuple[float, float] = ""  # of its diameter: a class such as H7, or lower and upper deviation, m
     area: float = 0.0
     outline: Array = field(default_factory=lambda: np.zeros((0, 3)))
 

@@ -58,7 +58,9 @@ class Pair:
     axis : direction of its axis, or normal of a planar pair; of a universal joint of the pin in the first body.
     second_axis : of a universal joint, direction of the pin in the second body.
     pin_radius, hole_radius : of the pin or ball, and of what it runs in, m; of a slider and its guide half the widths.
+    pin_limits, hole_limits : lower and upper deviation of these radii that the file states, m.
     length : of a bearing or guide, m.
+    elements : place, m, and axis of its element on each body, by name, where they are not the same.
     pitch : of a helical pair, m for a turn.
     limits : range of its coordinate from where it is drawn, rad or m.
     comments : how it was found, a line each; they stand above the joint in the model file.
@@ -72,10 +74,20 @@ class Pair:
     second_axis: Array | None = None
     pin_radius: float | None = None
     hole_radius: float | None = None
+    pin_limits: tuple[float, float] | None = None
+    hole_limits: tuple[float, float] | None = None
     length: float | None = None
+    elements: dict[str, tuple[Array, Array]] = field(default_factory=dict)
     pitch: float | None = None
     limits: tuple[float, float] | None = None
     comments: list[str] = field(default_factory=list)
+
+    def element(self, body: str) -> tuple[Array, Array]:
+        """Place, m, and axis of its element on a body."""
+        if body in self.elements:
+            return self.elements[body]
+        second = self.second_axis is not None and body == self.links[1]
+        return self.at, self.second_axis if second else self.axis  # type: ignore[return-value]
 
     @property
     def clearance(self) -> float | None:
@@ -257,6 +269,7 @@ def moved(draft: Draft, rotation: Array, shift: Array) -> Draft:
             at=place(pair.at),
             axis=rotation @ pair.axis,
             second_axis=None if pair.second_axis is None else rotation @ pair.second_axis,
+            elements={link: (place(at), rotation @ axis) for link, (at, axis) in pair.elements.items()},
         )
         for name, pair in draft.pairs.items()
     }

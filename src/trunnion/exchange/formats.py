@@ -256,6 +256,7 @@ def export_model(
     at: float | str | None = None,
     frames: int = 120,
     original: str | os.PathLike[str] | None = None,
+    magnify: float = 1.0,
 ) -> list[Finding]:
     """Write a mechanism in the format of another program.
 
@@ -266,6 +267,7 @@ def export_model(
     at : the position, as for `analyse`; the first of the cycle if not given. Formats that move take the whole cycle.
     frames : number of positions in a format that moves.
     original : the STEP file that the model was imported from, whose parts are written where they are then.
+    magnify : factor of the displacements of the links from the ideal mechanism, in formats that are looked at.
 
     Returns
     -------
@@ -279,7 +281,13 @@ def export_model(
     entry = _format_of(path, reads=False)
     module = _module(entry, path)
     moves = getattr(module, "MOVES", False)
-    positions = positions_of(mechanism, frames) if moves else positions_of(mechanism, FEWEST, at)
+    if magnify != 1 and not getattr(module, "MAGNIFIES", False):
+        what = f"a model in {entry.name} has the mechanism's own places; they are not magnified"
+        raise MechanismError(Finding(what, "--magnify", "leave it out, or write .step or .glb"))
+    if not np.isfinite(magnify):
+        raise MechanismError(Finding(f"is {magnify}", "--magnify", "give a number such as 100"))
+    shown = (frames, None) if moves else (FEWEST, at)
+    positions = positions_of(mechanism, *shown, magnify=magnify)
     if options.original is not None:
         if not getattr(module, "MOVES_PARTS", False):
             raise MechanismError(Finding(f"no parts are moved in {entry.name}", "--from", "write a .step file"))

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["MOVES", "read", "write"]
 
 MOVES = True  # it takes the whole cycle
+MAGNIFIES = True
 ROD, PIN, LONG = 0.012, 0.02, 3.0  # radius of a rod and of a pin that states none, of the size; rails by their sliders
 SIDES = 24  # of a cylinder
 COLOURS = [(0.45, 0.47, 0.5), (0.84, 0.37, 0.0), (0.0, 0.45, 0.7), (0.0, 0.62, 0.45), (0.8, 0.47, 0.65),
@@ -84,7 +85,7 @@ def write(positions: Positions, path: Path, options: ExportOptions) -> list[Find
 def _solids(draft: Draft, link: str, size: float) -> tuple[Array, Array]:
     """Vertices, m, and triangles of a link in the global frame: rods between its joints, pins, rails and sliders."""
     pairs, points = draft.pairs_of(link), list(draft.bodies[link].points.values())
-    places = [pair.at for pair in pairs] + points
+    places = [pair.element(link)[0] for pair in pairs] + points
     parts = [
         _bar(a, b, ROD * size, SIDES)
         for a, b in zip(places, places[1:] + (places[:1] if len(places) > 2 else []), strict=False)
@@ -101,14 +102,14 @@ def _solids(draft: Draft, link: str, size: float) -> tuple[Array, Array]:
 def _joint(pair: Pair, link: str, size: float) -> tuple[Array, Array]:
     """The pin of a joint, thicker and shorter on its second link as a sleeve; of a guide a rail and a slider."""
     second = link == pair.links[1]
-    axis = pair.second_axis if second and pair.second_axis is not None else pair.axis
+    place, axis = pair.element(link)
     axis = axis / np.linalg.norm(axis)
     if pair.type == "prismatic":
         half = (pair.length or 10 * PIN * size) / 2 * (1.0 if second else LONG)
-        return _bar(pair.at - half * axis, pair.at + half * axis, (2.2 if second else 1.2) * ROD * size, 4)
+        return _bar(place - half * axis, place + half * axis, (2.2 if second else 1.2) * ROD * size, 4)
     radius = (pair.pin_radius or PIN * size) * (1.2 if second else 1.0)
     half = (pair.length or 4 * PIN * size) / 2 * (0.8 if second else 1.0)
-    return _bar(pair.at - half * axis, pair.at + half * axis, radius, SIDES)
+    return _bar(place - half * axis, place + half * axis, radius, SIDES)
 
 
 def _bar(start: Array, end: Array, radius: float, sides: int) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ import numpy as np
 from trunnion.errors import MechanismError
 from trunnion.exchange.brep import Face
 from trunnion.exchange.draft import Array, Body, Draft, Pair, free_name, perpendicular
-from trunnion.joints.fits import fit
+from trunnion.joints.fits import fit, limits
 
 __all__ = ["joined", "loose_contacts"]
 
@@ -44,15 +44,27 @@ class Round:
     hole: bool
     covered: float  # of its full area
     faces: tuple[int, ...]
-    tolerance: str = ""  # as the file states it
+    tolerance: str | tuple[float, float] = ""  # of its diameter: a class such as H7, or lower and upper deviation, m
 
     @property
     def label(self) -> str:
         """In words, with its numbers in the file."""
         numbers = ", ".join(f"#{number}" for number in self.faces[:4])
         kind = (("pin", "hole") if self.high > self.low else ("ball", "socket"))[self.hole]
-        size = f"{2e3 * self.radius:.9g} mm" + f" {self.tolerance}" * bool(self.tolerance)
+        stated = self.tolerance
+        if isinstance(stated, tuple):
+            stated = f"{1e3 * stated[1]:+.6g}/{1e3 * stated[0]:+.6g} mm"
+        size = f"{2e3 * self.radius:.9g} mm {stated}".rstrip()
         return f"{kind} d={size} of {self.body} ({numbers})"
+
+    @property
+    def deviations(self) -> tuple[float, float] | None:
+        """Limits of the radius from that drawn, m; None where the file states none, or a class that ISO 286 has not."""
+        try:
+            either = self.tolerance if isinstance(self.tolerance, tuple) else limits(2 * self.radius, self.tolerance)
+        except MechanismError:
+            return None
+        return either[0] / 2, either[1] / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -657,6 +669,7 @@ def _pair(kind: str, contacts: list[Contact]) -> Pair:
     pair.pin_radius, pair.hole_radius, pair.length = main.pin.radius, main.hole.radius, max(ends) - min(ends)
     if main.play == 0:
         pair.hole_radius = pair.pin_radius
+    pair.pin_limits, pair.hole_limits = main.pin.deviations, main.hole.deviations
     for contact in contacts:
         over = f", over {1e3 * (contact.high - contact.low):.9g} mm" if contact.high > contact.low else ""
         pair.comments.append(f"{contact.pin.label} in {contact.hole.label}{over}")

@@ -204,10 +204,12 @@ def _joint(pair: Pair, size: float) -> Iterator[str]:
         parts.append(f"pitch: {_mm(pair.pitch, size)}")
     turns = PAIRS[pair.type].turns
     if turns and pair.pin_radius is not None:
-        pin = [f"radius: {_mm(pair.pin_radius, size)}"]
+        pin = [f"radius: {_limited(pair.pin_radius, pair.pin_limits, size)}"]
         if pair.length is not None:
             pin.append(f"length: {_mm(pair.length, size)}")
-        if pair.clearance is not None and pair.clearance > 0:
+        if pair.hole_radius is not None and (pair.pin_limits or pair.hole_limits):
+            pin.append(f"hole_radius: {_limited(pair.hole_radius, pair.hole_limits, size)}")
+        elif pair.clearance is not None and pair.clearance > 0:
             pin.append(f"clearance: {_mm(pair.clearance, size)}")
         parts.append(f"pin: {{{', '.join(pin)}}}")
     elif not turns and pair.length is not None and pair.type == "prismatic":
@@ -229,6 +231,13 @@ def _place(place: Array, spatial: bool, size: float) -> str:
 
 def _mm(length: float, size: float) -> str:
     return "0" if abs(length) <= TINY * size else f"{_number(1e3 * length)} mm"
+
+
+def _limited(radius: float, limits: tuple[float, float] | None, size: float) -> str:
+    """A radius between limits that its file states: their middle and half their distance."""
+    if limits is None:
+        return _mm(radius, size)
+    return f"{_mm(radius + sum(limits) / 2, size)} ± {_mm((limits[1] - limits[0]) / 2, size)}"
 
 
 def _plain(vector: Array, largest: float) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.space import rotation_matrix
@@ -114,10 +115,10 @@ class Positions:
 
 def _pair(name: str, kind: str, links: Sequence[str], first: Any, second: Any, values: Any, system: System) -> Pair:
     """The pair of a joint whose two elements lie so: its point is that on the second link."""
-    axis = first[1]
-    if kind == "prismatic" and not system.spatial:
-        axis = first[2]
-    pair = Pair(name, kind, (links[0], links[1]), second[0], axis)
+    along = 2 if kind == "prismatic" and not system.spatial else 1
+    pair = Pair(name, kind, (links[0], links[1]), second[0], first[along])
+    if not PAIRS[kind].guided:  # a slide's element on its guide is a point of the rail, wherever the slider is
+        pair.elements = {link: (end[0], end[along]) for link, end in zip(links, (first, second), strict=True)}
     if kind == "universal":
         pair.second_axis = second[1]
     path = f"joints.{name}"
@@ -160,6 +161,7 @@ def positions_of(
     steps: int = 360,
     at: float | str | None = None,
     progress: Callable[[int], None] | None = None,
+    magnify: float = 1.0,
 ) -> Positions:
     """The mechanism at positions of its cycle, or at one.
 
@@ -167,20 +169,46 @@ def positions_of(
     ----------
     mechanism : of any kind, errors of its joints included.
     steps : number of positions; at : one position instead, as for `analyse`.
+    magnify : factor of the displacements and rotations of the links from the ideal mechanism.
 
     Raises
     ------
-    MechanismError : if its structure does not determine the motion.
+    MechanismError : if its structure does not determine the motion, or there is nothing to magnify.
     """
     from trunnion.cycle.analyse import analyse
 
     variables = ["point_position", "joint_rotation_velocity", "joint_slide_velocity"]
     variables += ["link_position", "link_rotation"] if mechanism.space == "spatial" else ["link_angle"]
+    if magnify != 1:
+        if not mechanism.has_errors:
+            what = "has nothing to magnify: no errors, and no pin that lies off the middle of its hole"
+            raise MechanismError(Finding(what, "--magnify", "leave it out, or state `errors` or seats"))
+        variables += ["point_error", "link_error"]
     result = analyse(mechanism, steps, progress=progress, variables=variables, at=at)
     rotations, origins = {}, {}
     for link in result["link"].values.astype(str):
-        rotations[link], origins[link] = _poses(mechanism, result, link)
+        matrix, origin = _poses(mechanism, result, link)
+        points = (str(point) for point in result["point"].values if str(point).startswith(f"{link}."))
+        if magnify != 1 and (point := next(points, "")):
+            turn, shift = (factor * (magnify - 1) for factor in _errors(result, link, point))
+            place = _places(result["point_position"], point)
+            local = np.einsum("nji,nj->ni", matrix, place - origin)
+            matrix = Rotation.from_rotvec(turn).as_matrix() @ matrix
+            origin = place + shift - np.einsum("nij,nj->ni", matrix, local)
+        rotations[link], origins[link] = matrix, origin
     return Positions(mechanism, result, rotations, origins)
+
+
+def _errors(result: xr.Dataset, link: str, point: str) -> tuple[Array, Array]:
+    """Rotation vector, rad, of a link and displacement, m, of a point from the ideal mechanism, (position, 3)."""
+    turn = result["link_error"].sel(link=link).values.T
+    return np.pad(turn[:, None], ((0, 0), (2, 0))) if turn.ndim == 1 else turn, _places(result["point_error"], point)
+
+
+def _places(values: xr.DataArray, point: str) -> Array:
+    """A vector of a point in space, (position, 3)."""
+    vectors = values.sel(point=point).values.T
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
 
 
 def _poses(mechanism: Mechanism, result: xr.Dataset, link: str) -> tuple[Array, Array]:
@@ -193,8 +221,7 @@ def _poses(mechanism: Mechanism, result: xr.Dataset, link: str) -> tuple[Array, 
     matrix = np.moveaxis(np.array([[c, -s, zero], [s, c, zero], [zero, zero, unit]]), 2, 0)
     values, point = mechanism.parameters(), next(iter(mechanism.links[link].points))
     local = _in_space([values[f"links.{link}.points.{point}.{axis}"] for axis in "xy"])
-    placed = result["point_position"].sel(point=f"{link}.{point}").values.T
-    origin = np.column_stack([placed, zero]) - matrix @ local
+    origin = _places(result["point_position"], f"{link}.{point}") - matrix @ local
     return matrix, origin
 
 

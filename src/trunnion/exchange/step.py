@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["read", "write"]
 
 MOVES_PARTS = True  # of the file that a model came from
+MAGNIFIES = True
 PATIENCE = 60.0  # s, for the mesh of a free-form solid
 DEFLECTION = 1e-3  # of a mesh from its surface, of the unit of the file; and angle, rad
 SIZE = 0.02  # of the mechanism: length of an axis of a skeleton that has no bearing
@@ -366,7 +367,7 @@ def _relation(first: int, second: int, operator: int) -> str:
 
 def _wires(text: _Text, draft: Draft, body: Body, inside: Place, size: float) -> list[int]:
     """A link as its points, the lines between them and the axes of its joints, in its own frame."""
-    places = {pair.name: pair.at for pair in draft.pairs_of(body.name)} | body.points
+    places = {pair.name: pair.element(body.name)[0] for pair in draft.pairs_of(body.name)} | body.points
     local = {name: inside.matrix @ place + inside.shift for name, place in places.items()}
     points = [text(f"CARTESIAN_POINT({quoted(name)},({_reals(1e3 * place)}))") for name, place in local.items()]
     lines = [(f"{a}-{b}", local[a], local[b]) for a, b in pairwise(local)]
@@ -374,7 +375,7 @@ def _wires(text: _Text, draft: Draft, body: Body, inside: Place, size: float) ->
         first, *_, last = local
         lines.append((f"{last}-{first}", local[last], local[first]))
     for pair in draft.pairs_of(body.name):
-        axis = pair.second_axis if pair.second_axis is not None and pair.links[1] == body.name else pair.axis
+        axis = pair.element(body.name)[1]
         half = inside.matrix @ axis / np.linalg.norm(axis) * (pair.length or SIZE * size) / 2
         if pair.type != "spherical":
             lines.append((f"axis {pair.name}", local[pair.name] - half, local[pair.name] + half))

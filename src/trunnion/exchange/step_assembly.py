@@ -252,8 +252,8 @@ class Assembly:
             self._solids[definition] = solids, surfaces
         return self._solids[definition]
 
-    def tolerances(self) -> dict[int, str]:
-        """Tolerances of diameters that the file states, by the number of the face: classes such as H7, or limits."""
+    def tolerances(self) -> dict[int, str | tuple[float, float]]:
+        """Tolerances of diameters that the file states, by the number of the face: a class such as H7, or limits, m."""
         aspects = {}
         for entity in self.file.of("PLUS_MINUS_TOLERANCE"):
             limits, dimension = self.file.args(entity, "PLUS_MINUS_TOLERANCE")[:2]
@@ -266,8 +266,8 @@ class Assembly:
                 faces[int(item)] = aspects[aspect]
         return faces
 
-    def _limits(self, number: Any) -> str:
-        """Limits of a dimension in words: a class of ISO 286, or its two deviations in mm."""
+    def _limits(self, number: Any) -> str | tuple[float, float]:
+        """Limits of a dimension: a class of ISO 286, or its lower and upper deviation, m."""
         entity = self.file[number]
         if "LIMITS_AND_FITS" in entity:
             letter, _, grade = entity["LIMITS_AND_FITS"][:3]
@@ -277,8 +277,8 @@ class Assembly:
             for args in self.file[bound].values():
                 measure = next((part for part in args if isinstance(part, tuple)), None)
                 if measure is not None:
-                    ends.append(f"{1e3 * float(measure[1][0]) * self.size(args[-1]):+.6g}")
-        return f"{'/'.join(ends[::-1])} mm"
+                    ends.append(float(measure[1][0]) * self.size(args[-1]))
+        return (min(ends), max(ends)) if len(ends) == 2 else ""
 
     def density(self, definition: int) -> tuple[float | None, str]:
         """Density of a product, kg/m³, and the name of its material, as far as the file has them."""

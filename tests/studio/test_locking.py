@@ -52,6 +52,8 @@ def test_a_joint_locks_at_the_multiple_of_its_friction_that_is_told():
     index = 2
     multiple = found["locks"][joint][index]
     assert joint == "B"
+    live = ask(ask="try", text=PRESS, steps=STEPS, values={}, index=index)["locks"]  # while it is being changed
+    assert live == {"B": pytest.approx(multiple, rel=1e-6)}
     for times, locks in ((0.999, False), (1.001, True)):
         result = brief(mechanism_of(PRESS, {"B": 0.45 * multiple * times}), STEPS)
         assert (float(result["locking_margin"][index]) < 1) is locks

@@ -315,3 +315,11 @@ def _findings(path: Path) -> list[Any]:
     except MechanismError as error:
         return list(error.findings)
     return []
+
+
+@pytest.mark.parametrize(("stated", "remedy"), [("torque:A", "did you mean 'effort'?"), ("xyz:A", "effort:DRIVER")])
+def test_an_unknown_quantity_is_answered_with_the_nearest_few(stated: str, remedy: str) -> None:
+    with pytest.raises(MechanismError) as failure:
+        read_mapping(mapping({"channels/brake/measures": stated}))
+    assert remedy in failure.value.findings[0].remedy
+    assert failure.value.findings[0].remedy.count(":") < 5

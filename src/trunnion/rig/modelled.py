@@ -180,7 +180,8 @@ def _told_of(condition: Condition) -> Iterator[None]:
         ) from None
 
 
-Item, Result = TypeVar("Item"), TypeVar("Result")
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 
 def each(

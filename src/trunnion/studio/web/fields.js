@@ -44,7 +44,7 @@ export function rowsOf(entries, kind, name) {
   const known = (path) => there.some((row) => starts(row.path, path) || starts(path, row.path));
   const spatial = entries?.space === "spatial";
   const usual = usualOf(kind, part, kind === "links" && name === groundOf(entries))
-    .filter(([way]) => spatial || !way.endsWith("pin.bearing")) // a moment across a pin is one of space
+    .filter(([way]) => !way.endsWith("pin.bearing") || (spatial && part?.type !== "spherical")) // it carries a moment across, in space
     .map(([way, example]) => [way, (spatial && IN_SPACE[way]) || example]);
   const missing = usual
     .map(([way, example]) => ({ path: [...from, ...way.split(".")], value: null, example, fixed: false, common: kind === "joints" ? commonTo(entries, way.split(".")) : null }))

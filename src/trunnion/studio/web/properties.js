@@ -15,6 +15,7 @@ import { Button, html } from "./ui.js";
 
 const NOUNS = { links: "Link", joints: "Joint", points: "Point", drivers: "Driver", loads: "Load", springs: "Spring", gears: "Gear pair" };
 const SECTIONS = ["links", "joints", "drivers", "loads", "springs", "gears"];
+const MANY_WAYS = new Set(["spherical", "universal", "planar", "fixed"]); // joints whose motion is not along or about one axis
 const MOST = 300; // parts in a list
 const ROOMY = 9; // letters that every field has room for
 const LONG = 26; // that none has
@@ -43,7 +44,7 @@ function Chosen({ kind, name }) {
       ${driver && html`<h3>Driver</h3><${Rows} rows=${rowsOf(entries, "drivers", name)} findings=${findings} />`}
       <p class="row-of-buttons">
         ${kind === "joints" && !driver && html`<${Button} label="Drive this joint" onClick=${() => edit([{ do: "driver", joint: name }])} />`}
-        ${kind === "joints" && html`<${Button} label="Load against its motion" onClick=${() => edit([{ do: "load", against: name }])} />`}
+        ${kind === "joints" && !MANY_WAYS.has(entries?.joints?.[name]?.type) && html`<${Button} label="Load against its motion" onClick=${() => edit([{ do: "load", against: name }])} />`}
         ${kind === "loads" && against(entries, name).map((joint) => html`<${Button} label=${`Let it oppose the motion of ${joint}`} onClick=${() => edit([{ do: "load", against: joint, instead: name }])} />`)}
         ${(kind === "joints" || kind === "points") && !state.spatial.value && html`<${Button} label=${state.locked.value.includes(name) ? "Unlock" : "Lock"}
           title="A locked joint stays where it is while others are dragged (K)" onClick=${() => edit([{ do: "lock", point: name }])} />`}

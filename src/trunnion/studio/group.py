@@ -228,7 +228,7 @@ class _Moving:
     def _load(self, load: dict[str, Any]) -> None:
         if "force" in load:
             signs = (1, -1) if load.get("frame") == "link" else self.signs
-            load["force"] = [part if sign > 0 else _minus(part) for part, sign in zip(load["force"], signs, strict=True)]
+            load["force"] = [one if sign > 0 else _minus(one) for one, sign in zip(load["force"], signs, strict=True)]
         if "moment" in load:
             load["moment"] = _minus(load["moment"])
         if "only" in load and load.get("joint") and self._turns(load["joint"]):

@@ -440,8 +440,8 @@ def convergence(read: MeasureReading) -> Panel:
         elif bounded.any():
             middle, half = (0.5 * (high + sign * low)[bounded] for sign in (1, -1))
             marks.append(Line(size[bounded], middle, "95 % interval", Look(WITHIN, 1.3, "none"), half, half))
-        for last in values[np.isfinite(values)][-1:]:
-            marks.append(Rule(float(last), None, Look("muted", 0.8, "dashed", order=1.5), upright=False))
+        dashed = Look("muted", 0.8, "dashed", order=1.5)
+        marks += [Rule(float(last), None, dashed, upright=False) for last in values[np.isfinite(values)][-1:]]
         charts.append(Chart(across, Axis(title, count=4), marks, legend=None if charts else Legend()))
     return Panel("", charts, 4.5)
 

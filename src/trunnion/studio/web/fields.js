@@ -17,7 +17,9 @@ const USUAL = {
 
 const IN_SPACE = { gravity: ["0", "0", "-9.81"], centre: ["50 mm", "0", "0"], force: ["0 N", "0 N", "-100 N"] };
 const FIXED = new Set(["type", "links", "link", "at", "between", "joint", "joints"]); // drawn, not typed
-const OWN_PLACE = ["loop", "links", "joints", "drivers", "loads", "springs", "gears", "dimensions", "assembly", "notes", "references", "trunnion", "space", "ground"];
+/** Sections that are no rows of the model: parts, dimensions, and what is long and edited as text. */
+const OWN_PLACE = ["loop", "links", "joints", "drivers", "loads", "springs", "gears", "dimensions", "assembly", "notes", "references", "trunnion", "space", "ground",
+  "measures", "tolerances", "tolerance_defaults", "correlations", "costs", "processes"]; // prettier-ignore
 
 /** Values that are chosen, with the words for them, "" for none; nothing of a value that is typed. */
 function choicesOf(kind, key, part, entries) {

@@ -332,6 +332,13 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
             user.idle()
             assert told in user.page.locator("body").inner_text()
 
+    def test_mechanisms_in_space_open_after_each_other(user):
+        for name in ("rssr", "bennett", "universal-joint"):
+            user.of("actions", "m.openExample({ name: given })", name)
+            user.idle()
+            assert user.state("s.solved.value")
+            assert not user.wrong, (name, user.wrong)
+
     @pytest.mark.slow
     def test_every_example_opens(user):
         for name in sorted(EXAMPLES)[::3]:  # the answers to all of them are in test_answers.py

@@ -62,3 +62,10 @@ def test_samples_are_what_analyse_has_of_each() -> None:
         assert part["figure"][:3, k] == pytest.approx(alone.measure_figure.values[:3], rel=1e-7)
         turned = [one.joint_rotation.sel(joint="D").values[120:301] for one in (alone, nominal)]
         assert part["figure"][3, k] == pytest.approx(np.max(np.abs(turned[0] - turned[1])), rel=1e-4)
+
+
+def test_play_alone_is_about_the_middle_of_the_holes() -> None:
+    """The worst case over all positions of the pins does not depend on where loads press them."""
+    mechanism = trunnion.read(EXAMPLES / "fourbar-with-play.yaml")
+    loaded, free = (trunnion.play(mechanism.with_seats(seat), steps=36) for seat in ("loaded", "free"))
+    assert loaded.worst_case.values == pytest.approx(free.worst_case.values, rel=1e-9)

@@ -38,11 +38,10 @@ def measured(run: Run) -> dict[str, list[str]]:
     `unseated`, joints whose pins lie nowhere in their play.
     """
     system, mechanism = run.system, run.system.mechanism
-    loose = [name for name, (kind, _) in system.joints.items()
-             if play_of(mechanism.space, kind, run.values, name) is not None]  # fmt: skip
-    varies = loose or mechanism.tolerated()
+    unseated = [name for name, (kind, _) in system.joints.items()
+                if name not in mechanism.seated and play_of(mechanism.space, kind, run.values, name) is not None]  # fmt: skip
+    varies = unseated or mechanism.tolerated()
     measures = (chosen(mechanism, None, run.values) or outputs(system)) if varies else []
-    unseated = [name for name in loose if name not in mechanism.seated]
     return {"worst": [measure.name for measure in measures], "unseated": unseated}
 
 
@@ -125,7 +124,8 @@ def _scene(prepared: ToleranceStudy, numbers: Mapping[str, float], steps: int) -
 
     inputs, bare = prepared.inputs, prepare(prepared.run.system.mechanism.with_friction("off"))
     run = replace(bare, values={**bare.values, **numbers})
-    run.__dict__.update(ideal_values=inputs.nominal, erring=True, seats=[])  # its pins lie where the corner has them
+    pressed = [seat for seat in bare.seats if seat.joint in inputs.pressed]
+    run.__dict__.update(ideal_values=inputs.nominal, erring=True, seats=pressed)  # others lie where the corner has them
     shown = scene(result_of(run, positions(run, steps, margin=False, averaged=False)).dataset, max_positions=steps)
     for joint in inputs.loose:
         play, links = inputs.play(joint, numbers), run.system.joints[joint][1]

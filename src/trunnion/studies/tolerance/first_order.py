@@ -54,7 +54,7 @@ class ToleranceStudy:
     @cached_property
     def kernel(self) -> NumpyKernel:
         """The analysis of the mechanism and of others like it."""
-        kernel = kernel_of("numpy", self.run, self.measures, self.friction)
+        kernel = kernel_of("numpy", self.run, self.measures, self.friction, bool(self.inputs.pressed))
         assert isinstance(kernel, NumpyKernel)
         return kernel
 

@@ -188,9 +188,10 @@ def batch_of(engine: str, positions: int) -> int:
     return max(1, AT_ONCE[engine] // positions)
 
 
-def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: FrictionMethod) -> Kernel:
-    """The kernel of an engine by its name. Raises MechanismError if it cannot."""
-    loaded = any(seat.given is None for seat in run.seats)
+def kernel_of(
+    engine: str, run: Run, measures: Sequence[Measure], friction: FrictionMethod, loaded: bool = False
+) -> Kernel:
+    """The kernel of an engine by its name. loaded: pins lie where loads press them. MechanismError if it cannot."""
     numpy = (LoadedKernel if loaded else MotionKernel)(run, measures, friction)
     if engine == "numpy":
         return numpy
@@ -209,7 +210,7 @@ def many_of(run: Run, measures: Sequence[Measure], inputs: Inputs, friction: Fri
     """The measures of the nominal mechanism, pins in the middle of their holes where they have no seat."""
 
     def kernels(part: Sequence[Measure]) -> Kernel:
-        return kernel_of(engine, run, part, friction)
+        return kernel_of(engine, run, part, friction, bool(inputs.pressed))
 
     many = Many(run, measures, inputs.nominal, kernels)
     if not inputs.pressed:

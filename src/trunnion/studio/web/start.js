@@ -45,7 +45,7 @@ export function Welcome() {
       <button type="button" class=${seen() ? "plain" : "plain strong"} onClick=${begin}>Draw a first mechanism, step by step</button>
       <button type="button" class=${seen() ? "plain strong" : "plain"} onClick=${() => choose("link")}>Draw a link</button>
       <${Button} label="Open a file …" onClick=${() => (state.dialog.value = "open")} />
-      <${Button} label="A loop in space, by its table" onClick=${() => takeText(LOOP, "Begin a loop in space")} />
+      <${Button} label="A loop in space, by its table" onClick=${() => ((state.tab.value = "properties"), takeText(LOOP, "Begin a loop in space"))} />
       <${Button} label="All examples …" onClick=${() => (state.dialog.value = "examples")} />
     </p>
     <ul class="gallery">${cards.map(([name, shows]) => html`<li key=${name}><button type="button" class="card" onClick=${() => openExample(about.get(name))}>

@@ -154,6 +154,7 @@ export function begin({ name, saved, content, steps = null }) {
     corner.value = null;
     factor.value = 1;
     answer.value = null;
+    friction.value = "stated";
     selection.value = null;
     pending.value = null;
     live.value = null;

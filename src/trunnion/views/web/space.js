@@ -87,11 +87,12 @@ export function spaceView(scene, kinds, { fill = false, after = (_view) => {} } 
     recolour: () => recolour(view, false),
     take(scene, kinds, anew) {
       embody(view, scene, kinds);
+      Object.assign(view, { index: Math.min(view.index, scene.count - 1), project: null }); // nothing is drawn with the colours of other links
+      recolour(view, false);
       const { around, above } = view.camera;
       const [more, less] = [scene.size / view.fitted.size, view.fitted.size / scene.size];
       if (anew || Math.max(more, less) > RESIZED) settle(view);
       if (!anew) Object.assign(view.camera, { around, above });
-      recolour(view, false);
       if (view.frame) build(view, view.frame.width);
     },
     magnify(factor) {

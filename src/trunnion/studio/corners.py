@@ -38,16 +38,19 @@ def measured(run: Run) -> dict[str, list[str]]:
     `unseated`, joints whose pins lie nowhere in their play.
     """
     system, mechanism = run.system, run.system.mechanism
-    unseated = [name for name, (kind, _) in system.joints.items()
-                if name not in mechanism.seated and play_of(mechanism.space, kind, run.values, name) is not None]  # fmt: skip
-    varies = unseated or mechanism.tolerated()
+    loose = [name for name, (kind, _) in system.joints.items()
+             if play_of(mechanism.space, kind, run.values, name) is not None]  # fmt: skip
+    varies = loose or mechanism.tolerated()
     measures = (chosen(mechanism, None, run.values) or outputs(system)) if varies else []
+    unseated = [name for name in loose if name not in mechanism.seated]
     return {"worst": [measure.name for measure in measures], "unseated": unseated}
 
 
 @np.errstate(all="ignore")
 def worst_corner(mechanism: Mechanism, name: str, side: str | None, steps: int) -> dict[str, Any]:
     """Return the corner at which a measure is least or largest, or whichever of both is farther from nominal.
+
+    Pins that loads would press to one side may lie anywhere in their holes, as in `tolerance --seat free`.
 
     Returns
     -------
@@ -61,6 +64,8 @@ def worst_corner(mechanism: Mechanism, name: str, side: str | None, steps: int) 
     from trunnion.studies.tolerance.first_order import study
     from trunnion.studies.tolerance.linear import searched
 
+    if "loaded" in mechanism.seated.values():
+        mechanism = mechanism.with_seats("free")
     prepared = study(mechanism, [name], steps)
     run, (of,), effects = prepared.run, prepared.linear.measures, prepared.effects
     ends = searched(prepared.many, prepared.linear, of)
@@ -124,8 +129,7 @@ def _scene(prepared: ToleranceStudy, numbers: Mapping[str, float], steps: int) -
 
     inputs, bare = prepared.inputs, prepare(prepared.run.system.mechanism.with_friction("off"))
     run = replace(bare, values={**bare.values, **numbers})
-    pressed = [seat for seat in bare.seats if seat.joint in inputs.pressed]
-    run.__dict__.update(ideal_values=inputs.nominal, erring=True, seats=pressed)  # others lie where the corner has them
+    run.__dict__.update(ideal_values=inputs.nominal, erring=True, seats=[])  # its pins lie where the corner has them
     shown = scene(result_of(run, positions(run, steps, margin=False, averaged=False)).dataset, max_positions=steps)
     for joint in inputs.loose:
         play, links = inputs.play(joint, numbers), run.system.joints[joint][1]

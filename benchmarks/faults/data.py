@@ -242,8 +242,8 @@ _VIEWS = (
     Fault(
         "efficiency-difference-sign",
         "views/compare.py",
-        "(measured, wide, model, measured - model)",
-        "(measured, wide, model, model - measured)",
+        "_plain(c), _plain(m - c),",
+        "_plain(c), _plain(c - m),",
         ("tests/views/test_compare.py", "-k", "tables or difference"),
     ),
     Fault(

@@ -91,15 +91,6 @@ def test_friction_power_adds_up(plain):
     assert sum(lines[joint] for joint in "ABCD") == pytest.approx(lines["all joints"])
 
 
-def test_results_of_earlier_versions_have_means_and_peaks_by_their_positions(plain):
-    """Without the means over the cycle those of the positions, without a locking margin no position near it."""
-    older = plain.drop_vars(["friction_power_mean", "locking_margin"])
-    mean = float(plain.friction_power.sel(joint="A").mean())
-    assert mean_friction(older, "A") == pytest.approx(mean)
-    assert mean_friction(plain, "A") == pytest.approx(mean, rel=1e-3)
-    assert plots.figure(older, "torque").axes[0].lines
-
-
 def test_a_position_that_is_not_there_is_refused(plain):
     with pytest.raises(MechanismError, match="no position 360 among the 360 — name one from 0 to 359"):
         mechanism(plain, index=360)

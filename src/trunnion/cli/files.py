@@ -19,8 +19,7 @@ from trunnion.files import Target, writing
 
 __all__ = ["flags_of", "guarded", "named_words", "outputs"]
 
-IN_PLACE = "write"  # the one option that may name the model itself; the verb asks for --force then
-MODEL = "file"
+IN_PLACE = {"write": "file", "write_mapping": "mapping"}  # may name that input itself; the verb asks for --force then
 
 
 def guarded(verb: Callable[..., None]) -> Callable[..., None]:
@@ -69,7 +68,7 @@ def _targets(names: list[str], options: dict[str, Any]) -> Iterator[Target]:
     for name in names:
         given = options.get(name)
         for path in given if isinstance(given, list) else [given] if given is not None else []:
-            yield Target(f"--{name.strip('_')}", path, options.get(MODEL) if name == IN_PLACE else None)
+            yield Target(f"--{name.strip('_').replace('_', '-')}", path, options.get(IN_PLACE.get(name, "")))
 
 
 # ---- help ----------------------------------------------------------------------------------------------------------

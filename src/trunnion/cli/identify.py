@@ -102,6 +102,7 @@ def identify(
 
     check_files(out or [], report, of="identification", kind=kind)
     check_model(write, file, force)
+    _check_mapping(write_mapping, mapping, force)
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
         wanted, begin = parameters(parameter or []), dict(setting(text) for text in start or ())
@@ -120,7 +121,7 @@ def identify(
     if write is not None:
         findings += _write_model(mechanism, result, file, write, force, shown.written)
     if write_mapping is not None:
-        findings += _write_mapping(result, mapping, write_mapping, force, shown.written)
+        findings += _write_mapping(result, mapping, write_mapping, shown.written)
     shown.end(findings)
 
 
@@ -192,7 +193,22 @@ def _write_model(
     return notes
 
 
-def _write_mapping(result: xr.Dataset, mapping: Path, write: Path, force: bool, written: list[Path]) -> list[Finding]:
+def _check_mapping(write: Path | None, mapping: Path, force: bool) -> None:
+    """MechanismError for a mapping that cannot be written, is in another folder than its data, or is there already."""
+    if write is None:
+        return
+    if write.suffix.lower() not in (".yaml", ".yml"):
+        what, remedy = f"a mapping is not written as '{write.suffix}'", "write .yaml"
+    elif write.resolve().parent != mapping.resolve().parent:
+        what, remedy = f"'{write}' is not in the folder of '{mapping}', whose data it names", "name a file there"
+    elif write.exists() and not force:
+        what, remedy = f"'{write}' exists", "name another file, or add --force"
+    else:
+        return
+    raise MechanismError(Finding(what, "--write-mapping", remedy))
+
+
+def _write_mapping(result: xr.Dataset, mapping: Path, write: Path, written: list[Path]) -> list[Finding]:
     """The mapping with the zeros that were found, beside the data that it names."""
     from trunnion.files import whole
     from trunnion.model.file import read_entries
@@ -200,10 +216,6 @@ def _write_mapping(result: xr.Dataset, mapping: Path, write: Path, force: bool, 
     from trunnion.rig.identification import corrected_mapping
 
     try:
-        itself = write.exists() and write.samefile(mapping)
-        if write.resolve().parent != mapping.resolve().parent or (itself and not force):
-            what, remedy = f"'{write}' is no other file beside '{mapping}'", "name one in its folder, or add --force"
-            raise MechanismError(Finding(what, "--write-mapping", remedy))
         entries = corrected_mapping(read_entries(mapping, "a mapping file")[0], result)
     except MechanismError as error:
         return list(error.findings)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from math import floor, isfinite, isnan, log10
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import primal
 from trunnion.algebra.panels import CANCELLED
+from trunnion.algebra.roots import root
 from trunnion.cycle.course import CycleCourse, course_of, margin_of
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Coded, Status
@@ -33,6 +34,7 @@ from trunnion.solve.friction import FrictionProblem, frictionless, scaled
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.friction_problem import largest
 from trunnion.solve.loads import has_useful_work, useful_loads, useful_powers, useful_springs
+from trunnion.solve.margin import margin_in
 from trunnion.solve.status import status_of
 from trunnion.solve.switches import MARGINS
 from trunnion.solve.system import felt, law_of, scale_of
@@ -51,7 +53,9 @@ HEAD = ("state", "from", "to", "smallest margin", "at")  # of the table of range
 TIMES = "times the friction"  # what a locking margin is
 LITTLE = 1e-3  # of what the useful loads give: what masses, other loads and springs may supply beside it
 BACK = Accuracy(1e-8, shortest=1e-8, rounds=14, most=32)  # beside a locked position each one takes long
-HOLDING = Accuracy(1e-12, 1e-14, widest=1.0, rounds=12)
+HOLDING = 1e-13  # of a multiple of all friction: how near that is found at which friction begins to hold
+NODES = 9  # multiples among which the first that holds is looked for
+UNLOCKED = 1e-9  # of the multiple at which it locks: with less by that it does not
 SHORT = 3e-5  # of the cycle, as 0.01° of a turn: a range that is less is none, and an end as near to a break is at it
 BITS = 48  # joints that are told apart by the state of their critical multiples
 MOST_PLACES = 3  # named in one figure
@@ -132,12 +136,17 @@ def passed(run: Run, walk: Forward, method: FrictionMethod) -> Passage:
     Of one that goes `backward` speeds are turned round, friction and all that resists with them; inertia stays, for
     accelerations do.
     """
+    return Passage.of(_back(run, walk, method))
+
+
+def _back(run: Run, walk: Forward, method: FrictionMethod) -> Backward:
+    """Forces at positions of a walk, in its direction."""
     turned, time = walk.direction < 0, np.asarray(walk.time, float)
     past = histories(run.system, run.values, run.chosen.assembly, run.cycle, turned)
     time = run.cycle.duration - time if turned else time
     deflections = {joint: history.at(time) for joint, history in past.items()}
     with np.errstate(all="ignore"):
-        return Passage.of(backward(walk, method, Given({}, deflections)))
+        return backward(walk, method, Given({}, deflections))
 
 
 def locks(back: Backward) -> NDArray[np.bool_]:
@@ -205,32 +214,39 @@ def _alone(problem: FrictionProblem, masks: NDArray[np.bool_], most: float) -> A
 def holding_multiples(run: Run, time: Array) -> Array:
     """Multiple of all friction down to which friction holds the loads, at each time, s; NaN where it does not.
 
-    There the power delivered to the drivers, in the direction in which the loads push, rises from 0. 0 where it is
-    held without the friction that follows loads.
+    There the power delivered to the drivers, in the direction in which the loads push, falls to 0, or it locks. 0 where
+    it is held without the friction that follows loads.
     """
     multiples, least = np.full(len(time), np.nan), scales_of(run).floor("W")
     walk = run.walk(time)
     for direction in (walk, walk.backward()):
-        full = passed(run, direction, FrictionMethod())
+        back = _back(run, direction, FrictionMethod())
+        full = Passage.of(back)
         holding = np.flatnonzero((full.acting > least) & (full.locked | (full.delivered <= 0)))
         if not len(holding):
             continue
 
-        def released(
-            lane: NDArray[np.intp], multiple: Array, times: Array = time[holding], back: bool = direction.direction < 0
-        ) -> tuple[Array, NDArray[np.intp]]:
+        def delivered(lane: NDArray[np.intp], multiple: Array, turned: bool = direction.direction < 0) -> Array:
             """Power delivered to the drivers for multiples of all friction; below 0 where it locks."""
-            part = run.walk(np.repeat(times[lane], multiple.shape[1]))
-            through = passed(run, part.backward() if back else part, FrictionMethod(multiple=multiple.ravel()))
-            power = np.where(through.locked, -np.abs(through.acting), through.delivered)
-            return power.reshape(1, *multiple.shape), through.locked.reshape(multiple.shape).astype(np.intp)
+            part = run.walk(time[lane])
+            through = passed(run, part.backward() if turned else part, FrictionMethod(multiple=multiple))
+            return np.where(through.locked, -np.abs(through.acting), through.delivered)
 
         with np.errstate(all="ignore"):
-            each = Courses.many(released, [np.array([0.0, 1.0])] * len(holding), None, HOLDING)
-        for lane, course in zip(holding, each, strict=True):
-            passages = course.passages(0)
-            none = course.ends(0)[1][0] <= 0.0
-            multiples[lane] = 0.0 if none or not len(passages) else passages[0]
+            margins = np.broadcast_to(np.asarray(margin_in(back, 1.0), float), time.shape)[holding]
+            last = np.where(margins <= 1.0, margins * (1.0 - UNLOCKED), 1.0)  # there it does not lock yet
+            nodes = last[:, None] * np.linspace(0.0, 1.0, NODES)
+            power = delivered(np.repeat(holding, NODES), nodes.ravel()).reshape(nodes.shape)
+            held = power <= 0.0
+            first = np.argmax(held, axis=1)
+            found = np.where(np.any(held, axis=1), 0.0, margins)
+            inside = np.flatnonzero(first > 0)
+            if len(inside):
+                ends = [(inside, first[inside] - 1), (inside, first[inside])]
+                (low, high), (at_low, at_high) = ([rows[end] for end in ends] for rows in (nodes, power))
+                near = np.full(len(low), HOLDING)
+                found[inside] = root(partial(delivered, holding[inside]), low, high, at_low, at_high, near)
+        multiples[holding] = found
     return multiples
 
 

@@ -119,6 +119,8 @@ class SeatedKernel(NumpyKernel):
             status = status_of(seated.back, place.shape)
             np.maximum(status, np.where(seated.sticks, np.int8(Status.ZERO_SLIP), np.int8(0)), out=status)
             curves = self.curves(seated.back, status)
+        locked = status == Status.LOCKED  # no load presses a pin there, so that nothing is known of its place
+        curves = {name: tuple(np.where(locked, np.nan, part) for part in parts) for name, parts in curves.items()}
         lost = np.any((self.gaps[0] < place[:, None]) & (place[:, None] < self.gaps[1]), axis=1)
         return curves, np.where(lost, np.maximum(status, np.int8(Status.CONTACT_LOST)), status)
 

@@ -92,6 +92,7 @@ Pitch = Annotated[Length, NotZero("the thread does not advance", "give another p
 _FIT = re.compile(r"^(?P<size>.*[^\sA-Z])\s*(?P<hole>[A-Z]{1,2}[0-9]{1,2})\s*/\s*(?P<shaft>[a-z]{1,2}[0-9]{1,2})$")
 _PLAIN = re.compile(r"[0-9]+(\.[0-9]*)?")
 _CLASSES = re.compile(r"\s*[A-Z]{1,2}[0-9]{1,2}\s*/\s*[a-z]{1,2}[0-9]{1,2}\s*")
+_LIMITS = re.compile(r"±|[+-][\d.]+ */ *[+-]")  # as limits are written
 
 
 @dataclass(frozen=True)
@@ -162,6 +163,8 @@ class Pin(Part):
         fit, radius = (data.get(key) for key in ("fit", "radius")) if isinstance(data, Mapping) else (None, None)
         if not (isinstance(fit, str) and _CLASSES.fullmatch(fit) and isinstance(radius, str | int | float)):
             return data
+        if _LIMITS.search(str(radius)):
+            return data  # the fit has limits of its own: a finding says so
         size = radius if isinstance(radius, str) else f"{radius} m"
         return {key: value for key, value in data.items() if key != "radius"} | {"fit": f"2 * ({size}) {fit.strip()}"}
 

@@ -9,7 +9,7 @@ from typing import Any
 from trunnion.studio.ends import free, refused, taken
 from trunnion.studio.sketch import Sketch
 
-__all__ = ["rename", "rename_point"]
+__all__ = ["rename", "rename_point", "renamed"]
 
 Given = Mapping[str, Any]
 NAMED = ("links", "joints", "dimensions", "loads", "springs", "gears")
@@ -30,7 +30,7 @@ def rename(sketch: Sketch, given: Given) -> str:
     if section == "points":
         rename_point(sketch, old, new)
         return f"Rename {old} to {new}"
-    sketch.entries = dict(_renamed(sketch.entries, section, old, new))
+    sketch.entries = dict(renamed(sketch.entries, section, old, new))
     if section == "links" and old == sketch.ground:
         sketch.entries["ground"] = new
     if section in SIDES:
@@ -69,16 +69,16 @@ def rename_point(sketch: Sketch, old: str, new: str) -> None:
     sketch.locked = {f"{link}.{new}" if key == old else key for key in sketch.locked}
 
 
-def _renamed(group: Any, section: str, old: str, new: str, way: tuple[str, ...] = ()) -> Any:
+def renamed(group: Any, section: str, old: str, new: str, way: tuple[str, ...] = ()) -> Any:
     """The entries with another name in keys and in what speaks of it."""
     if isinstance(group, dict):
         named = _named(section, way)
         return {
-            (new if named and key == old else key): _renamed(one, section, old, new, (*way, key))
+            (new if named and key == old else key): renamed(one, section, old, new, (*way, key))
             for key, one in group.items()
         }
     if isinstance(group, list):
-        return [_renamed(one, section, old, new, way) for one in group]
+        return [renamed(one, section, old, new, way) for one in group]
     return _respoken(group, section, old, new, way) if isinstance(group, str) else group
 
 
@@ -106,6 +106,7 @@ def _respoken(text: str, section: str, old: str, new: str, way: tuple[str, ...])
     if section == "joints":
         if last == "between":
             return re.sub(rf"(?<=\.){re.escape(old)}$", new, text)
-        return new if text == old and last in ("at", "frame", "joint", "joints") else text
+        spoken = last in ("at", "frame", "joint", "joints") and way[0] != "links"  # there a place is a dimension
+        return new if text == old and spoken else text
     stated = way[:1] not in (("name",), ("notes",), ("references",)) and last not in ("links", "link", "at", "type")
     return re.sub(rf"(?<![\w.]){re.escape(old)}(?![\w.])", new, text) if stated else text

@@ -133,10 +133,9 @@ def joined(sketch: Sketch, link: str, end: Any, place: Vector) -> str:
     return point
 
 
-def doubled(sketch: Sketch, link: str, point: str) -> str:
-    """Another point of a link on the spot of one that is a joint already, for a second pin there."""
-    stated = sketch.points(link)[point]
-    name = letter(sketch)
+def doubled(sketch: Sketch, link: str, point: str, name: str = "") -> str:
+    """Another point of a link on the spot of one that is a joint already, for a second pin there: its name."""
+    stated, name = sketch.points(link)[point], name or letter(sketch)
     sketch.section("links")[link]["points"][name] = list(stated["at"] if isinstance(stated, dict) else stated)
     sketch.places[f"{link}.{name}"] = sketch.places[f"{link}.{point}"]
     sketch.forget()

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from trunnion.studio.changing import move
-from trunnion.studio.ends import begin, free, held, letter, pin, place_of, put, refused
+from trunnion.studio.ends import begin, doubled, free, held, letter, pin, place_of, put, refused
 from trunnion.studio.renaming import rename_point
 from trunnion.studio.sketch import Sketch, Vector
 
@@ -62,11 +62,10 @@ def _name(sketch: Sketch, links: tuple[str, str], ends: tuple[Any, Any]) -> str:
 def _call(sketch: Sketch, link: str, end: Any, name: str, place: Vector) -> None:
     """The link has a point of this name at an end of it."""
     if not isinstance(end, str):
-        return put(sketch, link, name, place)
+        put(sketch, link, name, place)
+        return
     point = held(sketch, end)[1]
-    if point not in sketch.joints:
-        return rename_point(sketch, f"{link}.{point}", name) if point != name else None
-    stated = sketch.points(link)[point]
-    sketch.section("links")[link]["points"][name] = list(stated["at"] if isinstance(stated, dict) else stated)
-    sketch.places[f"{link}.{name}"] = sketch.places[f"{link}.{point}"]
-    return None
+    if point in sketch.joints:
+        doubled(sketch, link, point, name)
+    elif point != name:
+        rename_point(sketch, f"{link}.{point}", name)

@@ -6,7 +6,6 @@ What does not change from answer to answer, as the positions before the drag, is
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from trunnion.solve.margin import margin_in, margins_beside
 from trunnion.solve.run import Run
 from trunnion.solve.status import status_of
 from trunnion.studio.loaded import Loaded
-from trunnion.studio.placed import column, tracks
+from trunnion.studio.placed import column, tracked, tracks
 
 __all__ = ["live_columns", "live_margin", "places_at", "solved_with"]
 
@@ -27,15 +26,9 @@ Array = NDArray[np.float64]
 NEAR = 3.0  # multiple of the friction up to which the margin is looked for: farther it takes longer than the forces
 
 
-@lru_cache(maxsize=4)
-@np.errstate(all="ignore")
-def _tracks(state: Loaded, steps: int) -> dict[str, dict[str, Array]]:
-    return tracks(state.run.walk(state.run.cycle.times(steps)), steps)
-
-
 def places_at(state: Loaded, steps: int, index: int) -> dict[str, tuple[float, float]]:
     """Where the points of a model are at a position of its cycle, m; MechanismError where it cannot be assembled."""
-    paths = _tracks(_planar(state), steps)
+    paths = tracked(_planar(state), steps)
     places = {key: (float(track["x"][index]), float(track["y"][index])) for key, track in paths.items()}
     if not np.all(np.isfinite(list(places.values()))):
         what = "cannot be assembled at the position that is shown"

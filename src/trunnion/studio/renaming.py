@@ -13,7 +13,7 @@ __all__ = ["rename", "rename_point", "renamed"]
 
 Given = Mapping[str, Any]
 NAMED = ("links", "joints", "dimensions", "loads", "springs", "gears")
-SIDES = {"links": 0, "joints": 1}  # of "link.point"
+SIDES = ("links", "joints")  # of "link.point"
 
 
 def rename(sketch: Sketch, given: Given) -> str:
@@ -34,20 +34,17 @@ def rename(sketch: Sketch, given: Given) -> str:
     if section == "links" and old == sketch.ground:
         sketch.entries["ground"] = new
     if section in SIDES:
-        for key in [key for key in sketch.places if key.split(".")[SIDES[section]] == old]:
-            parts = key.split(".")
-            parts[SIDES[section]] = new
-            sketch.places[".".join(parts)] = sketch.places.pop(key)
-        sketch.locked = {_relocked(key, SIDES[section], old, new) for key in sketch.locked}
+        sketch.places = {_key(key, section, old, new): place for key, place in sketch.places.items()}
+        sketch.locked = {_key(key, section, old, new) for key in sketch.locked}
     return f"Rename {old} to {new}"
 
 
-def _relocked(key: str, side: int, old: str, new: str) -> str:
-    """The name of a locked joint or point "link.P" after a link or joint is renamed."""
-    link, dot, point = key.partition(".")
-    if not dot:
-        return new if side == 1 and key == old else key
-    return f"{new}.{point}" if side == 0 and link == old else key
+def _key(key: str, section: str, old: str, new: str) -> str:
+    """The key "link.P" of a point, or the name of a joint, after a link or joint is renamed."""
+    link, dot, point = key.rpartition(".")
+    if section == "links":
+        return f"{new if link == old else link}{dot}{point}"
+    return f"{link}{dot}{new if point == old else point}"
 
 
 def rename_point(sketch: Sketch, old: str, new: str) -> None:

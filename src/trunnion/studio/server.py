@@ -371,11 +371,10 @@ async def _thumbnail(request: Request) -> Response:
 
 
 def _small(text: str) -> bytes:
-    from trunnion.studio.message import packed
-    from trunnion.studio.thumbnails import thumbnail
+    from trunnion.studio.placed import thumbnail
 
     with ANSWERING:
-        return packed(thumbnail(text))
+        return thumbnail(text)
 
 
 def _look(text: str, seen: Event) -> None:
@@ -389,11 +388,10 @@ def _look(text: str, seen: Event) -> None:
 
 
 def _placed(text: str) -> bytes:
-    from trunnion.studio.message import packed
     from trunnion.studio.placed import placed
 
     with ANSWERING:
-        return packed(placed(text))
+        return placed(text)
 
 
 def _answered(question: bytes) -> bytes:

@@ -31,7 +31,6 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
 from trunnion.studio.blocks import blocks_of
-from trunnion.studio.corners import measured, worst_corner
 from trunnion.studio.ends import held, vector
 from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
@@ -39,12 +38,11 @@ from trunnion.studio.live import live_columns, live_margin, places_at, solved_wi
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
 from trunnion.studio.margin import cures, locks_of, margin_of, margins_without
 from trunnion.studio.message import packed
-from trunnion.studio.missing import missing
 from trunnion.studio.overlays import centres, circles, place_motion, point_motion, seats, transmission
 from trunnion.studio.placed import plain, tracks
-from trunnion.studio.readiness import readiness
+from trunnion.studio.readiness import missing, readiness
 from trunnion.studio.sketch import Change, Sketch, Vector
-from trunnion.studio.tolerances import tolerated
+from trunnion.studio.tolerances import measured, tolerated, worst_corner
 from trunnion.studio.variants import overlaid
 from trunnion.studio.words import remedied, spoken
 from trunnion.version import __version__

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.model.changes import with_law
 from trunnion.model.file import Lines, entries_of, place, version_findings
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.text import stated_files
@@ -172,23 +174,10 @@ class Asked(dict[str, Any]):
 
 def _without_friction(entries: Mapping[str, Any]) -> Mechanism | None:
     """The mechanism without what is stated of friction; None where that is not what is wrong with it."""
-    joints, common = (entries.get(key) or {} for key in ("joints", "joint_defaults"))
-    rows = entries.get("loop") or []
-    if not isinstance(joints, dict) or not isinstance(common, dict) or not isinstance(rows, list):
-        return None
-    bare = {
-        "joints": {name: _plain(one) for name, one in joints.items()},
-        **({"joint_defaults": _plain(common)} if common else {}),
-        **({"loop": [_plain(row) for row in rows]} if rows else {}),
-    }
     try:
-        return Mechanism(**{**entries, **bare})
-    except MechanismError:
+        return Mechanism(**with_law(copy.deepcopy(dict(entries)), "off"))
+    except (MechanismError, TypeError, AttributeError):  # the last two of joints that are no groups of entries
         return None
-
-
-def _plain(part: Any) -> Any:
-    return {key: one for key, one in part.items() if key != "friction"} if isinstance(part, dict) else part
 
 
 def _refusals(entries: Mapping[str, Any]) -> list[Finding]:

@@ -148,24 +148,15 @@ class Sketch:
         """The frame of a link that fits its points best to where they are shown."""
         if link == self.ground:
             return GROUND
-        pairs = [
-            (self.local(link, point), self.places[f"{link}.{point}"])
-            for point in self.points(link)
-            if f"{link}.{point}" in self.places
-        ]
-        if not pairs:
+        shown = [point for point in self.points(link) if f"{link}.{point}" in self.places]
+        if not shown:
             return GROUND
-        middle = [[sum(one[side][i] for one in pairs) / len(pairs) for i in (0, 1)] for side in (0, 1)]
-        along = across = 0.0
-        for local, place in pairs:
-            (a, b), (x, y) = (
-                (one[0] - mid[0], one[1] - mid[1]) for one, mid in zip((local, place), middle, strict=True)
-            )
-            along, across = along + a * x + b * y, across + a * y - b * x
-        turn = atan2(across, along) if hypot(along, across) > 0.0 else 0.0
-        turned = Frame(0.0, 0.0, cos(turn), sin(turn))
-        x, y = turned.out((middle[0][0], middle[0][1]))
-        return turned._replace(x=middle[1][0] - x, y=middle[1][1] - y)
+        local = np.array([complex(*self.local(link, point)) for point in shown])
+        places = np.array([complex(*self.places[f"{link}.{point}"]) for point in shown])
+        turn = np.sum((local - local.mean()).conj() * (places - places.mean()))
+        turn = turn / abs(turn) if turn else 1.0 + 0.0j
+        origin = places.mean() - turn * local.mean()
+        return Frame(*map(float, (origin.real, origin.imag, turn.real, turn.imag)))
 
     def show(self, link: str, frame: Frame) -> None:
         """Show the points of a link where its frame has them."""

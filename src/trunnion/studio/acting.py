@@ -50,16 +50,16 @@ def load(sketch: Sketch, given: Given) -> str:
     """
     before = str(given.get("instead") or "")
     name = before if before in sketch.of("loads") else numbered(sketch, "loads", "load")
-    sketch.section("loads")[name] = _resisting(sketch, given, name) if "against" in given else _force(sketch, given)
+    if "against" in given:
+        entry = _resisting(sketch, given, name)
+    else:
+        link, point = point_of(sketch, given["at"])
+        if link == sketch.ground:
+            raise refused("would act on the ground", "the force", "choose a point of a moving link")
+        entry = {"link": link, "at": point, "force": list(given["force"])}
+    sketch.section("loads")[name] = entry
     sketch.made = ("loads", name)
     return f"Change {name}" if name == before else f"Add {name}"
-
-
-def _force(sketch: Sketch, given: Given) -> dict[str, Any]:
-    link, point = point_of(sketch, given["at"])
-    if link == sketch.ground:
-        raise refused("would act on the ground", "the force", "choose a point of a moving link")
-    return {"link": link, "at": point, "force": list(given["force"])}
 
 
 def _resisting(sketch: Sketch, given: Given, name: str) -> dict[str, Any]:

@@ -21,6 +21,7 @@ SECTIONS = {
 }  # fmt: skip
 NAMES = (("name",), ("notes",), ("references",))  # texts for readers
 NAMED = ("links", "link", "joint", "joints", "between", "at", "type")  # names of other parts, beside coordinates
+WORDS = ("off", "none", "yes", "no", "true", "false")  # that are no new name of a dimension
 DEFINED = re.compile(r"\s*([^\W\d]\w*)\s*=(.+)")  # crank = 30 mm
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
@@ -76,7 +77,8 @@ def put_value(sketch: Sketch, given: Given) -> str:
         group = group[key] if isinstance(group, list) else group.setdefault(key, {})
         if not isinstance(group, (dict, list)):
             raise refused("is a single value", ".".join(map(str, way)), "change it in the text of the model")
-    way_told = [way[0], sketch.rows[way[1]].get("joint"), *way[2:]] if way[:1] == ["loop"] and len(way) > 1 else way
+    in_loop = way[:1] == ["loop"] and len(way) > 1
+    way_told = [way[0], sketch.rows[way[1]].get("joint"), *way[2:]] if in_loop else way
     path, value = ".".join(map(str, [*way_told, last])), given.get("value")
     stated = spoken(path)
     if value is not None:
@@ -131,16 +133,12 @@ def _named(sketch: Sketch, value: Any, before: Any) -> Any:
         sketch.section("dimensions")[found[1]] = _typed(found[2].strip())
         return found[1]
     number = isinstance(before, (int, float)) or (isinstance(before, str) and re.match(NUMBER, before.strip()))
-    if not number or not isinstance(value, str) or not value.isidentifier() or value in _spoken_for(sketch):
+    if not number or not isinstance(value, str) or not value.isidentifier():
+        return value
+    if value in {*sketch.section("dimensions"), *sketch.of("tables"), *RESERVED, *MOTION, *FRICTION_LAWS, *WORDS}:
         return value
     sketch.section("dimensions")[value] = before
     return value
-
-
-def _spoken_for(sketch: Sketch) -> set[str]:
-    """Words that are no new name of a dimension."""
-    words = {"off", "none", "yes", "no", "true", "false", *FRICTION_LAWS}
-    return {*sketch.section("dimensions"), *sketch.of("tables"), *RESERVED, *MOTION, *words}
 
 
 def _typed(value: Any) -> Any:

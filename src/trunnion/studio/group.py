@@ -83,11 +83,15 @@ class _Moving:
             self._refuse(mine, outside)
             self._flip(mine)
         for name in outside:
-            if sketch.joints[name].get("type", "revolute") != "revolute":
+            if not self._turns(name):
                 raise refused("slides along a link that is not chosen", f"joints.{name}", "choose both links")
         pinned = {name for name, one in mine.items() if ground in one["links"]} | _fastened(sketch, self.links)
-        for point in pinned & set(sketch.points(ground)):
-            self._ground(point)
+        fixed = sketch.points(ground)
+        for point in pinned & set(fixed):
+            stated = fixed[point]
+            if not isinstance(stated.get("at") if isinstance(stated, dict) else stated, list):
+                raise refused("is not stated by x and y", f"links.{ground}.points.{point}", "write it so")
+            sketch.section("links")[ground]["points"][point] = self._placed(stated)
         for name in mine:
             self._hint(name)
         keys = [f"{link}.{point}" for link in self.links for point in sketch.points(link)]
@@ -117,13 +121,6 @@ class _Moving:
         sketch.places[f"{other}.{joint}"] = sketch.places[f"{inside}.{joint}"]
         sketch.show(other, sketch.frame(other))
 
-    def _ground(self, point: str) -> None:
-        points = self.sketch.section("links")[self.sketch.ground]["points"]
-        one = points[point]
-        if not isinstance(one.get("at") if isinstance(one, dict) else one, list):
-            raise refused("is not stated by x and y", f"links.{self.sketch.ground}.points.{point}", "write it so")
-        points[point] = self._placed(one)
-
     def _placed(self, stated: Any) -> Any:
         return _mapped(stated, self.signs, self.offset, self.sketch.unit)
 
@@ -138,7 +135,7 @@ class _Moving:
     # ---- mirrored --------------------------------------------------------------------------------------------
 
     def _turns(self, joint: str) -> bool:
-        return bool(self.sketch.joints[joint].get("type", "revolute") == "revolute")
+        return self.sketch.kind(joint) == "revolute"
 
     def _half(self, joint: str) -> float:
         """What the rotation q of a joint is taken from when it is mirrored, rad: q' = half − q."""

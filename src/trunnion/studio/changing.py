@@ -10,6 +10,7 @@ from typing import Any
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.expression import MOTION, RESERVED
 from trunnion.studio.ends import free, held, letter, numbered, refused, vector
+from trunnion.studio.renaming import names_dimensions
 from trunnion.studio.sketch import Sketch
 from trunnion.studio.words import spoken
 
@@ -19,8 +20,6 @@ Given = Mapping[str, Any]
 SECTIONS = {
     "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair"
 }  # fmt: skip
-NAMES = (("name",), ("notes",), ("references",))  # texts for readers
-NAMED = ("links", "link", "joint", "joints", "between", "at", "type")  # names of other parts, beside coordinates
 WORDS = ("off", "none", "yes", "no", "true", "false")  # that are no new name of a dimension
 DEFINED = re.compile(r"\s*([^\W\d]\w*)\s*=(.+)")  # crank = 30 mm
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
@@ -118,7 +117,7 @@ def _users(group: Any, name: str, way: tuple[str, ...] = ()) -> Iterator[str]:
     elif isinstance(group, list):
         for one in group:
             yield from dict.fromkeys(_users(one, name, way))
-    elif isinstance(group, str) and way[:1] not in NAMES and way[-1] not in NAMED:
+    elif isinstance(group, str) and names_dimensions(way):
         stated = way != ("dimensions", name) and re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", group)
         yield from [spoken(".".join(way))] if stated else []
 

@@ -9,7 +9,7 @@ from typing import Any
 from trunnion.studio.ends import free, refused, taken
 from trunnion.studio.sketch import Sketch
 
-__all__ = ["rename", "rename_point", "renamed"]
+__all__ = ["names_dimensions", "rename", "rename_point", "renamed"]
 
 Given = Mapping[str, Any]
 NAMED = ("links", "joints", "dimensions", "loads", "springs", "gears")
@@ -105,5 +105,10 @@ def _respoken(text: str, section: str, old: str, new: str, way: tuple[str, ...])
             return re.sub(rf"(?<=\.){re.escape(old)}$", new, text)
         spoken = last in ("at", "frame", "joint", "joints") and way[0] != "links"  # there a place is a dimension
         return new if text == old and spoken else text
-    stated = way[:1] not in (("name",), ("notes",), ("references",)) and last not in ("links", "link", "at", "type")
-    return re.sub(rf"(?<![\w.]){re.escape(old)}(?![\w.])", new, text) if stated else text
+    return re.sub(rf"(?<![\w.]){re.escape(old)}(?![\w.])", new, text) if names_dimensions(way) else text
+
+
+def names_dimensions(way: tuple[str, ...]) -> bool:
+    """Whether a text of the file may name dimensions: it is neither for readers nor the name of a part."""
+    names_part = way[-1] in ("links", "link", "joint", "joints", "between", "type")
+    return way[0] not in ("name", "notes", "references") and not names_part and (way[-1] != "at" or way[0] == "links")

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
 from functools import lru_cache, partial
 from importlib.resources import files
@@ -41,7 +41,7 @@ from trunnion.studio.message import packed
 from trunnion.studio.overlays import centres, circles, place_motion, point_motion, seats, transmission
 from trunnion.studio.placed import plain, tracks
 from trunnion.studio.readiness import missing, readiness
-from trunnion.studio.sketch import Change, Sketch, Vector
+from trunnion.studio.sketch import Sketch, Vector
 from trunnion.studio.tolerances import measured, tolerated, worst_corner
 from trunnion.studio.variants import overlaid
 from trunnion.studio.words import remedied, spoken
@@ -125,11 +125,14 @@ def _example(asked: Asked) -> dict[str, Any]:
 def _model(asked: Asked) -> dict[str, Any]:
     """Findings, numbers, motion and forces of a text; the figures of its cycle are asked for by `cycle`."""
     state = asked.state
-    result, told = _solved(state, lambda: asked.motion)
+    result, told = _solved(asked, lambda: asked.motion)
+    numbers: Mapping[str, Any] = {}
+    with suppress(MechanismError):  # of what is half drawn those that can be read
+        numbers = state.mechanism.parameters() if state.mechanism else _sketch(asked).numbers
     head = {
         **told,
         "entries": state.entries,
-        "numbers": _numbers(state, _sketch(state)),
+        "numbers": plain(numbers),
         "solved": result is not None,
         "bare": state.bare,
         "scene": None,
@@ -148,14 +151,15 @@ def _model(asked: Asked) -> dict[str, Any]:
     }
 
 
-def _sketch(state: Loaded, places: dict[str, Vector] | None = None) -> Sketch:
+def _sketch(asked: Asked, places: dict[str, Vector] | None = None) -> Sketch:
     """A drawing of a model's entries that may be changed."""
-    return Sketch(copy.deepcopy(dict(state.entries or {})), places or {})
+    entries, locked = copy.deepcopy(dict(asked.state.entries or {})), set(map(str, asked.get("locked") or ()))
+    return Sketch(entries, places or {}, locked, fine=float(asked.get("fine") or 0.0))
 
 
 def _cycle(asked: Asked) -> dict[str, Any]:
     """Findings and figures of the whole cycle of a text, which take longer than its motion."""
-    result, told = _solved(asked.state, lambda: asked.result)
+    result, told = _solved(asked, lambda: asked.result)
     if result is None:
         return told
     units = units_of(result)
@@ -169,9 +173,9 @@ def _cycle(asked: Asked) -> dict[str, Any]:
     return told | {"figures": [[label, value] for label, value in figures.items()], "margin_least": least}
 
 
-def _solved(state: Loaded, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset | None, dict[str, Any]]:
+def _solved(asked: Asked, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset | None, dict[str, Any]]:
     """The result of a text, None where it has none, and what there is to say of it."""
-    findings, result = list(state.findings), None
+    state, findings, result = asked.state, list(asked.state.findings), None
     if state.mechanism is not None:
         try:
             result = solve()
@@ -179,7 +183,7 @@ def _solved(state: Loaded, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset 
             findings = [*findings, *more] if state.bare else more or findings
         except MechanismError as error:
             findings += state.placed(error.findings)
-    lacks = missing(_sketch(state), findings)
+    lacks = missing(_sketch(asked), findings)
     ready = readiness(state.mechanism, result, findings, lacks)
     return result, {"findings": [_row(state, one, result) for one in findings], "missing": lacks, "ready": ready}
 
@@ -214,26 +218,15 @@ def _row(state: Loaded, one: Finding, result: xr.Dataset | None) -> dict[str, An
     } | {key: getattr(one, key) for key in ("code", "what", "where")}
 
 
-def _numbers(state: Loaded, drawn: Sketch) -> dict[str, float]:
-    """Every number in SI, by path; of what is half drawn those that can be read."""
-    if state.mechanism:
-        return plain(state.mechanism.parameters())
-    try:
-        return plain(drawn.numbers)
-    except MechanismError:
-        return {}
-
-
 # ---- dragging -----------------------------------------------------------------------------------------------------
 
 
 def _drag(asked: Asked) -> dict[str, Any]:
     """The cycle with a joint or point dragged to a place, a pin on the ground with `keep` by its links."""
     index, to, point = asked.index, vector(asked["to"]), str(asked["point"])
-    sketch = _sketch(asked.state, places_at(asked))
+    sketch = _sketch(asked, places_at(asked))
     if asked.state.mechanism is not None:
         sketch.numbers = asked.state.mechanism.parameter_set.nominal
-    sketch.locked, sketch.fine = set(map(str, asked.get("locked") or ())), float(asked.get("fine") or 0.0)
     changes = {change.path: change for change in sketch.moved(point, to, bool(asked.get("keep")))}  # a number once
     values = {path: change.value for path, change in changes.items()}
     back = solved_with(asked.run, values, asked.steps)
@@ -244,18 +237,18 @@ def _drag(asked: Asked) -> dict[str, Any]:
     near = index if not np.any(np.isfinite(far)) else int(np.nanargmin(far))
     if np.isfinite(far[index]) and far[index] <= far[near] + 1e-6 * sketch.size:
         near = index
-    if not _keeps(sketch, columns["points"], near):  # the crank would turn, and a locked joint with it
-        near = index
-    return {"changes": _told(sketch, changes.values())} | _live(asked, back, columns, near, values)
-
-
-def _keeps(sketch: Sketch, points: Mapping[str, Mapping[str, Array]], index: int) -> bool:
-    """Whether locked joints and points are where they were, to the fineness of the positions."""
-    keys = [".".join(held(sketch, name)) for name in sketch.locked if name in sketch.joints or name in points]
-    gone = (
-        np.hypot(*(points[key][axis][index] - sketch.places[key][i] for i, axis in enumerate("xy"))) for key in keys
-    )
-    return all(far <= KEPT * sketch.size for far in gone)
+    for name in sketch.locked & {*sketch.joints, *columns["points"]}:
+        key = ".".join(held(sketch, name))
+        track, (x, y) = columns["points"][key], sketch.places[key]
+        if not np.hypot(track["x"][near] - x, track["y"][near] - y) <= KEPT * sketch.size:
+            near = index  # the crank would turn, and a locked joint with it
+            break
+    rows = []
+    for path, value in values.items():
+        section, name, *inner = path.split(".")
+        name = f"{inner[2]} of {inner[1]} on {name}" if section == "links" else name
+        rows.append([name, sketch.length(float(sketch.numbers[path])), sketch.length(value)])
+    return {"changes": rows} | _live(asked, back, columns, near, values)
 
 
 def _try(asked: Asked) -> dict[str, Any]:
@@ -278,21 +271,6 @@ def _live(
     return {"solved": True, "index": index, **columns, "margin": margin, "locks": locks}
 
 
-def _told(sketch: Sketch, changes: Iterable[Change]) -> list[list[str]]:
-    """What a drag changes: name, before, after."""
-    return [
-        [_named(change.path),
-         sketch.length(float(sketch.numbers[change.path])), sketch.length(change.value)]
-        for change in changes
-    ]  # fmt: skip
-
-
-def _named(path: str) -> str:
-    """A dimension by its name, a coordinate as "y of D on link2"."""
-    section, name, *inner = path.split(".")
-    return f"{inner[2]} of {inner[1]} on {name}" if section == "links" else name
-
-
 # ---- editing ------------------------------------------------------------------------------------------------------
 
 
@@ -301,21 +279,20 @@ def _edit(asked: Asked) -> dict[str, Any]:
     text, state = str(asked["text"]), asked.state
     if state.entries is None:
         raise MechanismError(state.findings)
-    new = {"trunnion": 1, "name": "New mechanism", "space": "planar"}
-    entries = copy.deepcopy(dict(state.entries)) if text.strip() else new
     places = {str(key): (float(x), float(y)) for key, (x, y) in dict(asked.get("places") or {}).items()}
-    sketch = Sketch(entries, places, set(map(str, asked.get("locked") or ())), fine=float(asked.get("fine") or 0.0))
+    sketch = _sketch(asked, places)
+    if not text.strip():
+        sketch.entries = {"trunnion": 1, "name": "New mechanism", "space": "planar"}
     sketch.turns = partial(_turns, state)
     says = [done(sketch, given) for given in asked["gestures"]]
     empty = ("links", "drivers", "loads", "springs", "gears", "assembly", "dimensions", "joints")
     after = {key: one for key, one in sketch.entries.items() if one or key not in empty}
     changed = changed_text(text, after) if text.strip() else text_of(after)
-    known = {f"{link}.{point}" for link in sketch.of("links") for point in sketch.points(link)}
-    kept = {key: place for key, place in sketch.places.items() if key in known}
+    points = {f"{link}.{point}" for link in sketch.of("links") for point in sketch.points(link)}
     return {
         "text": changed,
-        "places": {key: list(place) for key, place in kept.items()},
-        "locked": sorted(sketch.locked & (known | set(sketch.joints))),
+        "places": {key: list(place) for key, place in sketch.places.items() if key in points},
+        "locked": sorted(sketch.locked & (points | set(sketch.joints))),
         "says": ", ".join(says),
         "made": sketch.made,
     }
@@ -358,7 +335,8 @@ def _layers(asked: Asked) -> dict[str, Any]:
         layers["circles"] = circles(result, [joint for joint in rubbing(system) if joint not in system.screws])
     if wanted & {"centres", "transmission"}:
         walk = solved_with(asked.state.run, {}, asked.steps).walk
-        layers |= {name: tell(walk, asked.steps) for name, tell in WALKED.items() if name in wanted}
+        shown = {"centres": centres, "transmission": transmission}
+        layers |= {name: tell(walk, asked.steps) for name, tell in shown.items() if name in wanted}
     return layers
 
 
@@ -389,9 +367,6 @@ def _moving(asked: Asked, result: xr.Dataset) -> dict[str, Any] | None:
         return place_motion(result, asked["place"])
     point = str(asked.get("point"))
     return point_motion(result, point) if point in result["point"].values else None
-
-
-WALKED = {"centres": centres, "transmission": transmission}
 
 
 def _compare(asked: Asked) -> dict[str, Any]:

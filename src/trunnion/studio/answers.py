@@ -231,8 +231,7 @@ def _drag(asked: Asked) -> dict[str, Any]:
     values = {path: change.value for path, change in changes.items()}
     back = solved_with(asked.run, values, asked.steps)
     columns = live_columns(back, asked.steps)
-    shown = f"{sketch.joints[point]['links'][1]}.{point}" if point in sketch.joints else point
-    track = columns["points"][shown]
+    track = columns["points"][".".join(held(sketch, point))]
     far = np.hypot(track["x"] - to[0], track["y"] - to[1])
     near = index if not np.any(np.isfinite(far)) else int(np.nanargmin(far))
     if np.isfinite(far[index]) and far[index] <= far[near] + 1e-6 * sketch.size:

@@ -34,9 +34,10 @@ def move(sketch: Sketch, given: Given) -> str:
     hints = sketch.entries.get("assembly") or {}
     if isinstance(hints.get(point), list) and not given.get("index"):
         hints[point] = [sketch.length(part) for part in to]
-    for link in dict.fromkeys(_links_at(sketch, point)):
-        sketch.places[f"{link}.{point.rpartition('.')[2]}"] = to
-    for link in _links_at(sketch, point):
+    links, name = sketch.links_at(point)
+    for link in links:
+        sketch.places[f"{link}.{name}"] = to
+    for link in links:
         sketch.show(link, sketch.frame(link))
     return f"Move {point}"
 
@@ -49,14 +50,10 @@ def _move_in_space(sketch: Sketch, given: Given) -> str:
     turns = sketch.turns(index)
     hint = (sketch.entries.get("assembly") or {}).get(point)
     if isinstance(hint, list) and index == 0:
-        before = (float(sketch.numbers[f"assembly.{point}.{axis}"]) for axis in "xyz")
-        sketch.entries["assembly"][point] = [sketch.length(sum(pair)) for pair in zip(before, by, strict=True)]
+        pairs = zip(sketch.vector(f"assembly.{point}", "xyz"), by, strict=True)
+        sketch.entries["assembly"][point] = [sketch.length(sum(pair)) for pair in pairs]
     sketch.write(sketch.shifted(point, by, turns))
     return f"Move {point}"
-
-
-def _links_at(sketch: Sketch, point: str) -> list[str]:
-    return list(sketch.joints[point]["links"]) if point in sketch.joints else [point.partition(".")[0]]
 
 
 def lock(sketch: Sketch, given: Given) -> str:

@@ -81,10 +81,8 @@ def place_of(sketch: Sketch, end: Any) -> Vector:
 
 def held(sketch: Sketch, name: str) -> tuple[str, str]:
     """Link and point of a joint, or of a free point "link.P"."""
-    if name in sketch.joints:
-        return sketch.joints[name]["links"][1], name
-    link, _, point = name.partition(".")
-    if point not in sketch.points(link):
+    (*_, link), point = sketch.links_at(name)
+    if name not in sketch.joints and point not in sketch.points(link):
         raise refused("is not a joint or a point", name, "choose one that is drawn")
     return link, point
 

@@ -170,7 +170,7 @@ def join(sketch: Sketch, given: Given) -> str:
     first, second = given["ends"]
     place = place_of(sketch, second)
     owners = [_owners(sketch, end) for end in (first, second)]
-    (link, *_), (other, *_) = owners
+    (*_, link), (*_, other) = owners  # of a joint its second, which moves
     if set(owners[0]) & set(owners[1]):
         raise refused("would be joined with itself", link, "choose ends of two links")
     for name, joint in sketch.joints.items():
@@ -188,10 +188,11 @@ def join(sketch: Sketch, given: Given) -> str:
 
 
 def _owners(sketch: Sketch, end: Any) -> list[str]:
-    """The links that an end is on; of a joint the second first, which moves."""
+    """The links that an end is on."""
     if isinstance(end, Mapping):
         return [str(end["on"])]
-    return list(reversed(sketch.joints[end]["links"])) if end in sketch.joints else [free(sketch, end)[0]]
+    held(sketch, end)
+    return sketch.links_at(end)[0]
 
 
 def _name(sketch: Sketch, links: tuple[str, str], ends: tuple[Any, Any]) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.expression import MOTION, RESERVED
-from trunnion.studio.ends import free, held, letter, numbered, refused, vector
+from trunnion.studio.ends import NUMBER, free, held, letter, numbered, refused, vector
 from trunnion.studio.renaming import names_dimensions
 from trunnion.studio.sketch import Sketch
 from trunnion.studio.words import spoken
@@ -22,7 +22,6 @@ SECTIONS = {
 }  # fmt: skip
 WORDS = ("off", "none", "yes", "no", "true", "false")  # that are no new name of a dimension
 DEFINED = re.compile(r"\s*([^\W\d]\w*)\s*=(.+)")  # crank = 30 mm
-NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 def move(sketch: Sketch, given: Given) -> str:

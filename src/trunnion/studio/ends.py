@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterable, Mapping
 from math import cos, hypot, isfinite, sin
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import KINDS
 from trunnion.studio.sketch import TOGETHER, Sketch, Vector
 
 __all__ = [
-    "SHORTEST", "Line", "begin", "doubled", "free", "held", "joined", "letter", "line_near", "numbered", "pin",
-    "place_of", "point_of", "put", "refused", "taken", "vector",
+    "NUMBER", "SHORTEST", "Line", "begin", "doubled", "free", "held", "joined", "letter", "line_near", "numbered",
+    "pin", "place_of", "point_of", "put", "refused", "taken", "typed", "vector",
 ]  # fmt: skip
 
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 SHORTEST = 1e-9  # m
 
@@ -30,6 +36,13 @@ def vector(given: Any) -> Vector:
     if not (isfinite(x) and isfinite(y)):
         raise ValueError(f"({x}, {y}) is no place")
     return x, y
+
+
+def typed(text: Any, kind: str, unit: str = "") -> float:
+    """A quantity as it was typed, SI; unit: of a plain number. UnitError or ValueError where it is none."""
+    text = str(text or "").strip()
+    plain = unit and NUMBER.fullmatch(text)
+    return float(np.asarray(Quantity.read(f"{text} {unit}" if plain else text, KINDS[kind]).evaluate()))
 
 
 # ---- names ----------------------------------------------------------------------------------------------------

@@ -52,23 +52,14 @@ class Figure:
         change = self.value - before.value
         if not np.isfinite(change) or self.beyond or before.beyond:
             return "—"
-        if self.unit == "%":
-            return f"{_percent(100 * change)} points"
         if self.unit == "1":
-            return _signed(change)
-        if before.value == 0:
+            return f"{'+' if change >= 0.0005 else ''}{number(change, 3) if abs(change) >= 0.0005 else '0'}"
+        if self.unit != "%" and before.value == 0:
             return f"{'+' if change > 0 else ''}{quantity(change, self.unit)}"
-        return f"{_percent(100 * change / abs(before.value))} %"
-
-
-def _percent(value: float) -> str:
-    text = f"{value:+.0f}" if abs(value) >= 100 else f"{value:+.1f}"
-    return "0" if float(text) == 0 else text.replace("-", "−")
-
-
-def _signed(value: float) -> str:
-    text = number(value, 3) if abs(value) >= 0.0005 else "0"
-    return f"+{text}" if value >= 0.0005 else text
+        percent = 100 * (change if self.unit == "%" else change / abs(before.value))
+        text = f"{percent:+.0f}" if abs(percent) >= 100 else f"{percent:+.1f}"
+        text = "0" if float(text) == 0 else text.replace("-", "−")
+        return f"{text} {'points' if self.unit == '%' else '%'}"
 
 
 def figures(result: xr.Dataset, rubs: bool, ways: Sequence[Way] = ()) -> Iterator[Figure]:
@@ -164,7 +155,8 @@ def _picked(result: xr.Dataset, index: Any, inside: Any) -> xr.Dataset:
 
 def _nearest(own: Abscissa, over: Abscissa) -> tuple[Any, Any]:
     """For each position the index of the nearest of another drive, and whether it lies within that one's range."""
-    known = own.values * _size(own.unit) / _size(over.unit)
+    sizes = (float(unit(one.unit)[0]) if one.unit not in ("", "°") else 1.0 for one in (own, over))  # SI; of counts 1
+    known = own.values * next(sizes) / next(sizes)
     order = np.argsort(known)
     ranked = known[order]
     above = np.clip(np.searchsorted(ranked, over.values), 1, max(len(ranked) - 1, 1))
@@ -174,8 +166,3 @@ def _nearest(own: Abscissa, over: Abscissa) -> tuple[Any, Any]:
     index = order[np.where(nearer, below, above)]
     step = float(np.max(np.diff(ranked))) if len(ranked) > 1 else 0.0
     return index, np.abs(known[index] - over.values) <= 0.5 * step + 1e-9 * float(np.max(np.abs(ranked)))
-
-
-def _size(unit_of: str) -> float:
-    """How many SI units one of an abscissa is; degrees, counts: 1."""
-    return float(unit(unit_of)[0]) if unit_of not in ("", "°") else 1.0

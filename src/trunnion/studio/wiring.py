@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from math import atan2, cos, hypot, sin
 from typing import Any
 
-import numpy as np
-
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.quantity import Quantity
-from trunnion.model.units import KINDS, UnitError
+from trunnion.model.units import UnitError
 from trunnion.studio.acting import driver, gear
-from trunnion.studio.ends import begin, letter, line_near, numbered, place_of, point_of, refused
+from trunnion.studio.ends import begin, letter, line_near, numbered, place_of, point_of, refused, typed
 from trunnion.studio.sketch import Frame, Sketch, Vector
 from trunnion.studio.strokes import bar, slide
 
 __all__ = ["block"]
 
 Given = Mapping[str, Any]
-PLAIN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)")
 APEX = 0.6  # of the distance of its pins, how far off their line the inner pin of an RRR is put
 INNER, TURNED = (
     0.8,
@@ -52,12 +47,10 @@ def block(sketch: Sketch, given: Given) -> str:
 
 def _place(sketch: Sketch, text: Any) -> Vector:
     """A place of two lengths, "120 mm, 0.4 in", m; plain numbers are in the unit of the sheet."""
-    parts = (part.strip() for part in str(text).replace(";", ",").split(","))
+    parts = str(text).replace(";", ",").split(",")
     try:
-        x, y = (
-            Quantity.read(f"{part} {sketch.unit}" if PLAIN.fullmatch(part) else part, KINDS["length"]) for part in parts
-        )
-        return float(np.asarray(x.evaluate())), float(np.asarray(y.evaluate()))
+        x, y = (typed(part, "length", sketch.unit) for part in parts)
+        return x, y
     except (UnitError, ValueError, KeyError) as error:
         what = f"'{str(text)[:40]}' is no place ({getattr(error, 'what', 'two lengths are needed')})"
         raise MechanismError(Finding(what, "the block", "write two lengths, such as 120 mm, 40 mm")) from None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import degrees, pi
 from typing import Any
@@ -25,18 +25,12 @@ __all__ = ["group"]
 Given = Mapping[str, Any]
 LITERAL = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d]*|°)\s*")
 ALONE = re.compile(rf"{LITERAL.pattern}|\s*[^\W\d]\w*\s*")  # a number or a name
-Turned = Callable[[Any], Any]
 AS_IT_IS = (
     "law", "period", "phase", "duration", "return_duration", "dwell", "returns", "delay", "periodic", "ends", "moves"
 )  # fmt: skip
 MIRRORED = (1, -1)  # what is stated in the frame of a link, which keeps its x
 OPPOSITE = ("speed", "amplitude")
-TURNED: dict[str, Callable[[Any, Turned], Any]] = {
-    "start": lambda one, turn: turn(one),
-    "mean": lambda one, turn: turn(one),
-    "range": lambda ends, turn: [turn(one) for one in ends],
-    "points": lambda rows, turn: [[time, turn(one)] for time, one in rows],
-}
+TURNED = ("start", "mean", "range", "points")  # angles of the joint
 
 
 def group(sketch: Sketch, given: Given) -> str:
@@ -79,9 +73,10 @@ class _Moving:
         sketch, ground = self.sketch, self.sketch.ground
         mine = {name: one for name, one in sketch.joints.items() if set(one["links"]) & set(self.links)}
         outside = [name for name, one in mine.items() if not set(one["links"]) <= {*self.links, ground}]
-        if self.flips:
+        if self.signs != (1, 1):
             self._refuse(mine, outside)
             self._flip(mine)
+            self._flip_acting(mine)
         for name in outside:
             if not self._turns(name):
                 raise refused("slides along a link that is not chosen", f"joints.{name}", "choose both links")
@@ -92,25 +87,19 @@ class _Moving:
             if not isinstance(stated.get("at") if isinstance(stated, dict) else stated, list):
                 raise refused("is not stated by x and y", f"links.{ground}.points.{point}", "write it so")
             sketch.section("links")[ground]["points"][point] = self._placed(stated)
+        hints = sketch.section("assembly")
         for name in mine:
-            self._hint(name)
-        keys = [f"{link}.{point}" for link in self.links for point in sketch.points(link)]
-        for key in [*keys, *(f"{ground}.{point}" for point in pinned)]:
-            if key in sketch.places:
-                sketch.places[key] = self.to(sketch.places[key])
+            if isinstance(hints.get(name), list):
+                hints[name] = self._placed(hints[name])
+            elif hints.get(name) is not None and self.signs != (1, 1) and self._turns(name):
+                hints[name] = self._angle(name, hints[name])
+        moving = {f"{link}.{point}" for link in self.links for point in sketch.points(link)}
+        for key in (moving | {f"{ground}.{point}" for point in pinned}) & set(sketch.places):
+            x, y = sketch.places[key]
+            sketch.places[key] = (self.signs[0] * x + self.offset[0], self.signs[1] * y + self.offset[1])
         sketch.forget()
         for name in outside:
             self._follow(name)
-
-    @property
-    def flips(self) -> bool:
-        """Whether it mirrors."""
-        return self.signs != (1, 1)
-
-    def to(self, place: Vector) -> Vector:
-        """Where a place goes."""
-        x, y = (sign * part + by for sign, part, by in zip(self.signs, place, self.offset, strict=True))
-        return x, y
 
     def _follow(self, joint: str) -> None:
         """The link outside follows with its end; its other joints stay."""
@@ -123,14 +112,6 @@ class _Moving:
 
     def _placed(self, stated: Any) -> Any:
         return _mapped(stated, self.signs, self.offset, self.sketch.unit)
-
-    def _hint(self, joint: str) -> None:
-        hints = self.sketch.section("assembly")
-        stated = hints.get(joint)
-        if isinstance(stated, list):
-            hints[joint] = self._placed(stated)
-        elif stated is not None and self.flips and self._turns(joint):
-            hints[joint] = self._angle(joint, stated)
 
     # ---- mirrored --------------------------------------------------------------------------------------------
 
@@ -175,7 +156,6 @@ class _Moving:
         for name in joints:
             if name in sketch.of("drivers") and self._turns(name):
                 self._driver(name, sketch.section("drivers")[name])
-        self._flip_acting(joints)
 
     def _flip_acting(self, joints: Mapping[str, Any]) -> None:
         """Gears, springs and loads."""
@@ -191,7 +171,12 @@ class _Moving:
         for name, load in sketch.of("loads").items():
             if load.get("link") in self.links or load.get("joint") in joints:
                 _still(sketch, name, load)
-                self._load(load)
+                if "force" in load:
+                    load["force"] = _mapped(load["force"], MIRRORED if load.get("frame") == "link" else self.signs)
+                if "moment" in load:
+                    load["moment"] = _minus(load["moment"])
+                if "only" in load and load.get("joint") and self._turns(load["joint"]):
+                    load["only"] = {"positive": "negative", "negative": "positive"}[load["only"]]
 
     def _driver(self, name: str, driver: dict[str, Any]) -> None:
         if strange := [key for key in driver if key not in (*AS_IT_IS, *OPPOSITE, *TURNED)]:
@@ -201,8 +186,12 @@ class _Moving:
             driver.setdefault(first, 0)
         for key in set(driver) & set(OPPOSITE):
             driver[key] = _minus(driver[key])
-        for key in set(driver) & set(TURNED):
-            driver[key] = TURNED[key](driver[key], lambda one: self._angle(name, one))
+        if "range" in driver:
+            driver["range"] = [self._angle(name, end) for end in driver["range"]]
+        if "points" in driver:
+            driver["points"] = [[time, self._angle(name, angle)] for time, angle in driver["points"]]
+        for key in {"start", "mean"} & set(driver):
+            driver[key] = self._angle(name, driver[key])
             if driver[key] in (0, "0 deg"):
                 del driver[key]
 
@@ -214,14 +203,6 @@ class _Moving:
         ratio, phase = (float(self.sketch.numbers[f"gears.{name}.{key}"]) for key in ("ratio", "phase"))
         turned = degrees(self._half(two) - ratio * self._half(one) - phase) % 360.0
         gear["phase"] = f"{turned:.15g} deg"
-
-    def _load(self, load: dict[str, Any]) -> None:
-        if "force" in load:
-            load["force"] = _mapped(load["force"], MIRRORED if load.get("frame") == "link" else self.signs)
-        if "moment" in load:
-            load["moment"] = _minus(load["moment"])
-        if "only" in load and load.get("joint") and self._turns(load["joint"]):
-            load["only"] = {"positive": "negative", "negative": "positive"}[load["only"]]
 
 
 def _mapped(stated: Any, signs: tuple[int, int], offset: Vector = (0.0, 0.0), usual: str = "") -> Any:
@@ -281,7 +262,8 @@ def _copied(sketch: Sketch, links: list[str]) -> list[str]:
     for section, pairs in (("links", names), ("joints", points)):
         for old, new in pairs.items():
             part = renamed(part, section, old, new)
-    sketch.section("links")[ground]["points"] |= part["links"].pop(ground)["points"]
+    if fixed := part["links"].pop(ground)["points"]:
+        sketch.section("links")[ground]["points"] |= fixed
     for section, entries in part.items():
         for name, entry in entries.items():
             numbers_its_parts = section in ("loads", "springs", "gears")

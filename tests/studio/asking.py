@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import struct
 from typing import Any
 
+import numpy as np
+
 from trunnion.studio.answers import answer
-from trunnion.studio.message import unpacked
 
 
 def ask(**question: Any) -> dict[str, Any]:
@@ -30,4 +32,29 @@ def solved(text: str) -> dict[str, Any]:
     """The answer about a model that has one."""
     found = ask(ask="model", text=text)
     assert found["solved"], (found["findings"], text)
+    return found
+
+
+def unpacked(answer: bytes) -> dict[str, Any]:
+    """The header of an answer with its columns as lists (None where there is no number) and its files as bytes."""
+    (length,) = struct.unpack_from("<I", answer)
+    header, body = json.loads(answer[4 : 4 + length]), answer[4 + length :]
+
+    def whole(value: Any) -> Any:
+        if isinstance(value, list):
+            return [whole(one) for one in value]
+        if not isinstance(value, dict):
+            return value
+        if value.keys() == {"bytes"}:
+            first, count = value["bytes"]
+            return body[first : first + count]
+        if value.keys() in ({"column"}, {"sum"}):
+            ((kind, (first, count)),) = value.items()
+            parts = 2 if kind == "sum" else 1
+            columns = np.frombuffer(body, "<f4", parts * count, 4 * first).reshape(parts, count)
+            numbers = columns.astype(float).sum(axis=0)
+            return [float(one) if np.isfinite(one) else None for one in numbers]
+        return {key: whole(one) for key, one in value.items()}
+
+    found: dict[str, Any] = whole(header)
     return found

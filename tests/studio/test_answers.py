@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import trunnion
-from studio.asking import ask, edited
+from studio.asking import ask, edited, unpacked
 from trunnion.errors import Status
 from trunnion.model.file import entries_of, text_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.studio.answers import answer
-from trunnion.studio.message import packed, unpacked
+from trunnion.studio.message import packed
 from trunnion.studio.words import remedied
 
 ROOT = Path(__file__).resolve().parents[2]

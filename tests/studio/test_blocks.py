@@ -11,11 +11,11 @@ import pytest
 
 import trunnion
 from browsing import CHROMIUM
+from studio.asking import unpacked
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.scales import without_noise
 from trunnion.studio.answers import answer
-from trunnion.studio.message import unpacked
 
 EXAMPLES = {path.stem: path.read_text("utf-8") for path in (Path(__file__).parents[2] / "examples").glob("*.yaml")}
 WATT = EXAMPLES["watt-six-bar"]

@@ -460,3 +460,17 @@ def test_a_mirrored_mechanism_has_the_mirrored_figures_and_a_copy_the_same(examp
         both = np.split(grouped(example, what="copy", **given)[1], 2)
         for one, expected in zip(both, (before, sign * before), strict=True):
             np.testing.assert_allclose(one, expected, **near)
+
+
+def test_a_dimension_in_the_place_of_a_guide_is_renamed_and_does_not_go():
+    text = """\
+trunnion: 1
+name: guide
+dimensions: {AB: 30 mm}
+links:
+  frame: {points: {C: {at: [AB, 0], axis: [1, 0]}}}
+"""
+    rename = {"do": "rename", "what": ["dimensions", "AB"], "to": "far"}
+    assert "at: [far, 0]" in edited(text, {}, rename)[0]
+    gone = ask(ask="edit", text=text, places={}, gestures=[{"do": "set", "path": ["dimensions", "AB"], "value": None}])
+    assert "AB is in use: by point C of link frame" in gone["error"]

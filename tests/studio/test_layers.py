@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import trunnion
+from studio.asking import unpacked
 from trunnion.errors import Status
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.scales import without_noise
 from trunnion.studio.answers import answer
-from trunnion.studio.message import unpacked
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}

@@ -14,10 +14,10 @@ import pytest
 
 import trunnion
 from browsing import CHROMIUM
+from studio.asking import unpacked
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.studio.answers import answer
-from trunnion.studio.message import unpacked
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}

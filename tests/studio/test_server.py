@@ -22,11 +22,11 @@ from websockets.sync.client import connect
 
 import trunnion
 from served import served as serving
+from studio.asking import unpacked
 from trunnion.cli.app import app
 from trunnion.errors import MechanismError
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
-from trunnion.studio.message import unpacked
 from trunnion.studio.page import document, script
 
 ROOT = Path(__file__).resolve().parents[2]

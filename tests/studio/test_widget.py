@@ -11,7 +11,7 @@ import pytest
 
 import trunnion
 from browsing import CHROMIUM, QUIET
-from trunnion.studio.message import unpacked
+from studio.asking import unpacked
 
 pytest.importorskip("anywidget")
 

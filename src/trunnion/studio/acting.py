@@ -8,9 +8,8 @@ from itertools import combinations
 from math import atan2, degrees, dist, hypot
 from typing import Any
 
-from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, UnitError
-from trunnion.studio.ends import begin, numbered, point_of, refused, vector
+from trunnion.studio.ends import begin, numbered, point_of, refused, typed, vector
 from trunnion.studio.sketch import Sketch, Vector
 
 __all__ = ["bar_mass", "centre", "driver", "gear", "load", "spring"]
@@ -50,16 +49,16 @@ def load(sketch: Sketch, given: Given) -> str:
     """
     before = str(given.get("instead") or "")
     name = before if before in sketch.of("loads") else numbered(sketch, "loads", "load")
-    sketch.section("loads")[name] = _resisting(sketch, given, name) if "against" in given else _force(sketch, given)
+    if "against" in given:
+        entry = _resisting(sketch, given, name)
+    else:
+        link, point = point_of(sketch, given["at"])
+        if link == sketch.ground:
+            raise refused("would act on the ground", "the force", "choose a point of a moving link")
+        entry = {"link": link, "at": point, "force": list(given["force"])}
+    sketch.section("loads")[name] = entry
     sketch.made = ("loads", name)
     return f"Change {name}" if name == before else f"Add {name}"
-
-
-def _force(sketch: Sketch, given: Given) -> dict[str, Any]:
-    link, point = point_of(sketch, given["at"])
-    if link == sketch.ground:
-        raise refused("would act on the ground", "the force", "choose a point of a moving link")
-    return {"link": link, "at": point, "force": list(given["force"])}
 
 
 def _resisting(sketch: Sketch, given: Given, name: str) -> dict[str, Any]:
@@ -127,13 +126,13 @@ def _bar(sketch: Sketch, link: str) -> tuple[float, Vector]:
     return dist((x, y), (a, b)), ((x + a) / 2, (y + b) / 2)
 
 
-def _above_zero(typed: Any, key: str, kind: str) -> float:
+def _above_zero(text: Any, key: str, kind: str) -> float:
     """A quantity that was typed, in SI."""
     try:
-        value = float(Quantity.read(str(typed or ""), KINDS[kind]).evaluate())
+        value = typed(text, kind)
     except (UnitError, ValueError, TypeError) as error:
         remedy = getattr(error, "remedy", "") or f"type it as {KINDS[kind].example}"
-        raise refused(f"'{str(typed)[:30]}' is no {kind}", f"the {key}", remedy) from None
+        raise refused(f"'{str(text or '')[:30]}' is no {kind}", f"the {key}", remedy) from None
     if not 0 < value < float("inf"):
         raise refused("is not above 0", f"the {key}", f"type it as {KINDS[kind].example}")
     return value
@@ -181,11 +180,11 @@ def _pivot(sketch: Sketch, end: Any) -> str:
     return str(end)
 
 
-def _ratio(typed: str) -> tuple[float | int | str, float]:
+def _ratio(text: str) -> tuple[float | int | str, float]:
     """A ratio as it is written, and its value."""
-    found = RATIO.fullmatch(typed)
+    found = RATIO.fullmatch(text)
     if not found or float(found[2]) == 0.0 or (found[4] and float(found[4]) == 0.0):
-        raise refused(f"'{typed}' is no ratio of gears", "", "type the teeth as 20:40, or a number")
+        raise refused(f"'{text}' is no ratio of gears", "", "type the teeth as 20:40, or a number")
     sign = "" if found[1] == "+" else "-"
     value = float(f"{sign}{found[2]}") / float(found[4] or 1.0)
     if found[4]:

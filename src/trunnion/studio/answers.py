@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
 from functools import lru_cache, partial
 from importlib.resources import files
@@ -31,20 +31,18 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
 from trunnion.studio.blocks import blocks_of
-from trunnion.studio.corners import measured, worst_corner
 from trunnion.studio.ends import held, vector
 from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
 from trunnion.studio.live import live_columns, live_margin, places_at, solved_with
-from trunnion.studio.loaded import Loaded, loaded
+from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
 from trunnion.studio.margin import cures, locks_of, margin_of, margins_without
 from trunnion.studio.message import packed
-from trunnion.studio.missing import missing
 from trunnion.studio.overlays import centres, circles, place_motion, point_motion, seats, transmission
 from trunnion.studio.placed import plain, tracks
-from trunnion.studio.readiness import readiness
-from trunnion.studio.sketch import Change, Sketch
-from trunnion.studio.tolerances import tolerated
+from trunnion.studio.readiness import missing, readiness
+from trunnion.studio.sketch import Sketch, Vector
+from trunnion.studio.tolerances import measured, tolerated, worst_corner
 from trunnion.studio.variants import overlaid
 from trunnion.studio.words import remedied, spoken
 from trunnion.version import __version__
@@ -56,11 +54,8 @@ if TYPE_CHECKING:
 
 __all__ = ["ANSWERS", "answer", "examples"]
 
-Asked = Mapping[str, Any]
 Array = NDArray[np.float64]
 
-STEPS = 360
-MOST_STEPS = 3600
 KEPT = 1e-2  # of the size: a locked joint that stays may be off by as much as a position is fine
 
 
@@ -69,9 +64,10 @@ def answer(request: bytes, turn: AbstractContextManager[object] | None = None) -
     what takes long is answered beside, for nobody is to wait for it."""
     head: dict[str, Any] = {}
     try:
-        asked = json.loads(request)
-        if not isinstance(asked, dict):
+        question = json.loads(request)
+        if not isinstance(question, dict):
             raise ValueError("not a group of entries")
+        asked = Asked(question)
         kind, revision = asked.get("ask"), asked.get("revision")
         head = {"ask": str(kind)[:40], "revision": revision if isinstance(revision, int) else None}
         about = ANSWERS.get(str(kind))
@@ -89,10 +85,6 @@ def answer(request: bytes, turn: AbstractContextManager[object] | None = None) -
 def _sentence(finding: Finding) -> str:
     remedy = f"— {remedied(finding.remedy)}" if finding.remedy else ""
     return " ".join(part for part in (spoken(finding.where), finding.what, remedy) if part)
-
-
-def _steps(asked: Asked) -> int:
-    return min(max(int(asked.get("steps") or STEPS), 1), MOST_STEPS)
 
 
 # ---- what there is to begin with --------------------------------------------------------------------------------
@@ -132,13 +124,15 @@ def _example(asked: Asked) -> dict[str, Any]:
 
 def _model(asked: Asked) -> dict[str, Any]:
     """Findings, numbers, motion and forces of a text; the figures of its cycle are asked for by `cycle`."""
-    state, steps = loaded(str(asked["text"])), _steps(asked)
-    friction = asked.get("friction") != "off"
-    result, told = _solved(state, lambda: state.motion(steps, friction))
+    state = asked.state
+    result, told = _solved(asked, lambda: asked.motion)
+    numbers: Mapping[str, Any] = {}
+    with suppress(MechanismError):  # of what is half drawn those that can be read
+        numbers = state.mechanism.parameters() if state.mechanism else _sketch(asked).numbers
     head = {
         **told,
         "entries": state.entries,
-        "numbers": _numbers(state, Sketch(copy.deepcopy(dict(state.entries or {})))),
+        "numbers": plain(numbers),
         "solved": result is not None,
         "bare": state.bare,
         "scene": None,
@@ -149,18 +143,23 @@ def _model(asked: Asked) -> dict[str, Any]:
     return head | {
         "scene": shown,
         "places": {key: [track[axis][0] for axis in "xy"] for key, track in shown["points"].items()},
-        **margin_of(result, friction and bool(rubbing(state.run.system))),
+        **margin_of(result, asked.rubs),
         "locks": locks_of(state.run, result["time"].values, result["status"].values),
-        **({"margin_why": "friction lacks something"} if state.bare and friction else {}),
+        **({"margin_why": "friction lacks something"} if state.bare and asked.friction else {}),
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
         **measured(state.run),
     }
 
 
+def _sketch(asked: Asked, places: dict[str, Vector] | None = None) -> Sketch:
+    """A drawing of a model's entries that may be changed."""
+    entries, locked = copy.deepcopy(dict(asked.state.entries or {})), set(map(str, asked.get("locked") or ()))
+    return Sketch(entries, places or {}, locked, fine=float(asked.get("fine") or 0.0))
+
+
 def _cycle(asked: Asked) -> dict[str, Any]:
     """Findings and figures of the whole cycle of a text, which take longer than its motion."""
-    state, steps = loaded(str(asked["text"])), _steps(asked)
-    result, told = _solved(state, lambda: state.result(steps, asked.get("friction") != "off"))
+    result, told = _solved(asked, lambda: asked.result)
     if result is None:
         return told
     units = units_of(result)
@@ -169,14 +168,14 @@ def _cycle(asked: Asked) -> dict[str, Any]:
         for one in summary_of(result)
         if not one.numerical
     }
-    figures |= dict(row for way in state.ways(steps) for row in way.rows)
-    least = margin_of(result, asked.get("friction") != "off" and bool(rubbing(state.run.system)))["margin_least"]
+    figures |= dict(row for way in asked.state.ways(asked.steps) for row in way.rows)
+    least = margin_of(result, asked.rubs)["margin_least"]
     return told | {"figures": [[label, value] for label, value in figures.items()], "margin_least": least}
 
 
-def _solved(state: Loaded, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset | None, dict[str, Any]]:
+def _solved(asked: Asked, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset | None, dict[str, Any]]:
     """The result of a text, None where it has none, and what there is to say of it."""
-    findings, result = list(state.findings), None
+    state, findings, result = asked.state, list(asked.state.findings), None
     if state.mechanism is not None:
         try:
             result = solve()
@@ -184,7 +183,7 @@ def _solved(state: Loaded, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset 
             findings = [*findings, *more] if state.bare else more or findings
         except MechanismError as error:
             findings += state.placed(error.findings)
-    lacks = missing(Sketch(copy.deepcopy(dict(state.entries or {}))), findings)
+    lacks = missing(_sketch(asked), findings)
     ready = readiness(state.mechanism, result, findings, lacks)
     return result, {"findings": [_row(state, one, result) for one in findings], "missing": lacks, "ready": ready}
 
@@ -219,92 +218,56 @@ def _row(state: Loaded, one: Finding, result: xr.Dataset | None) -> dict[str, An
     } | {key: getattr(one, key) for key in ("code", "what", "where")}
 
 
-def _numbers(state: Loaded, drawn: Sketch) -> dict[str, float]:
-    """Every number in SI, by path; of what is half drawn those that can be read."""
-    if state.mechanism:
-        return plain(state.mechanism.parameters())
-    try:
-        return plain(drawn.numbers)
-    except MechanismError:
-        return {}
-
-
 # ---- dragging -----------------------------------------------------------------------------------------------------
 
 
 def _drag(asked: Asked) -> dict[str, Any]:
     """The cycle with a joint or point dragged to a place, a pin on the ground with `keep` by its links."""
-    state, steps = loaded(str(asked["text"])), _steps(asked)
-    index, to = int(asked.get("index") or 0) % steps, vector(asked["to"])
-    sketch = Sketch(copy.deepcopy(dict(state.entries or {})), places_at(state, steps, index))
-    if state.mechanism is not None:
-        sketch.numbers = state.mechanism.parameter_set.nominal
-    sketch.locked, sketch.fine = set(map(str, asked.get("locked") or ())), float(asked.get("fine") or 0.0)
-    point = str(asked["point"])
+    index, to, point = asked.index, vector(asked["to"]), str(asked["point"])
+    sketch = _sketch(asked, places_at(asked))
+    if asked.state.mechanism is not None:
+        sketch.numbers = asked.state.mechanism.parameter_set.nominal
     changes = {change.path: change for change in sketch.moved(point, to, bool(asked.get("keep")))}  # a number once
     values = {path: change.value for path, change in changes.items()}
-    friction = asked.get("friction") != "off"
-    back = solved_with(state, values, steps, friction)
-    columns = live_columns(back, steps)
-    shown = f"{sketch.joints[point]['links'][1]}.{point}" if point in sketch.joints else point
-    track = columns["points"][shown]
+    back = solved_with(asked.run, values, asked.steps)
+    columns = live_columns(back, asked.steps)
+    track = columns["points"][".".join(held(sketch, point))]
     far = np.hypot(track["x"] - to[0], track["y"] - to[1])
     near = index if not np.any(np.isfinite(far)) else int(np.nanargmin(far))
     if np.isfinite(far[index]) and far[index] <= far[near] + 1e-6 * sketch.size:
         near = index
-    if not _keeps(sketch, columns["points"], near):  # the crank would turn, and a locked joint with it
-        near = index
-    head = {"solved": True, "index": near, "changes": _told(sketch, changes.values())}
-    return head | _live(state, back, columns, near, values, friction)
-
-
-def _keeps(sketch: Sketch, points: Mapping[str, Mapping[str, Array]], index: int) -> bool:
-    """Whether locked joints and points are where they were, to the fineness of the positions."""
-    keys = [".".join(held(sketch, name)) for name in sketch.locked if name in sketch.joints or name in points]
-    gone = (
-        np.hypot(*(points[key][axis][index] - sketch.places[key][i] for i, axis in enumerate("xy"))) for key in keys
-    )
-    return all(far <= KEPT * sketch.size for far in gone)
+    for name in sketch.locked & {*sketch.joints, *columns["points"]}:
+        key = ".".join(held(sketch, name))
+        track, (x, y) = columns["points"][key], sketch.places[key]
+        if not np.hypot(track["x"][near] - x, track["y"][near] - y) <= KEPT * sketch.size:
+            near = index  # the crank would turn, and a locked joint with it
+            break
+    rows = []
+    for path, value in values.items():
+        section, name, *inner = path.split(".")
+        name = f"{inner[2]} of {inner[1]} on {name}" if section == "links" else name
+        rows.append([name, sketch.length(float(sketch.numbers[path])), sketch.length(value)])
+    return {"changes": rows} | _live(asked, back, columns, near, values)
 
 
 def _try(asked: Asked) -> dict[str, Any]:
     """The cycle with some numbers replaced, `values` in SI by path, and the margin at the position `index`."""
-    state, steps = loaded(str(asked["text"])), _steps(asked)
-    index = int(asked.get("index") or 0) % steps
     values = {str(path): float(value) for path, value in dict(asked["values"]).items()}
-    friction = asked.get("friction") != "off"
-    back = solved_with(state, values, steps, friction)
-    columns = live_columns(back, steps)
-    return {"solved": True, "index": index} | _live(state, back, columns, index, values, friction)
+    back = solved_with(asked.run, values, asked.steps)
+    return _live(asked, back, live_columns(back, asked.steps), asked.index, values)
 
 
 def _live(
-    state: Loaded, back: Backward, columns: dict[str, Any], index: int, values: Mapping[str, float], friction: bool
+    asked: Asked, back: Backward, columns: dict[str, Any], index: int, values: Mapping[str, float]
 ) -> dict[str, Any]:
     """Columns of a mechanism that is being changed, with its margin and what locks at the position that is shown."""
-    status, locked = columns["status"], {}
+    status, run, locked = columns["status"], asked.state.run, {}
     if status[index] == Status.LOCKED:
-        numbers = state.run.system.mechanism.parameters(values)
-        time = state.run.cycle.times(len(status))[[index]]
-        locked = locks_of(state.run, time, status[index : index + 1], numbers)
+        numbers = run.system.mechanism.parameters(values)
+        locked = locks_of(run, run.cycle.times(len(status))[[index]], status[index : index + 1], numbers)
     locks = {joint: float(column[0]) for joint, column in locked.items()}
-    run = state.run if friction else state.frictionless_run
-    return columns | {"margin": live_margin(back, run, values, status, index), "locks": locks}
-
-
-def _told(sketch: Sketch, changes: Iterable[Change]) -> list[list[str]]:
-    """What a drag changes: name, before, after."""
-    return [
-        [_named(change.path),
-         sketch.length(float(sketch.numbers[change.path])), sketch.length(change.value)]
-        for change in changes
-    ]  # fmt: skip
-
-
-def _named(path: str) -> str:
-    """A dimension by its name, a coordinate as "y of D on link2"."""
-    section, name, *inner = path.split(".")
-    return f"{inner[2]} of {inner[1]} on {name}" if section == "links" else name
+    margin = live_margin(back, asked.run, values, status, index)
+    return {"solved": True, "index": index, **columns, "margin": margin, "locks": locks}
 
 
 # ---- editing ------------------------------------------------------------------------------------------------------
@@ -312,25 +275,23 @@ def _named(path: str) -> str:
 
 def _edit(asked: Asked) -> dict[str, Any]:
     """The text of the model after some gestures, and where its points are shown."""
-    text = str(asked["text"])
-    state = loaded(text)
+    text, state = str(asked["text"]), asked.state
     if state.entries is None:
         raise MechanismError(state.findings)
-    new = {"trunnion": 1, "name": "New mechanism", "space": "planar"}
-    entries = copy.deepcopy(dict(state.entries)) if text.strip() else new
     places = {str(key): (float(x), float(y)) for key, (x, y) in dict(asked.get("places") or {}).items()}
-    sketch = Sketch(entries, places, set(map(str, asked.get("locked") or ())), fine=float(asked.get("fine") or 0.0))
+    sketch = _sketch(asked, places)
+    if not text.strip():
+        sketch.entries = {"trunnion": 1, "name": "New mechanism", "space": "planar"}
     sketch.turns = partial(_turns, state)
     says = [done(sketch, given) for given in asked["gestures"]]
     empty = ("links", "drivers", "loads", "springs", "gears", "assembly", "dimensions", "joints")
     after = {key: one for key, one in sketch.entries.items() if one or key not in empty}
     changed = changed_text(text, after) if text.strip() else text_of(after)
-    known = {f"{link}.{point}" for link in sketch.of("links") for point in sketch.points(link)}
-    kept = {key: place for key, place in sketch.places.items() if key in known}
+    points = {f"{link}.{point}" for link in sketch.of("links") for point in sketch.points(link)}
     return {
         "text": changed,
-        "places": {key: list(place) for key, place in kept.items()},
-        "locked": sorted(sketch.locked & (known | set(sketch.joints))),
+        "places": {key: list(place) for key, place in sketch.places.items() if key in points},
+        "locked": sorted(sketch.locked & (points | set(sketch.joints))),
         "says": ", ".join(says),
         "made": sketch.made,
     }
@@ -348,11 +309,11 @@ def _turns(state: Loaded, index: int) -> dict[str, Array]:
 
 def _assemblies(asked: Asked) -> dict[str, Any]:
     """The other assemblies of a model in the plane, with the gestures that take them."""
-    state, steps = loaded(str(asked["text"])), _steps(asked)
+    state, steps = asked.state, asked.steps
     if state.run.system.mechanism.space != "planar":
         return {"others": []}
-    found = other_assemblies(state.run, state.entries or {}, steps)
-    rows = [{"name": name, "gestures": gestures, "points": tracks(walk, steps)} for name, gestures, walk in found]
+    others = other_assemblies(state.run, state.entries or {}, steps)
+    rows = [{"name": name, "gestures": gestures, "points": tracks(walk, steps)} for name, gestures, walk in others]
     return {"others": rows}
 
 
@@ -363,43 +324,38 @@ def _layers(asked: Asked) -> dict[str, Any]:
     """What the sheet shows over the mechanism, of what is wanted: motion of a point, and in the plane instant centres,
     friction circles, transmission angles, pins in their holes.
     """
-    state, steps = loaded(str(asked["text"])), _steps(asked)
-    result = state.motion(steps, asked.get("friction") != "off")
-    wanted = set(asked.get("wanted") or ())
-    found: dict[str, Any] = {"point": _moving(asked, result)}
-    if state.run.system.mechanism.space != "planar":
-        return found
+    result, system, wanted = asked.motion, asked.state.run.system, set(asked.get("wanted") or ())
+    layers: dict[str, Any] = {"point": _moving(asked, result)}
+    if system.mechanism.space != "planar":
+        return layers
     if "seats" in wanted:
-        found["seats"] = seats(result)
+        layers["seats"] = seats(result)
     if "circles" in wanted:
-        system = state.run.system
-        found["circles"] = circles(result, [joint for joint in rubbing(system) if joint not in system.screws])
+        layers["circles"] = circles(result, [joint for joint in rubbing(system) if joint not in system.screws])
     if wanted & {"centres", "transmission"}:
-        walk = solved_with(state, {}, steps).walk
-        found |= {name: tell(walk, steps) for name, tell in WALKED.items() if name in wanted}
-    return found
+        walk = solved_with(asked.state.run, {}, asked.steps).walk
+        shown = {"centres": centres, "transmission": transmission}
+        layers |= {name: tell(walk, asked.steps) for name, tell in shown.items() if name in wanted}
+    return layers
 
 
 def _blocks(asked: Asked) -> dict[str, Any]:
     """The mechanism as blocks wired by their pins, with what passes the wires at each position."""
-    state, steps = loaded(str(asked["text"])), _steps(asked)
-    friction = asked.get("friction") != "off"
-    return blocks_of(state.run.system, without_noise(state.motion(steps, friction)))
+    return blocks_of(asked.state.run.system, without_noise(asked.motion))
 
 
 def _margins(asked: Asked) -> dict[str, Any]:
     """For each block, the ground but not, the locking margin without its friction; none without friction."""
-    state, steps = loaded(str(asked["text"])), _steps(asked)
-    return {"without": margins_without(state.run, steps) if asked.get("friction") != "off" else []}
+    return {"without": margins_without(asked.state.run, asked.steps) if asked.friction else []}
 
 
 def _curves(asked: Asked) -> dict[str, Any]:
     """Names and units of all columns of the table of a cycle, and those that are wanted, in SI."""
-    result = loaded(str(asked["text"])).result(_steps(asked), asked.get("friction") != "off")
-    columns = {one.name: one for one in selected(without_noise(result), ["all"]) if one.values.dtype.kind == "f"}
+    table = selected(without_noise(asked.result), ["all"])
+    columns = {column.name: column for column in table if column.values.dtype.kind == "f"}
     wanted = [name for name in asked.get("names") or () if name in columns]
     return {
-        "names": [[one.name, one.unit] for one in columns.values()],
+        "names": [[column.name, column.unit] for column in columns.values()],
         "columns": {name: {"unit": columns[name].unit, "values": columns[name].values} for name in wanted},
     }
 
@@ -412,50 +368,27 @@ def _moving(asked: Asked, result: xr.Dataset) -> dict[str, Any] | None:
     return point_motion(result, point) if point in result["point"].values else None
 
 
-WALKED = {"centres": centres, "transmission": transmission}
-
-
 def _compare(asked: Asked) -> dict[str, Any]:
     """Other variants, `{text, friction}` each, laid over the present result, and the table of figures against it."""
-    state, steps = loaded(str(asked["text"])), _steps(asked)
-    friction = asked.get("friction") != "off"
-    present, rubs = state.result(steps, friction), friction and bool(rubbing(state.run.system))
-    moves = partial(_moving, asked)
-    return {
-        "others": [
-            overlaid(
-                loaded(str(other["text"])),
-                other.get("friction") != "off",
-                steps,
-                present,
-                rubs,
-                moves,
-                state.ways(steps),
-            )
-            for other in asked["others"]
-        ]
-    }
+    others = [Asked({**other, "steps": asked.steps}) for other in asked["others"]]
+    return {"others": [overlaid(other, asked, partial(_moving, asked)) for other in others]}
 
 
 def _export(asked: Asked) -> dict[str, Any]:
     """A file of the solved cycle; a picture of the position `index`."""
-    state, steps = loaded(str(asked["text"])), _steps(asked)
-    if state.bare:  # its file would be one without friction
-        raise MechanismError(state.findings)
-    return exported(state, str(asked["what"]), steps, int(asked.get("index") or 0) % steps)
+    if asked.state.bare:  # its file would be one without friction
+        raise MechanismError(asked.state.findings)
+    return exported(asked.state, str(asked["what"]), asked.steps, asked.index)
 
 
 def _tolerances(asked: Asked) -> dict[str, Any]:
     """What the tolerances of a model do to its largest effort and strokes."""
-    mechanism = loaded(str(asked["text"])).run.system.mechanism
-    return tolerated(mechanism.with_friction("off") if asked.get("friction") == "off" else mechanism, _steps(asked))
+    return tolerated(asked.run.system.mechanism, asked.steps)
 
 
 def _corner(asked: Asked) -> dict[str, Any]:
     """The worst corner of the tolerances and plays for a measure, on the stated side or the worse of both."""
-    mechanism = loaded(str(asked["text"])).run.system.mechanism
-    mechanism = mechanism.with_friction("off") if asked.get("friction") == "off" else mechanism
-    return worst_corner(mechanism, str(asked["measure"]), asked.get("side"), _steps(asked))
+    return worst_corner(asked.run.system.mechanism, str(asked["measure"]), asked.get("side"), asked.steps)
 
 
 ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {

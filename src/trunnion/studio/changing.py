@@ -9,7 +9,8 @@ from typing import Any
 
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.expression import MOTION, RESERVED
-from trunnion.studio.ends import free, held, letter, numbered, refused, vector
+from trunnion.studio.ends import NUMBER, free, held, letter, numbered, refused, vector
+from trunnion.studio.renaming import names_dimensions
 from trunnion.studio.sketch import Sketch
 from trunnion.studio.words import spoken
 
@@ -19,10 +20,8 @@ Given = Mapping[str, Any]
 SECTIONS = {
     "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair"
 }  # fmt: skip
-NAMES = (("name",), ("notes",), ("references",))  # texts for readers
-NAMED = ("links", "link", "joint", "joints", "between", "at", "type")  # names of other parts, beside coordinates
+WORDS = ("off", "none", "yes", "no", "true", "false")  # that are no new name of a dimension
 DEFINED = re.compile(r"\s*([^\W\d]\w*)\s*=(.+)")  # crank = 30 mm
-NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 def move(sketch: Sketch, given: Given) -> str:
@@ -34,9 +33,10 @@ def move(sketch: Sketch, given: Given) -> str:
     hints = sketch.entries.get("assembly") or {}
     if isinstance(hints.get(point), list) and not given.get("index"):
         hints[point] = [sketch.length(part) for part in to]
-    for link in dict.fromkeys(_links_at(sketch, point)):
-        sketch.places[f"{link}.{point.rpartition('.')[2]}"] = to
-    for link in _links_at(sketch, point):
+    links, name = sketch.links_at(point)
+    for link in links:
+        sketch.places[f"{link}.{name}"] = to
+    for link in links:
         sketch.show(link, sketch.frame(link))
     return f"Move {point}"
 
@@ -49,14 +49,10 @@ def _move_in_space(sketch: Sketch, given: Given) -> str:
     turns = sketch.turns(index)
     hint = (sketch.entries.get("assembly") or {}).get(point)
     if isinstance(hint, list) and index == 0:
-        before = (float(sketch.numbers[f"assembly.{point}.{axis}"]) for axis in "xyz")
-        sketch.entries["assembly"][point] = [sketch.length(sum(pair)) for pair in zip(before, by, strict=True)]
+        pairs = zip(sketch.vector(f"assembly.{point}", "xyz"), by, strict=True)
+        sketch.entries["assembly"][point] = [sketch.length(sum(pair)) for pair in pairs]
     sketch.write(sketch.shifted(point, by, turns))
     return f"Move {point}"
-
-
-def _links_at(sketch: Sketch, point: str) -> list[str]:
-    return list(sketch.joints[point]["links"]) if point in sketch.joints else [point.partition(".")[0]]
 
 
 def lock(sketch: Sketch, given: Given) -> str:
@@ -76,7 +72,8 @@ def put_value(sketch: Sketch, given: Given) -> str:
         group = group[key] if isinstance(group, list) else group.setdefault(key, {})
         if not isinstance(group, (dict, list)):
             raise refused("is a single value", ".".join(map(str, way)), "change it in the text of the model")
-    way_told = [way[0], sketch.rows[way[1]].get("joint"), *way[2:]] if way[:1] == ["loop"] and len(way) > 1 else way
+    in_loop = way[:1] == ["loop"] and len(way) > 1
+    way_told = [way[0], sketch.rows[way[1]].get("joint"), *way[2:]] if in_loop else way
     path, value = ".".join(map(str, [*way_told, last])), given.get("value")
     stated = spoken(path)
     if value is not None:
@@ -116,7 +113,7 @@ def _users(group: Any, name: str, way: tuple[str, ...] = ()) -> Iterator[str]:
     elif isinstance(group, list):
         for one in group:
             yield from dict.fromkeys(_users(one, name, way))
-    elif isinstance(group, str) and way[:1] not in NAMES and way[-1] not in NAMED:
+    elif isinstance(group, str) and names_dimensions(way):
         stated = way != ("dimensions", name) and re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", group)
         yield from [spoken(".".join(way))] if stated else []
 
@@ -131,16 +128,12 @@ def _named(sketch: Sketch, value: Any, before: Any) -> Any:
         sketch.section("dimensions")[found[1]] = _typed(found[2].strip())
         return found[1]
     number = isinstance(before, (int, float)) or (isinstance(before, str) and re.match(NUMBER, before.strip()))
-    if not number or not isinstance(value, str) or not value.isidentifier() or value in _spoken_for(sketch):
+    if not number or not isinstance(value, str) or not value.isidentifier():
+        return value
+    if value in {*sketch.section("dimensions"), *sketch.of("tables"), *RESERVED, *MOTION, *FRICTION_LAWS, *WORDS}:
         return value
     sketch.section("dimensions")[value] = before
     return value
-
-
-def _spoken_for(sketch: Sketch) -> set[str]:
-    """Words that are no new name of a dimension."""
-    words = {"off", "none", "yes", "no", "true", "false", *FRICTION_LAWS}
-    return {*sketch.section("dimensions"), *sketch.of("tables"), *RESERVED, *MOTION, *words}
 
 
 def _typed(value: Any) -> Any:

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterable, Mapping
 from math import cos, hypot, isfinite, sin
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import KINDS
 from trunnion.studio.sketch import TOGETHER, Sketch, Vector
 
 __all__ = [
-    "SHORTEST", "Line", "begin", "doubled", "free", "held", "joined", "letter", "line_near", "numbered", "pin",
-    "place_of", "point_of", "put", "refused", "taken", "vector",
+    "NUMBER", "SHORTEST", "Line", "begin", "doubled", "free", "held", "joined", "letter", "line_near", "numbered",
+    "pin", "place_of", "point_of", "put", "refused", "taken", "typed", "vector",
 ]  # fmt: skip
 
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 SHORTEST = 1e-9  # m
 
@@ -30,6 +36,13 @@ def vector(given: Any) -> Vector:
     if not (isfinite(x) and isfinite(y)):
         raise ValueError(f"({x}, {y}) is no place")
     return x, y
+
+
+def typed(text: Any, kind: str, unit: str = "") -> float:
+    """A quantity as it was typed, SI; unit: of a plain number. UnitError or ValueError where it is none."""
+    text = str(text or "").strip()
+    plain = unit and NUMBER.fullmatch(text)
+    return float(np.asarray(Quantity.read(f"{text} {unit}" if plain else text, KINDS[kind]).evaluate()))
 
 
 # ---- names ----------------------------------------------------------------------------------------------------
@@ -81,10 +94,8 @@ def place_of(sketch: Sketch, end: Any) -> Vector:
 
 def held(sketch: Sketch, name: str) -> tuple[str, str]:
     """Link and point of a joint, or of a free point "link.P"."""
-    if name in sketch.joints:
-        return sketch.joints[name]["links"][1], name
-    link, _, point = name.partition(".")
-    if point not in sketch.points(link):
+    (*_, link), point = sketch.links_at(name)
+    if name not in sketch.joints and point not in sketch.points(link):
         raise refused("is not a joint or a point", name, "choose one that is drawn")
     return link, point
 
@@ -133,10 +144,9 @@ def joined(sketch: Sketch, link: str, end: Any, place: Vector) -> str:
     return point
 
 
-def doubled(sketch: Sketch, link: str, point: str) -> str:
-    """Another point of a link on the spot of one that is a joint already, for a second pin there."""
-    stated = sketch.points(link)[point]
-    name = letter(sketch)
+def doubled(sketch: Sketch, link: str, point: str, name: str = "") -> str:
+    """Another point of a link on the spot of one that is a joint already, for a second pin there: its name."""
+    stated, name = sketch.points(link)[point], name or letter(sketch)
     sketch.section("links")[link]["points"][name] = list(stated["at"] if isinstance(stated, dict) else stated)
     sketch.places[f"{link}.{name}"] = sketch.places[f"{link}.{point}"]
     sketch.forget()

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.studio.loaded import Loaded
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 __all__ = ["EXPORTS", "exported"]
 
@@ -25,71 +23,61 @@ def exported(state: Loaded, what: str, steps: int, index: int = 0) -> dict[str, 
     return {"name": f"{stem[:60].strip('-') or 'mechanism'}.{ending}", "mime": mime, "bytes": content}
 
 
-def _result(state: Loaded, steps: int) -> xr.Dataset:
-    return state.result(steps, True)
-
-
 def _csv(state: Loaded, steps: int, _: int) -> bytes:
     from trunnion.results.export import frame
 
-    text: str = frame(_result(state, steps), units="model").to_csv(index=False, lineterminator="\n")
+    text: str = frame(state.result(steps, True), units="model").to_csv(index=False, lineterminator="\n")
     return text.encode()
 
 
 def _report(state: Loaded, steps: int, _: int) -> bytes:
     from trunnion.views.cycle.report import report
 
-    return report(_result(state, steps), state.result(steps, False)).encode()
+    return report(state.result(steps, True), state.result(steps, False)).encode()
 
 
-def _picture(kind: str) -> Callable[[Loaded, int, int], bytes]:
-    def make(state: Loaded, steps: int, index: int) -> bytes:
-        from trunnion.views.cycle.plots import mechanism
+def _picture(state: Loaded, steps: int, index: int, kind: str) -> bytes:
+    from trunnion.views.cycle.plots import mechanism
 
-        stream = io.BytesIO()
-        mechanism(_result(state, steps), index=index).savefig(stream, format=kind)
-        return stream.getvalue()
-
-    return make
+    stream = io.BytesIO()
+    mechanism(state.result(steps, True), index=index).savefig(stream, format=kind)
+    return stream.getvalue()
 
 
 def _animation(state: Loaded, steps: int, _: int) -> bytes:
     from trunnion.studio.animation import animation
 
-    return animation(_result(state, steps))
+    return animation(state.result(steps, True))
 
 
 def _script(state: Loaded, steps: int, _: int) -> bytes:
     """The model and what was asked of it, as Python; it writes no file that is not named to it."""
-    lines = [
-        '"""The session of the studio as a script: the model and its cycle; with the name of a file also its table."""',
-        "",
-        "import sys",
-        "from pathlib import Path",
-        "from tempfile import TemporaryDirectory",
-        "",
-        "import trunnion",
-        "",
-        f"MODEL = {state.text!r}",
-        "",
-        "with TemporaryDirectory() as folder:",
-        '    path = Path(folder, "model.yaml")',
-        '    path.write_text(MODEL, encoding="utf-8")',
-        "    mechanism = trunnion.read(path)",
-        f"result = trunnion.analyse(mechanism, steps={steps})",
-        "print(result.trunnion)",
-        "if len(sys.argv) > 1:  # as in: python session.py table.csv",
-        '    trunnion.save(result, sys.argv[1], units="model")',
-        "",
-    ]
-    return "\n".join(lines).encode()
+    return f'''"""The session of the studio as a script: the model and its cycle; with a file's name also its table."""
+
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import trunnion
+
+MODEL = {state.text!r}
+
+with TemporaryDirectory() as folder:
+    path = Path(folder, "model.yaml")
+    path.write_text(MODEL, encoding="utf-8")
+    mechanism = trunnion.read(path)
+result = trunnion.analyse(mechanism, steps={steps})
+print(result.trunnion)
+if len(sys.argv) > 1:  # as in: python session.py table.csv
+    trunnion.save(result, sys.argv[1], units="model")
+'''.encode()
 
 
 EXPORTS: dict[str, tuple[str, str, Callable[[Loaded, int, int], bytes]]] = {
     "csv": ("csv", "text/csv", _csv),
     "report": ("html", "text/html", _report),
-    "png": ("png", "image/png", _picture("png")),
-    "svg": ("svg", "image/svg+xml", _picture("svg")),
+    "png": ("png", "image/png", partial(_picture, kind="png")),
+    "svg": ("svg", "image/svg+xml", partial(_picture, kind="svg")),
     "gif": ("gif", "image/gif", _animation),
     "script": ("py", "text/x-python", _script),
 }

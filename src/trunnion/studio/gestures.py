@@ -9,10 +9,9 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.studio.acting import bar_mass, centre, driver, gear, load, spring
 from trunnion.studio.changing import add_row, delete, lock, move, put_value
 from trunnion.studio.group import group
-from trunnion.studio.joining import join
 from trunnion.studio.renaming import rename
 from trunnion.studio.sketch import Sketch
-from trunnion.studio.strokes import add_point, link, pinned, slide
+from trunnion.studio.strokes import add_point, join, link, pinned, slide
 from trunnion.studio.wiring import block
 
 __all__ = ["GESTURES", "Gesture", "done"]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import degrees, pi
 from typing import Any
@@ -17,6 +17,7 @@ from trunnion.model.expression import parse
 from trunnion.model.units import unit
 from trunnion.studio.changing import delete
 from trunnion.studio.ends import letter, numbered, refused, vector
+from trunnion.studio.renaming import renamed
 from trunnion.studio.sketch import Sketch, Vector
 
 __all__ = ["group"]
@@ -24,17 +25,12 @@ __all__ = ["group"]
 Given = Mapping[str, Any]
 LITERAL = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\W\d]*|°)\s*")
 ALONE = re.compile(rf"{LITERAL.pattern}|\s*[^\W\d]\w*\s*")  # a number or a name
-Turned = Callable[[Any], Any]
 AS_IT_IS = (
     "law", "period", "phase", "duration", "return_duration", "dwell", "returns", "delay", "periodic", "ends", "moves"
 )  # fmt: skip
+MIRRORED = (1, -1)  # what is stated in the frame of a link, which keeps its x
 OPPOSITE = ("speed", "amplitude")
-TURNED: dict[str, Callable[[Any, Turned], Any]] = {
-    "start": lambda one, turn: turn(one),
-    "mean": lambda one, turn: turn(one),
-    "range": lambda ends, turn: [turn(one) for one in ends],
-    "points": lambda rows, turn: [[time, turn(one)] for time, one in rows],
-}
+TURNED = ("start", "mean", "range", "points")  # angles of the joint
 
 
 def group(sketch: Sketch, given: Given) -> str:
@@ -77,34 +73,33 @@ class _Moving:
         sketch, ground = self.sketch, self.sketch.ground
         mine = {name: one for name, one in sketch.joints.items() if set(one["links"]) & set(self.links)}
         outside = [name for name, one in mine.items() if not set(one["links"]) <= {*self.links, ground}]
-        if self.flips:
+        if self.signs != (1, 1):
             self._refuse(mine, outside)
             self._flip(mine)
+            self._flip_acting(mine)
         for name in outside:
-            if sketch.joints[name].get("type", "revolute") != "revolute":
+            if not self._turns(name):
                 raise refused("slides along a link that is not chosen", f"joints.{name}", "choose both links")
         pinned = {name for name, one in mine.items() if ground in one["links"]} | _fastened(sketch, self.links)
-        for point in pinned & set(sketch.points(ground)):
-            self._ground(point)
+        fixed = sketch.points(ground)
+        for point in pinned & set(fixed):
+            stated = fixed[point]
+            if not isinstance(stated.get("at") if isinstance(stated, dict) else stated, list):
+                raise refused("is not stated by x and y", f"links.{ground}.points.{point}", "write it so")
+            sketch.section("links")[ground]["points"][point] = self._placed(stated)
+        hints = sketch.section("assembly")
         for name in mine:
-            self._hint(name)
-        keys = [f"{link}.{point}" for link in self.links for point in sketch.points(link)]
-        for key in [*keys, *(f"{ground}.{point}" for point in pinned)]:
-            if key in sketch.places:
-                sketch.places[key] = self.to(sketch.places[key])
+            if isinstance(hints.get(name), list):
+                hints[name] = self._placed(hints[name])
+            elif hints.get(name) is not None and self.signs != (1, 1) and self._turns(name):
+                hints[name] = self._angle(name, hints[name])
+        moving = {f"{link}.{point}" for link in self.links for point in sketch.points(link)}
+        for key in (moving | {f"{ground}.{point}" for point in pinned}) & set(sketch.places):
+            x, y = sketch.places[key]
+            sketch.places[key] = (self.signs[0] * x + self.offset[0], self.signs[1] * y + self.offset[1])
         sketch.forget()
         for name in outside:
             self._follow(name)
-
-    @property
-    def flips(self) -> bool:
-        """Whether it mirrors."""
-        return self.signs != (1, 1)
-
-    def to(self, place: Vector) -> Vector:
-        """Where a place goes."""
-        x, y = (sign * part + by for sign, part, by in zip(self.signs, place, self.offset, strict=True))
-        return x, y
 
     def _follow(self, joint: str) -> None:
         """The link outside follows with its end; its other joints stay."""
@@ -115,37 +110,13 @@ class _Moving:
         sketch.places[f"{other}.{joint}"] = sketch.places[f"{inside}.{joint}"]
         sketch.show(other, sketch.frame(other))
 
-    def _ground(self, point: str) -> None:
-        points = self.sketch.section("links")[self.sketch.ground]["points"]
-        one = points[point]
-        place = one.get("at") if isinstance(one, dict) else one
-        if not isinstance(place, list):
-            raise refused("is not stated by x and y", f"links.{self.sketch.ground}.points.{point}", "write it so")
-        place = self._placed(place)
-        if isinstance(one, dict):
-            axis = {"axis": [self._signed(part, i) for i, part in enumerate(one["axis"])]} if "axis" in one else {}
-            points[point] = {**one, "at": place, **axis}
-        else:
-            points[point] = place
-
-    def _placed(self, place: list[Any]) -> list[Any]:
-        return [_plus(self._signed(part, i), self.offset[i], self.sketch.unit) for i, part in enumerate(place)]
-
-    def _signed(self, part: Any, axis: int) -> Any:
-        return part if self.signs[axis] > 0 else _minus(part)
-
-    def _hint(self, joint: str) -> None:
-        hints = self.sketch.section("assembly")
-        stated = hints.get(joint)
-        if isinstance(stated, list):
-            hints[joint] = self._placed(stated)
-        elif stated is not None and self.flips and self._turns(joint):
-            hints[joint] = self._angle(joint, stated)
+    def _placed(self, stated: Any) -> Any:
+        return _mapped(stated, self.signs, self.offset, self.sketch.unit)
 
     # ---- mirrored --------------------------------------------------------------------------------------------
 
     def _turns(self, joint: str) -> bool:
-        return bool(self.sketch.joints[joint].get("type", "revolute") == "revolute")
+        return self.sketch.kind(joint) == "revolute"
 
     def _half(self, joint: str) -> float:
         """What the rotation q of a joint is taken from when it is mirrored, rad: q' = half − q."""
@@ -179,13 +150,12 @@ class _Moving:
         for link in self.links:
             entry = sketch.section("links")[link]
             for point, one in sketch.points(link).items():
-                entry["points"][point] = _mirrored(one)
+                entry["points"][point] = _mapped(one, MIRRORED)
             if "centre" in entry:
-                entry["centre"] = _mirrored(entry["centre"])
+                entry["centre"] = _mapped(entry["centre"], MIRRORED)
         for name in joints:
             if name in sketch.of("drivers") and self._turns(name):
                 self._driver(name, sketch.section("drivers")[name])
-        self._flip_acting(joints)
 
     def _flip_acting(self, joints: Mapping[str, Any]) -> None:
         """Gears, springs and loads."""
@@ -201,7 +171,12 @@ class _Moving:
         for name, load in sketch.of("loads").items():
             if load.get("link") in self.links or load.get("joint") in joints:
                 _still(sketch, name, load)
-                self._load(load)
+                if "force" in load:
+                    load["force"] = _mapped(load["force"], MIRRORED if load.get("frame") == "link" else self.signs)
+                if "moment" in load:
+                    load["moment"] = _minus(load["moment"])
+                if "only" in load and load.get("joint") and self._turns(load["joint"]):
+                    load["only"] = {"positive": "negative", "negative": "positive"}[load["only"]]
 
     def _driver(self, name: str, driver: dict[str, Any]) -> None:
         if strange := [key for key in driver if key not in (*AS_IT_IS, *OPPOSITE, *TURNED)]:
@@ -211,8 +186,12 @@ class _Moving:
             driver.setdefault(first, 0)
         for key in set(driver) & set(OPPOSITE):
             driver[key] = _minus(driver[key])
-        for key in set(driver) & set(TURNED):
-            driver[key] = TURNED[key](driver[key], lambda one: self._angle(name, one))
+        if "range" in driver:
+            driver["range"] = [self._angle(name, end) for end in driver["range"]]
+        if "points" in driver:
+            driver["points"] = [[time, self._angle(name, angle)] for time, angle in driver["points"]]
+        for key in {"start", "mean"} & set(driver):
+            driver[key] = self._angle(name, driver[key])
             if driver[key] in (0, "0 deg"):
                 del driver[key]
 
@@ -225,22 +204,20 @@ class _Moving:
         turned = degrees(self._half(two) - ratio * self._half(one) - phase) % 360.0
         gear["phase"] = f"{turned:.15g} deg"
 
-    def _load(self, load: dict[str, Any]) -> None:
-        if "force" in load:
-            signs = (1, -1) if load.get("frame") == "link" else self.signs
-            load["force"] = [one if sign > 0 else _minus(one) for one, sign in zip(load["force"], signs, strict=True)]
-        if "moment" in load:
-            load["moment"] = _minus(load["moment"])
-        if "only" in load and load.get("joint") and self._turns(load["joint"]):
-            load["only"] = {"positive": "negative", "negative": "positive"}[load["only"]]
 
-
-def _mirrored(stated: Any) -> Any:
-    """A point or mass centre in the frame of its link, mirrored over the x of that."""
+def _mapped(stated: Any, signs: tuple[int, int], offset: Vector = (0.0, 0.0), usual: str = "") -> Any:
+    """A place or a direction of the file, or a point with its axis, with other signs and so much more, m."""
     if isinstance(stated, list):
-        return [stated[0], _minus(stated[1])]
-    turned = {key: _mirrored(stated[key]) for key in ("at", "axis") if key in stated}
-    return {**stated, **turned, **({"angle": _minus(stated["angle"])} if "angle" in stated else {})}
+        signed = [part if sign > 0 else _minus(part) for part, sign in zip(stated, signs, strict=True)]
+        return [_plus(part, by, usual) for part, by in zip(signed, offset, strict=True)]
+    mapped = dict(stated)
+    if "at" in stated:
+        mapped["at"] = _mapped(stated["at"], signs, offset, usual)
+    if "axis" in stated:
+        mapped["axis"] = _mapped(stated["axis"], signs)
+    if "angle" in stated:  # of a point of a link, whose x stays
+        mapped["angle"] = _minus(stated["angle"])
+    return mapped
 
 
 def _fastened(sketch: Sketch, links: list[str]) -> set[str]:
@@ -267,60 +244,55 @@ def _still(sketch: Sketch, name: str, load: Mapping[str, Any]) -> None:
 
 def _copied(sketch: Sketch, links: list[str]) -> list[str]:
     """The links again, on the spot, with what is between them, under names that are free."""
-    ground = sketch.ground
-    inner = [name for name, one in sketch.joints.items() if set(one["links"]) <= {*links, ground}]
+    ground, part = sketch.ground, _between(sketch, links)
     names: dict[str, str] = {}
     for link in links:
         names[link] = _again(sketch, "links", link)
         sketch.section("links")[names[link]] = {"points": {}}  # its name is spoken for
     points: dict[str, str] = {}
-    theirs = [point for link in links for point in sketch.points(link)]
-    for point in dict.fromkeys([*inner, *theirs, *sorted(_fastened(sketch, links))]):
+    theirs = [point for link in (*links, ground) for point in part["links"][link].get("points", ())]
+    for point in dict.fromkeys([*part["joints"], *theirs]):
         points[point] = letter(sketch, points.values())
-    for link in links:
-        entry = copy.deepcopy(sketch.section("links")[link])
-        entry["points"] = {points[point]: entry["points"][point] for point in sketch.points(link)}
-        sketch.section("links")[names[link]] = entry
-        sketch.places |= {f"{names[link]}.{points[point]}": sketch.places[f"{link}.{point}"]
-                          for point in sketch.points(link) if f"{link}.{point}" in sketch.places}  # fmt: skip
-    for point in {*inner, *_fastened(sketch, links)} & set(sketch.points(ground)):
-        sketch.section("links")[ground]["points"][points[point]] = copy.deepcopy(sketch.points(ground)[point])
-        if f"{ground}.{point}" in sketch.places:
-            sketch.places[f"{ground}.{points[point]}"] = sketch.places[f"{ground}.{point}"]
-    for name in inner:
-        entry = copy.deepcopy(sketch.joints[name])
-        sketch.section("joints")[points[name]] = entry | {"links": [names.get(one, one) for one in entry["links"]]}
-    for section in ("drivers", "assembly"):
-        entries = sketch.section(section)
-        entries.update({points[name]: copy.deepcopy(entries[name]) for name in inner if name in entries})
-    _copy_acting(sketch, names, points, set(inner))
+    places = {
+        f"{names.get(link, link)}.{points[point]}": sketch.places[key]
+        for link, entry in part["links"].items()
+        for point in entry.get("points", ())
+        if (key := f"{link}.{point}") in sketch.places
+    }
+    for section, pairs in (("links", names), ("joints", points)):
+        for old, new in pairs.items():
+            part = renamed(part, section, old, new)
+    if fixed := part["links"].pop(ground)["points"]:
+        sketch.section("links")[ground]["points"] |= fixed
+    for section, entries in part.items():
+        for name, entry in entries.items():
+            numbers_its_parts = section in ("loads", "springs", "gears")
+            sketch.section(section)[_again(sketch, section, name) if numbers_its_parts else name] = entry
+    sketch.places |= places
     sketch.forget()
     return list(names.values())
 
 
-def _copy_acting(sketch: Sketch, names: Mapping[str, str], points: Mapping[str, str], inner: set[str]) -> None:
-    """Loads, springs and gears of the links that were copied."""
-    for name, load in sketch.of("loads").items():
-        if load.get("link") in names or load.get("joint") in inner:
-            _still(sketch, name, load)
-            also = {"link": names.get(load.get("link", "")), "at": points.get(load.get("at", "")),
-                    "joint": points.get(load.get("joint", ""))}  # fmt: skip
-            _add(sketch, "loads", name, load, also)
-    for name, spring in sketch.of("springs").items():
-        ends = [str(end).partition(".") for end in spring.get("between") or ()]
-        if spring.get("joint") in inner:
-            _add(sketch, "springs", name, spring, {"joint": points[spring["joint"]]})
-        elif set(names) & {end[0] for end in ends} and {end[0] for end in ends} <= {*names, sketch.ground}:
-            between = [f"{names.get(link, link)}.{points[point]}" for link, _, point in ends]
-            _add(sketch, "springs", name, spring, {"between": between})
-    for name, gear in sketch.of("gears").items():
-        if set(gear["joints"]) <= inner:
-            _add(sketch, "gears", name, gear, {"joints": [points[one] for one in gear["joints"]]})
-
-
-def _add(sketch: Sketch, section: str, name: str, entry: Mapping[str, Any], changed: Mapping[str, Any]) -> None:
-    changes = {key: one for key, one in changed.items() if key in entry and one is not None}
-    sketch.section(section)[_again(sketch, section, name)] = copy.deepcopy(dict(entry)) | changes
+def _between(sketch: Sketch, links: list[str]) -> dict[str, Any]:
+    """What the file states of some links and of what is between them and the ground: a copy."""
+    ground = sketch.ground
+    inner = {name: one for name, one in sketch.joints.items() if set(one["links"]) <= {*links, ground}}
+    pinned = {*inner, *_fastened(sketch, links)}
+    part: dict[str, Any] = {"links": {link: sketch.section("links")[link] for link in links}, "joints": inner}
+    part["links"][ground] = {"points": {name: at for name, at in sketch.points(ground).items() if name in pinned}}
+    for section in ("drivers", "assembly"):
+        part[section] = {name: one for name, one in sketch.section(section).items() if name in inner}
+    loads, springs, gears = map(sketch.of, ("loads", "springs", "gears"))
+    part["loads"] = {name: one for name, one in loads.items() if one.get("link") in links or one.get("joint") in inner}
+    for name, load in part["loads"].items():
+        _still(sketch, name, load)
+    part["springs"] = {}
+    for name, spring in springs.items():
+        ends = {str(end).partition(".")[0] for end in spring.get("between") or ()}
+        if spring.get("joint") in inner or (ends & {*links} and ends <= {*links, ground}):
+            part["springs"][name] = spring
+    part["gears"] = {name: one for name, one in gears.items() if set(one["joints"]) <= {*inner}}
+    return copy.deepcopy(part)
 
 
 def _again(sketch: Sketch, section: str, name: str) -> str:

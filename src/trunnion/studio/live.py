@@ -6,7 +6,6 @@ What does not change from answer to answer, as the positions before the drag, is
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,8 +16,8 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.margin import margin_in, margins_beside
 from trunnion.solve.run import Run
 from trunnion.solve.status import status_of
-from trunnion.studio.loaded import Loaded
-from trunnion.studio.placed import column, tracks
+from trunnion.studio.loaded import Asked
+from trunnion.studio.placed import column, tracked, tracks
 
 __all__ = ["live_columns", "live_margin", "places_at", "solved_with"]
 
@@ -27,15 +26,10 @@ Array = NDArray[np.float64]
 NEAR = 3.0  # multiple of the friction up to which the margin is looked for: farther it takes longer than the forces
 
 
-@lru_cache(maxsize=4)
-@np.errstate(all="ignore")
-def _tracks(state: Loaded, steps: int) -> dict[str, dict[str, Array]]:
-    return tracks(state.run.walk(state.run.cycle.times(steps)), steps)
-
-
-def places_at(state: Loaded, steps: int, index: int) -> dict[str, tuple[float, float]]:
-    """Where the points of a model are at a position of its cycle, m; MechanismError where it cannot be assembled."""
-    paths = _tracks(_planar(state), steps)
+def places_at(asked: Asked) -> dict[str, tuple[float, float]]:
+    """Where the points of a model are at the position that is shown, m; MechanismError where it has no answer."""
+    _refuse_space(asked.state.run)
+    paths, index = tracked(asked.state, asked.steps), asked.index
     places = {key: (float(track["x"][index]), float(track["y"][index])) for key, track in paths.items()}
     if not np.all(np.isfinite(list(places.values()))):
         what = "cannot be assembled at the position that is shown"
@@ -44,17 +38,16 @@ def places_at(state: Loaded, steps: int, index: int) -> dict[str, tuple[float, f
 
 
 @np.errstate(all="ignore")
-def solved_with(state: Loaded, values: Mapping[str, float], steps: int, friction: bool = True) -> Backward:
+def solved_with(run: Run, values: Mapping[str, float], steps: int) -> Backward:
     """Motion and forces of a mechanism in the plane over its cycle, with some numbers replaced."""
-    run = _planar(state).run if friction else _planar(state).frictionless_run
+    _refuse_space(run)
     time = run.cycle.times(steps)
     return run.solve(time, run.system.mechanism.parameters(values)) if values else run.solve(time)
 
 
-def _planar(state: Loaded) -> Loaded:
-    if state.run.system.mechanism.space != "planar":
+def _refuse_space(run: Run) -> None:
+    if run.system.mechanism.space != "planar":
         raise MechanismError(Finding("cannot be dragged in space", remedy="change its numbers instead"))
-    return state
 
 
 @np.errstate(all="ignore")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -10,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.model.changes import with_law
 from trunnion.model.file import Lines, entries_of, place, version_findings
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.text import stated_files
 from trunnion.solve.run import Run, prepare
+from trunnion.solve.system import rubbing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,10 +24,11 @@ if TYPE_CHECKING:
     from trunnion.cycle.positions import Positions
     from trunnion.studio.ways import Way
 
-__all__ = ["MOST_LINKS", "Loaded", "loaded"]
+__all__ = ["MOST_LINKS", "Asked", "Loaded", "loaded"]
 
 MOST_SIGNS = 300_000  # of a text: what is longer takes seconds to read at every stroke of a key
 MOST_LINKS = 400  # that are solved while one draws
+STEPS, MOST_STEPS = 360, 3600
 
 
 @dataclass(frozen=True, eq=False)  # one for each text, by which its results are kept
@@ -124,25 +128,56 @@ def loaded(text: str) -> Loaded:
     return Loaded(text, entries, lines, mechanism, tuple(place(found, "", lines, entries)), bare)
 
 
+class Asked(dict[str, Any]):
+    """A question of the page: its entries, and what most questions ask of their model, with friction or without."""
+
+    @property
+    def state(self) -> Loaded:
+        """The model of its text."""
+        return loaded(str(self["text"]))
+
+    @property
+    def steps(self) -> int:
+        """Positions of the cycle."""
+        return min(max(int(self.get("steps") or STEPS), 1), MOST_STEPS)
+
+    @property
+    def index(self) -> int:
+        """The position that is shown."""
+        return int(self.get("index") or 0) % self.steps
+
+    @property
+    def friction(self) -> bool:
+        """Whether it is asked with the friction that is stated."""
+        return self.get("friction") != "off"
+
+    @property
+    def rubs(self) -> bool:
+        """Whether a joint then rubs."""
+        return self.friction and bool(rubbing(self.state.run.system))
+
+    @property
+    def run(self) -> Run:
+        """The mechanism prepared; MechanismError where it has no motion."""
+        return self.state.run if self.friction else self.state.frictionless_run
+
+    @property
+    def motion(self) -> xr.Dataset:
+        """Its positions, without figures of the cycle."""
+        return self.state.motion(self.steps, self.friction)
+
+    @property
+    def result(self) -> xr.Dataset:
+        """What `analyse` gives of it."""
+        return self.state.result(self.steps, self.friction)
+
+
 def _without_friction(entries: Mapping[str, Any]) -> Mechanism | None:
     """The mechanism without what is stated of friction; None where that is not what is wrong with it."""
-    joints, common = (entries.get(key) or {} for key in ("joints", "joint_defaults"))
-    rows = entries.get("loop") or []
-    if not isinstance(joints, dict) or not isinstance(common, dict) or not isinstance(rows, list):
-        return None
-    bare = {
-        "joints": {name: _plain(one) for name, one in joints.items()},
-        **({"joint_defaults": _plain(common)} if common else {}),
-        **({"loop": [_plain(row) for row in rows]} if rows else {}),
-    }
     try:
-        return Mechanism(**{**entries, **bare})
-    except MechanismError:
+        return Mechanism(**with_law(copy.deepcopy(dict(entries)), "off"))
+    except (MechanismError, TypeError, AttributeError):  # the last two of joints that are no groups of entries
         return None
-
-
-def _plain(part: Any) -> Any:
-    return {key: one for key, one in part.items() if key != "friction"} if isinstance(part, dict) else part
 
 
 def _refusals(entries: Mapping[str, Any]) -> list[Finding]:

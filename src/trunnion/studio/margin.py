@@ -5,7 +5,7 @@ can be tried against it, and what each block has to do with it.
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -122,21 +122,22 @@ def cures(state: Loaded, finding: Finding) -> list[dict[str, Any]]:
         what = f"friction coefficient{'s' * (len(rubbing) > 1)} of {', '.join(rubbing)}"
         values = f"{before:.3g} → {gestures[-1]['value']:.3g}" if len(rubbing) == 1 else f"× {ENOUGH * times:.3g}"
         listed.append({"label": f"{what} {values}", "gestures": gestures})
-    return listed + [_resized(entries, numbers, decides, key, multiple) for key in SIZES if _sized(state, decides, key)]
+    return listed + list(_resized(entries, numbers, decides, multiple))
 
 
-def _sized(state: Loaded, joint: str | None, key: str) -> bool:
-    part = (state.entries or {}).get("joints", {}).get(joint or "", {}).get(key.partition(".")[0], {})
-    return f"joints.{joint}.{key}" in state.run.values and isinstance(part, Mapping)
-
-
-def _resized(entries: dict[str, Any], numbers: Values, joint: str, key: str, multiple: float) -> dict[str, Any]:
-    """The radius or length by which the friction of a joint is as much less as it need be."""
-    sketch, before = Sketch(copy.deepcopy(entries)), float(np.ravel(numbers[f"joints.{joint}.{key}"])[0])
-    times = SIZES[key] * (multiple if key == "pin.radius" else 1.0 / multiple)
-    length = sketch.length(float(f"{times * before:.3g}"))
-    gesture = {"do": "set", "path": ["joints", joint, *key.split(".")], "value": length}
-    return {"label": f"{key.replace('.', ' ')} of {joint} {sketch.length(before)} → {length}", "gestures": [gesture]}
+def _resized(entries: dict[str, Any], numbers: Values, joint: str | None, multiple: float) -> Iterator[dict[str, Any]]:
+    """The radius and length by which the friction of a joint is as much less as it need be, where they are stated."""
+    sketch = Sketch(copy.deepcopy(entries))
+    for key, enough in SIZES.items():
+        path = ["joints", str(joint), *key.split(".")]
+        part = entries["joints"].get(joint, {}).get(path[2], {})
+        if ".".join(path) not in numbers or not isinstance(part, Mapping):
+            continue
+        before = float(np.ravel(numbers[".".join(path)])[0])
+        times = enough * (multiple if key == "pin.radius" else 1.0 / multiple)
+        length = sketch.length(float(f"{times * before:.3g}"))
+        label = f"{key.replace('.', ' ')} of {joint} {sketch.length(before)} → {length}"
+        yield {"label": label, "gestures": [{"do": "set", "path": path, "value": length}]}
 
 
 def margins_without(run: Run, steps: int) -> list[Array | None]:

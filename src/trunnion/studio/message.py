@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Exact", "packed", "unpacked"]
+__all__ = ["Exact", "packed"]
 
 SHORTEST = 16  # numbers: shorter lists stay in the header
 
@@ -32,21 +32,8 @@ def packed(header: Mapping[str, Any]) -> bytes:
     """A header with its arrays, long lists of numbers and bytes moved into columns."""
     columns: list[np.ndarray] = []
     files: list[bytes] = []
-    plain = _without_columns(header, columns, files)
-    body = np.concatenate(columns).astype("<f4").tobytes() if columns else b""
-    first = len(body)
-    for place in plain.pop("", []):
-        place["bytes"][0] = first
-        first += place["bytes"][1]
-    text = json.dumps(
-        plain, allow_nan=False
-    ).encode()  # ASCII: half a character of the page's text comes back as it was
-    text += b" " * (-len(text) % 4)
-    return struct.pack("<I", len(text)) + text + body + b"".join(files)
-
-
-def _without_columns(header: Mapping[str, Any], columns: list[np.ndarray], files: list[bytes]) -> dict[str, Any]:
-    count, places = 0, []
+    count = 0
+    places: list[dict[str, Any]] = []  # of files: they are counted from the end of the columns
 
     def column(numbers: np.ndarray) -> dict[str, Any]:
         nonlocal count
@@ -75,32 +62,12 @@ def _without_columns(header: Mapping[str, Any], columns: list[np.ndarray], files
             return None
         return value.item() if isinstance(value, np.generic) else value
 
-    found: dict[str, Any] = plain(header)
-    if places:
-        found[""] = places
-    return found
-
-
-def unpacked(answer: bytes) -> dict[str, Any]:
-    """The header of an answer with its columns as lists (None where there is no number) and its files as bytes."""
-    (length,) = struct.unpack_from("<I", answer)
-    header, body = json.loads(answer[4 : 4 + length]), answer[4 + length :]
-
-    def whole(value: Any) -> Any:
-        if isinstance(value, list):
-            return [whole(one) for one in value]
-        if not isinstance(value, dict):
-            return value
-        if value.keys() == {"bytes"}:
-            first, count = value["bytes"]
-            return body[first : first + count]
-        if value.keys() in ({"column"}, {"sum"}):
-            ((kind, (first, count)),) = value.items()
-            parts = 2 if kind == "sum" else 1
-            columns = np.frombuffer(body, "<f4", parts * count, 4 * first).reshape(parts, count)
-            numbers = columns.astype(float).sum(axis=0)
-            return [float(one) if np.isfinite(one) else None for one in numbers]
-        return {key: whole(one) for key, one in value.items()}
-
-    found: dict[str, Any] = whole(header)
-    return found
+    head = plain(header)
+    body = np.concatenate(columns).astype("<f4").tobytes() if columns else b""
+    first = len(body)
+    for place in places:
+        place["bytes"][0] = first
+        first += place["bytes"][1]
+    text = json.dumps(head, allow_nan=False).encode()  # ASCII: half a character of the page's text comes back as it was
+    text += b" " * (-len(text) % 4)
+    return struct.pack("<I", len(text)) + text + body + b"".join(files)

@@ -1,4 +1,4 @@
-"""Where the points of a mechanism are over its cycle, before its forces are known: what the first picture is drawn of.
+"""Where the points of a mechanism are over its cycle, before its forces are known: what first pictures are drawn of.
 
 It loads a third of what the analysis does, so that a model is seen while the rest is loaded and solved.
 """
@@ -6,7 +6,8 @@ It loads a third of what the analysis does, so that a model is seen while the re
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
+from functools import lru_cache, partial
+from math import cos, radians, sin
 from typing import Any
 
 import numpy as np
@@ -16,30 +17,37 @@ from trunnion.algebra.dual import primal
 from trunnion.errors import MechanismError
 from trunnion.solve.forward import Forward
 from trunnion.studio.loaded import Loaded, loaded
+from trunnion.studio.message import packed
 
-__all__ = ["column", "placed", "plain", "tracks"]
+__all__ = ["column", "placed", "plain", "thumbnail", "tracked", "tracks"]
 
 Array = NDArray[np.float64]
 
 STEPS = 360
+SMALL_STEPS = 60  # of a small picture
+SHOWN = 8  # position of them that is drawn: at the start many mechanisms lie in line
+TURNED, TILTED = radians(35), radians(25)  # of the view of mechanisms in space, in which z is up
 
 
-def placed(text: str) -> dict[str, Any]:
-    """Entries, numbers and tracks of a model's text; tracks None in space and where the start has no answer."""
+def placed(text: str) -> bytes:
+    """As an answer: entries, numbers and tracks of a text; tracks None in space and where the start has no answer."""
     state = loaded(text)
     head = {"text": text, "entries": state.entries, "tracks": None}
-    try:
-        found = None if state.mechanism is None or state.mechanism.space != "planar" else _walked(state)
-    except MechanismError:
-        return head
-    if found is None or not all(np.isfinite(track[axis][0]) for track in found.values() for axis in "xy"):
-        return head
-    return head | {"tracks": found, "numbers": plain(state.run.values)}
+    if state.mechanism is not None and state.mechanism.space == "planar":
+        try:
+            points = tracked(state, STEPS)
+        except MechanismError:
+            points = {}
+        if points and all(np.isfinite(track[axis][0]) for track in points.values() for axis in "xy"):
+            head |= {"tracks": points, "numbers": plain(state.run.values)}
+    return packed(head)
 
 
+@lru_cache(maxsize=4)
 @np.errstate(all="ignore")
-def _walked(state: Loaded) -> dict[str, dict[str, Array]]:
-    return tracks(state.run.walk(state.run.cycle.times(STEPS)), STEPS)
+def tracked(state: Loaded, steps: int) -> dict[str, dict[str, Array]]:
+    """Tracks of a model's points; MechanismError where its structure does not determine them."""
+    return tracks(state.run.walk(state.run.cycle.times(steps)), steps)
 
 
 def column(number: Any, steps: int) -> Array:
@@ -51,7 +59,7 @@ def tracks(walk: Forward, steps: int) -> dict[str, dict[str, Array]]:
     """Where the points of the links are over the cycle, m."""
     whole = partial(column, steps=steps)
     return {
-        f"{link}.{name}": dict(zip("xy", map(whole, walk.point(link, name).place), strict=False))
+        f"{link}.{name}": dict(zip("xyz", map(whole, walk.point(link, name).place), strict=False))
         for link, name in walk.system.points
     }
 
@@ -59,3 +67,49 @@ def tracks(walk: Forward, steps: int) -> dict[str, dict[str, Array]]:
 def plain(numbers: Mapping[str, Any]) -> dict[str, float]:
     """Nominal numbers by their paths, SI."""
     return {path: float(np.ravel(primal(value))[0]) for path, value in numbers.items()}
+
+
+# ---- small pictures of the examples -----------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=128)
+def thumbnail(text: str) -> bytes:
+    """As an answer: links with their points at one position, and paths, in a plane, m; none of a model not placed.
+
+    Of mechanisms in space a parallel projection.
+    """
+    state = loaded(text)
+    try:
+        places = {key: _projected(list(track.values())) for key, track in tracked(state, SMALL_STEPS).items()}
+    except MechanismError:
+        places = {}
+    reached = np.flatnonzero(np.all([np.isfinite(track).all(axis=0) for track in places.values()], axis=0))
+    if not places or not len(reached):
+        return packed({"links": [], "paths": []})
+    shown, ground = reached[min(SHOWN, len(reached) - 1)], state.run.system.mechanism.fixed_link
+    links: dict[str, list[list[float]]] = {}
+    for key, track in places.items():
+        links.setdefault(key.rpartition(".")[0], []).append([float(part) for part in track[:, shown]])
+    moved = [track[:, reached] for key, track in places.items() if key.rpartition(".")[0] != ground]
+    return packed({
+        "links": [{"ground": link == ground, "points": points} for link, points in links.items()],
+        "paths": [{"x": track[0], "y": track[1]} for track in _different(moved)],
+    })  # fmt: skip
+
+
+def _projected(place: list[Array]) -> Array:
+    if len(place) == 2:
+        return np.array(place)
+    x, y, z = place
+    across, depth = cos(TURNED) * x + sin(TURNED) * y, cos(TURNED) * y - sin(TURNED) * x
+    return np.array([across, cos(TILTED) * z + sin(TILTED) * depth])
+
+
+def _different(tracks: list[Array]) -> list[Array]:
+    """Those that move, once each: the points of a joint lie on each other."""
+    kept: list[Array] = []
+    for track in tracks:
+        size = float(np.max(np.ptp(track, axis=1)))
+        if size and not any(np.allclose(track, other, rtol=0, atol=1e-6 * size) for other in kept):
+            kept.append(track)
+    return kept

@@ -9,11 +9,11 @@ from typing import Any
 from trunnion.studio.ends import free, refused, taken
 from trunnion.studio.sketch import Sketch
 
-__all__ = ["rename", "rename_point"]
+__all__ = ["names_dimensions", "rename", "rename_point", "renamed"]
 
 Given = Mapping[str, Any]
 NAMED = ("links", "joints", "dimensions", "loads", "springs", "gears")
-SIDES = {"links": 0, "joints": 1}  # of "link.point"
+SIDES = ("links", "joints")  # of "link.point"
 
 
 def rename(sketch: Sketch, given: Given) -> str:
@@ -30,24 +30,21 @@ def rename(sketch: Sketch, given: Given) -> str:
     if section == "points":
         rename_point(sketch, old, new)
         return f"Rename {old} to {new}"
-    sketch.entries = dict(_renamed(sketch.entries, section, old, new))
+    sketch.entries = dict(renamed(sketch.entries, section, old, new))
     if section == "links" and old == sketch.ground:
         sketch.entries["ground"] = new
     if section in SIDES:
-        for key in [key for key in sketch.places if key.split(".")[SIDES[section]] == old]:
-            parts = key.split(".")
-            parts[SIDES[section]] = new
-            sketch.places[".".join(parts)] = sketch.places.pop(key)
-        sketch.locked = {_relocked(key, SIDES[section], old, new) for key in sketch.locked}
+        sketch.places = {_key(key, section, old, new): place for key, place in sketch.places.items()}
+        sketch.locked = {_key(key, section, old, new) for key in sketch.locked}
     return f"Rename {old} to {new}"
 
 
-def _relocked(key: str, side: int, old: str, new: str) -> str:
-    """The name of a locked joint or point "link.P" after a link or joint is renamed."""
-    link, dot, point = key.partition(".")
-    if not dot:
-        return new if side == 1 and key == old else key
-    return f"{new}.{point}" if side == 0 and link == old else key
+def _key(key: str, section: str, old: str, new: str) -> str:
+    """The key "link.P" of a point, or the name of a joint, after a link or joint is renamed."""
+    link, dot, point = key.rpartition(".")
+    if section == "links":
+        return f"{new if link == old else link}{dot}{point}"
+    return f"{link}{dot}{new if point == old else point}"
 
 
 def rename_point(sketch: Sketch, old: str, new: str) -> None:
@@ -69,16 +66,16 @@ def rename_point(sketch: Sketch, old: str, new: str) -> None:
     sketch.locked = {f"{link}.{new}" if key == old else key for key in sketch.locked}
 
 
-def _renamed(group: Any, section: str, old: str, new: str, way: tuple[str, ...] = ()) -> Any:
+def renamed(group: Any, section: str, old: str, new: str, way: tuple[str, ...] = ()) -> Any:
     """The entries with another name in keys and in what speaks of it."""
     if isinstance(group, dict):
         named = _named(section, way)
         return {
-            (new if named and key == old else key): _renamed(one, section, old, new, (*way, key))
+            (new if named and key == old else key): renamed(one, section, old, new, (*way, key))
             for key, one in group.items()
         }
     if isinstance(group, list):
-        return [_renamed(one, section, old, new, way) for one in group]
+        return [renamed(one, section, old, new, way) for one in group]
     return _respoken(group, section, old, new, way) if isinstance(group, str) else group
 
 
@@ -106,6 +103,12 @@ def _respoken(text: str, section: str, old: str, new: str, way: tuple[str, ...])
     if section == "joints":
         if last == "between":
             return re.sub(rf"(?<=\.){re.escape(old)}$", new, text)
-        return new if text == old and last in ("at", "frame", "joint", "joints") else text
-    stated = way[:1] not in (("name",), ("notes",), ("references",)) and last not in ("links", "link", "at", "type")
-    return re.sub(rf"(?<![\w.]){re.escape(old)}(?![\w.])", new, text) if stated else text
+        spoken = last in ("at", "frame", "joint", "joints") and way[0] != "links"  # there a place is a dimension
+        return new if text == old and spoken else text
+    return re.sub(rf"(?<![\w.]){re.escape(old)}(?![\w.])", new, text) if names_dimensions(way) else text
+
+
+def names_dimensions(way: tuple[str, ...]) -> bool:
+    """Whether a text of the file may name dimensions: it is neither for readers nor the name of a part."""
+    names_part = way[-1] in ("links", "link", "joint", "joints", "between", "type")
+    return way[0] not in ("name", "notes", "references") and not names_part and (way[-1] != "at" or way[0] == "links")

@@ -146,11 +146,12 @@ class Studio:
     def _knows(self, token: str) -> bool:
         return secrets.compare_digest(token.encode("utf-8", "replace"), self.token.encode())
 
-    def _own(self, handle: Handler, admits: Callable[[Request], bool] = lambda _: True) -> Handler:
-        """A handler for requests of the own page. What it cannot do is an answer in words."""
+    def _own(self, handle: Handler, admitted: bool = False) -> Handler:
+        """A handler for requests of the own page, admitted: that name the token. What it cannot do is said in words."""
 
         async def guarded(request: Request) -> Response:
-            refusal = self._refusal(request) or (None if admits(request) else PRINTED)
+            token = request.headers.get("authorization", "")[len("Bearer ") :]
+            refusal = self._refusal(request) or (PRINTED if admitted and not self._knows(token) else None)
             if refusal is not None:
                 return PlainTextResponse(refusal, status_code=403)
             try:
@@ -164,10 +165,7 @@ class Studio:
         return guarded
 
     def _admitted(self, handle: Handler) -> Handler:
-        """A handler for requests that name the token."""
-        return self._own(
-            handle, lambda request: self._knows(request.headers.get("authorization", "")[len("Bearer ") :])
-        )
+        return self._own(handle, admitted=True)
 
     # ---- the page -------------------------------------------------------------------------------------------------
 
@@ -222,20 +220,18 @@ class Studio:
 
     async def _files(self, request: Request) -> Response:
         """The models of the folder; `id` tells it from others of its name."""
-        names = sorted(path.name for path in self.folder.iterdir() if self._is_model(path.name))
+        names = []
+        for path in self.folder.iterdir():
+            with contextlib.suppress(ValueError, OSError):
+                names += [path.name] if self._model(path.name).is_file() else []
         return JSONResponse(
             {
                 "folder": self.folder.name.encode("utf-8", "replace").decode(),
                 "id": hashlib.sha256(os.fsencode(os.path.realpath(self.folder))).hexdigest()[:16],
                 "open": self.opened,
-                "files": names[:MOST_FILES],
+                "files": sorted(names)[:MOST_FILES],
             }
         )
-
-    def _is_model(self, name: str) -> bool:
-        with contextlib.suppress(ValueError, OSError):
-            return self._model(name).is_file()
-        return False
 
     def _text(self, name: str) -> str:
         """The text of a model of the folder; ValueError or OSError if it cannot be had."""
@@ -246,7 +242,7 @@ class Studio:
 
     async def _first(self, request: Request) -> Response:
         """A model's text with what its first picture is drawn of, as an answer to a question."""
-        content = await run_in_threadpool(_placed, self._text(request.path_params["name"]))
+        content = await run_in_threadpool(_pictured, self._text(request.path_params["name"]))
         self.seen.set()
         return Response(content, media_type="application/octet-stream")
 
@@ -366,21 +362,13 @@ async def _thumbnail(request: Request) -> Response:
     if text is None:
         return PlainTextResponse("There is no such example.", status_code=404)
     headers = {"Cache-Control": "max-age=3600"}
-    content = await run_in_threadpool(_small, text)
+    content = await run_in_threadpool(_pictured, text, True)
     return Response(content, media_type="application/octet-stream", headers=headers)
-
-
-def _small(text: str) -> bytes:
-    from trunnion.studio.message import packed
-    from trunnion.studio.thumbnails import thumbnail
-
-    with ANSWERING:
-        return packed(thumbnail(text))
 
 
 def _look(text: str, seen: Event) -> None:
     """Load what answers, the first picture before the rest, and have the model solved before the page asks for it."""
-    _placed(text)
+    _pictured(text)
     seen.wait(PATIENCE)  # to load the rest beside would hold up the page
     import trunnion.studio.answers  # noqa: F401  # not while answers are being made: the page may ask for the picture
 
@@ -388,12 +376,12 @@ def _look(text: str, seen: Event) -> None:
         _answered(json.dumps({"ask": ask, "text": text}).encode())
 
 
-def _placed(text: str) -> bytes:
-    from trunnion.studio.message import packed
-    from trunnion.studio.placed import placed
+def _pictured(text: str, small: bool = False) -> bytes:
+    """What the first picture of a model, or a small one, is drawn of, as an answer to a question."""
+    from trunnion.studio.placed import placed, thumbnail
 
     with ANSWERING:
-        return packed(placed(text))
+        return (thumbnail if small else placed)(text)
 
 
 def _answered(question: bytes) -> bytes:

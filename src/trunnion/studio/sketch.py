@@ -32,6 +32,7 @@ TOGETHER = 1e-9  # of the size: joints nearer than this lie on one spot
 SHORT = 1e-5  # of the size: a link that a hand made so short was to have no length
 FIGURES = 9
 LENGTH = re.compile(r"[\d.]\s*(mm|cm|µm|um|m|in|ft)\b")
+LIMITS = re.compile(r"\s*(?:±|\+/-|\+-|\s[+-]\S.*/).*$")
 NAME = re.compile(r"\s*(-?)\s*([^\W\d]\w*)\s*")
 
 
@@ -133,10 +134,21 @@ class Sketch:
             what = "has entries that cannot be read"
             raise MechanismError(Finding(what, "the model", "correct what is found in its text first")) from None
 
+    def vector(self, path: str, axes: str = "xy") -> list[float]:
+        """Components of a point or a direction by the path of both, SI; 0 where none is stated."""
+        return [float(self.numbers.get(f"{path}.{axis}", 0.0)) for axis in axes]
+
     def local(self, link: str, point: str) -> Vector:
         """A point in the frame of its link, m."""
-        x, y = (float(self.numbers.get(f"links.{link}.points.{point}.{axis}", 0.0)) for axis in "xy")
+        x, y = self.vector(f"links.{link}.points.{point}")
         return (x, y) if isfinite(x) and isfinite(y) else (0.0, 0.0)
+
+    def links_at(self, name: str) -> tuple[list[str], str]:
+        """Links of a joint, or of a free point "link.P", and the name of their point there."""
+        if name in self.joints:
+            return list(self.joints[name]["links"]), name
+        link, _, point = name.partition(".")
+        return [link], point
 
     @cached_property
     def size(self) -> float:
@@ -148,24 +160,15 @@ class Sketch:
         """The frame of a link that fits its points best to where they are shown."""
         if link == self.ground:
             return GROUND
-        pairs = [
-            (self.local(link, point), self.places[f"{link}.{point}"])
-            for point in self.points(link)
-            if f"{link}.{point}" in self.places
-        ]
-        if not pairs:
+        shown = [point for point in self.points(link) if f"{link}.{point}" in self.places]
+        if not shown:
             return GROUND
-        middle = [[sum(one[side][i] for one in pairs) / len(pairs) for i in (0, 1)] for side in (0, 1)]
-        along = across = 0.0
-        for local, place in pairs:
-            (a, b), (x, y) = (
-                (one[0] - mid[0], one[1] - mid[1]) for one, mid in zip((local, place), middle, strict=True)
-            )
-            along, across = along + a * x + b * y, across + a * y - b * x
-        turn = atan2(across, along) if hypot(along, across) > 0.0 else 0.0
-        turned = Frame(0.0, 0.0, cos(turn), sin(turn))
-        x, y = turned.out((middle[0][0], middle[0][1]))
-        return turned._replace(x=middle[1][0] - x, y=middle[1][1] - y)
+        local = np.array([complex(*self.local(link, point)) for point in shown])
+        places = np.array([complex(*self.places[f"{link}.{point}"]) for point in shown])
+        turn = np.sum((local - local.mean()).conj() * (places - places.mean()))
+        turn = turn / abs(turn) if turn else 1.0 + 0.0j
+        origin = places.mean() - turn * local.mean()
+        return Frame(*map(float, (origin.real, origin.imag, turn.real, turn.imag)))
 
     def show(self, link: str, frame: Frame) -> None:
         """Show the points of a link where its frame has them."""
@@ -182,8 +185,7 @@ class Sketch:
 
         turns: rotation of each moving link, (3, 3), at the position at which the neighbours keep their places.
         """
-        link, _, name = point.partition(".")
-        links, name = (self.joints[point]["links"], point) if point in self.joints else ([link], name)
+        links, name = self.links_at(point)
         if any(name not in self.points(link) for link in links):
             what, remedy = "has no place of its own in the file", "change the table of the loop"
             raise MechanismError(Finding(what, point, remedy))
@@ -202,7 +204,7 @@ class Sketch:
 
     def _in_space(self, link: str, point: str) -> NDArray[np.float64]:
         """A point in the frame of its link in space, m."""
-        return np.array([float(self.numbers.get(f"links.{link}.points.{point}.{axis}", 0.0)) for axis in "xyz"])
+        return np.array(self.vector(f"links.{link}.points.{point}", "xyz"))
 
     def _rod_end(self, link: str, point: str) -> str | None:
         """The other end of a rod with two balls: a link of two points without axes, its origin and one on its x."""
@@ -225,7 +227,7 @@ class Sketch:
         if held := sorted(self.locked & {point, *joints}):
             raise MechanismError(Finding("is locked where it is", held[0], "unlock it first (key K)"))
         if not joints:
-            link, _, name = point.partition(".")
+            (link,), name = self.links_at(point)
             if name not in self.points(link):
                 raise MechanismError(Finding("is not a joint or a point", point, "drag one that is drawn"))
             local = {one: self.local(link, one) for one in self.points(link)}
@@ -254,7 +256,7 @@ class Sketch:
             yield from self._turned(link, slot, to)
 
     def _turns(self, joint: str) -> bool:
-        return bool(self.joints[joint].get("type", "revolute") == "revolute")
+        return self.kind(joint) == "revolute"
 
     def _together(self, joint: str) -> list[str]:
         """The joints on the spot of a joint that are connected with it by links."""
@@ -268,10 +270,13 @@ class Sketch:
                 links |= set(one["links"])
         return found
 
+    def _joints_of(self, link: str, turning: bool) -> list[str]:
+        """The joints of a link that turn, or those that slide."""
+        return [name for name, one in self.joints.items() if link in one["links"] and self._turns(name) == turning]
+
     def _guide(self, link: str) -> str | None:
         """The sliding joint of a block: a link with one of them that has a pin on the same spot or none at all."""
-        slides = [name for name, one in self.joints.items() if link in one["links"] and not self._turns(name)]
-        turning = [name for name, one in self.joints.items() if link in one["links"] and self._turns(name)]
+        slides, turning = (self._joints_of(link, turns) for turns in (False, True))
         spots = {self.places.get(f"{link}.{name}") for name in (*slides, *turning)}
         return slides[0] if slides and len(spots) == 1 and self.joints[slides[0]]["links"][1] == link else None
 
@@ -280,7 +285,7 @@ class Sketch:
         first, second = self.joints[joint]["links"]
         if first != self.ground:
             return
-        x, y = (float(self.numbers.get(f"links.{first}.points.{joint}.axis.{axis}", 0.0)) for axis in "xy")
+        x, y = self.vector(f"links.{first}.points.{joint}.axis")
         norm = hypot(x, y) or 1.0
         before, base = self.places[f"{second}.{joint}"], self.local(first, joint)
         across = ((to[1] - before[1]) * x - (to[0] - before[0]) * y) / norm
@@ -324,12 +329,12 @@ class Sketch:
 
     def _slot(self, link: str) -> str | None:
         """The sliding joint whose guide is on a moving link."""
-        slides = (name for name, one in self.joints.items() if one["links"][0] == link and not self._turns(name))
+        slides = (name for name in self._joints_of(link, False) if self.joints[name]["links"][0] == link)
         return next(slides, None) if link != self.ground else None
 
     def _pivot(self, link: str) -> str | None:
         """The pin that a link with a slot turns about: that on the ground, or its first."""
-        pins = [name for name, one in self.joints.items() if link in one["links"] and self._turns(name)]
+        pins = self._joints_of(link, True)
         return next((name for name in pins if self.ground in self.joints[name]["links"]), pins[0] if pins else None)
 
     def _turned(self, link: str, slot: str, to: Vector) -> Iterator[Change]:
@@ -351,7 +356,7 @@ class Sketch:
         here = self.places[f"{second}.{slot}"]
         centre, end = (self.places[f"{link}.{pivot}"], to) if block else (to, here)
         (x, y), (a, b) = self.local(link, pivot), self.local(link, slot)
-        c, s = (float(self.numbers.get(f"links.{link}.points.{slot}.axis.{axis}", 0.0)) for axis in "xy")
+        c, s = self.vector(f"links.{link}.points.{slot}.axis")
         turn, (u, v) = atan2(s, c), self.frame(link).into(here)
         beside = cos(turn) * (y - b) - sin(turn) * (x - a)
         far = dist(centre, end)
@@ -368,8 +373,8 @@ class Sketch:
         stated = self.points(link)[point]
         where: tuple[str | int, ...] = ("links", link, "points", point, *(("at",) if isinstance(stated, dict) else ()))
         parts = stated["at"] if isinstance(stated, dict) else stated
-        for i, (axis, value) in enumerate(zip("xyz", local, strict=False)):
-            before = float(self.numbers.get(f"links.{link}.points.{point}.{axis}", 0.0))
+        numbers = self.vector(f"links.{link}.points.{point}", "xyz")
+        for i, (axis, before, value) in enumerate(zip("xyz", numbers, local, strict=False)):
             if abs(value - before) <= TOGETHER * self.size:
                 continue
             name = NAME.fullmatch(parts[i]) if isinstance(parts[i], str) else None
@@ -401,9 +406,7 @@ class Sketch:
             group: Any = self.entries
             for key in way:
                 group = group[key]
-            limits = (
-                re.search(r"\s*(?:±|\+/-|\+-|\s[+-]\S.*/).*$", group[last]) if isinstance(group[last], str) else None
-            )
+            limits = LIMITS.search(group[last]) if isinstance(group[last], str) else None
             group[last] = self.length(value) + (limits[0] if limits else "")
         self.forget()
 

@@ -1,4 +1,4 @@
-"""Drawing: links, pins, guides and slots, points."""
+"""Drawing: links, pins, guides and slots, points; and ends that are drawn already, joined."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from math import atan2, cos, hypot, sin
 from typing import Any
 
+from trunnion.studio.changing import move
 from trunnion.studio.ends import (
     SHORTEST,
     begin,
@@ -23,9 +24,10 @@ from trunnion.studio.ends import (
     refused,
     vector,
 )
+from trunnion.studio.renaming import rename_point
 from trunnion.studio.sketch import Frame, Sketch, Vector
 
-__all__ = ["add_point", "link", "pinned", "slide"]
+__all__ = ["add_point", "bar", "join", "link", "pinned", "slide"]
 
 Given = Mapping[str, Any]
 
@@ -35,22 +37,26 @@ def link(sketch: Sketch, given: Given) -> str:
 
     length: as it was typed, if it was; it says the same as the places.
     """
+    return f"Draw {bar(sketch, given['from'], given['to'], length=given.get('length'))}"
+
+
+def bar(sketch: Sketch, *ends: Any, length: Any = None) -> str:
+    """A new link between two ends; its name."""
     begin(sketch)
-    ends = [given["from"], given["to"]]
     (x, y), (a, b) = places = [place_of(sketch, end) for end in ends]
-    length = hypot(a - x, b - y)
-    if length <= SHORTEST:
+    far = hypot(a - x, b - y)
+    if far <= SHORTEST:
         raise refused("the link has no length", "", "click at two places")
     name = numbered(sketch, "links", "link")
-    frame = Frame(x, y, (a - x) / length, (b - y) / length)
+    frame = Frame(x, y, (a - x) / far, (b - y) / far)
     sketch.section("links")[name] = {"points": {}}
-    for end, place, local in zip(ends, places, (0, given.get("length") or sketch.length(length)), strict=True):
+    for end, place, local in zip(ends, places, (0, length or sketch.length(far)), strict=True):
         sketch.forget()
         point = joined(sketch, name, end, place)
         sketch.section("links")[name]["points"][point] = [local, 0]
     sketch.forget()
     sketch.show(name, frame)
-    return f"Draw {name}"
+    return name
 
 
 def pinned(sketch: Sketch, given: Given) -> str:
@@ -150,3 +156,63 @@ def _end_to_slide(sketch: Sketch, name: str, carrier: str) -> tuple[str, str]:
     sketch.places.pop(f"{carrier}.{name}", None)
     sketch.forget()
     return own, name
+
+
+# ---- ends that are drawn already ------------------------------------------------------------------------------
+
+
+def join(sketch: Sketch, given: Given) -> str:
+    """Two ends are pinned together where the second is; the first goes there, unless it is a place on a link.
+
+    An end is a joint "J", a free point "link.P", or {on: link, at: place}.
+    """
+    begin(sketch)
+    first, second = given["ends"]
+    place = place_of(sketch, second)
+    owners = [_owners(sketch, end) for end in (first, second)]
+    (*_, link), (*_, other) = owners  # of a joint its second, which moves
+    if set(owners[0]) & set(owners[1]):
+        raise refused("would be joined with itself", link, "choose ends of two links")
+    for name, joint in sketch.joints.items():
+        if {link, other} == set(joint["links"]):
+            raise refused(f"and {other} are joined at {name} already", link, "choose two other links")
+    if isinstance(first, str):
+        move(sketch, {"point": first, "to": place})
+    name = _name(sketch, (link, other), (first, second))
+    for side, end in ((link, first), (other, second)):
+        _call(sketch, side, end, name, place)
+    sketch.forget()
+    pin(sketch, name, other, link, place)
+    sketch.made = ("joints", name)
+    return f"Join {link} with {other}"
+
+
+def _owners(sketch: Sketch, end: Any) -> list[str]:
+    """The links that an end is on."""
+    if isinstance(end, Mapping):
+        return [str(end["on"])]
+    held(sketch, end)
+    return sketch.links_at(end)[0]
+
+
+def _name(sketch: Sketch, links: tuple[str, str], ends: tuple[Any, Any]) -> str:
+    """The name of the new pin: that of a free end, the second's before the first's, if nothing else has it."""
+    for side in (1, 0):
+        if not isinstance(ends[side], str) or ends[side] in sketch.joints:
+            continue
+        name = free(sketch, ends[side])[1]
+        if all(name not in sketch.points(link) for link in sketch.of("links") if link != links[side]):
+            return name
+    return letter(sketch)
+
+
+def _call(sketch: Sketch, link: str, end: Any, name: str, place: Vector) -> None:
+    """The link has a point of this name at an end of it."""
+    if not isinstance(end, str):
+        put(sketch, link, name, place)
+        return
+    point = held(sketch, end)[1]
+    if point in sketch.joints:
+        doubled(sketch, link, point, name)
+    elif point != name:
+        rename_point(sketch, f"{link}.{point}", name)

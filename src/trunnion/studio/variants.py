@@ -16,8 +16,7 @@ from trunnion.model.units import unit
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import number, quantity
 from trunnion.results.scales import without_noise
-from trunnion.solve.system import rubbing
-from trunnion.studio.loaded import Loaded
+from trunnion.studio.loaded import Asked
 from trunnion.studio.margin import margin_of
 from trunnion.views.common.cycle import Abscissa, abscissa, column, names
 from trunnion.views.cycle.scene import scene
@@ -53,23 +52,14 @@ class Figure:
         change = self.value - before.value
         if not np.isfinite(change) or self.beyond or before.beyond:
             return "—"
-        if self.unit == "%":
-            return f"{_percent(100 * change)} points"
         if self.unit == "1":
-            return _signed(change)
-        if before.value == 0:
+            return f"{'+' if change >= 0.0005 else ''}{number(change, 3) if abs(change) >= 0.0005 else '0'}"
+        if self.unit != "%" and before.value == 0:
             return f"{'+' if change > 0 else ''}{quantity(change, self.unit)}"
-        return f"{_percent(100 * change / abs(before.value))} %"
-
-
-def _percent(value: float) -> str:
-    text = f"{value:+.0f}" if abs(value) >= 100 else f"{value:+.1f}"
-    return "0" if float(text) == 0 else text.replace("-", "−")
-
-
-def _signed(value: float) -> str:
-    text = number(value, 3) if abs(value) >= 0.0005 else "0"
-    return f"+{text}" if value >= 0.0005 else text
+        percent = 100 * (change if self.unit == "%" else change / abs(before.value))
+        text = f"{percent:+.0f}" if abs(percent) >= 100 else f"{percent:+.1f}"
+        text = "0" if float(text) == 0 else text.replace("-", "−")
+        return f"{text} {'points' if self.unit == '%' else '%'}"
 
 
 def figures(result: xr.Dataset, rubs: bool, ways: Sequence[Way] = ()) -> Iterator[Figure]:
@@ -118,54 +108,55 @@ def compared(
     return rows
 
 
-def overlaid(
-    state: Loaded,
-    friction: bool,
-    steps: int,
-    present: xr.Dataset,
-    rubs: bool,
-    moves: Moves = lambda _: None,
-    ways: Sequence[Way] = (),
-) -> dict[str, Any]:
+def overlaid(variant: Asked, present: Asked, moves: Moves = lambda _: None) -> dict[str, Any]:
     """A variant to lay over the present result: its scene at the positions of that, its margin, the table, and as
-    `point` what `moves` tells of its result: the motion of a point. ways: strokes of the present one.
+    `point` what `moves` tells of its result: the motion of a point.
 
     `shifted`: its drive runs over another range, and each position shows the nearest of its own; `why`: it has no
     cycle, or none that runs over the same drive.
     """
+    shown = present.result
     try:
-        result = state.result(steps, friction)
+        result = variant.result
     except MechanismError as error:
-        found = error.findings[0]
-        return {"scene": None, "why": f"cannot be solved: {found.where} {found.what}".strip(), "rows": []}
-    rubbed = friction and bool(rubbing(state.run.system))
-    were = state.ways(steps)
+        first = error.findings[0]
+        return {"scene": None, "why": f"cannot be solved: {first.where} {first.what}".strip(), "rows": []}
+    were, ways = (asked.state.ways(asked.steps) for asked in (variant, present))
     were, ways = ((), ()) if were is ways else (were, ways)  # of the same mechanism
-    rows = compared(result, rubbed, present, rubs, were, ways)
-    own, over = abscissa(result), abscissa(present)
+    rows = compared(result, variant.rubs, shown, present.rubs, were, ways)
+    own, over = abscissa(result), abscissa(shown)
     if (own.label, own.closed) != (over.label, over.closed):
         why = f"runs over {own.label}, the present one over {over.label}: its curves cannot be laid over"
         return {"scene": None, "why": why, "rows": rows}
     index, inside = _nearest(own, over)
-    shown = scene(result, None, max_positions=result.sizes["position"])
-    margin = margin_of(result, rubbed)["margin"]
-    point = moves(result)
-    same = bool(np.array_equal(index, np.arange(len(own.values))) and np.all(inside))
-    if not same:
-        shown = _picked(shown, result.sizes["position"], index, inside)
-        margin = None if margin is None else np.where(inside, margin[index], np.nan)
-        point = point and {
-            key: {axis: np.where(inside, row[index], np.nan) for axis, row in one.items()}
-            if isinstance(one, dict)
-            else one
-            for key, one in point.items()
-        }
-    return {"scene": shown, "margin": margin, "point": point, "why": None, "shifted": not same, "rows": rows}
+    shifted = not (np.array_equal(index, np.arange(len(own.values))) and np.all(inside))
+    if shifted:
+        result = _picked(result, index, inside)
+    return {
+        "scene": scene(result, None, max_positions=result.sizes["position"]),
+        "margin": margin_of(result, variant.rubs)["margin"],
+        "point": moves(result),
+        "why": None,
+        "shifted": shifted,
+        "rows": rows,
+    }
+
+
+def _picked(result: xr.Dataset, index: Any, inside: Any) -> xr.Dataset:
+    """A result at some of its positions; no numbers where it has no position inside."""
+    picked = result.isel(position=index)
+    within = picked["status"].copy(data=inside)
+    return picked.assign({
+        name: row.where(within)
+        for name, row in picked.data_vars.items()
+        if "position" in row.dims and row.dtype.kind == "f"
+    })  # fmt: skip
 
 
 def _nearest(own: Abscissa, over: Abscissa) -> tuple[Any, Any]:
     """For each position the index of the nearest of another drive, and whether it lies within that one's range."""
-    known = own.values * _size(own.unit) / _size(over.unit)
+    sizes = (float(unit(one.unit)[0]) if one.unit not in ("", "°") else 1.0 for one in (own, over))  # SI; of counts 1
+    known = own.values * next(sizes) / next(sizes)
     order = np.argsort(known)
     ranked = known[order]
     above = np.clip(np.searchsorted(ranked, over.values), 1, max(len(ranked) - 1, 1))
@@ -175,21 +166,3 @@ def _nearest(own: Abscissa, over: Abscissa) -> tuple[Any, Any]:
     index = order[np.where(nearer, below, above)]
     step = float(np.max(np.diff(ranked))) if len(ranked) > 1 else 0.0
     return index, np.abs(known[index] - over.values) <= 0.5 * step + 1e-9 * float(np.max(np.abs(ranked)))
-
-
-def _size(unit_of: str) -> float:
-    """How many SI units one of an abscissa is; degrees, counts: 1."""
-    return float(unit(unit_of)[0]) if unit_of not in ("", "°") else 1.0
-
-
-def _picked(tree: Any, count: int, index: Any, inside: Any) -> Any:
-    """A scene with its series taken at some of its positions."""
-    if isinstance(tree, dict):
-        return {key: _picked(one, count, index, inside) for key, one in tree.items()}
-    if (
-        isinstance(tree, list)
-        and len(tree) == count
-        and all(one is None or isinstance(one, (int, float)) for one in tree)
-    ):
-        return [tree[i] if near else None for i, near in zip(index, inside, strict=True)]
-    return [_picked(one, count, index, inside) for one in tree] if isinstance(tree, list) else tree

@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping
 from typing import Any
+from urllib.parse import unquote
 
 import anywidget
 import traitlets
@@ -14,6 +15,7 @@ from trunnion.model.file import entries_of, text_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.studio.answers import answer, examples
 from trunnion.studio.page import found, one_file
+from trunnion.studio.placed import placed, thumbnail
 
 __all__ = ["StudioWidget", "studio"]
 
@@ -64,9 +66,9 @@ class StudioWidget(anywidget.AnyWidget):
         kind, _, name = path.strip("/").partition("/")
         known: dict[str, Callable[[], bytes]] = {
             "files": self._files,
-            "first": self._first,
+            "first": lambda: placed(self.text),
             "file": lambda: self._saved(body),
-            "thumbnail": lambda: _small(name),
+            "thumbnail": lambda: thumbnail(examples()[unquote(name)]),
             "jobs": lambda: json.dumps({"forms": [], "jobs": []}).encode(),
         }
         if kind not in known:
@@ -77,24 +79,9 @@ class StudioWidget(anywidget.AnyWidget):
         own = hashlib.sha256(self.model_id.encode()).hexdigest()[:16]
         return json.dumps({"folder": "notebook", "id": own, "open": NAME, "files": [NAME]}).encode()
 
-    def _first(self) -> bytes:
-        from trunnion.studio.message import packed
-        from trunnion.studio.placed import placed
-
-        return packed(placed(self.text))
-
     def _saved(self, body: bytes) -> bytes:
         self.text = str(json.loads(body)["text"])
         return json.dumps({"saved": NAME}).encode()
-
-
-def _small(name: str) -> bytes:
-    from urllib.parse import unquote
-
-    from trunnion.studio.message import packed
-    from trunnion.studio.thumbnails import thumbnail
-
-    return packed(thumbnail(examples()[unquote(name)]))
 
 
 def studio(mechanism: Mechanism, height: int = 720) -> StudioWidget:

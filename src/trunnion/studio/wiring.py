@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from math import atan2, cos, hypot, sin
 from typing import Any
 
-import numpy as np
-
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.quantity import Quantity
-from trunnion.model.units import KINDS, UnitError
+from trunnion.model.units import UnitError
 from trunnion.studio.acting import driver, gear
-from trunnion.studio.ends import begin, letter, line_near, numbered, place_of, point_of, refused
+from trunnion.studio.ends import begin, letter, line_near, numbered, place_of, point_of, refused, typed
 from trunnion.studio.sketch import Frame, Sketch, Vector
-from trunnion.studio.strokes import link, slide
+from trunnion.studio.strokes import bar, slide
 
 __all__ = ["block"]
 
 Given = Mapping[str, Any]
-PLAIN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)")
 APEX = 0.6  # of the distance of its pins, how far off their line the inner pin of an RRR is put
 INNER, TURNED = (
     0.8,
@@ -52,22 +47,13 @@ def block(sketch: Sketch, given: Given) -> str:
 
 def _place(sketch: Sketch, text: Any) -> Vector:
     """A place of two lengths, "120 mm, 0.4 in", m; plain numbers are in the unit of the sheet."""
-    parts = (part.strip() for part in str(text).replace(";", ",").split(","))
+    parts = str(text).replace(";", ",").split(",")
     try:
-        x, y = (
-            Quantity.read(f"{part} {sketch.unit}" if PLAIN.fullmatch(part) else part, KINDS["length"]) for part in parts
-        )
-        return float(np.asarray(x.evaluate())), float(np.asarray(y.evaluate()))
+        x, y = (typed(part, "length", sketch.unit) for part in parts)
+        return x, y
     except (UnitError, ValueError, KeyError) as error:
         what = f"'{str(text)[:40]}' is no place ({getattr(error, 'what', 'two lengths are needed')})"
         raise MechanismError(Finding(what, "the block", "write two lengths, such as 120 mm, 40 mm")) from None
-
-
-def _bar(sketch: Sketch, start: Any, end: Any) -> str:
-    """A new link from one end to another; its name."""
-    before = set(sketch.of("links"))
-    link(sketch, {"from": start, "to": end})
-    return next(name for name in sketch.of("links") if name not in before)
 
 
 def _end(sketch: Sketch, name: str) -> str:
@@ -86,20 +72,19 @@ def _across(sketch: Sketch, pins: list[Any], share: float) -> Vector:
 
 def _crank(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
     x, y = place_of(sketch, pins[0])
-    before = set(sketch.joints)
-    _bar(sketch, pins[0], list(at or (x, y + max(0.3 * sketch.size, 0.04))))
-    driver(sketch, {"joint": next(name for name in sketch.joints if name not in before), "add": True})
+    crank = bar(sketch, pins[0], list(at or (x, y + max(0.3 * sketch.size, 0.04))))
+    driver(sketch, {"joint": next(iter(sketch.points(crank))), "add": True})
 
 
 def _rrr(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
-    first = _bar(sketch, pins[0], list(at or _across(sketch, pins, APEX)))
-    _bar(sketch, pins[1], _end(sketch, first))
+    first = bar(sketch, pins[0], list(at or _across(sketch, pins, APEX)))
+    bar(sketch, pins[1], _end(sketch, first))
 
 
 def _rrp(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
     x, y = place_of(sketch, pins[0])
     level = next((sketch.places[f"{sketch.ground}.{name}"][1] for name in sketch.points(sketch.ground)), y)
-    rod = _bar(sketch, pins[0], list(at or (x + 2 * max(sketch.size, 0.04), level)))
+    rod = bar(sketch, pins[0], list(at or (x + 2 * max(sketch.size, 0.04), level)))
     slide(sketch, {"joint": _end(sketch, rod), "angle": 0.0})
 
 
@@ -107,7 +92,7 @@ def _rpr(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
     if not isinstance(pins[1], str):
         raise refused("is what slides along the link", "the second pin", "choose a pin that is drawn")
     (x, y), (a, b) = (place_of(sketch, pin) for pin in pins)
-    lever = _bar(sketch, pins[0], list(at or (x + BEYOND * (a - x), y + BEYOND * (b - y))))
+    lever = bar(sketch, pins[0], list(at or (x + BEYOND * (a - x), y + BEYOND * (b - y))))
     slide(sketch, {"joint": pins[1], "along": lever})
 
 
@@ -119,7 +104,7 @@ def _rpp(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
     a, b = at or (x + max(sketch.size, 0.04), y)
     angle, half = atan2(b - y, a - x), max(sketch.size, 0.04)
     across = (-half * sin(angle), half * cos(angle))
-    yoke = _bar(sketch, [x - across[0], y - across[1]], [x + across[0], y + across[1]])
+    yoke = bar(sketch, [x - across[0], y - across[1]], [x + across[0], y + across[1]])
     slide(sketch, {"joint": pins[0], "along": yoke, "near": half})
     slide(sketch, {"joint": {"on": yoke, "at": [a, b]}, "angle": angle})
 
@@ -145,9 +130,9 @@ def _triad(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
     x, y = at or (sum(spot[0] for spot in spots) / 3, sum(spot[1] for spot in spots) / 3)
     c, s = INNER * cos(TURNED), INNER * sin(TURNED)
     corners = [[x + c * (a - x) - s * (b - y), y + s * (a - x) + c * (b - y)] for a, b in spots]
-    first, second = (_bar(sketch, pin, corner) for pin, corner in zip(pins[:2], corners, strict=False))
-    plate = _bar(sketch, _end(sketch, first), _end(sketch, second))
-    _bar(sketch, pins[2], {"on": plate, "at": corners[2]})
+    first, second = (bar(sketch, pin, corner) for pin, corner in zip(pins[:2], corners, strict=False))
+    plate = bar(sketch, _end(sketch, first), _end(sketch, second))
+    bar(sketch, pins[2], {"on": plate, "at": corners[2]})
 
 
 BLOCKS: dict[str, Callable[[Sketch, list[Any], Vector | None], None]] = {

@@ -474,3 +474,47 @@ links:
     assert "at: [far, 0]" in edited(text, {}, rename)[0]
     gone = ask(ask="edit", text=text, places={}, gestures=[{"do": "set", "path": ["dimensions", "AB"], "value": None}])
     assert "AB is in use: by point C of link frame" in gone["error"]
+
+
+FOUR_BAR = """
+links:
+  ground: {points: {A: [0, 0], D: [180 mm, 0]}}
+  crank: {points: {A: [0, 0], B: [60 mm, 0]}}
+  coupler: {points: {B: [0, 0], C: [160 mm, 0]}}
+  rocker: {points: {D: [0, 0], C: [120 mm, 0]}}
+joints:
+  A: {type: revolute, links: [ground, crank]}
+  B: {type: revolute, links: [crank, coupler]}
+  C: {type: revolute, links: [coupler, rocker]}
+  D: {type: revolute, links: [ground, rocker]}
+drivers: {A: {speed: 60 rpm}}
+loads: {push: {link: rocker, at: C, force: [-100 N, 0]}}
+"""
+MIRROR = {"do": "group", "links": ["crank", "coupler", "rocker"], "what": "mirror", "at": [0, 0], "start": True}
+
+
+def test_what_no_hint_assembles_is_mirrored_as_it_is_drawn():
+    """The other assembly would be taken without a hint of where the mirrored joint is."""
+
+    def run(text):
+        return trunnion.analyse(Mechanism(**entries_of(text)[0]), steps=12)
+
+    before = run(FOUR_BAR)
+    places = {str(key): before.point_position.sel(point=key).values[:, 0].tolist() for key in before.point.values}
+    after, peak = run(edited(FOUR_BAR, places, MIRROR)[0]), float(np.max(np.abs(before.drive_effort)))
+    np.testing.assert_allclose(after.drive_effort.values, -before.drive_effort.values, atol=1e-9 * peak)
+
+
+@pytest.mark.parametrize(
+    ("more", "links", "told"),
+    [
+        ("joint_defaults: {pin: {radius: 5 mm}, friction: {coefficient: 0.1, backward: 0.3}}\n", None, "by direction"),
+        ("measures: {swing: {rotation: D, at: 60 deg}}\n", None, "measure swing"),
+        ("tolerances: {links.coupler.points.C.x: +0.2/-0.0 mm}\n", None, "tolerances"),
+        ("", ["rocker"], "joint C"),
+        ("space: spatial\n", None, "in space"),
+    ],
+)
+def test_what_would_not_be_mirrored_truly_is_refused(more, links, told):
+    gesture = {**MIRROR, "links": links or MIRROR["links"]}
+    assert told in ask(ask="edit", text=FOUR_BAR + more, places={}, gestures=[gesture])["error"]

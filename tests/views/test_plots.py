@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from stand_in import four_bar, slider
 
 from trunnion.errors import MechanismError, Status
-from trunnion.views.common.cycle import mean_friction
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
 

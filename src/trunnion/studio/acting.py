@@ -94,12 +94,13 @@ def bar_mass(sketch: Sketch, given: Given) -> str:
     width, thickness, density: as they were typed. With length l and width b: J = m (l² + b²) / 12 about the middle.
     """
     link = str(given["link"])
-    if len(sketch.points(link)) < 2 or link == sketch.ground:
-        raise refused("is no bar", f"links.{link}", "choose a moving link with two points")
+    if len(sketch.points(link)) < 2 or link == sketch.ground or sketch.entries.get("space") == "spatial":
+        raise refused("is no bar in the plane", f"links.{link}", "choose a moving link with two points")
     length, (x, y) = _bar(sketch, link)
     kinds = {"width": "length", "thickness": "length", "density": "density"}
     width, thickness, density = (_above_zero(given.get(key), key, kind) for key, kind in kinds.items())
     mass = density * length * width * thickness
+    sketch.section("links")[link].pop("inertia_about", None)
     sketch.section("links")[link] |= {
         "mass": f"{mass:.6g} kg",
         "centre": [sketch.length(x), sketch.length(y)],
@@ -111,8 +112,8 @@ def bar_mass(sketch: Sketch, given: Given) -> str:
 def centre(sketch: Sketch, given: Given) -> str:
     """The mass centre of a link goes to the place `at`; without that to the middle of the bar between its points."""
     link = str(given["link"])
-    if link == sketch.ground or link not in sketch.of("links"):
-        raise refused("has no mass centre", f"links.{link}", "choose a link that moves")
+    if link == sketch.ground or link not in sketch.of("links") or sketch.entries.get("space") == "spatial":
+        raise refused("has no mass centre in the plane", f"links.{link}", "choose a link that moves")
     x, y = sketch.frame(link).into(vector(given["at"])) if given.get("at") else _bar(sketch, link)[1]
     sketch.section("links")[link]["centre"] = [sketch.length(x), sketch.length(y)]
     return f"Mass centre of {link}"

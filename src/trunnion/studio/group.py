@@ -35,11 +35,14 @@ TURNED = ("start", "mean", "range", "points")  # angles of the joint
 
 def group(sketch: Sketch, given: Given) -> str:
     """Links are changed together, `what`: "shift" by `by`, m; "mirror" over a line through `at`, upright or `level`;
-    "copy", which is shifted by `by` or, with `at`, mirrored; "delete".
+    "copy", which is shifted by `by` or, with `at`, mirrored; "delete". start: whether the sketch has the places of the
+    start, by which a mirrored mechanism without hints is assembled.
     """
-    links, what = [str(one) for one in given["links"]], str(given["what"])
+    links, what = list(dict.fromkeys(str(one) for one in given["links"])), str(given["what"])
     if not links or any(one not in sketch.of("links") or one == sketch.ground for one in links):
         raise refused("is no link that moves", ", ".join(links), "choose links that are drawn")
+    if sketch.entries.get("space") == "spatial":
+        raise refused("is of a mechanism in space", ", ".join(links), "change it in the table or the text")
     title = links[0] if len(links) == 1 else f"{len(links)} links"
     if what == "delete":
         for one in links:
@@ -56,6 +59,8 @@ def group(sketch: Sketch, given: Given) -> str:
         x, y = vector(given["at"])
         signs, offset = ((1, -1), (0.0, 2 * y)) if given.get("level") else ((-1, 1), (2 * x, 0.0))
         _Moving(sketch, links, signs, offset).do()
+        if given.get("start"):
+            _assembled(sketch, links)
     return f"{ {'shift': 'Move', 'mirror': 'Mirror'}.get(what, 'Copy') } {title}"
 
 
@@ -73,6 +78,8 @@ class _Moving:
         sketch, ground = self.sketch, self.sketch.ground
         mine = {name: one for name, one in sketch.joints.items() if set(one["links"]) & set(self.links)}
         outside = [name for name, one in mine.items() if not set(one["links"]) <= {*self.links, ground}]
+        if held := [name for name in mine if name in sketch.locked]:
+            raise refused("is locked where it is", ", ".join(held), "unlock it first (K)")
         if self.signs != (1, 1):
             self._refuse(mine, outside)
             self._flip(mine)
@@ -132,17 +139,34 @@ class _Moving:
         sketch = self.sketch
         if "at" in sketch.section("assembly"):
             raise refused("says where the driver is", "assembly.at", "mirror it in the text")
+        if outside:
+            what = "is at a link that is not chosen, which would be bent"
+            raise refused(what, ", ".join(f"joints.{name}" for name in outside), "choose the links up to the ground")
         for name, one in joints.items():
             if set(one) & {"seat", "seat_on", "misalignment"}:
                 raise refused("has a seat, which is not mirrored", f"joints.{name}", "mirror it in the text")
+            rubs = one.get("friction", (sketch.entries.get("joint_defaults") or {}).get("friction"))
+            if isinstance(rubs, Mapping) and "backward" in rubs:
+                raise refused(
+                    "has friction by direction, which is not mirrored", f"joints.{name}", "mirror it in the text"
+                )
             hint = (sketch.entries.get("assembly") or {}).get(name)
             if isinstance(hint, str) and not LITERAL.fullmatch(hint):
                 raise refused(f"is assembled by '{hint}'", f"joints.{name}", "state where it is at the start")
+        self._refuse_said({*self.links, *joints})
         for section in ("drivers", "gears", "springs", "loads"):
             for name, one in sketch.of(section).items():
                 meant = [name] if section == "drivers" else [one.get("joint"), *one.get("joints", ())]
                 if set(meant) & set(outside) or 0 < len(set(meant) & set(joints)) < len({*meant} - {None}):
                     raise refused("is at a link that is not chosen", f"{section}.{name}", "choose that link too")
+
+    def _refuse_said(self, names: set[str]) -> None:
+        """Limits that differ, and measures, of what is mirrored: they would be of another side or place."""
+        for section in ("tolerances", "measures", "errors"):
+            for name, one in (self.sketch.entries.get(section) or {}).items():
+                even = section == "tolerances" and "±" in str(one)
+                if not even and names & set(re.findall(r"\w+", f"{name} {one}")):
+                    raise refused("speaks of what is mirrored", f"{section}.{name}", "mirror it in the text")
 
     def _flip(self, joints: Mapping[str, Any]) -> None:
         """Frames of links, drivers and what acts, as a mirror shows them."""
@@ -220,6 +244,18 @@ def _mapped(stated: Any, signs: tuple[int, int], offset: Vector = (0.0, 0.0), us
     return mapped
 
 
+def _assembled(sketch: Sketch, links: list[str]) -> None:
+    """Hints of where the joints between some links are at the start: without them the other assembly may be taken."""
+    hints = sketch.section("assembly")
+    for name, one in sketch.joints.items():
+        if (
+            set(one["links"]) <= set(links)
+            and name not in hints
+            and (key := f"{one['links'][1]}.{name}") in sketch.places
+        ):
+            hints[name] = [sketch.length(part) for part in sketch.places[key]]
+
+
 def _fastened(sketch: Sketch, links: list[str]) -> set[str]:
     """Points of the ground that springs of some links are fastened to."""
     points = set()
@@ -277,6 +313,8 @@ def _between(sketch: Sketch, links: list[str]) -> dict[str, Any]:
     """What the file states of some links and of what is between them and the ground: a copy."""
     ground = sketch.ground
     inner = {name: one for name, one in sketch.joints.items() if set(one["links"]) <= {*links, ground}}
+    if seated := [name for name, one in inner.items() if "seat_on" in one]:
+        raise refused("states the link of its seat", f"joints.{seated[0]}.seat_on", "copy it in the text")
     pinned = {*inner, *_fastened(sketch, links)}
     part: dict[str, Any] = {"links": {link: sketch.section("links")[link] for link in links}, "joints": inner}
     part["links"][ground] = {"points": {name: at for name, at in sketch.points(ground).items() if name in pinned}}
@@ -321,6 +359,8 @@ def _plus(stated: Any, by: float, usual: str) -> Any:
     if by == 0.0:
         return stated
     value, sign, limits = str(stated).partition("±")
+    if "%" in limits or '"' in value or re.search(r"\s[+-]\S.*/", value):
+        raise refused(f"'{stated}' is not moved as it is written", "a number", "change it in the text")
     rest = f" {sign}{limits}" if sign else ""
     found = LITERAL.fullmatch(value)
     name = found[2] if found and (found[2] or float(found[1])) else usual

@@ -131,8 +131,8 @@ def _resized(entries: dict[str, Any], numbers: Values, joint: str | None, multip
     for key, enough in SIZES.items():
         path = ["joints", str(joint), *key.split(".")]
         part = entries["joints"].get(joint, {}).get(path[2], {})
-        if ".".join(path) not in numbers or not isinstance(part, Mapping):
-            continue
+        if ".".join(path) not in numbers or not isinstance(part, Mapping) or "fit" in part:
+            continue  # a fit states the radius
         before = float(np.ravel(numbers[".".join(path)])[0])
         times = enough * (multiple if key == "pin.radius" else 1.0 / multiple)
         length = sketch.length(float(f"{times * before:.3g}"))

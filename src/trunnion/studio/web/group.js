@@ -3,8 +3,8 @@
 import { place } from "../web/data.js";
 import { svg } from "../web/dom.js";
 import { outline } from "../web/plane.js";
-import { edit } from "./actions.js";
-import { dictionary, groundOf, onGrid } from "./geometry.js";
+import { edit, present } from "./actions.js";
+import { dictionary, groundOf, onGrid, placesAt } from "./geometry.js";
 import { partsAt, sheet } from "./sheet.js";
 import * as state from "./state.js";
 import { Button, html } from "./ui.js";
@@ -56,7 +56,9 @@ function middleOf(names) {
 }
 
 async function change(names, fields) {
-  const done = await edit([{ do: "group", links: names, ...fields }]);
+  const scene = fields.at && state.solved.value ? state.answer.value.scene : null; // a mirrored mechanism is assembled where it starts
+  const places = scene && { ...present().places, ...placesAt(scene, 0) };
+  const done = await edit([{ do: "group", links: names, start: Boolean(places), ...fields }], null, places);
   if (done && fields.what === "delete") state.group.value = [];
   return done;
 }

@@ -20,8 +20,14 @@ def main() -> None:
     """Write all pictures in both themes, those of the press with layers and a variant last."""
     four_bar = {"start": _at_rest, "plots": _compared, "drawing": _drawing}
     press = {"layers": _layers, "variants": _variants}
-    watt = {"blocks": _blocks}
-    for model, shots in (("durango-fourbar", four_bar), ("drawing-press", press), ("watt-six-bar", watt)):
+    watt, loose, space = {"blocks": _blocks}, {"errors": _errors}, {"space": _space}
+    for model, shots in (
+        ("durango-fourbar", four_bar),
+        ("drawing-press", press),
+        ("watt-six-bar", watt),
+        ("fourbar-with-play", loose),
+        ("rssr-with-play", space),
+    ):
         with _studio(model) as address, sync_playwright() as begun:
             browser = begun.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
             for (name, prepare), theme in product(shots.items(), ("light", "dark")):
@@ -59,6 +65,20 @@ def _blocks(page: Page) -> None:
     _go(page, 40)
     page.click("role=tab[name=Blocks]")
     page.locator(".formula .term").nth(1).click()
+
+
+def _errors(page: Page) -> None:
+    page.click("button:has-text('× 100')")
+    _go(page, 57)
+
+
+def _space(page: Page) -> None:
+    """A joint with its bar, its loads on the ends of the bearing, and sections along its pin."""
+    _go(page, 60)
+    page.locator(".hands .handle[aria-label^='Joint D']").focus()
+    page.keyboard.press("Enter")
+    for name in ("joint axes", "reactions", "end loads of bearings"):
+        page.get_by_label(name, exact=True).click()
 
 
 def _compared(page: Page) -> None:

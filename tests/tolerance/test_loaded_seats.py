@@ -69,3 +69,15 @@ def test_play_alone_is_about_the_middle_of_the_holes() -> None:
     mechanism = trunnion.read(EXAMPLES / "fourbar-with-play.yaml")
     loaded, free = (trunnion.play(mechanism.with_seats(seat), steps=36) for seat in ("loaded", "free"))
     assert loaded.worst_case.values == pytest.approx(free.worst_case.values, rel=1e-9)
+
+
+def test_a_position_that_locks_has_no_place_of_its_pins() -> None:
+    """No load presses a pin there, so that a figure of the place is not that of pins in the middle."""
+    data = trunnion.read(EXAMPLES / "fourbar-with-play.yaml").data()
+    data["joint_defaults"]["friction"] = 9.0
+    data["tolerances"] = {"crank": "±0.02 mm"}
+    data["measures"] = {"lean": {"rotation": "D", "at": "60 deg"}}
+    mechanism = Mechanism(**data)
+    assert np.isnan(trunnion.analyse(mechanism, steps=12).measure_figure.values).all()
+    found = trunnion.tolerance(mechanism, methods=["monte-carlo"], samples=2, jobs=1)
+    assert np.isnan(found["nominal"].values).all()

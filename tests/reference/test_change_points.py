@@ -276,6 +276,7 @@ def spatial_kite(kite: Kite, moves: bool, start: float) -> Mechanism:
     )
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("moves", [True, pytest.param(False, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 15))])
 def test_a_kite_in_space_goes_on_smoothly(seed: int, moves: bool) -> None:

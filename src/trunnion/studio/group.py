@@ -348,6 +348,8 @@ def _minus(stated: Any) -> Any:
     if re.search(r"\s[+-]\S.*/", value):
         raise refused(f"'{stated}' has limits that differ", "a number", "mirror it in the text")
     value = value.strip()
+    if (number := LITERAL.fullmatch(value)) and float(number[1]) == 0:
+        return stated
     rest = f" {sign}{limits}" if sign else ""
     if value.startswith("-") and ALONE.fullmatch(value[1:].strip()):
         return f"{value[1:].strip()}{rest}"

@@ -166,7 +166,7 @@ class _Moving:
             for name, one in (self.sketch.entries.get(section) or {}).items():
                 even = section == "tolerances" and "±" in str(one)
                 if not even and names & set(re.findall(r"\w+", f"{name} {one}")):
-                    raise refused("speaks of what is mirrored", f"{section}.{name}", "mirror it in the text")
+                    raise refused("names what is mirrored", f"{section}.{name}", "mirror it in the text")
 
     def _flip(self, joints: Mapping[str, Any]) -> None:
         """Frames of links, drivers and what acts, as a mirror shows them."""

@@ -103,12 +103,12 @@ def _respoken(text: str, section: str, old: str, new: str, way: tuple[str, ...])
     if section == "joints":
         if last == "between":
             return re.sub(rf"(?<=\.){re.escape(old)}$", new, text)
-        spoken = last in ("at", "frame", "joint", "joints") and way[0] != "links"  # there a place is a dimension
+        spoken = last in ("frame", "joint", "joints") or (last == "at" and way[0] != "links")  # there it is a place
         return new if text == old and spoken else text
     return re.sub(rf"(?<![\w.]){re.escape(old)}(?![\w.])", new, text) if names_dimensions(way) else text
 
 
 def names_dimensions(way: tuple[str, ...]) -> bool:
     """Whether a text of the file may name dimensions: it is neither for readers nor the name of a part."""
-    names_part = way[-1] in ("links", "link", "joint", "joints", "between", "type")
+    names_part = way[-1] in ("links", "link", "joint", "joints", "frame", "between", "type")
     return way[0] not in ("name", "notes", "references") and not names_part and (way[-1] != "at" or way[0] == "links")

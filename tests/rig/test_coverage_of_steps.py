@@ -72,15 +72,10 @@ def identified(folder: Path, seed: int, noise: float, rpm: float = 120.0, positi
     )
 
 
-def miss(result: xr.Dataset) -> Array:
-    """How far each estimate is off, in half widths of its interval: one of up to 1 holds."""
-    low, high = (result[name].values for name in ("lower", "upper"))
-    return np.asarray(np.abs(np.array(list(TRUE.values())) - (low + high) / 2) / ((high - low) / 2))
-
-
 def held(result: xr.Dataset) -> Array:
     """Whether each interval holds."""
-    return miss(result) <= 1
+    true = np.array(list(TRUE.values()))
+    return np.asarray((result["lower"].values <= true) & (true <= result["upper"].values))
 
 
 def test_steps_that_repeat_are_a_source(tmp_path: Path) -> None:
@@ -138,12 +133,9 @@ def test_frictions_of_two_joints_add() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("noise", "seeds"), [(0.25, 80), (0.1, 40)])
+@pytest.mark.parametrize(("noise", "seeds"), [(0.25, 300), (0.1, 150)])
 def test_coverage_where_steps_repeat(tmp_path: Path, noise: float, seeds: int) -> None:
-    """Normal errors of whose intervals 88 to 99 % hold are off by 1 / 1.555 to 1 / 2.576 half widths (RMS), which 80
-    rigs tell as sharply as 300 whose intervals are counted: 80 % would be 1 / 1.282, here five deviations away.
-    """
-    every = np.array([miss(identified(tmp_path, seed, noise)) for seed in range(seeds)])
-    spread = np.sqrt(np.mean(every**2, axis=0))
-    assert np.all((spread >= 1 / 2.576) & (spread <= 1 / 1.555)), spread
-    assert 0.9 <= np.mean(every <= 1) <= 0.99
+    """Of 300 measurements 88 % at least: of a true 93 % that fails in 0.03 % of cases, of 80 % in all but 0.03 %."""
+    every = np.array([held(identified(tmp_path, seed, noise)) for seed in range(seeds)])
+    assert np.all(np.mean(every, axis=0) >= 0.88), np.mean(every, axis=0)
+    assert 0.9 <= np.mean(every) <= 0.99

@@ -95,17 +95,13 @@ def test_the_corners_of_a_pressure_table_are_left_out(tmp_path: Path) -> None:
     [(PRESSURE, "5 kHz", "0.2 N m"), (PRESSURE, "12 kHz", "0.1 N m"), (JUMP, "5 kHz", "0.1 N m")],
 )
 def test_coverage_with_a_load_that_has_corners(tmp_path: Path, load: dict[str, Any], rate: str, noise: str) -> None:
-    """Of rigs with errors of their own, read from their files: 90 to 99 % of normal errors are in intervals that are
-    1.645 to 2.576 of their deviations to either side, which 25 rigs tell as sharply as 100 whose intervals are counted.
-    """
+    """Of 60 rigs with errors of their own, read from their files, 90 to 99 % of the 95 % intervals hold."""
     machine = compressor(load)
     observed = trunnion.rig.observe(machine, rig(rate, noise))
-    misses = []  # in half widths of the interval
-    for seed in range(1, 26):
+    held = []
+    for seed in range(1, 61):
         folder = tmp_path / str(seed)
         observed.seeded(seed).write(folder)
         result = trunnion.rig.identify(machine, trunnion.rig.read(folder / "mapping.yaml"), [GUIDE], ["M"])
-        low, high = result["lower"].values[0], result["upper"].values[0]
-        misses.append((TRUE - (low + high) / 2) / ((high - low) / 2))
-    assert 1 / 2.576 <= np.sqrt(np.mean(np.square(misses))) <= 1 / 1.645
-    assert np.max(np.abs(misses)) <= 1.6  # beyond it is one normal error in 580
+        held.append(bool(result["lower"].values[0] <= TRUE <= result["upper"].values[0]))
+    assert 0.9 <= np.mean(held) <= 0.99

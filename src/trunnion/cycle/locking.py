@@ -14,9 +14,9 @@ from trunnion.cycle.locking_course import (
     NEAR,
     LockingRange,
     LockingState,
-    critical_multiples,
     holding_multiples,
     locking_course,
+    multiples_at,
     passed,
 )  # fmt: skip
 from trunnion.cycle.scales import scales_of
@@ -89,8 +89,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
         raise MechanismError(Finding(f"the number of steps is {steps}", "steps", f"give 1 to {MOST_STEPS:,}"))
     result = analyse_run(run, steps, progress=progress)
     time, status = result["time"].values, result["status"].values
-    back = run.solve(time, method=FrictionMethod())
-    other, multiples = passed(run, back.walk.backward(), FrictionMethod()), critical_multiples(back, MARGIN)
+    other, multiples = passed(run, run.walk(time).backward(), FrictionMethod()), multiples_at(run, time, MARGIN)
     answered = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
     course, nothing = locking_course(run, METHOD), np.full(len(time), np.nan)
     state = np.full(len(time), int(LockingState.RUNS)) if course is None else course.states_at(time)

@@ -34,7 +34,7 @@ from trunnion.solve.friction import FrictionProblem, frictionless, scaled
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.friction_problem import largest
 from trunnion.solve.loads import has_useful_work, useful_loads, useful_powers, useful_springs
-from trunnion.solve.margin import margin_in
+from trunnion.solve.margin import least_beside, margin_in
 from trunnion.solve.status import status_of
 from trunnion.solve.switches import MARGINS
 from trunnion.solve.system import felt, law_of, scale_of
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "HEAD", "HELD_AND_DRIVEN", "NEAR", "NO_MARGIN", "LockingCourse", "LockingRange", "LockingState", "Passage",
-    "critical_figure", "critical_multiples", "holding_multiples", "locking_course", "locks", "passed",
+    "critical_figure", "critical_multiples", "holding_multiples", "locking_course", "locks", "multiples_at", "passed",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -182,6 +182,26 @@ def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
             multiple = np.where(np.isfinite(loads), multiple, np.nan)
             multiples[system.rubbing_joint(number, place)] = np.broadcast_to(multiple, positions)
     return {joint: multiples[joint] for joint in system.joints if joint in multiples}
+
+
+def multiples_at(run: Run, time: Array, most: float) -> dict[str, Array]:
+    """`critical_multiples` at times, s; where a joint turns round they are the less of those just before and after."""
+
+    def solved(at: Array) -> Backward:
+        return run.solve(at, method=FrictionMethod())
+
+    back = solved(time)
+    multiples = critical_multiples(back, most)
+    rests = [np.broadcast_to(resting, time.shape) for resting in back.resting.values()]
+    turning = np.flatnonzero(np.any(rests, axis=0))
+    if not multiples or not len(turning) or not run.cycle.duration > 0:
+        return multiples
+    rows = np.array(list(multiples.values()))
+    beside = least_beside(
+        lambda sides: np.array(list(critical_multiples(sides, most).values())), solved, time[turning], run.cycle
+    )
+    rows[:, turning] = np.where(np.isnan(beside), rows[:, turning], beside)
+    return dict(zip(multiples, rows, strict=True))
 
 
 def multiple_of(rows: Array) -> Array:

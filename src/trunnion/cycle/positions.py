@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -20,7 +21,7 @@ from trunnion.model.arguments import strict_arguments
 from trunnion.model.names import nearest
 from trunnion.results import variables as results
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
-from trunnion.solve.margin import margins_beside
+from trunnion.solve.margin import least_beside, margin_in
 from trunnion.solve.memory import blocks
 from trunnion.solve.run import Run
 from trunnion.solve.seating import SETTLED, seating_of
@@ -166,7 +167,7 @@ def stretch(
     if method.margin_up_to and resting and run.cycle.duration > 0:
         places = np.unique(np.concatenate(list(resting.values())))
         solve = (lambda at: seating.at(at, method).back) if seating else (lambda at: run.solve(at, method=method))
-        beside = margins_beside(solve, time[places], run.cycle, method.margin_up_to)
+        beside = least_beside(partial(margin_in, most=method.margin_up_to), solve, time[places], run.cycle)
         arrays["locking_margin"][places] = np.where(np.isnan(beside), arrays["locking_margin"][places], beside)
     if seating:
         contact_loss.find(arrays, seating, time)

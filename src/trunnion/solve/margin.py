@@ -26,11 +26,11 @@ from trunnion.solve.friction import (
 from trunnion.solve.friction_problem import largest
 from trunnion.solve.system import Cycle
 
-__all__ = ["locking_margin", "margin_in", "margins_beside"]
+__all__ = ["least_beside", "locking_margin", "margin_in"]
 
 Array = NDArray[np.float64]
 
-BESIDE = 1e-8  # of the cycle: how far before and after a time its margin is looked at
+BESIDE = 1e-8  # of the cycle: how far before and after a time a figure is looked at
 
 
 def locking_margin(back: Backward) -> Number:
@@ -62,17 +62,20 @@ def margin_in(back: Backward, most: float, lanes: Number = np.True_) -> Number:
     return margin
 
 
-def margins_beside(solve: Callable[[Array], Backward], time: Array, cycle: Cycle, most: float) -> Array:
-    """The margins at times, s, at which a joint turns round: the less of those just before and just after.
+def least_beside(
+    figure: Callable[[Backward], Number], solve: Callable[[Array], Backward], time: Array, cycle: Cycle
+) -> Array:
+    """A figure of positions at times, s, at which a joint turns round: the less of those just before and just after.
 
-    Its friction may act either way there, and is taken as none: with that alone the margin would jump at one position.
-    NaN where neither side has one.
+    Its friction may act either way there, and is taken as none: with that alone a margin would jump at one position.
+    figure: of positions that are solved, with these last in its shape. NaN where neither side has one.
     """
     sides = time + BESIDE * cycle.duration * np.array([[-1.0], [1.0]])
     inside = cycle.periodic | ((sides >= 0) & (sides <= cycle.duration))
     asked = (sides % cycle.duration if cycle.periodic else np.clip(sides, 0.0, cycle.duration)).ravel()
-    margins = np.broadcast_to(np.asarray(margin_in(solve(asked), most), float), asked.shape).reshape(sides.shape)
-    least: Array = np.fmin.reduce(np.where(inside, margins, np.nan))
+    figures = np.asarray(figure(solve(asked)), float)
+    figures = np.broadcast_to(figures, (*figures.shape[:-1], len(asked))).reshape(*figures.shape[:-1], *sides.shape)
+    least: Array = np.fmin.reduce(np.where(inside, figures, np.nan), axis=-2)
     return least
 
 

@@ -6,6 +6,7 @@ What does not change from answer to answer, as the positions before the drag, is
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.solve.backward import Backward
-from trunnion.solve.margin import margin_in, margins_beside
+from trunnion.solve.margin import least_beside, margin_in
 from trunnion.solve.run import Run
 from trunnion.solve.status import status_of
 from trunnion.studio.loaded import Asked
@@ -97,7 +98,8 @@ def live_margin(
     if status[index] == Status.ZERO_SLIP and run.cycle.duration > 0:
         numbers = run.system.mechanism.parameters(values)
         time = run.cycle.times(steps)[[index]]
-        margin = float(margins_beside(lambda at: run.solve(at, numbers), time, run.cycle, NEAR)[0])
+        figure, solve = partial(margin_in, most=NEAR), lambda at: run.solve(at, numbers)
+        margin = float(least_beside(figure, solve, time, run.cycle)[0])
     else:
         every = np.broadcast_to(np.asarray(margin_in(back, NEAR, np.arange(steps) == index), float), (steps,))
         margin = float(every[index])

@@ -45,9 +45,9 @@ LISTS = (Sequence, Iterable)
 LONGEST = 60  # letters of a value that a message repeats
 
 
-def check_keywords(call: str, keywords: Iterable[str], known: Iterable[str]) -> None:
+def check_keywords(call: str, keywords: Iterable[str], accepted: Iterable[str]) -> None:
     """TypeError that names the nearest argument if a keyword is none; call: what was called, such as `analyse`."""
-    names = list(known)
+    names = list(accepted)
     for word in keywords:
         if word not in names:
             method = BY_METHOD.get(word)
@@ -73,8 +73,8 @@ def strict_arguments(public: Public) -> Public:
 
     @functools.wraps(public)
     def in_units_of_the_model(*args: Any, **keywords: Any) -> Any:
-        stated = stated_by([*args, *keywords.values()])
-        with nullcontext() if stated is None else shown_as(stated):
+        quantities = stated_by([*args, *keywords.values()])
+        with nullcontext() if quantities is None else shown_as(quantities):
             return strict(*args, **keywords)
 
     return in_units_of_the_model  # type: ignore[return-value]
@@ -83,22 +83,26 @@ def strict_arguments(public: Public) -> Public:
 def _strict(function: Callable[..., Any], call: str) -> Callable[..., Any]:
     parameters = inspect.signature(function).parameters
     names = list(parameters)
-    closed = not any(one.kind is one.VAR_KEYWORD for one in parameters.values())
+    closed = not any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values())
 
     @functools.cache
     def hints() -> dict[str, Any]:
         """What the annotations mean where the function stands; nothing said is anything."""
         place = inspect.unwrap(function).__globals__
-        said = {name: one.annotation for name, one in parameters.items() if one.annotation is not one.empty}
-        return {name: eval(text, place) if isinstance(text, str) else text for name, text in said.items()}
+        hints_of = {
+            name: parameter.annotation
+            for name, parameter in parameters.items()
+            if parameter.annotation is not parameter.empty
+        }
+        return {name: eval(text, place) if isinstance(text, str) else text for name, text in hints_of.items()}
 
     @functools.wraps(function)
     def strict(*args: Any, **keywords: Any) -> Any:
         if closed:
             check_keywords(f"{call}()", keywords, [name for name in names if name not in ("self", "cls")])
-        given = [held(call, name, value, hints().get(name, Any)) for name, value in zip(names, args, strict=False)]
+        positional = [held(call, name, value, hints().get(name, Any)) for name, value in zip(names, args, strict=False)]
         named = {name: held(call, name, value, hints().get(name, Any)) for name, value in keywords.items()}
-        return function(*given, *args[len(names) :], **named)
+        return function(*positional, *args[len(names) :], **named)
 
     return strict
 
@@ -111,7 +115,7 @@ def held(call: str, name: str, value: Any, hint: Any) -> Any:
     member = next((get_args(kind)[0] for kind in kinds if get_origin(kind) in LISTS), None)
     if member is not None:
         values = list(value) if isinstance(value, Iterable) and not isinstance(value, str) else [value]
-        if all(_fits(one, member) for one in values):
+        if all(_fits(item, member) for item in values):
             return values
     choices = [word for kind in (*kinds, member) if get_origin(kind) is Literal for word in get_args(kind)]
     if choices and all(isinstance(text, str) for text in values):
@@ -137,7 +141,7 @@ def _fits(value: Any, hint: Any) -> bool:
         return isinstance(value, str) and value in get_args(hint)
     if origin in LISTS:
         listed = isinstance(value, Sequence) and not isinstance(value, (str, bytes))
-        return listed and all(_fits(one, get_args(hint)[0]) for one in value)
+        return listed and all(_fits(item, get_args(hint)[0]) for item in value)
     if hint in (int, float):
         return isinstance(value, Integral if hint is int else Real) and not isinstance(value, bool)
     return hint is Any or isinstance(value, (bool, np.bool_) if hint is bool else origin or hint)
@@ -150,7 +154,7 @@ def _worded(kind: Any) -> str:
     if get_origin(kind) is Literal:
         return _either(map(repr, get_args(kind)))
     if get_origin(kind) in LISTS:
-        return f"a list of {_either(_worded(one).removeprefix('a ') + 's' for one in _kinds(get_args(kind)[0]))}"
+        return f"a list of {_either(_worded(hint).removeprefix('a ') + 's' for hint in _kinds(get_args(kind)[0]))}"
     kind = get_origin(kind) or kind
     return f"a {WORDS.get(kind, kind.__name__)}"
 

@@ -44,14 +44,14 @@ def with_law(data: dict[str, Any], law: str, complete: bool = False) -> dict[str
     is not stated.
     """
     declared = {} if law == "off" else FRICTION_LAWS[law].parameters
-    needed = {key: 1.0 for key, one in declared.items() if complete and one.default is None and not one.optional}
+    needed = {key: 1.0 for key, entry in declared.items() if complete and entry.default is None and not entry.optional}
     shared = _kept(data.get("joint_defaults", {}).get("friction"), declared)
     holders = [data.get("joint_defaults", {}), *data.get("joints", {}).values(), *data.get("loop", [])]
-    for holder in (one for one in holders if "friction" in one):
-        own = _kept(holder.pop("friction"), declared)
+    for holder in (entry for entry in holders if "friction" in entry):
+        parameters_of_law = _kept(holder.pop("friction"), declared)
         if law != "off":
-            missing = {key: one for key, one in needed.items() if key not in shared}
-            holder["friction"] = {"law": law, **missing, **own}
+            missing = {key: entry for key, entry in needed.items() if key not in shared}
+            holder["friction"] = {"law": law, **missing, **parameters_of_law}
     return data
 
 
@@ -59,8 +59,8 @@ def _kept(friction: Any, declared: Collection[str]) -> dict[str, Any]:
     """What a statement of friction, short or long, keeps where the parameters of the law are others."""
     if friction is None:
         return {}
-    stated = friction if isinstance(friction, Mapping) else {"coefficient": friction}
-    return {key: value for key, value in stated.items() if key in ("model", *declared)}
+    parameters = friction if isinstance(friction, Mapping) else {"coefficient": friction}
+    return {key: value for key, value in parameters.items() if key in ("model", *declared)}
 
 
 def not_stated(model: BaseModel, name: str) -> str:

@@ -75,10 +75,12 @@ def with_points(data: Mapping[str, Any], files: TableFiles) -> tuple[dict[str, A
 def _put(data: dict[str, Any], section: str, key: str, points: TablePoints) -> None:
     """Points in place of those that a driver or table states, or of the file that it names."""
     entry = data[section][key]
-    kept = {key: value for key, value in entry.items() if key not in OF_A_FILE} if isinstance(entry, Mapping) else {}
-    if section == "drivers" and kept.get("law") != "table":
-        kept = {"law": "table"}
-    data[section] = {**data[section], key: {**kept, "points": points.rows}}
+    entry_kept = (
+        {key: value for key, value in entry.items() if key not in OF_A_FILE} if isinstance(entry, Mapping) else {}
+    )
+    if section == "drivers" and entry_kept.get("law") != "table":
+        entry_kept = {"law": "table"}
+    data[section] = {**data[section], key: {**entry_kept, "points": points.rows}}
 
 
 def with_own_points(data: Mapping[str, Any], model: Path) -> tuple[dict[str, Any], list[TablePoints]]:
@@ -129,8 +131,8 @@ def place_findings(findings: Sequence[Finding], read: Sequence[TablePoints]) -> 
     """The findings, those about points with the file and line that these came from and a few for each file."""
     placed = [finding for finding in findings if not any(_speaks_of(finding, points) for points in read)]
     for points in read:
-        found = [finding for finding in findings if _speaks_of(finding, points)]
-        placed += _few([finding.at(points.file, _line(finding, points)) for finding in found])
+        own_findings = [finding for finding in findings if _speaks_of(finding, points)]
+        placed += _few([finding.at(points.file, _line(finding, points)) for finding in own_findings])
     return placed
 
 
@@ -153,20 +155,20 @@ def _few(findings: list[Finding]) -> list[Finding]:
 
 def _holder(data: Mapping[str, Any], name: str) -> tuple[str, str]:
     """Section and name of the driver or table that a name means; `drivers.A` and `tables.A` tell two apart."""
-    known = {section: data.get(section) for section in ("drivers", "tables")}
-    names = {section: list(part) if isinstance(part, Mapping) else [] for section, part in known.items()}
+    sections = {section: data.get(section) for section in ("drivers", "tables")}
+    names = {section: list(part) if isinstance(part, Mapping) else [] for section, part in sections.items()}
     section, dot, key = name.partition(".")
     if dot and key in names.get(section, ()):
         return section, key
-    found = [one for one in names if name in names[one]]
-    if len(found) == 2:
+    holders = [holder for holder in names if name in names[holder]]
+    if len(holders) == 2:
         raise MechanismError(
             Finding(f"'{name}' is a driver and a table", remedy=f"say drivers.{name} or tables.{name}")
         )
-    if not found:
+    if not holders:
         remedy = nearest(name, [*names["drivers"], *names["tables"]])
         raise MechanismError(Finding(f"there is no driver or table '{name}'", remedy=remedy))
-    return found[0], name
+    return holders[0], name
 
 
 def _kinds(data: Mapping[str, Any], section: str, key: str) -> tuple[Kind, Kind]:
@@ -182,8 +184,8 @@ def _kinds(data: Mapping[str, Any], section: str, key: str) -> tuple[Kind, Kind]
 def _coordinate(data: Mapping[str, Any], joint: str) -> Kind:
     """What the coordinate of a joint measures; a model that does not tell is refused elsewhere."""
     joints = data.get("joints")
-    stated = joints.get(joint) if isinstance(joints, Mapping) else None
-    pair = PAIRS.get(str(stated.get("type"))) if isinstance(stated, Mapping) else None
+    joint_entry = joints.get(joint) if isinstance(joints, Mapping) else None
+    pair = PAIRS.get(str(joint_entry.get("type"))) if isinstance(joint_entry, Mapping) else None
     if pair is None:
         return KINDS["angle"] | KINDS["length"]
     return KINDS["angle" if "rotation" in pair.freedoms else "length"]
@@ -193,20 +195,20 @@ def _coordinate(data: Mapping[str, Any], joint: str) -> Kind:
 
 
 def _points(
-    path: Path, where: str, kinds: tuple[Kind, Kind], shown: str = "", names: Sequence[str] | None = None
+    path: Path, where: str, kinds: tuple[Kind, Kind], label: str = "", names: Sequence[str] | None = None
 ) -> TablePoints:
     """The points of a file; MechanismError with file and line of every finding, a few of each file.
 
-    shown: what the file is called in findings; names: the headers of the two columns, of a file that has more.
+    label: what the file is called in findings; names: the headers of the two columns, of a file that has more.
     """
-    units, rows = _columns(path, kinds, shown or str(path), names)
+    units, rows = _columns(path, kinds, label or str(path), names)
     if names:  # of another program, which writes numbers of SI without their unit
         units = [stated or (kind.unit if kind in (KINDS["time"], KINDS["angle"], KINDS["length"]) else "")
                  for stated, kind in zip(units, kinds, strict=True)]  # fmt: skip
     points: list[list[float | str]] = []
     for _, cells in rows:
-        points.append([f"{cell} {one}" if one else float(cell) for cell, one in zip(cells, units, strict=True)])
-    return TablePoints(where, shown or str(path), points, [line for line, _ in rows])
+        points.append([f"{cell} {unit}" if unit else float(cell) for cell, unit in zip(cells, units, strict=True)])
+    return TablePoints(where, label or str(path), points, [line for line, _ in rows])
 
 
 def column(path: Path, kind: Kind) -> list[float]:
@@ -224,20 +226,20 @@ _SAMPLE = ("sample", "a deviation in each line", "0.012", "use a random subset")
 
 
 def _columns(
-    path: Path, kinds: Sequence[Kind], shown: str, names: Sequence[str] | None = None
+    path: Path, kinds: Sequence[Kind], label: str, names: Sequence[str] | None = None
 ) -> tuple[list[str], list[Row]]:
     """The units of one or two columns, and their rows of plain numbers; MechanismError as `_points`."""
     noun, each, example, fewer = _TABLE if len(kinds) == 2 else _SAMPLE
     try:
         text = read_text(path, f"a {noun}", MAX_BYTES, f"write {each}, such as {example}")
-        stated = [(number, line) for number, line in enumerate(io.StringIO(text, newline=None), start=1)
+        numbered = [(number, line) for number, line in enumerate(io.StringIO(text, newline=None), start=1)
                   if line.strip() and not line.lstrip().startswith("#")]  # fmt: skip
-        if not stated:
+        if not numbered:
             raise MechanismError(Finding("has only comments", remedy=f"write {each}", line=1))
-        if len(stated) > MAX_ROWS + 1:
-            raise MechanismError(Finding(f"has {len(stated)} rows, a {noun} at most {MAX_ROWS}", remedy=fewer))
-        separator = next((one for one in ";\t" if one in stated[0][1]), "," if len(kinds) == 2 else ";")
-        rows = [(number, _cells(line, separator)) for number, line in stated]
+        if len(numbered) > MAX_ROWS + 1:
+            raise MechanismError(Finding(f"has {len(numbered)} rows, a {noun} at most {MAX_ROWS}", remedy=fewer))
+        separator = next((mark for mark in ";\t" if mark in numbered[0][1]), "," if len(kinds) == 2 else ";")
+        rows = [(number, _cells(line, separator)) for number, line in numbered]
         if names:
             rows = _with_units(_named_columns(rows, names))
         if len(rows[0][1]) != len(kinds):
@@ -253,10 +255,10 @@ def _columns(
             raise MechanismError(_few(findings))
     except csv.Error as error:
         raise MechanismError(
-            Finding(f"is not CSV: {error}", remedy="check that it is a text file", file=shown)
+            Finding(f"is not CSV: {error}", remedy="check that it is a text file", file=label)
         ) from None
     except MechanismError as error:
-        raise MechanismError([finding.at(shown, finding.line) for finding in error.findings]) from None
+        raise MechanismError([finding.at(label, finding.line) for finding in error.findings]) from None
     return units, [(line, [_number(cell, separator) for cell in cells]) for line, cells in numbers]
 
 
@@ -300,8 +302,8 @@ def _with_units(rows: Sequence[Row]) -> list[Row]:
     below = others[0][1] if others else [""]
     if not all(cell in _NO_UNIT or _is_unit(cell) for cell in below) or not any(map(_is_unit, below)):
         return list(rows)
-    stated = zip(header, below, strict=True)
-    return [(line, [f"{cell} [{unit}]" if unit and not _IN_BRACKETS.search(cell) else cell for cell, unit in stated]),
+    columns = zip(header, below, strict=True)
+    return [(line, [f"{cell} [{unit}]" if unit and not _IN_BRACKETS.search(cell) else cell for cell, unit in columns]),
             *others[1:]]  # fmt: skip
 
 
@@ -336,12 +338,12 @@ def _unreadable(rows: Sequence[Row], separator: str, columns: int) -> Iterator[F
 def _units(header: Row, kinds: Sequence[Kind]) -> list[str]:
     """The units of a header, empty where there is none; MechanismError if they are not those of the columns."""
     line, cells = header
-    found, findings = [], []
+    units, findings = [], []
     for cell, kind in zip(cells, kinds, strict=True):
         bracketed, rounded = _IN_BRACKETS.search(cell), _IN_PARENTHESES.search(cell)
         text = bracketed[1].strip() if bracketed else ""
         text = "" if text in _NO_UNIT else text
-        found.append(text)
+        units.append(text)
         if text:
             findings += [
                 Finding(f"{cell[:40]}: {what[:120]}", remedy=to_do, line=line) for what, to_do in _unfit(text, kind)
@@ -351,7 +353,7 @@ def _units(header: Row, kinds: Sequence[Kind]) -> list[str]:
             findings.append(Finding(f"{cell[:40]}: a unit stands in brackets", remedy=remedy, line=line))
     if findings:
         raise MechanismError(findings)
-    return found
+    return units
 
 
 def _unfit(text: str, kind: Kind) -> Iterator[tuple[str, str]]:

@@ -108,7 +108,9 @@ class Expression:
 
     def renamed(self, names: Mapping[str, str]) -> Expression:
         """The same that speaks of some by other names."""
-        return _expression(self._tree, {key: names.get(str(one), one) for key, one in self._operands.items()})
+        return _expression(
+            self._tree, {key: names.get(str(operand), operand) for key, operand in self._operands.items()}
+        )
 
     def dimension(self, names: Dimensions) -> Dimension | None:
         """Dimension of the value, from those of the names (None: unknown); UnitError if terms do not fit."""
@@ -145,9 +147,9 @@ def parse(text: str) -> Expression:
     if len(text) > MAX_LENGTH:
         raise UnitError(f"an expression of {len(text)} characters, {MAX_LENGTH} at most", "split it in dimensions")
     if fraction := _FRACTION.fullmatch(normalise(text).strip()):
-        whole, over, under, unit_text = fraction.groups()
+        integer, over, under, unit_text = fraction.groups()
         literal(under, unit_text)  # UnitError for what is no unit
-        size = int(whole or 0) + int(over) / int(under)
+        size = int(integer or 0) + int(over) / int(under)
         raise UnitError(f"'{text}' divides by {under} {unit_text}", f"write {size:.12g} {unit_text}")
     if (signless := text.strip()).startswith(DIAMETER):
         raise UnitError(f"'{signless[0]}' is not read in '{text}'", f"write {signless[1:].strip()}")
@@ -164,11 +166,13 @@ def parse(text: str) -> Expression:
 
 def _expression(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Expression:
     evaluate = _compile(tree, operands)
-    names = tuple(dict.fromkeys(one for one in operands.values() if isinstance(one, str) and one not in RESERVED))
-    found = [one for one in operands.values() if isinstance(one, Literal)]
+    names = tuple(
+        dict.fromkeys(operand for operand in operands.values() if isinstance(operand, str) and operand not in RESERVED)
+    )
+    literals = [operand for operand in operands.values() if isinstance(operand, Literal)]
     core = tree.operand if isinstance(tree, ast.UnaryOp) else tree
-    alone = found[0] if isinstance(core, ast.Name) and found else None
-    bare = len(found) == len(operands) and not any(one.unit for one in found)
+    alone = literals[0] if isinstance(core, ast.Name) and literals else None
+    bare = len(literals) == len(operands) and not any(operand.unit for operand in literals)
     return Expression(names, evaluate, alone, bare, tuple(_kinks(tree, operands)), tree, operands)
 
 
@@ -179,29 +183,29 @@ def _tokens(text: str) -> tuple[str, dict[str, Literal | str]]:
     place, after_operand = 0, False
     text = text.strip()
     while place < len(text):
-        found = _TOKEN.match(text, place)
-        if not found:
+        match = _TOKEN.match(text, place)
+        if not match:
             raise UnitError(f"'{text[place:].strip()[:20]}' is not understood in '{text}'", _hint(text, place))
         if power := _RECIPROCAL.match(text, place):
             what = f"'{power['power']}' is {power['unit']} less {power['power'][-1]} in '{text}'"
             raise UnitError(what, "write an angular speed in rpm or rad/s, a power of a unit as s^-1")
-        operator = found["operator"]
+        operator = match["operator"]
         if operator is None and after_operand:
             raise UnitError(
-                f"an operator is missing before '{found[0].strip()}' in '{text}'",
+                f"an operator is missing before '{match[0].strip()}' in '{text}'",
                 "write a product as 2 * AB, a quantity as 60 mm",
             )
         if operator is None:
             key = f"_{len(operands)}"
-            number = found["number"]
-            operands[key] = literal(number, found["unit"] or found["per"] or "") if number else found["name"]
+            number = match["number"]
+            operands[key] = literal(number, match["unit"] or match["per"] or "") if number else match["name"]
             source.append(key)
         else:
             if operator == "," and "(" not in source:
                 raise UnitError(f"',' is not understood in '{text}'", _hint(text, place))
             source.append("**" if operator == "^" else operator)
         after_operand = operator is None or operator == ")"
-        place = found.end()
+        place = match.end()
     return " ".join(source), operands
 
 
@@ -249,7 +253,7 @@ def _compile(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Evaluator
             combine, first, second = _OPERATORS[type(operator)], _compile(left, operands), _compile(right, operands)
             return lambda names: combine(first(names), second(names))
         case ast.Call(func=ast.Name(id=key), args=arguments, keywords=[]):
-            return _call(operands[key], [_compile(one, operands) for one in arguments])
+            return _call(operands[key], [_compile(argument, operands) for argument in arguments])
     raise UnitError("an expression has a part that is no number, name, operator or function", _hint(""))
 
 
@@ -313,17 +317,17 @@ def _kinks(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Iterator[Ev
     for part in ast.walk(tree):
         if not isinstance(part, ast.Call) or not isinstance(part.func, ast.Name):
             continue
-        name, values = operands[part.func.id], [_compile(one, operands) for one in part.args]
+        name, values = operands[part.func.id], [_compile(argument, operands) for argument in part.args]
         if name == "between":
             yield from (_less(values[0], end) for end in values[1:])
         elif name in ("min", "max"):
-            yield from (_less(one, other) for one, other in combinations(values, 2))
+            yield from (_less(argument, other) for argument, other in combinations(values, 2))
         elif name in ("abs", "atan2"):  # an angle jumps by a turn where its first argument passes 0
             yield values[0]
 
 
-def _less(one: Evaluator, other: Evaluator) -> Evaluator:
-    return lambda names: one(names) - other(names)
+def _less(first: Evaluator, other: Evaluator) -> Evaluator:
+    return lambda names: first(names) - other(names)
 
 
 def _dimension(tree: ast.expr, operands: Mapping[str, Literal | str], names: Dimensions) -> Dimension | None:
@@ -351,13 +355,15 @@ def _dimension(tree: ast.expr, operands: Mapping[str, Literal | str], names: Dim
         case ast.BinOp(left=left, right=right):
             return _same([of(left), of(right)], "added")
         case ast.Call(func=ast.Name(id=key), args=arguments):
-            return _function_dimension(str(operands[key]), [of(one) for one in arguments])
+            return _function_dimension(str(operands[key]), [of(argument) for argument in arguments])
     raise AssertionError("every node was checked when compiled")
 
 
 def _is_plain(tree: ast.expr, operands: Mapping[str, Literal | str], plain: Collection[str]) -> bool:
     leaves = [operands[part.id] for part in ast.walk(tree) if isinstance(part, ast.Name)]
-    return all(one in plain if isinstance(one, str) else not one.unit for one in leaves)  # neither pi nor a function
+    return all(
+        leaf in plain if isinstance(leaf, str) else not leaf.unit for leaf in leaves
+    )  # neither pi nor a function
 
 
 def _unitless_angles(
@@ -370,12 +376,12 @@ def _unitless_angles(
             angle = angle or _dimension(tree, operands, names) == ANGLE
         case ast.Call(func=ast.Name(id=key), args=parts):
             function = FUNCTIONS[str(operands[key])]
-            beside = function.takes == "same" and any(_dimension(one, operands, names) == ANGLE for one in parts)
-            angle = function.takes == "angle" or beside or (angle and function.gives == "same")
+            angular = function.takes == "same" and any(_dimension(leaf, operands, names) == ANGLE for leaf in parts)
+            angle = function.takes == "angle" or angular or (angle and function.gives == "same")
         case ast.Name() | ast.BinOp():
             if angle and _is_plain(tree, operands, plain):
                 leaves = [operands[part.id] for part in ast.walk(tree) if isinstance(part, ast.Name)]
-                dimensions = [one for one in leaves if isinstance(one, str)]
+                dimensions = [leaf for leaf in leaves if isinstance(leaf, str)]
                 yield from dimensions
                 if not dimensions:
                     yield float(_compile(tree, operands)({}))
@@ -409,11 +415,11 @@ def _power(
 
 def _same(dimensions: list[Dimension | None], verb: str) -> Dimension | None:
     """The common dimension of terms; an angle beside pure numbers makes an angle."""
-    known = [dimension for dimension in dimensions if dimension is not None]
-    if not known:
+    dimensions_known = [dimension for dimension in dimensions if dimension is not None]
+    if not dimensions_known:
         return None
-    result = next((dimension for dimension in known if dimension != NUMBER), NUMBER)
-    for dimension in known:
+    result = next((dimension for dimension in dimensions_known if dimension != NUMBER), NUMBER)
+    for dimension in dimensions_known:
         if not fits(dimension, result):
             raise UnitError(
                 f"{dimension_text(result)} and {dimension_text(dimension)} are {verb}",
@@ -425,9 +431,9 @@ def _same(dimensions: list[Dimension | None], verb: str) -> Dimension | None:
 def _function_dimension(name: str, arguments: list[Dimension | None]) -> Dimension | None:
     function = FUNCTIONS[name]
     common = _same(arguments, f"combined in {name}")
-    wanted = {"angle": ANGLE, "number": NUMBER}.get(function.takes)
-    if wanted is not None and common is not None and not fits(common, wanted):
-        raise UnitError(f"{name} is given {dimension_text(common)}", f"{name} takes {dimension_text(wanted)}")
+    needed = {"angle": ANGLE, "number": NUMBER}.get(function.takes)
+    if needed is not None and common is not None and not fits(common, needed):
+        raise UnitError(f"{name} is given {dimension_text(common)}", f"{name} takes {dimension_text(needed)}")
     results: Mapping[str, Dimension | None] = {
         "angle": ANGLE,
         "number": NUMBER,

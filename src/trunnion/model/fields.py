@@ -89,9 +89,9 @@ class Fields(Part):
     @cached_property
     def stated_joints(self) -> Mapping[str, Joint]:
         """Every joint as it was stated; a row of the loop joins the link before it to its own."""
-        stated = dict(self.joints)
+        joints = dict(self.joints)
         for before, row in zip((*self.loop[-1:], *self.loop[:-1]), self.loop, strict=True):
-            stated[row.joint] = Joint(
+            joints[row.joint] = Joint(
                 type=row.type,
                 links=(before.link, row.link),
                 pitch=row.pitch,
@@ -104,7 +104,7 @@ class Fields(Part):
                 seat_on=row.seat_on,
                 seat=row.seat,
             )
-        return ReadOnlyDict(stated)
+        return ReadOnlyDict(joints)
 
     @cached_property
     def effective_joints(self) -> Mapping[str, Joint]:
@@ -154,9 +154,9 @@ class Fields(Part):
 
     def carriers(self, gear: str) -> tuple[int, int] | None:
         """On which side (0, 1) of each of its joints a gear pair has the link common to both; None without one."""
-        one, two = (self.effective_joints[joint].links for joint in self.coupled(gear))
-        shared = next((link for link in one if link in two), None)
-        return None if shared is None else (one.index(shared), two.index(shared))
+        first_links, two = (self.effective_joints[joint].links for joint in self.coupled(gear))
+        shared = next((link for link in first_links if link in two), None)
+        return None if shared is None else (first_links.index(shared), two.index(shared))
 
     def data(self) -> dict[str, Any]:
         """The model as plain mappings, lists, numbers and texts: what was stated, as it was written."""

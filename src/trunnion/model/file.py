@@ -54,11 +54,11 @@ def read_model(
     """
     path = Path(path)
     data, lines = read_entries(path)
-    findings = [one.at(str(path), 1) for one in version_findings(data)]
+    findings = [version_finding.at(str(path), 1) for version_finding in version_findings(data)]
     data, read = with_points(data, tables or {})
     try:
-        data, own = with_own_points(data, path)
-        read += own
+        data, own_points = with_own_points(data, path)
+        read += own_points
         model = build(data)
     except MechanismError as error:
         findings += place_findings(error.findings, read)
@@ -94,15 +94,15 @@ def placed(findings: Iterable[Finding], path: str | os.PathLike[str], sections: 
     text = read_text(path, "a model file", MAX_BYTES, "start from one of the examples")
     data, lines = entries_of(text, _file_type(path))
     rows = _rows(data)
-    found: list[Finding] = []
+    placed_findings: list[Finding] = []
     for finding in findings:
         section, *names = finding.where.split(".")
         entry = ".".join([section, *names[:1]])
-        known = entry in rows or (section in data and entry in lines)
-        if known and not finding.file and (not only or section in only):
+        present = entry in rows or (section in data and entry in lines)
+        if present and not finding.file and (not only or section in only):
             finding = finding.at(str(path), _line(finding.where, lines, rows))
-        found.append(finding)
-    return found
+        placed_findings.append(finding)
+    return placed_findings
 
 
 def write_model(data: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
@@ -169,9 +169,9 @@ def _parse_toml(text: str) -> tuple[dict[str, Any], Lines]:
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        found = re.search(r"at line (\d+), column \d+", str(error))
+        match = re.search(r"at line (\d+), column \d+", str(error))
         raise MechanismError(
-            Finding(f"is not TOML: {error}", remedy="correct it there", line=int(found[1]) if found else None)
+            Finding(f"is not TOML: {error}", remedy="correct it there", line=int(match[1]) if match else None)
         ) from error
     except ValueError as error:  # of a whole number that Python does not read
         raise MechanismError(Finding(f"is not TOML: {error}", remedy="write a number as 1.25e1")) from error
@@ -185,8 +185,8 @@ def _depth(data: Any) -> int:
     depth, layer = 0, [data]
     while layer:
         depth += 1
-        groups = (one.values() if isinstance(one, dict) else one for one in layer)
-        layer = [one for group in groups for one in group if isinstance(one, (dict, list))]
+        groups = (node.values() if isinstance(node, dict) else node for node in layer)
+        layer = [node for group in groups for node in group if isinstance(node, (dict, list))]
     return depth
 
 
@@ -273,30 +273,30 @@ class _Builder:
 
     def _uncut(self, node: MappingNode | SequenceNode, items: list[tuple[Node, str]]) -> list[tuple[Node, str]]:
         """The values of a list or group, by path, without those that YAML cut out of an expression at its commas."""
-        kept, until = [], 0
+        pieces, until = [], 0
         for item, path in items:
             start = item.start_mark.index
             if start < until:
                 continue
-            kept.append((item, path))
+            pieces.append((item, path))
             plain = node.flow_style and isinstance(item, ScalarNode) and not item.style
             if plain and item.value.count("(") > item.value.count(")"):
-                whole = _balanced(self.text[start : node.end_mark.index - 1])
-                until = start + len(whole)
-                if whole:
-                    shown, kind = " ".join(whole.split()), "braces" if isinstance(node, MappingNode) else "brackets"
-                    what = f"'{shown[:80]}' has a comma, which ends a value in {kind}"
-                    mark = "'" if '"' in shown else '"'
-                    remedy = f"put it in quotation marks: {mark}{shown}{mark}"
+                inner = _balanced(self.text[start : node.end_mark.index - 1])
+                until = start + len(inner)
+                if inner:
+                    excerpt, kind = " ".join(inner.split()), "braces" if isinstance(node, MappingNode) else "brackets"
+                    what = f"'{excerpt[:80]}' has a comma, which ends a value in {kind}"
+                    mark = "'" if '"' in excerpt else '"'
+                    remedy = f"put it in quotation marks: {mark}{excerpt}{mark}"
                     self.findings.append(Finding(what, path, remedy, line=item.start_mark.line + 1))
-        return kept
+        return pieces
 
     def _mapping(self, node: MappingNode, path: str) -> dict[str, Any]:
         values: dict[str, Any] = {}
         parts = [(value, f"{path}.{key.value}".lstrip(".")) for key, value in node.value]
-        whole = {id(value) for value, _ in self._uncut(node, parts)}
+        uncut = {id(value) for value, _ in self._uncut(node, parts)}
         for key_node, value_node in node.value:
-            if id(value_node) not in whole:
+            if id(value_node) not in uncut:
                 continue
             line = key_node.start_mark.line + 1
             if not isinstance(key_node, ScalarNode):
@@ -315,11 +315,13 @@ class _Builder:
     def _text(self, node: ScalarNode, path: str) -> str:
         """What a node says; half a sign, which JSON can escape, is in no text that can be written again."""
         text = str(node.value)
-        whole = text.encode("utf-8", "replace").decode()
-        if whole != text:
+        encodable = text.encode("utf-8", "replace").decode()
+        if encodable != text:
             line = node.start_mark.line + 1
-            self.findings.append(Finding(f"'{whole[:40]}' has half a sign (\\ud800 …)", path, "remove it", line=line))
-        return whole
+            self.findings.append(
+                Finding(f"'{encodable[:40]}' has half a sign (\\ud800 …)", path, "remove it", line=line)
+            )
+        return encodable
 
     def _scalar(self, node: ScalarNode, path: str) -> Any:
         text = self._text(node, path)
@@ -381,7 +383,9 @@ def _rows(data: Mapping[str, Any]) -> dict[str, str]:
 
 def _groups(items: Any) -> list[tuple[int, dict[str, Any]]]:
     """The groups of entries in a list, with their index."""
-    return [(index, one) for index, one in enumerate(items if isinstance(items, list) else ()) if isinstance(one, dict)]
+    return [
+        (index, item) for index, item in enumerate(items if isinstance(items, list) else ()) if isinstance(item, dict)
+    ]
 
 
 def _line(where: str, lines: Lines, rows: Mapping[str, str]) -> int | None:

@@ -44,14 +44,14 @@ DATA_SHEET = (
 
 def schema_findings(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any]) -> list[Finding]:
     """One finding for each thing that pydantic found, with its path."""
-    return [_finding(one, model, data) for one in _errors(error)]
+    return [_finding(entry, model, data) for entry in _errors(error)]
 
 
 def _errors(error: ValidationError) -> list[ErrorDetails]:
     """pydantic's errors, but for lists that are too short only because some of their items are wrong."""
-    found = error.errors(include_url=False)
-    parents = {one["loc"][:-1] for one in found}
-    return [one for one in found if one["type"] != "too_short" or one["loc"] not in parents]
+    entries = error.errors(include_url=False)
+    parents = {entry["loc"][:-1] for entry in entries}
+    return [entry for entry in entries if entry["type"] != "too_short" or entry["loc"] not in parents]
 
 
 _INSTEAD = {  # what to write in place of a word that is none of the known, by key
@@ -130,16 +130,16 @@ def _fields(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str
 
 
 def repair(
-    error: ValidationError, data: Mapping[str, Any], told: Sequence[Finding]
+    error: ValidationError, data: Mapping[str, Any], findings: Sequence[Finding]
 ) -> tuple[dict[str, Any], frozenset[str]]:
     """The data without what could not be read, to check the rest; and the names of the entries lost with it.
 
-    told: `schema_findings`; an unknown key with one that was meant counts as that one.
+    findings: `schema_findings`; an unknown key with one that was meant counts as that one.
     """
     mended = {key: _mutable(value) for key, value in data.items()}
     lost: set[str] = set()
     # from the end, so that places in lists stay right
-    for one, finding in reversed(list(zip(_errors(error), told, strict=True))):
+    for one, finding in reversed(list(zip(_errors(error), findings, strict=True))):
         location = _plain(one["loc"])
         if one["type"] == "extra_forbidden":
             meant = re.fullmatch(r"did you mean '([^']*)'.*", finding.remedy)

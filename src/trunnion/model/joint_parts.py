@@ -109,24 +109,24 @@ class Fit:
         """A fit from its text; a pydantic error if it is none."""
         if isinstance(source, Fit):
             return source
-        found = _FIT.match(source.strip()) if isinstance(source, str) else None
-        if not isinstance(source, str) or not found:
+        match = _FIT.match(source.strip()) if isinstance(source, str) else None
+        if not isinstance(source, str) or not match:
             classes = isinstance(source, str) and _CLASSES.fullmatch(source)
             what = "has no diameter" if classes else "is not a fit"
             remedy = ", or state the radius of the pin too" if classes else ""
             raise problem(f"{str(source)[:60]!r} {what}", f"write diameter, hole and shaft as 20 mm H7/g6{remedy}")
-        diameter = found["size"].lstrip("".join(DIAMETER)).strip()
+        diameter = match["size"].lstrip("".join(DIAMETER)).strip()
         plain = bool(_PLAIN.fullmatch(diameter))
-        if plain or diameter != found["size"]:  # Ø 24 H7/g6
-            what = f"'{diameter}' has no unit" if plain else f"'{found['size'][0]}' is not read in '{source[:60]}'"
-            raise problem(what, f"write {diameter}{' mm' * plain} {found['hole']}/{found['shaft']}")
+        if plain or diameter != match["size"]:  # Ø 24 H7/g6
+            what = f"'{diameter}' has no unit" if plain else f"'{match['size'][0]}' is not read in '{source[:60]}'"
+            raise problem(what, f"write {diameter}{' mm' * plain} {match['hole']}/{match['shaft']}")
         try:
-            size = Quantity.read(found["size"], KINDS["length"])
+            size = Quantity.read(match["size"], KINDS["length"])
         except UnitError as error:
             raise problem(error.what, error.remedy) from error
         if size.tolerance:
             raise problem(f"the size of {source[:60]!r} has a tolerance of its own", "the classes of the fit state it")
-        return cls(source, size, found["hole"], found["shaft"])
+        return cls(source, size, match["hole"], match["shaft"])
 
 
 FitText = Annotated[
@@ -211,12 +211,12 @@ class Contact(Part):
         """With the exponent 3/2 where bodies give, and Poisson's ratio 0.3 and the pin's material where not stated."""
         if self.of.rigid:
             return self
-        found: dict[str, Any] = {"exponent": self.exponent or Quantity(1.5, KINDS["number"])}
+        values: dict[str, Any] = {"exponent": self.exponent or Quantity(1.5, KINDS["number"])}
         if self.modulus is not None:
-            found["poisson_ratio"] = self.poisson_ratio or Quantity(0.3, KINDS["number"])
-            found["hole_modulus"] = self.hole_modulus or self.modulus
-            found["hole_poisson_ratio"] = self.hole_poisson_ratio or found["poisson_ratio"]
-        return self.model_copy(update=found)
+            values["poisson_ratio"] = self.poisson_ratio or Quantity(0.3, KINDS["number"])
+            values["hole_modulus"] = self.hole_modulus or self.modulus
+            values["hole_poisson_ratio"] = self.hole_poisson_ratio or values["poisson_ratio"]
+        return self.model_copy(update=values)
 
 
 class Seat(Part):
@@ -281,11 +281,11 @@ class Friction(Part):
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """The number, or the group with the parameters of every law in the table."""
         group = handler.resolve_ref_schema(handler(schema))
-        declared = {key: one for law in FRICTION_LAWS.values() for key, one in law.parameters.items()}
+        declared = {key: parameter for law in FRICTION_LAWS.values() for key, parameter in law.parameters.items()}
         number = group["additionalProperties"]["type"]
-        for key, one in declared.items():
-            unit = f", {one.unit}" if one.unit else ""
-            group["properties"][key] = {"type": number, "description": f"{one.meaning}{unit}"}
+        for key, parameter in declared.items():
+            unit = f", {parameter.unit}" if parameter.unit else ""
+            group["properties"][key] = {"type": number, "description": f"{parameter.meaning}{unit}"}
         group["additionalProperties"] = False
         return {"anyOf": [{"type": number}, group], "description": group.pop("description")}
 
@@ -445,6 +445,6 @@ def play(joint: Joint, name: str, values: Mapping[str, Number]) -> Number:
         return 0.0
     if has_guide(joint.type):
         return values[f"joints.{name}.guide.clearance"]
-    pin, stated = f"joints.{name}.pin", clearance(name, values)
-    across = 0.0 if stated is None else stated + values.get(f"{pin}.cylindricity", 0.0)
+    pin, gap = f"joints.{name}.pin", clearance(name, values)
+    across = 0.0 if gap is None else gap + values.get(f"{pin}.cylindricity", 0.0)
     return across if across != 0 else 0.5 * values.get(f"{pin}.end_float", 0.0)

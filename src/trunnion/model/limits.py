@@ -63,13 +63,13 @@ class Limits:
 
 def _from_text(source: str) -> tuple[Quantity, Quantity]:
     text = normalise(source).strip()
-    if found := _EITHER.match(text):
-        return _either(found[1], source)
-    if found := _BOTH.match(text):
-        terms = [term(part) for part in found.groups()]
-        unit = next((one for _, one in reversed(terms) if one), "")
-        signed = [Quantity.read(f"{number} {own or unit}".strip()) for number, own in terms]
-        sizes = [float(one.evaluate()) for one in signed]
+    if match := _EITHER.match(text):
+        return _either(match[1], source)
+    if match := _BOTH.match(text):
+        terms = [term(part) for part in match.groups()]
+        unit = next((limit for _, limit in reversed(terms) if limit), "")
+        signed = [Quantity.read(f"{number} {unit_own or unit}".strip()) for number, unit_own in terms]
+        sizes = [float(limit.evaluate()) for limit in signed]
         order = np.argsort(sizes, kind="stable")
         lower, upper = (replace(signed[place], source=source) for place in order)
         return lower, upper
@@ -105,24 +105,24 @@ SHOWN_UNITS = {"length": ("mm", 1e3), "angle": ("deg", 180 / np.pi)}  # in which
 CLOSE = 1e-9  # of a number: what rounding down takes for the number itself
 
 
-def half_width(stated: object, kind: Kind, name: str) -> float:
+def half_width(limits: object, kind: Kind, name: str) -> float:
     """A half width in SI, of a number in SI or a text with a unit such as ±0.02 mm; MechanismError for others."""
     remedy = f"give a number of at least 0 in {kind.unit}, or a text such as ±{kind.example}"
     try:
-        text = _EITHER.sub(r"\1", normalise(stated)) if isinstance(stated, str) else stated
+        text = _EITHER.sub(r"\1", normalise(limits)) if isinstance(limits, str) else limits
         quantity = Quantity.read(text, kind)
         if quantity.tolerance or quantity.names or "%" in str(text):
             raise UnitError("is no number with a unit")
         value = float(quantity.evaluate())
     except UnitError as error:
-        raise MechanismError(Finding(f"a half width of {_told(stated)} is none: {error.what}", name, remedy)) from None
+        raise MechanismError(Finding(f"a half width of {_told(limits)} is none: {error.what}", name, remedy)) from None
     if value < 0:
-        raise MechanismError(Finding(f"a half width of {_told(stated)} is none", name, remedy))
+        raise MechanismError(Finding(f"a half width of {_told(limits)} is none", name, remedy))
     return value
 
 
-def _told(stated: object) -> str:
-    return f"{stated:g}" if isinstance(stated, float) else f"'{str(stated)[:40]}'"
+def _told(limits: object) -> str:
+    return f"{limits:g}" if isinstance(limits, float) else f"'{str(limits)[:40]}'"
 
 
 def written(value: float, kind: Kind, digits: int = DIGITS) -> str:
@@ -147,18 +147,18 @@ def number_with(quantity: Quantity, half: float, digits: int = DIGITS) -> str | 
         return None
     text = normalise(quantity.source)
     spans = deviation_spans(text)
-    numbers = [found for start, end in spans if (found := LITERAL.search(text, start, end))]
+    numbers = [number for start, end in spans if (number := LITERAL.search(text, start, end))]
     if not numbers or len(numbers) < len(spans):
         return None
-    units = [found["unit"] or "" for found in numbers]
-    stated = next((one for one in reversed(units) if one), "")
-    if not stated and (value := LITERAL.fullmatch(text[: spans[0][0]].strip(" -+±/"))):
-        stated = value["unit"] or ""
+    units = [number["unit"] or "" for number in numbers]
+    unit_stated = next((unit for unit in reversed(units) if unit), "")
+    if not unit_stated and (value := LITERAL.fullmatch(text[: spans[0][0]].strip(" -+±/"))):
+        unit_stated = value["unit"] or ""
     lower, upper = quantity.tolerance
     middle = (lower + upper) / 2
     falling = len(spans) == 1 or text[spans[0][0]] == "+" or text[spans[1][0]] == "-"  # the upper limit comes first
     for k in reversed(range(len(spans))):
-        factor = literal("1", units[k] or stated).value
+        factor = literal("1", units[k] or unit_stated).value
         size = _down(half / factor, digits)
         if len(spans) == 1:
             told = f"{size:.{DIGITS}g}"

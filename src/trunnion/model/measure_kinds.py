@@ -31,18 +31,20 @@ _COLUMN = re.compile(r"(?P<part>\w+)\.(?P<kind>rotation|slide|effort)|(?P<point>
 
 def dimension_kinds(mechanism: Fields) -> dict[str, Kind]:
     """What each dimension measures, as far as its value tells."""
-    known: dict[str, Dimension | None] = {}
+    dimensions: dict[str, Dimension | None] = {}
     for name in evaluation_order(mechanism.dimensions)[0]:
         with suppress(UnitError, KeyError):  # findings of their own
-            known[name] = mechanism.dimensions[name].check(known, ANY)
-    return {name: _of_dimension(one) for name, one in known.items() if one is not None}
+            dimensions[name] = mechanism.dimensions[name].check(dimensions, ANY)
+    return {name: _of_dimension(dimension) for name, dimension in dimensions.items() if dimension is not None}
 
 
 def _of_dimension(dimension: Dimension | None) -> Kind:
     """The usual kind of a dimension, a number where none is known."""
     usual = {kind.dimensions[0]: kind for kind in KINDS.values()}
-    own = dimension or NUMBER
-    return usual.get(own) or Kind("quantity", si_unit(own), f"1 {si_unit(own)}", (own,))
+    dimension_own = dimension or NUMBER
+    return usual.get(dimension_own) or Kind(
+        "quantity", si_unit(dimension_own), f"1 {si_unit(dimension_own)}", (dimension_own,)
+    )
 
 
 def drive_kind(mechanism: Fields) -> Kind:
@@ -119,11 +121,11 @@ def operands(mechanism: Fields, measure: Measure) -> dict[str, Measure | None]:
 
 
 def _column(name: str) -> Measure | None:
-    found = _COLUMN.fullmatch(name)
-    if found is None:
+    match = _COLUMN.fullmatch(name)
+    if match is None:
         return None
-    of_point = {"point": found["point"], "axis": found["axis"]}
-    return Measure.model_validate(of_point if found["point"] else {found["kind"]: found["part"]})
+    of_point = {"point": match["point"], "axis": match["axis"]}
+    return Measure.model_validate(of_point if match["point"] else {match["kind"]: match["part"]})
 
 
 def _dimensions(mechanism: Fields, measure: Measure) -> dict[str, Dimension | None]:

@@ -93,11 +93,11 @@ class Mechanism(Numbers):
                 super().__init__(**mended)
             except ValidationError:
                 raise MechanismError(findings) from None
-            sections = {one.alias or name for name, one in type(self).model_fields.items()}
+            sections = {field.alias or name for name, field in type(self).model_fields.items()}
             if lost & sections:  # a whole section: the rest would speak of nothing else
                 raise MechanismError(findings) from None
-        found = self.__dict__["checked"] = check_model(self, lost)
-        findings += [finding for finding in found if finding.severity is Severity.ERROR]
+        result = self.__dict__["checked"] = check_model(self, lost)
+        findings += [finding for finding in result if finding.severity is Severity.ERROR]
         if findings:
             raise MechanismError(findings)
 
@@ -247,14 +247,14 @@ class Mechanism(Numbers):
         try:
             return self.parameter_set.resolve(name)
         except MechanismError:
-            found = self._unstated(name)
+            entry = self._unstated(name)
             part = any(f".{name}." in f".{one}" for one in self.parameter_set.entries)  # of which some number is stated
-            if not found and not part and (path := not_stated(self, name)):
+            if not entry and not part and (path := not_stated(self, name)):
                 remedy = "write it into the model file: then this name changes it"
                 raise MechanismError(Finding(f"the model states no {path}", name, remedy)) from None
-            if not found:
+            if not entry:
                 raise
-            return found[0]
+            return entry[0]
 
     def _location(self, name: str) -> Location:
         """Where what a name means stands, or would stand; MechanismError if it means nothing."""
@@ -295,8 +295,8 @@ class Mechanism(Numbers):
             path = self.parameter_set.resolve(of)
         except MechanismError as error:
             raise MechanismError([replace(one, where=name) for one in error.findings]) from None
-        stated = (one for one in self.variations if self.parameter_set.resolve(one) == path)
-        of = next(stated, of)
+        names = (one for one in self.variations if self.parameter_set.resolve(one) == path)
+        of = next(names, of)
         short = key == "limits" and (of not in self.variations or self.variations[of].model_fields_set == {"limits"})
         return (section, of) if short else (section, of, key)
 
@@ -310,8 +310,8 @@ class Mechanism(Numbers):
             path = self.parameter_set.resolve(of)
         except MechanismError:
             path = ""
-        stated = [one for one in self.costs if one == of or (path and path in cost_paths(self, one))]
-        return (section, stated[0], key) if stated else None
+        names = [cost for cost in self.costs if cost == of or (path and path in cost_paths(self, cost))]
+        return (section, names[0], key) if names else None
 
     def _unstated(self, name: str) -> tuple[str, Location] | None:
         """Path and place of the error of a number, or of a number of a joint, that the file may state and does not."""
@@ -320,10 +320,10 @@ class Mechanism(Numbers):
             try:
                 return f"errors.{self.parameter_set.resolve(named)}", ("errors", named)
             except MechanismError as error:
-                raise MechanismError([replace(one, where=name) for one in error.findings]) from None
+                raise MechanismError([replace(finding, where=name) for finding in error.findings]) from None
         for part, kind in _JOINT_PARTS.items():
-            before, found, rest = name.rpartition(f".{part}.")
-            holder = self._holder(before) if found else None
+            before, middle, rest = name.rpartition(f".{part}.")
+            holder = self._holder(before) if middle else None
             key, *below = rest.split(".")
             if (
                 not holder
@@ -336,13 +336,13 @@ class Mechanism(Numbers):
             if key == "direction" and below in (["x"], ["y"], ["z"]):
                 return path, (*holder, part, key, "xyz".index(below[0]))
             return None if below or key in ("fit", "direction", "law") else (path, (*holder, part, key))
-        before, found, key = name.rpartition(".motor.")
+        before, middle, key = name.rpartition(".motor.")
         driver = before.removeprefix("drivers.")
-        if found and key in Motor.model_fields and driver in self.drivers and self.drivers[driver].motor is not None:
+        if middle and key in Motor.model_fields and driver in self.drivers and self.drivers[driver].motor is not None:
             return f"drivers.{driver}.motor.{key}", ("drivers", driver, "motor", key)
         if name == "joint_defaults.friction":  # as a file has it: a plain number is the coefficient
             name += ".coefficient"
-        before, found, key = name.rpartition(".friction.")
+        before, middle, key = name.rpartition(".friction.")
         if before == "joint_defaults" and key in FRICTION_LAWS[self._default_law].parameters:
             return name, (before, "friction", key)
         return None
@@ -388,8 +388,8 @@ class Mechanism(Numbers):
                 remedy = f"a coefficient is set by joint_defaults.friction={law}, of one joint by NAME.friction={law}"
             raise MechanismError(Finding(f"'{law}' is not a friction law", remedy=remedy))
         if law == "off":
-            stated = self.with_values(values) if values else self
-            return Mechanism(**kept(stated, with_law(stated.data(), law)))
+            changed = self.with_values(values) if values else self
+            return Mechanism(**kept(changed, with_law(changed.data(), law)))
         data = with_law(self.data(), law)
         if values:
             # names are those of a mechanism that states all parameters of the law, as it does with the values
@@ -408,10 +408,10 @@ class Mechanism(Numbers):
 
     def with_motions(self, laws: Mapping[str, MotionLaw]) -> Mechanism:
         """The mechanism whose drivers move as they were found to, by driver; its file and its digest stay the same."""
-        drivers = {name: one.moving(laws[name]) if name in laws else one for name, one in self.drivers.items()}
-        found = super().model_copy(update={"drivers": ReadOnlyDict(drivers)})
-        found.__dict__.pop("worked_out", None)
-        return found
+        drivers = {name: driver.moving(laws[name]) if name in laws else driver for name, driver in self.drivers.items()}
+        copy = super().model_copy(update={"drivers": ReadOnlyDict(drivers)})
+        copy.__dict__.pop("worked_out", None)
+        return copy
 
     def plot(self) -> Figure:
         """The mechanism at its start as a matplotlib Figure, without loads and friction: bodies, joints, point curves.

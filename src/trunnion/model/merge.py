@@ -51,7 +51,9 @@ def merge_joint(
     """
     pin, guide = joint.pin, joint.guide
     if has_pin(joint.type) and (pin or defaults.pin):
-        default = {key: one for key, one in stated(defaults.pin).items() if key != "end_float" or _floats(joint)}
+        default = {
+            key: quantity for key, quantity in stated(defaults.pin).items() if key != "end_float" or _floats(joint)
+        }
         pin = Pin(**_pin(default, stated(pin), limits, dimensions or {}))
     if has_guide(joint.type) and (guide or defaults.guide):
         guide = Guide(**{**stated(defaults.guide), **stated(guide)})
@@ -81,17 +83,19 @@ def _floats(joint: Joint) -> bool:
 
 
 def _pin(
-    default: Mapping[str, Any], own: Mapping[str, Any], limits: FitChoice, dimensions: Mapping[str, Number]
+    default: Mapping[str, Any], own_pin: Mapping[str, Any], limits: FitChoice, dimensions: Mapping[str, Number]
 ) -> dict[str, Any]:
     """A pin's own values over the defaults; one way to state the play replaces the others."""
-    if "fit" in own:
-        default = {key: one for key, one in default.items() if key not in ("radius", "hole_radius", "clearance")}
-    elif own.keys() & {"radius", "hole_radius", "clearance"}:
-        default = {key: one for key, one in default.items() if key != "fit"}
+    if "fit" in own_pin:
+        default = {
+            key: quantity for key, quantity in default.items() if key not in ("radius", "hole_radius", "clearance")
+        }
+    elif own_pin.keys() & {"radius", "hole_radius", "clearance"}:
+        default = {key: quantity for key, quantity in default.items() if key != "fit"}
     for key, other in (("clearance", "hole_radius"), ("hole_radius", "clearance")):
-        if key in own and other not in own:
-            default = {name: one for name, one in default.items() if name != other}
-    merged = {**default, **own}
+        if key in own_pin and other not in own_pin:
+            default = {name: quantity for name, quantity in default.items() if name != other}
+    merged = {**default, **own_pin}
     if merged.get("fit"):
         for key, radius in _radii(merged["fit"], limits, dimensions).items():
             merged[key] = merged.get(key) or radius
@@ -101,8 +105,8 @@ def _pin(
 def _radii(stated_fit: Fit, limits: FitChoice, dimensions: Mapping[str, Number]) -> dict[str, Quantity]:
     """Radii of pin and hole of a fit with their tolerances; half the size for the pin alone where it has no limits."""
     size = stated_fit.size
-    known = set(size.names) <= dimensions.keys()
-    value = float(size.evaluate(dimensions)) if known else np.nan
+    evaluable = set(size.names) <= dimensions.keys()
+    value = float(size.evaluate(dimensions)) if evaluable else np.nan
     try:
         found = fit(value, stated_fit.hole, stated_fit.shaft)
     except MechanismError:  # a finding of its own
@@ -139,27 +143,27 @@ def _misalignment(joint: Joint, spatial: bool) -> Misalignment | None:
 
 def _seat(joint: Joint, default: SeatChoice | None) -> SeatChoice:
     """A joint's own seat; else the default where it has a play that this can mean; else free."""
-    own = joint.seat
+    seat = joint.seat
     suits = default is not None and has_play(joint)
     if isinstance(default, Seat):
         suits = suits and (default.direction is not None) == PAIRS[joint.type].ball
-    if own is None:
-        own = default if suits else "free"
-    elif isinstance(own, Seat) and isinstance(default, Seat) and suits:
-        own = Seat(**{**stated(default), **stated(own)})
-    return own.complete() if isinstance(own, Seat) else own or "free"
+    if seat is None:
+        seat = default if suits else "free"
+    elif isinstance(seat, Seat) and isinstance(default, Seat) and suits:
+        seat = Seat(**{**stated(default), **stated(seat)})
+    return seat.complete() if isinstance(seat, Seat) else seat or "free"
 
 
-def _friction(default: Mapping[str, Any], own: Mapping[str, Any]) -> Friction | None:
+def _friction(default: Mapping[str, Any], own_friction: Mapping[str, Any]) -> Friction | None:
     """Friction complete: the joint's own over the file's defaults (those its law knows) over the law's."""
-    if not default and not own:
+    if not default and not own_friction:
         return None
-    law = own.get("law") or default.get("law") or DEFAULT_LAW
+    law = own_friction.get("law") or default.get("law") or DEFAULT_LAW
     declared = FRICTION_LAWS[law].parameters
     if (default.get("law") or DEFAULT_LAW) != law:
         default = {key: value for key, value in default.items() if key in (*declared, "model")}
-    if "coefficient" in own:  # of both directions, unless it says otherwise
+    if "coefficient" in own_friction:  # of both directions, unless it says otherwise
         default = {key: value for key, value in default.items() if key != "backward"}
-    filled = {key: one.default for key, one in declared.items() if one.default is not None}
-    model = own.get("model") or default.get("model") or "two-contact"
-    return Friction.model_validate({**filled, **default, **own, "law": law, "model": model})
+    filled = {key: parameter.default for key, parameter in declared.items() if parameter.default is not None}
+    model = own_friction.get("model") or default.get("model") or "two-contact"
+    return Friction.model_validate({**filled, **default, **own_friction, "law": law, "model": model})

@@ -42,19 +42,19 @@ def as_key(name: str) -> str:
     return name if plain else json.dumps(name, ensure_ascii=False)
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def nearest(name: str, names_known: Iterable[str]) -> str:
     """A remedy for an unknown name: the nearest known ones, else the first few that exist."""
-    name, names = str(name), list(dict.fromkeys(known))
-    folded = {one.casefold(): one for one in reversed(names)}
+    name, names = str(name), list(dict.fromkeys(names_known))
+    folded = {name_known.casefold(): name_known for name_known in reversed(names)}
     if (meant := MEANT.get(name.casefold())) in names:
         return f"did you mean '{meant}'{REMARKS.get(meant, '')}?"
-    close = [folded[one] for one in get_close_matches(name.casefold()[:80], folded, n=3, cutoff=0.6)]
+    close = [folded[name_known] for name_known in get_close_matches(name.casefold()[:80], folded, n=3, cutoff=0.6)]
     if close:
-        return "did you mean " + " or ".join(f"'{one}'" for one in close) + "?"
+        return "did you mean " + " or ".join(f"'{name_known}'" for name_known in close) + "?"
     if not names:
         return "none is defined"
     more = ", …" if len(names) > SHOWN else ""
-    return "known: " + ", ".join(f"'{one}'" for one in names[:SHOWN]) + more
+    return "known: " + ", ".join(f"'{name_known}'" for name_known in names[:SHOWN]) + more
 
 
 def guarded(text: str) -> str:
@@ -100,9 +100,9 @@ class ParameterNames:
         if not paths and name.startswith(ERRORS):
             return self._error(name)
         if paths:
-            some = ", ".join(paths[:6]) + (", …" if len(paths) > 6 else "")
+            examples = ", ".join(paths[:6]) + (", …" if len(paths) > 6 else "")
             raise MechanismError(
-                Finding(f"the name '{name}' stands for {len(paths)} numbers", remedy=f"say which: {some}")
+                Finding(f"the name '{name}' stands for {len(paths)} numbers", remedy=f"say which: {examples}")
             )
         below = [path for path in self.paths if f".{path}.".find(f".{name}.") >= 0]
         short = [path for path in below if path.endswith(f"{name}.{SHORT_FORM}")]
@@ -113,14 +113,14 @@ class ParameterNames:
             remedy = f"set joint_defaults.friction, or that of one joint, such as {joint}.friction"
             raise MechanismError(Finding(f"'{name}' is not one number", remedy=remedy))
         if below:
-            some = ", ".join(below[:6]) + (", …" if len(below) > 6 else "")
-            raise MechanismError(Finding(f"'{name}' is not one number", remedy=f"set one of {some}"))
+            examples = ", ".join(below[:6]) + (", …" if len(below) > 6 else "")
+            raise MechanismError(Finding(f"'{name}' is not one number", remedy=f"set one of {examples}"))
         dimensions = [path.partition(".")[2] for path in self.paths if path.startswith("dimensions.")]
         # a short name is most likely a mistyped dimension; endings such as `x` resemble everything
         every = [*self.paths, *self.endings]
         remedy = nearest(name, every if "." in name or not dimensions else dimensions)
         if not remedy.startswith("did you mean"):
-            longer = [one for one in self.endings if len(one) > 2 and "." not in one]
+            longer = [ending for ending in self.endings if len(ending) > 2 and "." not in ending]
             remedy = near if (near := nearest(name, longer)).startswith("did you mean") else remedy
         raise MechanismError(Finding(f"there is no number named '{name}'", remedy=remedy))
 

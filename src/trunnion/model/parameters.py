@@ -71,8 +71,8 @@ class Entry:
     @property
     def depends(self) -> tuple[str, ...]:
         """Paths of the numbers that it is computed from."""
-        own = (self.alias,) if self.alias else tuple(f"dimensions.{name}" for name in self.quantity.names)
-        return (*own, self.error) if self.error else own
+        names = (self.alias,) if self.alias else tuple(f"dimensions.{name}" for name in self.quantity.names)
+        return (*names, self.error) if self.error else names
 
     @property
     def where(self) -> str:
@@ -92,11 +92,11 @@ def entries(mechanism: Fields) -> list[Entry]:
 
     Last come the deviations that the model states of them; those whose name means no number are left out.
     """
-    found = list(_numbers(mechanism))
+    numbers = list(_numbers(mechanism))
     if not mechanism.errors:
-        return found
-    names = ParameterNames(entry.path for entry in found)
-    kinds = {entry.path: entry.kind for entry in found}
+        return numbers
+    names = ParameterNames(entry.path for entry in numbers)
+    kinds = {entry.path: entry.kind for entry in numbers}
     measured = dimension_kinds(mechanism)
     errors: dict[str, Entry] = {}
     for name, quantity in mechanism.errors.items():
@@ -104,7 +104,9 @@ def entries(mechanism: Fields) -> list[Entry]:
             path = names.resolve(name)
             kind = measured.get(path.removeprefix("dimensions."), kinds[path])
             errors[path] = Entry(f"{ERRORS}{path}", ("errors", name), quantity, kind)
-    shifted = [replace(one, error=errors[one.path].path) if one.path in errors else one for one in found]
+    shifted = [
+        replace(number, error=errors[number.path].path) if number.path in errors else number for number in numbers
+    ]
     return [*shifted, *errors.values()]
 
 
@@ -132,12 +134,14 @@ def _numbers(mechanism: Fields) -> Iterator[Entry]:
     placed = placed_measures(mechanism)
     for section in ("gears", "drivers", "tables", "loads", "springs", "assembly", "measures"):
         for name, part in getattr(mechanism, section).items():
-            stated = part.complete() if isinstance(part, Driver | Gear) else part
-            for entry in _walk(stated, f"{section}.{name}", (section, name)):
+            complete = part.complete() if isinstance(part, Driver | Gear) else part
+            for entry in _walk(complete, f"{section}.{name}", (section, name)):
                 kind = _narrow(mechanism, section, name, entry)
                 moving = {*MOTION, *mechanism.tables}
                 quantity = _of_motion(entry.quantity, placed) if section == "loads" else entry.quantity
-                varies = section == "loads" and any(one in moving or PLACED in one for one in quantity.names)
+                varies = section == "loads" and any(
+                    operand in moving or PLACED in operand for operand in quantity.names
+                )
                 signed = section == "springs" and part.between is None and entry.location[-1] == "free_length"
                 rules = () if signed else entry.rules  # a length along a slide has a sign
                 yield replace(entry, quantity=quantity, kind=kind, varies=varies, rules=rules)
@@ -207,9 +211,9 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
     yield from _walk(joint.pitch, f"joints.{name}.pitch", (*location, "pitch"), markers(Joint)["pitch"])
     for key in ("pin", "guide", "friction", "losses", "stiffness", "seat"):
         part, default = getattr(joint, key), getattr(mechanism.joint_defaults, key, None)
-        own = f"joints.{name}.{key}"
-        shared = {one.path: one.quantity for one in _walk(default, own, ())}
-        for entry in _walk(part, own, (*location, key)):
+        place = f"joints.{name}.{key}"
+        shared = {one.path: one.quantity for one in _walk(default, place, ())}
+        for entry in _walk(part, place, (*location, key)):
             if isinstance(part, Friction):
                 entry = _of_law(part, entry)
             elif isinstance(part, Losses):
@@ -229,10 +233,10 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
 
 def _misalignment(joint: Joint, path: str, location: Location) -> Iterator[Entry]:
     """How the axis of a joint lies off; the direction of its offset follows that of its tilt while it has no own."""
-    one = joint.misalignment
-    yield from _walk(one, path, location)
-    if one and one.towards and one.offset_towards is None:
-        towards = one.towards
+    misalignment = joint.misalignment
+    yield from _walk(misalignment, path, location)
+    if misalignment and misalignment.towards and misalignment.offset_towards is None:
+        towards = misalignment.towards
         yield Entry(f"{path}.offset_towards", (*location, "offset_towards"), towards, towards.kind, f"{path}.towards")
 
 
@@ -297,19 +301,19 @@ def _measure_kind(mechanism: Fields, name: str, entry: Entry) -> Kind:
     if entry.location[2] not in ("at", "over") and not is_place(measure):
         return figure_kind(mechanism, measure)
     kinds = dimension_kinds(mechanism) if entry.quantity.names else {}
-    return place_kind(mechanism, entry.quantity, {name: one.dimensions[0] for name, one in kinds.items()})
+    return place_kind(mechanism, entry.quantity, {name: kind.dimensions[0] for name, kind in kinds.items()})
 
 
-def dimension_errors(found: Iterable[Entry]) -> dict[str, Quantity]:
+def dimension_errors(entries: Iterable[Entry]) -> dict[str, Quantity]:
     """Deviations of dimensions by the name of the dimension."""
     before = f"{ERRORS}dimensions."
-    return {one.path.removeprefix(before): one.quantity for one in found if one.path.startswith(before)}
+    return {entry.path.removeprefix(before): entry.quantity for entry in entries if entry.path.startswith(before)}
 
 
-def measured(mechanism: Fields, found: Iterable[Entry]) -> dict[str, Kind]:
+def measured(mechanism: Fields, entries: Iterable[Entry]) -> dict[str, Kind]:
     """What each number measures, by path: of a dimension, as far as its value tells."""
     of_dimensions = {f"dimensions.{name}": kind for name, kind in dimension_kinds(mechanism).items()}
-    kinds = {entry.path: of_dimensions.get(entry.path, entry.kind) for entry in found}
+    kinds = {entry.path: of_dimensions.get(entry.path, entry.kind) for entry in entries}
     deviations = {path: kinds.get(path.removeprefix(ERRORS)) for path in kinds if path.startswith(ERRORS)}
     return {**kinds, **{path: kind for path, kind in deviations.items() if kind}}
 
@@ -320,8 +324,8 @@ class ParameterSet:
     def __init__(
         self, entries: Iterable[Entry], dimensions: Mapping[str, Quantity], unreadable: Iterable[str] = ()
     ) -> None:
-        found = list(entries)
-        order, _ = evaluation_order(dimensions, dimension_errors(found))
+        listed = list(entries)
+        order, _ = evaluation_order(dimensions, dimension_errors(listed))
         place = {f"dimensions.{name}": rank for rank, name in enumerate(order)}
         last = len(place)
 
@@ -330,8 +334,8 @@ class ParameterSet:
             deviates = entry.path.startswith(ERRORS)
             return place.get(entry.path.removeprefix(ERRORS) if deviates else entry.path, last), not deviates
 
-        found.sort(key=rank)  # stable: the rest keeps its order
-        self.entries: dict[str, Entry] = {entry.path: entry for entry in found}
+        listed.sort(key=rank)  # stable: the rest keeps its order
+        self.entries: dict[str, Entry] = {entry.path: entry for entry in listed}
         self.names = ParameterNames(self.entries)
         self._unreadable = frozenset(unreadable)
         numbers = [entry for entry in self.entries.values() if not entry.varies]
@@ -427,8 +431,8 @@ def _is_error(path: str) -> bool:
 def placed_measures(mechanism: Fields) -> dict[str, str]:
     """Measures that are a place or a speed at every position, by the names that a load has for these."""
     others = {*RESERVED, *MOTION, *mechanism.tables, *mechanism.dimensions}
-    found = {name: _placed(mechanism, one) for name, one in mechanism.measures.items() if name not in others}
-    return {name: placed for name, placed in found.items() if placed}
+    measures = {name: _placed(mechanism, measure) for name, measure in mechanism.measures.items() if name not in others}
+    return {name: placed for name, placed in measures.items() if placed}
 
 
 def _placed(mechanism: Fields, measure: Measure) -> str:

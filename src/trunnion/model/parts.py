@@ -302,9 +302,9 @@ class Driver(Part):
 
     def moving(self, law: MotionLaw) -> Driver:
         """The driver as it was found to move, in place of the law that it states."""
-        found = self.model_copy()
-        found._found_law = law
-        return found
+        copy = self.model_copy()
+        copy._found_law = law
+        return copy
 
     @property
     def options(self) -> Mapping[str, bool | str]:

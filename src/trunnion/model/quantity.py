@@ -180,31 +180,31 @@ def _finite(value: Number, source: str) -> None:
 
 def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
     """Value text and tolerance in SI; a unit stated once serves the value and the tolerance."""
-    if found := _SYMMETRIC.match(text):
-        main, parts = found[1], [found[2]]
+    if match := _SYMMETRIC.match(text):
+        main, parts = match[1], [match[2]]
         if not main.strip():
             raise UnitError(
                 f"'{text}' is a tolerance without a value", f"write 60 mm {text}, or tolerances: {{NAME: {text}}}"
             )
-    elif found := _LIMITS.match(text):
-        main, parts = found[1], [found[2], found[3]]
+    elif match := _LIMITS.match(text):
+        main, parts = match[1], [match[2], match[3]]
     else:
         return text, None
     terms = [term(part) for part in parts]
     value = LITERAL.fullmatch(main.strip().lstrip("-+ "))
     unit_of_value = value["unit"] or "" if value else ""
-    unit = next((one for _, one in reversed(terms) if one), unit_of_value)
+    unit = next((unit_of for _, unit_of in reversed(terms) if unit_of), unit_of_value)
     if value and unit == "%" and unit_of_value != unit:
-        own = ", ".join(f"{number.lstrip('+')} % is {_share(number, value)}" for number, _ in terms)
-        raise UnitError(f"the tolerance in '{text}' is in percent, the value is not", f"write the deviation: {own}")
+        shares = ", ".join(f"{number.lstrip('+')} % is {_share(number, value)}" for number, _ in terms)
+        raise UnitError(f"the tolerance in '{text}' is in percent, the value is not", f"write the deviation: {shares}")
     if value and not unit_of_value and unit:
         main = f"{main.strip()} {unit}"
     if not unit and not value and kind.dimensions != KINDS["number"].dimensions:
         raise UnitError(f"the tolerance in '{text}' has no unit", "write the unit of the tolerance, such as ± 0.05 mm")
     found_dimension = parse(main).dimension({}) if value else None
     deviations = []
-    for number, own in terms:
-        deviation = literal(number.lstrip("-+"), own or unit)
+    for number, shares in terms:
+        deviation = literal(number.lstrip("-+"), shares or unit)
         if found_dimension is not None and not (
             fits(deviation.dimension, found_dimension) and fits(found_dimension, deviation.dimension)
         ):
@@ -213,7 +213,7 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
                 f"the value {dimension_text(found_dimension)}",
                 "give both the same unit",
             )
-        if (own or unit) and not kind.accepts(deviation.dimension):
+        if (shares or unit) and not kind.accepts(deviation.dimension):
             raise UnitError(f"the tolerance in '{text}' is {dimension_text(deviation.dimension)}")
         deviations.append(-deviation.value if number.startswith("-") else deviation.value)
     if len(deviations) == 1:
@@ -231,19 +231,19 @@ def _share(percent: str, value: re.Match[str]) -> str:
 
 def deviation_spans(text: str) -> list[tuple[int, int]]:
     """Where the deviations of a tolerance, with their signs, stand in a text of plain signs; empty if it has none."""
-    if found := _SYMMETRIC.match(text):
-        return [found.span(2)]
-    return [found.span(2), found.span(3)] if (found := _LIMITS.match(text)) else []
+    if match := _SYMMETRIC.match(text):
+        return [match.span(2)]
+    return [match.span(2), match.span(3)] if (match := _LIMITS.match(text)) else []
 
 
 def term(text: str) -> tuple[str, str]:
     """Number (with its sign) and unit of one side of a tolerance."""
     stripped = text.strip()
     sign = stripped[:1] if stripped[:1] in ("-", "+") else ""
-    found = LITERAL.fullmatch(stripped[len(sign) :].strip())
-    if not found:
+    match = LITERAL.fullmatch(stripped[len(sign) :].strip())
+    if not match:
         raise UnitError(f"the tolerance '{stripped}' is not a number with a unit", "write ± 0.05 mm or +0.02/-0.01 mm")
-    return sign + found["number"], found["unit"] or ""
+    return sign + match["number"], match["unit"] or ""
 
 
 @dataclass(frozen=True)
@@ -304,9 +304,11 @@ def evaluation_order(
 
     errors: deviations of some of them, which may speak of dimensions too.
     """
-    graph = {name: {one for one in quantity.names if one in dimensions} for name, quantity in dimensions.items()}
+    graph = {
+        name: {operand for operand in quantity.names if operand in dimensions} for name, quantity in dimensions.items()
+    }
     for name, quantity in (errors or {}).items():
-        graph[name] |= {one for one in quantity.names if one in dimensions}
+        graph[name] |= {operand for operand in quantity.names if operand in dimensions}
     circles: list[list[str]] = []
     while True:
         try:

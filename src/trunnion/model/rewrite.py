@@ -47,10 +47,10 @@ def rewrite_mechanism(
     source, path = Path(source), Path(path)
     if not over and path.exists() and path.samefile(source):
         raise MechanismError(Finding("is the model itself", str(path), "name another file, or add --force"))
-    own = {source.suffix.lower(), path.suffix.lower()} <= set(YAMLS)
-    beside = source.resolve().parent == path.resolve().parent
+    both_yaml = {source.suffix.lower(), path.suffix.lower()} <= set(YAMLS)
+    same_folder = source.resolve().parent == path.resolve().parent
     with whole(path) as temporary:
-        for text in _texts(mechanism, source, beside) if own else ():
+        for text in _texts(mechanism, source, same_folder) if both_yaml else ():
             temporary.write_text(text, encoding="utf-8", newline="\n")
             if _holds(temporary, mechanism):
                 return
@@ -67,9 +67,9 @@ def changed_text(text: str, after: Mapping[str, Any]) -> str:
         return text
     for change in (_edited, _rewritten):
         try:
-            found = change(text, before, after)
-            if found is not None and entries_of(found)[0] == after:
-                return found
+            edited = change(text, before, after)
+            if edited is not None and entries_of(edited)[0] == after:
+                return edited
         except (MechanismError, YAMLError, ValueError, TypeError, LookupError):
             continue  # a way of writing that was not foreseen
     return text_of(after)
@@ -82,32 +82,32 @@ def _holds(path: Path, mechanism: Mechanism) -> bool:
         return False
 
 
-def _texts(mechanism: Mechanism, source: Path, beside: bool) -> Iterator[str]:
+def _texts(mechanism: Mechanism, source: Path, same_folder: bool) -> Iterator[str]:
     """Texts of the mechanism that are to be tried, the one that is most like the source first.
 
-    beside: whether it is to stand in the folder of the source, where the files are that this names.
+    same_folder: whether it is to stand in the folder of the source, where the files are that this names.
     """
     try:
         text, before = source.read_text("utf-8"), read_mechanism(source).data()
-        _name_files(before, mechanism.data(), source, beside)
-        found = _edited(text, before, mechanism.data())
+        _name_files(before, mechanism.data(), source, same_folder)
+        edited = _edited(text, before, mechanism.data())
     except (MechanismError, YAMLError, OSError, ValueError, TypeError, LookupError):
         return
-    if found is not None:
-        yield found
+    if edited is not None:
+        yield edited
     again = _rewritten(text, before, mechanism.data())
     if again is not None:
         yield again
 
 
-def _name_files(before: dict[str, Any], after: Mapping[str, Any], source: Path, beside: bool) -> None:
+def _name_files(before: dict[str, Any], after: Mapping[str, Any], source: Path, same_folder: bool) -> None:
     """Let the data of the source name the files again whose points are to be written out: others, or elsewhere."""
     entries = read_entries(source)[0]
     for section, name, _ in stated_files(entries):
-        stated = before[section][name]
-        if not beside or after.get(section, {}).get(name, {}).get("points") != stated.get("points"):
+        entry = before[section][name]
+        if not same_folder or after.get(section, {}).get(name, {}).get("points") != entry.get("points"):
             of_the_file = {key: value for key, value in entries[section][name].items() if key in OF_A_FILE}
-            before[section][name] = {key: value for key, value in stated.items() if key != "points"} | of_the_file
+            before[section][name] = {key: value for key, value in entry.items() if key != "points"} | of_the_file
 
 
 # ---- values alone ---------------------------------------------------------------------------------------------
@@ -117,7 +117,7 @@ def _edited(text: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> s
     """The text with values changed where they stand, and entries renamed, added and left out; None if there is more."""
     root = composed(text)
     edits = [_edit(text, root, location, value) for location, value in _changed(before, after)]
-    for edit in sorted((one for one in edits if one), key=lambda one: one[0])[::-1]:
+    for edit in sorted((change for change in edits if change), key=lambda change: change[0])[::-1]:
         start, end, new = edit
         rest = text[end:]
         blanks = len(rest) - len(rest.lstrip(" "))
@@ -176,7 +176,7 @@ def _entry(text: str, parent: MappingNode, name: str, change: Renamed | Gone) ->
 def _flow(value: Any) -> str:
     """A value on one line."""
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{_scalar(key, quoted=False)}: {_flow(one)}" for key, one in value.items()) + "}"
+        return "{" + ", ".join(f"{_scalar(key, quoted=False)}: {_flow(item)}" for key, item in value.items()) + "}"
     return f"[{', '.join(map(_flow, value))}]" if isinstance(value, list) else _scalar(value, quoted=False)
 
 
@@ -211,13 +211,13 @@ def _node(root: Node, location: Location) -> Node | None:
     node = root
     for key in location:
         if isinstance(node, MappingNode):
-            found = next((value for name, value in node.value if name.value == str(key)), None)
+            child = next((value for name, value in node.value if name.value == str(key)), None)
         else:
-            there = isinstance(node, SequenceNode) and isinstance(key, int) and key < len(node.value)
-            found = node.value[key] if there else None
-        if found is None:
+            inside = isinstance(node, SequenceNode) and isinstance(key, int) and key < len(node.value)
+            child = node.value[key] if inside else None
+        if child is None:
             return None
-        node = found
+        node = child
     return node
 
 
@@ -257,26 +257,26 @@ def _change(tree: MutableMapping[Any, Any], before: Mapping[str, Any], after: Ma
     for key, value in after.items():
         if key in before and before[key] == value:
             continue
-        own = keys.get(key, key)
-        there = tree.get(own)
-        if isinstance(there, MutableMapping) and isinstance(value, Mapping) and isinstance(before.get(key), Mapping):
-            _change(there, before[key], value)
-        elif not _rows_changed(there, before.get(key), value):
-            tree[own] = _laid_out(_short(value))
+        entry_key = keys.get(key, key)
+        current = tree.get(entry_key)
+        if isinstance(current, MutableMapping) and isinstance(value, Mapping) and isinstance(before.get(key), Mapping):
+            _change(current, before[key], value)
+        elif not _rows_changed(current, before.get(key), value):
+            tree[entry_key] = _laid_out(_short(value))
 
 
-def _rows_changed(there: Any, before: Any, after: Any) -> bool:
+def _rows_changed(current: Any, before: Any, after: Any) -> bool:
     """Take rows out of a list of groups and put others in, whose other rows stay as written; whether that was all."""
-    lists = [one for one in (there, before, after) if isinstance(one, list)]
+    lists = [one for one in (current, before, after) if isinstance(one, list)]
     if len(lists) < 3 or not all(isinstance(row, Mapping) for one in lists for row in one):
         return False
     rows = list(before)
     for index in range(len(rows) - 1, -1, -1):
         if rows[index] not in after:
-            del there[index], rows[index]
+            del current[index], rows[index]
     for index, row in enumerate(after):
         if rows[index : index + 1] != [row]:
-            there.insert(index, _laid_out(row))
+            current.insert(index, _laid_out(row))
             rows.insert(index, row)
     return bool(rows == after)
 
@@ -289,8 +289,8 @@ def _laid_out(value: Any) -> Any:
         return row
     if not isinstance(value, Mapping):
         return value
-    group = CommentedMap((key, _laid_out(one)) for key, one in value.items())
-    if not any(isinstance(one, Mapping) for one in value.values()):
+    group = CommentedMap((key, _laid_out(item)) for key, item in value.items())
+    if not any(isinstance(item, Mapping) for item in value.values()):
         group.fa.set_flow_style()
     return group
 

@@ -46,10 +46,10 @@ def _stated_units(mechanism: Any) -> dict[str, str]:
             counts[si_unit(unit(match[1])[1]), match[1]] += 1
         except UnitError:  # of a formula: "2 e", "40 N * x"
             continue
-    stated: dict[str, str] = {}
+    units: dict[str, str] = {}
     for (si, unit_text), _ in counts.most_common():
-        stated.setdefault(si, unit_text)
-    return {si: unit_text for si, unit_text in (ANGLES | stated).items() if si != unit_text}
+        units.setdefault(si, unit_text)
+    return {si: unit_text for si, unit_text in (ANGLES | units).items() if si != unit_text}
 
 
 def _customary(stated: Mapping[str, str]) -> ScreenUnits:
@@ -71,15 +71,15 @@ def in_use() -> ScreenUnits:
     return _IN_USE.get()
 
 
-def follow(stated: Mapping[str, str]) -> None:
+def follow(units: Mapping[str, str]) -> None:
     """Show numbers as a model has them from now on: all of a run of the command line is about one."""
-    _IN_USE.set(_customary(stated))
+    _IN_USE.set(_customary(units))
 
 
 @contextmanager
-def shown_as(stated: Mapping[str, str]) -> Iterator[None]:
+def shown_as(units: Mapping[str, str]) -> Iterator[None]:
     """Show numbers as a model has them, by its stated units."""
-    token = _IN_USE.set(_customary(stated))
+    token = _IN_USE.set(_customary(units))
     try:
         yield
     finally:

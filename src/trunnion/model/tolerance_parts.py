@@ -74,7 +74,7 @@ class Variation(Part):
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """The limits or the group."""
         group = handler.resolve_ref_schema(handler(schema))
-        limits = next(one for one in group["properties"]["limits"]["anyOf"] if one.get("type") != "null")
+        limits = next(form for form in group["properties"]["limits"]["anyOf"] if form.get("type") != "null")
         return {"anyOf": [limits, group], "description": group.pop("description")}
 
     @model_validator(mode="before")

@@ -211,9 +211,9 @@ def correlation(mechanism: Numbers, numbers: ParameterSet | None = None) -> NDAr
     numbers = numbers or mechanism.parameter_set
     place = {one.path: index for index, one in enumerate(tolerated(mechanism, numbers))}
     matrix = np.eye(len(place))
-    for stated in mechanism.correlations:
-        paths = [path for path in named_paths(numbers, stated.of) if path in place]
-        value = _number(stated.coefficient, numbers.dimension_values)
+    for correlation in mechanism.correlations:
+        paths = [path for path in named_paths(numbers, correlation.of) if path in place]
+        value = _number(correlation.coefficient, numbers.dimension_values)
         for one, other in combinations(dict.fromkeys(paths), 2):
             matrix[place[one], place[other]] = matrix[place[other], place[one]] = value
     return matrix

@@ -88,25 +88,25 @@ def _speaks_of(finding: Finding, name: str) -> bool:
 
 def _quantities(mechanism: Numbers, unreadable: set[str]) -> Iterator[Finding]:
     """Names and dimensions in every expression; `unreadable` receives the paths that have no value."""
-    known: dict[str, Dimension | None] = {}
-    yield from _dimensions(mechanism, known, unreadable)
-    yield from tables(mechanism, known)
-    moving = {**motion_dimensions(mechanism, known), **known}
+    dimensions: dict[str, Dimension | None] = {}
+    yield from _dimensions(mechanism, dimensions, unreadable)
+    yield from tables(mechanism, dimensions)
+    moving = {**motion_dimensions(mechanism, dimensions), **dimensions}
     plain, bare = plain_dimensions(mechanism.dimensions), list[Bare]()
     used: set[str] = set()
-    found = mechanism.entries
-    for entry in (*found, *stated_entries(mechanism, found)):
+    entries = mechanism.entries
+    for entry in (*entries, *stated_entries(mechanism, entries)):
         names = entry.quantity.names
         used.update(names)
         if entry.quantity is UNREADABLE:
             unreadable.add(entry.path)
         if entry.alias or entry.path in unreadable:
             continue
-        sayable = moving if entry.varies else known
+        sayable = moving if entry.varies else dimensions
         if missing := [name for name in names if name not in sayable]:
             unreadable.add(entry.path)
             for name in missing:
-                finding = unknown_name(mechanism, name, entry.where, entry.quantity.source, known)
+                finding = unknown_name(mechanism, name, entry.where, entry.quantity.source, dimensions)
                 respelt = entry.quantity.respelt(entry.kind)
                 yield replace(finding, remedy=f"write {respelt}") if respelt else finding
             continue

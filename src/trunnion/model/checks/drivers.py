@@ -25,7 +25,7 @@ def driver_findings(mechanism: Numbers) -> Iterator[Finding]:
         if name not in joints:
             yield Finding(f"there is no joint '{name}' to drive", where, nearest(name, joints))
         elif not PAIRS[joints[name].type].drivable:
-            pair, drivable = PAIRS[joints[name].type], [kind for kind, one in PAIRS.items() if one.drivable]
+            pair, drivable = PAIRS[joints[name].type], [kind for kind, pair_kind in PAIRS.items() if pair_kind.drivable]
             moves = f"has {counted(pair.count, 'freedom')}" if pair.count else "does not move"
             what = f"the joint '{name}' is {joints[name].type}: it {moves} and cannot be driven by one number"
             yield Finding(what, where, f"drive one that is {', '.join(drivable[:-1])} or {drivable[-1]}")
@@ -127,18 +127,16 @@ def gears(mechanism: Numbers) -> Iterator[Finding]:
 def _coupling(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
     """Whether a gear pair states the one number that couples two rotations, or a rotation and a slide."""
     gear = mechanism.gears[name]
-    sliding = [one for one in gear.joints if "rotation" not in freedoms(mechanism.effective_joints[one].type)]
-    stated = [key for key in ("ratio", "radius", "lead") if getattr(gear, key) is not None]
+    sliding = [joint for joint in gear.joints if "rotation" not in freedoms(mechanism.effective_joints[joint].type)]
+    keys = [key for key in ("ratio", "radius", "lead") if getattr(gear, key) is not None]
     if len(sliding) == 2:
         yield Finding("both joints slide", f"{where}.joints", "name a revolute joint, or two")
-    elif sliding and stated not in (["radius"], ["lead"]):
-        what = f"the joint '{sliding[0]}' slides, and {_states(stated)}"
+    elif sliding and keys not in (["radius"], ["lead"]):
+        what = f"the joint '{sliding[0]}' slides, and {_states(keys)}"
         yield Finding(what, where, "state radius: … of the wheel (rack, chain, rope), or lead: … (screw), not both")
-    elif not sliding and stated != ["ratio"]:
-        remedy = (
-            "state ratio: … alone" if "ratio" in stated or not stated else "state ratio: …, or name a prismatic joint"
-        )
-        yield Finding(f"both joints turn, and {_states(stated)}", where, remedy)
+    elif not sliding and keys != ["ratio"]:
+        remedy = "state ratio: … alone" if "ratio" in keys or not keys else "state ratio: …, or name a prismatic joint"
+        yield Finding(f"both joints turn, and {_states(keys)}", where, remedy)
     elif gear.lead is not None:
         yield from _thread(mechanism, mechanism.coupled(name)[0], where)
         for key in sorted({"teeth", "pressure_angle"} & gear.model_fields_set):
@@ -147,10 +145,10 @@ def _coupling(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
 
 def _thread(mechanism: Numbers, joint: str, where: str) -> Iterator[Finding]:
     """Whether the friction of a thread was meant: the defaults are those of pins."""
-    stated = mechanism.joints.get(joint)
-    if stated is None or mechanism.effective_joints[joint].friction is None:
+    joint_entry = mechanism.joints.get(joint)
+    if joint_entry is None or mechanism.effective_joints[joint].friction is None:
         return
-    if stated.friction is None or stated.pin is None or stated.pin.radius is None:
+    if joint_entry.friction is None or joint_entry.pin is None or joint_entry.pin.radius is None:
         what = f"its thread rubs as the pin of {joint} does by joint_defaults"
         remedy = f"state friction and pin.radius of {joint}, the mean radius of the thread, or friction: 0"
         yield Finding(what, where, remedy, Severity.WARNING)
@@ -163,8 +161,8 @@ def _states(keys: list[str]) -> str:
 def _teeth(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
     gear = mechanism.gears[name]
     first, second = gear.joints
-    one, two = (mechanism.effective_joints[joint].links for joint in gear.joints)
-    shared = set(one) & set(two)
+    first_sides, two = (mechanism.effective_joints[joint].links for joint in gear.joints)
+    shared = set(first_sides) & set(two)
     if len(shared) == 2:
         yield Finding("both joints are between the same two links", f"{where}.joints", "name joints of three links")
     elif gear.radius is not None and not shared:
@@ -182,8 +180,8 @@ def gear_values(mechanism: Numbers, values: Mapping[str, Number]) -> Iterator[Fi
         if gear.ratio is None:
             continue
         ratio = values.get(f"{where}.ratio", np.nan)
-        known = len({*gear.joints} & mechanism.effective_joints.keys()) == len(gear.joints)
-        carriers = mechanism.carriers(name) if known else None
+        complete = len({*gear.joints} & mechanism.effective_joints.keys()) == len(gear.joints)
+        carriers = mechanism.carriers(name) if complete else None
         if gear.teeth and carriers and abs((1 if carriers[0] == carriers[1] else -1) * ratio - 1) < 1e-9:
             what = "relative to the link that carries them, the gears turn equally: they have no pitch point"
             yield Finding(what, f"{where}.ratio", "state teeth: false, or another ratio")

@@ -43,16 +43,16 @@ def errors(mechanism: Numbers) -> Iterator[Finding]:
     """Whether each error is of one number, once, and measures what that does."""
     if not mechanism.errors:
         return
-    found = {entry.path: entry for entry in mechanism.entries}
-    names = ParameterNames(found)
+    entries = {entry.path: entry for entry in mechanism.entries}
+    names = ParameterNames(entries)
     first: dict[str, str] = {}
     for name in mechanism.errors:
         where = f"{ERRORS}{name}"
         try:
             path = names.resolve(name)
         except MechanismError as error:
-            one = error.findings[0]
-            yield Finding(one.what, where, one.remedy)
+            finding = error.findings[0]
+            yield Finding(finding.what, where, finding.remedy)
             continue
         if path.startswith("drivers."):
             what = "an error of a driver changes the times of the cycle, so there is no ideal cycle to compare with"
@@ -61,7 +61,7 @@ def errors(mechanism: Numbers) -> Iterator[Finding]:
             what = f"'{name}' and '{first[path]}' are the same number"
             yield Finding(what, where, "keep one of them")
         first.setdefault(path, name)
-        if found[path].varies:
+        if entries[path].varies:
             yield Finding(
                 f"'{path}' varies with the motion and has no one error", where, "state one of a dimension in it"
             )
@@ -73,18 +73,18 @@ def errors(mechanism: Numbers) -> Iterator[Finding]:
 def joint_errors(mechanism: Numbers) -> Iterator[Finding]:
     """Plays, seats and misalignments that a joint cannot have, or that lack something."""
     for name, joint in mechanism.effective_joints.items():
-        own, where = mechanism.stated_joints[name], f"joints.{name}"
-        yield from _empty_seat(own.seat, where)
-        if own.misalignment is not None:
-            yield from _misalignment(own, f"{where}.misalignment", mechanism.space == "spatial")
+        own_part, where = mechanism.stated_joints[name], f"joints.{name}"
+        yield from _empty_seat(own_part.seat, where)
+        if own_part.misalignment is not None:
+            yield from _misalignment(own_part, f"{where}.misalignment", mechanism.space == "spatial")
         if has_pin(joint.type):
-            yield from _pin(mechanism, name, own.pin, where)
+            yield from _pin(mechanism, name, own_part.pin, where)
         sized = joint.pin is not None and joint.pin.radius is not None
-        yield from _unused(joint.type, own.pin, own.friction, where, mechanism.space == "spatial", sized)
-        if own.seat_on is not None:
+        yield from _unused(joint.type, own_part.pin, own_part.friction, where, mechanism.space == "spatial", sized)
+        if own_part.seat_on is not None:
             yield from _seat_on(joint, f"{where}.seat_on")
         if joint.seat not in (None, "free"):
-            yield from _seat(mechanism, joint, where if own.seat is not None else "joint_defaults", where)
+            yield from _seat(mechanism, joint, where if own_part.seat is not None else "joint_defaults", where)
     yield from _defaults(mechanism)
 
 
@@ -108,25 +108,25 @@ def _misalignment(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:
         yield Finding("a planar joint cannot tilt", f"{where}.tilt", "keep the offset, or state space: spatial")
 
 
-def _pin(mechanism: Numbers, name: str, own: Pin | None, where: str) -> Iterator[Finding]:
+def _pin(mechanism: Numbers, name: str, own_pin: Pin | None, where: str) -> Iterator[Finding]:
     """One way to state a play; an end float where there are ends; the classes of a fit."""
     merged = mechanism.effective_joints[name].pin
     defaults = mechanism.joint_defaults.pin
-    for pin, place in ((own, f"{where}.pin"), (defaults, "joint_defaults.pin")):
+    for pin, place in ((own_pin, f"{where}.pin"), (defaults, "joint_defaults.pin")):
         ways = stated(pin).keys() & {"radius", "hole_radius", "clearance", "fit"}
         if "fit" in ways and len(ways) > 1:
             yield Finding("a fit states radius and clearance already", place, "keep the fit or the numbers")
         elif {"hole_radius", "clearance"} <= ways:
             yield Finding("the hole is stated by its radius and by the clearance", place, "keep one of them")
-    if own and own.hole_radius is not None and merged and merged.radius is None:
+    if own_pin and own_pin.hole_radius is not None and merged and merged.radius is None:
         yield Finding("the hole has a radius, the pin has none", f"{where}.pin", "add radius: …, or state clearance: …")
     spatial = mechanism.space == "spatial"
     pivot = spatial and PAIRS[mechanism.stated_joints[name].type].pivot
-    if own and own.end_float is not None and not pivot:
+    if own_pin and own_pin.end_float is not None and not pivot:
         what = "an end float is the play along the axis of a revolute joint in space"
         yield Finding(what, f"{where}.pin.end_float", "remove it")
-    if merged and merged.fit and isinstance(found := _fit(mechanism, name), Finding):
-        yield Finding(found.what, _fit_place(mechanism, name), found.remedy)
+    if merged and merged.fit and isinstance(limits := _fit(mechanism, name), Finding):
+        yield Finding(limits.what, _fit_place(mechanism, name), limits.remedy)
 
 
 def _fit(mechanism: Numbers, name: str) -> FitLimits | Finding | None:
@@ -217,7 +217,7 @@ def _defaults(mechanism: Numbers) -> Iterator[Finding]:
     pin, seat = mechanism.joint_defaults.pin, mechanism.joint_defaults.seat
     if mechanism.space == "planar":
         pins = [joint.pin for joint in mechanism.effective_joints.values()]
-        sized = any(one is not None and one.radius is not None for one in pins)
+        sized = any(pin_part is not None and pin_part.radius is not None for pin_part in pins)
         yield from _unused("", pin, mechanism.joint_defaults.friction, "joint_defaults", False, sized)
     joints = mechanism.effective_joints.values()
     yield from _empty_seat(seat, "joint_defaults")
@@ -258,9 +258,9 @@ def play_values(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterato
     if not has_play(joint):
         return
     yield from _play_sign(mechanism, name, joint, numbers)
-    found = _fit(mechanism, name)
-    if isinstance(found, FitLimits):
-        yield from _press(joint, found, _fit_place(mechanism, name))
+    limits = _fit(mechanism, name)
+    if isinstance(limits, FitLimits):
+        yield from _press(joint, limits, _fit_place(mechanism, name))
     yield from _play_size(mechanism, name, joint, values)
 
 
@@ -269,10 +269,10 @@ def _unmodelled(mechanism: Numbers, name: str, values: Mapping[str, Number]) -> 
     kind, pin = mechanism.effective_joints[name].type, f"joints.{name}.pin"
     if kind in PLAY_PAIRS or not has_pin(kind):
         return
-    own, further = clearance(name, values) or 0.0, values.get(f"{pin}.cylindricity", 0.0)
-    if not (np.abs(own) > 0 or np.abs(further) > 0):
+    gap, further = clearance(name, values) or 0.0, values.get(f"{pin}.cylindricity", 0.0)
+    if not (np.abs(gap) > 0 or np.abs(further) > 0):
         return
-    size = f" of {_um(own)}" * bool(own > 0)
+    size = f" of {_um(gap)}" * bool(gap > 0)
     what = f"the play{size} of a {kind} joint is not modelled"
     radius = f"radius: {values[f'{pin}.radius'] * 1e3:.6g} mm, " if f"{pin}.radius" in values else ""
     remedy = f"state pin: {{{radius}clearance: 0{', cylindricity: 0' * bool(further)}}} here"
@@ -304,18 +304,18 @@ def _play_sign(mechanism: Numbers, name: str, joint: Joint, numbers: ParameterSe
 
 def _fit_place(mechanism: Numbers, name: str) -> str:
     """Where the fit of a joint is stated: with the joint or with the defaults."""
-    own = mechanism.stated_joints[name].pin
-    return f"joints.{name}.pin.fit" if own and own.fit else "joint_defaults.pin.fit"
+    own_pin = mechanism.stated_joints[name].pin
+    return f"joints.{name}.pin.fit" if own_pin and own_pin.fit else "joint_defaults.pin.fit"
 
 
-def _press(joint: Joint, found: FitLimits, where: str) -> Iterator[Finding]:
+def _press(joint: Joint, limits: FitLimits, where: str) -> Iterator[Finding]:
     """A fit that may or must press."""
     text = joint.pin.fit.source if joint.pin and joint.pin.fit else ""
-    reach = f"its play on the diameter is {_um(found.minimum)} to {_um(found.maximum)}"
-    if found.maximum <= MEASURABLE:
+    reach = f"its play on the diameter is {_um(limits.minimum)} to {_um(limits.maximum)}"
+    if limits.maximum <= MEASURABLE:
         what = f"{text} is a press fit, no play: it cannot turn as a bearing; {reach}"
         yield Finding(what, where, "use a shaft of class e to h, such as g6", Severity.WARNING)
-    elif found.minimum < -MEASURABLE:
+    elif limits.minimum < -MEASURABLE:
         what = f"{text} may press: {reach}"
         yield Finding(what, where, "use a shaft of class e to h, such as g6", Severity.WARNING)
 
@@ -356,12 +356,12 @@ def _shortest_side(mechanism: Numbers, name: str, joint: Joint, values: Mapping[
     for link in joint.links:
         points = mechanism.links[link].points if link in mechanism.links else {}
         here = _place(values, link, name)
-        for other, one in mechanism.effective_joints.items():
-            if other == name or link not in one.links or other not in points or name not in points:
+        for other, other_joint in mechanism.effective_joints.items():
+            if other == name or link not in other_joint.links or other not in points or name not in points:
                 continue
-            if not has_pin(one.type) or len(there := _place(values, link, other)) != len(here):
+            if not has_pin(other_joint.type) or len(distance_to := _place(values, link, other)) != len(here):
                 continue
-            distance = float(np.linalg.norm(here - there))
+            distance = float(np.linalg.norm(here - distance_to))
             if 0 < distance < best[1]:
                 best = (other, distance, link)
     return best
@@ -369,13 +369,13 @@ def _shortest_side(mechanism: Numbers, name: str, joint: Joint, values: Mapping[
 
 def _cross(values: Mapping[str, Number], link: str, *points: str) -> bool:
     """Whether two points of a link have axes that are not parallel; those of an eccentric are."""
-    axes = [[float(values.get(f"links.{link}.points.{one}.axis.{k}", 0.0)) for k in "xyz"] for one in points]
+    axes = [[float(values.get(f"links.{link}.points.{point}.axis.{k}", 0.0)) for k in "xyz"] for point in points]
     return bool(np.any(np.cross(axes[0], axes[1]) != 0))
 
 
 def _place(values: Mapping[str, Number], link: str, point: str) -> np.ndarray:
     path = f"links.{link}.points.{point}"
-    return np.array([float(values[f"{path}.{one}"]) for one in "xyz" if f"{path}.{one}" in values])
+    return np.array([float(values[f"{path}.{axis}"]) for axis in "xyz" if f"{path}.{axis}" in values])
 
 
 def _mm(length: float) -> str:

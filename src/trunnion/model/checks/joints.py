@@ -44,8 +44,8 @@ def joint_findings(mechanism: Numbers) -> Iterator[Finding]:
             yield from _contact_law(mechanism, name, joint, joint.contact)
         yield from _losses(joint, f"{where}.losses")
         if joint.friction is not None:
-            own = mechanism.stated_joints[name].friction
-            stated_at = "joint_defaults.friction" if own is None else f"{where}.friction"
+            own_friction = mechanism.stated_joints[name].friction
+            stated_at = "joint_defaults.friction" if own_friction is None else f"{where}.friction"
             yield from _parameters_of_law(joint.friction, stated_at)
             yield from _suits(joint, joint.friction, f"{where}.friction")
 
@@ -76,9 +76,9 @@ def _parameters_of_law(friction: Friction, where: str) -> Iterator[Finding]:
         if parameter not in declared:
             what = f"the key '{parameter}' is unknown to the friction law {law}"
             yield Finding(what, f"{where}.{parameter}", nearest(parameter, ["law", "model", *declared]))
-    for parameter, one in declared.items():
-        if one.default is None and not one.optional and parameter not in friction.parameters:
-            remedy = f"add {parameter}" + f" ({one.meaning})" * bool(one.meaning)
+    for parameter, parameter_kind in declared.items():
+        if parameter_kind.default is None and not parameter_kind.optional and parameter not in friction.parameters:
+            remedy = f"add {parameter}" + f" ({parameter_kind.meaning})" * bool(parameter_kind.meaning)
             yield Finding(f"the friction law {law} needs '{parameter}'", where, remedy)
 
 
@@ -176,7 +176,9 @@ def _contact_law(mechanism: Numbers, name: str, joint: Joint, contact: Contact) 
     where, pair = f"joints.{name}.contact", PAIRS[joint.type]
     spatial = mechanism.space == "spatial"
     kinds = [
-        kind for kind, one in PAIRS.items() if (one.bored if spatial else one.planar and (one.pivot or one.guided))
+        kind
+        for kind, pair_kind in PAIRS.items()
+        if (pair_kind.bored if spatial else pair_kind.planar and (pair_kind.pivot or pair_kind.guided))
     ]
     if joint.type not in kinds:
         what = f"the contact of a {joint.type} joint of a {mechanism.space} mechanism is not modelled"
@@ -188,8 +190,8 @@ def _contact_law(mechanism: Numbers, name: str, joint: Joint, contact: Contact) 
     if spatial:
         yield from _in_space(joint, contact, name)
     for section, named in (("drivers", mechanism.drivers), ("loads", mechanism.loads), ("springs", mechanism.springs)):
-        for other, one in named.items():
-            if (other if section == "drivers" else getattr(one, "joint", None)) == name:
+        for other, pair_kind in named.items():
+            if (other if section == "drivers" else getattr(pair_kind, "joint", None)) == name:
                 what = "a joint that is in play has no one coordinate to drive, to load or to measure"
                 yield Finding(what, where, f"remove it, or {section}.{other}")
     if any(name in gear.joints for gear in mechanism.gears.values()):
@@ -270,8 +272,8 @@ def _contact_values(joint: Joint, values: Mapping[str, float], where: str) -> It
     if contact is None:
         return
     path = f"{where}.contact"
-    stated = clearance(where.removeprefix("joints."), values)
-    across = np.nan if stated is None else stated + values.get(f"{where}.pin.cylindricity", 0.0)
+    gap = clearance(where.removeprefix("joints."), values)
+    across = np.nan if gap is None else gap + values.get(f"{where}.pin.cylindricity", 0.0)
     if across <= 0:
         what = f"is in play with a clearance of {across:g} m"
         yield Finding(what, path, "give a clearance above 0, or remove the contact")

@@ -37,18 +37,20 @@ Dimensions = Mapping[str, Dimension | None]
 # ---- names in the expressions of loads ------------------------------------------------------------------------
 
 
-def motion_dimensions(mechanism: Numbers, known: Dimensions) -> dict[str, Dimension | None]:
+def motion_dimensions(mechanism: Numbers, names: Dimensions) -> dict[str, Dimension | None]:
     """What an expression in a load may speak of beside the dimensions, and what each measures."""
-    found: dict[str, Dimension | None] = {"time": KINDS["time"].dimensions[0]}
+    dimensions: dict[str, Dimension | None] = {"time": KINDS["time"].dimensions[0]}
     joint = mechanism.effective_joints.get(next(iter(mechanism.drivers), ""))
     if joint is not None:
         slides = "rotation" not in freedoms(joint.type)
-        found["drive"] = KINDS["length"].dimensions[0] if slides else ANGLE
-        found["speed"] = KINDS["speed" if slides else "angular speed"].dimensions[0]
-    found.update(_placed_dimensions(mechanism))
+        dimensions["drive"] = KINDS["length"].dimensions[0] if slides else ANGLE
+        dimensions["speed"] = KINDS["speed" if slides else "angular speed"].dimensions[0]
+    dimensions.update(_placed_dimensions(mechanism))
     for name, table in mechanism.tables.items():
-        found[name] = next((one for _, value in table.points if (one := _measure(value, known)) is not None), None)
-    return found
+        dimensions[name] = next(
+            (dimension for _, value in table.points if (dimension := _measure(value, names)) is not None), None
+        )
+    return dimensions
 
 
 def _placed_dimensions(mechanism: Numbers) -> Iterator[tuple[str, Dimension]]:
@@ -65,16 +67,16 @@ def _placed_dimensions(mechanism: Numbers) -> Iterator[tuple[str, Dimension]]:
                 yield f"{link}.{point}.velocity_{axis}", KINDS["speed"].dimensions[0]
 
 
-def _measure(value: Quantity, known: Dimensions) -> Dimension | None:
-    if not set(value.names) <= known.keys():
+def _measure(value: Quantity, names: Dimensions) -> Dimension | None:
+    if not set(value.names) <= names.keys():
         return None
     try:
-        return value.check(known, ANY)
+        return value.check(names, ANY)
     except UnitError:
         return None
 
 
-def unknown_name(mechanism: Numbers, name: str, path: str, source: object, known: Dimensions) -> Finding:
+def unknown_name(mechanism: Numbers, name: str, path: str, source: object, names: Dimensions) -> Finding:
     """A name in an expression that means nothing there."""
     section = path.partition(".")[0]
     refers = "" if str(source).strip() == name else f"refers to '{name}', which "
@@ -86,19 +88,19 @@ def unknown_name(mechanism: Numbers, name: str, path: str, source: object, known
     if PLACED in name and section != "loads":
         return Finding(what, path, "motions of joints and points are for loads; give a number or a dimension")
     if section == "loads" and name in mechanism.measures:
-        placed = [one for one, _ in _placed_dimensions(mechanism)]
-        shown = ", ".join(dict.fromkeys([placed[0], placed[-2]]))
-        remedy = f"name the motion of a joint or a point as the columns of a result do: {shown} …"
+        placed = [label for label, _ in _placed_dimensions(mechanism)]
+        examples = ", ".join(dict.fromkeys([placed[0], placed[-2]]))
+        remedy = f"name the motion of a joint or a point as the columns of a result do: {examples} …"
         what = f"'{source}' refers to the measure '{name}', which is no coordinate or speed at every position"
         return Finding(what, path, remedy)
     if name not in MOTION and name not in mechanism.tables:
-        remedy = nearest(name, [*known, *(motion_dimensions(mechanism, known) if section == "loads" else ())])
-        if not known and section != "loads":
+        remedy = nearest(name, [*names, *(motion_dimensions(mechanism, names) if section == "loads" else ())])
+        if not names and section != "loads":
             remedy = f"state it, as in dimensions: {{{as_key(name)}: 30 mm}}"
         if remedy.startswith("known:") and section == "loads":
-            placed = [one for one, _ in _placed_dimensions(mechanism)]
-            remedy = nearest(name, [*known, *MOTION, *mechanism.tables]).removesuffix(", …")
-            moves = [one for one in placed if one.endswith("slide_velocity")] or placed[1:2]
+            placed = [label for label, _ in _placed_dimensions(mechanism)]
+            remedy = nearest(name, [*names, *MOTION, *mechanism.tables]).removesuffix(", …")
+            moves = [label for label in placed if label.endswith("slide_velocity")] or placed[1:2]
             remedy += f"; the motion of a joint or point, such as {', '.join(moves[:2] + placed[-2:-1])}"
         return Finding(what, path, remedy)
     if section == "loads":
@@ -118,7 +120,7 @@ def expression_name(name: str, where: str) -> Iterator[Finding]:
         yield Finding(f"'{name}' cannot be used in an expression", where, remedy)
 
 
-def tables(mechanism: Numbers, known: Dimensions) -> Iterator[Finding]:
+def tables(mechanism: Numbers, names: Dimensions) -> Iterator[Finding]:
     """Names of the tables, and whether the values of each measure one thing."""
     for name, table in mechanism.tables.items():
         where = f"tables.{name}"
@@ -145,7 +147,7 @@ def tables(mechanism: Numbers, known: Dimensions) -> Iterator[Finding]:
             yield Finding(what, f"{where}.period", "remove it, or write periodic: true")
         first: Dimension | None = None
         for k, (_, value) in enumerate(table.points):
-            measured = _measure(value, known)
+            measured = _measure(value, names)
             first = first if first is not None else measured
             if measured is not None and first is not None and not (fits(measured, first) and fits(first, measured)):
                 what = f"is {dimension_text(measured)}, the values before are {dimension_text(first)}"
@@ -209,9 +211,9 @@ def _misfit(mechanism: Numbers, name: str, extent: Number, values: Values) -> It
     ratio = max(cycle / extent, extent / cycle)
     if abs(ratio - np.round(ratio)) <= FITS:
         return
-    size, whole = (_told(one, unit) for one in (extent, cycle))
-    what = f"it repeats after {size}, which is neither a part nor a multiple of the cycle of {whole}"
-    state = f"state period: {whole}, or period: {size} if that is meant" if extent < cycle else f"state period: {size}"
+    size, full = (_told(length, unit) for length in (extent, cycle))
+    what = f"it repeats after {size}, which is neither a part nor a multiple of the cycle of {full}"
+    state = f"state period: {full}, or period: {size} if that is meant" if extent < cycle else f"state period: {size}"
     remedy = f"end it one cycle after its first point, with the value of that, or {state}"
     yield Finding(what, f"tables.{name}.points", remedy)
 
@@ -273,17 +275,17 @@ def springs(mechanism: Numbers) -> Iterator[Finding]:
 
 def _free(spring: Spring, turns: bool, where: str) -> Iterator[Finding]:
     """What the spring states of itself."""
-    own, other = ("free_angle", "free_length") if turns else ("free_length", "free_angle")
+    key, other = ("free_angle", "free_length") if turns else ("free_length", "free_angle")
     if getattr(spring, other) is not None:
         kind = "turns" if turns else "acts along a line"
-        yield Finding(f"this spring {kind}", f"{where}.{other}", f"state {own} instead")
+        yield Finding(f"this spring {kind}", f"{where}.{other}", f"state {key} instead")
     elif spring.stiffness is None and spring.damping is None and spring.preload is None:
         yield Finding("this spring is empty", where, "state a stiffness, a damping or a preload")
-    elif spring.stiffness is not None and getattr(spring, own) is None:
+    elif spring.stiffness is not None and getattr(spring, key) is None:
         example = "20 deg" if turns else "40 mm"
-        yield Finding(f"a stiffness without a {own}", where, f"add {own}: {example}; its force there is the preload")
-    elif spring.stiffness is None and getattr(spring, own) is not None:
-        yield Finding(f"a {own} has no effect without a stiffness", f"{where}.{own}", "add stiffness: … or remove it")
+        yield Finding(f"a stiffness without a {key}", where, f"add {key}: {example}; its force there is the preload")
+    elif spring.stiffness is None and getattr(spring, key) is not None:
+        yield Finding(f"a {key} has no effect without a stiffness", f"{where}.{key}", "add stiffness: … or remove it")
     if spring.only is not None and turns:
         yield Finding(f"a spring in a joint that turns cannot only {spring.only}", f"{where}.only", "remove it")
     elif spring.only is not None and spring.stiffness is None:

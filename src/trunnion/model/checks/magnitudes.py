@@ -34,43 +34,49 @@ MEANT = {
 
 def magnitudes(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
     """What plain numbers mean where most lengths have a unit; plain lengths far above these; pins above every link."""
-    stated = [one for one in stated_entries(mechanism, mechanism.entries) if ".values." not in one.path]
-    entries = {**numbers.entries, **{one.path: one for one in stated}}
-    plain = {one.path: one.quantity.source for one in stated if not isinstance(one.quantity.source, str)}
+    entries_stated = [entry for entry in stated_entries(mechanism, mechanism.entries) if ".values." not in entry.path]
+    entries = {**numbers.entries, **{entry.path: entry for entry in entries_stated}}
+    plain = {
+        entry.path: entry.quantity.source for entry in entries_stated if not isinstance(entry.quantity.source, str)
+    }
     nominal = {path: float(value) for path, value in {**numbers.nominal, **plain}.items()}
     values = {path: abs(value) for path, value in nominal.items()}
-    lengths = [one for path, one in numbers.entries.items() if one.kind is KINDS["length"] and path in values]
-    places = [one for one in lengths if one.path.startswith("links.") and ".points." in one.path]
-    pins = [one for one in lengths if one.path.endswith((".pin.radius", ".guide.length")) and not one.alias]
-    known = max((values[one.path] for one in places if not _plain(mechanism, one)), default=0.0)
+    lengths = [entry for path, entry in numbers.entries.items() if entry.kind is KINDS["length"] and path in values]
+    places = [entry for entry in lengths if entry.path.startswith("links.") and ".points." in entry.path]
+    pins = [entry for entry in lengths if entry.path.endswith((".pin.radius", ".guide.length")) and not entry.alias]
+    known = max((values[entry.path] for entry in places if not _plain(mechanism, entry)), default=0.0)
     bare = _without_unit(mechanism, entries, nominal) if known > 0 else None
     bare = bare or {}
-    told: dict[str, float] = {}
+    doubtful: dict[str, float] = {}
     for path, kind in bare.items():
         if path.endswith(".limit.lower"):
             continue  # a plain limit is one number, told as the upper one
         narrow = path in plain or path.endswith(".limit.upper")
         if kind is KINDS["length"] and values[path] > (WIDE if narrow else 1.0) * known:
-            told[path] = values[path]
+            doubtful[path] = values[path]
         else:
             yield _meant(path, nominal[path], kind)
-    far = [one for one in (*places, *pins) if values[one.path] > FAR * known > 0]
-    told |= {path: values[path] for one in far for path in _plain(mechanism, one) if values[path] > FAR * known}
-    if told:
-        path = max(told, key=told.__getitem__)
-        yield _forgotten(path, told[path], known, len(told) - 1)
-    largest = 2 * max((values[one.path] for one in places), default=0.0)
-    for one in pins:
-        if values[one.path] > largest > 0 and not {one.path} & {*told, *bare} and one.path.endswith(".radius"):
-            what = f"is {values[one.path]:g} m, more than every link is long"
-            yield Finding(what, one.path, "check its unit", Severity.WARNING)
+    far = [entry for entry in (*places, *pins) if values[entry.path] > FAR * known > 0]
+    doubtful |= {path: values[path] for entry in far for path in _plain(mechanism, entry) if values[path] > FAR * known}
+    if doubtful:
+        path = max(doubtful, key=doubtful.__getitem__)
+        yield _forgotten(path, doubtful[path], known, len(doubtful) - 1)
+    largest = 2 * max((values[entry.path] for entry in places), default=0.0)
+    for entry in pins:
+        if (
+            values[entry.path] > largest > 0
+            and not {entry.path} & {*doubtful, *bare}
+            and entry.path.endswith(".radius")
+        ):
+            what = f"is {values[entry.path]:g} m, more than every link is long"
+            yield Finding(what, entry.path, "check its unit", Severity.WARNING)
 
 
-def _forgotten(path: str, value: float, known: float, others: int = 0) -> Finding:
+def _forgotten(path: str, value: float, largest: float, others: int = 0) -> Finding:
     """A warning of a length (m) above all that have a unit."""
     also = "as is another" if others == 1 else f"as are {others} others"
     more = f", {also} without a unit: units" if others else ": a unit"
-    times = f"{value / known:.3g} times the largest length with a unit, {known:g} m"
+    times = f"{value / largest:.3g} times the largest length with a unit, {largest:g} m"
     what = f"is {value:g} m, {times}{more} forgotten?"
     return Finding(what, path, f"write it, as {value:g} mm", Severity.WARNING)
 
@@ -88,15 +94,19 @@ def _without_unit(
 ) -> dict[str, Kind] | None:
     """Plain numbers by path, with what they measure; None unless more lengths have a unit. A hint is no length."""
     kinds = measured(mechanism, entries.values())
-    stated = [one for one in entries.values() if not one.alias and not one.path.startswith("assembly.")]
-    united = [one for one in stated if kinds[one.path] is KINDS["length"] and _literal_unit(one.quantity)]
-    found: dict[str, Kind] = {}
-    for one in stated:
-        kind = kinds[one.path]
-        if kind in MEANT and (kind.name != "speed" or one.path.startswith("drivers.")) and one.path in nominal:
-            found |= {path: kind for path in _plain(mechanism, one) if path == one.path or _is_one(path, one, kind)}
-    lengths = [path for path, kind in found.items() if kind is KINDS["length"]]
-    return found if len(united) > len(lengths) else None
+    entries_stated = [entry for entry in entries.values() if not entry.alias and not entry.path.startswith("assembly.")]
+    united = [
+        entry for entry in entries_stated if kinds[entry.path] is KINDS["length"] and _literal_unit(entry.quantity)
+    ]
+    suspects: dict[str, Kind] = {}
+    for entry in entries_stated:
+        kind = kinds[entry.path]
+        if kind in MEANT and (kind.name != "speed" or entry.path.startswith("drivers.")) and entry.path in nominal:
+            suspects |= {
+                path: kind for path in _plain(mechanism, entry) if path == entry.path or _is_one(path, entry, kind)
+            }
+    lengths = [path for path, kind in suspects.items() if kind is KINDS["length"]]
+    return suspects if len(united) > len(lengths) else None
 
 
 def _is_one(path: str, entry: Entry, kind: Kind) -> bool:
@@ -116,27 +126,27 @@ def _literal_unit(quantity: Quantity) -> str:
 
 def _plain(mechanism: Numbers, entry: Entry) -> list[str]:
     """Paths of the numbers without a unit that an entry is, or is made of."""
-    found: dict[str, Quantity] = {entry.path: entry.quantity}
+    quantities: dict[str, Quantity] = {entry.path: entry.quantity}
     for quantity in (left := [entry.quantity]):  # it grows
         for name in quantity.names:
-            if name in mechanism.dimensions and f"dimensions.{name}" not in found:
-                found[f"dimensions.{name}"] = mechanism.dimensions[name]
+            if name in mechanism.dimensions and f"dimensions.{name}" not in quantities:
+                quantities[f"dimensions.{name}"] = mechanism.dimensions[name]
                 left.append(mechanism.dimensions[name])
-    return [path for path, one in found.items() if not isinstance(one.source, str) and one.source != 0]
+    return [path for path, one in quantities.items() if not isinstance(one.source, str) and one.source != 0]
 
 
 def bare_number(numbers: ParameterSet, path: str, value: float) -> Iterator[Finding]:
     """A warning of a number without a unit, for one that the model states with a unit, if it is nearer to that number
     as it is written than to its value in SI."""
     entry, before = numbers.entries.get(path), float(numbers.nominal.get(path, math.nan))
-    own = _literal_unit(entry.quantity) if entry else ""
-    if not own or not abs(value * before) > 0:
+    own_unit = _literal_unit(entry.quantity) if entry else ""
+    if not own_unit or not abs(value * before) > 0:
         return
-    factor = unit(own)[0]
+    factor = unit(own_unit)[0]
     written = before / float(factor)
     if abs(math.log(abs(value / written))) < abs(math.log(abs(value / before))):
-        what = f"{value:g} is in SI units, where the model states {written:g} {own}: a unit forgotten?"
-        yield Finding(what, path, f"write {value:g}{own}", Severity.WARNING)
+        what = f"{value:g} is in SI units, where the model states {written:g} {own_unit}: a unit forgotten?"
+        yield Finding(what, path, f"write {value:g}{own_unit}", Severity.WARNING)
 
 
 Bare = tuple[str, float, bool]  # where a number without a unit stands, its value, whether in an expression
@@ -182,21 +192,21 @@ LENGTH = KINDS["length"].dimensions[0]
 _GROUPED = re.compile(r"(?<![\w.])[1-9][0-9]{0,2}\.[0-9]00(?=\s*[^\W\d])")  # and a unit
 
 
-def radians(mechanism: Numbers, found: Iterable[Bare]) -> Iterator[Finding]:
+def radians(mechanism: Numbers, bare: Iterable[Bare]) -> Iterator[Finding]:
     """What these numbers mean, of the rows of a table the largest.
 
     In a model without any unit all is in SI, and only many turns are told.
     """
     with_units = any(
-        one.quantity.expression and one.quantity.expression.literal and one.quantity.expression.literal.unit
-        for one in mechanism.entries
-        if one.quantity is not USUAL_PRESSURE_ANGLE
+        entry.quantity.expression and entry.quantity.expression.literal and entry.quantity.expression.literal.unit
+        for entry in mechanism.entries
+        if entry.quantity is not USUAL_PRESSURE_ANGLE
     )
     largest: dict[str, Bare] = {}
-    for one in found:
-        group = one[0] if one[0].startswith("links.") else one[0].partition(".points.")[0]
-        if one[1] and math.isfinite(one[1]) and (group not in largest or abs(one[1]) > abs(largest[group][1])):
-            largest[group] = one
+    for entry in bare:
+        group = entry[0] if entry[0].startswith("links.") else entry[0].partition(".points.")[0]
+        if entry[1] and math.isfinite(entry[1]) and (group not in largest or abs(entry[1]) > abs(largest[group][1])):
+            largest[group] = entry
     for where, value, in_expression in largest.values():
         finding = in_radians(where, value, f"takes {value:g} for" if in_expression else "is")
         if with_units or (finding.severity is Severity.WARNING and abs(value) > 2 * math.pi):
@@ -208,8 +218,8 @@ def in_radians(where: str, value: float, verb: str = "is") -> Finding:
 
     A whole number, or many turns, is a warning: it is likely meant in degrees; but a driver may well go through turns.
     """
-    turned, whole = abs(value) > 2 * math.pi, value.is_integer() and value != 0
-    doubtful = whole or (turned and not where.startswith("drivers."))
+    turned, integral = abs(value) > 2 * math.pi, value.is_integer() and value != 0
+    doubtful = integral or (turned and not where.startswith("drivers."))
     size = f"{value / (2 * math.pi):.3g} turns" if turned else f"{math.degrees(value):.3g}°"
     what = f"{verb} {value:g} rad, which is {size}: a plain number is in radians"
     remedy = f"write {value:g} deg if it is in degrees, else {value:g} rad"

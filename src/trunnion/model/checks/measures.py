@@ -22,8 +22,8 @@ PLACES = ("place-of-maximum", "place-of-minimum")
 def check_measure(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding]:
     """Whether a measure has one subject that exists, and is taken where and as it can be."""
     if len(measure.kinds) != 1:
-        found, known = " and ".join(measure.kinds) or "nothing", list(MEASURES)
-        yield Finding(f"measures {found}", where, f"state one of {', '.join(known[:-1])} or {known[-1]}")
+        kinds, names = " and ".join(measure.kinds) or "nothing", list(MEASURES)
+        yield Finding(f"measures {kinds}", where, f"state one of {', '.join(names[:-1])} or {names[-1]}")
     for key in measure.kinds:
         yield from _subject(mechanism, measure, key, where)
     yield from _component(mechanism, measure, where)
@@ -62,17 +62,17 @@ def _has_ends(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
 def _component(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding]:
     """Whether an axis or a direction is stated where one is needed, once, and there only."""
     words = {MEASURES[key].vector_in(mechanism.space) for key in measure.kinds}
-    stated = [key for key in ("axis", "along") if getattr(measure, key) is not None]
-    if "must" in words and not stated:
+    keys = [key for key in ("axis", "along") if getattr(measure, key) is not None]
+    if "must" in words and not keys:
         if measure.kind == "point":
             yield Finding("a point is measured along an axis", where, "write {point: link.point, axis: x}")
         else:
             what = "a link in space is not turned by one angle"
             yield Finding(what, f"{where}.angle", "measure its turn about a global axis: add axis: x, y or z")
-    if stated and not words - {""}:
+    if keys and not words - {""}:
         what = "the axis of a coordinate is stated, but no point and no reaction"
-        yield Finding(what, f"{where}.{stated[0]}", "remove it, or name a point")
-    if len(stated) > 1 or ("along" in stated and measure.kind == "angle"):
+        yield Finding(what, f"{where}.{keys[0]}", "remove it, or name a point")
+    if len(keys) > 1 or ("along" in keys and measure.kind == "angle"):
         yield Finding("has an axis and a direction", f"{where}.along", "keep one of them; an angle needs an axis")
     if measure.axis == "z" and mechanism.space == "planar":
         yield Finding("there is no z in the plane", f"{where}.axis", "write x or y")
@@ -113,16 +113,18 @@ def _taken(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding
         what = "there is no driver whose coordinate it could be: the mechanism has one position"
         yield Finding(what, f"{where}.{key}", "remove it")
     if measure.reduced:
-        whole = f"{subject}: {measure.subject}" if measure.subject == "cycle" else subject
+        subject_text = f"{subject}: {measure.subject}" if measure.subject == "cycle" else subject
         all_of_it = measure.subject == "cycle" or subject == "time_ratio"
         if measure.at is not None:
             remedy = "remove it" if all_of_it else "remove it, or state over: […]"
-            yield Finding(f"the {whole} is of a range, not of a position", f"{where}.at", remedy)
+            yield Finding(f"the {subject_text} is of a range, not of a position", f"{where}.at", remedy)
         if figure is not None and not (subject == "dead_centre" and figure in PLACES):
             remedy = "remove it" if subject != "dead_centre" else f"write {' or '.join(PLACES)}"
-            yield Finding(f"the {whole} is one number of a range already", f"{where}.as", remedy)
+            yield Finding(f"the {subject_text} is one number of a range already", f"{where}.as", remedy)
         if all_of_it and measure.over is not None:
-            yield Finding(f"the {whole.replace(': ', ' of the ')} is over all of it", f"{where}.over", "remove it")
+            yield Finding(
+                f"the {subject_text.replace(': ', ' of the ')} is over all of it", f"{where}.over", "remove it"
+            )
     elif measure.at is not None and figure not in (None, "value"):
         what = f"the {figure} is of a range, not of a position"
         yield Finding(what, f"{where}.as", "remove it, or state over: [0 deg, 90 deg] instead of at")

@@ -86,7 +86,7 @@ def loop(mechanism: Numbers) -> Iterator[Finding]:
     fixed, links = mechanism.fixed_link, [row.link for row in rows]
     if fixed in mechanism.links and fixed not in links:
         where = "ground" if mechanism.ground else "loop"
-        remedy = "let a row end at it: its link is " + ", ".join(f"'{one}'" for one in links) + " now"
+        remedy = "let a row end at it: its link is " + ", ".join(f"'{link}'" for link in links) + " now"
         yield Finding(f"the fixed link '{fixed}' is not a link of the loop", where, remedy)
     for row in rows:
         yield from _row(row)
@@ -114,7 +114,7 @@ def _frames(mechanism: Numbers) -> Iterator[Finding]:
     for name, link in mechanism.links.items():
         if link.frame is None:
             continue
-        ends = [joint for joint, one in mechanism.effective_joints.items() if name in one.links]
+        ends = [joint for joint, joint_entry in mechanism.effective_joints.items() if name in joint_entry.links]
         if not mechanism.loop:
             yield Finding("frame is for the links of a loop", f"links.{name}.frame", "remove it")
         elif ends and link.frame not in ends:

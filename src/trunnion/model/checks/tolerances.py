@@ -52,14 +52,14 @@ ROUNDING = 1e-9  # of an eigenvalue, and of limits that touch zero
 # ---- quantities, for the checks of units ----------------------------------------------------------------------
 
 
-def stated_entries(mechanism: Numbers, found: Sequence[Entry]) -> list[Entry]:
+def stated_entries(mechanism: Numbers, entries: Sequence[Entry]) -> list[Entry]:
     """Every quantity of the sections about tolerances and costs, with where it stands and what it has to measure.
 
-    found: the numbers of the mechanism.
+    entries: the numbers of the mechanism.
     """
     if not (mechanism.variations or mechanism.costs or mechanism.correlations or mechanism.processes):
         return _defaults(mechanism)
-    names, kinds = ParameterNames(entry.path for entry in found), measured(mechanism, found)
+    names, kinds = ParameterNames(entry.path for entry in entries), measured(mechanism, entries)
     listed = _defaults(mechanism)
     for name, variation in mechanism.variations.items():
         try:
@@ -67,15 +67,17 @@ def stated_entries(mechanism: Numbers, found: Sequence[Entry]) -> list[Entry]:
         except MechanismError:  # a finding of its own
             continue
         listed += _variation(variation, f"tolerances.{name}", ("tolerances", name), kind)
-    for row, one in enumerate(mechanism.correlations):
-        listed += _entries(one.coefficient, f"correlations.{row}.coefficient", ("correlations", row), NUMBER)
+    for row, pair in enumerate(mechanism.correlations):
+        listed += _entries(pair.coefficient, f"correlations.{row}.coefficient", ("correlations", row), NUMBER)
     return [*listed, *cost_entries(mechanism, names, kinds)]
 
 
 def _defaults(mechanism: Numbers) -> list[Entry]:
     section = "tolerance_defaults"
-    stated = {key: getattr(mechanism.tolerance_defaults, key, None) for key in OPTIONS}
-    return [one for key, value in stated.items() for one in _entries(value, f"{section}.{key}", (section, key), NUMBER)]
+    options = {key: getattr(mechanism.tolerance_defaults, key, None) for key in OPTIONS}
+    return [
+        entry for key, value in options.items() for entry in _entries(value, f"{section}.{key}", (section, key), NUMBER)
+    ]
 
 
 def _variation(variation: Variation, where: str, location: tuple[str | int, ...], kind: Kind) -> list[Entry]:
@@ -84,8 +86,8 @@ def _variation(variation: Variation, where: str, location: tuple[str | int, ...]
         for limit in (variation.limits.lower, variation.limits.upper):
             listed += _entries(limit, where, location, kind)
     for key in OPTIONS:
-        own = key in ("shift", "mode", "values")
-        listed += _entries(getattr(variation, key), f"{where}.{key}", (*location, key), kind if own else NUMBER)
+        own_kind = key in ("shift", "mode", "values")
+        listed += _entries(getattr(variation, key), f"{where}.{key}", (*location, key), kind if own_kind else NUMBER)
     return listed
 
 
@@ -94,17 +96,17 @@ def _entries(value: Any, where: str, location: tuple[str | int, ...], kind: Kind
     if isinstance(value, Quantity):
         return [Entry(where, location, value, kind)]
     items = value if isinstance(value, tuple) else ()
-    return [Entry(f"{where}.{place}", (*location, place), one, kind) for place, one in enumerate(items)]
+    return [Entry(f"{where}.{place}", (*location, place), quantity, kind) for place, quantity in enumerate(items)]
 
 
 # ---- names ----------------------------------------------------------------------------------------------------
 
 
-def tolerance_names(mechanism: Numbers, found: Sequence[Entry]) -> Iterator[Finding]:
+def tolerance_names(mechanism: Numbers, entries: Sequence[Entry]) -> Iterator[Finding]:
     """Whether each name is of a number that can vary, once, and each distribution gets what it takes."""
-    names = ParameterNames(entry.path for entry in found)
-    known, kinds = {entry.path: entry for entry in found}, measured(mechanism, found)
-    used = {name for entry in found for name in entry.quantity.names}
+    names = ParameterNames(entry.path for entry in entries)
+    by_path, kinds = {entry.path: entry for entry in entries}, measured(mechanism, entries)
+    used = {name for entry in entries for name in entry.quantity.names}
     first: dict[str, str] = {}
     for name, variation in mechanism.variations.items():
         where = f"tolerances.{name}"
@@ -117,11 +119,11 @@ def tolerance_names(mechanism: Numbers, found: Sequence[Entry]) -> Iterator[Find
         if path in first:
             yield Finding(f"'{name}' and '{first[path]}' are the same number", where, "keep one of them")
         first.setdefault(path, name)
-        yield from _number(known, path, used, where)
-        yield from _percent(variation, known[path], kinds[path], where)
+        yield from _number(by_path, path, used, where)
+        yield from _percent(variation, by_path[path], kinds[path], where)
     yield from _default_distribution(mechanism)
-    for row, one in enumerate(mechanism.correlations):
-        for place, name in enumerate(one.of):
+    for row, pair in enumerate(mechanism.correlations):
+        for place, name in enumerate(pair.of):
             try:
                 names.resolve(name)
             except MechanismError as error:
@@ -129,9 +131,9 @@ def tolerance_names(mechanism: Numbers, found: Sequence[Entry]) -> Iterator[Find
                 yield Finding(error.findings[0].what, at, error.findings[0].remedy)
 
 
-def _number(known: Mapping[str, Entry], path: str, used: set[str], where: str) -> Iterator[Finding]:
+def _number(entries: Mapping[str, Entry], path: str, used: set[str], where: str) -> Iterator[Finding]:
     """Whether a number is one that can vary and that something depends on."""
-    entry = known[path]
+    entry = entries[path]
     if entry.varies:
         what = f"'{path}' varies with the motion and has no one tolerance"
         yield Finding(what, where, "state one of a dimension in it")
@@ -140,7 +142,7 @@ def _number(known: Mapping[str, Entry], path: str, used: set[str], where: str) -
     elif not may_vary(entry):
         what = f"'{path}' is not a parameter of the mechanism"
         yield Finding(what, where, "state tolerances of dimensions, joints, links, loads, springs or drivers")
-    elif path.startswith(DEFAULTS) and not any(one.alias == path for one in known.values()):
+    elif path.startswith(DEFAULTS) and not any(entry_of.alias == path for entry_of in entries.values()):
         yield Finding(f"no joint follows '{path}'", where, "name the number of a joint, as B.pin.clearance")
     elif path.startswith("dimensions.") and path.partition(".")[2] not in used:
         yield Finding(f"no result depends on '{path}'", where, "use it, or remove it", Severity.WARNING)
@@ -191,13 +193,13 @@ def _default_distribution(mechanism: Numbers) -> Iterator[Finding]:
 
 def tolerance_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
     """Findings about limits, distributions and correlations as numbers; nan is reported already and passes."""
-    stated, written = variations(mechanism, numbers), written_limits(numbers)
+    by_path, written = variations(mechanism, numbers), written_limits(numbers)
     for tolerance in tolerated(mechanism, numbers):
-        name, variation = stated.get(tolerance.path, ("", Variation()))
+        name, variation = by_path.get(tolerance.path, ("", Variation()))
         where = f"tolerances.{name}" if name else tolerance.path
         yield from _limits(numbers, tolerance, variation, written.get(tolerance.path), where)
-        told = {key: where if getattr(variation, key) is not None else "tolerance_defaults" for key in OPTIONS}
-        yield from _options(tolerance, {key: f"{place}.{key}" for key, place in told.items()})
+        places = {key: where if getattr(variation, key) is not None else "tolerance_defaults" for key in OPTIONS}
+        yield from _options(tolerance, {key: f"{place}.{key}" for key, place in places.items()})
     if mechanism.correlations:
         yield from _correlations(mechanism, numbers)
 
@@ -256,21 +258,21 @@ def _options(tolerance: Tolerance, where: Mapping[str, str]) -> Iterator[Finding
 
 
 def _correlations(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
-    vary = {one.path for one in tolerated(mechanism, numbers)}
+    vary = {item.path for item in tolerated(mechanism, numbers)}
     first: dict[frozenset[str], int] = {}
     sound = True
-    for row, one in enumerate(mechanism.correlations):
+    for row, item in enumerate(mechanism.correlations):
         where = f"correlations.{row}"
-        known = set(one.coefficient.names) <= numbers.dimension_values.keys()
-        value = float(one.coefficient.evaluate(numbers.dimension_values)) if known else np.nan
-        paths = named_paths(numbers, one.of)
+        evaluable = set(item.coefficient.names) <= numbers.dimension_values.keys()
+        value = float(item.coefficient.evaluate(numbers.dimension_values)) if evaluable else np.nan
+        paths = named_paths(numbers, item.of)
         if abs(value) > 1:
             sound = False
             yield Finding(f"is {value:g}", f"{where}.coefficient", "give a number from -1 to 1")
-        for name in (name for name in one.of if not vary.issuperset(named_paths(numbers, [name]))):
+        for name in (name for name in item.of if not vary.issuperset(named_paths(numbers, [name]))):
             sound = False
             yield Finding(f"'{name}' has no tolerance", where, "state one in tolerances: {…}, or leave it out")
-        if len(paths) < 2 and len(one.of) < 2:
+        if len(paths) < 2 and len(item.of) < 2:
             yield Finding("a correlation needs two parameters", where, "name two, as of: [AB, BC]")
         for pair in map(frozenset, combinations(paths, 2)):
             if len(pair) < 2:
@@ -325,7 +327,7 @@ def cost_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
     if not mechanism.costs:
         return
     kinds = measured(mechanism, numbers.entries.values())
-    known = {one.path: one for one in tolerated(mechanism, numbers)}
+    tolerances = {tolerance.path: tolerance for tolerance in tolerated(mechanism, numbers)}
     first: dict[str, str] = {}
     for name, cost in mechanism.costs.items():
         where = f"costs.{name}"
@@ -339,9 +341,9 @@ def cost_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
             first.setdefault(path, name)
             if play:
                 yield from _play(mechanism, path, where)
-            elif path not in known:
+            elif path not in tolerances:
                 yield _untolerated(path, where)
-            elif not known[path].can_be_chosen:
+            elif not tolerances[path].can_be_chosen:
                 what = f"'{path}' varies as measured or over a full turn: there is no tolerance to choose"
                 yield Finding(what, where, "remove the cost", Severity.WARNING)
             kind = KINDS["length"] if play else kinds[path]
@@ -401,24 +403,24 @@ def _formula(cost: Cost, where: str, kind: Kind) -> Iterator[Finding]:
         yield Finding(what, f"{where}.unit", f"write a unit of {kind.name}, such as that of {kind.example}")
 
 
-def _price(found: Price, where: str) -> Iterator[Finding]:
+def _price(price: Price, where: str) -> Iterator[Finding]:
     for key, above in (("B", False), ("k", True)):
-        value = found.parameters.get(key, 1.0)
+        value = price.parameters.get(key, 1.0)
         if value < 0 or (above and value == 0):
             limit = "above 0" if above else "at least 0"
             yield Finding(
                 f"is {value:g}: a wider tolerance would cost more", f"{where}.{key}", f"give a number {limit}"
             )
-    if found.least < 0 or found.most <= 0:
-        key = "least" if found.least < 0 else "most"
+    if price.least < 0 or price.most <= 0:
+        key = "least" if price.least < 0 else "most"
         yield Finding("a half width is not negative, nor its bound 0", f"{where}.{key}", "give a number above 0")
-    elif found.least > found.most:
-        what = f"the least half width {found.least:g} is above the most {found.most:g} (SI)"
+    elif price.least > price.most:
+        what = f"the least half width {price.least:g} is above the most {price.most:g} (SI)"
         yield Finding(what, f"{where}.least", "exchange them")
-    for one in found.choices:
-        if one.tolerance <= 0:
-            what = f"'{one.name}' has a tolerance of {one.tolerance:g} (SI)"
-            yield Finding(what, f"{where}.options.{one.name}.tolerance", "give a half width above 0")
+    for choice in price.choices:
+        if choice.tolerance <= 0:
+            what = f"'{choice.name}' has a tolerance of {choice.tolerance:g} (SI)"
+            yield Finding(what, f"{where}.options.{choice.name}.tolerance", "give a half width above 0")
 
 
 def _process(

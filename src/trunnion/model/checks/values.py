@@ -74,7 +74,7 @@ def _weight(mechanism: Numbers, link: Link, values: Values, where: str) -> Itera
 
 def _unfollowed(numbers: ParameterSet) -> Iterator[Finding]:
     """Defaults without effect, as a clearance of pins that all have a fit."""
-    followed = {one.alias for one in numbers.entries.values()}
+    followed = {entry.alias for entry in numbers.entries.values()}
     for path in numbers.entries:
         if path.startswith("joint_defaults.") and path not in followed:
             remedy = "remove it, or state it in the joints"
@@ -88,7 +88,7 @@ def _each(numbers: ParameterSet, paths: Iterable[str]) -> Iterator[Finding]:
         if path not in values:  # an expression of the motion
             continue
         entry = numbers.entries[path]
-        undefined = any(np.isnan(values[one]) for one in entry.depends if one in values)
+        undefined = any(np.isnan(values[name]) for name in entry.depends if name in values)
         if entry.quantity.names and not undefined and not np.isfinite(values[path]) and not numbers.is_unreadable(path):
             yield Finding(
                 f"'{entry.quantity.source}' has no finite value ({values[path]})",
@@ -118,7 +118,7 @@ def _sides(mechanism: Numbers, values: Values) -> Iterator[Finding]:
         if any(key in gear.joints for gear in mechanism.gears.values() for key in joints):
             continue  # a shaft with two gears passes on a torque
         for first, second in combinations(joints, 2):
-            a, b = ([values[f"links.{name}.points.{key}.{one}"] for one in "xy"] for key in (first, second))
+            a, b = ([values[f"links.{name}.points.{key}.{axis}"] for axis in "xy"] for key in (first, second))
             if a == b:
                 severity = Severity.WARNING if name == mechanism.fixed_link else Severity.ERROR
                 what = f"the joints '{first}' and '{second}' of the link '{name}' are at one point"
@@ -128,7 +128,7 @@ def _sides(mechanism: Numbers, values: Values) -> Iterator[Finding]:
 def _inertia(mechanism: Numbers, link: Link, values: Values, where: str) -> Iterator[Finding]:
     """Whether a body can be so: principal moments about its centre, each at most the sum of the others."""
     mass = values[f"{where}.mass"]
-    centre = np.array([values[f"{where}.centre.{one}"] for one in _letters(values, f"{where}.centre")], dtype=float)
+    centre = np.array([values[f"{where}.centre.{axis}"] for axis in _letters(values, f"{where}.centre")], dtype=float)
     if not len(centre):
         distance, angle = values[f"{where}.centre.distance"], values[f"{where}.centre.angle"]
         centre = distance * np.array([np.cos(angle), np.sin(angle)])
@@ -147,7 +147,7 @@ def _inertia(mechanism: Numbers, link: Link, values: Values, where: str) -> Iter
             what = f"is {values[path]:g} kg m², less than m r² = {least:g}" if least else "is negative"
             yield Finding(what, path, "check unit and inertia_about")
         return
-    xx, yy, zz, xy, xz, yz = (float(values[f"{path}.{one}"]) for one in ("xx", "yy", "zz", "xy", "xz", "yz"))
+    xx, yy, zz, xy, xz, yz = (float(values[f"{path}.{axis}"]) for axis in ("xx", "yy", "zz", "xy", "xz", "yz"))
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if about_origin and len(centre) == 3:
         tensor = tensor - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
@@ -157,8 +157,8 @@ def _inertia(mechanism: Numbers, link: Link, values: Values, where: str) -> Iter
     excess = principal[2] - principal[0] - principal[1]
     if principal[0] < -INERTIA_SLACK * size or excess > INERTIA_SLACK * size:
         rounded = principal[0] >= -INERTIA_SLACK * size and excess <= INERTIA_ROUNDING * size
-        shown = ", ".join(f"{one:.4g}" for one in principal)
-        what = f"no body has the principal moments {shown} kg m² about its centre: one exceeds the sum of the others"
+        moments = ", ".join(f"{axis:.4g}" for axis in principal)
+        what = f"no body has the principal moments {moments} kg m² about its centre: one exceeds the sum of the others"
         remedy = "check inertia_about and the signs of xy, xz, yz (xy = −∫ x y dm)"
         if rounded:
             what, remedy = f"{what} by {100 * excess / size:.2g} %", "state more digits, if it is of rounding"

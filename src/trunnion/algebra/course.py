@@ -242,11 +242,11 @@ class Courses:
             The first of several; None where no panel has a value.
         """
         allowed = True if panels is None else panels
-        found = reading.extreme(np.moveaxis(self.coefficients, 1, 0)[:, None], of, sign, allowed, floor)
-        value, panel, spot = float(np.ravel(found.value)[0]), int(found.panel[0]), float(np.ravel(found.spot)[0])
+        peak = reading.extreme(np.moveaxis(self.coefficients, 1, 0)[:, None], of, sign, allowed, floor)
+        value, panel, spot = float(np.ravel(peak.value)[0]), int(peak.panel[0]), float(np.ravel(peak.spot)[0])
         if not np.isfinite(value):
             return None
-        if found.constant[0]:
+        if peak.constant[0]:
             return Place(value, float("nan"), everywhere=True)
         time = float(self.edges[panel] + self.half[panel] * (spot + 1.0))
         nearest = float(self.breaks[np.argmin(np.abs(self.breaks - time))])
@@ -255,17 +255,17 @@ class Courses:
 
     def passages(self, row: int, level: float = 0.0) -> Array:
         """Times, s, rising, at which a row passes a level; where it jumps over it that of the jump."""
-        own = self.coefficients[:, row].copy()
-        own[:, 0] -= level
-        found = []
-        for k in np.flatnonzero(np.abs(own[:, 0]) <= np.sum(np.abs(own[:, 1:]), axis=1)):
-            series = chebyshev.chebtrim(own[k], 1e-14 * np.max(np.abs(own[k])))
+        row_coefficients = self.coefficients[:, row].copy()
+        row_coefficients[:, 0] -= level
+        passages = []
+        for k in np.flatnonzero(np.abs(row_coefficients[:, 0]) <= np.sum(np.abs(row_coefficients[:, 1:]), axis=1)):
+            series = chebyshev.chebtrim(row_coefficients[k], 1e-14 * np.max(np.abs(row_coefficients[k])))
             roots = chebyshev.chebroots(series) if len(series) > 1 else np.zeros(0)
             real = np.real(roots[(np.abs(np.imag(roots)) <= REAL) & (np.abs(np.real(roots)) <= 1.0 + 1e-12)])
-            found.append(self.edges[k] + self.half[k] * (real + 1.0))
+            passages.append(self.edges[k] + self.half[k] * (real + 1.0))
         before, after = self.sides(row)
-        found.append(self.edges[1:-1][(before - level) * (after - level) < 0.0])
-        times = np.sort(np.concatenate(found))
+        passages.append(self.edges[1:-1][(before - level) * (after - level) < 0.0])
+        times = np.sort(np.concatenate(passages))
         return times[np.append(np.diff(times) > ONE * self.span, True)] if len(times) else times
 
     def below(self, rows: Sequence[int], floor: float) -> Array:
@@ -277,9 +277,10 @@ class Courses:
 
     def within(self, row: int, low: float, high: float) -> float:
         """Share of the time that a row is between two levels."""
-        own = self.coefficients[None, :, row]
+        row_coefficients = self.coefficients[None, :, row]
         both = [
-            reading.above(own, level) if np.isfinite(level) else np.where(level < 0, 2.0, 0.0) for level in (low, high)
+            reading.above(row_coefficients, level) if np.isfinite(level) else np.where(level < 0, 2.0, 0.0)
+            for level in (low, high)
         ]
         return float(np.sum((both[0] - both[1]) * self.half) / self.span)
 
@@ -353,15 +354,15 @@ class _Resolving:
         self, solve: Solve, breaks: Sequence[Array], like: Callable[[Array], Array] | None, accuracy: Accuracy
     ) -> None:
         self._solve, self._like, self._accuracy = solve, like, accuracy
-        self._breaks = [np.array(own, float) for own in breaks]
-        self._span = np.array([own[-1] - own[0] for own in breaks])
+        self._breaks = [np.array(edges, float) for edges in breaks]
+        self._span = np.array([edges[-1] - edges[0] for edges in breaks])
         self._asked = np.zeros(len(breaks), np.intp)
         self._loosened = np.ones(len(breaks))
         self._rows = self._sizes = np.zeros((0, len(breaks)))
         self._done: list[_Panels] = []
 
     def courses(self) -> list[Courses]:
-        count, edges = len(self._breaks), [self._first_edges(own) for own in self._breaks]
+        count, edges = len(self._breaks), [self._first_edges(lane_breaks) for lane_breaks in self._breaks]
         left = _between(edges, np.arange(count))
         for _ in range(CHECKED):
             self._resolve(*left)
@@ -475,11 +476,11 @@ class _Resolving:
         torn &= np.array(near) > 10 * self._accuracy.shortest * self._span[owner]
         chosen = np.flatnonzero(torn)
         chosen = chosen[np.diff(chosen, prepend=-2) > 1]  # of neighbours the next time
-        beside = 0.02 * np.minimum(width[chosen], width[chosen + 1])
+        margin = 0.02 * np.minimum(width[chosen], width[chosen + 1])
         gone = np.concatenate([chosen, chosen + 1])
         self._done = [panels.picked(np.setdiff1d(np.arange(len(edges) + 1), gone))]
         parts = np.array(
-            [panels.low[chosen], edges[chosen] - beside, edges[chosen] + 0.7 * beside, panels.high[chosen + 1]]
+            [panels.low[chosen], edges[chosen] - margin, edges[chosen] + 0.7 * margin, panels.high[chosen + 1]]
         ).T
         return _between(list(parts), owner[chosen])
 
@@ -505,8 +506,10 @@ def _fitted(rows: Array) -> Array:
 
 def _between(edges: Sequence[Array], mechanism: Labels) -> tuple[Labels, Array, Array]:
     """Mechanism, low and high of the panels between the edges of each part."""
-    low, high = (np.concatenate([own[part] for own in edges] or [np.zeros(0)]) for part in (slice(-1), slice(1, None)))
-    return np.repeat(mechanism, [len(own) - 1 for own in edges]), low, high
+    low, high = (
+        np.concatenate([edge[part] for edge in edges] or [np.zeros(0)]) for part in (slice(-1), slice(1, None))
+    )
+    return np.repeat(mechanism, [len(edge) - 1 for edge in edges]), low, high
 
 
 def _changing(time: Array, labels: Labels) -> Array:

@@ -58,8 +58,8 @@ class Dual:
         return self
 
     def __abs__(self) -> Dual:
-        found: Dual = _abs(self)
-        return found
+        magnitude: Dual = _abs(self)
+        return magnitude
 
     def __add__(self, other: Any) -> Dual:
         if _depth(other) < self.depth:

@@ -54,8 +54,8 @@ def matmul(a: Dual | Array, *others: Dual | Array) -> Dual:
 def inverse(a: Dual | Array) -> Dual:
     """A⁻¹ − ε A⁻¹ B A⁻¹; NaN where A is singular."""
     real, dual = _split(a)
-    found = np.linalg.inv(_regular(real))
-    return Dual(found, -found @ dual @ found)
+    inverted = np.linalg.inv(_regular(real))
+    return Dual(inverted, -inverted @ dual @ inverted)
 
 
 def solve(a: Dual | Array, b: Dual | Array) -> Dual:
@@ -66,8 +66,8 @@ def solve(a: Dual | Array, b: Dual | Array) -> Dual:
     real, dual = _split(a)
     b0, b1 = _split(b)
     if b0.ndim < real.ndim:
-        found = solve(a, Dual(b0[..., None], b1[..., None]))
-        return Dual(found.real[..., 0], found.dual[..., 0])
+        solution = solve(a, Dual(b0[..., None], b1[..., None]))
+        return Dual(solution.real[..., 0], solution.dual[..., 0])
     real = _regular(real)
     x0 = np.linalg.solve(real, b0)
     return Dual(x0, np.linalg.solve(real, b1 - dual @ x0))
@@ -117,5 +117,5 @@ def _gaps(values: Array, largest: Array) -> Array:
     steps = np.where(np.abs(steps) <= EQUAL * largest[..., None, None], np.nan, steps)
     n = values.shape[-1]
     steps[..., range(n), range(n)] = np.inf
-    found: Array = 1.0 / steps
-    return found
+    gaps: Array = 1.0 / steps
+    return gaps

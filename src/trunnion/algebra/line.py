@@ -55,9 +55,9 @@ def line(point: Vector3, direction: Vector3) -> Vector3:
     return spatial_vector(u, cross(point, u))
 
 
-def foot(one: Vector3) -> Vector3:
+def foot(at: Vector3) -> Vector3:
     """Point of the line nearest to the origin, u × m; m."""
-    u, m = vector_parts(one)
+    u, m = vector_parts(at)
     return cross(u, m)
 
 
@@ -95,12 +95,12 @@ def perpendicular(first: Vector3, second: Vector3) -> Perpendicular:
         crossed = _crossed(first, second, across)
         if not np.any(alike):
             return crossed
-        beside = _parallel(first, second)
-    xp = namespace(crossed.angle, beside.angle)
+        parallel = _parallel(first, second)
+    xp = namespace(crossed.angle, parallel.angle)
     return Perpendicular(
-        where(alike, beside.line, crossed.line),
-        xp.where(alike, beside.angle, crossed.angle),
-        (where(alike, beside.feet[0], crossed.feet[0]), where(alike, beside.feet[1], crossed.feet[1])),
+        where(alike, parallel.line, crossed.line),
+        xp.where(alike, parallel.angle, crossed.angle),
+        (where(alike, parallel.feet[0], crossed.feet[0]), where(alike, parallel.feet[1], crossed.feet[1])),
     )
 
 
@@ -122,19 +122,19 @@ def _meeting(u: Vector3, m: Vector3, n: Vector3, k: Vector3) -> Vector3:
 
 def _parallel(first: Vector3, second: Vector3) -> Perpendicular:
     """That of parallel lines: there the dual part of û × v̂ is ± the step from the first line to the second."""
-    u, v = (cast(Vector3, tuple(_value(entry) for entry in one)) for one in (first, second))
+    u, v = (cast(Vector3, tuple(_value(entry) for entry in item)) for item in (first, second))
     sense = np.sign(primal(dot(u, v)))
     step = scaled(sense, vector_parts(cross(u, v))[1])
     distance = _size(step)
     base = foot(u)
     theta = np.where(sense > 0, 0.0, np.pi)
-    beside = line(base, divided(step, np.where(distance == 0, np.nan, distance)))
+    common = line(base, divided(step, np.where(distance == 0, np.nan, distance)))
     feet = base, plus(base, step)
     depth = max(number.depth if isinstance(number, Dual) else 0 for number in (*first, *second))
     if depth == 0:
-        return Perpendicular(vector_parts(beside)[0], theta, feet)
+        return Perpendicular(vector_parts(common)[0], theta, feet)
     angle = _mark(Dual(theta, distance), depth)
-    return Perpendicular(_marked(beside, depth), angle, (_marked(feet[0], depth - 1), _marked(feet[1], depth - 1)))
+    return Perpendicular(_marked(common, depth), angle, (_marked(feet[0], depth - 1), _marked(feet[1], depth - 1)))
 
 
 def _size(a: Vector3) -> Number:

@@ -45,13 +45,13 @@ class Traced:
 
 def namespace(*numbers: Number) -> Any:
     """Functions (`sin`, `sqrt`, `hypot`, `where`, …) for the most general kind among `numbers`."""
-    found: Any = np
+    library: Any = np
     for number in numbers:
         if isinstance(number, Dual):
             return dual_functions
         if not isinstance(number, (np.ndarray, float, int)) and hasattr(number, "__array_namespace__"):
-            found = number.__array_namespace__()
-    return found
+            library = number.__array_namespace__()
+    return library
 
 
 def apart(lanes: Number) -> bool:

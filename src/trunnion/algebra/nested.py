@@ -23,7 +23,7 @@ def each(value: _Nested, change: Callable[[Number], Number]) -> _Nested:
 def _each(value: Any, change: Callable[[Number], Number]) -> Any:
     if not isinstance(value, tuple):
         return change(value)
-    parts = [_each(one, change) for one in value]
+    parts = [_each(part, change) for part in value]
     return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
 
 
@@ -36,21 +36,21 @@ def _zipped(change: Callable[..., Number], *values: Any) -> Any:
     first = values[0]
     if not isinstance(first, tuple):
         return change(*values)
-    parts = [_zipped(change, *one) for one in zip(*values, strict=True)]
+    parts = [_zipped(change, *group) for group in zip(*values, strict=True)]
     return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)
 
 
 def flat(value: Any) -> Iterator[Number]:
     """Every number of a tuple of tuples."""
     if isinstance(value, tuple):
-        for one in value:
-            yield from flat(one)
+        for part in value:
+            yield from flat(part)
     else:
         yield value
 
 
 def replaced(number: Number, lanes: NDArray[np.bool_], new: Number) -> NDArray[np.float64]:
     """The number in the shape of `lanes`, with others in the lanes that are chosen."""
-    whole = np.array(np.broadcast_to(number, lanes.shape), float)
-    whole[lanes] = new
-    return whole
+    full = np.array(np.broadcast_to(number, lanes.shape), float)
+    full[lanes] = new
+    return full

@@ -76,8 +76,8 @@ def selected(condition: Any, number: Number, other: Any) -> Number:
 def weighted(number: Number, weights: Number) -> Number:
     """Mean over panels of a number at the Gauss nodes, (lane, panel, node), each with its weight of time."""
     parts = linear(number * weights, lambda array: np.sum(array @ GAUSS_WEIGHTS, axis=-1))
-    whole = linear(weights, lambda array: np.sum(np.broadcast_to(array, np.shape(primal(number))) @ GAUSS_WEIGHTS, -1))
-    return parts / whole
+    total = linear(weights, lambda array: np.sum(np.broadcast_to(array, np.shape(primal(number))) @ GAUSS_WEIGHTS, -1))
+    return parts / total
 
 
 def spread_out(coefficients: Array, low: Array, half: Array, time: Array) -> Array:
@@ -85,7 +85,7 @@ def spread_out(coefficients: Array, low: Array, half: Array, time: Array) -> Arr
 
     low, half: starts and half widths of the panels, (lane, panel), one lane if they are those of all.
     """
-    found, near = np.full((*coefficients.shape[:2], len(time)), np.nan), 1e-12 * np.ptp(time)
+    values, near = np.full((*coefficients.shape[:2], len(time)), np.nan), 1e-12 * np.ptp(time)
     width = 2.0 * half
     first, last = np.searchsorted(time, [np.min(low, axis=0) - near, np.max(low + width, axis=0) + near])
     shared = np.all((low == low[0]) & (width == width[0]), axis=0)
@@ -93,24 +93,24 @@ def spread_out(coefficients: Array, low: Array, half: Array, time: Array) -> Arr
     for k in np.flatnonzero((last > first) & np.any(width > 0.0, axis=0)):
         part = slice(first[k], last[k])
         if shared[k]:
-            found[..., part] = coefficients[:, :, k] @ _basis((time[part] - low[0, k]) * scale[0, k] - 1.0)
+            values[..., part] = coefficients[:, :, k] @ _basis((time[part] - low[0, k]) * scale[0, k] - 1.0)
             continue
         spot = (time[part] - low[:, k, None]) * scale[:, k, None] - 1.0
         inside = np.abs(spot) <= 1.0 + 1e-9
-        found[..., part] = np.where(inside, _clenshaw(coefficients[:, :, k], spot), found[..., part])
-    return found
+        values[..., part] = np.where(inside, _clenshaw(coefficients[:, :, k], spot), values[..., part])
+    return values
 
 
-def _clenshaw(own: Array, spot: Array) -> Array:
+def _clenshaw(coefficients: Array, spot: Array) -> Array:
     """Values of polynomials, (row, lane, coefficient), at spots of each lane, (lane, place)."""
-    twice, after = 2.0 * spot, np.zeros(np.broadcast_shapes((*own.shape[:-1], 1), spot.shape))
-    value, new = after + own[..., -1:], np.empty_like(after)
+    twice, after = 2.0 * spot, np.zeros(np.broadcast_shapes((*coefficients.shape[:-1], 1), spot.shape))
+    value, new = after + coefficients[..., -1:], np.empty_like(after)
     for k in range(ORDER - 2, 0, -1):
         np.multiply(twice, value, out=new)
         new -= after
-        new += own[..., k, None]
+        new += coefficients[..., k, None]
         after, value, new = value, new, after
-    return np.asarray(own[..., :1] + spot * value - after)
+    return np.asarray(coefficients[..., :1] + spot * value - after)
 
 
 class OnGrid(NamedTuple):
@@ -162,11 +162,11 @@ def extreme(
     lane, panel = np.nonzero(known[:, None] & (tops >= (high - NEAR * (high - low))[:, None]))
     middle = GRID[np.clip(np.argmax(sign * grid.values[lane, panel], axis=1), 1, len(GRID) - 2)]
     width, pairs = np.full(len(lane), CELL), linear(coefficients, lambda array: array[:, lane, panel])
-    own = np.asarray(_fitted(primal(pairs), of, sign, middle, width))
-    middle, width = _narrowed(primal(pairs), of, sign, (own, middle, width))
+    rows = np.asarray(_fitted(primal(pairs), of, sign, middle, width))
+    middle, width = _narrowed(primal(pairs), of, sign, (rows, middle, width))
     if np.any(width < CELL):
-        own = np.asarray(_fitted(primal(pairs), of, sign, middle, width))
-    spot, value, level = _top(own)
+        rows = np.asarray(_fitted(primal(pairs), of, sign, middle, width))
+    spot, value, level = _top(rows)
     best = np.maximum.reduceat(value, np.searchsorted(lane, np.flatnonzero(known))) if len(lane) else value
     most = np.full(len(tops), np.nan)
     most[known] = best
@@ -178,31 +178,31 @@ def extreme(
     first[known] = _first(lane, value >= most[lane] - slack)
     pick = first
     if isinstance(pairs, Dual):
-        slopes = np.broadcast_to(derivative(_fitted(pairs, of, sign, middle, width)), own.shape)
+        slopes = np.broadcast_to(derivative(_fitted(pairs, of, sign, middle, width)), rows.shape)
         changes = _at(slopes, spot)
         tied = value >= (most - flat - TIED * (high - low))[lane]
         larger = np.lexsort((-np.abs(changes), ~tied, lane)) if len(lane) else lane
         pick = first.copy()
         pick[known] = larger[np.searchsorted(lane, np.flatnonzero(known))]
-        slope, rate, bend = _at(slopes @ RATE, spot), _at(own @ RATE, spot), _at(own @ RATE @ RATE, spot)
+        slope, rate, bend = _at(slopes @ RATE, spot), _at(rows @ RATE, spot), _at(rows @ RATE @ RATE, spot)
         still = ~constant & (bend < 0.0) & (np.abs(rate) <= STILL * np.abs(bend))  # also at an edge that is no break
         place = Dual(place, width * np.where(still, -slope / np.where(bend == 0.0, 1.0, bend), 0.0))
-        taken: Number = Dual(sign * most, _picked(sign * changes, pick, known))
+        reached: Number = Dual(sign * most, _picked(sign * changes, pick, known))
     else:
-        taken = sign * most
+        reached = sign * most
     panels = np.where(known, _picked(panel.astype(float), first, known), 0)
     return Top(
-        taken,
+        reached,
         panels.astype(np.intp),
         linear(place, lambda array: _picked(array, first, known)),
         known & (high - low <= flat),
     )
 
 
-def _picked(array: Array, pick: NDArray[np.intp], known: NDArray[np.bool_]) -> Array:
-    found = np.full(len(pick), np.nan)
-    found[known] = array[pick[known]]
-    return found
+def _picked(array: Array, pick: NDArray[np.intp], finite: NDArray[np.bool_]) -> Array:
+    values = np.full(len(pick), np.nan)
+    values[finite] = array[pick[finite]]
+    return values
 
 
 def _first(lane: NDArray[np.intp], good: NDArray[np.bool_]) -> NDArray[np.intp]:
@@ -221,18 +221,18 @@ def _fitted(pairs: Number, of: Made, sign: float, middle: Array, width: Array) -
 def _narrowed(pairs: Array, of: Made, sign: float, first: tuple[Array, Array, Array]) -> tuple[Array, Array]:
     """Spots and widths about them within which a number is a polynomial, or that are very narrow: it may have a corner
     at its top, as the size of a vector that passes zero."""
-    own, middle, width = first
+    rows, middle, width = first
     middle, width, left = middle.copy(), width.copy(), np.arange(len(middle))
     for _ in range(NARROWED):
-        size = ROUGH * np.max(np.abs(own[:, 1:]), axis=1) + ROUNDING * np.abs(own[:, 0])
-        rough = np.max(np.abs(own[:, -2:]), axis=1) > size
-        left, own = left[rough], own[rough]
+        size = ROUGH * np.max(np.abs(rows[:, 1:]), axis=1) + ROUNDING * np.abs(rows[:, 0])
+        rough = np.max(np.abs(rows[:, -2:]), axis=1) > size
+        left, rows = left[rough], rows[rough]
         if not len(left):
             break
-        best = np.clip(np.argmax(own @ ON_POINTS, axis=1), 1, ORDER - 2)
+        best = np.clip(np.argmax(rows @ ON_POINTS, axis=1), 1, ORDER - 2)
         low, high = (middle[left] + width[left] * POINTS[best + k] for k in (-1, 1))
         middle[left], width[left] = (low + high) / 2, (high - low) / 2
-        own = np.asarray(_fitted(pairs[:, left], of, sign, middle[left], width[left]))
+        rows = np.asarray(_fitted(pairs[:, left], of, sign, middle[left], width[left]))
     return middle, width
 
 
@@ -241,32 +241,32 @@ def _at(coefficients: Array, spot: Array) -> Array:
     return np.asarray(np.einsum("ce,ec->e", _basis(spot), coefficients))
 
 
-def _top(own: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+def _top(coefficients: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Spot and value of the largest value of polynomials that have one top, and whether they are level there."""
-    lead = own[:, :LEADING]  # what is about a top is a parabola and little more
+    lead = coefficients[:, :LEADING]  # what is about a top is a parabola and little more
     slope, bend = lead @ RATE[:LEADING, :LEADING], lead @ (RATE @ RATE)[:LEADING, :LEADING]
-    spot = POINTS[np.argmax(own @ ON_POINTS, axis=1)]
+    spot = POINTS[np.argmax(coefficients @ ON_POINTS, axis=1)]
     for _ in range(NEWTONS):
         basis = _basis(spot, LEADING)
         rate, second = np.einsum("ce,ec->e", basis, slope), np.einsum("ce,ec->e", basis, bend)
         step = np.where(second < 0.0, -rate / np.where(second < 0.0, second, 1.0), np.sign(rate))
         spot = np.clip(spot + np.clip(step, -0.5, 0.5), -1.0, 1.0)
     level = (np.abs(spot) < 1.0) & (np.abs(step) < SETTLED)
-    ends = own @ ENDS
-    value, at_ends = _at(own, spot), np.max(ends, axis=1)
+    ends = coefficients @ ENDS
+    value, at_ends = _at(coefficients, spot), np.max(ends, axis=1)
     spot = np.where(at_ends > value, np.where(ends[:, 1] >= ends[:, 0], 1.0, -1.0), spot)
     return spot, np.maximum(value, at_ends), level & (value >= at_ends)
 
 
 def _basis(spot: Array, count: int = ORDER) -> Array:
     """Chebyshev polynomials at spots, one after the other along a new first axis."""
-    found = np.empty((count, *spot.shape))
-    found[0], found[1] = 1.0, spot
+    basis = np.empty((count, *spot.shape))
+    basis[0], basis[1] = 1.0, spot
     twice = 2.0 * spot
     for k in range(2, count):
-        np.multiply(twice, found[k - 1], out=found[k])
-        found[k] -= found[k - 2]
-    return found
+        np.multiply(twice, basis[k - 1], out=basis[k])
+        basis[k] -= basis[k - 2]
+    return basis
 
 
 # ---- shares above a level -------------------------------------------------------------------------------------
@@ -274,8 +274,8 @@ def _basis(spot: Array, count: int = ORDER) -> Array:
 
 def above(coefficients: Number, level: float) -> Number:
     """How much of every panel, of the length 2 of its spots, a number, (lane, panel, coefficient), is above a level."""
-    own = coefficients - level * (np.arange(ORDER) == 0)
-    real = np.asarray(primal(own))
+    shifted = coefficients - level * (np.arange(ORDER) == 0)
+    real = np.asarray(primal(shifted))
     values: Array = real @ ON_GRID
     up = values >= 0.0
     share = CELL * np.sum(up[..., 1:] & up[..., :-1], axis=-1).astype(float)
@@ -284,16 +284,16 @@ def above(coefficients: Number, level: float) -> Number:
         spot = _crossed(real[lane, panel], low, high)
         falls = up_at(real[lane, panel], low)
         np.add.at(share, (lane, panel), np.where(falls, spot - low, high - spot) - full)
-        if isinstance(own, Dual):
+        if isinstance(shifted, Dual):
             slope = np.abs(_at(real[lane, panel] @ RATE, spot))
-            np.add.at(moved, (lane, panel), _at(np.broadcast_to(own.dual, real.shape)[lane, panel], spot) / slope)
+            np.add.at(moved, (lane, panel), _at(np.broadcast_to(shifted.dual, real.shape)[lane, panel], spot) / slope)
     share = np.where(np.any(np.isnan(values), axis=-1), np.nan, share)
-    return Dual(share, moved) if isinstance(own, Dual) else share
+    return Dual(share, moved) if isinstance(shifted, Dual) else share
 
 
-def up_at(own: Array, spot: Array) -> NDArray[np.bool_]:
+def up_at(coefficients: Array, spot: Array) -> NDArray[np.bool_]:
     """Whether polynomials are above 0 at their spots."""
-    return _at(own, spot) >= 0.0
+    return _at(coefficients, spot) >= 0.0
 
 
 def _crossings(real: Array, values: Array, up: NDArray[np.bool_]) -> Any:
@@ -321,15 +321,15 @@ def _crossings(real: Array, values: Array, up: NDArray[np.bool_]) -> Any:
         yield lane, panel, place, GRID[middle + 2], counted * (GRID[middle + 2] - place)
 
 
-def _crossed(own: Array, low: Array, high: Array) -> Array:
+def _crossed(coefficients: Array, low: Array, high: Array) -> Array:
     """Where polynomials pass 0 between two spots."""
-    before = up_at(own, low)
+    before = up_at(coefficients, low)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        same = up_at(own, middle) == before
+        same = up_at(coefficients, middle) == before
         low, high = np.where(same, middle, low), np.where(same, high, middle)
     spot = 0.5 * (low + high)
     for _ in range(NEWTONS):
-        slope = _at(own @ RATE, spot)
-        spot = np.clip(spot - _at(own, spot) / np.where(slope == 0.0, np.inf, slope), low, high)
+        slope = _at(coefficients @ RATE, spot)
+        spot = np.clip(spot - _at(coefficients, spot) / np.where(slope == 0.0, np.inf, slope), low, high)
     return spot

@@ -120,9 +120,9 @@ def turned(frame: Frame, angle: Number) -> Frame:
     return Frame(frame.x, frame.y, *turned_vector(xp.cos(angle), xp.sin(angle), frame.c, frame.s))
 
 
-def slid(frame: Frame, way: Number) -> Frame:
+def slid(frame: Frame, distance: Number) -> Frame:
     """The frame moved along its own x axis."""
-    return Frame(frame.x + frame.c * way, frame.y + frame.s * way, frame.c, frame.s)
+    return Frame(frame.x + frame.c * distance, frame.y + frame.s * distance, frame.c, frame.s)
 
 
 def distance(a: Frame, b: Frame) -> Number:

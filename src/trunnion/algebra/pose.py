@@ -68,12 +68,12 @@ def frame(point: Vector3, x: Vector3, z: Vector3) -> Matrix3:
 def pose(rotation: Matrix3, point: Vector3) -> Matrix3:
     """R + ε [p]× R of a rotation matrix R and a point p, m."""
     columns = transpose(rotation)
-    return transpose(cast(Matrix3, tuple(spatial_vector(one, cross(point, one)) for one in columns)))
+    return transpose(cast(Matrix3, tuple(spatial_vector(column, cross(point, column)) for column in columns)))
 
 
 def rotation_and_point(a: Matrix3) -> tuple[Matrix3, Vector3]:
     """R and p of a pose: p is half the sum of u × m over its columns u + ε m."""
-    columns = [vector_parts(one) for one in transpose(a)]
+    columns = [vector_parts(column) for column in transpose(a)]
     total = plus(plus(cross(*columns[0]), cross(*columns[1])), cross(*columns[2]))
     rotation = transpose(cast(Matrix3, tuple(u for u, _ in columns)))
     return rotation, scaled(0.5, total)
@@ -89,9 +89,9 @@ def inverse(a: Matrix3) -> Matrix3:
     return transpose(a)
 
 
-def transform(a: Matrix3, one: Vector3) -> Vector3:
+def transform(a: Matrix3, v: Vector3) -> Vector3:
     """Â v̂: a line, screw, twist or wrench of the moved frame, in the frame it was moved from."""
-    return apply(a, one)
+    return apply(a, v)
 
 
 def moved_point(a: Matrix3, point: Vector3) -> Vector3:

@@ -78,8 +78,8 @@ def log(pose: Matrix3) -> Vector3:
     )
     cosine = 0.5 * (pose[0][0] + pose[1][1] + pose[2][2] - 1)
     obtuse = np.less(primal(cosine), OBTUSE)
-    found = scaled(_acute(axis, cosine, obtuse), axis)
-    return where(obtuse, _obtuse(pose, axis, cosine, obtuse), found) if np.any(obtuse) else found
+    vector = scaled(_acute(axis, cosine, obtuse), axis)
+    return where(obtuse, _obtuse(pose, axis, cosine, obtuse), vector) if np.any(obtuse) else vector
 
 
 def _acute(axis: Vector3, cosine: Number, obtuse: Number) -> Number:

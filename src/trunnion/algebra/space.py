@@ -89,8 +89,8 @@ def relative(far: Frame, local: Frame) -> Frame:
     """The frame in which `local` is where `far` is: far ∘ local⁻¹."""
     columns = transpose((local.x, local.y, local.z))  # rows of Rᵀ, that is: columns of the inverse's rotation
     x, y, z = (rotated(far, column) for column in columns)
-    found = Frame(x, y, z, NULL)
-    return found._replace(place=vector_minus(far.place, rotated(found, local.place)))
+    frame = Frame(x, y, z, NULL)
+    return frame._replace(place=vector_minus(far.place, rotated(frame, local.place)))
 
 
 def turned(frame: Frame, angle: Number) -> Frame:
@@ -101,9 +101,9 @@ def turned(frame: Frame, angle: Number) -> Frame:
     return frame._replace(x=plus(scaled(c, x), scaled(s, y)), y=vector_minus(scaled(c, y), scaled(s, x)))
 
 
-def slid(frame: Frame, way: Number) -> Frame:
+def slid(frame: Frame, distance: Number) -> Frame:
     """The frame moved along its own z."""
-    return frame._replace(place=plus(frame.place, scaled(way, frame.z)))
+    return frame._replace(place=plus(frame.place, scaled(distance, frame.z)))
 
 
 def element(place: Vector3, axis: Vector3, x: Vector3 | None) -> Frame:
@@ -113,11 +113,11 @@ def element(place: Vector3, axis: Vector3, x: Vector3 | None) -> Frame:
     """
     z = _unit(axis)
     if x is None:
-        beside = np.asarray(np.abs(primal(z[0])) > 0.999)
-        if np.all(beside == np.ravel(beside)[0]):
-            x = (0.0, 1.0, 0.0) if np.ravel(beside)[0] else (1.0, 0.0, 0.0)
+        upright = np.asarray(np.abs(primal(z[0])) > 0.999)
+        if np.all(upright == np.ravel(upright)[0]):
+            x = (0.0, 1.0, 0.0) if np.ravel(upright)[0] else (1.0, 0.0, 0.0)
         else:
-            x = (np.where(beside, 0.0, 1.0), np.where(beside, 1.0, 0.0), 0.0)
+            x = (np.where(upright, 0.0, 1.0), np.where(upright, 1.0, 0.0), 0.0)
     x = vector_minus(x, scaled(dot(x, z), z))
     x = _unit(x)
     return Frame(x, cross(z, x), z, place)

@@ -47,8 +47,8 @@ class Spline(NamedTuple):
         row = list(self.rows[0])
         xp = namespace(place, *(number for numbers in self.rows for number in numbers))
         for later in self.rows[1:]:
-            beyond = primal(place) >= primal(later[0])
-            row = [old if new is old else xp.where(beyond, new, old) for new, old in zip(later, row, strict=True)]
+            after = primal(place) >= primal(later[0])
+            row = [old if new is old else xp.where(after, new, old) for new, old in zip(later, row, strict=True)]
         return row
 
 
@@ -74,11 +74,11 @@ def look_up(
     low, extent = knots[0], knots[-1] - knots[0]
     if periodic:
         place = place - extent * np.floor(primal((place - low) / extent))
-    found = _through(knots, values, ("periodic" if periodic else "natural") if smooth else None).at(place)[0]
+    value = _through(knots, values, ("periodic" if periodic else "natural") if smooth else None).at(place)[0]
     if periodic:
-        return found
-    beside = primal((place - low) / extent)
-    return namespace(found).where((beside >= -SLACK) & (beside <= 1 + SLACK), found, np.nan)
+        return value
+    share = primal((place - low) / extent)
+    return namespace(value).where((share >= -SLACK) & (share <= 1 + SLACK), value, np.nan)
 
 
 def _through(knots: Sequence[Number], values: Sequence[Number], ends: Ends | None) -> Spline:
@@ -90,8 +90,8 @@ def _through(knots: Sequence[Number], values: Sequence[Number], ends: Ends | Non
 
 @functools.lru_cache(maxsize=64)
 def _plain(knots: tuple[float, ...], values: tuple[float, ...], ends: Ends | None) -> Spline:
-    found = _fitted(knots, values, ends)
-    return found._replace(table=np.array(found.rows).T.copy())
+    spline = _fitted(knots, values, ends)
+    return spline._replace(table=np.array(spline.rows).T.copy())
 
 
 def _fitted(knots: Sequence[Number], values: Sequence[Number], ends: Ends | None) -> Spline:

@@ -108,11 +108,11 @@ def apply(a: Matrix3, v: Vector3) -> Vector3:
 
 def product(first: Matrix3, *others: Matrix3) -> Matrix3:
     """A B …; of poses one after the other, each in the frame reached so far."""
-    found = first
+    matrix = first
     for other in others:
         columns = transpose(other)
-        found = cast(Matrix3, tuple(_row(row, columns) for row in found))
-    return found
+        matrix = cast(Matrix3, tuple(_row(row, columns) for row in matrix))
+    return matrix
 
 
 def _row(row: Vector3, columns: Sequence[Vector3]) -> Vector3:

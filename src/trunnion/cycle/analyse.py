@@ -65,10 +65,10 @@ def analyse(
     Raises MechanismError if the structure does not determine the motion, `steps` is out of range, a variable is
     unknown, the engine cannot do the mechanism, or there is no file for what is said of tables.
     """
-    kept = Kept.read(variables, dtype)
+    selection = Kept.read(variables, dtype)
     paths = [out] if isinstance(out, (str, os.PathLike)) else out
     saved = {"units_row": units_row, "columns": columns, "units": units}
-    return analysed(mechanism, steps, friction_method, progress, engine, kept, paths, saved, at).dataset
+    return analysed(mechanism, steps, friction_method, progress, engine, selection, paths, saved, at).dataset
 
 
 @strict_arguments
@@ -79,7 +79,7 @@ def analysed(
     method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
     engine: Engine = "auto",
-    kept: Kept = ALL,
+    selection: Kept = ALL,
     out: Sequence[str | os.PathLike[str]] = (),
     saved: Mapping[str, Any] | None = None,
     at: float | str | None = None,
@@ -98,8 +98,10 @@ def analysed(
         for path in out:
             check_format(path)
     time = None if at is None else _time(run, at)
-    found = positions(run, steps, method, progress, kept.margin, engine=engine, wanted=kept.variables, at=time)
-    result = result_of(run, found, kept)
+    found = positions(
+        run, steps, method, progress, selection.margin, engine=engine, wanted=selection.variables, at=time
+    )
+    result = result_of(run, found, selection)
     for path in out:
         from trunnion.results.export import save
 
@@ -134,13 +136,13 @@ def drawable(mechanism: Mechanism) -> xr.Dataset:
     """
     bare = mechanism.with_friction("off")
     run = prepare(bare.with_seats("free") if bare.seated else bare)
-    found = positions(run, DRAWN, margin=False, averaged=False)
-    arrays = {name: array for name, array in found.arrays.items() if not name.startswith("reaction_")}
+    places = positions(run, DRAWN, margin=False, averaged=False)
+    arrays = {name: array for name, array in places.arrays.items() if not name.startswith("reaction_")}
     attributes = {
         **origin(mechanism, run.system.plan.formula, mobility=run.system.plan.mobility),
         "scene": scene_of(run),
         "periodic": int(run.cycle.periodic),
     }
-    along = driven(found.time, *found.dial)
+    along = driven(places.time, *places.dial)
     units = member_units(run.system)
-    return results.dataset(arrays, found.labels, along, found.means, attributes, units, found.ideal)
+    return results.dataset(arrays, places.labels, along, places.means, attributes, units, places.ideal)

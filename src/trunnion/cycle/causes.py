@@ -99,7 +99,9 @@ def _shortfalls(walk: Forward, number: int) -> dict[str, Number]:
     b, c, d = module.joints
     if module.kind == "RRR":
         (pin_b, b_i), (c_i, c_j), (pin_d, d_j) = walk.pairs(walk.system.places[number])
-        gap, bc, cd = (np.hypot(two.x - one.x, two.y - one.y) for one, two in ((pin_b, pin_d), (b_i, c_i), (c_j, d_j)))
+        gap, bc, cd = (
+            np.hypot(two.x - first.x, two.y - first.y) for first, two in ((pin_b, pin_d), (b_i, c_i), (c_j, d_j))
+        )
         return {
             f"|{b}{d}| exceeds {b}{c} + {c}{d}": gap - (bc + cd),
             f"|{b}{d}| falls short of |{b}{c} − {c}{d}|": np.abs(bc - cd) - gap,

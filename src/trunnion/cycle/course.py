@@ -163,10 +163,10 @@ class CycleCourse:
         """
         edges, open_ = self.courses.edges, np.concatenate([[1], self.status == Status.NOT_ASSEMBLED, [1]])
         changes = np.flatnonzero(np.diff(open_))
-        found = [(float(edges[a]), float(edges[b]), a == 0) for a, b in changes.reshape(-1, 2)]
-        if len(found) > 1 and self.run.cycle.periodic and not (open_[1] or open_[-2]):
-            found = [(found[-1][0], found[0][1], True), *found[1:-1]]
-        return found
+        spans = [(float(edges[a]), float(edges[b]), a == 0) for a, b in changes.reshape(-1, 2)]
+        if len(spans) > 1 and self.run.cycle.periodic and not (open_[1] or open_[-2]):
+            spans = [(spans[-1][0], spans[0][1], True), *spans[1:-1]]
+        return spans
 
     @cached_property
     def reached(self) -> NDArray[np.bool_]:
@@ -277,9 +277,9 @@ class CycleCourse:
             return 0.0
         if not place.at_break:
             return place.time
-        beside = np.clip(place.time + SIDE * self.courses.span * np.array([-1.0, 1.0]), 0.0, self.courses.edges[-1])
-        values = sign * self.courses.at(beside)[self._places[name].start]
-        return float(beside[np.argmax(np.where(np.isfinite(values), values, -np.inf))])
+        both_sides = np.clip(place.time + SIDE * self.courses.span * np.array([-1.0, 1.0]), 0.0, self.courses.edges[-1])
+        values = sign * self.courses.at(both_sides)[self._places[name].start]
+        return float(both_sides[np.argmax(np.where(np.isfinite(values), values, -np.inf))])
 
     @cached_property
     def means(self) -> Means:
@@ -396,8 +396,8 @@ class _Looking:
 
     def _filled(self, back: Backward, time: Array) -> Arrays:
         """The variables of a walk at times, s."""
-        wanted = {*self._names, "status", *(COMPARED if self.errs else ())}
-        arrays = allocate(self.run.system, len(time), ["errors"] if self.errs else [], wanted)
+        names = {*self._names, "status", *(COMPARED if self.errs else ())}
+        arrays = allocate(self.run.system, len(time), ["errors"] if self.errs else [], names)
         fill_chunk(arrays, back, time, slice(None))
         if "end_load" in self._names:  # what a joint does not have is no gap in a course
             for i, joint in enumerate(self.run.system.joints):
@@ -434,7 +434,7 @@ def like(run: Run, shapes: Mapping[str, tuple[int, ...]], sizes: Array) -> Array
     for name in ("drive_effort", "drive_effort_change"):
         units[names == name] = np.where(turning, scales.length, 1.0)[: np.count_nonzero(names == name)]
     forces, powers = np.isin(names, FORCES), np.isin(names, (*POWERS, SUPPOSED))
-    found = np.where(names == "joint_rotation_error", 1.0, scales.length)
-    found[forces] = units[forces] * np.max(sizes[forces] / units[forces], initial=scales.force)
-    found[powers] = np.max(sizes[powers], initial=scales.force * scales.length * scales.rate)
-    return found
+    size_of_each = np.where(names == "joint_rotation_error", 1.0, scales.length)
+    size_of_each[forces] = units[forces] * np.max(sizes[forces] / units[forces], initial=scales.force)
+    size_of_each[powers] = np.max(sizes[powers], initial=scales.force * scales.length * scales.rate)
+    return size_of_each

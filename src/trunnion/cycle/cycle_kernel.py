@@ -104,8 +104,8 @@ class CycleKernel:
         shape = arrays["status"].shape if several else (1, *arrays["status"].shape)
         doubtful, curves = np.empty(shape, bool), {}
         for name, (variable, place) in self._names.items():
-            whole = arrays[variable].dtype != float
-            curves[name] = np.empty(shape) if whole else arrays[variable][place].reshape(shape)
+            flags = arrays[variable].dtype != float
+            curves[name] = np.empty(shape) if flags else arrays[variable][place].reshape(shape)
         self._kernel.fill(values, time, Lanes(curves, arrays["status"].reshape(shape), doubtful))
         for name, (variable, place) in self._names.items():
             if arrays[variable].dtype != float:
@@ -151,8 +151,8 @@ def kernel_of(
             return None
 
     read = tuple(name for name, array in arrays.items() if array.strides[-1])
-    known = frozenset(literals(values).items())  # what is 0 with these is left out
-    return run.once(("compiled", engine, method, read, known), made)
+    constants = frozenset(literals(values).items())  # what is 0 with these is left out
+    return run.once(("compiled", engine, method, read, constants), made)
 
 
 def compiles(engine: str, run: Run, positions: int, method: FrictionMethod | None = None) -> bool:
@@ -183,7 +183,7 @@ def _weight(run: Run, method: FrictionMethod) -> float:
         with np.errstate(all="ignore"):
             back = run.solve(run.cycle.times(PROBED), method=replace(method, margin_up_to=0.0))
             problems = [settled.problem for settled in back.settled if settled.problem is not None]
-            shares = [np.mean(np.asarray(one.bound()) * method.margin_up_to >= 1.0) for one in problems]
+            shares = [np.mean(np.asarray(problem.bound()) * method.margin_up_to >= 1.0) for problem in problems]
         return float(max(shares, default=0.0))
 
     return 1.0 + MARGIN_WEIGHT * run.once(("margins followed", method), share)
@@ -210,35 +210,35 @@ class Many:
         ideal: Values | None,
         time: NDArray[np.float64],
         shape: tuple[int, int],
-        wanted: Collection[str],
+        variables: Collection[str],
         method: FrictionMethod,
         quick: FrictionMethod,
     ) -> tuple[Arrays, Arrays]:
         """Variables of `results` by name, (…, mechanism, position); the same of the mechanisms without errors.
 
         values: every number, (mechanism, 1) where they vary; ideal: without errors, if any has some; the first arrays
-        then hold the differences too. time: (mechanism, position) or (position,), s; wanted: what will be read, of the
-        rest there is nothing. method, quick: for the mechanisms and for those without errors.
+        then hold the differences too. time: (mechanism, position) or (position,), s; variables: the only ones that are
+        filled. method, quick: for the mechanisms and for those without errors.
         """
         if ideal is None:
-            return self.arrays(values, time, shape, wanted, method), {}
-        wanted, parts = {*wanted, *COMPARED}, ["errors"]
-        own = self.arrays(values, time, shape, wanted, method, parts)
-        meant = self.arrays(ideal, time, shape, wanted, quick, parts)
-        fill_errors(own, meant, self.run.system, slice(None))
-        return own, meant
+            return self.arrays(values, time, shape, variables, method), {}
+        variables, parts = {*variables, *COMPARED}, ["errors"]
+        arrays_filled = self.arrays(values, time, shape, variables, method, parts)
+        meant = self.arrays(ideal, time, shape, variables, quick, parts)
+        fill_errors(arrays_filled, meant, self.run.system, slice(None))
+        return arrays_filled, meant
 
     def arrays(
         self,
         values: Values,
         time: NDArray[np.float64],
         shape: tuple[int, int],
-        wanted: Collection[str],
+        variables: Collection[str],
         method: FrictionMethod,
         parts: Sequence[str] = (),
     ) -> Arrays:
         """Variables by name, and the condition of every module."""
-        flat = allocate(self.run.system, shape[0] * shape[1], parts, {*wanted, "status"})
+        flat = allocate(self.run.system, shape[0] * shape[1], parts, {*variables, "status"})
         arrays = {name: array.reshape(*array.shape[:-1], *shape) for name, array in flat.items()}
         arrays[CONDITIONS] = np.zeros((len(self.run.system.plan.modules), *shape))
         kernel = kernel_of(self.run, self.engine, values, time, arrays, method) if self.compiled else None
@@ -264,9 +264,12 @@ class Many:
             shapes.update(again)
             return rows, arrays["status"]
 
-        every = [bends(one) for one in (of, without) if one is not None]
-        breaks = [breaks_between(cycle, np.concatenate(own)) for cycle, *own in zip(of.cycles, *every, strict=True)]
+        every = [bends(item) for item in (of, without) if item is not None]
+        breaks = [
+            breaks_between(cycle, np.concatenate(breaks_each))
+            for cycle, *breaks_each in zip(of.cycles, *every, strict=True)
+        ]
         accuracy = accuracy_of(self.run.cycle, Accuracy())
         with np.errstate(all="ignore"):
             found = Courses.many(look, breaks, lambda sizes: like(self.run, shapes, sizes), accuracy)
-        return [CycleCourse(self.run, shapes, one) for one in found]
+        return [CycleCourse(self.run, shapes, item) for item in found]

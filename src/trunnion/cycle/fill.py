@@ -139,9 +139,9 @@ def fill_joint(arrays: Into, walk: SpatialWalk, i: int, joint: str, window: slic
                 for suffix, value in zip(("", "_velocity", "_acceleration"), values, strict=True):
                     arrays[name + suffix][i, window] = value
         return
-    (first, second), (one, two) = walk.system.joints[joint][1], walk.ends(joint)
-    turn = scaled(0.5, plus(plus(cross(one.x, two.x), cross(one.y, two.y)), cross(one.z, two.z)))
-    cosine = 0.5 * (dot(one.x, two.x) + dot(one.y, two.y) + dot(one.z, two.z) - 1)
+    (first, second), (first_end, two) = walk.system.joints[joint][1], walk.ends(joint)
+    turn = scaled(0.5, plus(plus(cross(first_end.x, two.x), cross(first_end.y, two.y)), cross(first_end.z, two.z)))
+    cosine = 0.5 * (dot(first_end.x, two.x) + dot(first_end.y, two.y) + dot(first_end.z, two.z) - 1)
     spin = walk.against(joint).u
     change = tuple(
         b - a for a, b in zip(walk.motions[first].acceleration.u, walk.motions[second].acceleration.u, strict=True)
@@ -261,11 +261,11 @@ def fill_seats(arrays: Into, back: Backward, window: slice) -> None:
 def _ends(seat: GivenSeat, vectors: Sequence[Vector], shared: bool = False) -> dict[int, list[Number]]:
     """Vectors of the ends at end 1 and 2; what is along the axis belongs to both, a force by halves."""
     keys = [key.split(".") for end in seat.play.model.ends for key in end]
-    found: dict[int, list[Number]] = {int(place) - 1: [0.0, 0.0, 0.0] for place, _ in keys if place != "3"}
+    loads: dict[int, list[Number]] = {int(place) - 1: [0.0, 0.0, 0.0] for place, _ in keys if place != "3"}
     for (place, axis), number in zip(keys, (number for vector in vectors for number in vector), strict=True):
-        for end in found if place == "3" else (int(place) - 1,):
-            found[end][AXES.index(axis)] = 0.5 * number if shared and place == "3" else number
-    return found
+        for end in loads if place == "3" else (int(place) - 1,):
+            loads[end][AXES.index(axis)] = 0.5 * number if shared and place == "3" else number
+    return loads
 
 
 def _describe(arrays: Into, i: int, window: slice, walk: Forward, seat: GivenSeat, ends: Mapping[int, Vector]) -> None:
@@ -281,15 +281,15 @@ def _describe(arrays: Into, i: int, window: slice, walk: Forward, seat: GivenSea
         beta, xi = describing(*((ends[end][1], 0.0) if guide else (ends[end][0], ends[end][1]) for end in (0, 1)))
     arrays["seat_beta"][i, window], arrays["seat_xi"][i, window] = beta, xi
     if walk.system.turns(seat.joint):
-        one, two = (walk.element(link, seat.joint) for link in walk.system.joints[seat.joint][1])
-        turn = walk.coordinate(seat.joint, one, two)
+        first_frame, two = (walk.element(link, seat.joint) for link in walk.system.joints[seat.joint][1])
+        turn = walk.coordinate(seat.joint, first_frame, two)
         arrays["seat_xi_pin"][i, window] = wrapped(xi + turn)
 
 
 def _contacts(walk: Forward, seat: GivenSeat, ends: Mapping[int, Vector]) -> dict[int, Vector]:
     """B₁ and B₂: on the wall of the hole in the direction of the offset; of a guide the ends of its axis."""
-    own, model = clearance(seat.joint, walk.values), seat.play.model
-    radius = walk.values.get(f"joints.{seat.joint}.pin.radius", np.nan) + (own if own is not None else 0.0)
+    gap, model = clearance(seat.joint, walk.values), seat.play.model
+    radius = walk.values.get(f"joints.{seat.joint}.pin.radius", np.nan) + (gap if gap is not None else 0.0)
     guide = model.size is not None and model.size[0] == "guide"
     half = 0.5 * seat.play.length if model.size is not None else 0.0
     places: dict[int, Vector] = {}
@@ -368,16 +368,16 @@ def fill_lanes(
 ) -> None:
     """The same of some positions, wherever they are: their numbers in the last dims of the arrays."""
     place: Any = (..., *lanes)
-    there = {name: array for name, array in arrays.items() if array.strides[-1]}
-    some = {name: array[place] for name, array in arrays.items()}
-    some |= {name: some[other] for name, other in results.SAME_AS.items() if name in some}
-    fill_chunk(some, back, time, slice(0, len(lanes[-1])))
+    varying = {name: array for name, array in arrays.items() if array.strides[-1]}
+    window = {name: array[place] for name, array in arrays.items()}
+    window |= {name: window[other] for name, other in results.SAME_AS.items() if name in window}
+    fill_chunk(window, back, time, slice(0, len(lanes[-1])))
     if causes:
-        causes.note(back, some["status"].astype(np.int8), lanes[-1])
-    for name, array in there.items():
+        causes.note(back, window["status"].astype(np.int8), lanes[-1])
+    for name, array in varying.items():
         # rows that stay as they are may be zeros that take no memory until they are written
-        for row in np.argwhere(np.any(some[name] != array[place], axis=-1)):
-            array[(*row, *lanes)] = some[name][tuple(row)]
+        for row in np.argwhere(np.any(window[name] != array[place], axis=-1)):
+            array[(*row, *lanes)] = window[name][tuple(row)]
 
 
 def write(arrays: Into, back: Backward, time: Number, window: slice) -> None:

@@ -144,8 +144,8 @@ def _far_hints(run: Run) -> Iterator[Finding]:
         if any(link in members and point not in ends for members, ends in spins):
             continue  # it may be anywhere about the line
         place = [float(np.ravel(primal(part))[0]) for part in walk.point(link, point).place]
-        stated = [float(run.values[f"assembly.{name}.{axis}"]) for axis in "xyz"[: len(place)]]
-        distance = float(np.linalg.norm(np.subtract(place, stated)))
+        numbers = [float(run.values[f"assembly.{name}.{axis}"]) for axis in "xyz"[: len(place)]]
+        distance = float(np.linalg.norm(np.subtract(place, numbers)))
         if distance > FAR * size:
             words = ", ".join(quantity(part, "m") for part in place)
             what = f"the hint for {name} is {readable(distance, 'm')} from where {name} is {when}"
@@ -164,7 +164,7 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     notes = list(mechanism.checked)
     values = mechanism.parameters()
     play = {name: clearance(name, values) for name in mechanism.effective_joints if name not in mechanism.seated}
-    playing = [name for name, own in play.items() if own is not None and own > 0]
+    playing = [name for name, gap in play.items() if gap is not None and gap > 0]
     bodies = {name: link for name, link in mechanism.effective_links.items() if name != mechanism.fixed_link}
     heavy = [name for name, link in bodies.items() if link.mass.source != 0]
     if heavy and mechanism.gravity is None:
@@ -194,8 +194,8 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
         notes.append(Finding.note("model.seat_without_play", "joints", what, remedy, joints=tight))
     if playing:
         # no seats are taken where links are over-constrained
-        held = {name for module in system.plan.modules if module.redundant for name in module.joints}
-        seatable = [name for name in playing if name not in held]
+        redundant_joints = {name for module in system.plan.modules if module.redundant for name in module.joints}
+        seatable = [name for name in playing if name not in redundant_joints]
         of = f" of {', '.join(seatable)}" if len(seatable) < len(playing) else ", or analyse with --seat loaded"
         remedy = f"for pins pressed to one side by their loads state seat: loaded{of}"
         if not seatable:
@@ -222,9 +222,9 @@ def shared_dimensions(mechanism: Mechanism) -> Iterator[Finding]:
         links = list(dict.fromkeys(path.split(".")[1] for path in used))
         if tolerance.path.startswith("dimensions.") and len(links) > 1:
             name = tolerance.path.removeprefix("dimensions.")
-            shown = [path.removeprefix("links.").replace(".points.", ".") for path in used]
-            more = f" and {len(shown) - MOST_PLACES} more" if len(shown) > MOST_PLACES else ""
-            what = f"one tolerance sets points of {', '.join(links)} ({', '.join(shown[:MOST_PLACES])}{more}): these "
+            names = [path.removeprefix("links.").replace(".points.", ".") for path in used]
+            more = f" and {len(names) - MOST_PLACES} more" if len(names) > MOST_PLACES else ""
+            what = f"one tolerance sets points of {', '.join(links)} ({', '.join(names[:MOST_PLACES])}{more}): these "
             what += "links deviate together, by the same amount"
             remedy = "if the links are made separately, give each a dimension of its own with its own tolerance"
             yield Finding.note("tolerance.shared_dimension", tolerance.path, what, remedy, name=name, links=links)
@@ -334,9 +334,9 @@ def _locked(cycle: Cycle) -> Iterator[Finding]:
         if cycle.locking is not None:
             states, responsible = cycle.locking.all_states(), cycle.locking.responsible
             if LockingState.JAMMED in states:
-                there = "locks at some of these positions too" if LockingState.LOCKED in states else "locks there too"
-                what += f"; driven backward it {there} (jammed)"
-                figures["reverse"] = there
+                also = "locks at some of these positions too" if LockingState.LOCKED in states else "locks there too"
+                what += f"; driven backward it {also} (jammed)"
+                figures["reverse"] = also
             if responsible and responsible[0] in module.joints:
                 figures |= {"decides": responsible[0], "multiple": responsible[1]}
                 alone = f"lower the coefficient of {responsible[0]} alone below {responsible[1]:.3g} times its value"
@@ -448,8 +448,8 @@ def _driving_resistances(cycle: Cycle) -> Iterator[Finding]:
         return
 
     def look(time: Array) -> list[Array]:
-        stated = Stated(stated_walk(run.system, run.values, run.chosen.assembly, time))
-        return [np.asarray(stated.get(path)) for path in paths]
+        steady = Stated(stated_walk(run.system, run.values, run.chosen.assembly, time))
+        return [np.asarray(steady.get(path)) for path in paths]
 
     courses = cycle.course_of(look)
     for row, path in enumerate(paths):
@@ -546,10 +546,10 @@ def _uncounted_work(cycle: Cycle) -> Iterator[Finding]:
     """A warning of an efficiency above 1, with the work of each source beside the drives; else notes of springs that
     keep work at the end of a range, and of loads that act beside the drive and supply work."""
     run, means, mechanism = cycle.run, cycle.at.means, cycle.mechanism
-    beside, useful = beside_the_drive(mechanism), useful_springs(mechanism)
+    on_drive, useful = beside_the_drive(mechanism), useful_springs(mechanism)
     storing = [name for name in mechanism.springs if name not in useful] if not run.cycle.periodic else []
     above = means.efficiency > 1 + ROUNDED + means.efficiency_error
-    if not (above or beside or storing) or run.cycle.duration <= 0 or not np.isfinite(means.drive_power.value):
+    if not (above or on_drive or storing) or run.cycle.duration <= 0 or not np.isfinite(means.drive_power.value):
         return
     drive = means.drive_power.net * run.cycle.duration
     every = _work(cycle, means)
@@ -569,7 +569,7 @@ def _uncounted_work(cycle: Cycle) -> Iterator[Finding]:
             what += "the drive supplies; the efficiency counts them as lost"
             remedy = "mark it useful: true if it stands for the work"
             yield Finding.note("spring.stores", f"springs.{name}", what, remedy, stored=stored, drive=drive)
-    for name in beside:
+    for name in on_drive:
         if (supplied := work.get(f"load {name}")) is not None:
             what = f"beside the drive, which supplies {readable(drive, 'J')}, this load supplies "
             what += f"{readable(supplied, 'J')} over the cycle; the efficiency does not count it as input"
@@ -756,8 +756,8 @@ def _moved_jumps(cycle: Cycle) -> Iterator[Finding]:
 def _moved(jumps: Array, without: Array, least: float, edges: Array) -> Iterator[tuple[int, int]]:
     """Numbers of edges, of a jump of the mechanism with errors and of that without to which it belongs."""
     alone = [
-        np.flatnonzero((np.abs(own) > least) & (np.abs(other) < ALIKE * np.abs(own)))
-        for own, other in ((jumps, without), (without, jumps))
+        np.flatnonzero((np.abs(mine) > least) & (np.abs(other) < ALIKE * np.abs(mine)))
+        for mine, other in ((jumps, without), (without, jumps))
     ]
     span = edges[-1] - edges[0]
     for built in alone[0]:
@@ -769,9 +769,11 @@ def _moved(jumps: Array, without: Array, least: float, edges: Array) -> Iterator
             yield int(built), int(alone[1][np.argmin(away)])
 
 
-def _between(one: int, other: int, count: int) -> NDArray[np.intp]:
+def _between(start: int, other: int, count: int) -> NDArray[np.intp]:
     """Panels between two edges, each of which ends the panel of its number, the shorter way round."""
-    ways = [np.arange(low + 1, low + 1 + (high - low) % count) % count for low, high in ((one, other), (other, one))]
+    ways = [
+        np.arange(low + 1, low + 1 + (high - low) % count) % count for low, high in ((start, other), (other, start))
+    ]
     return min(ways, key=len)
 
 

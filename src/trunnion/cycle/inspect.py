@@ -72,7 +72,7 @@ def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None
     Raises MechanismError if the structure does not determine the motion.
     """
     run = prepare(mechanism)
-    found = findings(Cycle(run, positions(run, steps, progress=progress, averaged=False)))
+    notes = findings(Cycle(run, positions(run, steps, progress=progress, averaged=False)))
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
     rank = run.determinacy.mobility if run.determinacy else _rank(walk)
     if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:
@@ -80,11 +80,11 @@ def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None
         what += "constraints"
         remedy = "the geometry is special: reactions or motion are not determined"
         figures = {"formula": run.system.plan.mobility, "rank": rank}
-        found.append(Finding.warning("mobility.special", "joints", what, remedy, **figures))
-    found += [*shared_dimensions(mechanism), *_unplaced(run)]
+        notes.append(Finding.warning("mobility.special", "joints", what, remedy, **figures))
+    notes += [*shared_dimensions(mechanism), *_unplaced(run)]
     order = list(Severity)
-    found.sort(key=lambda finding: order.index(finding.severity))
-    return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(found), _gears(run))
+    notes.sort(key=lambda finding: order.index(finding.severity))
+    return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(notes), _gears(run))
 
 
 def _unplaced(run: Run) -> Iterator[Finding]:
@@ -95,11 +95,11 @@ def _unplaced(run: Run) -> Iterator[Finding]:
         try:
             ends_by_name(run, [measure])
         except MechanismError as error:
-            yield from (replace(one, severity=Severity.WARNING) for one in error.findings)
+            yield from (replace(finding, severity=Severity.WARNING) for finding in error.findings)
 
 
 def _gears(run: Run) -> tuple[GearPair, ...]:
-    found = []
+    gears = []
     for name, gear in run.system.mechanism.gears.items():
         if not gear.touches:
             continue
@@ -108,8 +108,8 @@ def _gears(run: Run) -> tuple[GearPair, ...]:
         sign = 1.0 if carriers[0] == carriers[1] else -1.0
         radii = tuple((str(circle["at"]).rpartition(".")[0], float(circle["radius"])) for circle in circles)
         internal = not gear.slides and sign * float(run.system.ratio(run.values, name)) > 0
-        found.append(GearPair(name, internal, radii))
-    return tuple(found)
+        gears.append(GearPair(name, internal, radii))
+    return tuple(gears)
 
 
 def _rank(walk: Forward) -> int | None:

@@ -94,7 +94,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
     course, nothing = locking_course(run, METHOD), np.full(len(time), np.nan)
     state = np.full(len(time), int(LockingState.RUNS)) if course is None else course.states_at(time)
     efforts = [np.where(other.locked, np.nan, other.efforts[name]) for name in mechanism.drivers]
-    given = (other.given > scales_of(run).floor("W")) & ~other.locked
+    giving = (other.given > scales_of(run).floor("W")) & ~other.locked
     arrays: dict[str, Any] = {
         "critical_multiple": [
             np.where(answered, multiples.get(str(name), nothing), np.nan) for name in result["joint"].values
@@ -103,7 +103,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
         "power_delivered_reverse": np.where(other.locked, np.nan, other.delivered),
         "power_acting_reverse": other.acting,
         "power_given_reverse": other.given,
-        "efficiency_reverse_instant": np.where(given, other.delivered / other.given, np.nan),
+        "efficiency_reverse_instant": np.where(giving, other.delivered / other.given, np.nan),
         "holding_multiple": holding_multiples(run, time),
         "locking_state": np.where(answered, state, int(LockingState.UNSOLVED)).astype(np.int8),
     }
@@ -124,13 +124,15 @@ def _notes(run: Run) -> list[Finding]:
         what += "ranges, the motion backward, critical multiples of single joints"
         notes.append(Finding.note("locking.pins_centred", "joints", what, joints=[seat.joint for seat in run.seats]))
     mechanism = run.system.mechanism
-    beside = beside_the_drive(mechanism) if rubbing(run.system) else []
-    if beside:
-        what = f"{', '.join(beside)} {agreeing(len(beside), 'acts', 'act')} on a driven link beside the drive and "
-        what += f"{agreeing(len(beside), 'is', 'are')} not useful: backward "
-        what += f"{agreeing(len(beside), 'it acts', 'they act')} too, which moves the ranges"
+    on_drive = beside_the_drive(mechanism) if rubbing(run.system) else []
+    if on_drive:
+        what = f"{', '.join(on_drive)} {agreeing(len(on_drive), 'acts', 'act')} on a driven link beside the drive and "
+        what += f"{agreeing(len(on_drive), 'is', 'are')} not useful: backward "
+        what += f"{agreeing(len(on_drive), 'it acts', 'they act')} too, which moves the ranges"
         remedy = "leave out a load that stands for the drive itself, such as the force of a hand"
-        notes.append(Finding.note("locking.load_beside_drive", "loads", what, remedy, loads=beside, count=len(beside)))
+        notes.append(
+            Finding.note("locking.load_beside_drive", "loads", what, remedy, loads=on_drive, count=len(on_drive))
+        )
     return notes
 
 

@@ -197,10 +197,10 @@ def multiples_at(run: Run, time: Array, most: float) -> dict[str, Array]:
     if not multiples or not len(turning) or not run.cycle.duration > 0:
         return multiples
     rows = np.array(list(multiples.values()))
-    beside = least_beside(
+    least = least_beside(
         lambda sides: np.array(list(critical_multiples(sides, most).values())), solved, time[turning], run.cycle
     )
-    rows[:, turning] = np.where(np.isnan(beside), rows[:, turning], beside)
+    rows[:, turning] = np.where(np.isnan(least), rows[:, turning], least)
     return dict(zip(multiples, rows, strict=True))
 
 
@@ -257,16 +257,16 @@ def holding_multiples(run: Run, time: Array) -> Array:
             last = np.where(margins <= 1.0, margins * (1.0 - UNLOCKED), 1.0)  # there it does not lock yet
             nodes = last[:, None] * np.linspace(0.0, 1.0, NODES)
             power = delivered(np.repeat(holding, NODES), nodes.ravel()).reshape(nodes.shape)
-            held = power <= 0.0
-            first = np.argmax(held, axis=1)
-            found = np.where(np.any(held, axis=1), 0.0, margins)
+            holds = power <= 0.0
+            first = np.argmax(holds, axis=1)
+            multiples_held = np.where(np.any(holds, axis=1), 0.0, margins)
             inside = np.flatnonzero(first > 0)
             if len(inside):
                 ends = [(inside, first[inside] - 1), (inside, first[inside])]
                 (low, high), (at_low, at_high) = ([rows[end] for end in ends] for rows in (nodes, power))
                 near = np.full(len(low), HOLDING)
-                found[inside] = root(partial(delivered, holding[inside]), low, high, at_low, at_high, near)
-        multiples[holding] = found
+                multiples_held[inside] = root(partial(delivered, holding[inside]), low, high, at_low, at_high, near)
+        multiples[holding] = multiples_held
     return multiples
 
 
@@ -330,8 +330,8 @@ class LockingCourse:
             answered = ((status < Status.NOT_CONVERGED) | (status == Status.LOCKED)) & np.isfinite(other.acting)
             forward = np.where(ahead.locked | locked, np.nan, [ahead.delivered, ahead.acting])
             powers = [*forward, other.delivered, other.acting, other.given, other.acting - other.given]
-            held = np.where(answered, 2 * locked + other.locked, 4)  # 0: runs both ways; 3: neither
-            return np.stack([*powers, *(other.efforts[name] for name in drivers)]), held
+            codes_of = np.where(answered, 2 * locked + other.locked, 4)  # 0: runs both ways; 3: neither
+            return np.stack([*powers, *(other.efforts[name] for name in drivers)]), codes_of
 
         def like(sizes: Array) -> Array:
             return np.concatenate([np.full(6, np.max(sizes[:6])), np.full(len(drivers), np.max(sizes[6:]))])
@@ -343,16 +343,16 @@ class LockingCourse:
         # a power that is 0 at a break passes there
         cut = courses.parted(times[courses.from_breaks(times) > SHORT * courses.span])
         delivered, acting, back_delivered, back_acting, *_ = cut.at(cut.edges[:-1] + cut.half)
-        driven, beyond = back_acting > least, acting > least
+        driven, pushing = back_acting > least, acting > least
         cases = [
             (cut.states == 4, LockingState.UNSOLVED),
             (cut.states == 3, LockingState.JAMMED),
             (cut.states == 2, LockingState.LOCKED),
             (cut.states == 1, LockingState.LOCKED_BACKWARD),
             (driven & (back_delivered > 0), LockingState.BACKDRIVABLE),
-            (beyond & (delivered >= -least), LockingState.DRIVEN_ON),
+            (pushing & (delivered >= -least), LockingState.DRIVEN_ON),
             (driven, LockingState.SELF_LOCKING),
-            (beyond, LockingState.SELF_LOCKING_FORWARD),
+            (pushing, LockingState.SELF_LOCKING_FORWARD),
         ]
         where, codes = zip(*cases, strict=True)
         states = np.select(where, [int(code) for code in codes], int(LockingState.RUNS))
@@ -395,8 +395,8 @@ class LockingCourse:
         value = min(float(delivered / useful), 1.0)
         note = "the mean; see the ranges of `locking`" * bool(len(pushes) > 1 and felt(run.system, run.values))
         if value <= 0:
-            held = pushes <= {LockingState.SELF_LOCKING}
-            note = "self-locking" if held else "it takes work on the whole; see the ranges of `locking`"
+            holding = pushes <= {LockingState.SELF_LOCKING}
+            note = "self-locking" if holding else "it takes work on the whole; see the ranges of `locking`"
         return Figure(name, subject, value, note=note)
 
     def reversing_figures(self) -> Iterator[Figure]:
@@ -527,12 +527,12 @@ class LockingCourse:
     def critical_figures(self) -> Iterator[Figure]:
         """The least critical multiple of each joint whose friction is not 0, and its friction there."""
         run, joints = self.run, felt(self.run.system, self.run.values)
-        beyond = np.zeros(len(joints), bool)  # where a joint does not lock up to the margin
+        unbounded = np.zeros(len(joints), bool)  # where a joint does not lock up to the margin
 
         def look(time: Array) -> tuple[Array, NDArray[np.int64]]:
             multiples = critical_multiples(run.solve(time, method=FrictionMethod()), MARGIN)
             rows = np.array([multiples.get(joint, np.full(time.shape, np.nan)) for joint in joints])
-            beyond[np.any(np.isinf(rows), axis=1)] = True
+            unbounded[np.any(np.isinf(rows), axis=1)] = True
             rows = np.where(np.isfinite(rows), rows, np.nan)
             return rows, np.tensordot(1 << (np.arange(len(joints)) % BITS), np.isfinite(rows), 1)
 
@@ -548,7 +548,7 @@ class LockingCourse:
             name, subject = f"{joint}.critical_multiple", f"critical multiple of {joint} alone"
             least = course.extreme("multiple", i, of=multiple_of, sign=-1.0, panels=every)
             if least is None:
-                yield Figure(name, subject, MARGIN if beyond[i] else None, aspect=MORE_THAN * bool(beyond[i]))
+                yield Figure(name, subject, MARGIN if unbounded[i] else None, aspect=MORE_THAN * bool(unbounded[i]))
                 continue
             alone = critical_figure(run, joint, least.value, course.told(least))
             if least.value > 0:

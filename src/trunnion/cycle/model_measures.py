@@ -65,7 +65,7 @@ class Watched:
     @property
     def labels(self) -> dict[str, list[str]]:
         """Names along their dimension, if there are any."""
-        return {"measure": [one.name for one in self.measures]} if self.measures else {}
+        return {"measure": [measure.name for measure in self.measures]} if self.measures else {}
 
     def variables(self) -> dict[str, xr.Variable]:
         """What a result has of them."""
@@ -74,8 +74,10 @@ class Watched:
         system, values = self.run.system, self.run.values
         arrays = {"measure_value": self.values, "measure_figure": self.figures}
         units = {
-            "measure": MemberUnits("measure", [one.unit(system) for one in self.measures]),
-            "measure_figure": MemberUnits("measure", [one.figure_unit(system, values) for one in self.measures]),
+            "measure": MemberUnits("measure", [measure.unit(system) for measure in self.measures]),
+            "measure_figure": MemberUnits(
+                "measure", [measure.figure_unit(system, values) for measure in self.measures]
+            ),
         }
         return described(arrays, VARIABLES, units)
 
@@ -84,10 +86,10 @@ class Watched:
         for measure, figure in zip(self.measures, self.figures, strict=True):
             name, subject, unit = measure.name, f"measure {measure.name}", measure.unit(self.run.system)
             if measure.rule != "deviation":
-                own = measure.figure_unit(self.run.system, self.run.values)
+                unit_own = measure.figure_unit(self.run.system, self.run.values)
                 aspect, note = measure.statistic.replace("-", " "), self.notes.get(name, "")
                 figure, aspect = (MARGIN, MORE_THAN) if np.isinf(figure) else (figure, aspect)
-                yield Figure(name, subject, figure, own, aspect, note=note)
+                yield Figure(name, subject, figure, unit_own, aspect, note=note)
             elif name in self.extremes:
                 least, most = self.extremes[name]
                 yield Figure(f"{name}.min", subject, least, unit, "minimum")

@@ -79,14 +79,14 @@ ALL = Kept()
 
 def needed(wanted: Collection[str], system: System, erring: bool) -> set[str]:
     """The variables that have to be found for those that are wanted and for the books of the cycle."""
-    found = {*wanted, *BOOKS}
+    variables = {*wanted, *BOOKS}
     if erring:
-        parts = {name for name, one in results.VARIABLES.items() if one.part}
-        found |= {*parts, *COMPARED}
-    found |= {results.SAME_AS[name] for name in found & results.SAME_AS.keys()}
+        parts = {name for name, entry in results.VARIABLES.items() if entry.part}
+        variables |= {*parts, *COMPARED}
+    variables |= {results.SAME_AS[name] for name in variables & results.SAME_AS.keys()}
     if any(PAIRS[kind].threaded for kind, _ in system.joints.values()):  # a screw's slide follows its rotation
-        found.add("joint_rotation")
-    return found | {other for name in found & TURNED.keys() for other in TURNED[name]}
+        variables.add("joint_rotation")
+    return variables | {other for name in variables & TURNED.keys() for other in TURNED[name]}
 
 
 @dataclass(frozen=True)
@@ -131,16 +131,16 @@ def positions(
     method = replace(method or FrictionMethod(), margin_up_to=MARGIN if margin else 0.0)
     steps = steps if run.cycle.duration > 0 else 1
     time = run.cycle.times(steps) if at is None else np.array([at])
-    found = stretch(run, time, method, engine, wanted, progress)
-    return over_cycle(run, found) if averaged else found
+    result = stretch(run, time, method, engine, wanted, progress)
+    return over_cycle(run, result) if averaged else result
 
 
-def over_cycle(run: Run, found: Positions) -> Positions:
+def over_cycle(run: Run, result: Positions) -> Positions:
     """The same with the course of the cycle and its means, which do not depend on the positions."""
-    quick = replace(found.method, margin_up_to=0.0)  # the margin is known by now
+    quick = replace(result.method, margin_up_to=0.0)  # the margin is known by now
     course = course_of(run, quick)
     ideal = course_of(run, quick, ideal=True).means if run.erring else None
-    return replace(found, course=course, means=course.means, ideal=ideal)
+    return replace(result, course=course, means=course.means, ideal=ideal)
 
 
 def stretch(
@@ -148,14 +148,14 @@ def stretch(
     time: NDArray[np.float64],
     method: FrictionMethod,
     engine: str = "auto",
-    wanted: Collection[str] | None = None,
+    variables: Collection[str] | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Positions:
     """The same at some times of the cycle, s, in a row and equally spaced; the means are NaN."""
-    steps, wanted = len(time), None if wanted is None else needed(wanted, run.system, run.erring)
+    steps, variables = len(time), None if variables is None else needed(variables, run.system, run.erring)
     names = labels(run.system) | ({"end": ["1", "2"]} if run.seats else {})
     parts = [part for part, has in (("seats", run.seats), ("errors", run.erring)) if has]
-    arrays, causes = allocate(run.system, steps, parts, wanted), Causes(run.system)
+    arrays, causes = allocate(run.system, steps, parts, variables), Causes(run.system)
     compiled = compiles(engine, run, steps, method) and _compiled(arrays, run, time, method, causes, engine)
     for window in blocks(0 if compiled else steps, len(run.system.joints)):
         _fill(arrays, run, time[window], window, method, causes)
@@ -167,8 +167,8 @@ def stretch(
     if method.margin_up_to and resting and run.cycle.duration > 0:
         places = np.unique(np.concatenate(list(resting.values())))
         solve = (lambda at: seating.at(at, method).back) if seating else (lambda at: run.solve(at, method=method))
-        beside = least_beside(partial(margin_in, most=method.margin_up_to), solve, time[places], run.cycle)
-        arrays["locking_margin"][places] = np.where(np.isnan(beside), arrays["locking_margin"][places], beside)
+        least = least_beside(partial(margin_in, most=method.margin_up_to), solve, time[places], run.cycle)
+        arrays["locking_margin"][places] = np.where(np.isnan(least), arrays["locking_margin"][places], least)
     if seating:
         contact_loss.find(arrays, seating, time)
     unwrap(arrays, run.system, run.values, time)

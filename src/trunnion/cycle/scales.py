@@ -80,12 +80,12 @@ def _stated_forces(run: Run) -> tuple[list[float], list[float]]:
     gravity = float(np.linalg.norm([peak(primal(values.get(f"gravity.{axis}", 0.0))) for axis in "xyz"]))
     masses = [peak(primal(values[f"links.{name}.mass"])) for name in mechanism.links if f"links.{name}.mass" in values]
     resting = {name for name, load in mechanism.loads.items() if load.link == mechanism.fixed_link}
-    stated = {"N": [gravity * sum(masses)], "N m": [0.0]}
+    sizes = {"N": [gravity * sum(masses)], "N m": [0.0]}
     for path, entry in mechanism.parameter_set.entries.items():
         rests = entry.location[:1] == ("loads",) and entry.location[1] in resting
-        if entry.kind.unit in stated and path in values and not rests:
-            stated[entry.kind.unit].append(peak(primal(values[path])))
-    return stated["N"], stated["N m"]
+        if entry.kind.unit in sizes and path in values and not rests:
+            sizes[entry.kind.unit].append(peak(primal(values[path])))
+    return sizes["N"], sizes["N m"]
 
 
 def peak(values: ArrayLike) -> float:

@@ -64,10 +64,10 @@ def scene_of(run: Run) -> dict[str, Any]:
 
 def _measured(run: Run) -> dict[str, str]:
     """What each measure of the model is of, in words: "slide of S", "effort of A"."""
-    stated = run.system.mechanism.measures.items()
+    measures = run.system.mechanism.measures.items()
     return {
-        name: f"{one.kind.replace('_', ' ')} of {one.subject}{f'.{one.axis}' if one.axis else ''}"
-        for name, one in stated
+        name: f"{entry.kind.replace('_', ' ')} of {entry.subject}{f'.{entry.axis}' if entry.axis else ''}"
+        for name, entry in measures
     }
 
 
@@ -103,8 +103,8 @@ def pitch_circles(system: System, values: Values, name: str) -> list[dict[str, A
     carriers = system.mechanism.carriers(name) or (0, 0)
     links = [system.joints[joint][1] for joint in joints]
     if gear.slides:
-        own = links[0][1 - carriers[0]]
-        return [{"at": f"{own}.{joints[0]}", "radius": abs(float(system.ratio(values, name)))}]
+        carried = links[0][1 - carriers[0]]
+        return [{"at": f"{carried}.{joints[0]}", "radius": abs(float(system.ratio(values, name)))}]
     elements = system.elements(values)
     first, second = (elements[links[0][carriers[0]], joint] for joint in joints)
     sign = 1.0 if carriers[0] == carriers[1] else -1.0
@@ -160,7 +160,7 @@ def load_courses(run: Run, time: NDArray[np.float64]) -> dict[str, Any]:
 
 def _numbers(run: Run, time: NDArray[np.float64]) -> dict[str, dict[str, list[Number]]]:
     """Force, moment and resistance of every load, of those that it states, at times, s."""
-    stated = Stated(stated_walk(run.system, run.values, run.chosen.assembly, time))
+    steady = Stated(stated_walk(run.system, run.values, run.chosen.assembly, time))
     axes, space = "xyz"[: run.system.mechanism.coordinates], run.system.mechanism.space == "spatial"
     numbers: dict[str, dict[str, list[Number]]] = {}
     for name in run.system.mechanism.loads:
@@ -169,9 +169,9 @@ def _numbers(run: Run, time: NDArray[np.float64]) -> dict[str, dict[str, list[Nu
             "moment": [f"moment.{axis}" for axis in axes] if space else ["moment"],
             "resists": ["resisting_torque"],
         }
-        if stated.get(f"loads.{name}.resisting_torque") is None:
+        if steady.get(f"loads.{name}.resisting_torque") is None:
             keys["resists"] = ["resisting_force"]
-        parts = {what: [stated.get(f"loads.{name}.{key}") for key in paths] for what, paths in keys.items()}
+        parts = {what: [steady.get(f"loads.{name}.{key}") for key in paths] for what, paths in keys.items()}
         numbers[name] = {
             what: [part for part in rows if part is not None]
             for what, rows in parts.items() if all(part is not None for part in rows)

@@ -54,10 +54,10 @@ PEZZUTI = (
 )
 
 
-def result_of(run: Run, at: Positions, kept: Kept = ALL) -> Result:
+def result_of(run: Run, at: Positions, selection: Kept = ALL) -> Result:
     """The result of a cycle: formula, findings, summary, input data, drawing data, provenance; and its Dataset.
 
-    kept: the variables that the Dataset has.
+    selection: the variables that the Dataset has.
     """
     mechanism, cycle = run.system.mechanism, Cycle(run, at)
     near = cycle.locking if cycle.course else None
@@ -74,14 +74,14 @@ def result_of(run: Run, at: Positions, kept: Kept = ALL) -> Result:
             **drawn,
             **load_courses(run, at.time),
             "periodic": int(run.cycle.periodic),
-            **({} if kept.variables is None else {KEPT: kept.variables}),
+            **({} if selection.variables is None else {KEPT: selection.variables}),
         }
     )
 
     def dataset() -> xr.Dataset:
         along, units = driven(at.time, *at.dial), member_units(run.system)
         parts = at.arrays, at.labels | measured.labels, along, at.means, attributes, units, at.ideal
-        return results.dataset(*parts, kept.variables, kept.dtype, measured.variables())
+        return results.dataset(*parts, selection.variables, selection.dtype, measured.variables())
 
     return Result(attributes, dataset)
 
@@ -100,7 +100,7 @@ def member_units(system: System) -> dict[str, MemberUnits]:
     springs = system.mechanism.springs.values()
     return {
         **units("driver", map(system.turns, system.mechanism.drivers), drives),
-        **units("spring", (one.joint is not None and system.turns(one.joint) for one in springs), pulls),
+        **units("spring", (spring.joint is not None and system.turns(spring.joint) for spring in springs), pulls),
     }
 
 

@@ -87,18 +87,18 @@ def vocabulary(mechanism: Mechanism, steps: int = 360) -> Vocabulary:
     Raises MechanismError if the structure does not determine the motion.
     """
     run = prepare(mechanism)
-    own = watched(run, run.cycle.times(steps if run.cycle.duration > 0 else 1), FrictionMethod())
-    known = dict(zip((one.name for one in own.measures), own.figures, strict=True))
+    cycle_measures = watched(run, run.cycle.times(steps if run.cycle.duration > 0 else 1), FrictionMethod())
+    figures = dict(zip((one.name for one in cycle_measures.measures), cycle_measures.figures, strict=True))
     found = [*named(mechanism, mechanism.measures, run.values), *_others(run)]
     starts = _at_the_start(run, found)
     measures = []
     for measure in found:
-        value = float(known.get(measure.name, np.nan))
+        value = float(figures.get(measure.name, np.nan))
         value = value if np.isfinite(value) else starts.get(measure.name, np.nan)
-        unit, stated = measure.figure_unit(run.system, run.values), measure.name in mechanism.measures
+        unit, is_stated = measure.figure_unit(run.system, run.values), measure.name in mechanism.measures
         verbs = tuple(_verbs(run, measure))
-        measures.append(NamedMeasure(measure.name, measure.of.long_name, unit, value, stated, verbs))
-    return Vocabulary(tuple(_numbers(mechanism)), tuple(measures), tuple(own.findings))
+        measures.append(NamedMeasure(measure.name, measure.of.long_name, unit, value, is_stated, verbs))
+    return Vocabulary(tuple(_numbers(mechanism)), tuple(measures), tuple(cycle_measures.findings))
 
 
 def _numbers(mechanism: Mechanism) -> Iterator[NamedNumber]:
@@ -129,8 +129,8 @@ def _others(run: Run) -> Iterator[Measure]:
             axes = ("x", "y", "z")[: mechanism.coordinates]
             picked = of.vector_in(mechanism.space)
             for axis in (*([""] if picked != "must" else []), *(axes if picked else ())):
-                whole = f"{subject}.{axis}" if axis else subject
-                text = whole if kind == "point" else f"{kind}:{whole}"
+                full_name = f"{subject}.{axis}" if axis else subject
+                text = full_name if kind == "point" else f"{kind}:{full_name}"
                 with suppress(MechanismError):  # such as the slide of a joint that turns
                     measure = named(mechanism, [text], run.values)[0]
                     if measure.of_places:
@@ -140,8 +140,8 @@ def _others(run: Run) -> Iterator[Measure]:
 
 def _at_the_start(run: Run, measures: list[Measure]) -> dict[str, float]:
     """Value of every measure of one number at the start of the cycle, by name; NaN where it has none there."""
-    open_ = run.determinacy is not None and any(one.severity is Severity.ERROR for one in run.determinacy.findings())
-    single = [one for one in measures if one.single(run.system) and (one.of_motion or not open_)]
+    open_ = run.determinacy is not None and any(item.severity is Severity.ERROR for item in run.determinacy.findings())
+    single = [item for item in measures if item.single(run.system) and (item.of_motion or not open_)]
     courses = courses_of(run, single, np.zeros(1), FrictionMethod())[0]
     return {name: float(np.ravel(primal(parts[0]))[0]) for name, parts in courses.items()}
 

@@ -132,11 +132,11 @@ class Graph:
             args = tuple(map(self.as_boolean, args))
         elif not (op in ("eq", "ne") and all(map(self.boolean, args))):
             args = tuple(map(self.as_float, args))
-        known = [self.value(arg) for arg in args]
-        if all(value is not None for value in known):
+        constants = [self.value(arg) for arg in args]
+        if all(value is not None for value in constants):
             with np.errstate(all="ignore"):
-                return self.constant(FOLDED[op](*known))
-        simpler = self._of_one(op, args[0]) if len(args) == 1 else self._of_two(op, args, known)
+                return self.constant(FOLDED[op](*constants))
+        simpler = self._of_one(op, args[0]) if len(args) == 1 else self._of_two(op, args, constants)
         if simpler is not None:
             return simpler
         if op in RANGES and not self.within[args[0]]:  # within a loop it is NaN there
@@ -153,45 +153,45 @@ class Graph:
             return self.apply("abs", inner.args[0])
         return None
 
-    def _of_two(self, op: str, args: tuple[int, ...], known: Sequence[Any]) -> int | None:
+    def _of_two(self, op: str, args: tuple[int, ...], constants: Sequence[Any]) -> int | None:
         """What an operation on two nodes comes to where one is a constant or a negative, or both are the same."""
-        (a, b), (first, second) = args, known
+        (a, b), (first, second) = args, constants
         if a == b and op in ("max", "min", "and", "or"):
             return a
-        if op in ("max", "min") and any(value != value for value in known):
+        if op in ("max", "min") and any(value != value for value in constants):
             return self.constant(math.nan)
         if op in ("and", "or"):
-            kept = op == "and"  # the value that leaves the other as it is
+            identity = op == "and"  # the value that leaves the other as it is
             for value, other in ((first, b), (second, a)):
                 if value is not None:
-                    return other if value is kept else self.constant(not kept)
+                    return other if value is identity else self.constant(not identity)
         if op == "add":
-            return self._sum(args, known)
+            return self._sum(args, constants)
         if op == "sub":
-            return self._difference(args, known)
+            return self._difference(args, constants)
         if op in ("mul", "div"):
-            return self._product(op, args, known)
+            return self._product(op, args, constants)
         return None
 
-    def _sum(self, args: tuple[int, ...], known: Sequence[Any]) -> int | None:
-        (a, b), (first, second) = args, known
+    def _sum(self, args: tuple[int, ...], constants: Sequence[Any]) -> int | None:
+        (a, b), (first, second) = args, constants
         if first == 0.0 or second == 0.0:
             return b if first == 0.0 else a
-        for one, other in ((a, b), (b, a)):
+        for term, other in ((a, b), (b, a)):
             if self.nodes[other].op == "neg":
-                return self.apply("sub", one, self.nodes[other].args[0])
+                return self.apply("sub", term, self.nodes[other].args[0])
         return None
 
-    def _difference(self, args: tuple[int, ...], known: Sequence[Any]) -> int | None:
-        (a, b), (first, second) = args, known
+    def _difference(self, args: tuple[int, ...], constants: Sequence[Any]) -> int | None:
+        (a, b), (first, second) = args, constants
         if second == 0.0:
             return a
         if first == 0.0:
             return self.apply("neg", b)
         return self.apply("add", a, self.nodes[b].args[0]) if self.nodes[b].op == "neg" else None
 
-    def _product(self, op: str, args: tuple[int, ...], known: Sequence[Any]) -> int | None:
-        (a, b), (first, second) = args, known
+    def _product(self, op: str, args: tuple[int, ...], constants: Sequence[Any]) -> int | None:
+        (a, b), (first, second) = args, constants
         if second in (1.0, -1.0):
             return a if second == 1.0 else self.apply("neg", a)
         if op == "mul" and first in (1.0, -1.0):
@@ -208,9 +208,9 @@ class Graph:
     def where(self, condition: int, a: int, b: int) -> int:
         """a where the condition holds, b elsewhere."""
         condition = self.as_boolean(condition)
-        known = self.value(condition)
-        if known is not None or a == b:
-            return b if known is False else a
+        constant = self.value(condition)
+        if constant is not None or a == b:
+            return b if constant is False else a
         if self.boolean(a) and self.boolean(b):
             other = self.apply("and", self.apply("not", condition), b)
             return self.apply("or", self.apply("and", condition, a), other)
@@ -270,11 +270,11 @@ class Graph:
 
     def _made_of(self, numbers: Iterable[int], further: Callable[[int], bool]) -> set[int]:
         """These nodes, and what they are made of beyond those that are to be gone through further."""
-        found: set[int] = set()
+        nodes_used: set[int] = set()
         left = list(numbers)
         while left:
             number = left.pop()
-            if number not in found:
-                found.add(number)
+            if number not in nodes_used:
+                nodes_used.add(number)
                 left += self.nodes[number].args if further(number) else ()
-        return found
+        return nodes_used

@@ -48,7 +48,7 @@ class Lanes:
         self.width = width
         self.tables = tables  # of the module, by their entries
         self._constants: dict[tuple[str, bool], Value] = {}
-        kinds = (self._wide(one) for one in (DOUBLE, LONG, INT, BYTE, BIT))
+        kinds = (self._wide(scalar) for scalar in (DOUBLE, LONG, INT, BYTE, BIT))
         self.double, self.long, self.int, self.byte, self.bit = kinds
 
     def _wide(self, kind: Any) -> Any:
@@ -104,9 +104,9 @@ class Lanes:
 
     def _intrinsic(self, name: str, *args: Value) -> Value:
         full = f"llvm.{name}.v{self.width}f64" if self.width > 1 else f"llvm.{name}.f64"
-        known = self.b.module.globals.get(full)
+        declared = self.b.module.globals.get(full)
         kind = ir.FunctionType(self.double, [self.double] * len(args))
-        return self.b.call(known or ir.Function(self.b.module, kind, name=full), args)
+        return self.b.call(declared or ir.Function(self.b.module, kind, name=full), args)
 
     def sqrt(self, a: Value) -> Value:
         return self._intrinsic("sqrt", a)
@@ -135,9 +135,9 @@ class Lanes:
     def finite(self, a: Value) -> Value:
         return self.compare("<", self.abs(a), self.constant(math.inf))
 
-    def differ(self, some: Sequence[Value], others: Sequence[Value]) -> Value:
+    def differ(self, values: Sequence[Value], others: Sequence[Value]) -> Value:
         """Whether any bit of any lane does: one plain bit."""
-        pairs = [[self.b.bitcast(one, self.long) for one in pair] for pair in zip(some, others, strict=True)]
+        pairs = [[self.b.bitcast(value, self.long) for value in pair] for pair in zip(values, others, strict=True)]
         bits = functools.reduce(self.b.or_, [self.b.xor(*pair) for pair in pairs])
         return self.any(self.b.icmp_signed("!=", bits, self.whole(0)))
 
@@ -145,15 +145,15 @@ class Lanes:
         """Whether a bit is set in any lane: one plain bit."""
         if self.width == 1:
             return lanes
-        whole = ir.IntType(self.width)
-        return self.b.icmp_signed("!=", self.b.bitcast(lanes, whole), ir.Constant(whole, 0))
+        mask = ir.IntType(self.width)
+        return self.b.icmp_signed("!=", self.b.bitcast(lanes, mask), ir.Constant(mask, 0))
 
     def larger(self, a: Value, b: Value, sign: str = ">") -> Value:
         """The larger of two, NaN if one is; with < the smaller."""
         if isinstance(b, ir.Constant):
             a, b = b, a
-        found = self.select(self.compare(sign, a, b), a, b)  # if b is NaN, no comparison holds, and found is b
-        return found if isinstance(a, ir.Constant) else self.select(self.isnan(a), a, found)
+        picked = self.select(self.compare(sign, a, b), a, b)  # if b is NaN, no comparison holds, and found is b
+        return picked if isinstance(a, ir.Constant) else self.select(self.isnan(a), a, picked)
 
     def sign(self, a: Value) -> Value:
         signed = self.copysign(self.constant(1.0), a)
@@ -161,14 +161,14 @@ class Lanes:
 
     def polynomial(self, x: Value, coefficients: Sequence[float]) -> Value:
         """c₀ + c₁ x + c₂ x² …"""
-        found = self.constant(coefficients[-1])
+        result = self.constant(coefficients[-1])
         for coefficient in reversed(coefficients[:-1]):
-            found = self.fma(found, x, self.constant(coefficient))
-        return found
+            result = self.fma(result, x, self.constant(coefficient))
+        return result
 
-    def within(self, x: Value, most: float, found: Value) -> Value:
+    def within(self, x: Value, most: float, result: Value) -> Value:
         """What was found, NaN where |x| is beyond a range, or NaN."""
-        return self.select(self.compare("<=", self.abs(x), self.constant(most)), found, self.constant(math.nan))
+        return self.select(self.compare("<=", self.abs(x), self.constant(most)), result, self.constant(math.nan))
 
     def _rounded(self, x: Value) -> tuple[Value, Value]:
         """The whole number nearest to x, as a float and in the last bits of an integer."""
@@ -250,8 +250,8 @@ class Lanes:
         double = self.larger(self.b.fmul(self.abs(x), self.constant(2.0)), self.constant(44.0), "<")
         less, power = self._exponential(double)
         less = self.fma(power, less, self.b.fsub(power, self.constant(1.0)))
-        found = self.div(less, self.b.fadd(less, self.constant(2.0)))
-        return self.select(self.isnan(x), x, self.copysign(found, x))
+        result = self.div(less, self.b.fadd(less, self.constant(2.0)))
+        return self.select(self.isnan(x), x, self.copysign(result, x))
 
     # ---- tables ------------------------------------------------------------------------------------------------------
 
@@ -261,18 +261,18 @@ class Lanes:
         if key not in self.tables:
             kind = ir.ArrayType(DOUBLE, len(key))
             made = self.tables[key] = ir.GlobalVariable(self.b.module, kind, name=f"table{len(self.tables)}")
-            made.initializer = ir.Constant(kind, [ir.Constant(DOUBLE, one) for one in key])
+            made.initializer = ir.Constant(kind, [ir.Constant(DOUBLE, number) for number in key])
             made.global_constant, made.linkage = True, "internal"
         return self.tables[key]
 
     def gather(self, table: Value, index: Value) -> Value:
         """The entries at some places, which exist."""
-        found = ir.Constant(self.double, ir.Undefined) if self.width > 1 else None
+        vector = ir.Constant(self.double, ir.Undefined) if self.width > 1 else None
         for lane in range(self.width):
-            one = self.b.extract_element(index, ir.Constant(INT, lane)) if self.width > 1 else index
-            entry = self.b.load(self.b.gep(table, [ir.Constant(INT, 0), one]))
-            found = self.b.insert_element(found, entry, ir.Constant(INT, lane)) if self.width > 1 else entry
-        return found
+            place = self.b.extract_element(index, ir.Constant(INT, lane)) if self.width > 1 else index
+            entry = self.b.load(self.b.gep(table, [ir.Constant(INT, 0), place]))
+            vector = self.b.insert_element(vector, entry, ir.Constant(INT, lane)) if self.width > 1 else entry
+        return vector
 
     def take(self, entries: Sequence[float], x: Value) -> Value:
         """The entry whose number is x; the first or last beyond them."""
@@ -290,5 +290,5 @@ class Lanes:
             probe = self.gather(table, self.b.add(place, self.index(2**step - 1)))
             further = self.compare("<" if side == "left" else "<=", probe, x)
             place = self.b.select(further, self.b.add(place, self.index(2**step)), place)
-        found = self.b.sitofp(place, self.double)
-        return self.larger(found, self.constant(float(len(entries))), "<")  # ∞ is not above what fills the table up
+        result = self.b.sitofp(place, self.double)
+        return self.larger(result, self.constant(float(len(entries))), "<")  # ∞ is not above what fills the table up

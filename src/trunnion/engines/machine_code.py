@@ -66,10 +66,10 @@ class MachineCode:
     @classmethod
     def known(cls, key: str, folder: Path | None = None) -> MachineCode | None:
         """The machine code that was kept under a key, see `keep_as`; None if there is none."""
-        told = _read(_alias(key, _folder(folder)))
-        if told is None:
+        record = _read(_alias(key, _folder(folder)))
+        if record is None:
             return None
-        name, inputs, rows, width = json.loads(told)
+        name, inputs, rows, width = json.loads(record)
         path = _folder(folder) / name
         code = _read(path)
         if code is None:
@@ -81,8 +81,8 @@ class MachineCode:
 
     def keep_as(self, key: str) -> None:
         """Keep it under a key that is known before the program is."""
-        told = json.dumps([self.path.name, self.inputs, self.rows, self.width])
-        _keep(_alias(key, self.path.parent), told.encode())
+        record = json.dumps([self.path.name, self.inputs, self.rows, self.width])
+        _keep(_alias(key, self.path.parent), record.encode())
 
     def _link(self, inputs: tuple[tuple[str, ...], ...], rows: int, width: int, code: bytes) -> None:
         self.inputs, self.rows, self.width = inputs, rows, width
@@ -118,13 +118,19 @@ class MachineCode:
         stride = outputs[0].shape[-1]
         table = np.empty(max(1, self.rows * (positions[1] - positions[0])))
         arrays = [[inputs[name] for name in names] for names in self.inputs]
-        told = (*samples, *positions, stride, *(_pointers(some) for some in (*arrays, outputs)), table.ctypes.data)
-        held = inputs, outputs, table  # as long as their addresses are in use
+        arguments = (
+            *samples,
+            *positions,
+            stride,
+            *(_pointers(addresses) for addresses in (*arrays, outputs)),
+            table.ctypes.data,
+        )
+        alive = inputs, outputs, table  # as long as their addresses are in use
 
         def call() -> None:
-            self._function(*told)
+            self._function(*arguments)
 
-        call.held = held  # type: ignore[attr-defined]
+        call.held = alive  # type: ignore[attr-defined]
         return call
 
 
@@ -164,26 +170,26 @@ def _folder(folder: Path | None) -> Path:
 
 def _alias(key: str, folder: Path) -> Path:
     """The file that tells which program a key stands for, on this processor, by these versions of the sources."""
-    told = "\0".join((key, *_target(), llvmlite.__version__, __version__, _sources()))
-    return folder / f"{hashlib.sha256(told.encode()).hexdigest()}.key"
+    text = "\0".join((key, *_target(), llvmlite.__version__, __version__, _sources()))
+    return folder / f"{hashlib.sha256(text.encode()).hexdigest()}.key"
 
 
 @cache
 def _sources() -> str:
     """What tells these sources from others of the same version: places, sizes and times of their files."""
     root = Path(__file__).parents[1]
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for path in sorted(os.path.join(folder, name) for folder, _, names in os.walk(root) for name in names):
         if path.endswith(".py"):
             state = os.stat(path)
-            found.update(f"{path} {state.st_size} {state.st_mtime_ns}\n".encode())
-    return found.hexdigest()
+            digest.update(f"{path} {state.st_size} {state.st_mtime_ns}\n".encode())
+    return digest.hexdigest()
 
 
 def _path(program: Program, folder: Path) -> Path:
     """The file of a program, by what it does, for which processor, made by which versions."""
-    told = "\0".join((program.text, *_target(), llvmlite.__version__, __version__))
-    return folder / f"{hashlib.sha256(told.encode()).hexdigest()}.o"
+    text = "\0".join((program.text, *_target(), llvmlite.__version__, __version__))
+    return folder / f"{hashlib.sha256(text.encode()).hexdigest()}.o"
 
 
 def _read(path: Path) -> bytes | None:

@@ -63,8 +63,8 @@ class _Writer:
     def _point(self, names: Sequence[Sequence[str]]) -> None:
         """Where the inputs and outputs lie."""
         self.pointers = [
-            {name: self._pointer(argument, k) for k, name in enumerate(some)}
-            for argument, some in zip(self.arguments[5:9], names, strict=True)
+            {name: self._pointer(argument, k) for k, name in enumerate(array_names)}
+            for argument, array_names in zip(self.arguments[5:9], names, strict=True)
         ]
         self.out = [self._pointer(self.arguments[9], k) for k in range(len(self.outputs))]
 
@@ -73,9 +73,9 @@ class _Writer:
         level = {n: self.graph.differs[n] for n in live}
         if not any(differs & SAMPLE for differs in level.values()):  # one sample: no table is needed for it
             level = {n: BOTH if differs == POSITION else differs for n, differs in level.items()}
-        given, once, ahead, each = ([n for n in live if level[n] == kind] for kind in KINDS)
+        stated_nodes, once, ahead, each = ([n for n in live if level[n] == kind] for kind in KINDS)
         plain: dict[int, Value] = self._loaded(0, ir.Constant(LONG, 0))
-        self._emit(given, plain, self.scalar)
+        self._emit(stated_nodes, plain, self.scalar)
         wide = self._spread(plain, [*ahead, *each])
         self.tabled = self._frontier(ahead, each)
         if self.tabled:
@@ -106,9 +106,9 @@ class _Writer:
 
     def _frontier(self, ahead: Sequence[int], each: Sequence[int]) -> list[int]:
         """Nodes that differ by position alone and are read where samples are gone through."""
-        own = {n for n in ahead if self.graph.nodes[n].op not in ("input", "loop")}
+        frontier = {n for n in ahead if self.graph.nodes[n].op not in ("input", "loop")}
         read = {arg for n in each for arg in self.graph.nodes[n].args} | set(self.outputs)
-        return sorted(own & read)
+        return sorted(frontier & read)
 
     # ---- loops ----------------------------------------------------------------------------------------------------
 
@@ -156,16 +156,16 @@ class _Writer:
         return self.b.uitofp(value, self.lanes.double) if value.type == self.lanes.bit else value
 
     def _samples(
-        self, once: Sequence[int], each: Sequence[int], given: dict[int, Value], all_samples: dict[int, Value]
+        self, once: Sequence[int], each: Sequence[int], constants: dict[int, Value], all_samples: dict[int, Value]
     ) -> None:
         first, last, low, high, stride = self.arguments[:5]
         row = self.b.sub(high, low)
 
         def sample(s: Value) -> None:
-            plain = {**given, **self._loaded(SAMPLE, s)}
+            plain = {**constants, **self._loaded(SAMPLE, s)}
             self._emit(once, plain, self.scalar)
-            own = {n: value for n, value in plain.items() if n not in given}
-            wide = {**all_samples, **self._spread(own, each)}
+            local = {n: value for n, value in plain.items() if n not in constants}
+            wide = {**all_samples, **self._spread(local, each)}
             start = self.b.mul(s, stride)
 
             def position(p: Value) -> None:
@@ -188,12 +188,12 @@ class _Writer:
     def _loaded(self, differs: int, place: Value) -> dict[int, Value]:
         """The inputs of a kind at a place."""
         pointers = self.pointers[KINDS.index(differs)]
-        found = {}
+        loaded = {}
         for name, pointer in pointers.items():
             number = self.graph.input(name, self.graph.inputs[name])
             plain = differs in (0, SAMPLE)
-            found[number] = self.b.load(self.b.gep(pointer, [place])) if plain else self._load(pointer, place)
-        return found
+            loaded[number] = self.b.load(self.b.gep(pointer, [place])) if plain else self._load(pointer, place)
+        return loaded
 
     def _load(self, pointer: Value, place: Value) -> Value:
         at = self.b.bitcast(self.b.gep(pointer, [place]), self.lanes.double.as_pointer())
@@ -214,8 +214,8 @@ class _Writer:
     # ---- nodes -------------------------------------------------------------------------------------------------------
 
     def _of(self, n: int, values: dict[int, Value], lanes: Lanes) -> Value:
-        known = self.graph.value(n)
-        return values[n] if known is None else lanes.constant(known)
+        constant = self.graph.value(n)
+        return values[n] if constant is None else lanes.constant(constant)
 
     def _emit(self, numbers: Iterable[int], values: dict[int, Value], lanes: Lanes) -> None:
         """Instructions for nodes, in their order; what is known already is not computed again."""
@@ -276,17 +276,17 @@ class _Writer:
         states = [self.b.phi(lanes.double) for _ in start]
         inner = dict(values) | dict(zip(loop.states, states, strict=True))
         self._emit(self.graph.inside(loop.outputs, index), inner, lanes)
-        found = [self._of(n, inner, lanes) for n in loop.results]
-        for state, first, next_ in zip(states, start, found, strict=True):
+        results = [self._of(n, inner, lanes) for n in loop.results]
+        for state, first, next_ in zip(states, start, results, strict=True):
             state.add_incoming(first, before)
             state.add_incoming(next_, self.b.block)
         further = self.b.add(count, ir.Constant(int_, 1))
         count.add_incoming(further, self.b.block)
         more = self.b.icmp_signed("<", further, ir.Constant(int_, loop.rounds))
         if loop.done is None:
-            left = lanes.differ(states, found)
+            left = lanes.differ(states, results)
         else:
             left = lanes.any(self.b.xor(self._of(loop.done, inner, lanes), lanes.constant(True)))
         self.b.cbranch(self.b.and_(more, left), body, after)
         self.b.position_at_end(after)
-        return found
+        return results

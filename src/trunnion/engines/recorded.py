@@ -178,14 +178,14 @@ def _direct(op: str) -> Callable[..., Any]:
 
     def function(*numbers: Any) -> Any:
         graph = _graph_of(numbers)
-        return Recorded(graph, graph.apply(op, *(number_of(graph, one) for one in numbers)))
+        return Recorded(graph, graph.apply(op, *(number_of(graph, number) for number in numbers)))
 
     return function
 
 
 def _where(condition: Any, a: Any, b: Any) -> Any:
     graph = _graph_of((condition, a, b))
-    return Recorded(graph, graph.where(*(number_of(graph, one) for one in (condition, a, b))))
+    return Recorded(graph, graph.where(*(number_of(graph, number) for number in (condition, a, b))))
 
 
 def _fmax(a: Any, b: Any) -> Any:
@@ -214,7 +214,7 @@ def _searchsorted(table: Any, x: Any, side: str = "left") -> Any:
 
 
 def _take(row: Any, index: Any, **_: Any) -> Any:
-    if any(isinstance(one, Recorded) for one in np.ravel(np.asarray(row, object))):
+    if any(isinstance(item, Recorded) for item in np.ravel(np.asarray(row, object))):
         raise UntraceableError("an entry of a table whose numbers vary")
     graph = index.graph
     entries = tuple(float(value) for value in np.ravel(row))
@@ -258,17 +258,17 @@ class _Functions:
     """NumPy's functions on recorded numbers, by their names; of plain numbers alone they are NumPy's own."""
 
     def __getattr__(self, name: str) -> Any:
-        own = NAMES.get(name)
+        override = NAMES.get(name)
         numpy = getattr(np, name, None)
 
         def function(*args: Any, **options: Any) -> Any:
-            if not any(isinstance(one, Recorded) for one in (*args, *options.values())):
+            if not any(isinstance(item, Recorded) for item in (*args, *options.values())):
                 return numpy(*args, **options)  # type: ignore[misc]
-            if own is None:
+            if override is None:
                 raise UntraceableError(f"np.{name}")
-            return own(*args, **options)
+            return override(*args, **options)
 
-        if own is None and not callable(numpy):
+        if override is None and not callable(numpy):
             return numpy  # np.pi and the like
         setattr(self, name, function)
         return function

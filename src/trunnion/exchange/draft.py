@@ -228,13 +228,13 @@ class Draft:
         return self
 
 
-def united(one: Body, other: Body, name: str) -> Body:
+def united(first: Body, other: Body, name: str) -> Body:
     """Two bodies as one."""
-    mass = one.mass + other.mass
-    centre = (one.mass * one.centre + other.mass * other.centre) / mass if mass else one.centre
-    inertia = sum(body.inertia + body.mass * steiner(body.centre - centre) for body in (one, other))
+    mass = first.mass + other.mass
+    centre = (first.mass * first.centre + other.mass * other.centre) / mass if mass else first.centre
+    inertia = sum(body.inertia + body.mass * steiner(body.centre - centre) for body in (first, other))
     return Body(
-        name, mass, centre, np.asarray(inertia), {**one.points, **other.points}, [*one.comments, *other.comments]
+        name, mass, centre, np.asarray(inertia), {**first.points, **other.points}, [*first.comments, *other.comments]
     )
 
 
@@ -285,14 +285,14 @@ def perpendicular(axis: Array) -> Array:
     return np.asarray(across / np.linalg.norm(across), dtype=float)
 
 
-def free_name(text: str, taken: Iterable[str], default: str = "part") -> str:
+def free_name(text: str, used: Iterable[str], default: str = "part") -> str:
     """A name that a model file accepts and that is not taken yet: short, printable, without a dot."""
     name = "".join(sign for sign in text.replace(".", "-") if sign.isprintable()).strip().lstrip("=+-@ ")[:40].strip()
     name = name or default
-    taken = set(taken)
-    if name not in taken:
+    used = set(used)
+    if name not in used:
         return name
     number = 2
-    while f"{name}-{number}" in taken:
+    while f"{name}-{number}" in used:
         number += 1
     return f"{name}-{number}"

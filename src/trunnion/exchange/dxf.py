@@ -222,7 +222,7 @@ def _close_circles(sketch: Sketch) -> None:
     """Make two half arcs about one centre, which is how some programs draw a circle, a circle."""
     halves: list[Slot] = []
     for slot in sketch.halves:
-        other = next((one for one in halves if one.layer == slot.layer and _completes(one, slot)), None)
+        other = next((halve for halve in halves if halve.layer == slot.layer and _completes(halve, slot)), None)
         if other is None:
             halves.append(slot)
         else:
@@ -231,10 +231,10 @@ def _close_circles(sketch: Sketch) -> None:
     sketch.halves = halves
 
 
-def _completes(one: Slot, other: Slot) -> bool:
+def _completes(slot: Slot, other: Slot) -> bool:
     """Whether two half circles run between the same ends, the other way."""
-    apart = np.linalg.norm(one.start - other.end) + np.linalg.norm(one.end - other.start)
-    return bool(apart < HALF * other.half and abs(one.half - other.half) < HALF * other.half)
+    apart = np.linalg.norm(slot.start - other.end) + np.linalg.norm(slot.end - other.start)
+    return bool(apart < HALF * other.half and abs(slot.half - other.half) < HALF * other.half)
 
 
 def _entities(entities: Iterable[Any], inserted: str, depth: int, count: list[int]) -> Iterator[tuple[str, Any]]:

@@ -286,8 +286,8 @@ def export_model(
         raise MechanismError(Finding(what, "--magnify", "leave it out, or write .step or .glb"))
     if not np.isfinite(magnify):
         raise MechanismError(Finding(f"is {magnify}", "--magnify", "give a number such as 100"))
-    shown = (frames, None) if moves else (FEWEST, at)
-    positions = positions_of(mechanism, *shown, magnify=magnify)
+    span = (frames, None) if moves else (FEWEST, at)
+    positions = positions_of(mechanism, *span, magnify=magnify)
     if options.original is not None:
         if not getattr(module, "MOVES_PARTS", False):
             raise MechanismError(Finding(f"no parts are moved in {entry.name}", "--from", "write a .step file"))

@@ -51,10 +51,10 @@ class Round:
         """In words, with its numbers in the file."""
         numbers = ", ".join(f"#{number}" for number in self.faces[:4])
         kind = (("pin", "hole") if self.high > self.low else ("ball", "socket"))[self.hole]
-        stated = self.tolerance
-        if isinstance(stated, tuple):
-            stated = f"{1e3 * stated[1]:+.6g}/{1e3 * stated[0]:+.6g} mm"
-        size = f"{2e3 * self.radius:.9g} mm {stated}".rstrip()
+        deviation = self.tolerance
+        if isinstance(deviation, tuple):
+            deviation = f"{1e3 * deviation[1]:+.6g}/{1e3 * deviation[0]:+.6g} mm"
+        size = f"{2e3 * self.radius:.9g} mm {deviation}".rstrip()
         return f"{kind} d={size} of {self.body} ({numbers})"
 
     @property

@@ -280,9 +280,9 @@ class _Reader(Scene):
             pose = numbers(values.get("relpose"), f"relpose of {where}", 7, (0,) * 7)
             if pose[3:].any():
                 relative = self._frame({"pos": text_of(pose[:3]), "quat": text_of(pose[3:])}, where)
-                stated, drawn = self.frames[first].then(relative), self.frames[second]
-                other = place + stated.place - drawn.place
-                if np.abs(stated.rotation - drawn.rotation).max() > APART:
+                nominal, drawn = self.frames[first].then(relative), self.frames[second]
+                other = place + nominal.place - drawn.place
+                if np.abs(nominal.rotation - drawn.rotation).max() > APART:
                     raise refused("holds two bodies at another angle than the file draws them", where)
         gap = float(np.linalg.norm(place - other))
         if gap > APART:
@@ -319,9 +319,9 @@ def _onto(direction: Array, where: str) -> Array:
 def _solid(frame: Frame, values: Mapping[str, str], name: str) -> Body | None:
     """The body of a geom, in global axes; None if its mass cannot be found."""
     kind, where = values.get("type", "sphere"), f"size of a geom of body {name}"
-    stated = numbers(values.get("mass"), f"mass of a geom of body {name}", 1)[0] if "mass" in values else None
+    mass_stated = numbers(values.get("mass"), f"mass of a geom of body {name}", 1)[0] if "mass" in values else None
     density = float(numbers(values.get("density"), f"density of a geom of body {name}", 1, (1000,))[0])
-    if kind in ("plane", "hfield") or stated == 0 or (stated is None and density == 0):
+    if kind in ("plane", "hfield") or mass_stated == 0 or (mass_stated is None and density == 0):
         return Body(name)
     count = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}.get(kind, 0)
     if not count or "mesh" in values or values.get("shellinertia") == "true":
@@ -344,7 +344,7 @@ def _solid(frame: Frame, values: Mapping[str, str], name: str) -> Body | None:
         volume = 2 * math.pi * a * a * b / (1 - ball)
         across = (1 - ball) * a * a / 4 + ball * a * a / 5
         squares = np.array([across, across, (1 - ball) * b * b / 3 + ball * (a * a / 5 + b * b + 3 / 4 * a * b)])
-    mass = density * volume if stated is None else float(stated)
+    mass = density * volume if mass_stated is None else float(mass_stated)
     inertia = mass * np.diag(squares.sum() - squares)
     return Body(name, mass, frame.place, frame.inertia(inertia))
 

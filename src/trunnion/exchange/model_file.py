@@ -150,8 +150,9 @@ def _lines(draft: Draft, spatial: bool) -> Iterator[str]:
         if PAIRS[pair.type].turns:
             low, high = pair.limits or (-math.inf, math.inf)
             ends = f", range: [{_number(math.degrees(low))} deg, {_number(math.degrees(high))} deg]"
-            whole = high - low >= 2 * math.pi
-            yield f"  {_quoted(name)}: {{speed: {_number(rate if whole else abs(rate))} rad/s{'' if whole else ends}}}"
+            closed = high - low >= 2 * math.pi
+            speed = _number(rate if closed else abs(rate))
+            yield f"  {_quoted(name)}: {{speed: {speed} rad/s{'' if closed else ends}}}"
         else:
             low, high = pair.limits or (0.0, size * STROKE)
             ends = f"range: [{_number(1e3 * low)} mm, {_number(1e3 * high)} mm]"

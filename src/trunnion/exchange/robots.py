@@ -219,8 +219,8 @@ def opening(positions: Positions, row: int, also: str = "") -> Draft:
     """The draft to write, with notes on what the format cannot hold."""
     draft, mechanism = positions.draft(row), positions.mechanism
     places = (path.split(".") for path, value in mechanism.parameters().items() if np.any(primal(value)))
-    stated = {place[2] for place in places if place[0] == "joints" and place[-1] != "pair_factor"}
-    lost = [name for name in LOST if getattr(mechanism, name)] + sorted(stated - {"pitch"})
+    entries = {place[2] for place in places if place[0] == "joints" and place[-1] != "pair_factor"}
+    lost = [name for name in LOST if getattr(mechanism, name)] + sorted(entries - {"pitch"})
     if any(driver.moves or driver.law != "constant" for driver in mechanism.drivers.values()):
         lost.append("laws of motion")
     if lost := [*lost, *([also] if also else [])]:
@@ -400,21 +400,21 @@ def _pair_of(chain: list[Pair], drives: Mapping[str, float]) -> Pair | None:
 
 def _leave_loose(draft: Draft, start: str) -> None:
     """Leave out the bodies that no chain of pairs joins to the one that is fixed."""
-    held, front = {start}, [start]
+    reached, front = {start}, [start]
     neighbours: dict[str, set[str]] = {}
     for pair in draft.pairs.values():
         for link, other in (pair.links, pair.links[::-1]):
             neighbours.setdefault(link, set()).add(other)
     while front:
-        new = neighbours.get(front.pop(), set()) - held
-        held |= new
+        new = neighbours.get(front.pop(), set()) - reached
+        reached |= new
         front += new
-    free = [name for name in draft.bodies if name not in held]
+    free = [name for name in draft.bodies if name not in reached]
     if free:
         what = f"are joined to nothing that is fixed, and left out: {_listed(free)}"
         draft.warn("exchange.free", "links", what, "join them to the ground, or state another one with --ground")
-    draft.bodies = {name: body for name, body in draft.bodies.items() if name in held}
-    draft.pairs = {name: pair for name, pair in draft.pairs.items() if set(pair.links) <= held}
+    draft.bodies = {name: body for name, body in draft.bodies.items() if name in reached}
+    draft.pairs = {name: pair for name, pair in draft.pairs.items() if set(pair.links) <= reached}
 
 
 def _listed(names: Sequence[str]) -> str:

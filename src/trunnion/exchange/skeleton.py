@@ -97,8 +97,8 @@ class Positions:
         centre, inertia = _mass_properties(system, values, link)
         body = Body(link, _float(values[f"links.{link}.mass"]), origin + rotation @ centre)
         body.inertia = rotation @ inertia @ rotation.T
-        stated = self.mechanism.effective_links[link]
-        for name in stated.points:
+        link_entry = self.mechanism.effective_links[link]
+        for name in link_entry.points:
             if name not in self.mechanism.effective_joints:
                 body.points[name] = origin + rotation @ _in_space(system.vector(values, f"links.{link}.points.{name}"))
         return body
@@ -142,16 +142,16 @@ def _mass_properties(system: System, values: Any, link: str) -> tuple[Array, Arr
     A body that moves in a plane feels J_zz alone; J_xx = J_yy = J_zz / 2 are those of a thin plate.
     """
     centre = _in_space(system.centre(values, link))
-    stated, path = system.mechanism.effective_links[link], f"links.{link}.inertia"
+    link_entry, path = system.mechanism.effective_links[link], f"links.{link}.inertia"
     mass = _float(values[f"links.{link}.mass"])
-    if isinstance(stated.inertia, InertiaTensor):
+    if isinstance(link_entry.inertia, InertiaTensor):
         xx, yy, zz, xy, xz, yz = (_float(values[f"{path}.{key}"]) for key in ("xx", "yy", "zz", "xy", "xz", "yz"))
         inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        if stated.inertia_about == "origin":
+        if link_entry.inertia_about == "origin":
             inertia = inertia - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
         return centre, inertia
     zz = _float(values.get(path, 0.0))
-    if stated.inertia_about == "origin":
+    if link_entry.inertia_about == "origin":
         zz -= mass * float(centre @ centre)
     return centre, np.diag([zz / 2, zz / 2, zz])
 

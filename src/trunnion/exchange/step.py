@@ -251,13 +251,13 @@ def _alone(file: Part21, number: int) -> str:
         if number in file.references(shape)
     )
     context = file[shape][file.kind(shape)][2]
-    wanted, queue = {number, int(context)}, [number, int(context)]
+    needed, queue = {number, int(context)}, [number, int(context)]
     while queue:
-        new = file.references(queue.pop()) - wanted
-        wanted |= new
+        new = file.references(queue.pop()) - needed
+        needed |= new
         queue += new
     text = _Text(max(file.spans) + 1)
-    text.lines = [f"#{entity}={file.text[slice(*file.spans[entity])]};" for entity in sorted(wanted)]
+    text.lines = [f"#{entity}={file.text[slice(*file.spans[entity])]};" for entity in sorted(needed)]
     text.product("solid", [number], "ADVANCED_BREP_SHAPE_REPRESENTATION", int(context))
     return text.text()
 

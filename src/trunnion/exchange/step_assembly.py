@@ -120,12 +120,12 @@ class Assembly:
         used = {child for uses in self.uses.values() for _, child in uses}
         every = dict.fromkeys([*self.shapes, *self.uses])
         roots = [root for root in every if root not in used]
-        count, seen = 0, set[int]()
+        count, visited = 0, set[int]()
 
         def expanded(occurrence: Occurrence, above: tuple[int, ...]) -> Occurrence:
             nonlocal count
             count += 1
-            seen.add(occurrence.definition)
+            visited.add(occurrence.definition)
             if count > MOST:
                 raise self.file.unreadable(f"has more than {MOST:,} parts", "export the parts that move")
             if occurrence.definition in above:
@@ -138,7 +138,7 @@ class Assembly:
             return occurrence
 
         tree = [expanded(Occurrence(self.name(root), root, Place()), ()) for root in roots if self.is_product(root)]
-        for left in (one for one in every if one not in seen and self.is_product(one)):
+        for left in (number for number in every if number not in visited and self.is_product(number)):
             raise self.file.unreadable(f"has the product {self.name(left)!r} inside itself")
         return tree
 

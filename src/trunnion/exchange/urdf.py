@@ -47,14 +47,14 @@ def _model_of(root: Element) -> tuple[Element, str]:
     links: dict[str, Element] = {}
     for link in root.findall("link"):
         links[link.get("name", "")] = made = SubElement(model, "link", name=link.get("name", ""))
-        inertial, stated = SubElement(made, "inertial"), link.find("inertial")
+        inertial, inertia_entry = SubElement(made, "inertial"), link.find("inertial")
         mass, inertia = link.find("inertial/mass"), link.find("inertial/inertia")
         SubElement(inertial, "mass").text = "0" if mass is None else mass.get("value", "")
         entries = SubElement(inertial, "inertia")
         for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"):
             SubElement(entries, key).text = "0" if inertia is None else inertia.get(key)
-        if stated is not None:
-            _add_pose(inertial, stated)
+        if inertia_entry is not None:
+            _add_pose(inertial, inertia_entry)
         made.extend([*link.findall("visual"), *link.findall("collision")])
     inner: set[str] = set()
     for part in root.findall("joint"):
@@ -91,9 +91,9 @@ def _joint_of(part: Element) -> Element:
     return joint
 
 
-def _add_pose(made: Element, stated: Element, relative: str = "") -> None:
+def _add_pose(made: Element, source: Element, relative: str = "") -> None:
     """Write an origin as a pose."""
-    origin = stated.find("origin")
+    origin = source.find("origin")
     xyz, rpy = ("0 0 0", "0 0 0") if origin is None else (origin.get("xyz", "0 0 0"), origin.get("rpy", "0 0 0"))
     pose = SubElement(made, "pose", {"relative_to": relative} if relative else {})
     pose.text = f"{xyz} {rpy}"

@@ -87,7 +87,7 @@ def _turn(axis: Vector3, twist: Number) -> Number:
     return namespace(x, y).arctan2(x, y)
 
 
-def rates(axes: tuple[Vector3, Vector3, Vector3], given: Vector3) -> Vector3:
+def rates(axes: tuple[Vector3, Vector3, Vector3], rates_of: Vector3) -> Vector3:
     """Rates θ̂̇_B, θ̂̇_C, θ̂̇_D with θ̂̇_B b̂ + θ̂̇_C ĉ + θ̂̇_D d̂ = `given`, the twist of k against h.
 
     By the adjugate: θ̂̇_B = given · (ĉ × d̂)/(b̂ · ĉ × d̂) and so on round. In a closed chain of four with joint 1 driven
@@ -96,13 +96,13 @@ def rates(axes: tuple[Vector3, Vector3, Vector3], given: Vector3) -> Vector3:
     b, c, d = axes
     normals = cross(c, d), cross(d, b), cross(b, c)
     volume = _nonzero(dot(b, normals[0]))
-    return dot(given, normals[0]) / volume, dot(given, normals[1]) / volume, dot(given, normals[2]) / volume
+    return dot(rates_of, normals[0]) / volume, dot(rates_of, normals[1]) / volume, dot(rates_of, normals[2]) / volume
 
 
 def closure(loop: Loop, twists: Sequence[Number]) -> tuple[Number, Number]:
     """By how much a loop misses closing: the largest entry of the product less I, real and dual part; rad, m."""
-    found = compose(*(link(angle, twist) for angle, twist in zip(loop.angles, twists, strict=True)))
-    gaps = [parts(entry - (1.0 if i == j else 0.0)) for i, row in enumerate(found) for j, entry in enumerate(row)]
+    product_of = compose(*(link(angle, twist) for angle, twist in zip(loop.angles, twists, strict=True)))
+    gaps = [parts(entry - (1.0 if i == j else 0.0)) for i, row in enumerate(product_of) for j, entry in enumerate(row)]
     real, dual = (np.broadcast_arrays(*map(primal, half)) for half in zip(*gaps, strict=True))
     return np.max(np.abs(real), axis=0), np.max(np.abs(dual), axis=0)
 

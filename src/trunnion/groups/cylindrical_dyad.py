@@ -38,7 +38,8 @@ class CylindricalDyad(SpatialGroup):
             bc, cd = (dual_angle(*pair) for pair in sides)
             c = ccc.meet(b, d, bc, cd, assembly)
             frames = [
-                relative(_triad(*found), _triad(*own)) for found, own in zip(((b, c), (c, d)), sides, strict=True)
+                relative(_triad(*found_axes), _triad(*side))
+                for found_axes, side in zip(((b, c), (c, d)), sides, strict=True)
             ]
             q = [self._coordinates(elements, frames, k) for k in range(3)]
             return self._posed(elements, q, self.size(elements))

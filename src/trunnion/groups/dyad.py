@@ -118,14 +118,14 @@ class Dyad(ABC):
         """Twists of the links and their derivatives, from those of h and k; see `Tree.moved`."""
         (h, _, k), (s_b, s_c, s_d) = outer, pose.screws
         p, q = self._rates(pose, minus(h, k))
-        one, two = times(p, s_b), times(q, s_d)
-        twists = [added(h, one), added(k, two)]
+        first, two = times(p, s_b), times(q, s_d)
+        twists = [added(h, first), added(k, two)]
         across = minus(twists[1], twists[0])
         rate = across.w
         if self.letters[1] == "P":
             x, y = velocity_at(across, pose.place)
             rate = s_c.x * x + s_c.y * y
-        carried = [bracket(h, one), bracket(twists[0], times(rate, s_c)), bracket(k, two)]
+        carried = [bracket(h, first), bracket(twists[0], times(rate, s_c)), bracket(k, two)]
         on_i, on_j = added(outer_seconds[0], carried[0]), added(outer_seconds[2], carried[2])
         p, q = self._rates(pose, minus(added(on_i, carried[1]), on_j))
         return twists, [added(on_i, times(p, s_b)), added(on_j, times(q, s_d))]

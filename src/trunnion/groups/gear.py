@@ -105,10 +105,10 @@ def mesh(gear: GearPair, elements: Sequence[Any], ratio: Number) -> Mesh:
     """
     if gear.carriers is None:
         raise ValueError("a gear pair without a common link has no pitch point")
-    one, two = (1.0 if side == 0 else -1.0 for side in gear.carriers)
+    first, two = (1.0 if side == 0 else -1.0 for side in gear.carriers)
     if gear.slide is not None:
-        return _mesh_with_rack(gear, elements, one * two * (ratio if gear.slide == 1 else 1 / ratio), ratio)
-    relative = one * two * ratio
+        return _mesh_with_rack(gear, elements, first * two * (ratio if gear.slide == 1 else 1 / ratio), ratio)
+    relative = first * two * ratio
     a, d = elements[gear.first][gear.carriers[0]], elements[gear.second][gear.carriers[1]]
     dx, dy = d.x - a.x, d.y - a.y
     xp = namespace(dx, dy)
@@ -176,5 +176,5 @@ def apart(gear: GearPair, touch: Mesh, size: Number) -> list[ToothForce]:
 
 def _on_gears(gear: GearPair, push: Wrench) -> list[ToothForce]:
     """A force on the second gear, and its opposite on the first."""
-    one, two = (1 - side for side in gear.carriers or (0, 0))
-    return [ToothForce(gear.second, two, push), ToothForce(gear.first, one, times(-1.0, push))]
+    first, two = (1 - side for side in gear.carriers or (0, 0))
+    return [ToothForce(gear.second, two, push), ToothForce(gear.first, first, times(-1.0, push))]

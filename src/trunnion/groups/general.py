@@ -66,8 +66,8 @@ class General(Tree):
         for k in self.chords:
             first, second = placed[k][:2]
             aim = self.motion(k).place(first, q[k]) if k in self.driven else first
-            way = Twist(second.x - aim.x, second.y - aim.y, turn_from(aim, second, 0.0) if self._aligned(k) else 0.0)
-            rows += self._components(k, first, way, size)
+            gap = Twist(second.x - aim.x, second.y - aim.y, turn_from(aim, second, 0.0) if self._aligned(k) else 0.0)
+            rows += self._components(k, first, gap, size)
         for i, gear in enumerate(self.gears):  # φ₂ − i φ₁ − φ₀, of a turn within half a turn
             slot = len(self.driven) + NUMBERS * i
             ratio, phase, near = drive[slot : slot + NUMBERS]
@@ -85,13 +85,13 @@ class General(Tree):
         """Whether a chord asks for a direction."""
         return chord in self.driven or not self.joints[chord].pair.turns
 
-    def _components(self, chord: int, first: Frame, way: Twist, size: Number) -> list[Number]:
+    def _components(self, chord: int, first: Frame, gap: Twist, size: Number) -> list[Number]:
         """The rows of a chord of how its point on the second link moves, or is off, and how that link turns."""
         if chord in self.driven:
-            return [way.x / size, way.y / size, way.w]
+            return [gap.x / size, gap.y / size, gap.w]
         if self.joints[chord].pair.turns:
-            return [way.x / size, way.y / size]
-        return [(first.c * way.y - first.s * way.x) / size, way.w]
+            return [gap.x / size, gap.y / size]
+        return [(first.c * gap.y - first.s * gap.x) / size, gap.w]
 
     def opening(self, placed: Sequence[Element], q: Coordinates, size: Number) -> Number:
         """Largest distance by which a chord is open, m."""
@@ -106,8 +106,8 @@ class General(Tree):
 
     def entries(self, chord: int, pair: Element, screw: Twist, size: Number, slides: bool = False) -> list[Number]:
         """See `Tree.entries`."""
-        way = Twist(*velocity_at(screw, place_of(pair[1])), screw.w)
-        return self._components(chord, pair[0], way, 1.0 if slides else size)
+        velocity = Twist(*velocity_at(screw, place_of(pair[1])), screw.w)
+        return self._components(chord, pair[0], velocity, 1.0 if slides else size)
 
     def cut_wrench(self, pose: Pose, chord: int, multipliers: Sequence[Number]) -> Wrench:
         """See `Tree.cut_wrench`."""

@@ -29,8 +29,8 @@ class PRP(Dyad):
         (b, b_i), (c_i, c_j), (d, d_j) = elements
         u, v = (b.c, b.s), (d.c, d.s)
         rest_i, rest_j = relative(b, b_i), relative(d, d_j)
-        one, two = compose(rest_i, c_i), compose(rest_j, c_j)
-        apart = (two.x - one.x, two.y - one.y)
+        first, two = compose(rest_i, c_i), compose(rest_j, c_j)
+        apart = (two.x - first.x, two.y - first.y)
         inverse = 1 / cross(u, v)
         frame_i = shifted(rest_i, u, cross(apart, v) * inverse)
         frame_j = shifted(rest_j, v, cross(apart, u) * inverse)

@@ -39,10 +39,10 @@ def pseudo_inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
     """J⁺ as rows; NaN where an entry is."""
     table = stacked(matrix)
     bad = np.asarray(~np.isfinite(table).all(axis=(-2, -1)))
-    found = np.linalg.pinv(np.where(bad[..., None, None], 0.0, table), rcond=RANK)
-    found[bad] = np.nan
+    inverse = np.linalg.pinv(np.where(bad[..., None, None], 0.0, table), rcond=RANK)
+    inverse[bad] = np.nan
     dual = any(isinstance(entry, Dual) for row in matrix for entry in row)
-    rows = [[found[..., i, j] for j in range(found.shape[-1])] for i in range(found.shape[-2])]
+    rows = [[inverse[..., i, j] for j in range(inverse.shape[-1])] for i in range(inverse.shape[-2])]
     return [[Dual(entry, np.nan) for entry in row] for row in rows] if dual else rows
 
 
@@ -54,8 +54,8 @@ def condition(matrix: Sequence[Sequence[Number]]) -> Array:
     columns = table.shape[-1]
     with np.errstate(divide="ignore"):
         lost = (values[..., -1] <= RANK * values[..., 0]) | (values.shape[-1] < columns)
-        found = 2 / columns * np.sqrt(np.sum(values**2, axis=-1) * np.sum(1 / values**2, axis=-1))
-    return np.where(bad, np.nan, np.where(lost, np.inf, found))
+        number = 2 / columns * np.sqrt(np.sum(values**2, axis=-1) * np.sum(1 / values**2, axis=-1))
+    return np.where(bad, np.nan, np.where(lost, np.inf, number))
 
 
 def least_squares(matrix: Sequence[Sequence[Number]], side: Sequence[Number]) -> list[Number]:
@@ -63,10 +63,10 @@ def least_squares(matrix: Sequence[Sequence[Number]], side: Sequence[Number]) ->
     table = stacked(matrix)
     right = stacked([[entry] for entry in side])
     bad = np.asarray(~(np.isfinite(table).all(axis=(-2, -1)) & np.isfinite(right).all(axis=(-2, -1))))
-    found = np.linalg.pinv(np.where(bad[..., None, None], 0.0, table), rcond=RANK) @ right
-    found[bad] = np.nan
+    solution = np.linalg.pinv(np.where(bad[..., None, None], 0.0, table), rcond=RANK) @ right
+    solution[bad] = np.nan
     dual = any(isinstance(entry, Dual) for row in matrix for entry in row)
-    values = [found[..., i, 0] for i in range(found.shape[-2])]
+    values = [solution[..., i, 0] for i in range(solution.shape[-2])]
     return [Dual(value, np.nan) for value in values] if dual else values
 
 
@@ -128,7 +128,7 @@ def least(
     safe = np.where(bad[..., None, None], 0.0, table)
     project = np.eye(count) - safe @ np.linalg.pinv(safe, rcond=RANK)  # onto the null space of Jᵀ
     moves = np.where(bad[..., None, None], 0.0, effect @ project)
-    wanted = np.where(bad[..., None], 0.0, np.broadcast_to(start, shape))
-    change = (project @ np.linalg.pinv(moves, rcond=RANK) @ wanted[..., None])[..., 0]
+    target = np.where(bad[..., None], 0.0, np.broadcast_to(start, shape))
+    change = (project @ np.linalg.pinv(moves, rcond=RANK) @ target[..., None])[..., 0]
     change = np.where(bad[..., None], np.nan, change)
     return [primal(value) - change[..., j] for j, value in enumerate(multipliers)]

@@ -60,8 +60,8 @@ class SpatialGroup(Tree):
     ) -> list[Number]:
         """Of the loops; a spin is never open."""
         rows: list[Number] = []
-        for turn, way in self._loops(placed, q):
-            rows += [*turn, *(length / size for length in way)]
+        for turn, gap in self._loops(placed, q):
+            rows += [*turn, *(length / size for length in gap)]
         return rows + [0.0] * len(self.spinning)
 
     def opening(self, placed: Sequence[Element], q: Coordinates, size: Number) -> Number:

@@ -46,7 +46,9 @@ def unspun(group: SpatialGroup, elements: Sequence[Element], rows: Array, drive:
             sense = -1.0 if group.joints[k].sides[1] in members else 1.0  # back by what it has spun
             begin = group.starts[k]
             if group.joints[k].pair.ball:
-                local = np.array([np.sum(axis * _full(one, grid), axis=0) for one in (first.x, first.y, first.z)])
+                local = np.array(
+                    [np.sum(axis * _full(direction, grid), axis=0) for direction in (first.x, first.y, first.z)]
+                )
                 where = [place[begin + i] for i in range(4)]
                 rows[where] = _turned(rows[where], local, sense * spun)
             elif group.joints[k].kind == "planar":

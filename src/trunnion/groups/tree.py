@@ -376,9 +376,11 @@ class Tree(ABC):
             last = functools.reduce(np.maximum, moves)
             shrink = 1 / np.maximum(last, 1.0)  # as a whole, so that the direction stays
             after = self._advanced(now, [[value * shrink for value in values] for values in steps], size)
-            further, there = [*self._in_row(after), last], arrived(state)
+            further, arrived_at = [*self._in_row(after), last], arrived(state)
             return (
-                further if not np.any(there) else [np.where(there, *pair) for pair in zip(state, further, strict=True)]
+                further
+                if not np.any(arrived_at)
+                else [np.where(arrived_at, *pair) for pair in zip(state, further, strict=True)]
             )
 
         def arrived(state: list[Number]) -> Number:
@@ -439,8 +441,8 @@ class Tree(ABC):
         moved: Coordinates = []
         for k, (values, step) in enumerate(zip(q, steps, strict=True)):
             motion = self.motion(k)
-            way = [s * size if kind == "slide" else s for s, kind in zip(step, motion.steps, strict=True)]
-            moved.append(motion.advanced(values, way) if values else [])
+            motion_along = [s * size if kind == "slide" else s for s, kind in zip(step, motion.steps, strict=True)]
+            moved.append(motion.advanced(values, motion_along) if values else [])
         return moved
 
     def jacobian(
@@ -594,10 +596,10 @@ class Tree(ABC):
 
     def link_by_link(self, pose: Pose, loads: Sequence[Any], multipliers: Sequence[Number]) -> list[Any]:
         """The wrenches of all joints from those of the loops."""
-        algebra, carried, found = self.algebra, dict(enumerate(loads)), dict[int, Any]()
+        algebra, carried, reactions = self.algebra, dict(enumerate(loads)), dict[int, Any]()
         rest = iter(multipliers)
         for k in self.chords:
-            found[k] = wrench = self.cut_wrench(pose, k, [next(rest) for _ in range(self.count(k))])
+            reactions[k] = wrench = self.cut_wrench(pose, k, [next(rest) for _ in range(self.count(k))])
             first, second = self.joints[k].sides
             if second != OUTER:
                 carried[second] = algebra.added(carried[second], wrench)
@@ -608,10 +610,10 @@ class Tree(ABC):
                 carried[link] = algebra.added(carried[link], load)
         for step in reversed(self.steps):
             total = carried[step.child]
-            found[step.joint] = algebra.times(-1.0 if step.near == 0 else 1.0, total)
+            reactions[step.joint] = algebra.times(-1.0 if step.near == 0 else 1.0, total)
             if step.parent != OUTER:
                 carried[step.parent] = algebra.added(carried[step.parent], total)
-        return [found.get(k, algebra.ZERO_LOAD) for k in range(len(self.joints))]
+        return [reactions.get(k, algebra.ZERO_LOAD) for k in range(len(self.joints))]
 
     def multipliers(self, pose: Pose, loads: Sequence[Any]) -> list[Number]:
         """λ of every row."""

@@ -148,11 +148,11 @@ def pin_transform(clearance: Number, length: Number, beta: Number, xi: Number) -
 
 def described(radius: Number, beta: Number, xi: Number) -> list[Vector]:
     """End offsets c₁ = ρ(cos(ξ + β/2), sin(ξ + β/2)), c₂ = ρ(cos(ξ − β/2), sin(ξ − β/2)), m.  [P 12, 13]"""
-    found: list[Vector] = []
+    vectors: list[Vector] = []
     for angle in (xi + 0.5 * beta, xi - 0.5 * beta):
         xp = namespace(angle)
-        found.append((radius * xp.cos(angle), radius * xp.sin(angle)))
-    return found
+        vectors.append((radius * xp.cos(angle), radius * xp.sin(angle)))
+    return vectors
 
 
 def describing(first: Vector, second: Vector) -> tuple[Number, Number]:
@@ -213,8 +213,8 @@ def _size(load: Vector) -> Number:
     for part in load:
         square = square + part * part
     xp = namespace(square)
-    there = square > 0
-    return xp.where(there, xp.sqrt(xp.where(there, square, 1.0)), 0.0)
+    positive = square > 0
+    return xp.where(positive, xp.sqrt(xp.where(positive, square, 1.0)), 0.0)
 
 
 def pressed(load: Vector, radius: Number, least: Number = 0.0) -> Vector:
@@ -227,8 +227,8 @@ def pressed(load: Vector, radius: Number, least: Number = 0.0) -> Vector:
         square = square + part * part
     xp = namespace(square)
     square = xp.where(square > least * least, square, least * least)
-    there = square > 0
-    share = xp.where(there, radius / xp.sqrt(xp.where(there, square, 1.0)), 0.0)
+    positive = square > 0
+    share = xp.where(positive, radius / xp.sqrt(xp.where(positive, square, 1.0)), 0.0)
     return tuple(share * part for part in load)
 
 
@@ -266,7 +266,7 @@ def _turned_ball(load: Vector, friction: Number, spin: Vector3) -> Vector3:
 
     Where the load is within atan μ of the spin's axis the ball bears on its pole and does not slip there.
     """
-    whole: Vector3 = (load[0], load[1], load[2])
+    pull: Vector3 = (load[0], load[1], load[2])
     rate = dot(spin, spin)
     xp = namespace(rate, *load)
     spins = rate > 0
@@ -275,7 +275,7 @@ def _turned_ball(load: Vector, friction: Number, spin: Vector3) -> Vector3:
     a: Vector3 = (axis[0], axis[1], axis[2])
     size = _size(load)
     normal = size / xp.sqrt(1 + friction * friction)
-    along = dot(whole, a)
+    along = dot(pull, a)
     side = tuple(q - along * part for q, part in zip(load, a, strict=True))
     flat: Vector3 = (side[0], side[1], side[2])
     left = normal * normal - along * along  # N² (1 − α²)
@@ -289,11 +289,11 @@ def _turned_ball(load: Vector, friction: Number, spin: Vector3) -> Vector3:
     width = _size(flat)
     fit = root / xp.where(width > 0, width, 1.0)
     grown = size / xp.where(normal > 0, normal, 1.0)
-    found = [
-        xp.where(slips, grown * (along * part + fit * q), xp.where(spins, size * xp.sign(along) * part, own))
-        for part, q, own in zip(a, turned, load, strict=True)
+    parts = [
+        xp.where(slips, grown * (along * part + fit * q), xp.where(spins, size * xp.sign(along) * part, component))
+        for part, q, component in zip(a, turned, load, strict=True)
     ]
-    return found[0], found[1], found[2]
+    return parts[0], parts[1], parts[2]
 
 
 PIN_ENDS = (("1.x", "1.y"), ("2.x", "2.y"))

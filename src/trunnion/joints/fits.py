@@ -141,8 +141,8 @@ def _metres(pair: tuple[float, float]) -> tuple[float, float]:
 
 def _deviations(size: float, tolerance_class: str) -> tuple[float, float]:
     """(lower, upper), µm."""
-    found = re.fullmatch(r"([A-Za-z]{1,2})([0-9]{1,2})", tolerance_class)
-    letter, grade = (found[1], int(found[2])) if found else ("", 0)
+    match = re.fullmatch(r"([A-Za-z]{1,2})([0-9]{1,2})", tolerance_class)
+    letter, grade = (match[1], int(match[2])) if match else ("", 0)
     table = HOLES if letter.isupper() else SHAFTS
     if letter not in table:
         kind = "holes" if tolerance_class[:1].isupper() else "shafts"
@@ -205,20 +205,20 @@ def _graded(
 ) -> tuple[float, ...]:
     """The row of a grade in a table that has only some."""
     if grade not in table:
-        known = f"{min(table)} to {max(table)}"
-        raise _refused(f"there is no '{letter}{grade}' in the tables", f"'{letter}' has the grades {known}")
+        grades = f"{min(table)} to {max(table)}"
+        raise _refused(f"there is no '{letter}{grade}' in the tables", f"'{letter}' has the grades {grades}")
     return table[grade]
 
 
 def _stated(shaft: str, letter: str, diameter: float) -> float:
     """The fundamental deviation of a letter that does not begin at the smallest size."""
     row = LOWER[shaft]
-    found = row[_place(diameter, len(row))]
-    if found is None:
+    deviation = row[_place(diameter, len(row))]
+    if deviation is None:
         first = next(STEPS[place - 1] for place, one in enumerate(row) if one is not None)
         other = "u" if letter.islower() else "U"
         raise _refused(f"there is no '{letter}' of {diameter:g} mm", f"it begins above {first} mm; use '{other}'")
-    return found
+    return deviation
 
 
 def _at(row: tuple[float, ...], diameter: float) -> float:

@@ -205,11 +205,11 @@ def _profile(profile: Profile, peak_rate: float, peak_second: float, source: str
         """Ends of the rise and of the return, and where the profile goes from one function to the next."""
         duration, start = parameters["duration"], parameters["delay"]
         inner = (0.0, 0.125, 0.875, 1.0) if profile is modified_sine else (0.0, 1.0)
-        found = [start + part * duration for part in inner]
+        instants = [start + part * duration for part in inner]
         if parameters["returns"]:
             start, back = start + duration + parameters["dwell"], _return_duration(parameters)
-            found += [start + part * back for part in inner]
-        return found
+            instants += [start + part * back for part in inner]
+        return instants
 
     return MotionLaw(
         _between(profile),

@@ -54,8 +54,8 @@ class MotorKind:
 
 def constant(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
     """The same effort at every speed."""
-    found: Array = parameters["effort"] + 0.0 * speed
-    return found
+    effort: Array = parameters["effort"] + 0.0 * speed
+    return effort
 
 
 def linear(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
@@ -63,8 +63,8 @@ def linear(speed: Array, time: Array, parameters: Parameters, integral: Array) -
 
     Source: A. Hughes, B. Drury, Electric Motors and Drives, 5th ed., Newnes, 2019, chapter 3.
     """
-    found: Array = parameters["stall_effort"] * (1.0 - speed / parameters["no_load_speed"])
-    return found
+    effort: Array = parameters["stall_effort"] * (1.0 - speed / parameters["no_load_speed"])
+    return effort
 
 
 def induction(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
@@ -74,15 +74,15 @@ def induction(speed: Array, time: Array, parameters: Parameters, integral: Array
     Source: M. Kloss, Drehmoment und Schlüpfung des Drehstrommotors, Archiv für Elektrotechnik 5 (1916) 59-87.
     """
     slip, most = 1.0 - speed / parameters["synchronous_speed"], parameters["breakdown_slip"]
-    found: Array = 2.0 * parameters["breakdown_effort"] * slip * most / (slip * slip + most * most)
-    return found
+    effort: Array = 2.0 * parameters["breakdown_effort"] * slip * most / (slip * slip + most * most)
+    return effort
 
 
 def table(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
     """Points (speed or time, effort) joined by straight lines; before the first and after the last the effort stays."""
     knots, place = parameters["points.place"], time + 0.0 * speed if parameters["over"] == "time" else speed
-    found: Array = look_up(knots, parameters["points.effort"], np.clip(place, knots[0], knots[-1]))
-    return found
+    effort: Array = look_up(knots, parameters["points.effort"], np.clip(place, knots[0], knots[-1]))
+    return effort
 
 
 def speed_control(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
@@ -95,8 +95,8 @@ def speed_control(speed: Array, time: Array, parameters: Parameters, integral: A
 
 
 def _wanted(speed: Array, parameters: Parameters, integral: Array) -> Array:
-    found: Array = parameters["proportional"] * (parameters["target"] - speed) + parameters["integral"] * integral
-    return found
+    effort: Array = parameters["proportional"] * (parameters["target"] - speed) + parameters["integral"] * integral
+    return effort
 
 
 # of the limit: by how much what is wanted may exceed it before the integral is held. At the limit itself it would be
@@ -108,10 +108,10 @@ def control_error(speed: Array, time: Array, parameters: Parameters, integral: A
     """Rate of the controller's integral: ω* − ω; less of it, down to 0, while what is wanted goes beyond the limit by
     up to BEYOND of it and the error would drive it farther."""
     error, limit = parameters["target"] - speed, parameters["limit"]
-    wanted = _wanted(speed, parameters, integral)
-    left = np.clip(1.0 - (np.abs(wanted) / limit - 1.0) / BEYOND, 0.0, 1.0)
-    found: Array = np.where(wanted * error > 0, left * error, error)
-    return found
+    aimed = _wanted(speed, parameters, integral)
+    left = np.clip(1.0 - (np.abs(aimed) / limit - 1.0) / BEYOND, 0.0, 1.0)
+    rate: Array = np.where(aimed * error > 0, left * error, error)
+    return rate
 
 
 def control_at_rest(since: Array, parameters: Parameters, integral: Array) -> Array:
@@ -125,10 +125,10 @@ def control_at_rest(since: Array, parameters: Parameters, integral: Array) -> Ar
     begin, end = ((sense * share * limit - parameters["proportional"] * error) / gain for share in (1.0, 1.0 + BEYOND))
     after = np.maximum(since - np.maximum((begin - integral) / error, 0.0), 0.0)  # from where it begins to be held
     here = np.where((integral - begin) * sense > 0.0, integral, begin)
-    held = end + (here - end) * np.exp(-gain * abs(error) / (BEYOND * limit) * after)
-    evenly = np.where(after > 0.0, held, integral + error * since)
-    found: Array = np.where((integral - end) * sense >= 0.0, integral, evenly)
-    return found
+    settled = end + (here - end) * np.exp(-gain * abs(error) / (BEYOND * limit) * after)
+    evenly = np.where(after > 0.0, settled, integral + error * since)
+    integral_at: Array = np.where((integral - end) * sense >= 0.0, integral, evenly)
+    return integral_at
 
 
 MOTORS: dict[str, MotorKind] = {

@@ -44,8 +44,8 @@ def _length(*parts: Number) -> Number:
     xp = namespace(square)
     if xp is np:
         return np.sqrt(square)
-    there = primal(square) > 0
-    return xp.where(there, xp.sqrt(xp.where(there, square, 1.0)), 0.0)
+    positive = primal(square) > 0
+    return xp.where(positive, xp.sqrt(xp.where(positive, square, 1.0)), 0.0)
 
 
 def _shares(size: Number, *parts: Number) -> tuple[Number, ...]:
@@ -115,15 +115,15 @@ class BearingLoad:
         """N."""
         fx, fy, gx, gy, *more = reaction
         if self.summed:
-            found = _length(fx, fy) + 2 * _length(gx, gy)
+            normal = _length(fx, fy) + 2 * _length(gx, gy)
         else:
             hx, hy = 0.5 * fx, 0.5 * fy
-            found = _length(hx - gx, hy - gy) + _length(hx + gx, hy + gy)
+            normal = _length(hx - gx, hy - gy) + _length(hx + gx, hy + gy)
         if self.width is not None:
-            found = found + 2 * namespace(more[1]).abs(more[1]) / self.width
+            normal = normal + 2 * namespace(more[1]).abs(more[1]) / self.width
         if self.flank is not None:
-            found = found + self.flank * namespace(more[0]).abs(more[0])
-        return found
+            normal = normal + self.flank * namespace(more[0]).abs(more[0])
+        return normal
 
     def gradient(self, reaction: Reaction, normal: Number) -> Reaction:
         """∂N/∂ of what it feels: by the directions of the contact forces."""

@@ -210,8 +210,8 @@ def _load(measure: MotionRequest, back: Backward) -> Number:
 
     Times the speed of the joint it is the power that the load takes.
     """
-    stated = back.walk.system.mechanism.loads[measure.subject]
-    speed = back.walk.rates(stated.joint or "")[0 if stated.resisting_torque is not None else 1]
+    load = back.walk.system.mechanism.loads[measure.subject]
+    speed = back.walk.rates(load.joint or "")[0 if load.resisting_torque is not None else 1]
     xp = namespace(speed)
     return -back.load_powers[measure.subject] / xp.where(primal(speed) != 0, speed, np.nan)
 

@@ -89,10 +89,10 @@ class NumpyKernel:
 
         NaN where a status rules it out.
         """
-        found, shape = self.solved(values, time), shape_of(values, time)
+        solved, shape = self.solved(values, time), shape_of(values, time)
         with np.errstate(all="ignore"):
-            status = pose_status(found, shape) if isinstance(found, Forward) else status_of(found, shape)
-            return self.curves(found, status), status
+            status = pose_status(solved, shape) if isinstance(solved, Forward) else status_of(solved, shape)
+            return self.curves(solved, status), status
 
     def curves(self, solved: Backward | Forward, status: NDArray[np.int8]) -> Curves:
         """The parts of the courses of what is solved."""
@@ -173,7 +173,7 @@ def step_of(run: Run, values: Mapping[str, Number], count: int) -> Array:
 def where_known(measure: Measure, status: NDArray[np.int8], number: Number) -> Number:
     """The course of a measure, NaN where the status of the positions says that it has no answer."""
     if measure.of_motion:
-        known = status < (Status.NOT_ASSEMBLED if measure.of_places else Status.SINGULAR)
+        valid = status < (Status.NOT_ASSEMBLED if measure.of_places else Status.SINGULAR)
     else:
-        known = status < (Status.LOAD_UNDEFINED if measure.wants_margin else Status.NOT_CONVERGED)
-    return number if np.all(known) else number + np.where(known, 0.0, np.nan)
+        valid = status < (Status.LOAD_UNDEFINED if measure.wants_margin else Status.NOT_CONVERGED)
+    return number if np.all(valid) else number + np.where(valid, 0.0, np.nan)

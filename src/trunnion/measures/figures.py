@@ -139,10 +139,10 @@ class Panels:
 
         def spread(array: Array) -> Array:
             rows = spread_out(array, low, half, time)
-            beyond = np.any(np.isnan(rows), axis=(0, 1)) & (period > 0.0)  # the first panel of one begins later
-            for shift in (period, -period) if np.any(beyond) else ():
-                again = spread_out(array, low, half, time[beyond] + shift)
-                rows[..., beyond] = np.where(np.isnan(rows[..., beyond]), again, rows[..., beyond])
+            past_end = np.any(np.isnan(rows), axis=(0, 1)) & (period > 0.0)  # the first panel of one begins later
+            for shift in (period, -period) if np.any(past_end) else ():
+                again = spread_out(array, low, half, time[past_end] + shift)
+                rows[..., past_end] = np.where(np.isnan(rows[..., past_end]), again, rows[..., past_end])
             return rows
 
         return linear(self.coefficients, spread)
@@ -196,8 +196,8 @@ class Reading:
         figure, least, most, time = self._of_rule(panels)
         if self.measure.wants_margin and self.measure.rule != "deviation":
             figure = self._to_the_end(panels, figure)
-            known = np.isfinite(primal(figure)) | (primal(figure) != self.nominal)
-            least = most = selected(known, figure - self.nominal, 0.0)
+            moving = np.isfinite(primal(figure)) | (primal(figure) != self.nominal)
+            least = most = selected(moving, figure - self.nominal, 0.0)
         figure, least, most = (selected(~lost, number, np.nan) for number in (figure, least, most))
         return Figures(figure, least, most, np.where(np.isfinite(primal(figure)), time, np.nan))
 
@@ -240,8 +240,8 @@ class Reading:
         rule, end = self.measure.rule, MARGIN * (1 - NARROW)
         lowest, highest = (primal(panels.top(first, sign).value) for sign in (-1.0, 1.0))
         within = ((lowest if rule.endswith("minimum") else highest) < end) | (rule == "dwell")
-        beyond = (rule in ("maximum", "largest", "value")) | (lowest >= end) & (rule in ("minimum", "mean", "rms"))
-        return selected(within, figure, np.where(beyond, np.inf, np.nan))
+        past_end = (rule in ("maximum", "largest", "value")) | (lowest >= end) & (rule in ("minimum", "mean", "rms"))
+        return selected(within, figure, np.where(past_end, np.inf, np.nan))
 
     # ---- rules --------------------------------------------------------------------------------------------
 
@@ -292,8 +292,8 @@ class Reading:
     def _beside(self, panels: Panels, top: Top) -> Array:
         """Time of an extreme, s, within its panel; NaN of a constant."""
         low, half = (primal(side) for side in panels.sides(top))
-        beside = np.minimum(BESIDE * self.run.cycle.duration, half)
-        time = np.clip(primal(panels.time(top)), low + beside, low + 2.0 * half - beside)
+        offset = np.minimum(BESIDE * self.run.cycle.duration, half)
+        time = np.clip(primal(panels.time(top)), low + offset, low + 2.0 * half - offset)
         return np.where(top.constant, np.nan, time)
 
     def _ratio(self, panels: Panels) -> Number:
@@ -317,8 +317,8 @@ class Reading:
         share = share - above(row, high) if np.isfinite(high) else share
         shape = (*np.shape(primal(row))[:-1], ORDER)
         times = linear(panels.weights, lambda array: np.broadcast_to(array, shape) @ GAUSS_WEIGHTS / 2)
-        within, whole = (linear(number * times, lambda array: np.sum(array, -1)) for number in (share, 2.0))
-        return within / whole
+        within, full = (linear(number * times, lambda array: np.sum(array, -1)) for number in (share, 2.0))
+        return within / full
 
     @property
     def _around(self) -> bool:

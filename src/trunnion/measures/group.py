@@ -141,8 +141,8 @@ class Group:
     @cached_property
     def _breaks(self) -> Array:
         """Times, s, at which courses of the nominal mechanism may bend or jump."""
-        own = self.kernel.breaks(self.values)
-        return np.array([bend.time for bend in self.bends]) if own is None else own[0]
+        edges = self.kernel.breaks(self.values)
+        return np.array([bend.time for bend in self.bends]) if edges is None else edges[0]
 
     @cached_property
     def course(self) -> Courses:
@@ -208,9 +208,9 @@ class Group:
         """Part the panels until they resolve the courses of some mechanisms as far as their figures need it."""
         if self._each_alone:
             return
-        own, lost = self._own_bends(values)
+        bends, lost = self._own_bends(values)
         for _ in range(0 if self.at_place else PARTED):
-            edges = self._own_edges(own)
+            edges = self._own_edges(bends)
             panels = np.any(self._on(values, edges, {}, FIRM)[1][~lost], axis=0)
             count = len(self.edges) - 1
             if len(panels) != count:  # the bends of each are edges besides
@@ -233,24 +233,24 @@ class Group:
         none = np.zeros(lanes_of(values), bool)
         if self.at_place or values is self.values or not self.bends:
             return None, none
-        own, end = self._tracked(values), self.span[1]
+        bends, end = self._tracked(values), self.span[1]
         times = np.array([bend.time for bend in self.bends])
-        lost = np.any(np.isnan(primal(own)), axis=1)
-        close = np.abs(primal(own) - times) <= LOCATED * end  # so that the same mechanism has the same edges
-        own = own + np.where(close, times - primal(own), 0.0)
-        same = np.all(close, axis=1) & ~np.any(derivative(own) + 0.0 * times, axis=1)
+        lost = np.any(np.isnan(primal(bends)), axis=1)
+        close = np.abs(primal(bends) - times) <= LOCATED * end  # so that the same mechanism has the same edges
+        bends = bends + np.where(close, times - primal(bends), 0.0)
+        same = np.all(close, axis=1) & ~np.any(derivative(bends) + 0.0 * times, axis=1)
         if np.all(same | lost):
             return None, lost
-        own = linear(own, lambda array: np.where(lost[:, None], 0.0, array)) + np.where(lost[:, None], times, 0.0)
-        return own, lost
+        bends = linear(bends, lambda array: np.where(lost[:, None], 0.0, array)) + np.where(lost[:, None], times, 0.0)
+        return bends, lost
 
     def _tracked(self, values: Values) -> Number:
         """Times of the nominal mechanism, s, (lane, bend), at which each switches; NaN where it is far off."""
         run, count = self.run, lanes_of(values)
         plain = {path: primal(value) for path, value in values.items()}
 
-        def at(own: Values, time: Array) -> Number:
-            return moved(run, own, time)
+        def at(v: Values, time: Array) -> Number:
+            return moved(run, v, time)
 
         of = Mechanisms(run.system, run.chosen.assembly, plain, [run.cycle] * count)
         times = tracked(of, self.bends, at)
@@ -262,20 +262,20 @@ class Group:
         shifts = shifts_of(of, self.bends, times, at, (below, above))
         return Dual(times, np.divide(shifts, 2 * step, out=np.zeros_like(shifts), where=step > 0))
 
-    def _own_edges(self, own: Number | None) -> Number:
+    def _own_edges(self, bends: Number | None) -> Number:
         """Edges of the panels of each, (lane, edge), or (1, edge) if they are those of all: the nominal ones go along
         with the bends next to them. What is taken less the nominal mechanism jumps at the bends of that too."""
-        if own is None:
+        if bends is None:
             return self.edges[None]
         times = np.array([bend.time for bend in self.bends])
-        (start, end), cycle, count = self.span, self.run.cycle, np.shape(primal(own))[0]
+        (start, end), cycle, count = self.span, self.run.cycle, np.shape(primal(bends))[0]
         close, laps = CLOSE * end, np.zeros(1)
         if cycle.periodic:  # all periods that the span touches
             laps = np.arange(np.floor(start / cycle.duration) - 1, np.ceil(end / cycle.duration) + 1) * cycle.duration
         nominal = (times + laps[:, None]).ravel()
         order = np.argsort(nominal, kind="stable")
         nominal = nominal[order]
-        others = linear(own, lambda array: np.tile(array, len(laps))[:, order]) + np.repeat(laps, len(times))[order]
+        others = linear(bends, lambda array: np.tile(array, len(laps))[:, order]) + np.repeat(laps, len(times))[order]
         fixed = np.unique(nominal[(nominal >= start - close) & (nominal <= end + close)] if self.against else [])
         if self.ends or not cycle.periodic:  # the ends of a window stay
             inner = (nominal > start + close) & (nominal < end - close)
@@ -305,8 +305,8 @@ class Group:
         """
         if self._each_alone:
             return self._alone({}, values, np.arange(lanes_of(values)), times)
-        own, lost = self._own_bends(values)
-        edges = self._own_edges(own)
+        bends, lost = self._own_bends(values)
+        edges = self._own_edges(bends)
         reads, offending, gone = self._on(values, edges, times)
         left = np.flatnonzero(np.any(offending, axis=1) & ~lost & ~gone)
         edges = linear(edges, lambda array: np.broadcast_to(array, (len(lost), array.shape[1]))[left])
@@ -362,10 +362,10 @@ class Group:
         they are others."""
         run, flat = self.run, linear(time, lambda array: array.reshape(len(array), -1))
         place = within(run, flat)
-        own = moved(run, values, place)
-        alone = len(primal(own)) == 1
-        curves, status = self.kernel.courses(values, linear(own, lambda array: array[0]) if alone else own)
-        full = (max(lanes_of(values), len(primal(own))), *np.shape(primal(time))[1:])
+        evaluated = moved(run, values, place)
+        alone = len(primal(evaluated)) == 1
+        curves, status = self.kernel.courses(values, linear(evaluated, lambda array: array[0]) if alone else evaluated)
+        full = (max(lanes_of(values), len(primal(evaluated))), *np.shape(primal(time))[1:])
 
         def shaped(array: Any) -> Any:
             array = np.asarray(array)
@@ -374,11 +374,11 @@ class Group:
             return array.reshape(full)
 
         parts = {measure.name: [linear(part, shaped) for part in curves[measure.name]] for measure in self.measures}
-        if own is place:
+        if evaluated is place:
             return parts, shaped(status), None
         laps = np.rint((primal(flat) - primal(place)) / run.cycle.duration)
-        own = own + moved(run, values, np.array([run.cycle.duration])) * laps
-        return parts, shaped(status), linear(own, lambda array: array.reshape(-1, *full[1:]))
+        evaluated = evaluated + moved(run, values, np.array([run.cycle.duration])) * laps
+        return parts, shaped(status), linear(evaluated, lambda array: array.reshape(-1, *full[1:]))
 
     def _nominal(self, time: Number) -> dict[str, list[Number]]:
         """The parts of the nominal mechanism at times, s, of measures that are judged against it."""
@@ -389,7 +389,9 @@ class Group:
         at = (Dual(real[:1], np.ones_like(real[:1])) if isinstance(time, Dual) else real[:1]) if once else time
         parts = self._evaluated(self.values, at)[0]
         if once and isinstance(time, Dual):
-            parts = {name: [Dual(primal(p), derivative(p) * time.dual) for p in own] for name, own in parts.items()}
+            parts = {
+                name: [Dual(primal(p), derivative(p) * time.dual) for p in numbers] for name, numbers in parts.items()
+            }
         return {measure.name: parts[measure.name] for measure in self.against}
 
     def _rows(
@@ -400,15 +402,15 @@ class Group:
         time: Number,
     ) -> Number:
         """The rows that the figure is read of, (row, lane, panel, node)."""
-        own, before = parts[measure.name], nominal.get(measure.name)
+        numbers, before = parts[measure.name], nominal.get(measure.name)
         if measure.turning(self.run.system):
-            own = [near(own[0], np.interp(primal(time), *self.angles[measure.name]))]
-            before = before and [near(before[0], primal(own[0]))]
+            numbers = [near(numbers[0], np.interp(primal(time), *self.angles[measure.name]))]
+            before = before and [near(before[0], primal(numbers[0]))]
         if before and measure.of_attitude(self.run.system):
-            own = [turn(own, before, measure.axis)]
+            numbers = [turn(numbers, before, measure.axis)]
         elif before:
-            own = [part - was for part, was in zip(own, before, strict=True)]
-        return combined(lambda *arrays: np.stack(np.broadcast_arrays(*arrays)), *own)
+            numbers = [part - was for part, was in zip(numbers, before, strict=True)]
+        return combined(lambda *arrays: np.stack(np.broadcast_arrays(*arrays)), *numbers)
 
     def _fine(self, measure: Measure) -> float:
         """Of the size of courses: how far figures may be off; a place is off by the root of that."""
@@ -443,13 +445,13 @@ class Group:
     def _read(self, measure: Measure, panels: Panels, status: NDArray[np.int8], times: Mapping[str, Array]) -> Read:
         reading, time = self._reading(measure), times.get(measure.name)
         figure, least, most, top = reading.read(panels)
-        shown: Number = np.zeros((len(status), 0))
+        places: Number = np.zeros((len(status), 0))
         if self.at_place:
-            shown = np.asarray(primal(figure))[:, None]
+            places = np.asarray(primal(figure))[:, None]
         elif time is not None and not isinstance(panels.low, Dual):
-            shown = linear(reading.shown(panels, time), lambda array: np.broadcast_to(array, (len(status), len(time))))
+            places = linear(reading.shown(panels, time), lambda array: np.broadcast_to(array, (len(status), len(time))))
         top = np.full(len(status), np.nan) if measure in self.against else top
-        return Read(figure, least, most, shown, top, status)
+        return Read(figure, least, most, places, top, status)
 
     # ---- mechanisms by themselves -------------------------------------------------------------------------
 
@@ -458,18 +460,18 @@ class Group:
     ) -> dict[str, Read]:
         """The same with some mechanisms read of courses of their own; derivatives are differences of them."""
         plain = {path: primal(value) for path, value in values.items()}
-        own = self._of_their_own(picked(plain, lanes), times)
+        alone = self._of_their_own(picked(plain, lanes), times)
         if any(isinstance(value, Dual) for value in values.values()):
             *sides, step = _sides(self.run, values, 1.0)
             below, above = (self._of_their_own(picked(side, lanes), {}) for side in sides)
             width = 2 * step[lanes, 0]
-            for name, read in own.items():
+            for name, read in alone.items():
                 numbers = [
                     Dual(middle, np.divide(high - low, width, out=np.zeros_like(width), where=width > 0))
                     for middle, low, high in zip(read[:3], below[name], above[name], strict=False)
                 ]
-                own[name] = Read(numbers[0], numbers[1], numbers[2], *read[3:])
-        return {name: _put(reads[name], lanes, read) if reads else read for name, read in own.items()}
+                alone[name] = Read(numbers[0], numbers[1], numbers[2], *read[3:])
+        return {name: _put(reads[name], lanes, read) if reads else read for name, read in alone.items()}
 
     def _of_their_own(self, values: Values, times: Mapping[str, Array]) -> dict[str, Read]:
         """What courses of their own say of some mechanisms, each with the places where it switches looked for."""
@@ -481,8 +483,8 @@ class Group:
             block_values, count = picked(values, lanes), len(lanes)
             lengths = np.ravel(primal(moved(run, block_values, np.array([cycle.duration])))) / cycle.duration
             ratio, switching = np.broadcast_to(lengths, count), [np.zeros(0)] * count
-            if (own := self.kernel.breaks(block_values)) is not None:
-                switching = own
+            if (breaks_own := self.kernel.breaks(block_values)) is not None:
+                switching = breaks_own
             elif self.bends or not self.of_motion:
                 cycles = [replace(cycle, duration=cycle.duration * float(length)) for length in ratio]
                 switching = bends(Mechanisms(run.system, run.chosen.assembly, block_values, cycles))
@@ -595,7 +597,7 @@ def _joined_reads(reads: Sequence[Read]) -> Read:
     return Read.of(lambda *arrays: np.concatenate(arrays), *reads)
 
 
-def _put(read: Read, lanes: Lanes, own: Read) -> Read:
+def _put(read: Read, lanes: Lanes, single: Read) -> Read:
     """What is read of all lanes, with others in place of some."""
 
     def replaced(every: Array, part: Array) -> Array:
@@ -604,4 +606,4 @@ def _put(read: Read, lanes: Lanes, own: Read) -> Read:
             changed[lanes] = part
         return changed
 
-    return Read.of(replaced, read, own)
+    return Read.of(replaced, read, single)

@@ -125,19 +125,19 @@ class Measure:
     @property
     def rule(self) -> str:
         """What makes the figure of the course: a rule of `figures.Reading`."""
-        own = self.of.rule
-        if own == "ratio" and self.subject != "cycle":
-            own = "deviation"
-        if own == "dead centre":
-            return "dead centre, least" if self.statistic == "place-of-minimum" else own
-        if own in ("line", "ratio", "work", "time ratio"):
-            return own
-        return self.statistic or ("value" if self.at is not None else own)
+        rule = self.of.rule
+        if rule == "ratio" and self.subject != "cycle":
+            rule = "deviation"
+        if rule == "dead centre":
+            return "dead centre, least" if self.statistic == "place-of-minimum" else rule
+        if rule in ("line", "ratio", "work", "time ratio"):
+            return rule
+        return self.statistic or ("value" if self.at is not None else rule)
 
     def single(self, system: System) -> bool:
         """Whether it is by itself one number at every position, of one mechanism alone: what a sensor could show."""
-        one = self.of.rule == "deviation" or (self.of.rule == "ratio" and self.subject == "instant")
-        return one and not self.of.against and not self.of_attitude(system)
+        single = self.of.rule == "deviation" or (self.of.rule == "ratio" and self.subject == "instant")
+        return single and not self.of.against and not self.of_attitude(system)
 
     def unit(self, system: System) -> str:
         """SI unit of the course."""
@@ -169,8 +169,8 @@ class Measure:
 
     def turning(self, system: System) -> bool:
         """Whether the course is an angle, which may gain whole turns."""
-        own = self.coordinate(system)
-        return own.kind in MOTIONS and own.unit(system) == "rad" and not self.of_attitude(system)
+        own_coordinate = self.coordinate(system)
+        return own_coordinate.kind in MOTIONS and own_coordinate.unit(system) == "rad" and not self.of_attitude(system)
 
     def of_attitude(self, system: System) -> bool:
         """Whether it is the turn of a link in space from where it lies in the nominal mechanism."""
@@ -235,22 +235,22 @@ def named(mechanism: Mechanism, names: Iterable[str], values: Values) -> list[Me
     `maximum:effort:A`, `rms:link.point.x`.
     Raises MechanismError for a name that means nothing, or an efficiency where nothing is useful.
     """
-    found, findings = [], []
+    measures, findings = [], []
     for name in dict.fromkeys(names):
-        stated = mechanism.measures.get(name)
-        if stated is None:
-            stated = _read(name)
-            findings += [] if stated is None else list(check_measure(mechanism, stated, f"--measure {name}"))
-        if stated is None:
+        entry = mechanism.measures.get(name)
+        if entry is None:
+            entry = _read(name)
+            findings += [] if entry is None else list(check_measure(mechanism, entry, f"--measure {name}"))
+        if entry is None:
             findings.append(Finding(f"'{name}' is no measure", "", _meant(name, mechanism), code="input.measure"))
-        elif stated.kind == "efficiency" and not has_useful_work(mechanism):
+        elif entry.kind == "efficiency" and not has_useful_work(mechanism):
             what = f"the efficiency is undefined: {NOTHING_USEFUL}"
             findings.append(Finding(what, f"measures.{name}", STATE_USEFUL, code="input.measure"))
         else:
-            found.append(_measure(name, stated, values, mechanism))
+            measures.append(_measure(name, entry, values, mechanism))
     if findings:
         raise MechanismError(findings)
-    return found
+    return measures
 
 
 def chosen(mechanism: Mechanism, names: Sequence[str] | None, values: Values) -> list[Measure]:
@@ -263,13 +263,15 @@ def chosen(mechanism: Mechanism, names: Sequence[str] | None, values: Values) ->
 def _meant(name: str, mechanism: Mechanism) -> str:
     """A remedy for a text that is no measure: what is most like it, else how one is written."""
     head, colon, _ = name.partition(":")
-    points = (f"{link}.{point}" for link, one in mechanism.effective_links.items() for point in one.points)
+    points = (
+        f"{link}.{point}" for link, joined_link in mechanism.effective_links.items() for point in joined_link.points
+    )
     components = [f"{point}.{axis}" for point in points for axis in AXES[: mechanism.coordinates]]
     near = nearest(head, [*STATISTICS, *MEASURES]) if colon else nearest(name, [*mechanism.measures, *components])
     if near.startswith("did you mean"):
         return near
-    known = f"; the model's measures are {', '.join(mechanism.measures)}" if mechanism.measures else ""
-    return f"write {FORMS}, with KIND and STATISTIC as in a model file{known}"
+    names_listed = f"; the model's measures are {', '.join(mechanism.measures)}" if mechanism.measures else ""
+    return f"write {FORMS}, with KIND and STATISTIC as in a model file{names_listed}"
 
 
 def _read(text: str) -> Stated | None:
@@ -296,39 +298,39 @@ def _read(text: str) -> Stated | None:
         return None
 
 
-def _measure(name: str, stated: Stated, values: Values, mechanism: Mechanism) -> Measure:
+def _measure(name: str, entry: Stated, values: Values, mechanism: Mechanism) -> Measure:
     path = f"measures.{name}"
 
     def number(key: str) -> float | None:
-        found = values.get(f"{path}.{key}")
-        return None if found is None else float(np.ravel(primal(found))[0])
+        value = values.get(f"{path}.{key}")
+        return None if value is None else float(np.ravel(primal(value))[0])
 
     def numbers(*keys: str) -> tuple[float, ...]:
-        return tuple(found for key in keys if (found := number(key)) is not None)
+        return tuple(value for key in keys if (value := number(key)) is not None)
 
     over, within = numbers("over.from", "over.to"), numbers("within.from", "within.to")
     places = [f"{path}.{key}" for key in ("at", "over.from") if f"{path}.{key}" in values]
     kinds = mechanism.parameter_kinds()
     return Measure(
-        name, stated.kind, stated.subject, stated.axis or "",
+        name, entry.kind, entry.subject, entry.axis or "",
         number("limit.lower"), number("limit.upper"), number("at_least"), number("at_most"),
         at=number("at"),
         over=(over[0], over[1]) if over else None,
         timed=any(kinds[place].unit == "s" for place in places),
-        statistic=stated.statistic or "",
+        statistic=entry.statistic or "",
         along=numbers(*(f"along.{axis}" for axis in AXES)),
         within=(within[0], within[1]) if within else None,
         duration=number("duration"),
-        formula=_formula(mechanism, stated, values),
+        formula=_formula(mechanism, entry, values),
     )  # fmt: skip
 
 
-def _formula(mechanism: Mechanism, stated: Stated, values: Values) -> Formula | None:
+def _formula(mechanism: Mechanism, entry: Stated, values: Values) -> Formula | None:
     """The expression of a measure, None of another kind: it needs what the most demanding of its parts does."""
-    if stated.formula is None:
+    if entry.formula is None:
         return None
     parts, inner = dict[str, Measure](), dict[str, Formula]()
-    for name, part in operands(mechanism, stated).items():
+    for name, part in operands(mechanism, entry).items():
         if part is None:
             continue
         measure = _measure(name, part, values, mechanism)
@@ -338,8 +340,8 @@ def _formula(mechanism: Mechanism, stated: Stated, values: Values) -> Formula | 
             inner[name] = measure.formula
             parts |= measure.formula.parts
     needs = max((part.of.needs for part in parts.values()), key=("places", "motion", "forces").index)
-    kind = replace(MEASURES["expression"], quantity=course_kind(mechanism, stated), needs=needs)
-    return Formula(stated.formula, parts, inner, kind)
+    kind = replace(MEASURES["expression"], quantity=course_kind(mechanism, entry), needs=needs)
+    return Formula(entry.formula, parts, inner, kind)
 
 
 def outputs(system: System) -> list[Measure]:

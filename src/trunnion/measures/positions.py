@@ -80,9 +80,9 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
     Raises MechanismError for places and windows that are not in the cycle.
     """
     ends = ends_by_name(run, measures)
-    grid = run.cycle.times(steps) if any(len(own) != 1 for own in ends.values()) else np.zeros(0)
-    times = np.unique(np.concatenate([grid, *(within(run, np.array(own)) for own in ends.values())]))
-    return PositionPlan(times, {name: _window(run, own, times, grid) for name, own in ends.items()})
+    grid = run.cycle.times(steps) if any(len(lane_ends) != 1 for lane_ends in ends.values()) else np.zeros(0)
+    times = np.unique(np.concatenate([grid, *(within(run, np.array(lane_ends)) for lane_ends in ends.values())]))
+    return PositionPlan(times, {name: _window(run, lane_ends, times, grid) for name, lane_ends in ends.items()})
 
 
 def place_of(mechanism: Mechanism, at: float | str) -> tuple[float, bool]:
@@ -158,15 +158,15 @@ def _window_ends(run: Run, measure: Measure, over: tuple[float, float], where: s
     """Both ends of a window, s; none of a window as wide as the cycle."""
     duration, (first, last) = run.cycle.duration, (time_of(run, place, measure.timed, where) for place in over)
     if run.cycle.periodic:
-        stated, whole = over[1] - over[0], duration if measure.timed else abs(gain_of(run))
+        length, full = over[1] - over[0], duration if measure.timed else abs(gain_of(run))
         # [300, 60] and [-60, 60] deg are the same of a driver that turns on: from the first place to the second; one
         # that turns backward passes the upper end first
-        if not measure.timed and stated >= 0 and gain_of(run) < 0:
+        if not measure.timed and length >= 0 and gain_of(run) < 0:
             first, last = last, first
-        if abs(abs(stated) - whole) <= 1e-9 * whole:
+        if abs(abs(length) - full) <= 1e-9 * full:
             return ()
-        if abs(stated) > whole:
-            what = f"the window is {abs(stated):g} wide, the cycle {whole:g} (SI)"
+        if abs(length) > full:
+            what = f"the window is {abs(length):g} wide, the cycle {full:g} (SI)"
             raise MechanismError(Finding(what, where, "state a window within one cycle"))
         first %= duration
         last = first + (last - first) % duration

@@ -106,8 +106,8 @@ class Cost:
 
     def numbers(self) -> dict[str, float]:
         """The parameters by name, those that are not stated with their defaults."""
-        stated = COST_MODELS[self.model].parameters
-        return {name: self.parameters.get(name, parameter.default or 0.0) for name, parameter in stated.items()}
+        parameters = COST_MODELS[self.model].parameters
+        return {name: self.parameters.get(name, parameter.default or 0.0) for name, parameter in parameters.items()}
 
     def value(self, t: float) -> float:
         """Cost of a half width t, m or rad."""

@@ -45,7 +45,7 @@ def _moments_of(values: Floats) -> tuple[float, ...]:
         size = np.max(np.abs(apart))
         scaled = apart / size if size > 0.0 else apart  # so that no power leaves the range of floats
         square = scaled * scaled
-        second, third, fourth = (np.mean(one) for one in (square, square * scaled, square * square))
+        second, third, fourth = (np.mean(array) for array in (square, square * scaled, square * square))
         deviation = size * np.sqrt(second * number / (number - 1)) if number > 1 else np.nan
         shape = (third / second**1.5, fourth / second**2) if second > 0 else (np.nan, np.nan)
     return float(number), float(mean), float(deviation), *map(float, shape)

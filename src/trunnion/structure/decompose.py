@@ -80,8 +80,8 @@ def taken(mechanism: Mechanism, joint: str) -> int:
 def mobility_by_formula(mechanism: Mechanism) -> int:
     """Grübler's count d (n − 1) − Σ (d − f_j) − gear pairs of n links; d = 3 in the plane, 6 in space."""
     moving = len(mechanism.effective_links) - 1
-    held = sum(taken(mechanism, joint) for joint in mechanism.effective_joints)
-    return FREEDOMS[mechanism.space] * moving - held - len(mechanism.gears)
+    constrained = sum(taken(mechanism, joint) for joint in mechanism.effective_joints)
+    return FREEDOMS[mechanism.space] * moving - constrained - len(mechanism.gears)
 
 
 def mobility_by_rank(
@@ -105,13 +105,13 @@ def mobility_by_rank(
     for module in reversed(modules):
         meshed = {name: gears[name] for name in module.gears}
         spoken = (joint for pair, _ in meshed.values() for joint in pair)
-        held = {name: joints[name] for name in dict.fromkeys((*module.joints, *spoken))}
-        matrix, _ = constraints(module.links, ground, held, places, module.driven, meshed)
+        members = {name: joints[name] for name in dict.fromkeys((*module.joints, *spoken))}
+        matrix, _ = constraints(module.links, ground, members, places, module.driven, meshed)
         if needed.isdisjoint(module.links) and rank(matrix) == int(matrix.shape[1]):
             firm += len(module.driven)
         else:
             weak.append(module)
-            needed.update(link for _, sides in held.values() for link in sides)
+            needed.update(link for _, sides in members.values() for link in sides)
     if modules:
         links = [link for module in weak for link in module.links]
         joints = {name: joints[name] for module in weak for name in module.joints}
@@ -152,12 +152,12 @@ def decompose(mechanism: Mechanism) -> Plan:
         if by_rank:
             return _as_one(table, mobility, spinning)
         raise MechanismError([fault])
-    known = {mechanism.fixed_link}
+    placed = {mechanism.fixed_link}
     modules: list[Module] = []
     for part in ordered(before, [table.numbers[links[0]] for links in parts]):
         gears = [name for (name, number), body in determines.items() if number == GEAR and body in parts[part]]
-        modules.append(table.module(parts[part], known, gears))
-        known.update(parts[part])
+        modules.append(table.module(parts[part], placed, gears))
+        placed.update(parts[part])
     return Plan(tuple(modules), mobility, tuple(spinning))
 
 
@@ -177,8 +177,8 @@ def _undriven(mobility: int, drivers: int, spins: int) -> Finding:
         else "remove a driver, or a joint or link that constrains twice; if it moves all the same, as a parallelogram "
         "with a third crank does, state over_constraint: minimum-norm"
     )
-    beside = f" beside {counted(spins, 'passive spin')}" if spins else ""
-    what = f"the mobility is {mobility} by Grübler's formula{beside}, but there {has}"
+    suffix = f" beside {counted(spins, 'passive spin')}" if spins else ""
+    what = f"the mobility is {mobility} by Grübler's formula{suffix}, but there {has}"
     return Finding(what, "drivers", remedy)
 
 
@@ -222,9 +222,9 @@ class LinkTable:
         determines = {constraint: bodies[k // size] for constraint, k in places.items() if k >= 0}
         return determines, [constraint for constraint, k in places.items() if k < 0]
 
-    def inside(self, links: list[str], known: set[str]) -> list[str]:
+    def inside(self, links: list[str], placed: set[str]) -> list[str]:
         """Joints among some links, or between them and the known ones, in file order."""
-        reach = known.union(links)
+        reach = placed.union(links)
         touching = {name for link in links for name in self.joints_of.get(link, [])}
         return sorted(
             (name for name in touching if reach.issuperset(self.joints[name].links)), key=self.order.__getitem__
@@ -234,10 +234,10 @@ class LinkTable:
         """The letter of a joint in the formula."""
         return PAIRS[self.joints[joint].type].symbol
 
-    def module(self, links: list[str], known: set[str], gears: list[str]) -> Module:
+    def module(self, links: list[str], placed: set[str], gears: list[str]) -> Module:
         """The module that the given links form on the links known so far, and through these gear pairs."""
         mechanism, numbers = self.mechanism, self.numbers
-        joints = self.inside(links, known)
+        joints = self.inside(links, placed)
         driven = [name for name in joints if name in mechanism.drivers]
         letters = "".join(f"[{self.symbol(name)}]" if name in driven else self.symbol(name) for name in joints)
         letters += "G" * len(gears)
@@ -276,10 +276,10 @@ class LinkTable:
         if len(links) != 2 or len(joints) != 3 or len(inner) != 1:
             return None
         first, last = (name for name in joints if name != inner[0])
-        held = [link for name in (first, last) for link in self.joints[name].links if link in links]
-        if sorted(held) != sorted(links):
+        outer_links = [link for name in (first, last) for link in self.joints[name].links if link in links]
+        if sorted(outer_links) != sorted(links):
             return None
-        if held[0] != links[0]:
+        if outer_links[0] != links[0]:
             first, last = last, first
         for order, sides in (([first, inner[0], last], links), ([last, inner[0], first], links[::-1])):
             kind = "".join(self.symbol(name) for name in order)

@@ -169,9 +169,9 @@ class Generic:
             tight[body].update(self.links_of[constraint])
             for link in self.links_of[constraint]:
                 slack[link].add(body)
-        held = Counter(self.determines.values())
+        counts = Counter(self.determines.values())
         twice = reached((link for constraint in left_over for link in self.links_of[constraint]), tight.__getitem__)
-        return twice, reached((body for body in self.bodies if held[body] < 3), slack.__getitem__)
+        return twice, reached((body for body in self.bodies if counts[body] < 3), slack.__getitem__)
 
     def _finding(self, twice: set[str], loose: set[str]) -> Finding:
         """The finding about a part that is constrained twice and one that is loose, both among the given links.
@@ -187,7 +187,7 @@ class Generic:
                 list(dict.fromkeys(name for name, strained in zip(owners, rows, strict=True) if strained)) or joints
             )
         links = [body for body in self.bodies if body in loose]
-        matrix, _ = self._matrix(links, [one for one, on in self.links_of.items() if not loose.isdisjoint(on)])
+        matrix, _ = self._matrix(links, [joint for joint, on in self.links_of.items() if not loose.isdisjoint(on)])
         if len(links) <= MOST_LINKS and matrix.size:
             columns = np.abs(_null(matrix)).max(axis=0, initial=0.0).reshape(-1, 3).max(axis=1) > RANK_TOLERANCE
             links = [body for body, free in zip(links, columns, strict=True) if free] or links

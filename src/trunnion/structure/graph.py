@@ -112,9 +112,9 @@ def longest_loop(edges: Sequence[tuple[Node, Node]]) -> int:
     (1987) 358-366, doi:10.1137/0216026.
     """
     near: dict[Node, list[tuple[Node, int]]] = {}
-    for k, (one, other) in enumerate(edges):
-        near.setdefault(one, []).append((other, 1 << k))
-        near.setdefault(other, []).append((one, 1 << k))
+    for k, (first, other) in enumerate(edges):
+        near.setdefault(first, []).append((other, 1 << k))
+        near.setdefault(other, []).append((first, 1 << k))
     loops: set[int] = set()  # sets of edges, one a bit
     for root in near:
         path, queue = {root: 0}, deque([root])
@@ -125,9 +125,9 @@ def longest_loop(edges: Sequence[tuple[Node, Node]]) -> int:
                     path[other] = path[node] | edge
                     queue.append(other)
         loops.update(
-            path[one] ^ path[other] ^ 1 << k
-            for k, (one, other) in enumerate(edges)
-            if one in path and not path[one] & path[other]
+            path[first] ^ path[other] ^ 1 << k
+            for k, (first, other) in enumerate(edges)
+            if first in path and not path[first] & path[other]
         )
     longest, basis = 0, dict[int, int]()  # by its highest edge
     for loop in sorted(loops - {0}, key=int.bit_count):

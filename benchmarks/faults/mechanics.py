@@ -41,8 +41,8 @@ _JOINTS = (
     Fault(
         "guide-torsion-halved",
         "joints/spatial_load.py",
-        "found = found + 2 * namespace(more[1]).abs(more[1]) / self.width",
-        "found = found + namespace(more[1]).abs(more[1]) / self.width",
+        "normal = normal + 2 * namespace(more[1]).abs(more[1]) / self.width",
+        "normal = normal + namespace(more[1]).abs(more[1]) / self.width",
         ("tests/invariants/test_bearing_loads.py",),
     ),
     Fault(
@@ -222,8 +222,8 @@ _SOLVE = (
     Fault(
         "hints-hold-at-the-start-alone",
         "solve/drawn.py",
-        "if stated is None or not drivers",
-        "if stated is not None or not drivers",
+        "if time_stated is None or not drivers",
+        "if time_stated is not None or not drivers",
         ("tests/reference/test_assemblies.py", "-k", "hint_holds"),
     ),
     Fault(
@@ -420,7 +420,7 @@ _ENGINES = (
     Fault(
         "loop-ends-with-its-first-lane-at-rest",
         "engines/lanes.py",
-        'return self.b.icmp_signed("!=", self.b.bitcast(lanes, whole), ir.Constant(whole, 0))',
+        'return self.b.icmp_signed("!=", self.b.bitcast(lanes, mask), ir.Constant(mask, 0))',
         "return self.b.extract_element(lanes, ir.Constant(INT, 0))",
         ("tests/reference/test_engines.py", "tests/reference/test_compiled_cycle.py"),
     ),
@@ -441,8 +441,8 @@ _ENGINES = (
     Fault(
         "kept-code-of-other-figures",
         "solve/walk_kernel.py",
-        "asked = described, list(figures), forces,",
-        "asked = described, forces,",
+        "request = described, list(figures), forces,",
+        "request = described, forces,",
         ("tests/reference/test_compiled_cycle.py",),
     ),
     Fault(
@@ -472,15 +472,15 @@ _DYNAMICS = (
     Fault(
         "friction-of-the-other-sense-at-rest",
         "dynamics/rest.py",
-        "miss = sense * (given - demanded)[0]",
-        "miss = (given - demanded)[0]",
+        "miss = sense * (drive_given - demanded)[0]",
+        "miss = (drive_given - demanded)[0]",
         ("tests/reference/test_motion_in_time.py", "-k", "weak or breaks"),
     ),
     Fault(
         "twice-the-kinetic-energy",
         "dynamics/energy.py",
-        "found = found - 0.5 * algebra.power",
-        "found = found - algebra.power",
+        "energy = energy - 0.5 * algebra.power",
+        "energy = energy - algebra.power",
         ("tests/reference/test_energy_account.py", "-k", "works_and_energies"),
     ),
 )
@@ -496,8 +496,8 @@ _STICKING = (
     Fault(
         "shares-that-are-not-the-least",
         "dynamics/bordered.py",
-        "abs(normal @ wanted) / whole <= best",
-        "abs(normal @ wanted) / whole >= best >= 0.0",
+        "abs(normal @ target) / total <= best",
+        "abs(normal @ target) / total >= best >= 0.0",
         ("tests/invariants/test_least_shares.py",),
     ),
     Fault(

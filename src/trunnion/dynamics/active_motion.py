@@ -144,9 +144,9 @@ class ActiveMotion(Integration):
         if np.all(senses != 0):
             walk, left = self.motion.walk(at, np.zeros_like(at.q)), 0.0 * senses
         else:
-            found = self.motion.accelerate(at)
-            shares = np.asarray(found.shares, float)
-            walk, left = found.back.walk, 1.0 + SLACK - np.abs(np.nan_to_num(shares, nan=np.inf))
+            accelerated = self.motion.accelerate(at)
+            shares = np.asarray(accelerated.shares, float)
+            walk, left = accelerated.back.walk, 1.0 + SLACK - np.abs(np.nan_to_num(shares, nan=np.inf))
         slow = np.sqrt(self.motion.typical)[:, None]
         return np.where(senses == 0, left, senses * self.motion.speeds(walk, len(at.time)) / slow + SLACK)
 
@@ -225,14 +225,14 @@ class ActiveMotion(Integration):
 
     def _jammed(self, time: float, row: Array, senses: Senses) -> bool:
         """Let joints lock, if they can: they stop at once."""
-        found = self._active.lock(self.moment(time, row, 0.0, self.now), senses)
-        if found is None:
+        locked = self._active.lock(self.moment(time, row, 0.0, self.now), senses)
+        if locked is None:
             return False
-        energy = self._stopped(time, row, found.rate, 0.0, self.now)
-        for k in found.joints:  # the whole loss is told once
-            figure = energy if k == found.joints[0] else np.nan
+        energy = self._stopped(time, row, locked.rate, 0.0, self.now)
+        for k in locked.joints:  # the whole loss is told once
+            figure = energy if k == locked.joints[0] else np.nan
             self.solution.events.append(Event(time, "lock", self.motion.resisted[k], figure, "J"))
-        self.senses = found.senses
+        self.senses = locked.senses
         return True
 
     def _failed(
@@ -247,7 +247,7 @@ class ActiveMotion(Integration):
             n, second = self.layout.coordinates, np.nan_to_num(self.motion.accelerate(at).second[:, 0])
             ahead[:n] += soon * row[n : 2 * n]
             ahead[n : 2 * n] += soon * second
-            causes = {self._cause(when, one, sense, now) for when, one in ((time, row), (time + soon, ahead))}
+            causes = {self._cause(when, state, sense, now) for when, state in ((time, row), (time + soon, ahead))}
             if causes & {"locked", "no_acceleration"} and self._jammed(time, row, self.senses):
                 return time, row, None
         return super()._failed(time, row, sense, now, message)
@@ -290,21 +290,21 @@ class ActiveMotion(Integration):
             return
         dense, begin, end = stretch.state, stretch.begin, stretch.end
         times, weights = step_nodes(begin, end)
-        seen = self._look(dense, times)
-        for k, one in self._open.items():
+        touches = self._look(dense, times)
+        for k, opening in self._open.items():
             contact = self.motion.contacts.each[k]
-            normal, slip = seen.normal[k], seen.slip[k]
-            elastic = elastic_force(-seen.gap[k], contact.stiffness, contact.exponent)
-            one.impulse += float(weights @ normal)
-            one.loss += float(weights @ ((elastic - normal) * seen.rate[k]))
+            normal, slip = touches.normal[k], touches.slip[k]
+            elastic = elastic_force(-touches.gap[k], contact.stiffness, contact.exponent)
+            opening.impulse += float(weights @ normal)
+            opening.loss += float(weights @ ((elastic - normal) * touches.rate[k]))
             turns = np.flatnonzero(slip[1:] * slip[:-1] < 0.0)
             if len(turns):
                 places = [self._turn(dense, k, times[i], times[i + 1]) for i in turns]
-                one.wear += self._rubbed(dense, k, [begin, *places, end])
+                opening.wear += self._rubbed(dense, k, [begin, *places, end])
             else:
-                one.wear += float(weights @ np.abs(normal * slip))
-            one.force = self._largest(dense, times, seen.normal[k], k, 1, one.force)
-            one.depth = self._largest(dense, times, -seen.gap[k], k, -1, one.depth)
+                opening.wear += float(weights @ np.abs(normal * slip))
+            opening.force = self._largest(dense, times, touches.normal[k], k, 1, opening.force)
+            opening.depth = self._largest(dense, times, -touches.gap[k], k, -1, opening.depth)
 
     def _turn(self, dense: Dense, k: int, low: float, high: float) -> float:
         """When the slip of a contact turns round."""
@@ -312,27 +312,27 @@ class ActiveMotion(Integration):
 
     def _rubbed(self, dense: Dense, k: int, ends: list[float]) -> float:
         """Wear index of a contact, J, over parts of a step."""
-        found = 0.0
+        work = 0.0
         for begin, end in pairwise(ends):
             times, weights = step_nodes(begin, end)
-            seen = self._look(dense, times)
-            found += float(weights @ np.abs(seen.normal[k] * seen.slip[k]))
-        return found
+            touches = self._look(dense, times)
+            work += float(weights @ np.abs(touches.normal[k] * touches.slip[k]))
+        return work
 
-    def _largest(self, dense: Dense, times: Array, seen: Array, k: int, what: int, known: float) -> float:
+    def _largest(self, dense: Dense, times: Array, touches: Array, k: int, what: int, peak: float) -> float:
         """The largest normal force (what: 1) or penetration (−1) of a contact, from before and within a step: looked at
         closely where it may be the largest."""
-        top = int(np.argmax(seen))
-        if seen[top] > (1.0 - NEARLY) * known:
+        top = int(np.argmax(touches))
+        if touches[top] > (1.0 - NEARLY) * peak:
             low, high = times[max(top - 1, 0)], times[min(top + 1, len(times) - 1)]
             close = self._look(dense, np.linspace(low, high, CLOSELY))
-            known = max(known, _peak(close.normal[k] if what > 0 else -close.gap[k]))
-        return known
+            peak = max(peak, _peak(close.normal[k] if what > 0 else -close.gap[k]))
+        return peak
 
     def finished(self) -> list[Impact]:
         """All contacts, those that last at the end with an end that is not known."""
         last = [self._impact_of(k, contact, np.nan, np.nan) for k, contact in self._open.items()]
-        return sorted([*self.impacts, *last], key=lambda one: one.begin)
+        return sorted([*self.impacts, *last], key=lambda impact: impact.begin)
 
 
 def step_nodes(begin: float, end: float) -> tuple[Array, Array]:
@@ -346,6 +346,6 @@ def _peak(values: Array) -> float:
     k = int(np.argmax(values))
     if not 0 < k < len(values) - 1:
         return float(values[k])
-    before, top, after = (float(one) for one in values[k - 1 : k + 2])
+    before, top, after = (float(value) for value in values[k - 1 : k + 2])
     bend = before - 2.0 * top + after
     return top if bend >= 0.0 else top - 0.125 * (after - before) ** 2 / bend

@@ -73,7 +73,7 @@ def _with_shares(slopes: Array, missed: Array, shares: Array) -> tuple[Array, bo
     return np.concatenate([along_ways + right[rank:].T @ along_free, change]), bool(over < 0.0)
 
 
-def least_shares(ways: Array, wanted: Array) -> Array:
+def least_shares(ways: Array, target: Array) -> Array:
     """s of W s = c, (equation, share), whose largest |s| is least; W of as many shares or more as equations.
 
     By duality the largest |s| is the maximum of |ν·c| / Σ|ν·W_j| over all ν, which is found among those that are
@@ -83,18 +83,18 @@ def least_shares(ways: Array, wanted: Array) -> Array:
     if rank == 0:
         return np.zeros(count)
     if rank == count:
-        return np.asarray(np.linalg.lstsq(ways, wanted, rcond=1e-12)[0], float)
+        return np.asarray(np.linalg.lstsq(ways, target, rcond=1e-12)[0], float)
     best, shares = -1.0, np.zeros(count)
     for inside in itertools.combinations(range(count), rank - 1):
         normal = np.linalg.svd(ways[:, inside].T)[2][-1] if inside else np.ones(1)
         along = normal @ ways
         along[list(inside)] = 0.0
-        if (whole := float(np.sum(np.abs(along)))) == 0.0 or abs(normal @ wanted) / whole <= best:
+        if (total := float(np.sum(np.abs(along)))) == 0.0 or abs(normal @ target) / total <= best:
             continue
-        best = float(abs(normal @ wanted)) / whole
-        shares = best * np.sign(along) * np.sign(normal @ wanted)
+        best = float(abs(normal @ target)) / total
+        shares = best * np.sign(along) * np.sign(normal @ target)
         if inside:
-            rest = wanted - ways @ shares
+            rest = target - ways @ shares
             shares[list(inside)] = np.linalg.lstsq(ways[:, inside], rest, rcond=1e-12)[0]
     return shares
 

@@ -48,11 +48,11 @@ class Bridged:
             return self.inner(at)  # type: ignore[no-any-return]
         about = [self.inner(at._replace(q=at.q - nearest + place * self.width)) for place in PLACES]
         columns = [
-            carried_on(self.width * PLACES, np.array([getattr(one, key) for one in about], float).T, nearest)
+            carried_on(self.width * PLACES, np.array([getattr(state, key) for state in about], float).T, nearest)
             for key in ("second", "integral", "bristles", "works", "slip")
         ]
         second, integral, bristles, works, slip = columns
-        sound, locked = all(one.sound for one in about), any(one.locked for one in about)
+        sound, locked = all(state.sound for state in about), any(state.locked for state in about)
         return Rates(second, integral, bristles, works, sound, locked, slip)
 
     def __getattr__(self, name: str) -> Any:

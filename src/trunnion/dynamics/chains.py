@@ -90,16 +90,16 @@ def _chained(
 ) -> Chain:  # fmt: skip
     """The parts of a chain. order: along which axis of its carriers each of its joints is."""
     names = [f"{name}_in_play_{k}" for k in range(1, len(kinds) + 1)]
-    carriers = [f"{one}_carrier" for one in names[:-1]]
+    carriers = [f"{link}_carrier" for link in names[:-1]]
     row, axes = [links[0], *carriers, links[1]], np.eye(3)
-    bodies: dict[str, dict[str, Any]] = {one: {"points": {}} for one in carriers}
+    bodies: dict[str, dict[str, Any]] = {link: {"points": {}} for link in carriers}
     joints: dict[str, dict[str, Any]] = {}
-    for k, (one, kind, i) in enumerate(zip(names, kinds, order, strict=True)):
+    for k, (link, kind, i) in enumerate(zip(names, kinds, order, strict=True)):
         pair = {"R": "revolute", "P": "prismatic"}[kind]
-        joints[one] = {"type": pair, "links": row[k : k + 2], "friction": 0, "seat": "free"}
+        joints[link] = {"type": pair, "links": row[k : k + 2], "friction": 0, "seat": "free"}
         for carrier in (row[k], row[k + 1]):
             if carrier in bodies:
-                bodies[carrier]["points"][one] = _point(np.zeros(3), axes[i], axes[(i + 1) % 3])
+                bodies[carrier]["points"][link] = _point(np.zeros(3), axes[i], axes[(i + 1) % 3])
     points = {names[0]: ends[0]}, {names[-1]: ends[1]}
     return Chain(points, bodies, joints, dict(zip(names, start, strict=True)))
 
@@ -116,16 +116,16 @@ def _turning(run: Run, walk: Forward, first: str, second: str) -> Array:
     start = _relative(walk, first, second)[0]
     moving = _relative(run.walk(np.linspace(0.0, run.cycle.duration, LOOKS)), first, second)
     turned = np.array(
-        [one @ start.T for one in (start, *moving) if np.all(np.isfinite(one))]
+        [rotation @ start.T for rotation in (start, *moving) if np.all(np.isfinite(rotation))]
     )  # as the first link sees it
     home = np.array(_plain(walk.motions[first].frame)[:3]).T
     best, least = np.eye(3), np.inf
     for axis in _tried(turned):
-        one = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-        one /= np.linalg.norm(one)
-        other = np.cross(axis, one)
+        rotation = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+        rotation /= np.linalg.norm(rotation)
+        other = np.cross(axis, rotation)
         for angle in np.arange(ANGLES) * np.pi / ANGLES:
-            last = np.cos(angle) * one + np.sin(angle) * other
+            last = np.cos(angle) * rotation + np.sin(angle) * other
             near = float(np.max(np.abs(axis @ turned @ last)))
             if near < least - 1e-9:
                 best, least = np.array([axis, np.cross(last, axis), last]), near
@@ -140,20 +140,22 @@ def _turning(run: Run, walk: Forward, first: str, second: str) -> Array:
 
 def _tried(turned: Array) -> Iterator[Array]:
     """First axes to be tried: those about which the links turn most, then those of the first link."""
-    halves = np.array([[one[2, 1] - one[1, 2], one[0, 2] - one[2, 0], one[1, 0] - one[0, 1]] for one in turned])
+    halves = np.array(
+        [[matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]] for matrix in turned]
+    )
     yield from np.linalg.eigh(halves.T @ halves)[1].T[::-1]
     yield from np.eye(3)
 
 
 def _relative(walk: Forward, first: str, second: str) -> Array:
     """How the second link is turned as the first sees it, (time, row, column)."""
-    one, other = (
+    first_axis, other = (
         np.array([[np.broadcast_to(primal(part), np.shape(walk.time)).ravel() for part in axis]
                   for axis in walk.motions[link].frame[:3]])
         for link in (first, second)
     )  # fmt: skip
-    found: Array = np.einsum("art,brt->tab", one, other)  # axis of the first, of the second
-    return found
+    products: Array = np.einsum("art,brt->tab", first_axis, other)  # axis of the first, of the second
+    return products
 
 
 def _plain(numbers: Any) -> Any:

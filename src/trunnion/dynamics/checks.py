@@ -30,14 +30,14 @@ def refuse(mechanism: Mechanism) -> None:
 def refuse_undetermined(run: Run, playing: Sequence[str] = ()) -> None:
     """MechanismError where the joints of a mechanism in space do not determine its motion or its reactions. playing:
     joints in play, without which it is."""
-    found = run.determinacy
-    redundant = [joint for part in found.parts if part.redundant for joint in part.joints] if found else []
+    determinacy = run.determinacy
+    redundant = [joint for part in determinacy.parts if part.redundant for joint in part.joints] if determinacy else []
     if redundant and playing:
         of = f"{', '.join(redundant)} constrain each other more than once also while {', '.join(playing)} is in play"
         what = f"{of}: statics does not determine their reactions"
         raise MechanismError(Finding(what, "joints", "use a joint with more freedoms there (cylindrical, spherical)"))
-    if found is not None:
-        found.refuse()
+    if determinacy is not None:
+        determinacy.refuse()
 
 
 SINGULAR = 1e12  # condition of a mass matrix, coordinates by what is typical of each, that is none
@@ -53,8 +53,8 @@ def refuse_massless(motion: FreeMotion, row: Array) -> None:
         condition = np.linalg.cond(matrix / scale[:, None] / scale) if np.all(scale > 0) else np.inf
     if condition < SINGULAR:
         return
-    joints = dict.fromkeys(one.joint for one in motion.contacts.each)
-    touching = dict.fromkeys(link for one in motion.contacts.each for link in (one.body, one.other))
+    joints = dict.fromkeys(contact.joint for contact in motion.contacts.each)
+    touching = dict.fromkeys(link for contact in motion.contacts.each for link in (contact.body, contact.other))
     light = [link for link in touching if not _weighs(motion, link)]
     light = [link for link in light if any(name.startswith(f"{link}_in_play_") for name in motion.names)] or light
     if not light:  # what turns without inertia
@@ -136,13 +136,13 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
 
 def _clutches(mechanism: Mechanism, free: list[str]) -> Iterator[Finding]:
     """Clutches beside several free coordinates."""
-    beside, remedy = f"{len(free)} coordinates are free", "remove it, or let this driver alone be free"
+    subject, remedy = f"{len(free)} coordinates are free", "remove it, or let this driver alone be free"
     if len(free) < 2:
-        beside, remedy = "joints are in play", "remove it, or the contact of the joints in play"
+        subject, remedy = "joints are in play", "remove it, or the contact of the joints in play"
     for name in free:
         motor = mechanism.drivers[name].motor
         if motor is not None and motor.clutch is not None:
-            what = f"a clutch that may slip is solved with one free coordinate, and {beside}"
+            what = f"a clutch that may slip is solved with one free coordinate, and {subject}"
             yield Finding(what, f"drivers.{name}.motor.clutch", remedy)
 
 
@@ -168,12 +168,12 @@ def _of_several(mechanism: Mechanism) -> Iterator[Finding]:
         joint, path = mechanism.effective_joints[name], f"joints.{name}"
         what = f"in a {joint.type} joint of a loop with {playing} in play it is not modelled"
         rubs = (f"{path}.friction.{key}" for key in joint.friction.parameters) if joint.friction else ()
-        if any(values[one] != 0 for one in rubs):
+        if any(values[joint_name] != 0 for joint_name in rubs):
             yield Finding(f"friction: {what}", f"{path}.friction", "state friction: 0 for this joint")
         if joint.losses is not None:
             yield Finding(what, f"{path}.losses", "remove it")
-        for spring, one in mechanism.springs.items():
-            if one.joint == name:
+        for spring, joint_name in mechanism.springs.items():
+            if joint_name.joint == name:
                 yield Finding(what, f"springs.{spring}", "state it between two points")
 
 

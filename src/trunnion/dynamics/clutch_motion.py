@@ -85,12 +85,12 @@ class ClutchMotion(Integration):
         self.let_go = 0.0
         if self.rest is not None:
             self.rest = replace(self.rest, slips=self.slips)
-        found = "opens" if not engaged else "slips" if self.slips else "holds"
-        if found != self.known:
+        change = "opens" if not engaged else "slips" if self.slips else "holds"
+        if change != self.known:
             turns = self.motion.system.turns(self.motion.names[0])
-            figure = (slip, "rad/s" if turns else "m/s") if found == "slips" else (np.nan, "")
-            self._note(time, f"clutch-{found}", *figure)
-            self.known = found
+            figure = (slip, "rad/s" if turns else "m/s") if change == "slips" else (np.nan, "")
+            self._note(time, f"clutch-{change}", *figure)
+            self.known = change
 
     def _overloaded(self, time: float, row: Array, now: float) -> float:
         """The sense in which a clutch without slip begins to slip, 0 if it holds."""
@@ -111,8 +111,8 @@ class ClutchMotion(Integration):
         """Effort through a clutch that holds, (lane,): the motor's, less what the rotor takes."""
         second = 0.0 * at.rate[0] if rests else self.rates.inner.seconds(at)[0]
         shaft = self.drive.shaft(at.time, at.rate[0], at.integral[0], at.now)
-        found: Array = shaft - self.drive.inertia * self.drive.ratio * second
-        return found
+        effort: Array = shaft - self.drive.inertia * self.drive.ratio * second
+        return effort
 
     # ---- where that changes -------------------------------------------------------------------------------------
 

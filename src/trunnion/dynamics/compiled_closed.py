@@ -58,20 +58,20 @@ class CompiledClosed(CompiledRates):
     def touches(self, at: Moment) -> Seen:
         """See `rates.Rigid`; by walks where there is any doubt."""
         program = self._program("rates", at)
-        found = None if program is None else program.run(at)
-        if found is None or np.any(found[-1]) or not np.all(np.isfinite(found)):
+        rates = None if program is None else program.run(at)
+        if rates is None or np.any(rates[-1]) or not np.all(np.isfinite(rates)):
             return self.walks.touches(at)
-        return Seen(*found[self.last : -1].reshape(len(Seen._fields), -1, at.q.shape[1]))
+        return Seen(*rates[self.last : -1].reshape(len(Seen._fields), -1, at.q.shape[1]))
 
     def linear(self, at: Moment) -> Linear:
         """See `rates.Rigid`; by walks where there is any doubt."""
         count, contacts = self.layout.coordinates, len(at.onsets)
         free = at._replace(onsets=(None,) * contacts)
         program = self._program("linear", free)
-        found = None if program is None else program.run(free)[:, 0]
-        if found is None or found[-1] or not np.all(np.isfinite(found)):
+        numbers = None if program is None else program.run(free)[:, 0]
+        if numbers is None or numbers[-1] or not np.all(np.isfinite(numbers)):
             return self.walks.linear(at)
-        mass, rest = found[: count * count].reshape(count, count).T, found[count * count : -1]
+        mass, rest = numbers[: count * count].reshape(count, count).T, numbers[count * count : -1]
         ways = rest[: 2 * contacts * count].reshape(count, 2 * contacts).T
         return Linear(mass, ways, *np.split(rest[2 * contacts * count :], [2 * contacts]))
 
@@ -91,8 +91,8 @@ def _linear(motion: FreeMotion, at: Moment) -> list[Number]:
     rest, columns = _rates(still), list[Number]()
     for k in range(count):
         moved = _rates(states([1.0 if i == k else 0.0 for i in range(count)]))
-        columns += [one - zero for one, zero in zip(moved, rest, strict=True)]
-    mass = [one for column in columns_of(motion, at) for one in column]
+        columns += [number - zero for number, zero in zip(moved, rest, strict=True)]
+    mass = [number for column in columns_of(motion, at) for number in column]
     return [*mass, *columns, *rest, *(state.gap for state in still), 0.0]
 
 
@@ -105,43 +105,43 @@ def _closed(motion: FreeMotion, at: Moment, force: float) -> list[Number]:
     nothing: Any = [0.0] * len(motion.names)
     free = at._replace(onsets=(None,) * len(at.onsets))
     still = free._replace(rate=nothing)
-    held = motion.held(at)
-    contacts = len(held.closed) + len(held.walls)
+    active = motion.held(at)
+    contacts = len(active.closed) + len(active.walls)
     columns = [column + more for column, more in zip(columns_of(motion, at),
-               _driven(motion, still, held), strict=True)]  # fmt: skip
+               _driven(motion, still, active), strict=True)]  # fmt: skip
     zero = missing_of(motion, still, nothing)
     for k in range(contacts):
         forces = [force if i == k else 0.0 for i in range(contacts)]
-        pushed = missing_of(motion, still._replace(onsets=motion.forced(at.onsets, forces, held)), nothing)
-        own: list[Number] = [(one - rest) / force for one, rest in zip(pushed, zero, strict=True)]
-        columns.append(own + [0.0] * contacts)
-    right = [*missing_of(motion, free, nothing), *_kept(motion, motion.walk(free, nothing), held)]
-    numbers, pivots = eliminated([list(row) for row in zip(*columns, strict=True)], [-one for one in right])
+        pushed = missing_of(motion, still._replace(onsets=motion.forced(at.onsets, forces, active)), nothing)
+        stiffness: list[Number] = [(number - rest) / force for number, rest in zip(pushed, zero, strict=True)]
+        columns.append(stiffness + [0.0] * contacts)
+    right = [*missing_of(motion, free, nothing), *_kept(motion, motion.walk(free, nothing), active)]
+    numbers, pivots = eliminated([list(row) for row in zip(*columns, strict=True)], [-number for number in right])
     second: Any = numbers[: len(nothing)]
-    onsets = motion.forced(at.onsets, numbers[len(nothing) :], held)
-    done = at._replace(onsets=motion.shared(onsets, held.walls))
-    found = motion.contacts.pushes(motion.walk(at, nothing), done.onsets)
-    touches = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in found]
-    seen = [one[i] for i in range(len(Seen._fields)) for one in touches]
+    onsets = motion.forced(at.onsets, numbers[len(nothing) :], active)
+    done = at._replace(onsets=motion.shared(onsets, active.walls))
+    pushes_of = motion.contacts.pushes(motion.walk(at, nothing), done.onsets)
+    touches = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in pushes_of]
+    columns_seen = [number[i] for i in range(len(Seen._fields)) for number in touches]
     xp = namespace(pivots[0])
     least = functools.reduce(xp.minimum, pivots)
-    second = [xp.where(least > 0.0, one, np.nan) for one in second]
+    second = [xp.where(least > 0.0, number, np.nan) for number in second]
     back = motion.solve(done, second, sliding=True)
-    return [*second, *errors_of(motion, at), *works_of(back, done, motion.contacts), *seen, 0.0]
+    return [*second, *errors_of(motion, at), *works_of(back, done, motion.contacts), *columns_seen, 0.0]
 
 
-def _driven(motion: FreeMotion, still: Moment, held: Held) -> list[list[Number]]:
+def _driven(motion: FreeMotion, still: Moment, active: Held) -> list[list[Number]]:
     """W: accelerations of gaps and of slips that stay 0, by those of the coordinates; a list for each coordinate."""
     unit, nothing = motion.trial, cast("Any", [0.0] * len(motion.trial))
-    zero, found = _kept(motion, motion.walk(still, nothing), held), []
+    zero, columns = _kept(motion, motion.walk(still, nothing), active), []
     for k, size in enumerate(unit):
         step: Any = [size if i == k else 0.0 for i in range(len(unit))]
-        moved = _kept(motion, motion.walk(still, step), held)
-        found.append([(one - rest) / size for one, rest in zip(moved, zero, strict=True)])
-    return found
+        moved = _kept(motion, motion.walk(still, step), active)
+        columns.append([(number - rest) / size for number, rest in zip(moved, zero, strict=True)])
+    return columns
 
 
-def _kept(motion: FreeMotion, walk: Forward, held: Held) -> list[Number]:
+def _kept(motion: FreeMotion, walk: Forward, active: Held) -> list[Number]:
     """Accelerations that closed contacts keep at 0: of gaps, and of slips of those that stick."""
-    moved = {k: motion.contacts.each[k].accelerations(walk) for k in held.closed}
-    return [*(moved[k][0] for k in held.closed), *(moved[k][1] for k in held.walls)]
+    moved = {k: motion.contacts.each[k].accelerations(walk) for k in active.closed}
+    return [*(moved[k][0] for k in active.closed), *(moved[k][1] for k in active.walls)]

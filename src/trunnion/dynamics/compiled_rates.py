@@ -63,11 +63,11 @@ def _kind(onset: Onset) -> int | None:
     return None if onset is None else TOUCHES
 
 
-def _onset(kind: int | None, told: Iterator[Any]) -> Onset:
+def _onset(kind: int | None, onsets_given: Iterator[Any]) -> Onset:
     """The contact of a kind, with what is told of it: speed of approach, or sense of the slip."""
     if kind == SLIPS:
-        return Closed(next(told))
-    return next(told) if kind == TOUCHES else Closed(0) if kind == STICKS else None
+        return Closed(next(onsets_given))
+    return next(onsets_given) if kind == TOUCHES else Closed(0) if kind == STICKS else None
 
 
 def rates_of(motion: FreeMotion, codes: Codes | None = None, varied: Collection[str] = ()) -> CompiledRates | Walks:
@@ -103,8 +103,10 @@ class CompiledRates:
             state = np.concatenate([at.q, at.rate, at.integral, at.bristles])[:, 0]
             rates = program.of_row(float(at.time[0]), state, at.onsets, at.sense)
             if rates[-1] == 0.0 and math.isfinite(rates.sum()):
-                n, memory, own = self.layout.coordinates, self._works, rates[: self.last].copy()
-                return Rates(own[:n], own[n : 2 * n], own[2 * n : memory], own[memory:], True)
+                n, memory, rates_last = self.layout.coordinates, self._works, rates[: self.last].copy()
+                return Rates(
+                    rates_last[:n], rates_last[n : 2 * n], rates_last[2 * n : memory], rates_last[memory:], True
+                )
         return self.walks(at)
 
     def seconds(self, at: Moment) -> Array:
@@ -120,11 +122,11 @@ class CompiledRates:
     ) -> Array:
         """The derivative of a row, without ado: this is asked for some hundred thousand times. NaN for no answer."""
         if program := self._program_of("rates", onsets, now, senses):
-            n, found = self.layout.coordinates, np.empty(len(row))
+            n, slopes = self.layout.coordinates, np.empty(len(row))
             rates = program.of_row(time, row[: self.layout.slip], onsets)
-            found[:n], found[n:] = row[n : 2 * n], rates[: self.last]
-            if rates[-1] == 0.0 and math.isfinite(found.sum()):
-                return found
+            slopes[:n], slopes[n:] = row[n : 2 * n], rates[: self.last]
+            if rates[-1] == 0.0 and math.isfinite(slopes.sum()):
+                return slopes
         return self.walks.derivative(time, row, onsets, now, senses)
 
     def margins(self, at: Moment) -> Array:
@@ -152,14 +154,14 @@ class CompiledRates:
         """The program; None while a joint sticks, and where something cannot be recorded."""
         if 0 in senses:
             return None
-        kinds, switches = tuple(map(_kind, onsets)), tuple(one.switches(now) for one in self.motion.drives.values())
+        kinds, switches = tuple(map(_kind, onsets)), tuple(drive.switches(now) for drive in self.motion.drives.values())
         key = what, kinds, switches, senses, slips
         if key not in self._programs:
-            whole = *key, self.motion.affine, self.motion.rests, *self.constant.items()
-            if whole not in self.codes:
+            key_of_all = *key, self.motion.affine, self.motion.rests, *self.constant.items()
+            if key_of_all not in self.codes:
                 figures = self.figures(what, kinds)
-                self.codes[whole] = _code(self.motion, figures, kinds, switches, senses, slips, self.constant)
-            code = self.codes[whole]
+                self.codes[key_of_all] = _code(self.motion, figures, kinds, switches, senses, slips, self.constant)
+            code = self.codes[key_of_all]
             self._programs[key] = None if code is None else Program(self.motion, code)
         return self._programs[key]
 
@@ -198,13 +200,13 @@ def _code(
     n, graph = len(motion.names), Graph()
     paths = tuple(path for path in _numbers(motion) if path not in constant)
     recorded: dict[str, Any] = {path: Recorded(graph, graph.input(path, 0)) for path in paths}
-    kept = (*(f"{kind}{i}" for kind in ("q", "rate", "integral") for i in range(n)), *motion.bristles)
-    states = ("time", *(f"state.{name}" for name in kept), "sense")
+    variables = (*(f"{kind}{i}" for kind in ("q", "rate", "integral") for i in range(n)), *motion.bristles)
+    states = ("time", *(f"state.{name}" for name in variables), "sense")
     time, *state, sense = [Recorded(graph, graph.input(name, POSITION)) for name in states]
     onsets = tuple(f"onset{k}" for k, kind in enumerate(kinds) if kind in TOLD)
-    told: Any = iter([Recorded(graph, graph.input(name, 0)) for name in onsets])
+    onsets_given: Any = iter([Recorded(graph, graph.input(name, 0)) for name in onsets])
     q, rate, integral, bristles = cast("Any", (state[:n], state[n : 2 * n], state[2 * n : 3 * n], state[3 * n :]))
-    touching = tuple(_onset(kind, told) for kind in kinds)
+    touching = tuple(_onset(kind, onsets_given) for kind in kinds)
     at = Moment(cast("Any", time), q, rate, integral, bristles, onsets=touching, senses=senses, slips=slips)
     if motion.rests:  # also where a speed is lost in rounding, it is known in which sense joints slide
         at = at._replace(sense=cast("Any", np.where(rate[0] != 0.0, np.sign(rate[0]), sense)))
@@ -213,9 +215,9 @@ def _code(
             numbers = figures(_recorded(motion, {**constant, **recorded}, switches), at)
     except UntraceableError:
         return None
-    *wanted, doubt = [graph.as_float(number_of(graph, one)) for one in numbers]
-    for one in graph.doubts:
-        doubt = graph.apply("max", doubt, graph.as_float(one))
+    *wanted, doubt = [graph.as_float(number_of(graph, number)) for number in numbers]
+    for number in graph.doubts:
+        doubt = graph.apply("max", doubt, graph.as_float(number))
     outputs = [*wanted, graph.as_float(doubt)]
     return Code(MachineCode(program(graph, outputs, vector_width())), paths, states, onsets, len(outputs))
 
@@ -262,12 +264,12 @@ class Program:
         self.state[1:-1, : self.width] = state[:, None]
         self.state[-1, : self.width] = sense
         self._short()
-        found: Array = self.found[:, 0]
-        return found
+        values: Array = self.found[:, 0]
+        return values
 
     def _begin(self, onsets: Sequence[Onset]) -> None:
-        told = [onset.sense if isinstance(onset, Closed) else onset for onset in onsets if _kind(onset) in TOLD]
-        for name, number in zip(self.onsets, told, strict=True):
+        onsets_given = [onset.sense if isinstance(onset, Closed) else onset for onset in onsets if _kind(onset) in TOLD]
+        for name, number in zip(self.onsets, onsets_given, strict=True):
             self.numbers[name][0] = number
 
 
@@ -276,9 +278,9 @@ class Program:
 
 def _recorded(motion: FreeMotion, values: dict[str, Any], switches: Sequence[tuple[bool, bool, bool]]) -> FreeMotion:
     """The motion with numbers that write down what is done with them; what depends on their size is as it is."""
-    own = drives(motion.system, values, lambda value: value)
-    own = {name: drive.switched(*on) for (name, drive), on in zip(own.items(), switches, strict=True)}
-    recorded = replace(motion, run=replace(motion.run, values=values), drives=own)
+    own_drives = drives(motion.system, values, lambda value: value)
+    own_drives = {name: drive.switched(*on) for (name, drive), on in zip(own_drives.items(), switches, strict=True)}
+    recorded = replace(motion, run=replace(motion.run, values=values), drives=own_drives)
     trial = [values[f"{TRIAL}{name}"] for name in motion.names]
     vars(recorded).update(affine=motion.affine, resisted=motion.resisted, trial=trial)
     return recorded
@@ -293,8 +295,8 @@ def _rates_of(motion: FreeMotion, at: Moment) -> list[Number]:
     else:
         second, doubt = _by_rounds(motion, at)
     back = motion.solve(at, cast("Any", second), sliding=True)
-    for one in back.settled:
-        doubt = np.maximum(doubt, np.where(one.converged, 0.0, 1.0))
+    for settled in back.settled:
+        doubt = np.maximum(doubt, np.where(settled.converged, 0.0, 1.0))
     memory = bristle_rates(motion, at, back)
     return [*second, *errors_of(motion, at), *memory, *works_of(back, at, motion.contacts), doubt]
 
@@ -310,28 +312,28 @@ def _by_rounds(motion: FreeMotion, at: Moment) -> tuple[list[Number], Number]:
         for k, size in enumerate(unit):
             ahead = DIFFERENCE * np.maximum(np.abs(second[k]), 1e-2 * size)
             ahead = np.where(second[k] < 0.0, -ahead, ahead)
-            tried = [one + ahead if i == k else one for i, one in enumerate(second)]
+            tried = [number + ahead if i == k else number for i, number in enumerate(second)]
             columns.append([(a - b) / ahead for a, b in zip(missing_of(motion, at, tried), missed, strict=True)])
         change, pivots = eliminated([list(row) for row in zip(*columns, strict=True)], missed)
         turned: Number = 1.0  # the sign of the determinant, see `state.Accelerated`
         for pivot in pivots:
             turned = np.where(pivot > 0.0, turned, -turned)
-        return [*(one - part for one, part in zip(second, change, strict=True)), *change, turned]
+        return [*(number - part for number, part in zip(second, change, strict=True)), *change, turned]
 
     begin = [0.0 * rate for rate in at.rate]
-    *found, positive = looped(step, [*begin, *begin, 1.0], ROUNDS)
+    *change_of, positive = looped(step, [*begin, *begin, 1.0], ROUNDS)
     doubt: Number = np.where(positive > 0.0, 0.0, 1.0)
-    for one, change, size in zip(found[:count], found[count:], unit, strict=True):
-        small = CLOSE * np.maximum(np.abs(one), 1e-2 * size)
+    for number, change, size in zip(change_of[:count], change_of[count:], unit, strict=True):
+        small = CLOSE * np.maximum(np.abs(number), 1e-2 * size)
         doubt = np.maximum(doubt, np.where(np.abs(change) <= small, 0.0, 1.0))
-    return found[:count], doubt
+    return change_of[:count], doubt
 
 
 def _affine(motion: FreeMotion, at: Moment) -> list[Number]:
     """Accelerations where efforts are affine in them."""
     nothing: Any = [0.0] * len(motion.names)
     matrix = [list(row) for row in zip(*columns_of(motion, at), strict=True)]
-    return eliminated(matrix, [-one for one in missing_of(motion, at, nothing)])[0]
+    return eliminated(matrix, [-number for number in missing_of(motion, at, nothing)])[0]
 
 
 def columns_of(motion: FreeMotion, at: Moment) -> list[list[Number]]:
@@ -342,7 +344,9 @@ def columns_of(motion: FreeMotion, at: Moment) -> list[list[Number]]:
     zero, columns = missing_of(motion, still, nothing), []
     for k, size in enumerate(motion.trial):
         step = [size if i == k else 0.0 for i in range(count)]
-        columns.append([(one - rest) / size for one, rest in zip(missing_of(motion, still, step), zero, strict=True)])
+        columns.append(
+            [(number - rest) / size for number, rest in zip(missing_of(motion, still, step), zero, strict=True)]
+        )
     return columns
 
 
@@ -362,9 +366,9 @@ def missing_of(motion: FreeMotion, at: Moment, second: Any) -> list[Number]:
 def _seen(motion: FreeMotion, at: Moment) -> list[Number]:
     """What `rates.Seen` has, of every contact."""
     nothing: Any = [0.0] * len(motion.names)
-    found = motion.contacts.pushes(motion.walk(at, nothing), at.onsets)
-    parts = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in found]
-    return [*(one[i] for i in range(len(Seen._fields)) for one in parts), 0.0]
+    pushes_of = motion.contacts.pushes(motion.walk(at, nothing), at.onsets)
+    parts = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in pushes_of]
+    return [*(part[i] for i in range(len(Seen._fields)) for part in parts), 0.0]
 
 
 def _margins(motion: FreeMotion, at: Moment) -> list[Number]:
@@ -383,8 +387,8 @@ def eliminated(matrix: list[list[Number]], right: list[Number]) -> tuple[list[Nu
             share = matrix[i][k] / matrix[k][k]
             matrix[i] = [a - share * b for a, b in zip(matrix[i], matrix[k], strict=True)]
             right[i] = right[i] - share * right[k]
-    found: list[Number] = [0.0] * count
+    solution: list[Number] = [0.0] * count
     for i in reversed(range(count)):
-        rest = sum((matrix[i][j] * found[j] for j in range(i + 1, count)), 0.0)
-        found[i] = (right[i] - rest) / matrix[i][i]
-    return found, pivots
+        rest = sum((matrix[i][j] * solution[j] for j in range(i + 1, count)), 0.0)
+        solution[i] = (right[i] - rest) / matrix[i][i]
+    return solution, pivots

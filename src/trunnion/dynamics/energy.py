@@ -23,7 +23,7 @@ def kinetic_energy(walk: Forward) -> Number:
         link: Motion(motion.frame, algebra.times(0.0, motion.twist), type(motion.acceleration)(*motion.twist))
         for link, motion in walk.motions.items()
     }
-    still, found = replace(walk, motions=moved), 0.0
+    still, energy = replace(walk, motions=moved), 0.0
     for link in system.mechanism.effective_links:
         if link == system.mechanism.fixed_link:
             continue
@@ -31,13 +31,13 @@ def kinetic_energy(walk: Forward) -> Number:
         centre = still.at(link, system.centre(walk.values, link))
         force = tuple(-mass * a for a in centre.acceleration)
         load = algebra.about(force, algebra.NO_MOMENT if moment is None else moment, centre.place)
-        found = found - 0.5 * algebra.power(load, walk.motions[link].twist)
-    return found
+        energy = energy - 0.5 * algebra.power(load, walk.motions[link].twist)
+    return energy
 
 
 def potential_energy(walk: Forward) -> Number:
     """−Σ m g·r, J: of gravity, against the origin of the ground."""
-    system, found = walk.system, 0.0
+    system, energy = walk.system, 0.0
     gravity = system.vector(walk.values, "gravity")
     if not any(np.any(part) for part in gravity):
         return 0.0
@@ -45,5 +45,5 @@ def potential_energy(walk: Forward) -> Number:
         if link != system.mechanism.fixed_link:
             place = walk.at(link, system.centre(walk.values, link)).place
             for g, coordinate in zip(gravity, place, strict=True):
-                found = found - walk.values[f"links.{link}.mass"] * g * coordinate
-    return found
+                energy = energy - walk.values[f"links.{link}.mass"] * g * coordinate
+    return energy

@@ -58,55 +58,55 @@ class Filling:
             touches.fill(lanes, touched, onsets)
             if played is not None:
                 played.fill(back, touched, window)
-        whole = layout.moment(self.time, rows)
+        moments = layout.moment(self.time, rows)
         for array in arrays.values():  # there is no motion any more
             if array.dtype == np.float64:
                 array[..., which < 0] = np.nan
-        fill.unwrap(arrays, system, motion.values_at(whole, np.nan_to_num(seconds)), self.time)
+        fill.unwrap(arrays, system, motion.values_at(moments, np.nan_to_num(seconds)), self.time)
         resting = np.array([k >= 0 and self.solution.stretches[k].resting for k in which])
         if self.stated is not None and played is not None:
             played.unwrap(self.time)
             arrays, labels = as_stated(self.stated.run, played, arrays, labels)
             energies = np.vstack([energies, touches.stored.sum(axis=0)])
         works, sticking = layout.works(rows), self._sticking(which)
-        return Books(self.time, arrays, labels, whole, seconds, energies, works, resting, touches, sticking)
+        return Books(self.time, arrays, labels, moments, seconds, energies, works, resting, touches, sticking)
 
     def _sticking(self, which: NDArray[np.intp]) -> NDArray[np.bool_] | None:
         """Which joints stick, (joint, row), where they do one by one; of joints in play none does."""
         if not self.motion.resisted:
             return None
         joints = list((self.stated.run if self.stated else self.motion.run).system.joints)
-        found = np.zeros((len(joints), len(which)), bool)
+        sticks = np.zeros((len(joints), len(which)), bool)
         for i, name in enumerate(self.motion.resisted):
-            found[joints.index(name)] = [k >= 0 and self.solution.stretches[k].senses[i] == 0 for k in which]
-        return found
+            sticks[joints.index(name)] = [k >= 0 and self.solution.stretches[k].senses[i] == 0 for k in which]
+        return sticks
 
     def _alike(self, which: NDArray[np.intp]) -> list[tuple[NDArray[np.intp], Stretch]]:
         """Runs of rows that one walk can solve: of the same sense, switches and assembly."""
-        found: list[tuple[NDArray[np.intp], Stretch]] = []
+        groups: list[tuple[NDArray[np.intp], Stretch]] = []
         stretches = self.solution.stretches
 
         def key(k: int) -> object:
-            one = stretches[k]
-            snapshot = None if one.snapshot is None else id(one.snapshot)
-            return one.sense, one.resting, one.now, one.onsets, one.senses, one.slips, snapshot
+            stretch = stretches[k]
+            snapshot = None if stretch.snapshot is None else id(stretch.snapshot)
+            return stretch.sense, stretch.resting, stretch.now, stretch.onsets, stretch.senses, stretch.slips, snapshot
 
         begin = 0
         for i in range(1, len(which) + 1):
             same = i < len(which) and i - begin < CHUNK and which[i] >= 0 and key(which[i]) == key(which[begin])
             if which[begin] >= 0 and not same:
-                found.append((np.arange(begin, i), stretches[which[begin]]))
+                groups.append((np.arange(begin, i), stretches[which[begin]]))
             if not same:
                 begin = i
             if begin < len(which) and which[begin] < 0:
                 break
-        return found
+        return groups
 
     def _solved(self, at: Moment, stretch: Stretch) -> tuple[Array, Backward, tuple[Onset, ...]]:
         """Accelerations and the walk; at rest with the shares of the friction that hold it."""
         self.motion.begin(stretch.snapshot)
         if not stretch.resting or self.motion.resisted:
-            found = self.motion.accelerate(at)
-            return found.second, found.back, found.onsets
+            accelerated = self.motion.accelerate(at)
+            return accelerated.second, accelerated.back, accelerated.onsets
         rest = Rest(self.motion, self.solution.layout, stretch.slips)
         return np.zeros_like(at.q), rest.back(at), ()

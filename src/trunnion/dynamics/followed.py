@@ -56,9 +56,11 @@ class Followed:
         if not group.BRANCHES:
             last = self.snapshot.poses[self.number]
             return group.position(elements, [float(np.ravel(primal(last.q[i]))[0]) for i in group.kept], drive)
-        one, other = group.BRANCHES
-        misses = [self._miss(group, group.position(elements, branch, drive), walk, time) for branch in (one, other)]
-        return group.position(elements, np.where(misses[1] < misses[0], other, one), drive)
+        first_branch, other = group.BRANCHES
+        misses = [
+            self._miss(group, group.position(elements, branch, drive), walk, time) for branch in (first_branch, other)
+        ]
+        return group.position(elements, np.where(misses[1] < misses[0], other, first_branch), drive)
 
     def _miss(self, group: Any, pose: Any, walk: Forward, time: Number) -> Number:
         """How far places and velocities are from the last ones, and from what they would be with the accelerations.
@@ -69,8 +71,8 @@ class Followed:
         system, module = walk.system, walk.system.plan.modules[self.number]
         rates = [system.drive(walk.values, name, time)[1] for name in module.driven]
         outer = [walk.outside(place) for place in system.places[self.number]]
-        known = [twist for twist, _ in outer], [second for _, second in outer]
-        twists, _ = group.moved(pose, *known, rates, (0.0,) * len(rates))
+        outer_motions = [twist for twist, _ in outer], [second for _, second in outer]
+        twists, _ = group.moved(pose, *outer_motions, rates, (0.0,) * len(rates))
         since, missed = time - self.snapshot.time, 0.0
         for link, frame, twist in zip(module.links, pose.frames, twists, strict=True):
             before = self.snapshot.motions[link]
@@ -89,9 +91,9 @@ def follows(run: Run, several: bool) -> tuple[Any, ...]:
     if not several:
         return run.chosen.assembly
     pace = float(np.ravel(primal(run.system.pace(run.values)))[0])
-    found: list[Any] = []
+    following: list[Any] = []
     for number, chosen in enumerate(run.chosen.assembly):
         closed = chosen is not None and len(run.system.groups[number].BRANCHES) == 2
         passing = closed and not folds(run.system, run.system.plan.modules[number])
-        found.append(Followed(number, chosen, pace, passing) if closed or isinstance(chosen, Track) else chosen)
-    return tuple(found)
+        following.append(Followed(number, chosen, pace, passing) if closed or isinstance(chosen, Track) else chosen)
+    return tuple(following)

@@ -220,8 +220,10 @@ class DeadCentre:
         row, speed, second = solver.y, float(solver.y[n]), float(solver.f[n])
         if self.shrunk < SHRUNK or not speed * second < 0.0:
             return None
-        left, way = -speed / second, -0.5 * speed * speed / second
-        beside = np.array([float(row[0]), float(row[0]) + (1 - BESIDE) * way, float(row[0]) + (1 + BESIDE) * way])
+        left, duration = -speed / second, -0.5 * speed * speed / second
+        beside = np.array(
+            [float(row[0]), float(row[0]) + (1 - BESIDE) * duration, float(row[0]) + (1 + BESIDE) * duration]
+        )
         rows = np.repeat(np.asarray(row, float)[:, None], 3, axis=1)
         rows[0] = beside
         at = self.layout.moment(np.full(3, float(solver.t)), rows)
@@ -232,7 +234,7 @@ class DeadCentre:
             status = pose_status(walk, (3,))
         if not near or status[1] == Status.NOT_ASSEMBLED or status[2] != Status.NOT_ASSEMBLED:
             return None
-        return float(solver.t) + left, {"coordinate": float(row[0]) + way, "rate": 0.0}
+        return float(solver.t) + left, {"coordinate": float(row[0]) + duration, "rate": 0.0}
 
 
 def _root(stretch: Stretch, number: int, level: float, low: float, high: float) -> float:

@@ -88,22 +88,22 @@ def _struck(delassus: Array, before: Array, restitution: Array, friction: Array)
 def _solved(delassus: Array, before: Array, back: Array, friction: Array, cases: Modes) -> tuple[Array, Array]:
     """Impulses and rates after of one case: as many equations as places that exchange something."""
     places = len(cases)
-    unknown, wanted, spread = list[int](), list[float](), np.zeros((2 * places, 2 * places))
+    unknown, targets, spread = list[int](), list[float](), np.zeros((2 * places, 2 * places))
     for k, case in enumerate(cases):
         if case is not OPEN:
             spread[k, k], spread[places + k, k] = 1.0, -friction[k] * case
             unknown.append(k)
-            wanted.append(back[k] - before[k])
+            targets.append(back[k] - before[k])
         if case == STICK:
             spread[places + k, places + k] = 1.0
             unknown.append(places + k)
-            wanted.append(-before[places + k])
+            targets.append(-before[places + k])
     if not unknown:
         return np.zeros(2 * places), before
-    rows, own = np.array(unknown), spread[:, unknown]
-    matrix = delassus[rows] @ own
-    numbers = np.linalg.lstsq(matrix, np.array(wanted), rcond=1e-13)[0]  # two places may share one impulse
-    impulse: Array = own @ numbers
+    rows, columns = np.array(unknown), spread[:, unknown]
+    matrix = delassus[rows] @ columns
+    numbers = np.linalg.lstsq(matrix, np.array(targets), rcond=1e-13)[0]  # two places may share one impulse
+    impulse: Array = columns @ numbers
     return impulse, before + delassus @ impulse
 
 

@@ -48,11 +48,11 @@ class ImpactMotion(ActiveMotion):
         super().__post_init__()
         self.rows = 2 * self.count
         self.rigid, each = cast("Rigid", self.dynamics), self.motion.contacts.each
-        self.friction = np.array([one.coefficient for one in each])
-        self.restitution = np.array([one.restitution for one in each])
+        self.friction = np.array([contact.coefficient for contact in each])
+        self.restitution = np.array([contact.restitution for contact in each])
         size = float(np.ravel(primal(self.motion.system.size(self.motion.values)))[0])
         self.meet = MEET * self.motion.contacts.least_clearance
-        self.low = np.array([max(LOW * one.clearance, ROUNDED * size) for one in self.motion.contacts.each])
+        self.low = np.array([max(LOW * contact.clearance, ROUNDED * size) for contact in self.motion.contacts.each])
 
     # ---- what ends a step -------------------------------------------------------------------------------------
 
@@ -68,12 +68,12 @@ class ImpactMotion(ActiveMotion):
         if not any(self.onsets):
             values[: self.count] = self.rigid.look(at).gap
             return values
-        seen = self.rigid.touches(at)
+        touches = self.rigid.touches(at)
         for k, onset in enumerate(self.onsets):
-            values[k] = seen.normal[k] if onset else seen.gap[k]
+            values[k] = touches.normal[k] if onset else touches.gap[k]
             if isinstance(onset, Closed) and self.friction[k] > 0.0:
-                left = self.friction[k] * seen.normal[k] - np.abs(seen.friction[k])
-                values[self.count + k] = onset.sense * seen.slip[k] if onset.sense else left
+                left = self.friction[k] * touches.normal[k] - np.abs(touches.friction[k])
+                values[self.count + k] = onset.sense * touches.slip[k] if onset.sense else left
         return values
 
     def _measured(self, stretch: Stretch) -> None:
@@ -81,11 +81,11 @@ class ImpactMotion(ActiveMotion):
         if not self._open:
             return
         times, weights = step_nodes(stretch.begin, stretch.end)
-        seen = self._touches(stretch.state, times)
+        touches = self._touches(stretch.state, times)
         for k, contact in self._open.items():
-            contact.force = np.fmax(contact.force, float(np.max(seen.normal[k])))
-            contact.impulse += float(weights @ seen.normal[k])
-            contact.wear += float(weights @ np.abs(seen.normal[k] * seen.slip[k]))
+            contact.force = np.fmax(contact.force, float(np.max(touches.normal[k])))
+            contact.impulse += float(weights @ touches.normal[k])
+            contact.wear += float(weights @ np.abs(touches.normal[k] * touches.slip[k]))
 
     def _met(self, k: int, time: float, row: Array) -> float:
         """An impact, a lift-off, or a change between slip and stick; `row` is what it is after it."""
@@ -163,12 +163,12 @@ class ImpactMotion(ActiveMotion):
             return 0.0
         free = at._replace(onsets=(None,) * self.count)
         still, struck_so = (self.motion.solve(free, second) for second in (0.0 * at.q, change[:, None]))
-        given = sum(
+        put_in = sum(
             float(np.ravel(primal((struck_so.efforts[name] - still.efforts[name]) * still.walk.rate(name)))[0])
             for name in names
         )
         rows = [*places, *(self.count + k for k in places)]
-        return given - float(struck.impulse @ driven[rows])
+        return put_in - float(struck.impulse @ driven[rows])
 
     def _strike_off(self, row: Array, change: Array, drive: float, loss: float) -> None:
         """Let an impact change a row: rates, and the works of drivers and contacts."""
@@ -177,11 +177,11 @@ class ImpactMotion(ActiveMotion):
         works[0] += drive
         works[-1] += loss
 
-    def _lowered(self, time: float, kept: float) -> None:
+    def _lowered(self, time: float, energy_left: float) -> None:
         """Take down that an impact kept less than its restitution."""
         note = self.solution.notes.setdefault("simulate.restitution_lowered", {"times": 0, "time": time, "share": 1.0})
         note["times"] += 1
-        note["share"] = min(note["share"], kept)
+        note["share"] = min(note["share"], energy_left)
 
     def _flights(
         self, time: float, row: Array, places: Sequence[int], before: Array, struck: Struck, change: Array

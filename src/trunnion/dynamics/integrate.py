@@ -100,8 +100,8 @@ class Integration:
     def __post_init__(self) -> None:
         self.layout = Layout.of(self.motion)
         self.solution = Solution(self.layout)
-        known = [time for drive in self.motion.drives.values() for time in drive.times]
-        times = {time for time in (*known, *self.times) if self.start < time < self.duration}
+        switch_times = [time for drive in self.motion.drives.values() for time in drive.times]
+        times = {time for time in (*switch_times, *self.times) if self.start < time < self.duration}
         self.pace = np.sqrt(self.motion.unit)  # typical rates
         self.turned_over, self.asked_for, self.slips, self.resting = 0.0, 0, 0.0, False
         self.last = self.start, np.empty(0)  # time and row from which it is to go on
@@ -136,7 +136,7 @@ class Integration:
             if stayed > STUCK:
                 self._stop("step", time, row)
                 return
-            k = next(k for k, one in enumerate(self.breaks) if one > time + CLOSE * self.duration)
+            k = next(k for k, time_of_break in enumerate(self.breaks) if time_of_break > time + CLOSE * self.duration)
             until, now = self.breaks[k], 0.5 * (self.breaks[k] + (self.breaks[k - 1] if k else self.start))
             self._couple(time, row, now)
             if self.solution.ended:
@@ -317,8 +317,8 @@ class Integration:
             self._follow(float(solver.t), np.array(solver.y), sense, now)
             self._end_step(solver, np.array(solver.y))
             self._compare(before, row, sense, now)
-            if found := dead_centre.reached(solver, float(solver.t) - before):
-                self._turns_round(*found)
+            if event := dead_centre.reached(solver, float(solver.t) - before):
+                self._turns_round(*event)
                 break
         return float(solver.t), np.array(solver.y), float(solver.step_size or 0.0) or None
 
@@ -330,14 +330,14 @@ class Integration:
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
             speeds = numbers[n : 2 * n]
-            asked = numbers.copy()
+            numbers_asked = numbers.copy()
             if not one_way:
-                asked[:n] = self._in_range(numbers[:n])
+                numbers_asked[:n] = self._in_range(numbers[:n])
             else:
-                asked[0] = min(max(numbers[0], low), high)
+                numbers_asked[0] = min(max(numbers[0], low), high)
                 if sense and sense * speeds[0] < 0.0:
-                    asked[n] = 0.0
-            at = self.moment(moment, asked, sense, now)
+                    numbers_asked[n] = 0.0
+            at = self.moment(moment, numbers_asked, sense, now)
             with np.errstate(all="ignore"):
                 rates = self.dynamics(at)
             return self.layout.row(speeds, rates) if rates.sound else np.full(len(numbers), np.nan)
@@ -435,12 +435,12 @@ class Integration:
             moment, state[k] = float(numbers[k]), value
             if k == 0 and sense and sense * state[n] <= 0.0:
                 return np.full_like(state, np.nan)  # it turns round before
-            found = rate(moment, state)
-            pace = found[k]
+            numbers_at = rate(moment, state)
+            pace = numbers_at[k]
             if not pace * (to.value - begin) > 0.0:
                 return np.full_like(state, np.nan)  # it does not go there
             with np.errstate(all="ignore"):
-                slopes: Array = found / pace
+                slopes: Array = numbers_at / pace
                 slopes[k] = 1.0 / pace
             return slopes
 
@@ -453,24 +453,24 @@ class Integration:
         absolute[k] = self.tolerance / max(float(np.max(self.pace)), 1e-300)
         solver = self._solver(by_number, begin, state, to.value, absolute)
         while solver.status == "running":
-            last, held = float(solver.t), np.array(solver.y)
+            last, last_row = float(solver.t), np.array(solver.y)
             solver, failed = self._stepped(solver, by_number, absolute) if last == begin else (solver, solver.step())
-            wrong, before = solver.status == "failed" or not np.all(np.isfinite(solver.y)), held.copy()
+            wrong, before = solver.status == "failed" or not np.all(np.isfinite(solver.y)), last_row.copy()
             before[k] = last
             if wrong and k == 0 and before[n] != 0.0:  # it turns round before the place
-                return self._approach(float(held[k]), before, Passing(n, 0.0), until, sense, now, rate)
+                return self._approach(float(last_row[k]), before, Passing(n, 0.0), until, sense, now, rate)
             if wrong:
-                return self._failed(float(held[k]), before, sense, now, failed)[:2]
+                return self._failed(float(last_row[k]), before, sense, now, failed)[:2]
             if solver.y[k] > until:
-                return self._plain(float(held[k]), before, until, sense, now, rate)
+                return self._plain(float(last_row[k]), before, until, sense, now, rate)
             along = by_time(solver.dense_output(), last, float(solver.t), k)
-            self._step(float(held[k]), float(solver.y[k]), along, sense, now)
-        found = np.array(solver.y)
-        end, found[k] = float(found[k]), to.value
-        self._follow(end, found, sense, now)
+            self._step(float(last_row[k]), float(solver.y[k]), along, sense, now)
+        numbers_at = np.array(solver.y)
+        end, numbers_at[k] = float(numbers_at[k]), to.value
+        self._follow(end, numbers_at, sense, now)
         if k == 0:
             self._end_at(end, to.value)
-        return end, found
+        return end, numbers_at
 
     def _end_at(self, time: float, coordinate: float) -> None:
         """End the motion where a coordinate is the end of the range, or that of a change point."""
@@ -506,18 +506,18 @@ class Integration:
         n, system = self.layout.coordinates, self.motion.system
         size = float(np.ravel(system.size(self.motion.values))[0])
         sizes = np.array([1.0 if system.turns(name) else size for name in self.motion.names])
-        found = np.full(len(row), self.tolerance)
-        found[:n] *= 0.01 * sizes
-        found[n : 2 * n] *= 0.01 * self.pace
-        found[2 * n : 3 * n] *= sizes
-        found[3 * n : 3 * n + self.layout.bristles] *= 1e-9
+        tolerances = np.full(len(row), self.tolerance)
+        tolerances[:n] *= 0.01 * sizes
+        tolerances[n : 2 * n] *= 0.01 * self.pace
+        tolerances[2 * n : 3 * n] *= sizes
+        tolerances[3 * n : 3 * n + self.layout.bristles] *= 1e-9
         self.turned_over = max(self.turned_over, float(np.max(np.abs(row[-len(self.layout.works_named) :]))))
         self.asked_for += 1
         if self.asked_for & (self.asked_for - 1) == 0:  # the 1st, 2nd, 4th … time: energy may be large and no work done
             self.turned_over = max(self.turned_over, self._kinetic(self.start, row, 0.0, self.start))
         # at the start nothing is turned over: the works follow the motion then
-        found[-len(self.layout.works_named) :] = self.tolerance * self.turned_over if self.turned_over else np.inf
-        return found
+        tolerances[-len(self.layout.works_named) :] = self.tolerance * self.turned_over if self.turned_over else np.inf
+        return tolerances
 
     def _place(self, q: float, sense: float) -> tuple[float, float]:
         """The coordinates on either side of q at which a step ends; a coordinate that is one of them is left behind."""
@@ -544,10 +544,10 @@ class Integration:
         ahead[:n] += 1e-6 * np.sign(row[n : 2 * n]) * np.maximum(1.0, np.abs(row[:n]))
         later[:n] += soon * row[n : 2 * n]
         states = ((time, row), (time, ahead), (time + soon, later))
-        causes = [self._cause(when, one, sense, now) for when, one in states]
+        causes = [self._cause(when, state_at, sense, now) for when, state_at in states]
         if self._locked(time, row, sense, now, causes):
             return time, row, None
-        code = next((one for one in causes if one), "step")
+        code = next((state_at for state_at in causes if state_at), "step")
         if code == "not_assembled" and not causes[0] and len(self.motion.names) == 1:  # it can be assembled until then
             self._turns_round(time, {"coordinate": float(row[0]), "rate": float(row[n])})
         else:
@@ -584,10 +584,10 @@ class Integration:
     def _stopped(self, time: float, row: Array, rates: Array, sense: float, now: float) -> float:
         """Change rates at once, by friction: the energy lost, J, of rotors too, which is work of friction."""
         n, works = self.layout.coordinates, self.layout.size - len(self.layout.works_named)
-        before, known = self._kinetic(time, row, sense, now), row[n : 2 * n].copy()
+        before, rates_before = self._kinetic(time, row, sense, now), row[n : 2 * n].copy()
         rotors = sum(
             0.5 * drive.inertia * drive.ratio**2 * (old * old - new * new)
-            for drive, old, new in zip(self.motion.drives.values(), known, rates, strict=True)
+            for drive, old, new in zip(self.motion.drives.values(), rates_before, rates, strict=True)
             if not drive.clutched
         )
         row[n : 2 * n] = rates

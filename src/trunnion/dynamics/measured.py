@@ -39,8 +39,8 @@ class MotionKernel(NumpyKernel):
 
     def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Curves, NDArray[np.int8]]:
         """As `NumpyKernel.courses`; a measure of a motion in time is one number a sample."""
-        found, status = super().courses(values, time)
-        return found | courses_in_time(self.run, self.measures, values, shape_of(values, time)), status
+        values_of, status = super().courses(values, time)
+        return values_of | courses_in_time(self.run, self.measures, values, shape_of(values, time)), status
 
 
 def not_steady(run: Run, measure: Measure) -> str:
@@ -54,16 +54,16 @@ def courses_in_time(
     run: Run, measures: Iterable[Measure], values: Mapping[str, Number], shape: tuple[int, ...]
 ) -> dict[str, tuple[Number, ...]]:
     """Those measures that are of a motion in time, by name: one number a sample, to broadcast to the shape."""
-    found: dict[str, tuple[Number, ...]] = {}
-    known: dict[tuple[str, float | None], dict[str, Number]] = {}
+    courses_of: dict[str, tuple[Number, ...]] = {}
+    figures_of: dict[tuple[str, float | None], dict[str, Number]] = {}
     for measure in measures:
         if not measure.in_time:
             continue
         motion = measure.subject, measure.duration
-        if motion not in known:
-            known[motion] = numbers_in_time(run, *motion, values, shape)
-        found[measure.name] = (known[motion][measure.kind],)
-    return found
+        if motion not in figures_of:
+            figures_of[motion] = numbers_in_time(run, *motion, values, shape)
+        courses_of[measure.name] = (figures_of[motion][measure.kind],)
+    return courses_of
 
 
 def numbers_in_time(
@@ -72,35 +72,37 @@ def numbers_in_time(
     """What `figures_in_time` tells, one number a sample, with derivatives where values are dual."""
     count = shape[0] if len(shape) == 2 else 1
     dual = {path: value for path, value in values.items() if isinstance(value, Dual)}
-    own = {path: _column(primal(value), count) for path, value in values.items()}
+    numbers_each = {path: _column(primal(value), count) for path, value in values.items()}
     column = (count, 1) if len(shape) == 2 else (1,)
     if not dual:
-        return {name: figure.reshape(column) for name, figure in _known(run, driver, own, count, duration).items()}
+        return {
+            name: figure.reshape(column) for name, figure in _known(run, driver, numbers_each, count, duration).items()
+        }
     slopes = {path: np.broadcast_to(np.asarray(derivative(value), float), (count, 1)) for path, value in dual.items()}
     step = step_of(run, values, count)
     moved = np.flatnonzero(np.any(np.array(list(slopes.values())) != 0.0, axis=(0, 2)))
-    tried = {path: _tried(value, slopes.get(path), step, moved) for path, value in own.items()}
-    found: dict[str, Number] = {}
+    tried = {path: _tried(value, slopes.get(path), step, moved) for path, value in numbers_each.items()}
+    numbers: dict[str, Number] = {}
     for name, figure in _known(run, driver, tried, count + 2 * len(moved), duration).items():
         change = np.zeros(count)
         above, below = figure[count:].reshape(2, len(moved))
         change[moved] = (above - below) / (2.0 * np.ravel(step[moved]))
-        found[name] = Dual(figure[:count].reshape(column), change.reshape(column))
-    return found
+        numbers[name] = Dual(figure[:count].reshape(column), change.reshape(column))
+    return numbers
 
 
 def _known(run: Run, driver: str, values: Mapping[str, Number], count: int, duration: float | None) -> dict[str, Array]:
     """`figures_in_time`; those of few samples are kept, as a search asks for the same ones measure by measure."""
     if count > FEW:
         return figures_in_time(run, driver, values, count, duration)
-    kept: dict[Any, dict[str, Array]] = run.once("figures in time", dict)
+    stored: dict[Any, dict[str, Array]] = run.once("figures in time", dict)
     numbers = tuple((path, np.asarray(value, float).tobytes()) for path, value in values.items())
     what = driver, duration, count, numbers
-    if what not in kept:
-        if len(kept) >= KEPT:
-            kept.clear()
-        kept[what] = figures_in_time(run, driver, values, count, duration)
-    return kept[what]
+    if what not in stored:
+        if len(stored) >= KEPT:
+            stored.clear()
+        stored[what] = figures_in_time(run, driver, values, count, duration)
+    return stored[what]
 
 
 def _column(value: Number, count: int) -> Number:
@@ -114,9 +116,9 @@ def _tried(value: Number, slope: Array | None, step: Array, moved: NDArray[np.in
     """A number of every row, and of those moved up and down."""
     if slope is None and not np.ndim(value):
         return value
-    whole = np.broadcast_to(value, step.shape)
-    change = np.zeros_like(whole[moved]) if slope is None else (slope * step)[moved]
-    return np.concatenate([whole, whole[moved] + change, whole[moved] - change])
+    full = np.broadcast_to(value, step.shape)
+    change = np.zeros_like(full[moved]) if slope is None else (slope * step)[moved]
+    return np.concatenate([full, full[moved] + change, full[moved] - change])
 
 
 # ---- motions one after another ----------------------------------------------------------------------------------
@@ -148,10 +150,10 @@ def _alone(
     codes: Codes = run.once("machine code of motions", dict)
     try:
         motion = FreeMotion.of(Run(run.system, values, run.system.cycle(values), run.chosen))
-        known, row = places(motion), initial_row(motion)
-        if not known.limits[0] <= row[0] <= known.limits[1]:
+        load_places, row = places(motion), initial_row(motion)
+        if not load_places.limits[0] <= row[0] <= load_places.limits[1]:
             return {}
-        solution = integration_of(motion, rates_of(motion, codes, varied), known, duration, tolerance).run(row)
+        solution = integration_of(motion, rates_of(motion, codes, varied), load_places, duration, tolerance).run(row)
     except MechanismError:
         return {}
     if solution.ended is not None or not solution.stretches:

@@ -56,12 +56,12 @@ class Drive:
     @property
     def times(self) -> list[float]:
         """Times, s, at which its effort jumps or bends."""
-        found = [self.off_from, self.brake_from]
+        instants = [self.off_from, self.brake_from]
         if self.clutched:
-            found += [self.clutch_from, self.clutch_until]
+            instants += [self.clutch_from, self.clutch_until]
         if self.motor is not None and self.motor.kind == "table" and self.motor.over == "time":
-            found += self.parameters["points.place"]
-        return [time for time in found if np.isfinite(time)]
+            instants += self.parameters["points.place"]
+        return [time for time in instants if np.isfinite(time)]
 
     @property
     def timed(self) -> bool:
@@ -102,14 +102,14 @@ class Drive:
         """What the coordinate is driven by: a constant effort without a rotor where that turns by itself."""
         if not self.loose(now, slips):
             return self
-        own = {"effort": self.carried(now, slips)}
-        return replace(self, motor=CARRIED, parameters=own, inertia=0.0, off_from=np.inf, clutch=np.inf)
+        efforts = {"effort": self.carried(now, slips)}
+        return replace(self, motor=CARRIED, parameters=efforts, inertia=0.0, off_from=np.inf, clutch=np.inf)
 
     def spin(self, time: Array, rotor: Array, integral: Array, now: float, slips: float) -> Array:
         """Acceleration of a rotor that turns by itself, at its speed: J ω̇ = T(ω) less what goes through the clutch."""
         shaft = self.shaft(time, rotor / self.ratio, integral, now)
-        found: Array = (shaft - self.carried(now, slips)) / self.inertia
-        return found
+        spin: Array = (shaft - self.carried(now, slips)) / self.inertia
+        return spin
 
     def waiting(self, since: Array, integral: Array, now: float) -> Array:
         """The controller's integral after a time at rest, s."""
@@ -132,8 +132,8 @@ class Drive:
         in between, at rest."""
         free = self.shaft(time, speed, integral, now) - self.inertia * self.ratio * second
         ahead, back = (transmitted(free, np.asarray(sense), self.ratio, self.efficiency) for sense in (1.0, -1.0))
-        found: Array = 0.5 * ((1.0 + share) * ahead + (1.0 - share) * back) - share * self.braking(now)
-        return found + self.applied
+        effort: Array = 0.5 * ((1.0 + share) * ahead + (1.0 - share) * back) - share * self.braking(now)
+        return effort + self.applied
 
     def braking(self, now: float) -> float:
         """Effort of the brake, against the motion."""
@@ -162,20 +162,20 @@ def applied_to(driver: str) -> str:
 
 def drives(system: System, values: Values, number: Callable[[Any], Any] = float) -> dict[str, Drive]:
     """What drives each free coordinate, by driver. number: what becomes of a value."""
-    found: dict[str, Drive] = {}
+    drives_of: dict[str, Drive] = {}
     for name, driver in system.mechanism.drivers.items():
         if not driver.found:
             continue
         motor, path = driver.motor, f"drivers.{name}.motor."
         applied = number(values.get(applied_to(name), 0.0))
         if motor is None:
-            found[name] = Drive(None, {}, applied=applied)
+            drives_of[name] = Drive(None, {}, applied=applied)
             continue
         own = {key.removeprefix(path): number(value) for key, value in values.items() if key.startswith(path)}
         parameters: dict[str, Any] = {"integral": 0.0, **own, "over": motor.over}
         for key in ("place", "effort"):
             parameters[f"points.{key}"] = [own[f"points.{k}.{key}"] for k in range(len(motor.points or ()))]
-        known = ("ratio", "efficiency", "inertia", "off_from", "brake", "brake_from",
+        keys = ("ratio", "efficiency", "inertia", "off_from", "brake", "brake_from",
                  "clutch", "clutch_from", "clutch_until")  # fmt: skip
-        found[name] = Drive(motor, parameters, applied=applied, **{key: own[key] for key in known if key in own})
-    return found
+        drives_of[name] = Drive(motor, parameters, applied=applied, **{key: own[key] for key in keys if key in own})
+    return drives_of

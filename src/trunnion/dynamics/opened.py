@@ -97,20 +97,20 @@ def opened(run: Run) -> Opened:
             coordinates.update(_hang(data, mechanism.fixed_link, link, walk))
     base = Mechanism(**data)
     hung = [name for name in coordinates if name not in single]
-    wanted = mobility_by_formula(base) - len(passive(base)) - len(base.drivers) - len(hung)
-    chosen = _chosen(base, hung, max(wanted, 0), cut, run)
-    found = {name: coordinates.get(name) or _coordinate(walk, name) for name in (*hung, *chosen)}
-    data["drivers"] = {**data.get("drivers", {}), **_drivers(run, base, found)}
+    missing = mobility_by_formula(base) - len(passive(base)) - len(base.drivers) - len(hung)
+    chosen = _chosen(base, hung, max(missing, 0), cut, run)
+    coordinates_of = {name: coordinates.get(name) or _coordinate(walk, name) for name in (*hung, *chosen)}
+    data["drivers"] = {**data.get("drivers", {}), **_drivers(run, base, coordinates_of)}
     return Opened(Mechanism(**data), run, parts)
 
 
 def _leave_out(data: dict[str, Any], mechanism: Mechanism, without: Sequence[str]) -> None:
     """Take joints out of what a file says."""
-    data["joints"] = {name: one for name, one in data["joints"].items() if name not in without}
-    data["assembly"] = {name: one for name, one in data.get("assembly", {}).items() if name not in without}
+    data["joints"] = {name: entry for name, entry in data["joints"].items() if name not in without}
+    data["assembly"] = {name: entry for name, entry in data.get("assembly", {}).items() if name not in without}
     errors = data.get("errors", {}).items()
-    data["errors"] = {name: one for name, one in errors if not _of(mechanism.path_of(name), without)}
-    data["links"] = {name: {**one, "points": dict(one["points"])} for name, one in data["links"].items()}
+    data["errors"] = {name: entry for name, entry in errors if not _of(mechanism.path_of(name), without)}
+    data["links"] = {name: {**entry, "points": dict(entry["points"])} for name, entry in data["links"].items()}
 
 
 def _of(path: str, joints: Sequence[str]) -> bool:
@@ -146,10 +146,10 @@ def _loose(data: Mapping[str, Any], mechanism: Mechanism) -> list[str]:
     """One link of every part of the mechanism that no joint connects with the ground any more: the heaviest."""
     part = {link: {link} for link in data["links"]}
     for joint in data["joints"].values():
-        one, other = (part[link] for link in joint["links"])
-        if one is not other:
-            one |= other
-            part.update(dict.fromkeys(other, one))
+        first, other = (part[link] for link in joint["links"])
+        if first is not other:
+            first |= other
+            part.update(dict.fromkeys(other, first))
     ground = part[mechanism.fixed_link]
     others = {id(links): links for links in part.values() if links is not ground}
     mass = mechanism.parameters()
@@ -186,8 +186,8 @@ def _turning_point(data: Mapping[str, Any], link: str, walk: Forward) -> tuple[f
     """The mass centre of a link; beside it where a joint is, for two that turn at one point move nothing."""
     x, y = (_number(part) for part in walk.system.centre(walk.values, link))
     joints = [name for name, joint in data["joints"].items() if link in joint["links"]]
-    taken = {tuple(_number(walk.values[f"links.{link}.points.{name}.{one}"]) for one in "xy") for name in joints}
-    return (x + BESIDE * _number(walk.system.size(walk.values)) if (x, y) in taken else x), y
+    places = {tuple(_number(walk.values[f"links.{link}.points.{name}.{axis}"]) for axis in "xy") for name in joints}
+    return (x + BESIDE * _number(walk.system.size(walk.values)) if (x, y) in places else x), y
 
 
 # ---- chains in space ------------------------------------------------------------------------------------------
@@ -243,11 +243,11 @@ def _chosen(base: Mechanism, hung: list[str], count: int, cut: Sequence[str], ru
 
 def _loop(mechanism: Mechanism, cut: Sequence[str]) -> set[str]:
     """Joints on the shortest ways around the joints that are cut."""
-    found: set[str] = set()
+    links_of_loop: set[str] = set()
     for name in cut:
         first, second = mechanism.effective_joints[name].links
-        found.update(_way(mechanism, first, second, set(cut)))
-    return found
+        links_of_loop.update(_way(mechanism, first, second, set(cut)))
+    return links_of_loop
 
 
 def _way(mechanism: Mechanism, first: str, second: str, without: set[str]) -> Iterator[str]:
@@ -257,10 +257,10 @@ def _way(mechanism: Mechanism, first: str, second: str, without: set[str]) -> It
     while front and second not in came:
         ahead: list[str] = []
         for name, joint in mechanism.effective_joints.items():
-            for here, there in (joint.links, joint.links[::-1]):
-                if name not in without and here in front and there not in came:
-                    came[there] = (name, here)
-                    ahead.append(there)
+            for here, next_link in (joint.links, joint.links[::-1]):
+                if name not in without and here in front and next_link not in came:
+                    came[next_link] = (name, here)
+                    ahead.append(next_link)
         front = ahead
     while (step := came.get(second)) is not None:
         yield step[0]
@@ -273,13 +273,13 @@ def _drivers(run: Run, base: Mechanism, coordinates: Mapping[str, tuple[float, f
     What they are stated to do otherwise is next to nothing, in the time of one cycle: it chooses the assembly there.
     """
     size, duration = _number(run.system.size(run.values)), run.cycle.duration or 1.0
-    found: dict[str, dict[str, Any]] = {}
+    drivers_made: dict[str, dict[str, Any]] = {}
     for name, (coordinate, rate) in coordinates.items():
-        way = SHARE * (1.0 if PAIRS[base.effective_joints[name].type].turns else size)
-        found[name] = {
+        span = SHARE * (1.0 if PAIRS[base.effective_joints[name].type].turns else size)
+        drivers_made[name] = {
             "free": True,
-            "speed": way / duration,
-            "range": [coordinate, coordinate + way],
+            "speed": span / duration,
+            "range": [coordinate, coordinate + span],
             "initial": {"coordinate": coordinate, "speed": rate},
         }
-    return found
+    return drivers_made

@@ -20,13 +20,13 @@ CYCLES = 10  # of the nominal motion: the duration if none is stated
 
 
 def integration_of(
-    motion: FreeMotion, rates: CompiledRates | Walks, known: Places, duration: float, tolerance: float,
+    motion: FreeMotion, rates: CompiledRates | Walks, load_places: Places, duration: float, tolerance: float,
     progress: Callable[[float], None] | None = None, evaluations: int = MOST_EVALUATIONS, start: float = 0.0,
     senses: tuple[int, ...] = (),
 ) -> Integration:  # fmt: skip
     """What integrates a motion. duration, evaluations, start, senses: see `Integration`."""
     times = load_times(motion, duration)
-    limits = ranges(motion, motion.names, known)
+    limits = ranges(motion, motion.names, load_places)
     if motion.resisted:
         return ActiveMotion(
             motion,
@@ -42,6 +42,6 @@ def integration_of(
         )
     kind = ClutchMotion if any(drive.clutched for drive in motion.drives.values()) else Integration
     return kind(
-        motion, bridged(motion, rates), duration, tolerance, known.bends, known.period, limits, progress,
-        times, evaluations, known.meetings, start=start,
+        motion, bridged(motion, rates), duration, tolerance, load_places.bends, load_places.period, limits, progress,
+        times, evaluations, load_places.meetings, start=start,
     )  # fmt: skip

@@ -152,19 +152,21 @@ class Walks:
             unknown = np.full(2 * n + len(at.bristles) + len(self.layout.works_named), np.nan)
             second, integral, bristles, works = np.split(unknown, [n, 2 * n, 2 * n + len(at.bristles)])
             return Rates(second, integral, bristles, works, False)
-        found = motion.accelerate(at, self._last)
-        if self._last is not None and not np.all(found.converged & ~found.turned):
-            found = motion.accelerate(at)  # the last ones may lie on the wrong side of where a reaction turns round
-        if np.all(np.isfinite(found.second)):
-            self._last = found.second
+        accelerated = motion.accelerate(at, self._last)
+        if self._last is not None and not np.all(accelerated.converged & ~accelerated.turned):
+            accelerated = motion.accelerate(
+                at
+            )  # the last ones may lie on the wrong side of where a reaction turns round
+        if np.all(np.isfinite(accelerated.second)):
+            self._last = accelerated.second
         integral = np.array([
             drive.error(at.time, at.rate[i], at.integral[i], at.now) for i, drive in enumerate(motion.drives.values())
         ]).reshape(at.q.shape)  # fmt: skip
-        sound = bool(np.all(found.converged & ~found.turned))
-        locked = any(bool(np.any(np.less(one.share, 1.0))) for one in found.back.settled)
-        memory = _of_one_lane(bristle_rates(motion, at, found.back))
-        works = _of_one_lane(works_of(found.back, at._replace(onsets=found.onsets), motion.contacts))
-        return Rates(found.second[:, 0], integral[:, 0], memory, works, sound, locked)
+        sound = bool(np.all(accelerated.converged & ~accelerated.turned))
+        locked = any(bool(np.any(np.less(settled.share, 1.0))) for settled in accelerated.back.settled)
+        memory = _of_one_lane(bristle_rates(motion, at, accelerated.back))
+        works = _of_one_lane(works_of(accelerated.back, at._replace(onsets=accelerated.onsets), motion.contacts))
+        return Rates(accelerated.second[:, 0], integral[:, 0], memory, works, sound, locked)
 
     def seconds(self, at: Moment) -> Array:
         """The accelerations, (coordinate, lane)."""
@@ -179,8 +181,8 @@ class Walks:
     def look(self, at: Moment) -> Seen:
         """See `Seeing`."""
         motion = self.motion
-        found = motion.contacts.pushes(motion.walk(at, np.zeros_like(at.q)), at.onsets)
-        return seen_of(found, at.q.shape[1])
+        pushes_of = motion.contacts.pushes(motion.walk(at, np.zeros_like(at.q)), at.onsets)
+        return seen_of(pushes_of, at.q.shape[1])
 
     def derivative(
         self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()
@@ -202,10 +204,10 @@ class Walks:
         return self.motion.linear(at)
 
 
-def seen_of(found: Sequence[tuple[ContactState, Push]], lanes: int) -> Seen:
+def seen_of(pushes: Sequence[tuple[ContactState, Push]], lanes: int) -> Seen:
     """Of contacts at many moments what is looked at."""
-    parts = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in found]
-    return Seen(*(np.array([np.broadcast_to(one[i], lanes) for one in parts]) for i in range(len(Seen._fields))))
+    parts = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in pushes]
+    return Seen(*(np.array([np.broadcast_to(part[i], lanes) for part in parts]) for i in range(len(Seen._fields))))
 
 
 def _of_one_lane(numbers: Sequence[Number]) -> Array:
@@ -226,10 +228,10 @@ def powers_of(back: Backward, lanes: int) -> Array:
 
 
 def _powers(back: Backward) -> list[Number]:
-    stated = back.walk.system.mechanism.loads
+    loads = back.walk.system.mechanism.loads
     return [
         sum((effort * back.walk.rate(name) for name, effort in back.efforts.items()), 0.0),
-        sum((power for name, power in back.load_powers.items() if name in stated), 0.0),
+        sum((power for name, power in back.load_powers.items() if name in loads), 0.0),
         sum((state.power for state in back.springs.values()), 0.0),
         sum((back.losses[joint] for joint in back.walk.system.joints), 0.0),
     ]

@@ -40,7 +40,7 @@ class Repeated:
     @classmethod
     def of(cls, motion: FreeMotion, solution: Solution) -> list[Repeated]:
         """Those of the free coordinates, over a solution that ends as it begins but for whole turns."""
-        begins = np.array([one.begin for one in solution.stretches] + [solution.end])
+        begins = np.array([stretch.begin for stretch in solution.stretches] + [solution.end])
         time = 0.5 * (begins[1:] + begins[:-1])[:, None] + 0.5 * np.diff(begins)[:, None] * NODES
         books = Filling(motion, solution, time.ravel()).books()
         ends, _ = solution.at(np.array([0.0, solution.end]))
@@ -61,8 +61,8 @@ class Repeated:
         place = 2 * (moment - self.begins[step]) / (self.begins[step + 1] - self.begins[step]) - 1
         basis = np.cos(np.arange(DEGREE + 1) * np.arccos(np.clip(place, -1.0, 1.0))[..., None])
         value, rate, second = np.sum(self.parts[:, step] * basis, axis=-1)
-        beside = time - primal(time)  # 0, and the derivative of a dual time
-        return Drive(value + cycles * self.advance + rate * beside, rate + second * beside, second + 0.0 * beside)
+        zero = time - primal(time)  # 0, and the derivative of a dual time
+        return Drive(value + cycles * self.advance + rate * zero, rate + second * zero, second + 0.0 * zero)
 
     def span(self, parameters: Parameters) -> Span:
         """One cycle, from the nodes of the steps."""
@@ -71,6 +71,8 @@ class Repeated:
         return Span(self.period, True, False, one_way, float(np.max(np.abs(rates))), float(np.ptp(values)))
 
 
-def motion_law(found: Repeated) -> MotionLaw:
+def motion_law(repeated: Repeated) -> MotionLaw:
     """A motion that repeats as the law of a driver."""
-    return MotionLaw(found.at, found.span, needs=(), source="motion in time", validity="the mechanism it was found for")
+    return MotionLaw(
+        repeated.at, repeated.span, needs=(), source="motion in time", validity="the mechanism it was found for"
+    )

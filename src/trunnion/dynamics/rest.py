@@ -41,27 +41,27 @@ class Rest:
 
     def held(self, begin: float, row: Array, time: Array) -> Array:
         """The state at times of a rest that began at a time in a row: only controllers move on."""
-        found = np.repeat(row[:, None], len(time), axis=1)
+        rows_of = np.repeat(row[:, None], len(time), axis=1)
         (drive,), n = self.motion.drives.values(), self.layout.coordinates
-        found[2 * n] = drive.waiting(time - begin, row[2 * n], begin)
-        return found
+        rows_of[2 * n] = drive.waiting(time - begin, row[2 * n], begin)
+        return rows_of
 
     def beyond(self, time: Array, row: Array, begin: float, now: float) -> tuple[Array, Array]:
         """By how much what drives it exceeds the break-away effort forward and backward, N m or N; both < 0 at rest."""
-        found = []
+        efforts = []
         for sense in (1.0, -1.0):
             at = self._moment(time, row, begin, sense, now)
             zero = np.zeros_like(at.q)
             with np.errstate(all="ignore"):
                 demanded = self.motion.demanded(self.motion.solve(at, zero), at.q.shape)
-                given = self.motion.given(at, zero)
-            miss = sense * (given - demanded)[0]
-            found.append(np.where(np.isfinite(demanded[0]), miss, -np.inf))  # no solution: it locks, that way
-        return found[0], found[1]
+                drive_given = self.motion.given(at, zero)
+            miss = sense * (drive_given - demanded)[0]
+            efforts.append(np.where(np.isfinite(demanded[0]), miss, -np.inf))  # no solution: it locks, that way
+        return efforts[0], efforts[1]
 
     def sense(self, time: float, row: Array, now: float) -> float:
         """+1, −1: which way it moves on; 0: it stays."""
-        forward, backward = (float(one[0]) for one in self.beyond(np.array([time]), row, time, now))
+        forward, backward = (float(effort[0]) for effort in self.beyond(np.array([time]), row, time, now))
         if forward <= 0.0 and backward <= 0.0:
             return 0.0
         return 1.0 if forward >= backward else -1.0
@@ -85,15 +85,15 @@ class Rest:
         """The share of the friction, of the same part in every joint, that holds each lane at rest; from −1 to 1."""
         zero = np.zeros_like(at.q)
         low, high = np.full(at.q.shape[1], -1.0), np.full(at.q.shape[1], 1.0)
-        given = self.motion.given(at._replace(sense=0.0), zero)[0]
+        drive_given = self.motion.given(at._replace(sense=0.0), zero)[0]
         for _ in range(SHARES):
             middle = 0.5 * (low + high)
             senses = self.motion.beginning(at._replace(sense=1.0), middle)
             demanded = self.motion.demanded(self.motion.solve(at, zero, senses), at.q.shape)[0]
-            less = demanded < given
+            less = demanded < drive_given
             low, high = np.where(less, middle, low), np.where(less, high, middle)
-        found: Array = 0.5 * (low + high)
-        return found
+        shares: Array = 0.5 * (low + high)
+        return shares
 
     # ---- what is done meanwhile -------------------------------------------------------------------------------
 
@@ -143,8 +143,8 @@ class Meanwhile:
         integrals: Array = np.asarray(half * chebyshev.chebint(self.through, lbnd=-1), np.float64)
         each = integrals.sum(axis=0)  # every polynomial is 1 at 1
         before = np.cumsum(each, axis=1) - each
-        found: Array = before[:, panel] + chebyshev.chebval(place, integrals[:, :, panel], tensor=False)
-        return found
+        works: Array = before[:, panel] + chebyshev.chebval(place, integrals[:, :, panel], tensor=False)
+        return works
 
     def _place(self, time: Array) -> tuple[NDArray[np.intp], Array]:
         """The panel of each time, and the place in it from −1 to 1."""

@@ -106,21 +106,21 @@ class Course(NamedTuple):
         """That of a solution, None if it does not begin. between: the books at some rising times, s."""
         if not solution.end > 0.0:
             return None
-        ends = np.array([0.0, *(one.end for one in solution.stretches)])
+        ends = np.array([0.0, *(stretch.end for stretch in solution.stretches)])
         breaks = ends[np.append(np.diff(ends) > SHORTEST * solution.end, True)]
         begin, sizes = between(np.nextafter(ends[:1], np.inf)), [np.zeros(6)]
 
         def solve(time: Array) -> tuple[Array, NDArray[np.integer]]:
-            found, order = np.empty((len(begin.at.rate) + len(flat(begin)), len(time))), np.argsort(time)
+            numbers, order = np.empty((len(begin.at.rate) + len(flat(begin)), len(time))), np.argsort(time)
             for part in np.split(order, range(PORTION, len(order), PORTION)):
                 books = between(time[part])
                 works, changes = books.works - begin.works, books.energies - begin.energies
                 residual = np.where(books.arrays["condition"] > BLURRED, np.nan, _residual(works, changes))
                 account = residual, np.concatenate([works, changes]), books.energies
                 scales = largest(run, books.arrays)
-                sizes.append(np.array([*scales, *(np.nanmax(np.abs(one), initial=0.0) for one in account)]))
-                found[:, part] = np.concatenate([books.at.rate, flat(books)])
-            return found, np.zeros(len(time), np.intp)
+                sizes.append(np.array([*scales, *(np.nanmax(np.abs(stretch), initial=0.0) for stretch in account)]))
+                numbers[:, part] = np.concatenate([books.at.rate, flat(books)])
+            return numbers, np.zeros(len(time), np.intp)
 
         def flat(books: Books) -> Array:
             forces = books.arrays["reaction_force"]
@@ -128,7 +128,7 @@ class Course(NamedTuple):
 
         courses = Courses.of(solve, breaks, accuracy=ACCURACY)
         counts = len(begin.at.rate), len(begin.arrays["drive_effort"]), begin.arrays["reaction_force"].shape[:2]
-        *scales, worst, turned_over, stored = (float(one) for one in np.max(sizes, axis=0))
+        *scales, worst, turned_over, stored = (float(stretch) for stretch in np.max(sizes, axis=0))
         return cls(courses, counts, between(ends[-1:]), Scales(*scales), worst, turned_over, stored)
 
     def rate(self, i: int) -> tuple[float, float]:
@@ -182,16 +182,16 @@ class Found(NamedTuple):
         return self.course.worst / self.course.turned_over if self.course.turned_over > 0 else 0.0
 
 
-def result_of(motion: FreeMotion, found: Found, duration: float, stated: Run | None = None) -> Result:
-    """The result of a motion in time. stated: the mechanism as it was stated, where joints in play were taken out."""
-    solution, books, impacts = found.solution, found.books, found.impacts
-    run = stated or motion.run
+def result_of(motion: FreeMotion, integrated: Found, duration: float, nominal: Run | None = None) -> Result:
+    """The result of a motion in time. nominal: the mechanism as it was stated, where joints in play were taken out."""
+    solution, books, impacts = integrated.solution, integrated.books, integrated.impacts
+    run = nominal or motion.run
     _note_switches(motion, solution)
     mechanism, system = run.system.mechanism, run.system
-    scales = found.course.scales if found.course else largest(run, books.arrays)
+    scales = integrated.course.scales if integrated.course else largest(run, books.arrays)
     findings = [
         *motion_findings(motion, solution, run, impacts),
-        *_unbalanced(found),
+        *_unbalanced(integrated),
         *_undefined(books),
     ]
     attributes = encoded(
@@ -201,25 +201,25 @@ def result_of(motion: FreeMotion, found: Found, duration: float, stated: Run | N
             "free_drivers": _shown(motion, run),
             "duration": duration,
             "findings": finding_rows(findings),
-            **(_named_contacts(motion, impacts) if stated else {}),
-            **scales.summary(_summary(motion, found, run, scales)),
+            **(_named_contacts(motion, impacts) if nominal else {}),
+            **scales.summary(_summary(motion, integrated, run, scales)),
             "inputs": inputs(mechanism),
             "scene": scene_of(run),
-            "events": [[one.kind, one.of, one.figure if np.isfinite(one.figure) else None, one.unit]
-                       for one in solution.events],
+            "events": [[event.kind, event.of, event.figure if np.isfinite(event.figure) else None, event.unit]
+                       for event in solution.events],
         }
     )  # fmt: skip
 
     def build() -> xr.Dataset:
-        known = {name: one.over("time") for name, one in results.variables(mechanism.space).items()}
+        variables = {name: event.over("time") for name, event in results.variables(mechanism.space).items()}
         units = member_units(system)
-        given = described(books.arrays, known, units)
-        given |= described(_own(motion, run, solution, books), MOTION, units)
+        arrays_of = described(books.arrays, variables, units)
+        arrays_of |= described(_own(motion, run, solution, books), MOTION, units)
         labels, along = dict(books.labels), {"time": Variable(("time",), "s", "time from the start")}
         coordinates = {"time": books.time}
-        if stated is not None and books.touches is not None:
+        if nominal is not None and books.touches is not None:
             labels["contact"] = list(motion.contacts.labels)
-            given |= described(books.touches.arrays(books.works[-1]), CONTACT) | described(
+            arrays_of |= described(books.touches.arrays(books.works[-1]), CONTACT) | described(
                 impact_arrays(impacts), IMPACT
             )
             rows = np.flatnonzero(np.all(np.isfinite(books.touches.normal), axis=0))
@@ -227,16 +227,16 @@ def result_of(motion: FreeMotion, found: Found, duration: float, stated: Run | N
             if len(rows) >= FEWEST and not is_rigid(mechanism):  # an impact of rigid bodies has no force
                 along["frequency"] = FREQUENCY
                 coordinates["frequency"], amplitude = spectrum(books.time[rows], books.touches.normal[:, rows])
-                given |= described({"contact_force_amplitude": amplitude}, SPECTRUM)
-        return dataset_of("motion", given, labels, attributes, described(coordinates, along))
+                arrays_of |= described({"contact_force_amplitude": amplitude}, SPECTRUM)
+        return dataset_of("motion", arrays_of, labels, attributes, described(coordinates, along))
 
     return Result(attributes, build)
 
 
 def _named_contacts(motion: FreeMotion, impacts: Sequence[Impact]) -> dict[str, list[str]]:
     """The contact of every impact, and the contacts that are pins in holes."""
-    pins = [one.label for one in motion.contacts.each if one.bored]
-    return {"impacts": [one.label for one in impacts], "contact_pins": pins}
+    pins = [contact.label for contact in motion.contacts.each if contact.bored]
+    return {"impacts": [contact.label for contact in impacts], "contact_pins": pins}
 
 
 def _shown(motion: FreeMotion, run: Run) -> list[str]:
@@ -266,7 +266,7 @@ def _own(motion: FreeMotion, run: Run, solution: Solution, books: Books) -> dict
         "energy_residual": _residual(books.works, books.energies),
         "resting": books.resting,
         **({} if books.sticking is None else {"sticking": books.sticking}),
-        "event_time": np.array([one.time for one in solution.events], float),
+        "event_time": np.array([event.time for event in solution.events], float),
     }
 
 
@@ -277,11 +277,11 @@ def _works(solution: Solution, works: Array) -> dict[str, Array]:
 
 def _rotors(motion: FreeMotion, names: Sequence[str], books: Books) -> dict[str, Array]:
     """Speeds of the rotors behind clutches, (driver, time), where there are any."""
-    found = np.full((len(names), len(books.time)), np.nan)
+    coordinates = np.full((len(names), len(books.time)), np.nan)
     for i, (name, drive) in enumerate(motion.drives.items()):
         if drive.clutched:
-            found[names.index(name)] = books.at.slip[0] + drive.ratio * books.at.rate[i]
-    return {"rotor_speed": found} if len(books.at.slip) else {}
+            coordinates[names.index(name)] = books.at.slip[0] + drive.ratio * books.at.rate[i]
+    return {"rotor_speed": coordinates} if len(books.at.slip) else {}
 
 
 def _note_switches(motion: FreeMotion, solution: Solution) -> None:
@@ -314,11 +314,11 @@ ROUNDING = 1e-12  # of the energy turned over: a work that is none
 WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
 
-def _unbalanced(found: Found) -> Iterator[Finding]:
-    if found.share > WORST:
-        what = f"works and energies differ by {found.share:.2g} of the energy turned over"
+def _unbalanced(integrated: Found) -> Iterator[Finding]:
+    if integrated.share > WORST:
+        what = f"works and energies differ by {integrated.share:.2g} of the energy turned over"
         remedy = "ask for a smaller --tolerance"
-        yield Finding.warning("simulate.energy", "", what, remedy, share=found.share)
+        yield Finding.warning("simulate.energy", "", what, remedy, share=integrated.share)
 
 
 def _undefined(books: Books) -> Iterator[Finding]:
@@ -341,8 +341,8 @@ def motion_findings(
 ) -> Iterator[Finding]:
     """What is to be known of a motion: how it rests, locks or ends."""
     system = motion.system
-    yield from (one for one in motion.run.chosen.findings if one.code != "assembly.change_point")
-    centred = [one.joint for one in motion.run.seats]
+    yield from (finding for finding in motion.run.chosen.findings if finding.code != "assembly.change_point")
+    centred = [finding.joint for finding in motion.run.seats]
     if centred:
         what = f"pins of {', '.join(centred)} are taken in the middle of their holes: a seat that follows the load is "
         what += "left out"
@@ -457,10 +457,10 @@ def _locks(motion: FreeMotion, solution: Solution) -> Iterator[Finding]:
 
 def _rests(motion: FreeMotion, solution: Solution, name: str, effort: str) -> Iterator[Finding]:
     """What holds it where it rests at the end."""
-    rests = [one for one in solution.events if one.kind == "rest"]
+    rests = [event for event in solution.events if event.kind == "rest"]
     if not (rests and solution.stretches and solution.stretches[-1].resting):
         return
-    last, stays = solution.stretches[-1], all(one.resting for one in solution.stretches)
+    last, stays = solution.stretches[-1], all(event.resting for event in solution.stretches)
     on = _on(motion, solution)
     figures: dict[str, Any] = {} if stays else {"time": rests[-1].time, **({} if on else {"times": len(rests)})}
     since, times = readable(rests[-1].time, "s"), counted(len(rests), "time")
@@ -485,9 +485,12 @@ def _rests(motion: FreeMotion, solution: Solution, name: str, effort: str) -> It
             what = f"all free drivers come to rest {times}, for the last time at {since}: what acts then {needs}"
             yield Finding.note("simulate.all_rest", where, what, **figures)
         return
-    given, needed = _holding(motion, solution, last)
-    where, figures = f"drivers.{name}", {**figures, "driver": name, "given": given, "needed": needed, "unit": effort}
-    act, breaks = f"{readable(given, effort)} act on it", f"it breaks away from {readable(needed, effort)} on"
+    drive_given, needed = _holding(motion, solution, last)
+    where, figures = (
+        f"drivers.{name}",
+        {**figures, "driver": name, "given": drive_given, "needed": needed, "unit": effort},
+    )
+    act, breaks = f"{readable(drive_given, effort)} act on it", f"it breaks away from {readable(needed, effort)} on"
     if stays:
         what = f"{name} does not start: {act}, and {breaks}"
         yield Finding.warning("simulate.stays_at_rest", where, what, stronger, **figures)
@@ -505,50 +508,52 @@ def _on(motion: FreeMotion, solution: Solution) -> list[str]:
     """The free drivers whose motor still acts at the end, through its clutch if it has one, and is not braked."""
     last, time = solution.stretches[-1], np.array([solution.end])
     at = solution.layout.moment(time, solution.at(time)[0], now=last.now)
-    found = []
+    findings = []
     for i, (name, drive) in enumerate(motion.drives.items()):
         effort = drive.seen(last.now, last.slips).shaft(time, at.rate[i], at.integral[i], last.now)
         if np.any(effort != 0.0) and not drive.braking(last.now):
-            found.append(name)
-    return found
+            findings.append(name)
+    return findings
 
 
 def _of_contacts(motion: FreeMotion, run: Run, impacts: Sequence[Impact]) -> Iterator[Finding]:
     """What the laws of the contacts return, where that is not what was stated; how deep soft surfaces sink in; what is
     lost in contacts that begin so slowly that their law is not followed."""
-    for one in motion.contacts.each:
-        own = [impact for impact in impacts if impact.label == one.label]
-        slow = [impact for impact in own if impact.approach < SLOWEST]
-        lost, whole = (sum(impact.loss for impact in some) for some in (slow, own))
-        if len(slow) > FEW and lost > DIFFERS * whole:
-            what = f"{one.label}: {len(slow):.0f} of {len(own):.0f} contacts begin slower than "
-            what += f"{readable(SLOWEST, 'm/s')} and are treated as beginning at that speed; {lost / whole:.2%} of "
+    for contact in motion.contacts.each:
+        of_contact = [impact for impact in impacts if impact.label == contact.label]
+        slow = [impact for impact in of_contact if impact.approach < SLOWEST]
+        lost, total = (sum(impact.loss for impact in group) for group in (slow, of_contact))
+        if len(slow) > FEW and lost > DIFFERS * total:
+            what = f"{contact.label}: {len(slow):.0f} of {len(of_contact):.0f} contacts begin slower than "
+            what += f"{readable(SLOWEST, 'm/s')} and are treated as beginning at that speed; {lost / total:.2%} of "
             what += "what the contact law loses is lost in them"
             remedy = "compare with another restitution: the law is one of impacts, and tells little of slow pressing"
             figures = {
-                "contact": one.label,
+                "contact": contact.label,
                 "count": len(slow),
-                "of": len(own),
+                "of": len(of_contact),
                 "slowest": SLOWEST,
-                "share": lost / whole,
+                "share": lost / total,
             }
-            yield Finding.note("simulate.slow_onsets", f"joints.{one.joint}.contact", what, remedy, **figures)
-        depth = max((impact.depth for impact in impacts if impact.label == one.label), default=0.0)
-        if depth > one.clearance:
-            what = f"{one.label}: the surfaces sink {readable(depth, 'm')} into each other, more than the clearance "
-            what += f"of {readable(one.clearance, 'm')}"
+            yield Finding.note("simulate.slow_onsets", f"joints.{contact.joint}.contact", what, remedy, **figures)
+        depth = max((impact.depth for impact in impacts if impact.label == contact.label), default=0.0)
+        if depth > contact.clearance:
+            what = (
+                f"{contact.label}: the surfaces sink {readable(depth, 'm')} into each other, more than the clearance "
+            )
+            what += f"of {readable(contact.clearance, 'm')}"
             remedy = "check the stiffness of the contact; a contact law holds for small penetrations"
-            figures = {"contact": one.label, "depth": depth, "clearance": one.clearance}
-            yield Finding.warning("simulate.soft", f"joints.{one.joint}.contact", what, remedy, **figures)
-    for one in {one.joint: one for one in motion.contacts.each}.values():
-        law = run.system.mechanism.effective_joints[one.joint].contact
-        returned = restitution_of(one.factor)
-        if law is not None and not law.of.rigid and abs(returned - one.restitution) > DIFFERS:
-            what = f"{one.joint}: with a stated restitution of {one.restitution:.3g} the contact law {law.law} "
+            figures = {"contact": contact.label, "depth": depth, "clearance": contact.clearance}
+            yield Finding.warning("simulate.soft", f"joints.{contact.joint}.contact", what, remedy, **figures)
+    for contact in {contact.joint: contact for contact in motion.contacts.each}.values():
+        law = run.system.mechanism.effective_joints[contact.joint].contact
+        returned = restitution_of(contact.factor)
+        if law is not None and not law.of.rigid and abs(returned - contact.restitution) > DIFFERS:
+            what = f"{contact.joint}: with a stated restitution of {contact.restitution:.3g} the contact law {law.law} "
             what += f"returns {returned:.3g}"
             remedy = "state law: restitution to get back what is stated"
-            figures = {"joint": one.joint, "law": law.law, "stated": one.restitution, "returned": returned}
-            yield Finding.note("simulate.restitution", f"joints.{one.joint}.contact", what, remedy, **figures)
+            figures = {"joint": contact.joint, "law": law.law, "stated": contact.restitution, "returned": returned}
+            yield Finding.note("simulate.restitution", f"joints.{contact.joint}.contact", what, remedy, **figures)
 
 
 def _holding(motion: FreeMotion, solution: Solution, stretch: Stretch) -> tuple[float, float]:
@@ -557,43 +562,48 @@ def _holding(motion: FreeMotion, solution: Solution, stretch: Stretch) -> tuple[
     rows, _ = solution.at(np.array([time]))
     rest = Rest(motion, solution.layout, stretch.slips)
     at = solution.layout.moment(np.array([time]), rows, 1.0, time, stretch.slips)
-    given = float(motion.given(at._replace(sense=0.0), np.zeros_like(at.q))[0, 0])
-    forward, backward = (float(one[0]) for one in rest.beyond(np.array([time]), rows[:, 0], time, time))
-    ahead = given > 0 or (given == 0 and forward >= backward)
-    return given, given - forward if ahead else given + backward
+    drive_given = float(motion.given(at._replace(sense=0.0), np.zeros_like(at.q))[0, 0])
+    forward, backward = (float(efforts[0]) for efforts in rest.beyond(np.array([time]), rows[:, 0], time, time))
+    ahead = drive_given > 0 or (drive_given == 0 and forward >= backward)
+    return drive_given, drive_given - forward if ahead else drive_given + backward
 
 
 # ---- summary --------------------------------------------------------------------------------------------------
 
 
-def _summary(motion: FreeMotion, own: Found, run: Run, scales: Scales) -> Sequence[Figure]:
+def _summary(motion: FreeMotion, integrated: Found, run: Run, scales: Scales) -> Sequence[Figure]:
     """The figures that one looks at first; none of a motion that does not begin."""
-    found: list[Figure] = []
-    solution, course, impacts, names = own.solution, own.course, own.impacts, list(run.system.mechanism.drivers)
+    figures: list[Figure] = []
+    solution, course, impacts, names = (
+        integrated.solution,
+        integrated.course,
+        integrated.impacts,
+        list(run.system.mechanism.drivers),
+    )
     if course is None:
-        return found
+        return figures
     for i, name in enumerate(_shown(motion, run)):
         turns, effort = motion.system.turns(name), effort_units(motion.system)[names.index(name)]
         unit, speed = "rad/s" if turns else "m/s", f"speed of {name}"
-        found.append(_largest(f"{name}.speed_max", speed, unit, *course.rate(i)))
+        figures.append(_largest(f"{name}.speed_max", speed, unit, *course.rate(i)))
         last = float(course.last.at.rate[i, 0])
-        found.append(Figure(f"{name}.speed_end", speed, last, unit, "at the end", _at(solution.end)))
+        figures.append(Figure(f"{name}.speed_end", speed, last, unit, "at the end", _at(solution.end)))
         peak, noun = course.effort(names.index(name)), "drive torque" if turns else "drive force"
         # of others it is rounding; where nothing has inertia at a dead centre there is none
         if motion.system.mechanism.drivers[name].motor is not None and np.isfinite(peak[0]):
-            found.append(_largest(f"{name}.effort_max", f"{noun} of {name}", effort, *peak))
-        found += steady_figures(motion, solution, i)
+            figures.append(_largest(f"{name}.effort_max", f"{noun} of {name}", effort, *peak))
+        figures += steady_figures(motion, solution, i)
     ended = solution.ended is not None and solution.ended.code == "simulate.change_point"
     if not ended and not any(event.kind == "change-point" for event in solution.events):  # there they have no bound
         for i, joint in enumerate(run.system.joints):
             if (peak := course.reaction(i))[0] > 0:
-                found.append(_largest(f"{joint}.reaction_max", f"reaction in {joint}", "N", *peak))
-    found += impact_figures(motion.contacts.labels, impacts, solution.end)
+                figures.append(_largest(f"{joint}.reaction_max", f"reaction in {joint}", "N", *peak))
+    figures += impact_figures(motion.contacts.labels, impacts, solution.end)
     for key, work in _works(solution, course.last.works).items():
         if abs(work[0]) > scales.floor("J"):
-            found.append(Figure(f"work_{key}", WORDS[key], float(work[0]), "J"))
-    found.append(Figure("energy_residual", "largest error of the energy account", course.worst, "J"))
-    return found
+            figures.append(Figure(f"work_{key}", WORDS[key], float(work[0]), "J"))
+    figures.append(Figure("energy_residual", "largest error of the energy account", course.worst, "J"))
+    return figures
 
 
 def _largest(name: str, subject: str, unit: str, value: float, time: float) -> Figure:

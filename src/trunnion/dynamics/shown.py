@@ -72,9 +72,9 @@ class Touches(NamedTuple):
         sizes = [*[(contacts, times)] * 6, (contacts, axes, times)]
         return cls(*(np.full(size, np.nan) for size in sizes))
 
-    def fill(self, lanes: NDArray[np.intp], found: Touched, onsets: Sequence[object]) -> None:
+    def fill(self, lanes: NDArray[np.intp], touched: Touched, onsets: Sequence[object]) -> None:
         """Write the rows of one walk."""
-        for k, (state, push) in enumerate(found):
+        for k, (state, push) in enumerate(touched):
             self.gap[k, lanes], self.normal[k, lanes] = state.gap, push.normal
             self.friction[k, lanes], self.slip[k, lanes] = push.friction, state.slip
             self.touching[k, lanes], self.stored[k, lanes] = float(onsets[k] is not None), push.stored
@@ -100,26 +100,26 @@ def as_stated(
 ) -> tuple[dict[str, Array], dict[str, list[str]]]:
     """Arrays and labels of the mechanism as it is stated, from those of the mechanism without its joints in play."""
     system = run.system
-    wanted, found = fill.labels(system), played.arrays
-    known = results.variables(system.mechanism.space)
+    names_of, arrays_played = fill.labels(system), played.arrays
+    variables = results.variables(system.mechanism.space)
     for name, array in arrays.items():
-        if name not in found or results.SAME_AS.get(name) in found:
+        if name not in arrays_played or results.SAME_AS.get(name) in arrays_played:
             continue
-        into, dims = found[name], known[name].dims
-        places = [[(i, labels[dim].index(one)) for i, one in enumerate(wanted[dim]) if one in labels[dim]]
-                  for dim in dims if dim in wanted]  # fmt: skip
+        into, dims = arrays_played[name], variables[name].dims
+        places = [[(i, labels[dim].index(one)) for i, one in enumerate(names_of[dim]) if one in labels[dim]]
+                  for dim in dims if dim in names_of]  # fmt: skip
         if not places:
             into[...] = array
             continue
-        to, of = (np.ix_(*([pair[side] for pair in some] for some in places)) for side in (0, 1))
+        to, of = (np.ix_(*([pair[side] for pair in place] for place in places)) for side in (0, 1))
         into[to] = array[of]
     if system.mechanism.space == "planar":
         for joint, row in played.rows.items():
-            first, second = (wanted["link"].index(link) for link in system.joints[joint][1])
+            first, second = (names_of["link"].index(link) for link in system.joints[joint][1])
             for suffix in ("", "_velocity", "_acceleration"):
-                angles = found[f"link_angle{suffix}"]
-                found[f"joint_rotation{suffix}"][row] = angles[second] - angles[first]
-    return found, wanted
+                angles = arrays_played[f"link_angle{suffix}"]
+                arrays_played[f"joint_rotation{suffix}"][row] = angles[second] - angles[first]
+    return arrays_played, names_of
 
 
 @dataclass
@@ -145,9 +145,9 @@ class PlayedJoints:
         """The rows of one walk of the opened mechanism."""
         run = self.opened.run
         local = run.system.elements(run.values)
-        own = {key: hole for key, hole in run.system.holes(run.values).items() if key[1] in self.cut}
+        own_holes = {key: hole for key, hole in run.system.holes(run.values).items() if key[1] in self.cut}
         motions = {link: back.walk.motions[link] for link in run.system.mechanism.effective_links}
-        walk = type(back.walk)(run.system, run.values, {**local, **own}, motions, back.walk.time)
+        walk = type(back.walk)(run.system, run.values, {**local, **own_holes}, motions, back.walk.time)
         for joint, row in self.rows.items():
             reaction, rubbing, lost = self._wrenches(back, joint, touched)
             self.arrays["friction_power"][row, window] = lost
@@ -207,36 +207,41 @@ class PlayedJoints:
 def impact_arrays(impacts: Sequence[Impact]) -> dict[str, Array]:
     """The variables of `IMPACT`."""
     keys = ("begin", "end", "approach", "separation", "force", "depth", "impulse", "wear")
-    return {f"impact_{key}": np.array([getattr(one, key) for one in impacts], float) for key in keys}
+    return {f"impact_{key}": np.array([getattr(impact, key) for impact in impacts], float) for key in keys}
 
 
 def impact_figures(labels: Sequence[str], impacts: Sequence[Impact], end: float) -> list[Figure]:
     """What a summary says of every contact: how often and how hard it touches, for how long, and how much it wears."""
-    found: list[Figure] = []
+    figures: list[Figure] = []
     for label in labels:
-        own = [one for one in impacts if one.label == label]
-        found.append(Figure(f"{label}.impacts", f"contacts of {label}", float(len(own)), "1"))
-        if not own:
+        of_contact = [impact for impact in impacts if impact.label == label]
+        figures.append(Figure(f"{label}.impacts", f"contacts of {label}", float(len(of_contact)), "1"))
+        if not of_contact:
             continue
-        long = sum((one.end if np.isfinite(one.end) else end) - one.begin for one in own)
+        long = sum((impact.end if np.isfinite(impact.end) else end) - impact.begin for impact in of_contact)
         share = long / end if end else np.nan
-        depth, speed = max(one.depth for one in own), max(one.approach for one in own)
-        struck, pushed = [one for one in own if np.isnan(one.force)], [one for one in own if np.isfinite(one.force)]
+        depth, speed = max(impact.depth for impact in of_contact), max(impact.approach for impact in of_contact)
+        struck, pushed = (
+            [impact for impact in of_contact if np.isnan(impact.force)],
+            [impact for impact in of_contact if np.isfinite(impact.force)],
+        )
         if struck:  # an impact of rigid bodies has no largest force
-            hardest = max(struck, key=lambda one: one.impulse)
+            hardest = max(struck, key=lambda impact: impact.impulse)
             when = f"at {hardest.begin:.4g} s"
-            found.append(Figure(f"{label}.impulse_max", f"impulse in {label}", hardest.impulse, "N s", "largest", when))
+            figures.append(
+                Figure(f"{label}.impulse_max", f"impulse in {label}", hardest.impulse, "N s", "largest", when)
+            )
         if pushed:
-            most = max(pushed, key=lambda one: one.force)
+            most = max(pushed, key=lambda impact: impact.force)
             when = f"in the contact from {most.begin:.4g} s"
-            found.append(
+            figures.append(
                 Figure(f"{label}.contact_force_max", f"contact force in {label}", most.force, "N", "largest", when)
             )
         if depth > 0:
-            found.append(Figure(f"{label}.contact_depth_max", f"penetration in {label}", depth, "m", "largest"))
-        found += [
+            figures.append(Figure(f"{label}.contact_depth_max", f"penetration in {label}", depth, "m", "largest"))
+        figures += [
             Figure(f"{label}.approach_max", f"speed of approach in {label}", speed, "m/s", "largest"),
             Figure(f"{label}.contact_time", f"time in contact of {label}", share, "1", "of all"),
-            Figure(f"{label}.wear", f"wear index of {label}", sum(one.wear for one in own), "J"),
+            Figure(f"{label}.wear", f"wear index of {label}", sum(impact.wear for impact in of_contact), "J"),
         ]
-    return found
+    return figures

@@ -120,13 +120,13 @@ def simulated(
     if playing:
         return _with_play(run, duration, steps, tolerance, progress, evaluations)
     motion = FreeMotion.of(run)
-    known = places(motion)
+    load_places = places(motion)
     rates, row, time = rates_of(motion), initial_row(motion), np.linspace(0.0, duration, steps + 1)
-    check_start(motion, row, ranges(motion, motion.names, known))
+    check_start(motion, row, ranges(motion, motion.names, load_places))
 
     def found(tolerance: float) -> Found:
         motion.begin(None)
-        integration = integration_of(motion, rates, known, duration, tolerance, progress, evaluations)
+        integration = integration_of(motion, rates, load_places, duration, tolerance, progress, evaluations)
         solution = integration.run(row.copy())
         return Found.of(run, solution, time, lambda when: Filling(motion, solution, when).books())
 
@@ -153,8 +153,8 @@ def _balanced(find: Callable[[float], Found], tolerance: float) -> Found:
     return best
 
 
-def _exhausted(found: Found) -> bool:
-    return found.solution.ended is not None and found.solution.ended.code == "simulate.evaluations"
+def _exhausted(integrated: Found) -> bool:
+    return integrated.solution.ended is not None and integrated.solution.ended.code == "simulate.evaluations"
 
 
 def _with_play(
@@ -212,8 +212,8 @@ def check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float
         return
     rows = np.repeat(row[:, None], 2, axis=1)
     rows[0, 1] += BESIDE * (1.0 if motion.system.turns(motion.names[0]) else motion.system.size(motion.values))
-    there, beside = np.abs(motion.inertia(Layout.of(motion).moment(np.zeros(2), rows))[0, 0])
-    if there < MASSLESS * beside:
+    inertia, shift_of = np.abs(motion.inertia(Layout.of(motion).moment(np.zeros(2), rows))[0, 0])
+    if inertia < MASSLESS * shift_of:
         what = "begins where nothing moves that has a mass, as at a dead centre, so that it has no acceleration there"
         remedy = "state the inertia of the link or the rotor that it turns, or begin elsewhere"
         raise MechanismError(Finding(what, f"drivers.{motion.names[0]}.initial", remedy))
@@ -221,14 +221,14 @@ def check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float
 
 def _check_numbers(duration: float, steps: int, tolerance: float, evaluations: int) -> None:
     """MechanismError for numbers that make no sense."""
-    found = []
+    findings = []
     if not (np.isfinite(duration) and duration > 0):
-        found.append(Finding(f"a duration of {duration:g} s", "duration", "give a time above 0, such as 2 s"))
+        findings.append(Finding(f"a duration of {duration:g} s", "duration", "give a time above 0, such as 2 s"))
     if not 1 <= steps <= MOST_STEPS:
-        found.append(Finding(f"cannot give {steps} steps", "steps", f"give a whole number from 1 to {MOST_STEPS:,}"))
+        findings.append(Finding(f"cannot give {steps} steps", "steps", f"give a whole number from 1 to {MOST_STEPS:,}"))
     if evaluations < 1:
-        found.append(Finding(f"cannot do {evaluations} evaluations", "evaluations", "give a whole number from 1"))
+        findings.append(Finding(f"cannot do {evaluations} evaluations", "evaluations", "give a whole number from 1"))
     if not 1e-13 <= tolerance <= 1e-2:
-        found.append(Finding(f"a tolerance of {tolerance:g}", "tolerance", "give a number from 1e-13 to 1e-2"))
-    if found:
-        raise MechanismError(found)
+        findings.append(Finding(f"a tolerance of {tolerance:g}", "tolerance", "give a number from 1e-13 to 1e-2"))
+    if findings:
+        raise MechanismError(findings)

@@ -79,17 +79,17 @@ class Solution:
 
     def at(self, time: Array) -> tuple[Array, NDArray[np.intp]]:
         """State (number, time) and number of the stretch at rising times; NaN, −1 after the end."""
-        found = np.full((self.layout.size, len(time)), np.nan)
+        rows_at = np.full((self.layout.size, len(time)), np.nan)
         which = np.full(len(time), -1, np.intp)
-        ends = np.array([one.end for one in self.stretches])
+        ends = np.array([stretch.end for stretch in self.stretches])
         # the end is reached but for rounding
         time = np.where((time > self.end) & (time <= self.end * (1 + 2 * CLOSE)), self.end, time)
         number = np.searchsorted(ends, time)
         for lanes in np.split(np.arange(len(time)), np.flatnonzero(np.diff(number)) + 1) if len(time) else []:
             if (k := number[lanes[0]]) < len(ends):
-                found[:, lanes] = self.stretches[k].state(time[lanes])
+                rows_at[:, lanes] = self.stretches[k].state(time[lanes])
                 which[lanes] = k
-        return found, which
+        return rows_at, which
 
 
 def by_time(dense: Callable[[Array], Array], low: float, high: float, k: int) -> Callable[[Array], Array]:

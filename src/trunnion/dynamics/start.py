@@ -52,41 +52,41 @@ def initial_row(motion: FreeMotion) -> Array:
     return row
 
 
-def ranges(motion: FreeMotion, drivers: Iterable[str], known: Places) -> dict[str, tuple[float, float]]:
+def ranges(motion: FreeMotion, drivers: Iterable[str], load_places: Places) -> dict[str, tuple[float, float]]:
     """The coordinates between which free drivers may move, of those that have a range."""
     if len(motion.system.mechanism.drivers) == 1:
-        return {motion.names[0]: known.limits}
-    stated = {}
+        return {motion.names[0]: load_places.limits}
+    ranges_stated = {}
     for name in drivers:
         ends = [motion.values.get(f"drivers.{name}.range.{end}") for end in ("from", "to")]
         if name in motion.names and None not in ends:
-            stated[name] = min(map(_number, ends)), max(map(_number, ends))
-    return stated
+            ranges_stated[name] = min(map(_number, ends)), max(map(_number, ends))
+    return ranges_stated
 
 
 def load_times(motion: FreeMotion, duration: float) -> list[float]:
     """Times, s, at which loads that vary with the time jump or bend: ends of a `between`, points of a table."""
     mechanism = motion.system.mechanism
-    found, grid = list[float](), np.linspace(0.0, duration, SCANNED)
+    instants, grid = list[float](), np.linspace(0.0, duration, SCANNED)
     for name, table in mechanism.tables.items():
         if table.over == "time":
             knots = np.array([_number(motion.values[f"tables.{name}.points.{k}.at"]) for k in range(len(table.points))])
             period = _number(motion.values.get(f"tables.{name}.period", knots[-1] - knots[0]))
             laps = np.arange(int(duration / period) + 2) * period if table.repeats and period > 0 else np.zeros(1)
-            found += list((knots + laps[:, None]).ravel())
+            instants += list((knots + laps[:, None]).ravel())
     for entry in mechanism.parameter_set.entries.values():
         if not entry.varies or entry.quantity.expression is None or "time" not in entry.quantity.names:
             continue
         sizes = [name for name in entry.quantity.names if name in mechanism.dimensions]
-        known = {name: motion.values[f"dimensions.{name}"] for name in sizes}
+        dimensions = {name: motion.values[f"dimensions.{name}"] for name in sizes}
         for kink in entry.quantity.expression.kinks:
             try:
-                level = np.broadcast_to(np.asarray(kink({**known, "time": grid}), float), grid.shape)
+                level = np.broadcast_to(np.asarray(kink({**dimensions, "time": grid}), float), grid.shape)
             except KeyError:  # it depends on the motion as well
                 continue
             k = np.flatnonzero(np.diff(np.sign(level)) != 0)
-            found += list(grid[k] - level[k] * (grid[k + 1] - grid[k]) / (level[k + 1] - level[k]))
-    return found
+            instants += list(grid[k] - level[k] * (grid[k + 1] - grid[k]) / (level[k + 1] - level[k]))
+    return instants
 
 
 def places(motion: FreeMotion) -> Places:
@@ -105,15 +105,18 @@ def places(motion: FreeMotion) -> Places:
     ]
     met = tuple((begin + speed * time, module) for time, module in meetings)
     times = bends(Mechanisms(run.system, run.chosen.assembly, run.values, [cycle]))[0]
-    coordinates, way = begin + speed * np.append(times, [time for time, _ in meetings]), abs(speed) * cycle.duration
+    coordinates, span = begin + speed * np.append(times, [time for time, _ in meetings]), abs(speed) * cycle.duration
     if cycle.periodic:
-        return Places(_apart(np.mod(coordinates, way), way), way, meetings=met)
+        return Places(_apart(np.mod(coordinates, span), span), span, meetings=met)
     low, high = sorted((begin, begin + speed * cycle.duration))
     inside = coordinates[(coordinates > low) & (coordinates < high)]
-    return Places(_apart(inside, way), None, (low, high), met)
+    return Places(_apart(inside, span), None, (low, high), met)
 
 
-def _apart(coordinates: Array, way: float) -> tuple[float, ...]:
+def _apart(coordinates: Array, span: float) -> tuple[float, ...]:
     """Rising, those that are one but for rounding taken once."""
-    found = np.sort(coordinates)
-    return tuple(float(one) for one in found[np.append(True, np.diff(found) > CLOSE * abs(way))[: len(found)]])
+    ordered = np.sort(coordinates)
+    return tuple(
+        float(coordinate)
+        for coordinate in ordered[np.append(True, np.diff(ordered) > CLOSE * abs(span))[: len(ordered)]]
+    )

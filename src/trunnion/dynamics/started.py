@@ -88,10 +88,10 @@ class DriveCourse:
     def at(self, gone: float, numbers: Array) -> float:
         """A number, (step, node), where the coordinate has gone so far."""
         step = min(int(np.searchsorted(self.gone[:, -1], gone)), len(self.gone) - 1)
-        way = _COEFFICIENTS @ self.gone[step]
+        motion_gone = _COEFFICIENTS @ self.gone[step]
 
         def ahead(place: float) -> float:
-            return float(chebyshev.chebval(place, way)) - gone
+            return float(chebyshev.chebval(place, motion_gone)) - gone
 
         inside = ahead(-1.0) < 0.0 < ahead(1.0)
         place = brentq(ahead, -1.0, 1.0, xtol=1e-15) if inside else (-1.0 if ahead(-1.0) >= 0.0 else 1.0)
@@ -206,7 +206,7 @@ def _run_down(motion: FreeMotion, solution: Solution, i: int) -> list[Figure]:
     none, until all rest; nothing if it did not move then."""
     name, drive = list(motion.drives.items())[i]
     off = 0.0 if drive.motor is None else drive.off_from
-    rest = next((one.time for one in reversed(solution.events) if one.kind == "rest"), np.nan)
+    rest = next((event.time for event in reversed(solution.events) if event.kind == "rest"), np.nan)
     if not off < rest:
         return []
     (begin, end), unit = solution.at(np.array([off, rest]))[0][i], "rad" if motion.system.turns(name) else "m"

@@ -166,16 +166,16 @@ class FreeMotion:
         """Where several coordinates are free: joints that may stick, by friction, loads, brakes or losses of gears."""
         if len(self.names) == 1:
             return ()
-        held = {name for name, drive in self.drives.items() if drive.brake or drive.efficiency < 1.0}
-        held |= self.system.resisted.keys()
-        held |= set(self.sticking) & set(felt(self.system, self.system.mechanism.parameter_set.nominal))
-        return tuple(name for name in self.system.joints if name in held)
+        resisting = {name for name, drive in self.drives.items() if drive.brake or drive.efficiency < 1.0}
+        resisting |= self.system.resisted.keys()
+        resisting |= set(self.sticking) & set(felt(self.system, self.system.mechanism.parameter_set.nominal))
+        return tuple(name for name in self.system.joints if name in resisting)
 
     @cached_property
     def rests(self) -> bool:
         """Whether the one free coordinate may rest in friction."""
-        held = any(np.isfinite(drive.brake_from) or drive.efficiency < 1.0 for drive in self.drives.values())
-        return len(self.names) == 1 and bool(self.sticking or held)
+        may_rest = any(np.isfinite(drive.brake_from) or drive.efficiency < 1.0 for drive in self.drives.values())
+        return len(self.names) == 1 and bool(self.sticking or may_rest)
 
     @cached_property
     def affine(self) -> bool:
@@ -260,14 +260,14 @@ class FreeMotion:
         """Motion and forces. zero_slip, sliding: see `backward.Given`; of one coordinate what begins to move in its
         sense."""
         self.walked[0] += 1
-        given = Given(
+        given_state = Given(
             self.beginning(at) if zero_slip is None else zero_slip,
             dict(zip(self.bristles, at.bristles, strict=True)),
             acting=self._acting(at.onsets),
             sliding=sliding,
             rests={joint: sense == 0 for joint, sense in zip(self.resisted, at.senses, strict=False)},
         )
-        return solve(self.system, self.values_at(at, second), self.assembly, at.time, self.method, given)
+        return solve(self.system, self.values_at(at, second), self.assembly, at.time, self.method, given_state)
 
     def _acting(self, onsets: Sequence[Onset]) -> Callable[[Forward], Iterable[tuple[str, LoadAction]]] | None:
         """What the contacts that touch do to the links."""
@@ -285,18 +285,18 @@ class FreeMotion:
         zero: Any = [0.0 * at.q[0]]
         rate: Any = [np.sqrt(self.trial[0]) + zero[0]]
         walk = self.walk(at._replace(rate=rate), zero)
-        found: dict[str, Sense] = {}
+        senses: dict[str, Sense] = {}
         for joint in self.sticking:
             sign = np.where(walk.still(joint, self.system.turns(joint)), 0.0, np.sign(walk.speed(joint)))
-            found[joint] = at.sense * share * sign
-        return found
+            senses[joint] = at.sense * share * sign
+        return senses
 
     # ---- the assembly by momentum -----------------------------------------------------------------------------
 
     @cached_property
     def followed(self) -> tuple[Followed, ...]:
         """The modules whose assembly is followed."""
-        return tuple(one for one in self.assembly if isinstance(one, Followed))
+        return tuple(assembly for assembly in self.assembly if isinstance(assembly, Followed))
 
     def step(self, at: Moment) -> None:
         """Go on from here: the assembly of the modules that are followed is this one from now on; one lane."""
@@ -307,8 +307,8 @@ class FreeMotion:
 
     def begin(self, snapshot: Snapshot | None) -> None:
         """Follow the assembly from a snapshot."""
-        for one in self.followed:
-            one.snapshot = snapshot
+        for follower in self.followed:
+            follower.snapshot = snapshot
 
     # ---- accelerations ----------------------------------------------------------------------------------------
 
@@ -332,8 +332,8 @@ class FreeMotion:
 
     def demanded(self, back: Backward, shape: tuple[int, ...]) -> Array:
         """Efforts that a walk demands of the free drivers, (coordinate, lane)."""
-        found = [np.broadcast_to(primal(back.efforts[name]), shape[1:]) for name in self.names]
-        return np.array(found, float).reshape(shape)
+        demands = [np.broadcast_to(primal(back.efforts[name]), shape[1:]) for name in self.names]
+        return np.array(demands, float).reshape(shape)
 
     def accelerate(self, at: Moment, guess: Array | None = None, pulls: Array | None = None) -> Accelerated:
         """The accelerations at which every free driver is given what the walk demands, with what holds the rows that
@@ -343,11 +343,11 @@ class FreeMotion:
         Where the search ends on a side of where a reaction turns round on which there is no answer, or on which more
         acceleration takes less effort, it is begun from far away on other sides.
         """
-        found = self.searched(at, guess, pulls)
-        left = found.turned | (~found.converged & (found.shares is None))
+        accelerated = self.searched(at, guess, pulls)
+        left = accelerated.turned | (~accelerated.converged & (accelerated.shares is None))
         if self.affine or not np.any(left):
-            return found
-        second = np.nan_to_num(found.second)
+            return accelerated
+        second = np.nan_to_num(accelerated.second)
         for start in self.far(second).T:
             other = self.searched(at, np.where(left, start[:, None], second), pulls)
             better = left & other.converged & ~other.turned
@@ -355,26 +355,26 @@ class FreeMotion:
             left &= ~better
             if not np.any(left):
                 return self.searched(at, second, pulls)
-        return found
+        return accelerated
 
     def searched(self, at: Moment, guess: Array | None = None, pulls: Array | None = None) -> Accelerated:
         """See `accelerate`, from one place."""
-        held, senses, (count, lanes) = self.held(at), self.beginning(at), at.q.shape
-        unit, typical = self._units(held)
-        joints = slice(len(unit) - len(held.joints), None)
+        active, senses, (count, lanes) = self.held(at), self.beginning(at), at.q.shape
+        unit, typical = self._units(active)
+        joints = slice(len(unit) - len(active.joints), None)
         numbers = np.zeros((len(unit), lanes))
         numbers[:count] = self._begun(at, senses) if guess is None else guess
-        pulls = np.zeros((len(held.joints), 1)) if pulls is None else pulls / typical
+        pulls = np.zeros((len(active.joints), 1)) if pulls is None else pulls / typical
         last = before = numbers
-        exact = self.affine and not held.joints
+        exact = self.affine and not active.joints
         for _ in range(ROUNDS):
-            missed, slopes = self._linearised(at, numbers, held, senses)
+            missed, slopes = self._linearised(at, numbers, active, senses)
             slopes = slopes * unit
             missed[joints], slopes[joints] = missed[joints] / typical - pulls, slopes[joints] / typical[:, None]
             step, turned = newton_step(slopes, missed, numbers[joints])
             before, last, numbers = last, numbers, numbers + step * unit
             largest = np.maximum(np.max(np.abs(numbers / unit), axis=0), 1e-6)
-            missed, back, onsets = self._missed(at, numbers, held, senses)
+            missed, back, onsets = self._missed(at, numbers, active, senses)
             missed[joints] = missed[joints] / typical - pulls
             rest = newton_step(slopes, missed, numbers[joints])[0]  # most are there after one step, as this walk tells
             if np.all(~np.isfinite(rest) | (np.abs(rest) <= SETTLED * largest)) and not np.any(turned):
@@ -387,14 +387,14 @@ class FreeMotion:
         able = np.max(np.abs(slopes[:count, joints]), axis=0) > 0.0  # others have nothing to be held by
         converged &= np.all(np.abs(missed[joints]) <= HELD * np.maximum(np.where(able, 1.0, 1e-6), largest), axis=0)
         numbers = np.where(turned, np.nan, numbers)
-        if held.closed:
-            onsets = self.shared(self.forced(at.onsets, numbers[count : joints.start], held), held.walls)
-        if held.walls:
+        if active.closed:
+            onsets = self.shared(self.forced(at.onsets, numbers[count : joints.start], active), active.walls)
+        if active.walls:
             back = self.solve(at._replace(onsets=onsets), numbers[:count], senses, sliding=True)
         shares = None
-        if held.joints:
+        if active.joints:
             shares = np.repeat(np.array(at.senses, float)[:, None], lanes, axis=1)
-            shares[list(held.joints)] = numbers[joints]
+            shares[list(active.joints)] = numbers[joints]
         return Accelerated(numbers[:count], back, turned, converged, onsets, shares)
 
     def held(self, at: Moment) -> Held:
@@ -403,11 +403,11 @@ class FreeMotion:
         walls = {self.contacts.each[k].surface: k for k in reversed(closed) if _sticks(at.onsets[k])}
         return Held([k for k, sense in enumerate(at.senses) if sense == 0], closed, list(walls.values()))
 
-    def _units(self, held: Held) -> tuple[Array, Array]:
+    def _units(self, active: Held) -> tuple[Array, Array]:
         """What is typical of the unknowns, and of the accelerations of the joints that stick, (row, 1)."""
-        forces = np.full(len(held.closed) + len(held.walls), self.force)
-        unit = np.concatenate([self.unit, forces, np.ones(len(held.joints))])
-        return unit[:, None], self.typical[list(held.joints)][:, None]
+        forces = np.full(len(active.closed) + len(active.walls), self.force)
+        unit = np.concatenate([self.unit, forces, np.ones(len(active.joints))])
+        return unit[:, None], self.typical[list(active.joints)][:, None]
 
     def _begun(self, at: Moment, senses: Mapping[str, Sense]) -> Array:
         """Where the search for the accelerations begins: at 0, on the side of it to which they are driven."""
@@ -415,34 +415,34 @@ class FreeMotion:
         return second if self.affine else np.copysign(0.0, -self._missed(at, second, NONE, senses)[0])
 
     def _missed(
-        self, at: Moment, numbers: Array, held: Held, senses: Mapping[str, Sense]
+        self, at: Moment, numbers: Array, active: Held, senses: Mapping[str, Sense]
     ) -> tuple[Array, Backward, tuple[Onset, ...]]:
         """E − T, and the accelerations of gaps, slips and joints that are to be 0, (equation, lane); the walk, and the
         contacts with their forces."""
         count, lanes = at.q.shape
-        second, forces, shares = np.split(numbers, [count, len(numbers) - len(held.joints)])
-        onsets = self.forced(at.onsets, forces, held) if held.closed else at.onsets
-        if held.joints:
-            senses = {**senses, **{self.resisted[k]: share for k, share in zip(held.joints, shares, strict=True)}}
+        second, forces, shares = np.split(numbers, [count, len(numbers) - len(active.joints)])
+        onsets = self.forced(at.onsets, forces, active) if active.closed else at.onsets
+        if active.joints:
+            senses = {**senses, **{self.resisted[k]: share for k, share in zip(active.joints, shares, strict=True)}}
         back = self.solve(at._replace(onsets=onsets), second, senses, sliding=True)
-        moved = {k: self.contacts.each[k].accelerations(back.walk) for k in held.closed}
+        moved = {k: self.contacts.each[k].accelerations(back.walk) for k in active.closed}
         rows = [
             self.demanded(back, at.q.shape) - self.given(at, second, senses),
-            *(moved[k][0] for k in held.closed),
-            *(moved[k][1] for k in held.walls),
+            *(moved[k][0] for k in active.closed),
+            *(moved[k][1] for k in active.walls),
         ]
-        if held.joints:
-            rows.append(self.pulls(back.walk, lanes)[list(held.joints)])
+        if active.joints:
+            rows.append(self.pulls(back.walk, lanes)[list(active.joints)])
         return np.vstack(rows), back, onsets
 
-    def _linearised(self, at: Moment, numbers: Array, held: Held, senses: Mapping[str, Sense]) -> tuple[Array, Array]:
+    def _linearised(self, at: Moment, numbers: Array, active: Held, senses: Mapping[str, Sense]) -> tuple[Array, Array]:
         """What is missed (equation, lane), and its derivatives by the unknowns (equation, unknown, lane)."""
         (size, lanes), count = numbers.shape, len(at.q)
         if self.affine:
-            steps = np.maximum(self._units(held)[0], np.abs(numbers))
+            steps = np.maximum(self._units(active)[0], np.abs(numbers))
             steps[:count] = np.maximum(steps[:count], self.trial[:, None])
         else:  # away from 0, where reactions may turn round
-            least = 1e-2 * self._units(held)[0]
+            least = 1e-2 * self._units(active)[0]
             least[count:] *= 1e2
             steps = np.copysign(DIFFERENCE * np.maximum(np.abs(numbers), least), numbers)
         tried = [numbers, *(numbers + np.where(np.arange(size)[:, None] == i, steps, 0.0) for i in range(size))]
@@ -450,7 +450,7 @@ class FreeMotion:
             joint: np.tile(sense, size + 1) if isinstance(sense, np.ndarray) else sense
             for joint, sense in senses.items()
         }
-        missed = self._missed(repeated(at, size + 1), np.concatenate(tried, axis=1), held, wide)[0]
+        missed = self._missed(repeated(at, size + 1), np.concatenate(tried, axis=1), active, wide)[0]
         missed = missed.reshape(size, size + 1, lanes)
         return missed[:, 0].copy(), (missed[:, 1:] - missed[:, :1]) / steps[None]
 
@@ -514,10 +514,10 @@ class FreeMotion:
     def stopped(self, at: Moment, sticks: Sequence[int]) -> Array:
         """Rates after joints begin to stick, (coordinate,), beside contacts that stay closed: the momentum of what
         stays free is kept, and energy only falls; one lane."""
-        (ways, speeds), scale, held = self.ways(at), np.sqrt(self.unit), self.held(at)
+        (ways, speeds), scale, active = self.ways(at), np.sqrt(self.unit), self.held(at)
         ways, speeds = ways[list(sticks)], speeds[list(sticks)]
-        if held.closed:
-            linear, rows = self.linear(at), [*held.closed, *(len(at.onsets) + k for k in held.walls)]
+        if active.closed:
+            linear, rows = self.linear(at), [*active.closed, *(len(at.onsets) + k for k in active.walls)]
             speed = float(np.ravel(self.system.size(self.values) * primal(self.system.pace(self.values)))[0])
             ways = np.vstack([ways, linear.ways[rows] * scale / speed])
             speeds = np.concatenate([speeds, (linear.driven + linear.ways @ at.rate[:, 0])[rows] / speed])
@@ -527,14 +527,14 @@ class FreeMotion:
 
     # ---- contacts of rigid bodies -----------------------------------------------------------------------------------
 
-    def forced(self, onsets: Sequence[Onset], forces: Sequence[Any] | Array, held: Held) -> tuple[Onset, ...]:
+    def forced(self, onsets: Sequence[Onset], forces: Sequence[Any] | Array, active: Held) -> tuple[Onset, ...]:
         """The contacts with their forces: normal ones, then along the tangent of those that stick."""
         forced = list(onsets)
-        for row, k in enumerate(held.closed):
+        for row, k in enumerate(active.closed):
             onset = forced[k]
             assert isinstance(onset, Closed)
-            if k in held.walls:
-                friction = forces[len(held.closed) + held.walls.index(k)]
+            if k in active.walls:
+                friction = forces[len(active.closed) + active.walls.index(k)]
             elif _sticks(onset):  # of those that stick on one wall the first is given all
                 friction = 0.0 * forces[row]
             else:

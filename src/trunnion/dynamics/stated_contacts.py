@@ -24,27 +24,27 @@ __all__ = ["contacts_of"]
 
 def contacts_of(run: Run, joints: Sequence[str]) -> Contacts:
     """The contacts of joints in play of a mechanism as it is stated."""
-    return Contacts(tuple(one for joint in joints for one in _of_joint(run, joint)))
+    return Contacts(tuple(contact for joint in joints for contact in _of_joint(run, joint)))
 
 
 def _of_joint(run: Run, name: str) -> Iterator[Contact]:
-    stated, values = run.system.mechanism.effective_joints[name], run.values
-    contact, play = stated.contact, shifts.play_of(run.system.mechanism.space, stated.type, values, name)
+    joint_entry, values = run.system.mechanism.effective_joints[name], run.values
+    contact, play = joint_entry.contact, shifts.play_of(run.system.mechanism.space, joint_entry.type, values, name)
     assert contact is not None  # the model's checks
     assert play is not None
-    known = {key: _number(values[path]) for key in ("restitution", "exponent", "stiffness")
+    numbers = {key: _number(values[path]) for key in ("restitution", "exponent", "stiffness")
              if (path := f"joints.{name}.contact.{key}") in values}  # fmt: skip
     clearance, radius = _number(play.radii[0]), _number(values.get(f"joints.{name}.pin.radius", 0.0))
-    restitution = known.get("restitution", 1.0)
-    law = FRICTION_LAWS[stated.friction.law or "coulomb"] if stated.friction else None
+    restitution = numbers.get("restitution", 1.0)
+    law = FRICTION_LAWS[joint_entry.friction.law or "coulomb"] if joint_entry.friction else None
     if contact.of.rigid:
         stiffness = 0.0
     else:
-        stiffness = known["stiffness"] if "stiffness" in known else _hertz(values, name, radius, radius + clearance)
+        stiffness = numbers["stiffness"] if "stiffness" in numbers else _hertz(values, name, radius, radius + clearance)
     common: dict[str, Any] = {
-        "joint": name, "clearance": clearance, "stiffness": stiffness, "exponent": known.get("exponent", 1.0),
+        "joint": name, "clearance": clearance, "stiffness": stiffness, "exponent": numbers.get("exponent", 1.0),
         "factor": contact.of.factor(restitution), "restitution": restitution, "law": law,
-        "parameters": {key: _number(one) for key, one in law_parameters(law, values, name).items()} if law else {},
+        "parameters": {key: _number(size) for key, size in law_parameters(law, values, name).items()} if law else {},
     }  # fmt: skip
     if run.system.mechanism.space == "spatial":
         yield from _in_space(run, name, play, radius + clearance, common)
@@ -84,11 +84,11 @@ def _in_space(run: Run, name: str, play: shifts.Play, wall: float, common: dict[
     half = 0.5 * common["stiffness"]
     for number, side in ((1, -0.5), (2, 0.5)):
         end = slid(middle, side * _number(play.length))
-        given = {**common, **links, "stiffness": half, "hole": end}
-        yield DiscContact(label=f"{name}.end_{number}", wall=wall, **given)
+        entry = {**common, **links, "stiffness": half, "hole": end}
+        yield DiscContact(label=f"{name}.end_{number}", wall=wall, **entry)
     for number, (i, side) in enumerate(itertools.product(play.model.axial, (-1.0, 1.0)), 1):
-        given = {**common, **links, "hole": middle, "clearance": _number(play.radii[i]), "law": None, "parameters": {}}
-        yield ShoulderContact(label=f"{name}.shoulder_{number}", side=side, **given)
+        entry = {**common, **links, "hole": middle, "clearance": _number(play.radii[i]), "law": None, "parameters": {}}
+        yield ShoulderContact(label=f"{name}.shoulder_{number}", side=side, **entry)
 
 
 def _hertz(values: Mapping[str, Any], name: str, pin: float, hole: float) -> float:

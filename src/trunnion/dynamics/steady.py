@@ -43,59 +43,68 @@ def steady(
         what = "it may stick while others slide, as several drivers are free, which is not followed in a steady cycle"
         remedy = "use friction laws that are smooth at rest (brown-mcphee, dahl, lugre), or leave --steady out"
         raise MechanismError([Finding(what, f"joints.{joint}", remedy) for joint in motion.resisted])
-    found = steady_cycle(motion, duration, tolerance, progress, evaluations)
-    each = Repeated.of(motion, found.solution)
-    moving = mechanism.with_motions({name: motion_law(one) for name, one in zip(motion.names, each, strict=True)})
+    cycle_of = steady_cycle(motion, duration, tolerance, progress, evaluations)
+    each = Repeated.of(motion, cycle_of.solution)
+    moving = mechanism.with_motions(
+        {name: motion_law(repeated) for name, repeated in zip(motion.names, each, strict=True)}
+    )
     run = prepare(moving)
     at = positions(run, steps, engine="numpy")
     cycle = summary.result_of(run, at)
-    missing = _missing(found, at)
-    findings = [*findings_of(cycle), *_findings(found, missing)]
+    missing = _missing(cycle_of, at)
+    findings = [*findings_of(cycle), *_findings(cycle_of, missing)]
     attributes = encoded({
         **cycle.attrs,
         "findings": finding_rows(findings),
-        **scales_in(cycle).summary([*_figures(found, each, missing), *summary_of(cycle)]),
+        **scales_in(cycle).summary([*_figures(cycle_of, each, missing), *summary_of(cycle)]),
         "steady": 1,
     })  # fmt: skip
     return Result(attributes, lambda: cycle.dataset.assign_attrs(attributes))
 
 
-def _missing(found: SteadyCycle, at: Positions) -> float:
+def _missing(cycle_found: SteadyCycle, at: Positions) -> float:
     """By how much the efforts that the cycle takes differ from those of the motors, of the largest.
 
     Where a joint is at rest for a moment its friction may act either way: such positions tell nothing.
     """
-    given = Filling(found.motion, found.solution, at.time).books().arrays["drive_effort"]
-    told = at.arrays["status"] == Status.SOLVED
-    largest = float(np.max(np.abs(given)))
-    return float(np.nanmax(np.abs(at.arrays["drive_effort"] - given)[:, told], initial=0.0)) / max(largest, 1e-300)
+    efforts_given = Filling(cycle_found.motion, cycle_found.solution, at.time).books().arrays["drive_effort"]
+    solved = at.arrays["status"] == Status.SOLVED
+    largest = float(np.max(np.abs(efforts_given)))
+    return float(np.nanmax(np.abs(at.arrays["drive_effort"] - efforts_given)[:, solved], initial=0.0)) / max(
+        largest, 1e-300
+    )
 
 
-def _figures(found: SteadyCycle, each: Sequence[Repeated], missing: float) -> list[Figure]:
+def _figures(cycle_found: SteadyCycle, each: Sequence[Repeated], missing: float) -> list[Figure]:
     """What is said of a steady cycle before what is said of any cycle."""
-    name, one = found.motion.names[found.first], each[found.first]
-    course, mean = DriveCourse.of(found.motion, found.solution, found.first), abs(one.advance) / one.period
+    name, repeated = cycle_found.motion.names[cycle_found.first], each[cycle_found.first]
+    course, mean = (
+        DriveCourse.of(cycle_found.motion, cycle_found.solution, cycle_found.first),
+        abs(repeated.advance) / repeated.period,
+    )
     speed = np.abs(course.speed)
     most, least = course.largest(speed), -course.largest(-speed)
     return [
-        Figure("cycle_time", "time of the cycle", one.period, "s"),
+        Figure("cycle_time", "time of the cycle", repeated.period, "s"),
         Figure(f"{name}.speed_mean", f"speed of {name}", mean, "rad/s", "mean"),
         Figure(f"{name}.speed_max", f"speed of {name}", most, "rad/s", "largest"),
         Figure(f"{name}.speed_min", f"speed of {name}", least, "rad/s", "smallest"),
         Figure(f"{name}.fluctuation", f"coefficient of fluctuation of {name}", (most - least) / mean, "1"),
-        Figure("decay", "what is left of a difference after a cycle", found.factor, "1"),
-        Figure("repeats", "by how much the end misses the begin", found.residual, "1", "of the state"),
+        Figure("decay", "what is left of a difference after a cycle", cycle_found.factor, "1"),
+        Figure("repeats", "by how much the end misses the begin", cycle_found.residual, "1", "of the state"),
         Figure("efforts_differ", "efforts of cycle and motors, difference", missing, "1", "of the largest"),
     ]
 
 
-def _findings(found: SteadyCycle, missing: float) -> Iterator[Finding]:
-    if found.factor > 1.0 + INDIFFERENT:
-        what = f"the steady cycle is not stable: a difference from it grows by the factor {found.factor:.4g} with "
+def _findings(cycle_found: SteadyCycle, missing: float) -> Iterator[Finding]:
+    if cycle_found.factor > 1.0 + INDIFFERENT:
+        what = (
+            f"the steady cycle is not stable: a difference from it grows by the factor {cycle_found.factor:.4g} with "
+        )
         what += "every cycle"
         remedy = "run it without --steady to see how it leaves this cycle"
-        where = f"drivers.{found.motion.names[found.first]}"
-        figures = {"factor": found.factor}
+        where = f"drivers.{cycle_found.motion.names[cycle_found.first]}"
+        figures = {"factor": cycle_found.factor}
         yield Finding.warning("simulate.unstable", where, what, remedy, **figures)
     if not missing <= DIFFERS:
         what = f"the cycle takes efforts that differ from those of the motors by up to {missing:.2g} of the largest: "

@@ -126,23 +126,23 @@ def steady_cycle(
     if first is None:
         what = "no free driver goes round, so there is no steady cycle"
         raise MechanismError(Finding(what, f"drivers.{motion.names[0]}", "leave --steady out"))
-    known = places(motion)
+    load_places = places(motion)
     rates = rates_of(motion)
     unstable = None  # one that no run-up comes to, unless it begins there
     for longer in LONGER:
         end = longer * duration
-        integration = integration_of(motion, rates, known, end, tolerance, progress, evaluations)
+        integration = integration_of(motion, rates, load_places, end, tolerance, progress, evaluations)
         solution = integration.run(initial_row(motion))
         course = DriveCourse.of(motion, solution, first)
         if solution.ended or solution.stretches[-1].resting:
             break
         if not course.runs:
             continue
-        section = Section.of(motion, known, rates, max(FINER * tolerance, FINEST), solution, course, first)
-        found = section.repeated()
-        if found is not None and found.factor <= 1.0 + INDIFFERENT:
-            return found
-        unstable = found or unstable
+        section = Section.of(motion, load_places, rates, max(FINER * tolerance, FINEST), solution, course, first)
+        repeated_cycle = section.repeated()
+        if repeated_cycle is not None and repeated_cycle.factor <= 1.0 + INDIFFERENT:
+            return repeated_cycle
+        unstable = repeated_cycle or unstable
     if unstable is not None:
         return unstable
     raise UnsteadyError(_why(motion, solution, course, first))
@@ -189,22 +189,24 @@ class Section:
 
     @classmethod
     def of(
-        cls, motion: FreeMotion, known: Places, rates: CompiledRates | Walks, tolerance: float, solution: Solution,
-        course: DriveCourse, first: int,
+        cls, motion: FreeMotion, load_places: Places, rates: CompiledRates | Walks, tolerance: float,
+        solution: Solution, course: DriveCourse, first: int,
     ) -> Section:  # fmt: skip
         """The last passage of a run-up through the begin of the cycle."""
-        way = known.period if known.period is not None else TURN
+        span = load_places.period if load_places.period is not None else TURN
         start, gone = float(course.coordinate[0, 0]), course.travel
         sense = 1.0 if course.coordinate[-1, -1] > start else -1.0
         begin = float(np.ravel(primal(motion.system.drive(motion.values, motion.names[first], 0.0)[0]))[0])
-        ahead = np.mod(sense * (begin - start), way)
-        passed = ahead + way * np.floor((gone - ahead) / way)
-        time, before = (course.at(max(at, 0.0), course.time) for at in (passed, passed - way))
+        ahead = np.mod(sense * (begin - start), span)
+        passed = ahead + span * np.floor((gone - ahead) / span)
+        time, before = (course.at(max(at, 0.0), course.time) for at in (passed, passed - span))
         rows, which = solution.at(np.array([time]))
         snapshot = solution.stretches[which[0]].snapshot
         if snapshot is not None:
             snapshot = replace(snapshot, time=snapshot.time - time)
-        return cls(motion, known, rates, tolerance, first, begin, sense * way, time - before, rows[:, 0], snapshot)
+        return cls(
+            motion, load_places, rates, tolerance, first, begin, sense * span, time - before, rows[:, 0], snapshot
+        )
 
     # ---- the numbers of a state -------------------------------------------------------------------------------
 
@@ -257,10 +259,10 @@ class Section:
     def _miss(self, state: Array, passage: Passage, scale: Array) -> Array:
         """P(x) − x, in parts of what is typical."""
         miss = passage.state - state
-        whole = self._turning()
-        miss[whole] = np.mod(miss[whole] + np.pi, TURN) - np.pi
-        found: Array = miss / scale
-        return found
+        turning = self._turning()
+        miss[turning] = np.mod(miss[turning] + np.pi, TURN) - np.pi
+        misses: Array = miss / scale
+        return misses
 
     def repeated(self) -> SteadyCycle | None:
         """The state that comes back, from the last one of the run-up; None if it is not found."""
@@ -287,14 +289,14 @@ class Section:
 
     def _slopes(self, state: Array, passage: Passage, scale: Array) -> Array | None:
         """∂(P − x)/∂x by differences, in parts of what is typical; None where a state near by does not come back."""
-        found, miss = np.empty((len(state), len(state))), self._miss(state, passage, scale)
+        slopes, miss = np.empty((len(state), len(state))), self._miss(state, passage, scale)
         for k, nudge in enumerate(NUDGE * scale):
             nudged = state + np.where(np.arange(len(state)) == k, nudge, 0.0)
             other = self.after(nudged)
             if other is None:
                 return None
-            found[:, k] = (self._miss(nudged, other, scale) - miss) / NUDGE
-        return found
+            slopes[:, k] = (self._miss(nudged, other, scale) - miss) / NUDGE
+        return slopes
 
     def _near(self, state: Array) -> bool:
         """Whether the driver still goes round in the same sense, at a speed of the same order."""
@@ -313,5 +315,5 @@ class Section:
 
 def _until(solution: Solution, time: float) -> Solution:
     """A solution up to a time."""
-    kept = [one._replace(end=min(one.end, time)) for one in solution.stretches if one.begin < time]
-    return replace(solution, stretches=kept, events=[one for one in solution.events if one.time <= time])
+    stretches = [item._replace(end=min(item.end, time)) for item in solution.stretches if item.begin < time]
+    return replace(solution, stretches=stretches, events=[item for item in solution.events if item.time <= time])

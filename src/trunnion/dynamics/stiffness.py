@@ -54,7 +54,7 @@ def _changed(motion: FreeMotion) -> Iterator[tuple[str, FreeMotion]]:
     for path, value in motion.values.items():
         section, _, rest = path.partition(".")
         number = float(np.ravel(primal(value))[0])
-        if number == 0.0 or not any(section == one and part in rest for one, part in CAUSES):
+        if number == 0.0 or not any(section == name and part in rest for name, part in CAUSES):
             continue
         values = {**motion.values, path: number * (1.0 + CHANGE)}
         changed = replace(motion, run=replace(motion.run, values=values), drives=drives(motion.system, values))
@@ -76,8 +76,8 @@ def _fastest(motion: FreeMotion, at: Moment, step: float) -> float:
 
     def derivative(numbers: Array) -> Array:
         q, rate, integral, bristles = np.split(numbers[:, None], [n, 2 * n, 3 * n])
-        found = rates(at._replace(q=q, rate=rate, integral=integral, bristles=bristles))
-        return np.concatenate([rate[:, 0], found.second, found.integral, found.bristles])
+        rates_at = rates(at._replace(q=q, rate=rate, integral=integral, bristles=bristles))
+        return np.concatenate([rate[:, 0], rates_at.second, rates_at.integral, rates_at.bristles])
 
     state = np.concatenate([at.q, at.rate, at.integral, at.bristles])[:, 0]
     typical = np.concatenate([unit, unit * pace, unit, np.full(len(at.bristles), FLOOR)])

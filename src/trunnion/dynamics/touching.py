@@ -150,8 +150,8 @@ class Contact(ABC):
         force = tuple(-push.normal * n + push.friction * t for n, t in zip(state.normal, state.tangent, strict=True))
         on: list[tuple[str, Any]] = []
         for link, sign in ((self.body, 1.0), (self.other, -1.0)):
-            own = tuple(sign * part for part in force)
-            on.append((link, walk.algebra.about(own, walk.algebra.NO_MOMENT, state.place)))
+            action_own = tuple(sign * part for part in force)
+            on.append((link, walk.algebra.about(action_own, walk.algebra.NO_MOMENT, state.place)))
         return LoadAction(on, push.normal * state.rate + push.friction * state.slip)
 
 
@@ -170,9 +170,9 @@ class PinContact(Contact):
         cx, cy = a[0] - b[0], a[1] - b[1]
         xp = namespace(cx, cy)
         size = xp.hypot(cx, cy)
-        there = size > CENTRED * self.clearance
-        size_there = xp.where(there, size, 1.0)
-        nx, ny = xp.where(there, cx / size_there, 1.0), xp.where(there, cy / size_there, 0.0)
+        off_centre = size > CENTRED * self.clearance
+        size_there = xp.where(off_centre, size, 1.0)
+        nx, ny = xp.where(off_centre, cx / size_there, 1.0), xp.where(off_centre, cy / size_there, 0.0)
         ux, uy = a[2] - b[2], a[3] - b[3]
         tx, ty = -ny, nx
         px, py = b[0] + self.wall * nx, b[1] + self.wall * ny
@@ -189,7 +189,7 @@ class PinContact(Contact):
     def accelerations(self, walk: Forward) -> tuple[Array, Array]:
         """Of ρ − |c|, and of the slip c·t + ω_pin (R − |c|) − ω_hole R."""
         a, b = _point(walk, self.body, self.pin), _point(walk, self.other, self.hole)
-        cx, cy, ux, uy = (one - other for one, other in zip(a, b, strict=True))
+        cx, cy, ux, uy = (difference_of - other for difference_of, other in zip(a, b, strict=True))
         far, first = _acceleration(walk, self.body, self.pin), _acceleration(walk, self.other, self.hole)
         ax, ay = far[0] - first[0], far[1] - first[1]
         size = namespace(cx, cy).hypot(cx, cy)
@@ -230,9 +230,9 @@ class EdgeContact(Contact):
         spin = primal(walk.motions[self.other].twist.w)
         vx = a[2] - (origin[2] - spin * (a[1] - origin[1]))
         vy = a[3] - (origin[3] + spin * (a[0] - origin[0]))
-        one = 0.0 * away
+        zero = 0.0 * away
         return ContactState(
-            self.distance - away, -(vx * nx + vy * ny), vx * tx + vy * ty, (nx + one, ny + one), (tx + one, ty + one),
+            self.distance - away, -(vx * nx + vy * ny), vx * tx + vy * ty, (nx + zero, ny + zero), (tx + zero, ty + zero),
             (a[0], a[1]), ((a[0] - origin[0]) * tx + (a[1] - origin[1]) * ty, self.side * away),
         )  # fmt: skip
 
@@ -278,11 +278,11 @@ class SpatialContact(Contact):
 
     def _axes(self, walk: Forward) -> tuple[Frame, Frame]:
         """Global frames of pin and hole."""
-        found = []
+        axes_of = []
         for link, local in ((self.body, self.axle), (self.other, self.hole)):
             frame = walk.motions[link].frame
-            found.append(each(walk.algebra.compose(frame, local), primal))
-        return found[0], found[1]
+            axes_of.append(each(walk.algebra.compose(frame, local), primal))
+        return axes_of[0], axes_of[1]
 
     def _speed(self, walk: Forward, place: Vector3) -> Vector3:
         """Velocity of the pin against the hole, of their materials at a place, m/s."""
@@ -304,12 +304,12 @@ class DiscContact(SpatialContact):
         c = minus(apart, scaled(dot(apart, pin.z), pin.z))
         size = length(c)
         xp = namespace(size)
-        there = size > CENTRED * self.clearance
-        over = 1 / xp.where(there, size, 1.0)
-        beside = cross(end.y, pin.z)  # where it lies in no direction
-        share = 1 / length(beside)
+        off_centre = size > CENTRED * self.clearance
+        over = 1 / xp.where(off_centre, size, 1.0)
+        upright = cross(end.y, pin.z)  # where it lies in no direction
+        share = 1 / length(upright)
         normal = cast("Vector3", tuple(
-            xp.where(there, part * over, other * share) for part, other in zip(c, beside, strict=True)
+            xp.where(off_centre, part * over, other * share) for part, other in zip(c, upright, strict=True)
         ))  # fmt: skip
         place = plus(end.place, scaled(self.wall, normal))
         speed = self._speed(walk, place)
@@ -354,25 +354,27 @@ class Contacts:
     labels: tuple[str, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "labels", tuple(one.label for one in self.each))
+        object.__setattr__(self, "labels", tuple(contact.label for contact in self.each))
 
     @property
     def least_clearance(self) -> float:
         """m."""
-        return min((one.clearance for one in self.each), default=0.0)
+        return min((contact.clearance for contact in self.each), default=0.0)
 
     def states(self, walk: Forward) -> list[ContactState]:
         """Where all surfaces are."""
-        return [one.state(walk) for one in self.each]
+        return [contact.state(walk) for contact in self.each]
 
     def pushes(self, walk: Forward, onsets: Sequence[Onset]) -> list[tuple[ContactState, Push]]:
         """The forces of all contacts."""
         states = self.states(walk)
-        return [(state, one.push(state, onset)) for one, state, onset in zip(self.each, states, onsets, strict=True)]
+        return [
+            (state, contact.push(state, onset)) for contact, state, onset in zip(self.each, states, onsets, strict=True)
+        ]
 
     def actions(self, walk: Forward, onsets: Sequence[Onset]) -> Iterator[tuple[str, LoadAction]]:
         """What those that touch do to the links, by label."""
-        for one, onset in zip(self.each, onsets, strict=True):
+        for contact, onset in zip(self.each, onsets, strict=True):
             if onset is not None:
-                state = one.state(walk)
-                yield one.label, one.action(walk, state, one.push(state, onset))
+                state = contact.state(walk)
+                yield contact.label, contact.action(walk, state, contact.push(state, onset))

@@ -241,8 +241,8 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool, drawn: in
         follower = Follower(group, elements, drive, 0.0, STRIDE)
         nearest = _drawn(walk, number, follower, solved, lanes, begin, drawn, grid, periodic) or nearest
     best = nearest[0] if named is None else sets[named][0]
-    taken, tied = set_of[best], sorted({set_of[place] for place in nearest})
-    shows = [best if k == taken else places[0] for k, places in enumerate(sets)]
+    chosen_set, tied = set_of[best], sorted({set_of[place] for place in nearest})
+    shows = [best if k == chosen_set else places[0] for k, places in enumerate(sets)]
     frames = each(frames, lambda n: n[shows])
     orientation = float(np.broadcast_to(solved.pose.orientation, shape)[lanes[best]])
     rows[:, begin] = solved.q[:, lanes[best]]
@@ -253,7 +253,7 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool, drawn: in
         follower = replace(follower, stride=1)
         rows[:, np.arange(grid) != begin] = np.nan
         follower.both_ways(rows, begin, periodic)
-    track = Track(times, rows, orientation, periodic, clock, turns, nowhere, float(times[begin]), frames, taken)
+    track = Track(times, rows, orientation, periodic, clock, turns, nowhere, float(times[begin]), frames, chosen_set)
     return Decision(track, ways, _said(walk, module, ways, frames, begin, named, tied))
 
 
@@ -265,28 +265,28 @@ def _drawn(
 
     It is the nearest where the drivers are as drawn, followed from there.
     """
-    group, there, lanes_there = follower.group, solved, list(lanes)
+    group, arrived, lanes_there = follower.group, solved, list(lanes)
     if drawn != begin:
-        there = closed_at(group, follower.elements, follower.drive, [drawn], GUESSES)
-        lanes_there = each_once(group, there)
+        arrived = closed_at(group, follower.elements, follower.drive, [drawn], GUESSES)
+        lanes_there = each_once(group, arrived)
     if not lanes_there:
         return []
-    shape = there.closed.shape
-    frames = each(there.pose.frames, lambda n: np.broadcast_to(primal(n), shape))
-    off = _off_drawing(walk, number, there.pose._replace(frames=frames), np.array(lanes_there))
+    shape = arrived.closed.shape
+    frames = each(arrived.pose.frames, lambda n: np.broadcast_to(primal(n), shape))
+    off = _off_drawing(walk, number, arrived.pose._replace(frames=frames), np.array(lanes_there))
     nearest = _tied(walk, np.broadcast_to(off, (len(lanes_there),)))
     if len(nearest) > 1 or drawn == begin:
         return nearest if len(nearest) == 1 else []
     lane, index = lanes_there[nearest[0]], np.array([begin])
-    follower = replace(follower, orientation=float(np.broadcast_to(there.pose.orientation, shape)[lane]))
+    follower = replace(follower, orientation=float(np.broadcast_to(arrived.pose.orientation, shape)[lane]))
     elements, drive = elements_at(follower.elements, index), [lane_of(n, index) for n in follower.drive]
-    way = 1 if begin > drawn else -1
-    orders = [np.arange(drawn, begin + way, way)]
+    direction = 1 if begin > drawn else -1
+    orders = [np.arange(drawn, begin + direction, direction)]
     if periodic:  # the last position of the grid is the first
-        orders.append(np.arange(drawn, begin - way * grid, -way) % (grid - 1))
+        orders.append(np.arange(drawn, begin - direction * grid, -direction) % (grid - 1))
     for order in orders:
         rows = np.full((len(group.kept), grid), np.nan)
-        rows[:, drawn] = there.q[:, lane]
+        rows[:, drawn] = arrived.q[:, lane]
         follower.run(rows, order)
         pose = group.position(elements, list(rows[:, index]), drive)
         key = np.array([np.ravel(n)[0] for n in key_of(group, pose, extent(group, elements))])
@@ -336,9 +336,11 @@ def way_name(index: int) -> str:
 
 def _names(system: System, module: Module) -> dict[str, str]:
     """The hints that name an assembly of a module, by link."""
-    stated = system.mechanism.assembly
+    hints_stated = system.mechanism.assembly
     return {
-        key: hint for key, hint in stated.items() if key in module.links and isinstance(hint, str) and hint != FOLDS
+        key: hint
+        for key, hint in hints_stated.items()
+        if key in module.links and isinstance(hint, str) and hint != FOLDS
     }
 
 
@@ -379,17 +381,17 @@ def _misnamed(system: System, module: Module, count: int) -> list[Finding]:
 
 def hints(walk: Forward, module: Module) -> list[tuple[str, str, tuple[Number, ...]]]:
     """(link, point, place) or ("", joint, (angle or slide,)) of the hints that tell assemblies of a module apart."""
-    stated: list[tuple[str, str, tuple[Number, ...]]] = []
+    hints_of: list[tuple[str, str, tuple[Number, ...]]] = []
     for key in walk.system.mechanism.assembly:
         path = f"assembly.{key}"
         if f"{path}.x" in walk.values:
             link, name = _point_of(walk.system, module, key)
             if link:
                 place = tuple(walk.values[f"{path}.{axis}"] for axis in "xyz" if f"{path}.{axis}" in walk.values)
-                stated.append((link, name, place))
+                hints_of.append((link, name, place))
         elif key in module.joints:
-            stated.append(("", key, (walk.values[path],)))
-    return stated
+            hints_of.append(("", key, (walk.values[path],)))
+    return hints_of
 
 
 def _point_of(system: System, module: Module, key: str) -> tuple[str, str]:
@@ -480,7 +482,7 @@ def _difference(walk: Forward, module: Module, count: int, frames: Any, lane: in
         if np.max(np.ptp(compared, axis=1)) > SAME:
             places = [", ".join(quantity(part, "rad" if turned else "m") for part in place) for place in rows.T]
             brackets = "({})" if len(rows) > 1 else "{}"
-            texts = [f"{brackets.format(place)} in {way_name(way)}" for place, way in zip(places, ways, strict=True)]
+            texts = [f"{brackets.format(place)} in {way_name(mode)}" for place, mode in zip(places, ways, strict=True)]
             return f": {joint} is at {', '.join(texts)}"
     return ""
 
@@ -522,10 +524,10 @@ def _told_twice(walk: Forward, module: Module, named: int, placed: int | None) -
         what = f"the assembly mode of the links {', '.join(links)} is stated by name and by the place of "
         what += f"{', '.join(places)}"
         return [Finding.note("assembly.told_twice", where, what, "one is enough", links=links, places=places)]
-    way = way_name(placed)
+    mode = way_name(placed)
     what = f"the assembly mode of the links {', '.join(links)} is stated by name, {name}, and by the place of "
-    what += f"{', '.join(places)}, which means {way}; the name is used"
-    figures = {"links": links, "places": places, "way": way, "name": name}
+    what += f"{', '.join(places)}, which means {mode}; the name is used"
+    figures = {"links": links, "places": places, "way": mode, "name": name}
     return [Finding.warning("assembly.contradiction", where, what, "remove one of the two", **figures)]
 
 
@@ -535,15 +537,15 @@ def _undecided(walk: Forward, module: Module, count: int, tied: Sequence[int] = 
     tied: those that it does not tell apart, of which the first is used; difference: what does.
     """
     system = walk.system
-    given = list(dict.fromkeys(name for _, name, _ in hints(walk, module)))
-    stated = [key for key in system.mechanism.assembly if key in module.joints and key not in given]
-    why, names = "no assembly hint selects one", given or stated
+    hinted = list(dict.fromkeys(name for _, name, _ in hints(walk, module)))
+    unhinted = [key for key in system.mechanism.assembly if key in module.joints and key not in hinted]
+    why, names = "no assembly hint selects one", hinted or unhinted
     if names:
         why = f"the {agreeing(len(names), 'hint', 'hints')} of {' and '.join(names)} "
-        them = "them" if len(tied) in (0, count) else " and ".join(way_name(way) for way in tied)
+        them = "them" if len(tied) in (0, count) else " and ".join(way_name(mode) for mode in tied)
         why += f"{agreeing(len(names), 'does', 'do')} not distinguish {them}"
-        why += difference if given else f": {agreeing(len(names), 'its place is', 'their places are')} the same in all"
-    free = [joint for joint in module.joints if joint not in stated] or list(module.joints)
+        why += difference if hinted else f": {agreeing(len(names), 'its place is', 'their places are')} the same in all"
+    free = [joint for joint in module.joints if joint not in unhinted] or list(module.joints)
     joint = module.joints[len(module.joints) // 2]
     joint = joint if joint in free else free[0]
     key = as_key(joint)
@@ -552,7 +554,7 @@ def _undecided(walk: Forward, module: Module, count: int, tied: Sequence[int] = 
         met = PAIRS[system.joints[joint][0]].meets and not system.mechanism.loop
         place, hint = (place, f"{{{key}: [x, y, z]}}") if met else ("how far a joint has turned", f"{{{key}: 60 deg}}")
     remedy = f"state roughly {place} at the start, e.g. assembly: {hint}, or one of the names listed by `check`"
-    if given:
+    if hinted:
         remedy = "give a hint that is nearer to one of them, or one of the names listed by `check`"
     links, used = list(module.links), way_name(tied[0]) if tied else "the first one"
     what = f"links {', '.join(links)} have {count} assembly modes and {why}; {used} is used"

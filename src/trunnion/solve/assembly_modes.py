@@ -50,9 +50,9 @@ class GroupModes:
     where: str
     ways: tuple[AssemblyMode, ...]
 
-    def line(self, way: AssemblyMode) -> str:
+    def line(self, mode: AssemblyMode) -> str:
         """What to write into the model file to take one of its ways."""
-        return f"assembly: {{{as_key(self.link)}: {way.name}}}"
+        return f"assembly: {{{as_key(self.link)}: {mode.name}}}"
 
 
 @np.errstate(all="ignore")
@@ -70,19 +70,19 @@ def choices(run: Run) -> tuple[GroupModes, ...]:
 
 
 def _modes(run: Run, walk: Forward, times: NDArray[np.float64]) -> Iterator[GroupModes]:
-    stated = run.system.mechanism.assembly
+    hints_stated = run.system.mechanism.assembly
     for number, module in enumerate(run.system.plan.modules):
         assembly, count = run.chosen.assembly[number], run.chosen.found[number]
         if count < 2:
             continue
         if isinstance(assembly, Track):
-            lane, frames, taken = int(np.searchsorted(times, assembly.begin)), assembly.ways, assembly.taken
+            lane, frames, branch = int(np.searchsorted(times, assembly.begin)), assembly.ways, assembly.taken
         else:
             first, frames = ways_of(walk, number, times)
             if first is None:
                 continue
             here = int(assembly.branch(times[first])) if isinstance(assembly, Passing) else assembly
-            lane, taken = first, run.system.groups[number].BRANCHES.index(here)
+            lane, branch = first, run.system.groups[number].BRANCHES.index(here)
         rows = joint_rows(walk, module, count, frames, lane)
         if not rows:
             continue
@@ -90,9 +90,9 @@ def _modes(run: Run, walk: Forward, times: NDArray[np.float64]) -> Iterator[Grou
         for i in range(count):
             joints = {name: tuple(float(n[i]) for n in numbers) for name, (turns, numbers) in rows.items() if not turns}
             turned = {name: float(numbers[0][i]) for name, (turns, numbers) in rows.items() if turns}
-            ways.append(AssemblyMode(way_name(i), joints, i == taken, turned))
-        named = [link for link in module.links if isinstance(stated.get(link), str)]
-        free = [link for link in module.links if link not in stated]
+            ways.append(AssemblyMode(way_name(i), joints, i == branch, turned))
+        named = [link for link in module.links if isinstance(hints_stated.get(link), str)]
+        free = [link for link in module.links if link not in hints_stated]
         link = (*named, *free, *module.links)[0]
         where = ""
         if lane:
@@ -101,7 +101,7 @@ def _modes(run: Run, walk: Forward, times: NDArray[np.float64]) -> Iterator[Grou
         yield GroupModes(number, module.label, module.links, link, float(times[lane]), where, tuple(ways))
 
 
-def put_together(mechanism: Mechanism, choice: GroupModes, way: AssemblyMode) -> Mechanism:
+def put_together(mechanism: Mechanism, choice: GroupModes, mode: AssemblyMode) -> Mechanism:
     """The mechanism with one group assembled in another way, chosen by name; its hints by place stay."""
     data = mechanism.data()
     others = {
@@ -109,4 +109,4 @@ def put_together(mechanism: Mechanism, choice: GroupModes, way: AssemblyMode) ->
         for key, hint in data.get("assembly", {}).items()
         if key not in choice.links or mechanism.assembly[key] == FOLDS or not isinstance(mechanism.assembly[key], str)
     }
-    return Mechanism(**{**data, "assembly": {**others, choice.link: way.name}})
+    return Mechanism(**{**data, "assembly": {**others, choice.link: mode.name}})

@@ -131,33 +131,33 @@ def solve(
     assembly: Assembly,
     time: Number,
     method: FrictionMethod | None = None,
-    given: Given | None = None,
+    conditions: Given | None = None,
 ) -> Backward:
     """Motion and forces at the given times (s): one walk forward, one back.
 
     values: every number by path; floats, arrays (sample, 1) or dual numbers. time: (position,).
-    given: what is known of the joints beside the motion.
+    conditions: what is known of the joints beside the motion.
     """
-    given = given or Given()
-    walk = forward(system, values, assembly, time, given.travel)
+    conditions = conditions or Given()
+    walk = forward(system, values, assembly, time, conditions.travel)
     with np.errstate(all="ignore"):
-        return backward(walk, method or FrictionMethod(), given)
+        return backward(walk, method or FrictionMethod(), conditions)
 
 
-def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
+def backward(walk: Forward, method: FrictionMethod, conditions: Given) -> Backward:
     """Reactions and friction of every module, last module first."""
     system = walk.system
-    back = Backward(walk, unloaded(walk), travels=bool(given.travel), margin_up_to=method.margin_up_to)
+    back = Backward(walk, unloaded(walk), travels=bool(conditions.travel), margin_up_to=method.margin_up_to)
     back.contacts = {joint: list(contacts_of(walk, joint)) for joint in rubbing(system)}
     back.resting = {joint: _resting(back, joint) for joint in system.joints}
     _add_body_loads(back)
-    _add_stated_loads(back, given.zero_slip, given.rests)
-    for name, action in given.acting(walk) if given.acting else ():
+    _add_stated_loads(back, conditions.zero_slip, conditions.rests)
+    for name, action in conditions.acting(walk) if conditions.acting else ():
         back.load_powers[name] = action.power
         back.act(action, name)
     back.stated = dict(back.loads)
     for number in reversed(range(len(system.plan.modules))):
-        _settle_module(back, number, method, given)
+        _settle_module(back, number, method, conditions)
     return back
 
 
@@ -209,7 +209,7 @@ def _add_stated_loads(back: Backward, zero_slip: Mapping[str, Sense], sensed: Co
 # ---- one module -----------------------------------------------------------------------------------------------
 
 
-def _settle_module(back: Backward, number: int, method: FrictionMethod, given: Given) -> None:
+def _settle_module(back: Backward, number: int, method: FrictionMethod, conditions: Given) -> None:
     walk, system = back.walk, back.walk.system
     module, group, places = system.plan.modules[number], system.groups[number], system.places[number]
     pose, loads = walk.poses[number], [back.loads[link] for link in module.links]
@@ -217,7 +217,7 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, given: G
     for k, place in enumerate(places):
         joint = place.joint
         for i, rub in enumerate(() if place.witness or joint in system.screws else back.contacts.get(joint, ())):
-            slope, slip, felt = _felt(back, joint, rub, given, i)
+            slope, slip, felt = _felt(back, joint, rub, conditions, i)
             rubbed.append((_contact(walk, module.links, k, joint, rub, slope), felt))
             if rub.turning is not None:
                 back.turning[joint] = literal.times(slope, rub.turning), slip
@@ -225,7 +225,7 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, given: G
         joint = system.mechanism.coupled(name)[0]
         if name in system.screws.get(joint, ()) and joint in back.contacts:
             rub = back.contacts[joint][system.screws[joint].index(name)]
-            slope, _, felt = _felt(back, joint, rub, given, 0)
+            slope, _, felt = _felt(back, joint, rub, conditions, 0)
             unit_loads = units(walk, number, on_thread(walk, number, i, 1.0))
             rubbed.append((Contact(len(places) + i, unit_loads, rub.load, slope), felt))
     rubbed += [(contact, None) for contact in teeth(walk, number)]
@@ -272,31 +272,31 @@ def pass_on(
     for k, place in enumerate(places):
         if not place.witness:
             back.module_reactions[place.joint] = reactions[k]
-            own, driven = [part for part in parts if part[0].joint == k], place.joint in module.driven
-            _record(back, place, walk.wrench(place, reactions[k]), own, driven)
+            own_parts, driven = [part for part in parts if part[0].joint == k], place.joint in module.driven
+            _record(back, place, walk.wrench(place, reactions[k]), own_parts, driven)
 
 
-def _felt(back: Backward, joint: str, rub: Rubbing, given: Given, i: int) -> tuple[Number, Number, Rubbing]:
+def _felt(back: Backward, joint: str, rub: Rubbing, conditions: Given, i: int) -> tuple[Number, Number, Rubbing]:
     """Friction force of a contact for each newton of its normal load, the slip that goes with it, and the contact.
 
     Power goes by the speed itself where the law is told on which side of rest it is.
     """
-    slope, slip = _slope(back, joint, rub, given, i)
-    return slope, slip, rub if joint in given.rests else rub._replace(slip=slip)
+    slope, slip = _slope(back, joint, rub, conditions, i)
+    return slope, slip, rub if joint in conditions.rests else rub._replace(slip=slip)
 
 
-def _slope(back: Backward, joint: str, rub: Rubbing, given: Given, i: int) -> tuple[Number, Number]:
+def _slope(back: Backward, joint: str, rub: Rubbing, conditions: Given, i: int) -> tuple[Number, Number]:
     """Friction force of the i-th contact of a joint for each newton of its normal load, and the slip that goes with it.
 
     Where there is no slip it is that which is about to begin.
     """
     law = law_of(back.walk.system, joint)
     parameters = law_parameters(law, back.walk.values, joint)
-    if joint in given.deflections:
-        parameters["deflection"] = given.deflections[joint]
-    sense, slip, zero, sliding = sense_of(given.zero_slip, joint, i), rub.slip, rub.zero, given.sliding
-    if joint in given.rests:  # it is known whether it rests or slides in a sense
-        zero, sliding = np.bool_(given.rests[joint]), False
+    if joint in conditions.deflections:
+        parameters["deflection"] = conditions.deflections[joint]
+    sense, slip, zero, sliding = sense_of(conditions.zero_slip, joint, i), rub.slip, rub.zero, conditions.sliding
+    if joint in conditions.rests:  # it is known whether it rests or slides in a sense
+        zero, sliding = np.bool_(conditions.rests[joint]), False
         if not zero:
             slip = namespace(slip).where(primal(slip) * sense > 0.0, slip, 1e-300 * sense)
     if not np.any(zero):

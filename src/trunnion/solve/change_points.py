@@ -105,9 +105,9 @@ def find(walk: Forward, number: int, assembly: Any, times: Array, pose: Any, cyc
         near[max(first - 2, 0) : last + 1] = False  # it lacks the first and the last of the grid
     moments = touched(margin_at, times, np.flatnonzero(near) + 1)
     if cycle.periodic:
-        moments = [0.0 if abs(one - duration) < SAME_PLACE * duration else one % duration for one in moments]
+        moments = [0.0 if abs(moment - duration) < SAME_PLACE * duration else moment % duration for moment in moments]
     ends = np.minimum(times, duration)
-    return sorted([*((one, one) for one in moments), *((float(ends[a]), float(ends[b])) for a, b in ranges)])
+    return sorted([*((moment, moment) for moment in moments), *((float(ends[a]), float(ends[b])) for a, b in ranges)])
 
 
 def carried_on(times: Array, rows: Array, time: float) -> Array:

@@ -42,11 +42,13 @@ def bearing_middle(walk: SpatialWalk, joint: str) -> Vector3:
 def bearing_ends(mechanism: Mechanism, joint: str) -> int:
     """How many ends of bearings a joint has: two of a bearing or guide whose length is stated, four of a cross; in the
     plane a pin bears its load in its middle."""
-    stated = mechanism.effective_joints[joint]
-    pair, spatial = PAIRS[stated.type], mechanism.space == "spatial"
+    joint_entry = mechanism.effective_joints[joint]
+    pair, spatial = PAIRS[joint_entry.type], mechanism.space == "spatial"
     if pair.guided:
-        return 2 if stated.guide and stated.guide.length is not None else 0
-    has_length = stated.pin is not None and (stated.pin.bearing is not None or stated.pin.length is not None)
+        return 2 if joint_entry.guide and joint_entry.guide.length is not None else 0
+    has_length = joint_entry.pin is not None and (
+        joint_entry.pin.bearing is not None or joint_entry.pin.length is not None
+    )
     return (4 if pair.crossed else 2) if has_length and spatial and (pair.one_axis or pair.crossed) else 0
 
 

@@ -85,7 +85,7 @@ def follow(
 
 
 def _correct(
-    system: System, start: Sequence[Number], share: Number, wanted: Number
+    system: System, start: Sequence[Number], share: Number, lanes: Number
 ) -> tuple[list[Number], Number, Number, Number]:
     """Newton from `start` at the given share: the end, det J there, whether it stayed on the branch, whether straight.
 
@@ -96,7 +96,7 @@ def _correct(
     residual, jacobian = system(start, share)
     move, determinant = linalg.solve_and_determinant(jacobian, residual)
     aim = [value - delta for value, delta in zip(start, move, strict=True)]
-    calm = np.where(wanted & (determinant > 0), 1.0, 0.0)
+    calm = np.where(lanes & (determinant > 0), 1.0, 0.0)
 
     def correction(now: list[Number]) -> list[Number]:
         *x, determinant, closed, going = now

@@ -41,10 +41,10 @@ def drawn_at(walk: Forward, times: Array) -> int | None:
 
 def hinted_at(walk: Forward, times: Array) -> int:
     """The position of some at which the first driver is nearest to where the hints hold; the start if that is open."""
-    stated, drivers = walk.values.get(f"assembly.{AT}"), list(walk.system.mechanism.drivers)
-    if stated is None or not drivers or AT in walk.system.joints:
+    time_stated, drivers = walk.values.get(f"assembly.{AT}"), list(walk.system.mechanism.drivers)
+    if time_stated is None or not drivers or AT in walk.system.joints:
         return 0
-    return _nearest(walk, times, {drivers[0]: float(np.ravel(primal(stated))[0])})
+    return _nearest(walk, times, {drivers[0]: float(np.ravel(primal(time_stated))[0])})
 
 
 def _nearest(walk: Forward, times: Array, driven: Mapping[str, float]) -> int:
@@ -113,5 +113,5 @@ def _meets(system: System, kind: str, first: Any, second: Any, size: float) -> b
     if pair.slides:
         away = away - (away @ axis) * axis
     turned = [] if pair.ball else [float(axis @ second.z)] if pair.crossed else [*z]
-    held = [*x] if pair.name in ("prismatic", "fixed") else []
-    return bool(np.linalg.norm([*away, *turned, *held]) < MEETS)
+    kept_axis = [*x] if pair.name in ("prismatic", "fixed") else []
+    return bool(np.linalg.norm([*away, *turned, *kept_axis]) < MEETS)

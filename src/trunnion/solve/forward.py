@@ -316,10 +316,10 @@ class Forward:
     def reactions(self, number: int, loads: Sequence[Any], group: Any = None) -> list[Reaction]:
         """Reactions of a module to loads on its links, flat. group: in place of the module itself."""
         group = self.system.groups[number] if group is None else group
-        given: list[Any] = [self.poses[number], loads]
+        arguments: list[Any] = [self.poses[number], loads]
         if self.system.plan.modules[number].redundant:
-            given.append([self.system.support(self.values, place.joint) for place in self.system.places[number]])
-        return [tuple(flat(wrench)) for wrench in group.reactions(*given)]
+            arguments.append([self.system.support(self.values, place.joint) for place in self.system.places[number]])
+        return [tuple(flat(wrench)) for wrench in group.reactions(*arguments)]
 
     def wrench(self, place: Place, reaction: Reaction) -> Any:
         """The reaction on a joint's second link as the file names it; a module may see it from the other."""
@@ -491,11 +491,11 @@ class SpatialWalk(Forward):
 
     def _tensor(self, link: str) -> Matrix3 | None:
         """Inertia of a link about its mass centre in its own axes, kg m²; None if it has none."""
-        stated, values = self.system.mechanism.effective_links[link], self.values
-        if not isinstance(stated.inertia, InertiaTensor):
+        link_entry, values = self.system.mechanism.effective_links[link], self.values
+        if not isinstance(link_entry.inertia, InertiaTensor):
             return None
         xx, yy, zz, xy, xz, yz = (values[f"links.{link}.inertia.{key}"] for key in ("xx", "yy", "zz", "xy", "xz", "yz"))
-        if stated.inertia_about == "origin":  # Steiner: J_C = J_O − m (c² 1 − c cᵀ)
+        if link_entry.inertia_about == "origin":  # Steiner: J_C = J_O − m (c² 1 − c cᵀ)
             mass, (x, y, z) = values[f"links.{link}.mass"], self.system.centre(values, link)
             xx, yy, zz = xx - mass * (y * y + z * z), yy - mass * (x * x + z * z), zz - mass * (x * x + y * y)
             xy, xz, yz = xy + mass * x * y, xz + mass * x * z, yz + mass * y * z
@@ -557,8 +557,8 @@ def _walked(
     walk = start(system, values)
     walk.time = time
     with np.errstate(all="ignore"):
-        for number, own in enumerate(assembly):
-            add(walk, number, pose_of(walk, number, own, time))
+        for number, placed in enumerate(assembly):
+            add(walk, number, pose_of(walk, number, placed, time))
     return walk
 
 

@@ -38,7 +38,7 @@ def driven_at_outputs(mechanism: Mechanism) -> Mechanism | None:
         return None
     data = mechanism.data()
     drivers = {driver.moves or name: data["drivers"][name] for name, driver in mechanism.drivers.items()}
-    drivers = {name: {key: value for key, value in one.items() if key != "moves"} for name, one in drivers.items()}
+    drivers = {name: {key: value for key, value in entry.items() if key != "moves"} for name, entry in drivers.items()}
     return Mechanism(**{key: data[key] for key in KEPT if key in data}, drivers=drivers)
 
 
@@ -56,13 +56,13 @@ class Inverse:
 
     def drive(self, values: Values, name: str, time: Number) -> tuple[Number, Number, Number]:
         """Coordinate, rate and second derivative of a driver at times, s; NaN past a dead centre of the drivers."""
-        own = self._renamed(values)
-        walk = forward(self.system, own, self.assembly, time)
+        renamed = self._renamed(values)
+        walk = forward(self.system, renamed, self.assembly, time)
         which = 0 if self.system.turns(name) else 1
         coordinate, rate, second = (of(name)[which] for of in (walk.coordinates, walk.rates, walk.second_rates))
         if which == 0 and self.cycle.duration > 0:
             coordinate = near(coordinate, np.interp(primal(time), *self._turns[name]))
-        lost = np.where(self._sense(own, time) * self._sense_at_start < 0, np.nan, 0.0)
+        lost = np.where(self._sense(renamed, time) * self._sense_at_start < 0, np.nan, 0.0)
         return coordinate + lost, rate, second
 
     def span(self, name: str, span: Span) -> Span:
@@ -108,13 +108,13 @@ class Inverse:
     def _ranges(self) -> dict[str, tuple[Array, Array]]:
         """Rates and coordinates of the drivers over the cycle of the nominal mechanism."""
         time = self.cycle.times(LOOKS)
-        walk, found = self._walk(time), {}
+        walk, ranges = self._walk(time), {}
         for name in self.moves:
             which = 0 if self.system.turns(name) else 1
             coordinate = np.broadcast_to(np.asarray(walk.coordinates(name)[which], float), time.shape)
             coordinate = np.interp(time, *self._turns[name]) if which == 0 and self.cycle.duration > 0 else coordinate
-            found[name] = np.broadcast_to(np.asarray(walk.rates(name)[which], float), time.shape), coordinate
-        return found
+            ranges[name] = np.broadcast_to(np.asarray(walk.rates(name)[which], float), time.shape), coordinate
+        return ranges
 
     @cached_property
     def _turns(self) -> dict[str, tuple[Array, Array]]:
@@ -140,9 +140,9 @@ class Inverse:
 
     def _turned(self, walk: Forward, name: str) -> Number:
         """Angle of a driver; with its whole turns where it moves a rack or screw, whose slide tells them."""
-        for gear, stated in self.system.mechanism.gears.items():
+        for gear, gear_entry in self.system.mechanism.gears.items():
             turning, sliding = self.system.mechanism.coupled(gear)
-            if stated.slides and turning == name:
+            if gear_entry.slides and turning == name:
                 slide = walk.coordinates(sliding)[1] - self.values[f"gears.{gear}.phase"]
                 return slide / self.system.ratio(self.values, gear)
         return walk.coordinates(name)[0]
@@ -150,12 +150,14 @@ class Inverse:
     def check(self, system: System, values: Values, assembly: Any) -> None:
         """MechanismError where the drivers do not hold the stated joints at the start where their laws say."""
         walk = forward(system, values, assembly, np.zeros(1))
-        own = self._walk(np.zeros(1))
+        own_walk = self._walk(np.zeros(1))
         size = float(np.max(primal(system.size(values))))
         for name, joint in self.moves.items():
             which, unit = (0, 1.0) if system.turns(joint) else (1, size)
-            held, wanted = (float(np.ravel(primal(of.coordinates(joint)[which]))[0]) for of in (walk, own))
-            off = held - wanted
+            coordinate, coordinate_wanted = (
+                float(np.ravel(primal(of.coordinates(joint)[which]))[0]) for of in (walk, own_walk)
+            )
+            off = coordinate - coordinate_wanted
             off -= TURN * round(off / TURN) if which == 0 and np.isfinite(off) else 0.0
             if abs(off) > 1e-6 * unit:
                 what = f"the assembly that is chosen does not hold {joint} where its motion begins"

@@ -85,8 +85,8 @@ class Stated:
 
     def vector(self, path: str) -> Vector | None:
         """A force, or in space a moment; None if it is not stated."""
-        found = tuple(self.get(f"{path}.{axis}") for axis in self.walk.system.axes)
-        return None if any(number is None for number in found) else found
+        components = tuple(self.get(f"{path}.{axis}") for axis in self.walk.system.axes)
+        return None if any(number is None for number in components) else components
 
     def switches(self) -> Iterator[Switch]:
         """What decides where numbers that vary with the motion jump or bend: ends of `between` …, points of tables."""
@@ -135,11 +135,11 @@ class Stated:
     def _driven(self, name: str) -> tuple[Number, Number, Number]:
         """Coordinate of a driver within its turn, and its rates."""
         system, values = self.walk.system, self.walk.values
-        found = system.drive(values, name, self.walk.time)
+        coordinate = system.drive(values, name, self.walk.time)
         if not system.is_free(values, name) or not (span := system.span(values, name)).periodic:
-            return found
+            return coordinate
         begin = values.get(f"drivers.{name}.start", 0.0)  # loads come again every turn
-        return begin + np.mod(found[0] - begin, span.travel), *found[1:]
+        return begin + np.mod(coordinate[0] - begin, span.travel), *coordinate[1:]
 
     def _of_table(self, name: str) -> tuple[list[Number], list[Number], Number]:
         """Knots and values of a table, and the place in it."""
@@ -176,22 +176,22 @@ def stated_loads(
     walk: Forward, zero_slip: Mapping[str, Share], sensed: Container[str] = ()
 ) -> Iterator[tuple[str, LoadAction]]:
     """The loads of the model, by name. zero_slip: see `backward.Given`; sensed: joints of which it tells all."""
-    stated = Stated(walk)
+    expressions = Stated(walk)
     for name, load in walk.system.mechanism.loads.items():
         path, joint = f"loads.{name}", load.joint
         if joint is None:
-            yield name, _push(stated, load, path)
+            yield name, _push(expressions, load, path)
         else:
-            yield name, _resist(stated, load, path, zero_slip.get(joint, 0.0), joint in sensed)
+            yield name, _resist(expressions, load, path, zero_slip.get(joint, 0.0), joint in sensed)
 
 
-def _push(stated: Stated, load: Load, path: str) -> LoadAction:
+def _push(expressions: Stated, load: Load, path: str) -> LoadAction:
     """A force at a point of a link and a moment, in global axes or the link's."""
-    walk, link, algebra = stated.walk, load.link or "", stated.walk.algebra
+    walk, link, algebra = expressions.walk, load.link or "", expressions.walk.algebra
     frame, twist, _ = walk.motions[link]
-    force, moment = stated.vector(f"{path}.force") or algebra.NULL, stated.get(f"{path}.moment")
+    force, moment = expressions.vector(f"{path}.force") or algebra.NULL, expressions.get(f"{path}.moment")
     if moment is None:
-        moment = stated.vector(f"{path}.moment") or algebra.NO_MOMENT
+        moment = expressions.vector(f"{path}.moment") or algebra.NO_MOMENT
     if load.frame == "link":
         force, moment = algebra.rotated(frame, force), algebra.rotated_moment(frame, moment)
     place = walk.placed(frame, link, load.at) if load.at else algebra.point_of(frame, algebra.NULL)
@@ -199,10 +199,10 @@ def _push(stated: Stated, load: Load, path: str) -> LoadAction:
     return LoadAction([(link, wrench)], algebra.power(wrench, twist))
 
 
-def _resist(stated: Stated, load: Load, path: str, at_rest: Share, sensed: bool) -> LoadAction:
+def _resist(expressions: Stated, load: Load, path: str, at_rest: Share, sensed: bool) -> LoadAction:
     """A torque or force that opposes the motion of a joint, whichever way it goes or one way only."""
-    walk, joint = stated.walk, load.joint or ""
-    torque, force = stated.get(f"{path}.resisting_torque"), stated.get(f"{path}.resisting_force")
+    walk, joint = expressions.walk, load.joint or ""
+    torque, force = expressions.get(f"{path}.resisting_torque"), expressions.get(f"{path}.resisting_force")
     size, turns = (force, False) if torque is None else (torque, True)
     speed = walk.rates(joint)[0 if turns else 1]
     sign = _sense(walk, joint, turns, speed, at_rest, sensed)
@@ -310,8 +310,8 @@ def spring_state(walk: Forward, path: str, elongation: Number, rate: Number, onl
     force = preload + stiffness * elongation + damping * rate
     loss = damping * rate * rate
     if only is not None:
-        beyond = primal(elongation)
-        idle = beyond <= 0 if only == "pull" else beyond >= 0  # not so where there is no elongation: NaN is kept
+        outside = primal(elongation)
+        idle = outside <= 0 if only == "pull" else outside >= 0  # not so where there is no elongation: NaN is kept
         force, loss = (namespace(number).where(idle, 0.0, number) for number in (force, loss))
     return SpringState(force, elongation, -force * rate, loss)
 

@@ -72,9 +72,9 @@ def least_beside(
     """
     sides = time + BESIDE * cycle.duration * np.array([[-1.0], [1.0]])
     inside = cycle.periodic | ((sides >= 0) & (sides <= cycle.duration))
-    asked = (sides % cycle.duration if cycle.periodic else np.clip(sides, 0.0, cycle.duration)).ravel()
-    figures = np.asarray(figure(solve(asked)), float)
-    figures = np.broadcast_to(figures, (*figures.shape[:-1], len(asked))).reshape(*figures.shape[:-1], *sides.shape)
+    times = (sides % cycle.duration if cycle.periodic else np.clip(sides, 0.0, cycle.duration)).ravel()
+    figures = np.asarray(figure(solve(times)), float)
+    figures = np.broadcast_to(figures, (*figures.shape[:-1], len(times))).reshape(*figures.shape[:-1], *sides.shape)
     least: Array = np.fmin.reduce(np.where(inside, figures, np.nan), axis=-2)
     return least
 

@@ -77,20 +77,20 @@ def followed_through(
     follower = Follower(group, walk.pairs(system.places[number]), drive, track.orientation, STRIDE)
     at, folding = change_points.find(walk, number, track, times, pose, cycle), folds(system, module)
     kinks = False
-    for way in () if group.redundant or folding else (1, -1):  # the least-squares way on is smooth by itself
+    for direction in () if group.redundant or folding else (1, -1):  # the least-squares way on is smooth by itself
         last = track.begin
         while True:
-            places = [(way * moment, False) for moment in follower.broken(track.coordinates, times)]
-            places += [(way * first, True) for first, end in at if first == end]
-            places = [place for place in places if place[0] > way * last + NEARBY * times[1]]
+            places = [(direction * moment, False) for moment in follower.broken(track.coordinates, times)]
+            places += [(direction * first, True) for first, end in at if first == end]
+            places = [place for place in places if place[0] > direction * last + NEARBY * times[1]]
             if not places:
                 break
             ahead, met = min(places)
-            last = way * ahead
-            beyond, ends = _beyond(follower, track, times, last, met, way)
+            last = direction * ahead
+            past, ends = _beyond(follower, track, times, last, met, direction)
             kinks = kinks or (met and ends)
-            if beyond is not None:
-                track, last = beyond, way * max(ahead, way * beyond.passed[-1 if way > 0 else 0])
+            if past is not None:
+                track, last = past, direction * max(ahead, direction * past.passed[-1 if direction > 0 else 0])
                 at = change_points.find(walk, number, track, times, pose_of(walk, number, track, times), cycle)
     if track.passed and cycle.periodic and (0.0, 0.0) in at and _comes_round(follower, track, times):
         track = replace(track, passed=(*track.passed, cycle.duration))
@@ -109,19 +109,19 @@ def followed_through(
 
 
 def _beyond(
-    follower: Follower, track: Track, times: Array, moment: float, met: bool, way: int
+    follower: Follower, track: Track, times: Array, moment: float, met: bool, direction: int
 ) -> tuple[Track | None, bool]:
     """The track on over a change point near a time, s, if it is smoother there, and whether no assembly leads on so.
 
     met: whether the assemblies meet there; else the old one ends, maybe for good, and a new one is as smooth as it was.
-    way: 1 onward from where it was put together, -1 back.
+    direction: 1 onward from where it was put together, -1 back.
     """
-    order = np.arange(len(times))[::way]
-    before = order[way * times[order] < way * moment - NEARBY * times[1]][-BEFORE:]
-    beyond = order[way * times[order] > way * moment + NEARBY * times[1]]
-    if len(before) < BEFORE or way * times[before[0]] < way * track.begin or not len(beyond):
+    order = np.arange(len(times))[::direction]
+    before = order[direction * times[order] < direction * moment - NEARBY * times[1]][-BEFORE:]
+    past = order[direction * times[order] > direction * moment + NEARBY * times[1]]
+    if len(before) < BEFORE or direction * times[before[0]] < direction * track.begin or not len(past):
         return None, False
-    rows, place = track.coordinates.copy(), beyond[0]
+    rows, place = track.coordinates.copy(), past[0]
     guess = change_points.carried_on(times[before], rows[:, before], float(times[place]))
     follower = replace(follower, orientation=-float(track.sense(times[before[-1]])))
     fresh = follower.solved_from(place, guess)
@@ -130,12 +130,12 @@ def _beyond(
         kink = SMOOTH * np.max(np.abs(guess - rows[:, before[-1]]))
     if fresh is None or not np.max(np.abs(fresh - guess)) < kink:
         return None, fresh is None
-    for between in range(before[-1] + way, place, way):
+    for between in range(before[-1] + direction, place, direction):
         rows[:, between] = change_points.carried_on(times[before], rows[:, before], float(times[between]))
-    rows[:, beyond] = np.nan
+    rows[:, past] = np.nan
     rows[:, place] = fresh
-    follower.run(rows, beyond)
-    exact = follower.turned_over(rows, np.append(before, beyond[:BEFORE]), times, moment)
+    follower.run(rows, past)
+    exact = follower.turned_over(rows, np.append(before, past[:BEFORE]), times, moment)
     return replace(track, coordinates=rows, passed=tuple(sorted((*track.passed, exact)))), False
 
 

@@ -50,7 +50,7 @@ class Run:
         time: Number,
         values: Values | None = None,
         method: FrictionMethod | None = None,
-        given: Given | None = None,
+        conditions: Given | None = None,
         past: Mapping[str, History] | None = None,
     ) -> Backward:
         """Motion and forces at the given times (s), nominal or with other values; see `backward.solve`.
@@ -61,8 +61,8 @@ class Run:
         if past is None:
             past = self._past if values is self.values else self._histories(values)
         deflections = {joint: history.at(time) for joint, history in past.items()}
-        given = replace(given or Given(), deflections=deflections)
-        return solve(self.system, values, self.chosen.assembly, time, method, given)
+        conditions = replace(conditions or Given(), deflections=deflections)
+        return solve(self.system, values, self.chosen.assembly, time, method, conditions)
 
     def walk(self, time: Number) -> Forward:
         """Motion alone at the given times (s)."""
@@ -78,8 +78,8 @@ class Run:
         rests: Mapping[str, bool] | None = None,
     ) -> Backward:
         """Motion and forces at the given times (s) with the pins at offsets in their holes, as they travel there."""
-        given = Given(zero_slip or {}, travel=travel or {}, rests=rests or {})
-        return self.solve(time, {**self.values, **offsets}, method, given, self._past)
+        conditions = Given(zero_slip or {}, travel=travel or {}, rests=rests or {})
+        return self.solve(time, {**self.values, **offsets}, method, conditions, self._past)
 
     def ideal(self, time: Number, method: FrictionMethod | None = None) -> Backward:
         """Motion and forces at the given times (s) without errors and with every pin in the middle of its hole."""
@@ -105,8 +105,8 @@ class Run:
         """What `find` finds, found once: for what is the same however often and at whatever positions it is run."""
         if what not in self._found:
             self._found[what] = find()
-        found: Found = self._found[what]
-        return found
+        entry: Found = self._found[what]
+        return entry
 
     @functools.cached_property
     def seats(self) -> list[GivenSeat]:
@@ -125,8 +125,8 @@ class Run:
 
     def _bends(self, values: Values) -> list[Bend]:
         passed = {time for met in self.chosen.meetings.values() for place in met.at for time in place}
-        stated = stated_bends(Mechanisms(self.system, self.chosen.assembly, values, [self.cycle]))
-        return [*stated, *(Bend(time) for time in sorted(passed))]
+        bends_of = stated_bends(Mechanisms(self.system, self.chosen.assembly, values, [self.cycle]))
+        return [*bends_of, *(Bend(time) for time in sorted(passed))]
 
     @np.errstate(all="ignore")
     def courses(
@@ -214,14 +214,14 @@ def _prepared(mechanism: Mechanism, free: bool) -> Run:
 
 def built(mechanism: Mechanism) -> System:
     """The mechanism decomposed; with what its drivers do that move other joints than their own."""
-    own = driven_at_outputs(mechanism)
-    return build(mechanism, None if own is None else _inverse(mechanism, own))
+    outward = driven_at_outputs(mechanism)
+    return build(mechanism, None if outward is None else _inverse(mechanism, outward))
 
 
-def _inverse(mechanism: Mechanism, own: Mechanism) -> Inverse:
+def _inverse(mechanism: Mechanism, outward: Mechanism) -> Inverse:
     moves = {name: driver.moves for name, driver in mechanism.drivers.items() if driver.moves}
     try:
-        run = prepare(own)
+        run = prepare(outward)
     except MechanismError as error:
         name, joint = next(iter(moves.items()))
         what = f"the mechanism is not moved by {joint}: {error.findings[0].what}"

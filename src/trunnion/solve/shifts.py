@@ -46,12 +46,12 @@ class Play(NamedTuple):
 def play_of(space: str, kind: str, values: Values, joint: str) -> Play | None:
     """The play that a joint states; None if it has none, or of a kind that has no model of it."""
     model = CLEARANCE_MODELS[space].get(kind)
-    own = clearance(joint, values)
+    gap = clearance(joint, values)
     path = f"joints.{joint}"
     floats = values.get(f"{path}.pin.end_float", 0.0) if model and model.axial else 0.0
-    if model is None or (own is None and np.all(primal(floats) == 0)):
+    if model is None or (gap is None and np.all(primal(floats) == 0)):
         return None
-    radius = (own if own is not None else 0.0) + values.get(f"{path}.pin.cylindricity", 0.0)
+    radius = (gap if gap is not None else 0.0) + values.get(f"{path}.pin.cylindricity", 0.0)
     radii = tuple(0.5 * floats if i in model.axial else radius for i in range(len(model.ends)))
     return Play(model, radii, length_of(model, values, joint))
 
@@ -67,12 +67,12 @@ class GivenSeat(NamedTuple):
 def seats(mechanism: Mechanism, values: Values) -> list[GivenSeat]:
     """The joints whose seat is given or follows the load."""
     plays = (
-        (joint, stated, play_of(mechanism.space, mechanism.effective_joints[joint].type, values, joint))
-        for joint, stated in mechanism.seated.items()
+        (joint, seat, play_of(mechanism.space, mechanism.effective_joints[joint].type, values, joint))
+        for joint, seat in mechanism.seated.items()
     )
     return [
-        GivenSeat(joint, play, None if isinstance(stated, str) else given_offsets(values, joint, play))
-        for joint, stated, play in plays if play is not None
+        GivenSeat(joint, play, None if isinstance(seat, str) else given_offsets(values, joint, play))
+        for joint, seat, play in plays if play is not None
     ]  # fmt: skip
 
 
@@ -100,10 +100,10 @@ def carriers_of(mechanism: Mechanism, joint: str) -> tuple[str, ...]:
 
     Where nothing turns in a hole, both are the same; where a joint slides, the length of its hole goes with one link.
     """
-    one = mechanism.effective_joints[joint]
-    model = CLEARANCE_MODELS[mechanism.space].get(one.type)
-    if one.seat_on is not None:
-        return (CARRIERS[0] if one.seat_on == one.links[1] else CARRIERS[1],)
+    joint_entry = mechanism.effective_joints[joint]
+    model = CLEARANCE_MODELS[mechanism.space].get(joint_entry.type)
+    if joint_entry.seat_on is not None:
+        return (CARRIERS[0] if joint_entry.seat_on == joint_entry.links[1] else CARRIERS[1],)
     return CARRIERS if model is not None and model.turns else CARRIERS[:1]
 
 

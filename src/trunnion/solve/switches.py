@@ -72,8 +72,8 @@ class Mechanisms:
     def shaped(self, number: Number, time: Array) -> Array:
         """A number that a walk at `lanes` has, (lane, place)."""
         shape = (1, time.size) if len(self.cycles) == 1 else time.shape
-        found: Array = np.broadcast_to(np.asarray(primal(number), float), shape).reshape(time.shape)
-        return found
+        lanes_of: Array = np.broadcast_to(np.asarray(primal(number), float), shape).reshape(time.shape)
+        return lanes_of
 
     def row(self, number: Number) -> Array:
         """A number that does not change along the way, (mechanism,)."""
@@ -126,7 +126,7 @@ def bends(of: Mechanisms) -> list[Array]:
     times: list[list[float]] = [[] for _ in of.cycles]
     for row, bend in _bends(of):
         times[row].append(bend.time)
-    return [np.array(own, float) for own in times]
+    return [np.array(time, float) for time in times]
 
 
 def stated_bends(of: Mechanisms) -> list[Bend]:
@@ -140,16 +140,16 @@ def _bends(of: Mechanisms) -> Iterator[tuple[int, Bend]]:
         yield from ((row, Bend(time, k, function, level)) for row, time, function, level in _passages(of, scan))
 
 
-def tracked(of: Mechanisms, known: Sequence[Bend], moved: Callable[[Values, Array], Number]) -> Array:
+def tracked(of: Mechanisms, bends: Sequence[Bend], moved: Callable[[Values, Array], Number]) -> Array:
     """Times, s, (mechanism, bend), at which other mechanisms have the bends of one; NaN where it is not near the same.
 
     They are times of the one, `moved` to those of the others by their values; cycles: that of the one, for each.
     """
-    cycle, tracks = of.cycles[0], np.tile([bend.time for bend in known], (len(of.cycles), 1))
-    widths, levels = np.array([_width(bend, known, cycle) for bend in known]), np.array([bend.level for bend in known])
-    for scan, rows, function, which in _by_scan(of, known):
+    cycle, tracks = of.cycles[0], np.tile([bend.time for bend in bends], (len(of.cycles), 1))
+    widths, levels = np.array([_width(bend, bends, cycle) for bend in bends]), np.array([bend.level for bend in bends])
+    for scan, rows, function, which in _by_scan(of, bends):
         number = partial(_moved, of, scan, moved, rows, function)
-        low, high = (tracks[rows, which] + way * widths[which] for way in (-1.0, 1.0))
+        low, high = (tracks[rows, which] + side * widths[which] for side in (-1.0, 1.0))
         crossing = _Crossing(rows, function, levels[which], low, high, number(low), number(high))
         passed = (crossing.at_low >= crossing.level) != (crossing.at_high >= crossing.level)
         times = _located(crossing, number, np.full(len(rows), cycle.duration))
@@ -159,7 +159,7 @@ def tracked(of: Mechanisms, known: Sequence[Bend], moved: Callable[[Values, Arra
 
 def shifts_of(
     of: Mechanisms,
-    known: Sequence[Bend],
+    bends: Sequence[Bend],
     times: Array,
     moved: Callable[[Values, Array], Number],
     sides: tuple[Values, Values],
@@ -169,11 +169,11 @@ def shifts_of(
     What passes its level there goes on to do so: to first order δt = −δg/(∂g/∂t), g being its number.
     """
     shifts, step = np.zeros(times.shape), SLOPED * of.cycles[0].duration
-    for scan, rows, function, which in _by_scan(of, known):
+    for scan, rows, function, which in _by_scan(of, bends):
         time = times[rows, which]
         below, here, above = (
-            partial(_moved, replace(of, values=own), scan, moved, rows, function)
-            for own in (sides[0], of.values, sides[1])
+            partial(_moved, replace(of, values=numbers), scan, moved, rows, function)
+            for numbers in (sides[0], of.values, sides[1])
         )
         # on both sides in time too, as what is noise beside its own size counts as zero
         change = [above(moment) - below(moment) for moment in (time - step, time + step)]
@@ -182,14 +182,14 @@ def shifts_of(
     return shifts
 
 
-def _by_scan(of: Mechanisms, known: Sequence[Bend]) -> Iterator[tuple[_Scan, Rows, Rows, Rows]]:
+def _by_scan(of: Mechanisms, bends: Sequence[Bend]) -> Iterator[tuple[_Scan, Rows, Rows, Rows]]:
     """Of every scan the mechanisms, lane by lane, and the functions and numbers of its bends among those known."""
-    functions = np.array([bend.function for bend in known])
+    functions = np.array([bend.function for bend in bends])
     for k, scan in enumerate(_scans(of.system)):
-        own = np.flatnonzero([bend.scan == k for bend in known])
-        which = np.tile(own, len(of.cycles))
-        if len(own):
-            yield scan, np.repeat(np.arange(len(of.cycles)), len(own)), functions[which], which
+        bends_own = np.flatnonzero([bend.scan == k for bend in bends])
+        which = np.tile(bends_own, len(of.cycles))
+        if len(bends_own):
+            yield scan, np.repeat(np.arange(len(of.cycles)), len(bends_own)), functions[which], which
 
 
 def _moved(
@@ -201,9 +201,9 @@ def _moved(
     return scan.number(of, rows, function, np.asarray(primal(moved(of.picked(rows), time[:, None])), float)[:, 0])
 
 
-def _width(of: Bend, known: Sequence[Bend], cycle: Cycle) -> float:
+def _width(of: Bend, bends: Sequence[Bend], cycle: Cycle) -> float:
     """How far to either side of a bend it is looked for in other mechanisms, s: not beyond the next one of its kind."""
-    like = [abs(bend.time - of.time) / 2 for bend in known if bend[1:3] == of[1:3] and bend is not of]
+    like = [abs(bend.time - of.time) / 2 for bend in bends if bend[1:3] == of[1:3] and bend is not of]
     return min(cycle.duration / (TRACKED * max(1.0, cycle.turns)), *like, cycle.duration)
 
 

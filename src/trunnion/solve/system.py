@@ -300,17 +300,19 @@ class System:
 
     def holes(self, values: Values) -> dict[tuple[str, str], Any]:
         """The same where every pin lies in the middle of its hole."""
-        found = self.stated_elements(values)
+        elements = self.stated_elements(values)
         for name, (_, (_, second)) in self.joints.items():
-            found[second, name] = shifts.misaligned(self.mechanism.space, found[second, name], values, name)
-        return found
+            elements[second, name] = shifts.misaligned(self.mechanism.space, elements[second, name], values, name)
+        return elements
 
     def stated_elements(self, values: Values) -> dict[tuple[str, str], Any]:
         """The same without errors of joints; c, s in the plane and z in space is the direction of the joint."""
         if self.mechanism.loop:
             return self._loop_elements(values)
-        stated = self._element_in_space if self.spatial else self._element_in_plane
-        return {(link, name): stated(values, link, name) for name, (_, links) in self.joints.items() for link in links}
+        element_of = self._element_in_space if self.spatial else self._element_in_plane
+        return {
+            (link, name): element_of(values, link, name) for name, (_, links) in self.joints.items() for link in links
+        }
 
     def _element_in_plane(self, values: Values, link: str, joint: str) -> plane.Frame:
         path = f"links.{link}.points.{joint}"
@@ -322,9 +324,9 @@ class System:
         return plane.Frame(x, y, ax / length, ay / length)
 
     def _element_in_space(self, values: Values, link: str, joint: str) -> space.Frame:
-        stated, path = self.mechanism.links[link].points[joint], f"links.{link}.points.{joint}"
-        axis: Any = self.vector(values, f"{path}.axis") if stated.axis is not None else (0.0, 0.0, 1.0)
-        x: Any = self.vector(values, f"{path}.x") if stated.x is not None else None
+        point, path = self.mechanism.links[link].points[joint], f"links.{link}.points.{joint}"
+        axis: Any = self.vector(values, f"{path}.axis") if point.axis is not None else (0.0, 0.0, 1.0)
+        x: Any = self.vector(values, f"{path}.x") if point.x is not None else None
         place: Any = self.vector(values, path)
         return space.element(place, axis, x)
 
@@ -338,8 +340,8 @@ class System:
             c, s = namespace(twist).cos(twist), namespace(twist).sin(twist)
             first = space.ORIGIN
             following = space.Frame((1.0, 0.0, 0.0), (0.0, c, s), (0.0, -s, c), (distance, 0.0, 0.0))
-            stated = self.mechanism.links.get(row.link)
-            home = stated.frame if stated and stated.frame else None
+            link_entry = self.mechanism.links.get(row.link)
+            home = link_entry.frame if link_entry and link_entry.frame else None
             if home is None and row.link == self.mechanism.fixed_link:
                 home = after.joint
             if home == after.joint and home != row.joint:
@@ -477,8 +479,8 @@ class System:
             pins = [primal(value) for path, value in values.items() if path.endswith((".pin.bearing", ".pin.radius"))]
             smallest = functools.reduce(np.maximum, pins, 0.0)
         else:
-            points = [[(name, self.vector(values, f"links.{link}.points.{name}")) for name in stated.points]
-                      for link, stated in self.mechanism.links.items()]  # fmt: skip
+            points = [[(name, self.vector(values, f"links.{link}.points.{name}")) for name in link_entry.points]
+                      for link, link_entry in self.mechanism.links.items()]  # fmt: skip
             joints = [[place for name, place in places if name in self.joints] for places in points]
             smallest = _widest([[place for _, place in places] for places in points])
         widest = _widest(joints)

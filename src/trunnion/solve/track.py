@@ -198,7 +198,7 @@ class Follower:
         good = good & np.all((np.abs(change) <= most) & (bend <= most / 4), axis=0)
         return solved[:, : _leading(good)]
 
-    def _by_parts(self, q: Array, slope: Array, here: int, there: int) -> Array | None:
+    def _by_parts(self, q: Array, slope: Array, here: int, after: int) -> Array | None:
         """Coordinates at the next position, by parts of the way that are halved where Newton strays; None if too small.
 
         All halvings are tried at once: Newton costs about as much for many lanes as for one.
@@ -207,8 +207,8 @@ class Follower:
         while share < 1.0:
             ends: Array = share + (1 - share) * HALVES
             ends = ends[ends - share >= HALVES[-1]]
-            elements = [_part(pair, here, there, ends) for pair in self.elements]
-            drive = [_mixed(number, here, there, ends) for number in self.drive]
+            elements = [_part(pair, here, after, ends) for pair in self.elements]
+            drive = [_mixed(number, here, after, ends) for number in self.drive]
             guess = q[:, None] + slope[:, None] * (ends - share)
             solved, good = self._solved(elements, drive, guess, NEAR_LIMIT)
             most = limits(self.group, extent(self.group, elements))[:, None]
@@ -322,13 +322,13 @@ def _between_knots(knots: Places, columns: Array, places: Places) -> Array:
     return np.asarray(ends + width * (slopes[:, low] * s * (1 - s) ** 2 + slopes[:, low + 1] * s**2 * (s - 1)))
 
 
-def _mixed(number: Number, here: int, there: int, share: Array) -> Number:
-    return number[here] + share * (number[there] - number[here]) if np.ndim(number) else number
+def _mixed(number: Number, here: int, after: int, share: Array) -> Number:
+    return number[here] + share * (number[after] - number[here]) if np.ndim(number) else number
 
 
-def _part(pair: Any, here: int, there: int, share: Array) -> Any:
+def _part(pair: Any, here: int, after: int, share: Array) -> Any:
     """Both elements of a joint part of the way between two positions; axes stay of length one."""
-    mixed = each(pair, lambda n: _mixed(n, here, there, share))
+    mixed = each(pair, lambda n: _mixed(n, here, after, share))
     parts: list[Any] = [side.normalised() if hasattr(side, "normalised") else side for side in mixed]
     return type(pair)(*parts) if hasattr(pair, "_fields") else tuple(parts)
 

@@ -59,10 +59,10 @@ class WalkKernel(Kernel):
         self.method = method or FrictionMethod()
         self.gravest = gravest
         _check(run, self.method)
-        asked = described, list(figures), forces, self.method, gravest, sorted(undefined)
+        request = described, list(figures), forces, self.method, gravest, sorted(undefined)
         laws = (law_of(run.system, joint).function.__module__ for joint in rubbing(run.system))
         keyed = described is not None and all(name.startswith("trunnion.") for name in laws)
-        model = (run.system.mechanism.model_dump_json(), repr(run.chosen.assembly), repr(asked)) if keyed else ()
+        model = (run.system.mechanism.model_dump_json(), repr(run.chosen.assembly), repr(request)) if keyed else ()
         super().__init__(list(figures), threads, undefined, "\0".join(model) if keyed else None)
 
     def walked(self, values: Values, time: Number) -> Lanes:

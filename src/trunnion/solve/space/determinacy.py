@@ -238,8 +238,8 @@ def _present(names: Sequence[str], parts: Sequence[Array], vectors: Sequence[Arr
     parts, wholes: (name, entry, lane) of each null vector.
     """
     present = np.zeros(len(names), bool)
-    for part, whole in zip(parts, vectors, strict=True):
-        largest = np.max(np.linalg.norm(whole, axis=1), axis=0)
+    for part, vector in zip(parts, vectors, strict=True):
+        largest = np.max(np.linalg.norm(vector, axis=1), axis=0)
         present |= np.any((np.linalg.norm(part, axis=1) > PRESENT * largest) & lanes, axis=-1)
     return tuple(name for name, is_present in zip(names, present, strict=True) if is_present)
 
@@ -278,8 +278,8 @@ class Determinacy:
         for part in self.parts:
             joints, links = list(part.joints), list(part.links)
             if part.surplus:
-                beside = f", {spins} of them passive" if spins else ""
-                what = f"{mobility}{beside}, but there {agreeing(drivers, 'is', 'are')} {counted(drivers, 'driver')}"
+                suffix = f", {spins} of them passive" if spins else ""
+                what = f"{mobility}{suffix}, but there {agreeing(drivers, 'is', 'are')} {counted(drivers, 'driver')}"
                 figures = {**counts, "spins": spins, "drivers": drivers}
                 findings.append(Finding.error("mobility.overdriven", "drivers", what, "remove a driver", **figures))
             if part.undetermined:

@@ -286,7 +286,7 @@ def least_play(loops: Loops, q: Array, c: Array, ask: Ask) -> LeastPlay:
         for place, lane in enumerate(active):
             if settled[place]:
                 continue
-            answer = _solve(LinearLoops(*(one[place] for one in linear)), c[lane], ask, loops.size)
+            answer = _solve(LinearLoops(*(number[place] for number in linear)), c[lane], ask, loops.size)
             if answer is None:
                 least[lane], done[place] = np.inf, True
                 continue

@@ -230,9 +230,9 @@ class EdgeContact(Contact):
         spin = primal(walk.motions[self.other].twist.w)
         vx = a[2] - (origin[2] - spin * (a[1] - origin[1]))
         vy = a[3] - (origin[3] + spin * (a[0] - origin[0]))
-        zero = 0.0 * away
+        nil = 0.0 * away
         return ContactState(
-            self.distance - away, -(vx * nx + vy * ny), vx * tx + vy * ty, (nx + zero, ny + zero), (tx + zero, ty + zero),
+            self.distance - away, -(vx * nx + vy * ny), vx * tx + vy * ty, (nx + nil, ny + nil), (tx + nil, ty + nil),
             (a[0], a[1]), ((a[0] - origin[0]) * tx + (a[1] - origin[1]) * ty, self.side * away),
         )  # fmt: skip
 

@@ -97,11 +97,11 @@ def room(result: xr.Dataset) -> Table:
         margin = f"{read.value('yield_margin'):.4g} σ" if split and read.limited else NONE
         lower, upper = (read.limits[0], read.room[1]) if read.is_size else read.room
         sides = ((read.value("searched_lower"), lower), (read.value("searched_upper"), upper))
-        taken = [max(part / end, 0.0) for part, end in sides if math.isfinite(part + end) and end != 0]
+        shares = [max(part / end, 0.0) for part, end in sides if math.isfinite(part + end) and end != 0]
         ends = [abs(end) for end in (lower, upper) if math.isfinite(end)]
         wider = 0.01 * read.value("saving") * min(ends) if ends else math.nan
         rows.append(
-            [read.name, read.limits_said, _percent(read.value("used")), margin, _percent(max(taken, default=math.nan)),
+            [read.name, read.limits_said, _percent(read.value("used")), margin, _percent(max(shares, default=math.nan)),
              _percent(read.value("yield")), NONE if math.isnan(wider) else f"{wider:.4g}"]
         )  # fmt: skip
     head = ["measure", "limits", "used", "margin", "worst case found", "yield", "1\u00a0% wider saves"]
@@ -133,8 +133,8 @@ def _half_width(t: float, unit: str, sign: str) -> str:
     """A half width in mm or degrees, to five digits."""
     if not math.isfinite(t):
         return NONE
-    factor, shown = drawn_in(t, unit)
-    return joined(f"{sign}{t * factor:.5g}", shown)
+    factor, display_unit = drawn_in(t, unit)
+    return joined(f"{sign}{t * factor:.5g}", display_unit)
 
 
 def _cost(cost: float) -> str:
@@ -247,9 +247,9 @@ def trade_off(
     if feasible.any():
         bottom = 0.0 if cost[feasible].min() > 0 else None
         if part[feasible][0] <= 1.0 <= part[feasible][-1]:
-            stated = float(np.interp(1.0, part[feasible], cost[feasible]))
-            label = f"stated limits: {number(stated)}"
-            marks.append(Line(np.array([factor]), np.array([stated]), label, CHOSEN))
+            stated_cost = float(np.interp(1.0, part[feasible], cost[feasible]))
+            label = f"stated limits: {number(stated_cost)}"
+            marks.append(Line(np.array([factor]), np.array([stated_cost]), label, CHOSEN))
     if not feasible.all():
         lost = float(part[~feasible].max())
         ends = factor * part[0], factor * float(min(part[feasible & (part > lost)], default=lost))
@@ -263,11 +263,11 @@ def tolerance_cost(result: xr.Dataset, curves: Sequence[PriceCurve]) -> Figure:
     from trunnion.views.draw import figure as draw
 
     order = sorted(curves, key=lambda price: -price.chosen[1] if math.isfinite(price.chosen[1]) else math.inf)
-    shown = order[:MOST_PRICES]
-    columns = min(len(shown), 2 if len(shown) in (2, 4) else 3)
-    charts = [_price(price, k % columns == 0, columns < 3) for k, price in enumerate(shown)]
+    largest = order[:MOST_PRICES]
+    columns = min(len(largest), 2 if len(largest) in (2, 4) else 3)
+    charts = [_price(price, k % columns == 0, columns < 3) for k, price in enumerate(largest)]
     panels = [Panel("", [chart], 3.2 if columns < 3 else 2.55) for chart in charts]
-    more = f"the {len(shown)} most expensive of {len(curves)}" if len(shown) < len(curves) else ""
+    more = f"the {len(largest)} most expensive of {len(curves)}" if len(largest) < len(curves) else ""
     return draw("Cost of each tolerance over its half width", result, panels, columns, WIDTH, more)
 
 

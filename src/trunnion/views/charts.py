@@ -295,8 +295,8 @@ def check_kind(kind: str, kinds: Iterable[str]) -> None:
 
 def joined(lines: Sequence[Line]) -> list[Line]:
     """The lines, those with a name that are the same as one with the names of all: "A = B". Gaps are a part of them."""
-    known = [np.max(np.abs(line.y[np.isfinite(line.y)]), initial=0.0) for line in lines]
-    near, groups = SAME * float(max(known, default=0.0)), list[Line]()
+    sizes = [np.max(np.abs(line.y[np.isfinite(line.y)]), initial=0.0) for line in lines]
+    near, groups = SAME * float(max(sizes, default=0.0)), list[Line]()
     for line in lines:
         alike = (
             k for k, other in enumerate(groups) if line.name and other.name and line.y.shape == other.y.shape

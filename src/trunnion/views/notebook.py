@@ -40,8 +40,8 @@ def mechanism_figure(mechanism: Mechanism) -> Drawing:
     """The mechanism at the first position of its cycle that can be assembled; MechanismError if there is none."""
     result = drawable(mechanism)
     points = result["point_position"].values
-    known = np.flatnonzero(np.isfinite(points).all(axis=tuple(range(points.ndim - 1))))
-    return plots.mechanism(result, index=int(known[0]) if known.size else 0)
+    finite = np.flatnonzero(np.isfinite(points).all(axis=tuple(range(points.ndim - 1))))
+    return plots.mechanism(result, index=int(finite[0]) if finite.size else 0)
 
 
 def mechanism_html(mechanism: Mechanism) -> str:
@@ -52,9 +52,9 @@ def mechanism_html(mechanism: Mechanism) -> str:
     """
     facts, findings, drawing = [_parts(mechanism)], [], ""
     try:
-        known = check(mechanism, LOOKED_AT)
-        facts.append(f"<code>{escape(known.formula)}</code>, mobility {known.mobility}")
-        findings = list(known.findings)
+        checked = check(mechanism, LOOKED_AT)
+        facts.append(f"<code>{escape(checked.formula)}</code>, mobility {checked.mobility}")
+        findings = list(checked.findings)
         drawing = _svg(mechanism_figure(mechanism), mechanism.digest)
     except MechanismError as error:
         findings = findings or list(error.findings)  # that there is nothing to draw, the findings have said better
@@ -72,7 +72,7 @@ def result_html(result: xr.Dataset) -> str:
     figures = summary_of(result)
     rows = [
         f'<tr><th style="{CELL}" scope="row">{escape(subject)}</th><td style="{CELL}">{_told(members)}</td></tr>'
-        for subject, members in groupby(figures[:MOST_FIGURES], key=lambda one: one.subject)
+        for subject, members in groupby(figures[:MOST_FIGURES], key=lambda figure: figure.subject)
     ]
     more = _more(len(figures) - MOST_FIGURES, "figures")
     table = f"<table>{''.join(rows)}</table>{more}" if rows else ""
@@ -101,16 +101,16 @@ def _parts(mechanism: Mechanism) -> str:
 def _told(members: Iterable[Figure]) -> str:
     """The figures of one subject, each with what it is."""
     cells = []
-    for one in members:
-        text = one.value if isinstance(one.value, str) else "—" if one.value is None else _figure(one)
-        text = f"> {text}" if one.aspect == MORE_THAN else text
-        cells.append(f"<b>{escape(text)}</b>" + (f" {escape(one.remark)}" if one.remark else ""))
+    for member in members:
+        text = member.value if isinstance(member.value, str) else "—" if member.value is None else _figure(member)
+        text = f"> {text}" if member.aspect == MORE_THAN else text
+        cells.append(f"<b>{escape(text)}</b>" + (f" {escape(member.remark)}" if member.remark else ""))
     return "; ".join(cells)
 
 
-def _figure(one: Figure) -> str:
+def _figure(figure: Figure) -> str:
     """A number with as many digits as the terminal shows: four would hide what a narrow limit is about."""
-    return readable(float(one.value or 0.0), one.unit, 7).replace(" ", "\u00a0")
+    return readable(float(figure.value or 0.0), figure.unit, 7).replace(" ", "\u00a0")
 
 
 def _svg(figure: Drawing, salt: str) -> str:
@@ -124,13 +124,13 @@ def _svg(figure: Drawing, salt: str) -> str:
 
 def _findings(findings: Iterable[Finding]) -> str:
     rows = []
-    for one in findings:
-        where = f"<code>{escape(one.where)}</code> " if one.where else ""
-        where = f"{one.kind_of_part} " if one.kind_of_part else where
-        remedy = f" — {with_code(one.remedy)}" if one.remedy else ""
-        severity = str(one.severity)
+    for finding in findings:
+        where = f"<code>{escape(finding.where)}</code> " if finding.where else ""
+        where = f"{finding.kind_of_part} " if finding.kind_of_part else where
+        remedy = f" — {with_code(finding.remedy)}" if finding.remedy else ""
+        severity = str(finding.severity)
         head = f'<b style="color:{COLOURS.get(severity, "inherit")}">{escape(severity)}</b>'
-        rows.append(f"<li>{head} {where}{with_code(one.what)}{remedy}</li>")
+        rows.append(f"<li>{head} {where}{with_code(finding.what)}{remedy}</li>")
     if not rows:
         return ""
     more = _more(len(rows) - MOST_FINDINGS, "findings")

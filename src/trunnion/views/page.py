@@ -126,14 +126,14 @@ def page(
     signed : with room for names and dates
     """
     style = web_text("report.css") + web_text("page.css")
-    stated = said(result, style)
-    stated["findings"] = [row for row in stated["findings"] if row not in missed]
+    text = said(result, style)
+    text["findings"] = [row for row in text["findings"] if row not in missed]
     context: dict[str, Any] = {
         "kicker": kicker, "name": name or str(result.attrs.get("name", "")) or "Mechanism",
         "formula": str(result.attrs.get("formula", "")), "facts": facts, "summary": summary, "missed": missed,
         "sections": [_drawn(part) for part in parts], "end": [_drawn(part) for part in end],
         "inputs": inputs_of(result) if "inputs" in result.attrs else [], "about_data": about_data, "signed": signed,
-        **stated,
+        **text,
     }  # fmt: skip
     return template("page.html.j2").render(context)
 
@@ -172,11 +172,11 @@ def source(figure: Figure) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 
-def said(result: xr.Dataset, style: str, found: Sequence[dict[str, str]] | None = None) -> dict[str, Any]:
+def said(result: xr.Dataset, style: str, findings: Sequence[dict[str, str]] | None = None) -> dict[str, Any]:
     """What every report says: findings, notes apart from them, and where the result comes from; with its style."""
     from markupsafe import Markup
 
-    rows = attribute(result, "findings") if found is None else found
+    rows = attribute(result, "findings") if findings is None else findings
     return {
         "findings": [row for row in rows if row["severity"] != "note"],
         "notes": [row for row in rows if row["severity"] == "note"],

@@ -57,10 +57,10 @@ def limits_in(lower: float, upper: float, unit: str, path: str) -> str:
     """Limits of a toleranced number with their unit; of a play how far its pin may be from the middle."""
     if math.isnan(lower) or math.isnan(upper):
         return ""
-    factor, shown = drawn_in(max(abs(lower), abs(upper)), unit)
+    factor, display_unit = drawn_in(max(abs(lower), abs(upper)), unit)
     within = f"within\u00a0{rounded(upper * factor)}"
     text = within if is_play(path) else limits_text(lower * factor, upper * factor)
-    return joined(text, shown.replace(" ", "\u00a0"))
+    return joined(text, display_unit.replace(" ", "\u00a0"))
 
 
 def is_play(path: str) -> bool:
@@ -72,8 +72,8 @@ def value_text(value: float, unit: str, digits: int = 8) -> str:
     """A toleranced number with its unit, lengths in mm, with all digits that a drawing would show."""
     if not math.isfinite(value):
         return "—"
-    factor, shown = drawn_in(abs(value), unit)
-    return joined(rounded(value * factor, digits), shown.replace(" ", "\u00a0"))
+    factor, display_unit = drawn_in(abs(value), unit)
+    return joined(rounded(value * factor, digits), display_unit.replace(" ", "\u00a0"))
 
 
 def ending(name: str, most: int) -> str:
@@ -369,9 +369,9 @@ class MeasureReading:
         if math.isnan(row.sensitivity):
             return "—"
         half = row.worst / abs(row.sensitivity) if row.sensitivity else math.nan  # whose unit is that of the limits
-        factor, shown = drawn_in(half if half > 0 else 1.0, row.unit)
-        shown = shown.replace(" ", "\u00a0")
-        unit = f"{self.label or '1'}/{shown}" if shown else self.label
+        factor, display_unit = drawn_in(half if half > 0 else 1.0, row.unit)
+        display_unit = display_unit.replace(" ", "\u00a0")
+        unit = f"{self.label or '1'}/{display_unit}" if display_unit else self.label
         return f"{number(row.sensitivity * self.factor / factor)}\u00a0{unit}".rstrip("\u00a0")
 
     def largest(self, most: int) -> tuple[list[ContributionRow], list[ContributionRow]]:

@@ -264,7 +264,7 @@ def field_of(result: xr.Dataset, measure: str, x: str, family: str) -> Field:
     values, status = panelled(values), panelled(statuses(result, plan))
     ideal = None if ideal is None else panelled(ideal)
     scope = usual_peak(ease_of_status(result, status), values, ideal)
-    factor, shown = prefixed(scope, unit)
+    factor, display_unit = prefixed(scope, unit)
     count, title = len(places), _meaning(measure, unit)
     columns = count if count <= 3 else 2 if count == 4 else 3 if count <= 6 or count == 9 else 4
     if len(sizes) == 2 and 1 < sizes[-1] <= 4:  # the values of the last name side by side
@@ -273,7 +273,8 @@ def field_of(result: xr.Dataset, measure: str, x: str, family: str) -> Field:
     titles = [_panel_title([s.equation(i) for s, i in zip(plan.facets, place, strict=True)], room) for place in places]
     return Field(
         plan, plan.x.values[order], values * factor, None if ideal is None else ideal * factor, status, unit, title,
-        f"{title} [{shown}]" if shown else title, scope * factor, factor, titles, total - count, columns, nothing,
+        f"{title} [{display_unit}]" if display_unit else title,
+        scope * factor, factor, titles, total - count, columns, nothing,
     )  # fmt: skip
 
 

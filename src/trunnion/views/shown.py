@@ -83,8 +83,8 @@ def figure_of(result: xr.Dataset, kind: str | None = None, **options: Any) -> Fi
 
 def _called(view: Callable[..., Any], call: str, result: xr.Dataset, options: Mapping[str, Any]) -> Any:
     """What the function of a view makes of a result; TypeError for an option that it does not have."""
-    _, *known = signature(view).parameters
-    check_keywords(call, options, known)
+    _, *parameters = signature(view).parameters
+    check_keywords(call, options, parameters)
     return view(result, **options)
 
 

@@ -94,8 +94,8 @@ def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> Tab
 def _column(result: xr.Dataset, plan: Arrangement, name: str) -> tuple[str, Array]:
     """Head and numbers of a figure: lengths in mm, angles in degrees."""
     unit, values = grid(result, plan, name)
-    factor, shown = {"m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}.get(unit, (1.0, unit))
-    return name.replace("_", " ") + (f" [{shown}]" if shown not in ("", "1") else ""), factor * values
+    factor, display_unit = {"m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}.get(unit, (1.0, unit))
+    return name.replace("_", " ") + (f" [{display_unit}]" if display_unit not in ("", "1") else ""), factor * values
 
 
 def _efforts(every: dict[str, tuple[str, Any]]) -> list[str]:
@@ -103,8 +103,8 @@ def _efforts(every: dict[str, tuple[str, Any]]) -> list[str]:
     picked = []
     for driver in (name.removesuffix(".effort_max") for name in every if name.endswith(".effort_max")):
         ends_of = {f"{driver}.effort_min": -1.0, f"{driver}.effort_max": 1.0}
-        beyond = [name for name, sign in ends_of.items() if np.nanmax(sign * every[name][1], initial=0.0) > 0]
-        picked += beyond or [f"{driver}.effort_max"]
+        reached = [name for name, sign in ends_of.items() if np.nanmax(sign * every[name][1], initial=0.0) > 0]
+        picked += reached or [f"{driver}.effort_max"]
     return picked
 
 
@@ -261,9 +261,9 @@ def _colours(other: Scale) -> ColourScale:
 def _curve(x: Array, y: Array, label: str | None, look: Look) -> list[Mark]:
     """One curve; points beside a gap have a cross."""
     answered = np.isfinite(y)
-    beside = answered & (np.append(False, ~answered[:-1]) | np.append(~answered[1:], False))
+    edges = answered & (np.append(False, ~answered[:-1]) | np.append(~answered[1:], False))
     cross = look.but(dash="none", mark="x", size=7.0 if look.mark or look.width > 1.2 else 3.5, order=4.0)
-    return [Line(x, y, label, look), *([Line(x[beside], y[beside], None, cross)] if beside.any() else [])]
+    return [Line(x, y, label, look), *([Line(x[edges], y[edges], None, cross)] if edges.any() else [])]
 
 
 def _frame(field: Field) -> Axis:
@@ -295,9 +295,9 @@ def _hindered(field: Field, status: NDArray[np.int8]) -> list[Mark]:
     for start, stop in pairwise(bounds):
         if not kind[start]:
             continue
-        code, some = int(codes[start:stop].max()), bool(kind[start] == 1)
-        text = (field.nothing if code == NOTHING else cause(code)) + " for some" * some
-        look = Look("rule" if some else "shade", hatch="///" * some, order=0.5)
+        code, partial = int(codes[start:stop].max()), bool(kind[start] == 1)
+        text = (field.nothing if code == NOTHING else cause(code)) + " for some" * partial
+        look = Look("rule" if partial else "shade", hatch="///" * partial, order=0.5)
         new = text not in causes
         wide = new or (stop - start) / len(kind) > 0.03  # a second time only where there is room
         name = text if new and not alone else None

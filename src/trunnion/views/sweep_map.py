@@ -90,16 +90,16 @@ def draw(board: Board, field: Field) -> None:
         bar.ax.set_yticks(places, [say(value) for value in places])
 
 
-def _levels(known: Array, scope: float) -> tuple[Array, Beyond]:
+def _levels(levels_of: Array, scope: float) -> tuple[Array, Beyond]:
     """Round edges of a few bands over what is shown, and the side on which there is more."""
-    if not known.size:
+    if not levels_of.size:
         return np.array([0.0, 1.0]), "neither"
-    low, high = max(float(known.min()), -scope), min(float(known.max()), scope)
+    low, high = max(float(levels_of.min()), -scope), min(float(levels_of.max()), scope)
     if high - low <= ALIKE * max(abs(low), abs(high)):
         half = 0.05 * max(abs(low), abs(high)) or 1.0
         return np.array([low - half, high + half]), "neither"
     levels = np.asarray(MaxNLocator(BANDS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high), float)
-    below, above = known.min() < levels[0], known.max() > levels[-1]
+    below, above = levels_of.min() < levels[0], levels_of.max() > levels[-1]
     return levels, "both" if below and above else "min" if below else "max" if above else "neither"
 
 
@@ -144,11 +144,11 @@ def _refined(over: Ground, values: Array) -> tuple[Array, Array, Any]:
 
 def _beside_gaps(axes: Axes, edges: list[Array], values: Array, missing: NDArray[np.bool_], norm: BoundaryNorm) -> None:
     """Below the contours: the surroundings of points next to one without a number, in the colour of their band."""
-    beside = maximum_filter(missing, 3, mode="constant") & ~missing
-    where = np.argwhere(beside)
+    at_gaps = maximum_filter(missing, 3, mode="constant") & ~missing
+    where = np.argwhere(at_gaps)
     if where.size:
         boxes = [_box(edges, i, i + 1, k) for i, k in where]
-        colours = COLOURS(norm(values[beside]))
+        colours = COLOURS(norm(values[at_gaps]))
         patches = PolyCollection(boxes, facecolors=colours, edgecolors=colours, linewidths=0.3, zorder=0.8)
         axes.add_collection(patches, autolim=False)
 
@@ -163,18 +163,18 @@ def _lines(axes: Axes, x: Array, y: Array, field: Any, levels: Array, size: floa
     within = [level for level in levels if float(field.min()) < level < float(field.max())]
     if not within:
         return
-    found = axes.contour(
+    contours = axes.contour(
         x, y, field.T, levels=within, colors=INK, linewidths=0.6, linestyles="-", corner_mask=False, zorder=2
     )
-    taken: list[tuple[float, float]] = []
+    boxes: list[tuple[float, float]] = []
     inside = axes.transData + axes.transAxes.inverted()
-    for text in axes.clabel(found, fontsize=size, fmt=_numbers(levels), inline=False):
+    for text in axes.clabel(contours, fontsize=size, fmt=_numbers(levels), inline=False):
         h, v = inside.transform(text.get_position())
-        crowded = any(abs(h - across) < 0.08 and abs(v - upward) < 0.06 for across, upward in taken)
+        crowded = any(abs(h - across) < 0.08 and abs(v - upward) < 0.06 for across, upward in boxes)
         if crowded or not (0.03 < h < 0.97 and 0.03 < v < 0.97):
             text.remove()
             continue
-        taken.append((h, v))
+        boxes.append((h, v))
         text.set_path_effects([withStroke(linewidth=2.2, foreground="white", alpha=0.85)])
 
 

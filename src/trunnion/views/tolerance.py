@@ -302,15 +302,15 @@ def _window(read: MeasureReading, low: float, high: float) -> tuple[float, float
 
 def _rebinned(tally: Array, edges: Array, low: float, high: float) -> tuple[Array, Array]:
     """The counts over some 20 to 60 even bars in the picture, the more the more samples there are."""
-    seen = np.flatnonzero((edges[1:] > low) & (edges[:-1] < high))
-    widths = np.diff(edges)[seen]
+    visible = np.flatnonzero((edges[1:] > low) & (edges[:-1] < high))
+    widths = np.diff(edges)[visible]
     bars = int(np.clip(np.sqrt(tally.sum()), FEWEST, MOST))
-    if not widths.size or seen.size <= 1.5 * bars:
+    if not widths.size or visible.size <= 1.5 * bars:
         return tally, edges
     if np.ptp(widths) <= 0.01 * widths.max():  # even: some of them together
-        some = max(round(seen.size / bars), 1)
-        starts = np.arange(seen[0] % some, len(tally) - some + 1, some)
-        return np.add.reduceat(tally[: starts[-1] + some], starts), edges[np.append(starts, starts[-1] + some)]
+        group = max(round(visible.size / bars), 1)
+        starts = np.arange(visible[0] % group, len(tally) - group + 1, group)
+        return np.add.reduceat(tally[: starts[-1] + group], starts), edges[np.append(starts, starts[-1] + group)]
     even = np.linspace(low, high, bars + 1)
     return np.diff(np.interp(even, edges, np.append(0.0, np.cumsum(tally)))), even
 

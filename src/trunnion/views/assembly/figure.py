@@ -107,8 +107,8 @@ def report(result: xr.Dataset) -> str:
 def _results(result: xr.Dataset) -> Table:
     """The figures of the summary, as the terminal shows them."""
     rows = []
-    for one in summary_of(result):
-        value = "undefined" if one.value is None else one.value
-        text, unit = (value, "") if isinstance(value, str) else parts(value, one.unit)
-        rows.append([one.label, text, "" if unit == "1" else unit])
+    for figure in summary_of(result):
+        value = "undefined" if figure.value is None else figure.value
+        text, unit = (value, "") if isinstance(value, str) else parts(value, figure.unit)
+        rows.append([figure.label, text, "" if unit == "1" else unit])
     return Table("results", ["", "value", "unit"], rows)

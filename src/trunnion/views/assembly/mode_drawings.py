@@ -47,28 +47,28 @@ class Cell(NamedTuple):
     draw: Callable[[Axes, float, Labels], None]
 
 
-def ways(mechanism: Mechanism, found: Sequence[GroupModes] | None = None) -> Figure:
+def ways(mechanism: Mechanism, groups: Sequence[GroupModes] | None = None) -> Figure:
     """A drawing for every way of every group that has several, with the paths of the points; the taken one is marked.
 
     Each is what the mechanism becomes if that way is named in the file and all else is left, so later groups follow
-    their own hints. A row is a group, or more rows if it has many ways. found: the choices, if known.
+    their own hints. A row is a group, or more rows if it has many ways. groups: the choices, if known.
     Raises MechanismError if there is nothing to choose or to draw.
     """
-    found = choices(prepare(mechanism)) if found is None else found
-    if not found:
+    groups = choices(prepare(mechanism)) if groups is None else groups
+    if not groups:
         what = "no group has more than one assembly mode: there is nothing to draw"
         raise MechanismError(Finding(what, remedy="draw the mechanism with `trunnion plot --kind mechanism`"))
     if mechanism.space == "spatial":
         result = analyse(mechanism.with_friction("off"), 1)
-        return _sheet(result, found, _in_space(mechanism, found), columns=3, width=2.9)
+        return _sheet(result, groups, _in_space(mechanism, groups), columns=3, width=2.9)
     result = analyse(mechanism, 1)
-    drawn = [[_drawn(mechanism, layout(result), choice, way) for way in some(choice, MOST_DRAWN)] for choice in found]
-    cells = [[Cell(one.way, one.shown.box, one.draw) for one in row] for row in drawn]
-    return _sheet(result, found, cells, columns=4, width=2.4)
+    drawn = [[_drawn(mechanism, layout(result), choice, way) for way in some(choice, MOST_DRAWN)] for choice in groups]
+    cells = [[Cell(mode.way, mode.shown.box, mode.draw) for mode in row] for row in drawn]
+    return _sheet(result, groups, cells, columns=4, width=2.4)
 
 
 def _sheet(
-    result: xr.Dataset, found: Sequence[GroupModes], rows: list[list[Cell]], columns: int, width: float
+    result: xr.Dataset, groups: Sequence[GroupModes], rows: list[list[Cell]], columns: int, width: float
 ) -> Figure:
     """The drawings in rows of at most so many columns, each so wide, inches, all in one scale."""
     boxes = np.array([cell.box for row in rows for cell in row if cell.box] or [(0.0, 0.0, 1.0, 1.0)])
@@ -80,11 +80,11 @@ def _sheet(
     tall = width * min(max((box[3] - box[1]) / (box[2] - box[0]), 0.45), 1.6) + 0.28
     heights = [0.3 + math.ceil(len(row) / columns) * tall for row in rows]
     figure = new("Assembly modes", result, 0.6 + sum(heights), max(columns, 2) * width + 0.2)
-    parts = figure.subfigures(len(found), 1, squeeze=False, height_ratios=heights)[:, 0]
-    labels, shown = Labels(figure), float(np.hypot(box[2] - box[0], box[3] - box[1]))
-    for part, choice, row in zip(parts, found, rows, strict=True):
+    parts = figure.subfigures(len(groups), 1, squeeze=False, height_ratios=heights)[:, 0]
+    labels, extent = Labels(figure), float(np.hypot(box[2] - box[0], box[3] - box[1]))
+    for part, choice, row in zip(parts, groups, rows, strict=True):
         for axes, cell in zip(_panels(part, choice, [cell.way for cell in row], columns, box), row, strict=True):
-            cell.draw(axes, shown, labels)
+            cell.draw(axes, extent, labels)
     labels.place()
     return figure
 
@@ -128,9 +128,9 @@ class ModeDrawing:
 
     def draw(self, axes: Axes, size: float, labels: Labels) -> None:
         """The mechanism with the names of the joints of the group; size: of the box around all drawings, m."""
-        shown = replace(self.shown, size=SYMBOLS * size)
-        sketch_plane(axes, shown, self.index)
-        name_points(axes, shown, self.index, labels, list(self.way.joints))
+        symbols = replace(self.shown, size=SYMBOLS * size)
+        sketch_plane(axes, symbols, self.index)
+        name_points(axes, symbols, self.index, labels, list(self.way.joints))
         if self.missing:
             _remark(axes, f"not assembled here: {', '.join(self.missing)}")
 
@@ -139,9 +139,9 @@ def _remark(axes: Axes, text: str) -> None:
     axes.text(0.03, 0.03, plain(text), transform=axes.transAxes, fontsize=7, color=MUTED, zorder=8)
 
 
-def _drawn(mechanism: Mechanism, stated: dict[str, Any], choice: GroupModes, way: AssemblyMode) -> ModeDrawing:
+def _drawn(mechanism: Mechanism, layout_of: dict[str, Any], choice: GroupModes, mode: AssemblyMode) -> ModeDrawing:
     """The whole mechanism with one group put together in one way, as far as it can be assembled."""
-    run = _run(mechanism, choice, way)
+    run = _run(mechanism, choice, mode)
     turns = max(1, math.ceil(run.cycle.turns)) if run.cycle.duration > 0 else 1
     times = np.union1d(run.cycle.times(min(STEPS * turns, MOST_STEPS)), choice.time)
     walk = forward(run.system, run.values, run.chosen.assembly, times)
@@ -156,50 +156,52 @@ def _drawn(mechanism: Mechanism, stated: dict[str, Any], choice: GroupModes, way
     }
     index = int(np.searchsorted(times, choice.time))
     missing = tuple(link for link, angle in angles.items() if not np.isfinite(angle[index]))
-    picture = framed(stated, tracks, angles)
-    return ModeDrawing(way, replace(picture, weight=0.5, only=choice.links), index, missing)
+    picture = framed(layout_of, tracks, angles)
+    return ModeDrawing(mode, replace(picture, weight=0.5, only=choice.links), index, missing)
 
 
-def _run(mechanism: Mechanism, choice: GroupModes, way: AssemblyMode) -> Run:
+def _run(mechanism: Mechanism, choice: GroupModes, mode: AssemblyMode) -> Run:
     """The mechanism put together in a way; without the names of other groups' ways if those then do not exist."""
-    changed = put_together(mechanism, choice, way)
+    changed = put_together(mechanism, choice, mode)
     try:
         return prepare(changed)
     except MechanismError:
-        stated = changed.data()
+        data = changed.data()
         hints = {key: hint for key, hint in changed.assembly.items() if key == choice.link or not isinstance(hint, str)}
-        kept = {key: stated["assembly"][key] for key in hints}
-        return prepare(Mechanism(**{**stated, "assembly": kept}))
+        hints_kept = {key: data["assembly"][key] for key in hints}
+        return prepare(Mechanism(**{**data, "assembly": hints_kept}))
 
 
 # ---- in space -----------------------------------------------------------------------------------------------------
 
 
-def _in_space(mechanism: Mechanism, found: Sequence[GroupModes]) -> list[list[Cell]]:
+def _in_space(mechanism: Mechanism, groups: Sequence[GroupModes]) -> list[list[Cell]]:
     """The drawings of all ways from one side; of those that cannot be assembled a remark."""
     rows = []
     camera = None
-    for choice in found:
+    for choice in groups:
         rows.append(list[Cell]())
-        for way in some(choice, MOST_DRAWN // 2):
+        for mode in some(choice, MOST_DRAWN // 2):
             try:
-                result = analyse(put_together(mechanism, choice, way).with_friction("off"), STEPS_SPACE)
-                shown = space(result)
+                result = analyse(put_together(mechanism, choice, mode).with_friction("off"), STEPS_SPACE)
+                bodies = space(result)
             except MechanismError:
-                rows[-1].append(Cell(way, None, lambda axes, *_: _remark(axes, "cannot be assembled in this mode")))
+                rows[-1].append(Cell(mode, None, lambda axes, *_: _remark(axes, "cannot be assembled in this mode")))
                 continue
-            camera = camera or looking(*best(shown))
-            look = scenery(shown, camera)
-            known = np.flatnonzero(shown.drawable)
+            camera = camera or looking(*best(bodies))
+            look = scenery(bodies, camera)
+            drawable = np.flatnonzero(bodies.drawable)
             times = np.asarray(result["time"].values, dtype=float)
-            index = int(known[np.argmin(np.abs(times[known] - choice.time))])
-            rows[-1].append(Cell(way, look.box, _drawing(choice, way, look, index)))
+            index = int(drawable[np.argmin(np.abs(times[drawable] - choice.time))])
+            rows[-1].append(Cell(mode, look.box, _drawing(choice, mode, look, index)))
     return rows
 
 
-def _drawing(choice: GroupModes, way: AssemblyMode, look: Scenery, index: int) -> Callable[[Axes, float, Labels], None]:
+def _drawing(
+    choice: GroupModes, mode: AssemblyMode, look: Scenery, index: int
+) -> Callable[[Axes, float, Labels], None]:
     def draw(axes: Axes, size: float, labels: Labels) -> None:
         sketch_space(axes, look, index, choice.links)
-        name_joints(axes, look, index, labels, tuple(way.joints), 7.5)
+        name_joints(axes, look, index, labels, tuple(mode.joints), 7.5)
 
     return draw

@@ -23,31 +23,31 @@ EQUAL = 1e-7  # of the largest number: nearer ones are one
 
 def gear_line(pair: GearPair) -> str:
     """'mesh: external, pitch radii 40 mm of crank, 80 mm of wheel', 'steering: pitch radius 8 mm of pinion'."""
-    told = []
+    parts = []
     for link, radius in pair.radii:
         factor, unit = prefixed(radius, "m")
-        told.append(f"{radius * factor:.5g} {unit} of {link}")
-    if len(told) == 1:
-        return f"{pair.name}: pitch radius {told[0]}"
-    return f"{pair.name}: {'internal' if pair.internal else 'external'}, pitch radii {', '.join(told)}"
+        parts.append(f"{radius * factor:.5g} {unit} of {link}")
+    if len(parts) == 1:
+        return f"{pair.name}: pitch radius {parts[0]}"
+    return f"{pair.name}: {'internal' if pair.internal else 'external'}, pitch radii {', '.join(parts)}"
 
 
 def lines(choice: GroupModes) -> list[str]:
     """The position if it is not the start, each way with its joints, and what to write to take another."""
-    wide = max(len(way.name) for way in choice.ways)
-    found = [f"at {choice.where}:"] * bool(choice.where)
-    told = some(choice, MOST_WAYS)
-    found += [f"{way.name:<{wide}}  {places(choice, way)}{'  <- used' * way.taken}" for way in told]
-    found += [f"… and {len(choice.ways) - len(told)} more"] * (len(told) < len(choice.ways))
-    other = next(way for way in choice.ways if not way.taken)
-    return [*found, f"to use another: {choice.line(other)}"]
+    wide = max(len(mode.name) for mode in choice.ways)
+    texts = [f"at {choice.where}:"] * bool(choice.where)
+    modes = some(choice, MOST_WAYS)
+    texts += [f"{mode.name:<{wide}}  {places(choice, mode)}{'  <- used' * mode.taken}" for mode in modes]
+    texts += [f"… and {len(choice.ways) - len(modes)} more"] * (len(modes) < len(choice.ways))
+    other = next(mode for mode in choice.ways if not mode.taken)
+    return [*texts, f"to use another: {choice.line(other)}"]
 
 
 def some(choice: GroupModes, most: int) -> list[AssemblyMode]:
     """The first ways of a choice, no more than `most`, the one that is taken always among them."""
     first = list(choice.ways[:most])
-    taken = [way for way in choice.ways[most:] if way.taken]
-    return [*first[: len(first) - len(taken)], *taken]
+    used = [mode for mode in choice.ways[most:] if mode.taken]
+    return [*first[: len(first) - len(used)], *used]
 
 
 def places(choice: GroupModes, way: AssemblyMode) -> str:

@@ -65,10 +65,10 @@ def _collect(name: str, read: Read, libraries: Collection[str], done: dict[str, 
 
 
 def _as_function(name: str, source: str, libraries: Collection[str]) -> str:
-    def unpacked(found: re.Match[str]) -> str:
-        what, other = found.groups()
+    def unpacked(match: re.Match[str]) -> str:
+        what, other = match.groups()
         if other not in libraries and (what.isidentifier() or not other.startswith(".")):
-            return found[0]
+            return match[0]
         named = {"{": what.replace(" as ", ": "), "*": what.split()[-1]}.get(what[0], f"{{ default: {what} }}")
         return f"const {named} = {_variable(other if other in libraries else _beside(name, other))};"
 

@@ -79,16 +79,16 @@ def layout(result: xr.Dataset) -> dict[str, Any]:
 
 @lru_cache(maxsize=4)  # every part of a view asks for it
 def _layout(text: str) -> dict[str, Any]:
-    stated: dict[str, Any] = json.loads(text)
-    return {"ground": "", "links": {}, "joints": {}, "loads": {}, "springs": {}, "gears": {}} | stated
+    layout_stated: dict[str, Any] = json.loads(text)
+    return {"ground": "", "links": {}, "joints": {}, "loads": {}, "springs": {}, "gears": {}} | layout_stated
 
 
 def course(result: xr.Dataset, picked: NDArray[np.intp], load: str) -> dict[str, list[list[float | None]]] | None:
     """Force and moment of a load that varies at the picked positions, by component; None if they are not known."""
-    known = attribute(result, "load_courses", "{}").get(load)
-    if known is None or any(len(one) != result.sizes["position"] for parts in known.values() for one in parts):
+    loads = attribute(result, "load_courses", "{}").get(load)
+    if loads is None or any(len(part) != result.sizes["position"] for parts in loads.values() for part in parts):
         return None
-    return {what: [[one[k] for k in picked] for one in parts] for what, parts in known.items()}
+    return {what: [[part[k] for k in picked] for part in parts] for what, parts in loads.items()}
 
 
 def names(result: xr.Dataset, dim: str) -> list[str]:

@@ -81,20 +81,20 @@ def picture(result: xr.Dataset) -> Picture:
     return replace(framed(layout(result), tracks, angles), pulls=members(result, "spring_force", "spring"))
 
 
-def framed(stated: dict[str, Any], tracks: dict[str, Array], angles: dict[str, Array]) -> Picture:
+def framed(layout_of: dict[str, Any], tracks: dict[str, Array], angles: dict[str, Array]) -> Picture:
     """The picture with the box around all that is known; raises MechanismError if nothing is."""
     points = np.concatenate([track.T for track in tracks.values()]) if tracks else np.empty((0, 2))
     points = points[np.isfinite(points).all(axis=1)]
     if not points.size:
         what = "no position of the mechanism can be assembled: there is nothing to draw"
         raise MechanismError(Finding(what, remedy="change the lengths or the range of the driver"))
-    centres = [(tracks[circle["at"]], circle["radius"]) for pair in stated["gears"].values() for circle in pair]
+    centres = [(tracks[circle["at"]], circle["radius"]) for pair in layout_of["gears"].values() for circle in pair]
     rims = [np.array([np.nanmin(track, axis=1) - radius, np.nanmax(track, axis=1) + radius])
             for track, radius in centres if np.isfinite(track).any()]  # fmt: skip
     points = np.concatenate([points, *rims])
     low, high = points.min(axis=0), points.max(axis=0)
     size = float(np.hypot(*(high - low))) or 1.0
-    return Picture(stated, tracks, angles, size, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
+    return Picture(layout_of, tracks, angles, size, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
 
 
 def bare(axes: Axes, low: Array, high: Array, title: Sequence[str]) -> Axes:
@@ -113,50 +113,52 @@ def facts(result: xr.Dataset, index: int) -> list[str]:
     return [f"{over.label} = {over.say(index)}", str(result.attrs.get("formula", "")), cause]
 
 
-def draw(axes: Axes, shown: Picture, index: int, labels: Labels) -> None:
+def draw(axes: Axes, drawing: Picture, index: int, labels: Labels) -> None:
     """Everything at position `index`, over the ghosts and the coupler curves; the names are still to be placed."""
-    _ghosts(axes, shown, index)
-    sketch(axes, shown, index)
-    name_points(axes, shown, index, labels)
+    _ghosts(axes, drawing, index)
+    sketch(axes, drawing, index)
+    name_points(axes, drawing, index, labels)
 
 
-def sketch(axes: Axes, shown: Picture, index: int) -> None:
+def sketch(axes: Axes, drawing: Picture, index: int) -> None:
     """Links, springs, gears and joints at position `index` over the coupler curves, without a letter."""
-    _curves(axes, shown)
-    cylinders = {link for name, joint in shown.stated["joints"].items()
-                 if PAIRS[joint["type"]].guided and cylinder(shown, name) for link in joint["links"]}  # fmt: skip
-    for link in sorted({*shown.moving} - cylinders, key=lambda link: (link in shown.only, shown.moving.index(link))):
-        _body(axes, shown, link, index, shown.colour(link))
-    for name, spring in shown.stated["springs"].items():
-        _spring(axes, shown, spring.get("between") or (), index, shown.pulls.get(name))
-    for pair in shown.stated["gears"].values():
+    _curves(axes, drawing)
+    cylinders = {link for name, joint in drawing.stated["joints"].items()
+                 if PAIRS[joint["type"]].guided and cylinder(drawing, name) for link in joint["links"]}  # fmt: skip
+    for link in sorted(
+        {*drawing.moving} - cylinders, key=lambda link: (link in drawing.only, drawing.moving.index(link))
+    ):
+        _body(axes, drawing, link, index, drawing.colour(link))
+    for name, spring in drawing.stated["springs"].items():
+        _spring(axes, drawing, spring.get("between") or (), index, drawing.pulls.get(name))
+    for pair in drawing.stated["gears"].values():
         for circle in pair:
-            _pitch_circle(axes, shown.tracks[circle["at"]][:, index], circle["radius"])
-    for name, joint in shown.stated["joints"].items():
-        _joint(axes, shown, name, joint, index)
+            _pitch_circle(axes, drawing.tracks[circle["at"]][:, index], circle["radius"])
+    for name, joint in drawing.stated["joints"].items():
+        _joint(axes, drawing, name, joint, index)
 
 
-def _ghosts(axes: Axes, shown: Picture, index: int) -> None:
-    count = next(iter(shown.tracks.values())).shape[1]
+def _ghosts(axes: Axes, drawing: Picture, index: int) -> None:
+    count = next(iter(drawing.tracks.values())).shape[1]
     for step in range(1, GHOSTS):
         other = (index + round(step * count / GHOSTS)) % count
-        for link in shown.stated["links"]:
-            corners = _corners(shown, link, other)
-            if link != shown.ground and corners is not None and other != index:
+        for link in drawing.stated["links"]:
+            corners = _corners(drawing, link, other)
+            if link != drawing.ground and corners is not None and other != index:
                 closed = np.vstack([corners, corners[:1]]) if len(corners) > 2 else corners
                 axes.plot(*closed.T, color=MUTED, linewidth=0.6, alpha=0.35, zorder=2, solid_joinstyle="round")
 
 
-def _curves(axes: Axes, shown: Picture) -> None:
+def _curves(axes: Axes, drawing: Picture) -> None:
     """Tracks of points that are no joints, and thinly those of the moving joints."""
-    for key, track in shown.tracks.items():
+    for key, track in drawing.tracks.items():
         link, point = key.split(".", 1)
-        if link == shown.ground:
+        if link == drawing.ground:
             continue
-        free = point not in shown.stated["joints"]
+        free = point not in drawing.stated["joints"]
         x, y = np.hstack([track, track[:, :1]]) if closes(track) else track
         if free:
-            axes.plot(x, y, color=INK, linewidth=1.3 * shown.weight, zorder=2.5)
+            axes.plot(x, y, color=INK, linewidth=1.3 * drawing.weight, zorder=2.5)
         else:
             axes.plot(x, y, color=MUTED, linewidth=0.7, linestyle=(0, (1, 2)), zorder=2.5)
 
@@ -169,10 +171,10 @@ def closes(track: Array) -> bool:
     return bool(np.linalg.norm(track[:, 0] - track[:, -1]) <= 2.0 * steps.max())
 
 
-def _corners(shown: Picture, link: str, index: int) -> Array | None:
+def _corners(drawing: Picture, link: str, index: int) -> Array | None:
     """A link's points as the corners of its convex body, (corner, axis); None where it has no place."""
-    keys = shown.joints(link)
-    points = np.array([shown.tracks[key][:, index] for key in keys]).reshape(-1, 2)
+    keys = drawing.joints(link)
+    points = np.array([drawing.tracks[key][:, index] for key in keys]).reshape(-1, 2)
     if not len(points) or not np.isfinite(points).all():
         return None
     return hull(points)
@@ -185,12 +187,12 @@ def hull(points: Array) -> Array:
         return np.array(ordered)
 
     def half(chain: list[tuple[float, float]]) -> list[tuple[float, float]]:
-        kept: list[tuple[float, float]] = []
+        corners: list[tuple[float, float]] = []
         for point in chain:
-            while len(kept) > 1 and _turn(kept[-2], kept[-1], point) <= 0:
-                kept.pop()
-            kept.append(point)
-        return kept[:-1]
+            while len(corners) > 1 and _turn(corners[-2], corners[-1], point) <= 0:
+                corners.pop()
+            corners.append(point)
+        return corners[:-1]
 
     return np.array(half(ordered) + half(ordered[::-1]))
 
@@ -199,13 +201,13 @@ def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-def _body(axes: Axes, shown: Picture, link: str, index: int, colour: str) -> None:
+def _body(axes: Axes, drawing: Picture, link: str, index: int, colour: str) -> None:
     """A rounded plate around the link's points: the same outline drawn wide, then less wide in a tint."""
-    corners = _corners(shown, link, index)
+    corners = _corners(drawing, link, index)
     if corners is None or len(corners) < 2:
         return
     for width, paint in ((12.0, colour), (9.6, tint(colour))):
-        width *= shown.weight
+        width *= drawing.weight
         if len(corners) == 2:
             axes.plot(*corners.T, color=paint, linewidth=width, solid_capstyle="round", zorder=4)
         else:
@@ -222,13 +224,13 @@ def tint(colour: str, share: float = 0.28) -> str:
 COILS = np.array([[0.0, 0.18, *np.linspace(0.2, 0.8, 16), 0.82, 1.0], [0, 0, *np.tile([1.0, -1.0], 8), 0, 0]])
 
 
-def _spring(axes: Axes, shown: Picture, ends: Sequence[str], index: int, pull: Array | None) -> None:
+def _spring(axes: Axes, drawing: Picture, ends: Sequence[str], index: int, pull: Array | None) -> None:
     """A zigzag between the ends of a spring, dotted where it does not act."""
-    places = [shown.tracks[end][:, index] for end in ends if end in shown.tracks]
+    places = [drawing.tracks[end][:, index] for end in ends if end in drawing.tracks]
     if len(places) < 2 or not np.isfinite(places).all():
         return
     along = places[1] - places[0]
-    across = np.array([-along[1], along[0]]) / (np.hypot(*along) or 1.0) * 0.012 * shown.size
+    across = np.array([-along[1], along[0]]) / (np.hypot(*along) or 1.0) * 0.012 * drawing.size
     path = places[0][:, None] + np.outer(along, COILS[0]) + np.outer(across, COILS[1])
     line = ":" if pull is not None and pull[index] == 0 else "-"
     axes.plot(*path, color=MUTED, linewidth=1.1, linestyle=line, zorder=4.5, solid_joinstyle="round")
@@ -241,21 +243,21 @@ def _pitch_circle(axes: Axes, place: Array, radius: float) -> None:
         axes.add_patch(Circle((place[0], place[1]), radius, fill=False, edgecolor=INK, linestyle=line, zorder=3.5))
 
 
-def _joint(axes: Axes, shown: Picture, name: str, joint: dict[str, Any], index: int) -> None:
+def _joint(axes: Axes, drawing: Picture, name: str, joint: dict[str, Any], index: int) -> None:
     first, second = joint["links"]
-    track = shown.tracks.get(f"{second}.{name}")
+    track = drawing.tracks.get(f"{second}.{name}")
     if track is None or not np.isfinite(track[:, index]).all():
         return
-    if f"{first}.{name}" in shown.tracks and not np.isfinite(shown.tracks[f"{first}.{name}"][:, index]).all():
+    if f"{first}.{name}" in drawing.tracks and not np.isfinite(drawing.tracks[f"{first}.{name}"][:, index]).all():
         return  # its first link has no place
     place = track[:, index]
-    grounded = shown.ground in (first, second)
+    grounded = drawing.ground in (first, second)
     if PAIRS[joint["type"]].guided:
-        _slider(axes, shown, name, index, place, grounded)
+        _slider(axes, drawing, name, index, place, grounded)
         return
     if grounded:
-        _support(axes, place, 0.022 * shown.size)
-    r = 0.0095 * shown.size
+        _support(axes, place, 0.022 * drawing.size)
+    r = 0.0095 * drawing.size
     axes.add_patch(Circle((place[0], place[1]), r, facecolor="white", edgecolor=INK, linewidth=1.3, zorder=6))
 
 
@@ -277,23 +279,23 @@ def _hatched(axes: Axes, middle: Array, angle: float, half: float, r: float) -> 
         axes.plot(*stroke.T, color=INK, linewidth=0.8, zorder=3)
 
 
-def _slider(axes: Axes, shown: Picture, name: str, index: int, place: Array, grounded: bool) -> None:
+def _slider(axes: Axes, drawing: Picture, name: str, index: int, place: Array, grounded: bool) -> None:
     """A block on its guide; the guide is hatched if it is fixed."""
-    angle = shown.axis(name, index)
-    r = 0.022 * shown.size
+    angle = drawing.axis(name, index)
+    r = 0.022 * drawing.size
     if grounded:
-        track = shown.tracks[f"{shown.stated['joints'][name]['links'][1]}.{name}"]
-        way = np.array([np.cos(angle), np.sin(angle)]) @ track
-        low, high = float(np.nanmin(way)), float(np.nanmax(way))
+        track = drawing.tracks[f"{drawing.stated['joints'][name]['links'][1]}.{name}"]
+        direction = np.array([np.cos(angle), np.sin(angle)]) @ track
+        low, high = float(np.nanmin(direction)), float(np.nanmax(direction))
         here = float(np.array([np.cos(angle), np.sin(angle)]) @ place)
         middle = place + ((low + high) / 2 - here) * np.array([np.cos(angle), np.sin(angle)])
         below = np.array([np.sin(angle), -np.cos(angle)]) * r
         _hatched(axes, middle + below, angle, (high - low) / 2 + 2.4 * r, r)
-    elif (parts := cylinder(shown, name)) is not None:
-        _cylinder(axes, shown, name, index, parts)
+    elif (parts := cylinder(drawing, name)) is not None:
+        _cylinder(axes, drawing, name, index, parts)
         return
     else:
-        _slot(axes, shown, name, index, 2.4 * r)
+        _slot(axes, drawing, name, index, 2.4 * r)
     turned = Affine2D().rotate(angle).translate(*place) + axes.transData
     axes.add_patch(Rectangle((-1.7 * r, -r), 3.4 * r, 2 * r, transform=turned, facecolor="white", edgecolor=INK,
                              linewidth=1.3, zorder=5))  # fmt: skip
@@ -310,69 +312,69 @@ class Cylinder(NamedTuple):
     long: tuple[float, float]
 
 
-def cylinder(shown: Picture, name: str) -> Cylinder | None:
+def cylinder(drawing: Picture, name: str) -> Cylinder | None:
     """The cylinder that a slide is; None where no driver moves it, where its links have more than two joints, where the
     eyes do not lie on the guide, or where the stroke is longer than a barrel could be.
     """
-    stated, eyes = shown.stated, list[str]()
-    for link in stated["joints"][name]["links"]:
-        keys = [key for key in shown.joints(link) if key != f"{link}.{name}"]
-        if link == shown.ground or len(keys) != 1 or keys[0].split(".", 1)[1] not in stated["joints"]:
+    layout_of, eyes = drawing.stated, list[str]()
+    for link in layout_of["joints"][name]["links"]:
+        keys = [key for key in drawing.joints(link) if key != f"{link}.{name}"]
+        if link == drawing.ground or len(keys) != 1 or keys[0].split(".", 1)[1] not in layout_of["joints"]:
             return None
         eyes += keys
-    if name not in stated.get("drivers", ()):
+    if name not in layout_of.get("drivers", ()):
         return None
-    apart = shown.tracks[eyes[1]] - shown.tracks[eyes[0]]
-    turns = np.array([shown.axis(name, position) for position in range(apart.shape[1])])
-    beside = np.nanmax(np.abs(apart[1] * np.cos(turns) - apart[0] * np.sin(turns)), initial=0.0)
+    apart = drawing.tracks[eyes[1]] - drawing.tracks[eyes[0]]
+    turns = np.array([drawing.axis(name, position) for position in range(apart.shape[1])])
+    width = np.nanmax(np.abs(apart[1] * np.cos(turns) - apart[0] * np.sin(turns)), initial=0.0)
     low, high = (float(end(np.hypot(*apart))) for end in (np.nanmin, np.nanmax))
     rod = PISTON * low
     barrel = high - rod + (1 - PISTON) * low
-    return Cylinder(eyes[0], eyes[1], (rod, barrel)) if barrel < low and beside < ASIDE * shown.size else None
+    return Cylinder(eyes[0], eyes[1], (rod, barrel)) if barrel < low and width < ASIDE * drawing.size else None
 
 
-def _cylinder(axes: Axes, shown: Picture, name: str, index: int, parts: Cylinder) -> None:
+def _cylinder(axes: Axes, drawing: Picture, name: str, index: int, parts: Cylinder) -> None:
     """The rod, and over it the barrel that it comes out of."""
-    start, end = shown.tracks[parts.barrel][:, index], shown.tracks[parts.rod][:, index]
+    start, end = drawing.tracks[parts.barrel][:, index], drawing.tracks[parts.rod][:, index]
     along = (end - start) / np.hypot(*(end - start))
-    barrel, rod = shown.stated["joints"][name]["links"]
+    barrel, rod = drawing.stated["joints"][name]["links"]
     for ends, width, link in (((end - parts.long[0] * along, end), 7.0, rod),
                               ((start, start + parts.long[1] * along), 17.0, barrel)):  # fmt: skip
-        for edge, paint in ((0.0, shown.colour(link)), (2.4, tint(shown.colour(link)))):
-            axes.plot(*np.array(ends).T, color=paint, linewidth=(width - edge) * shown.weight,
+        for edge, paint in ((0.0, drawing.colour(link)), (2.4, tint(drawing.colour(link)))):
+            axes.plot(*np.array(ends).T, color=paint, linewidth=(width - edge) * drawing.weight,
                       zorder=4.2 if link == rod else 4.3, solid_capstyle="round")  # fmt: skip
 
 
-def _slot(axes: Axes, shown: Picture, name: str, index: int, beyond: float) -> None:
+def _slot(axes: Axes, drawing: Picture, name: str, index: int, overrun: float) -> None:
     """The guide on a moving first link: as long as the block travels in it, and a little beyond."""
-    first, second = shown.stated["joints"][name]["links"]
-    on, at = shown.tracks[f"{first}.{name}"], shown.tracks[f"{second}.{name}"]
-    turns = np.array([shown.axis(name, position) for position in range(on.shape[1])])
+    first, second = drawing.stated["joints"][name]["links"]
+    on, at = drawing.tracks[f"{first}.{name}"], drawing.tracks[f"{second}.{name}"]
+    turns = np.array([drawing.axis(name, position) for position in range(on.shape[1])])
     along = np.array([np.cos(turns), np.sin(turns)])
     slide = np.sum((at - on) * along, axis=0)
-    travel = np.array([np.nanmin(slide) - beyond, np.nanmax(slide) + beyond])
+    travel = np.array([np.nanmin(slide) - overrun, np.nanmax(slide) + overrun])
     body = np.array([min(travel[0], 0.0), max(travel[1], 0.0)])  # as far as the link's own point
-    colour = shown.colour(first)
+    colour = drawing.colour(first)
     for reach, width, paint in ((body, 12.0, colour), (body, 9.6, tint(colour)), (travel, 2.4, "white")):
         ends = on[:, index, None] + along[:, index, None] * reach
-        axes.plot(*ends, color=paint, linewidth=width * shown.weight, solid_capstyle="round", zorder=4.2)
+        axes.plot(*ends, color=paint, linewidth=width * drawing.weight, solid_capstyle="round", zorder=4.2)
 
 
-def name_points(axes: Axes, shown: Picture, index: int, labels: Labels, only: Sequence[str] | None = None) -> None:
+def name_points(axes: Axes, drawing: Picture, index: int, labels: Labels, only: Sequence[str] | None = None) -> None:
     """Names of joints and points, all or only some; points that are no joints get a dot."""
     places: dict[str, Array] = {}
-    for key, track in shown.tracks.items():
+    for key, track in drawing.tracks.items():
         link, point = key.split(".", 1)
-        joint = shown.stated["joints"].get(point)
+        joint = drawing.stated["joints"].get(point)
         if np.isfinite(track[:, index]).all() and (joint is None or joint["links"][1] == link):
             places[point] = track[:, index]
-            if joint is None and link != shown.ground:
-                axes.plot(*track[:, index], "o", markersize=4.5 * shown.weight, color=INK, zorder=6)
+            if joint is None and link != drawing.ground:
+                axes.plot(*track[:, index], "o", markersize=4.5 * drawing.weight, color=INK, zorder=6)
     places = places if only is None else {point: place for point, place in places.items() if point in only}
-    for text, points in _together(places, 0.02 * shown.size):
-        joints = [shown.stated["joints"].get(point, {}) for point in points]
+    for text, points in _together(places, 0.02 * drawing.size):
+        joints = [drawing.stated["joints"].get(point, {}) for point in points]
         block = any(joint.get("type") in GUIDED for joint in joints)
-        labels.add(axes, text, places[points[0]], 10 * shown.letters, 0.036 * shown.size if block else 0.0)
+        labels.add(axes, text, places[points[0]], 10 * drawing.letters, 0.036 * drawing.size if block else 0.0)
 
 
 def _together(places: dict[str, Array], near: float) -> list[tuple[str, list[str]]]:

@@ -69,9 +69,9 @@ class Sheet(Figure):
 
     def _repr_png_(self) -> bytes:
         """What a notebook shows; matplotlib tells it only of figures that pyplot has made."""
-        found = io.BytesIO()
-        self.savefig(found, format="png", dpi=100)
-        return found.getvalue()
+        buffer = io.BytesIO()
+        self.savefig(buffer, format="png", dpi=100)
+        return buffer.getvalue()
 
 
 @cache
@@ -241,18 +241,18 @@ class Labels:
         halves = [0.5 * np.asarray(note.get_window_extent(renderer).size, float) for note in notes]
         ways = [np.array(GAPS)[:, None, None] * scale * SIDES + half * SIDES / np.abs(SIDES).max(axis=1, keepdims=True)
                 for half in halves]  # fmt: skip
-        costs = [_costs(sums, spot + way, half + MARGIN * scale)
-                 for spot, way, half in zip(spots, ways, halves, strict=True)]  # fmt: skip
-        taken: list[tuple[Array, Array]] = []
+        costs = [_costs(sums, spot + direction, half + MARGIN * scale)
+                 for spot, direction, half in zip(spots, ways, halves, strict=True)]  # fmt: skip
+        boxes: list[tuple[Array, Array]] = []
         for k in np.argsort([-cost.min() for cost in costs], kind="stable"):
             middles, cost = spots[k] + ways[k], costs[k]
-            for middle, half in taken:
+            for middle, half in boxes:
                 cost = cost + CROSSED * np.all(np.abs(middles - middle) < halves[k] + MARGIN * scale + half, axis=-1)
             for other in np.delete(spots, k, axis=0):
                 far = np.linalg.norm(middles - other, axis=-1)
                 cost = cost + STRAY * (far < np.linalg.norm(ways[k], axis=-1))
             offset = ways[k].reshape(-1, 2)[int(np.argmin(cost))]
-            taken.append((spots[k] + offset, halves[k]))
+            boxes.append((spots[k] + offset, halves[k]))
             notes[k].set_position(tuple(offset / scale))
 
     def _darkness(self, pixels: NDArray[np.uint8], spots: Array, scale: float) -> Array:

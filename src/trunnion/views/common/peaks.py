@@ -54,17 +54,17 @@ def ease_of_status(result: xr.Dataset, status: NDArray[np.generic]) -> Array:
     return np.where(np.isin(status, [int(code) for code in BESIDE]) & (UNCUT not in result.attrs), 0.0, 1.0)
 
 
-def whole_peaks(result: xr.Dataset, wanted: bool = True) -> xr.Dataset:
+def whole_peaks(result: xr.Dataset, uncut: bool = True) -> xr.Dataset:
     """The result whose views cut no peak, if that is wanted."""
-    return result.assign_attrs({UNCUT: 1}) if wanted else result
+    return result.assign_attrs({UNCUT: 1}) if uncut else result
 
 
 def _condition(result: xr.Dataset) -> Array:
     """Condition over the usual one, (position,)."""
     condition = column(result, "condition")
     assert condition is not None  # `ease` has looked
-    known = condition[np.isfinite(condition)]
-    return condition / float(np.median(known)) if known.size else np.ones(condition.size)
+    finite = condition[np.isfinite(condition)]
+    return condition / float(np.median(finite)) if finite.size else np.ones(condition.size)
 
 
 def _friction(result: xr.Dataset) -> Array:
@@ -78,21 +78,21 @@ def _friction(result: xr.Dataset) -> Array:
 
 def _touched(within: NDArray[np.bool_], core: NDArray[np.bool_], closed: bool) -> NDArray[np.bool_]:
     """The runs of `within` that hold one of `core`; closed: after the last comes the first."""
-    kept = np.zeros_like(within)
+    marks = np.zeros_like(within)
     if within.all():
         return within & core.any()
     first = int(np.flatnonzero(~within)[0]) if closed else 0
     inside, at = np.roll(within, -first), np.roll(core, -first)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        kept[start:stop] = at[start:stop].any()
-    return np.roll(kept, first)
+        marks[start:stop] = at[start:stop].any()
+    return np.roll(marks, first)
 
 
 def peak(*columns: Array | None) -> float:
     """The greatest magnitude in all columns; 0 if none is finite."""
-    known = [np.abs(values[np.isfinite(values)]).max(initial=0.0) for values in columns if values is not None]
-    return float(max(known, default=0.0))
+    sizes = [np.abs(values[np.isfinite(values)]).max(initial=0.0) for values in columns if values is not None]
+    return float(max(sizes, default=0.0))
 
 
 def usual_peak(easy: Array, *columns: Array | None) -> float:
@@ -101,11 +101,11 @@ def usual_peak(easy: Array, *columns: Array | None) -> float:
     easy: of `ease`, (position,); columns: (…, position). What does not grow towards the dead centre as forces do is a
     load that works there, and all is shown.
     """
-    found = [np.broadcast_to(easy, values.shape) for values in columns if values is not None]
-    shares = np.concatenate([share.ravel() for share in found]) if found else np.empty(0)
-    sizes = np.concatenate([np.abs(values).ravel() for values in columns if values is not None]) if found else shares
-    known = np.isfinite(sizes)
-    shares, sizes = shares[known], sizes[known]
+    limits = [np.broadcast_to(easy, values.shape) for values in columns if values is not None]
+    shares = np.concatenate([share.ravel() for share in limits]) if limits else np.empty(0)
+    sizes = np.concatenate([np.abs(values).ravel() for values in columns if values is not None]) if limits else shares
+    finite = np.isfinite(sizes)
+    shares, sizes = shares[finite], sizes[finite]
     most = float(sizes.max(initial=0.0))
     rest = float(sizes[shares == 1.0].max(initial=0.0))
     works = float((sizes * shares**FASTEST).max(initial=0.0)) > 2.0 * rest

@@ -279,8 +279,8 @@ def _rate(result: xr.Dataset, over: Abscissa, kind: Motions, order: int) -> Char
 
 def _motions(result: xr.Dataset) -> list[Motions]:
     """What moves: links that turn and joints that slide; in space also joints that turn."""
-    stated, spatial = layout(result), is_spatial(result)
-    kinds = {name: stated["joints"].get(name, {}).get("type") for name in names(result, "joint")}
+    layout_of, spatial = layout(result), is_spatial(result)
+    kinds = {name: layout_of["joints"].get(name, {}).get("type") for name in names(result, "joint")}
 
     def rated(variable: str, dim: str, of: Collection[str]) -> list[dict[str, Array]]:
         every = (members(result, variable + rate, dim) for rate in ("", "_velocity", "_acceleration"))
@@ -288,7 +288,7 @@ def _motions(result: xr.Dataset) -> list[Motions]:
 
     if not spatial:
         turning = [link for link, angle in members(result, "link_angle", "link").items()
-                   if link != stated["ground"] and _moves(angle)]  # fmt: skip
+                   if link != layout_of["ground"] and _moves(angle)]  # fmt: skip
         sliding = [name for name, kind in kinds.items() if kind in GUIDED]
         angles = [Motions("angle", "rad", rated("link_angle", "link", turning))] if turning or not sliding else []
         return [*angles, *([Motions("slide", "m", rated("joint_slide", "joint", sliding))] if sliding else [])]
@@ -302,7 +302,7 @@ def _motions(result: xr.Dataset) -> list[Motions]:
     for rate in ("velocity", "acceleration"):
         vectors = members(result, f"link_angular_{rate}", "link")
         turns.append({link: np.linalg.norm(vector, axis=0) for link, vector in vectors.items()})
-    courses = [{link: course for link, course in order.items() if link != stated["ground"]} for order in turns]
+    courses = [{link: course for link, course in order.items() if link != layout_of["ground"]} for order in turns]
     return [*panels, Motions("turn of the link", "rad", courses, ("angular velocity", "angular acceleration"))]
 
 
@@ -333,8 +333,8 @@ def turned_from_start(rotation: Array) -> Array:
     same = np.sign(np.sum(rotation[:, solved[1:]] * rotation[:, solved[:-1]], axis=0))
     cosine, sine = (part * np.cumprod([1.0, *np.where(same < 0, -1.0, 1.0)]) for part in (cosine, sine))
     size = np.linalg.norm(sine, axis=0)
-    way = np.sum(sine[:, 1:] * sine[:, :-1], axis=0)
-    size = size * np.cumprod([1.0, *np.where(way < 0, -1.0, 1.0)])
+    turning = np.sum(sine[:, 1:] * sine[:, :-1], axis=0)
+    size = size * np.cumprod([1.0, *np.where(turning < 0, -1.0, 1.0)])
     angle[solved] = np.unwrap(2 * np.arctan2(size, cosine), period=4 * np.pi)
     return angle
 
@@ -356,16 +356,16 @@ def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
         what = "there is no measure with one number at every position"
         raise MechanismError(Finding(what, "measures", "state measures: in the model"))
     units, figure_units = (units_along(result[f"measure_{part}"], "measure") for part in ("value", "figure"))
-    stated, aspects = layout(result).get("measures", {}), {row.name: row.aspect for row in summary_of(result)}
+    measures_stated, aspects = layout(result).get("measures", {}), {row.name: row.aspect for row in summary_of(result)}
     names_of = [str(name) for name in result["measure"].values]
     values, figures, charts = result["measure_value"].values, result["measure_figure"].values, list[Chart]()
     for i in rows:
         same = [k for k in rows if units[k] == units[i] and np.array_equal(values[k], values[i], equal_nan=True)]
         if i != same[0]:
             continue
-        title = names_of[i] if len(same) == 1 else stated.get(names_of[i], "course of the measures")
+        title = names_of[i] if len(same) == 1 else measures_stated.get(names_of[i], "course of the measures")
         scope = usual_peak(ease(result), values[i])
-        factor, shown = (scaled if units[i] == "m" else prefixed)(scope, units[i])
+        factor, display_unit = (scaled if units[i] == "m" else prefixed)(scope, units[i])
         marks = list[Mark]()
         for k in same:
             if np.isfinite(figures[k]):
@@ -376,7 +376,7 @@ def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
                 # a figure that is no value of the course is told in the legend alone
                 marks.append(Rule(figures[k] * factor if level else np.nan, text, look, upright=False))
         line = Line(over.values, values[i], title, Look(0, 2.0), close=True)
-        charts.append(over_drive(result, over, title, units[i], [line], marks=marks, scale=(factor, shown),
+        charts.append(over_drive(result, over, title, units[i], [line], marks=marks, scale=(factor, display_unit),
                                  legend=Legend(3)))  # fmt: skip
     return _stack("Measures", charts)
 
@@ -502,12 +502,12 @@ def _states(result: xr.Dataset, over: Abscissa, named: bool) -> list[Mark]:
     if len(time) > 1:  # a motion that comes again has ranges beyond its last position
         time, values = (np.append(row, 2 * row[-1] - row[-2]) for row in (time, values))
     rows = [row for row in attribute(result, "locking_ranges", '{"rows": []}')["rows"] if row["state"]]
-    marks, both, seen = list[Mark](), {state.name.lower() for state in HELD_AND_DRIVEN}, set[str]()
+    marks, both, names_marked = list[Mark](), {state.name.lower() for state in HELD_AND_DRIVEN}, set[str]()
     for state, colour in STATES:
         for row in (row for row in rows if row["state"] == state.name.lower()):
             low, high = np.interp(row["times"], time, values)
-            name = state.short if named and state.short not in seen else None
-            seen.add(state.short)
+            name = state.short if named and state.short not in names_marked else None
+            names_marked.add(state.short)
             marks.append(Stripe(float(low), float(high), "", Look(colour, order=0.55), name))
     label = "drive effort changes sign" if named else None
     for before, after in pairwise(rows):

@@ -103,11 +103,11 @@ class Output(NamedTuple):
 
 def outputs(result: xr.Dataset) -> list[Output]:
     """Transmission errors, as the summary of the result has them."""
-    stated, drivers, picked = layout(result), names(result, "driver"), []
+    layout_of, drivers, picked = layout(result), names(result, "driver"), []
     turns, slides = (members(result, f"joint_{what}_error", "joint") for what in ("rotation", "slide"))
     for joint in names(result, "joint"):
-        about = stated["joints"].get(joint, {})
-        if stated["ground"] in about.get("links", ()) and joint not in drivers:
+        about = layout_of["joints"].get(joint, {})
+        if layout_of["ground"] in about.get("links", ()) and joint not in drivers:
             guided = PAIRS[about["type"]].guided
             error = (slides if guided else turns).get(joint)
             if error is not None and np.isfinite(error).any():
@@ -127,24 +127,24 @@ def with_worst_case(result: xr.Dataset, mechanism: Mechanism) -> xr.Dataset:
     `transmission_centre` and `transmission_reach` (joint, position), rad or m, NaN of joints that are no outputs: the
     error with every pin in the middle of its hole, and the most that all plays can add to it, to first order.
     """
-    found = outputs(result) if has(result, "errors") else []
-    if not found:
+    outputs_of = outputs(result) if has(result, "errors") else []
+    if not outputs_of:
         return result
-    measures = [f"{'slide' if one.unit == 'm' else 'rotation'}:{one.joint}" for one in found]
+    measures = [f"{'slide' if output.unit == 'm' else 'rotation'}:{output.joint}" for output in outputs_of]
     try:
         free = play_of(mechanism, measures, result.sizes["position"])
     except MechanismError:  # no joint has a play
         return result
     joints = names(result, "joint")
     centre, reach = (np.full((len(joints), result.sizes["position"]), np.nan) for _ in range(2))
-    for one, measure in zip(found, measures, strict=True):
-        told = column(result, f"joint_{measure.split(':')[0]}", joint=one.joint)
+    for output, measure in zip(outputs_of, measures, strict=True):
+        rotation = column(result, f"joint_{measure.split(':')[0]}", joint=output.joint)
         middle, most = (column(free, name, measure=measure) for name in ("value", "worst_case_total"))
-        if told is None or middle is None or most is None:
+        if rotation is None or middle is None or most is None:
             continue
-        apart = middle - told
-        turns = 2 * np.pi * np.round(apart / (2 * np.pi)) if one.unit == "rad" else 0.0
-        centre[joints.index(one.joint)], reach[joints.index(one.joint)] = one.error + apart - turns, most
+        apart = middle - rotation
+        turns = 2 * np.pi * np.round(apart / (2 * np.pi)) if output.unit == "rad" else 0.0
+        centre[joints.index(output.joint)], reach[joints.index(output.joint)] = output.error + apart - turns, most
     if not np.nanmax(reach, initial=0.0) > 0:
         return result
     dims = ("joint", "position")
@@ -183,13 +183,13 @@ class Seats(NamedTuple):
 
 def seated(result: xr.Dataset) -> list[Seats]:
     """Every joint with a seat that is known anywhere."""
-    stated, every = layout(result), []
+    layout_of, every = layout(result), []
     offsets, forces = (members(result, name, "joint") for name in ("seat_offset", "end_force"))
-    for joint, play in stated.get("plays", {}).items():
+    for joint, play in layout_of.get("plays", {}).items():
         if joint in offsets and np.isfinite(offsets[joint]).any():
             offset, force, kind = offsets[joint], forces[joint], play["kind"]
             ends = 1 if kind == "ball" or (kind == "pin" and offset.shape[1] == 2) else 2
-            first, second = stated["joints"][joint]["links"]
+            first, second = layout_of["joints"][joint]["links"]
             every.append(Seats(joint, kind, play["clearance"], play["float"], play["length"], offset[:ends],
                                force[:ends], (first, second)))  # fmt: skip
     return every
@@ -214,13 +214,17 @@ def continued(beta: Array, xi: Array) -> tuple[Array, Array]:
     β stays as near as it can to the position before, within a turn to either side; ξ in (−π, π].
     """
     turns = np.zeros(beta.size)
-    known = np.flatnonzero(np.isfinite(beta))
-    turns[known] = np.cumsum(np.append(0.0, -np.round(np.diff(beta[known]) / (2 * np.pi))))
-    usual = float(np.median((beta + 2 * np.pi * turns)[known])) if known.size else 0.0
+    finite = np.flatnonzero(np.isfinite(beta))
+    turns[finite] = np.cumsum(np.append(0.0, -np.round(np.diff(beta[finite]) / (2 * np.pi))))
+    usual = float(np.median((beta + 2 * np.pi * turns)[finite])) if finite.size else 0.0
     middle = np.ceil((usual - 1.5 * np.pi) / (2 * np.pi))  # crossed ends, ±π, are shown at π
     turns = turns - middle
-    whole = (beta + 2 * np.pi * turns) / (2 * np.pi)  # an end that goes round and round starts anew after each turn
-    turns = turns - np.where(np.abs(whole) > 1.0 + 1e-9, np.sign(whole) * np.ceil(np.abs(whole) - 1.0 - 1e-9), 0.0)
+    revolutions = (beta + 2 * np.pi * turns) / (
+        2 * np.pi
+    )  # an end that goes round and round starts anew after each turn
+    turns = turns - np.where(
+        np.abs(revolutions) > 1.0 + 1e-9, np.sign(revolutions) * np.ceil(np.abs(revolutions) - 1.0 - 1e-9), 0.0
+    )
     turned = xi - np.pi * turns
     return beta + 2 * np.pi * turns, turned - 2 * np.pi * np.ceil((turned - np.pi) / (2 * np.pi))
 
@@ -230,9 +234,9 @@ def jumps(y: Array, jump: float, lost: NDArray[np.intp] = NOWHERE) -> NDArray[np
     lost.
     """
     step = np.abs(np.diff(y))
-    beside = np.nan_to_num(np.maximum(np.append(0.0, step[:-1]), np.append(step[1:], 0.0)))
+    neighbours = np.nan_to_num(np.maximum(np.append(0.0, step[:-1]), np.append(step[1:], 0.0)))
     near = np.isin(np.arange(step.size), [lost - 1, lost])
-    return np.flatnonzero((step > jump) | (step > np.where(near, 0.0, SUDDEN * beside) + jump / 20)) + 1
+    return np.flatnonzero((step > jump) | (step > np.where(near, 0.0, SUDDEN * neighbours) + jump / 20)) + 1
 
 
 def broken(x: Array, y: Array, jump: float, lost: NDArray[np.intp] = NOWHERE) -> tuple[Array, Array]:
@@ -303,12 +307,12 @@ def loss_rows(result: xr.Dataset) -> list[Row]:
     """Joints that lose contact, with the positions, and the largest contact loss number."""
     over, rows = abscissa(result), []
     for joint, places in losses(result).items():
-        shown = ", ".join(over.say(int(index)) for index in places[:MOST_PLACES])
+        examples = ", ".join(over.say(int(index)) for index in places[:MOST_PLACES])
         more = len(places) - MOST_PLACES
         rates = column(result, "contact_loss_number", joint=joint)
-        known = rates is not None and np.isfinite(rates).any()
-        most = f"{number(float(np.nanmax(rates)), 3)}\u00a0rad/(N\u00a0s)" if rates is not None and known else "—"
-        rows.append({"joint": joint, "places": f"{shown} and {more} more" if more > 0 else shown, "number": most})
+        any_rate = rates is not None and np.isfinite(rates).any()
+        most = f"{number(float(np.nanmax(rates)), 3)}\u00a0rad/(N\u00a0s)" if rates is not None and any_rate else "—"
+        rows.append({"joint": joint, "places": f"{examples} and {more} more" if more > 0 else examples, "number": most})
     return rows
 
 
@@ -327,25 +331,25 @@ def built(result: xr.Dataset, lost: list[int]) -> dict[str, Any] | None:
     if "point_error" not in result:
         return None
     spatial = is_spatial(result)
-    shown, points = gathered(result) if spatial else None, members(result, "point_error", "point")
+    bodies, points = gathered(result) if spatial else None, members(result, "point_error", "point")
     return {
-        "preset": _preset(result, shown.size if shown else _size(result)),
+        "preset": _preset(result, bodies.size if bodies else _size(result)),
         "points": {} if spatial else {key: _vector(error) for key, error in points.items()},
-        "links": _moved(result, shown)
-        if shown
+        "links": _moved(result, bodies)
+        if bodies
         else {link: _series(error) for link, error in members(result, "link_error", "link").items()},
         "worst": [{"label": key, "values": _series(values)} for key, values in worst_points(result).items()],
         "outputs": _outputs(result),
         "lost": lost,
-        "seats": [_seat(one) for one in seated(result)],
+        "seats": [_seat(seat) for seat in seated(result)],
         "angles": _angles(result, np.array(lost, np.intp)),
     }
 
 
 def _series(values: Array) -> list[float | None]:
     """Five digits of a series; one number if it never changes."""
-    rounded = [None if one is None else float(f"{one:.{DIGITS}g}") for one in numbers(values)]
-    return rounded[:1] if rounded and all(one == rounded[0] for one in rounded) else rounded
+    rounded = [None if number is None else float(f"{number:.{DIGITS}g}") for number in numbers(values)]
+    return rounded[:1] if rounded and all(number == rounded[0] for number in rounded) else rounded
 
 
 def _vector(values: Array) -> dict[str, list[float | None]]:
@@ -355,8 +359,8 @@ def _vector(values: Array) -> dict[str, list[float | None]]:
 def _size(result: xr.Dataset) -> float:
     """Diagonal of the box around all points of a mechanism in the plane, m."""
     places = np.asarray(result["point_position"].transpose("axis", ...).values, dtype=float).reshape(2, -1)
-    known = places[:, np.isfinite(places).all(axis=0)]
-    return float(np.linalg.norm(np.ptp(known, axis=1))) if known.size else 0.0
+    finite = places[:, np.isfinite(places).all(axis=0)]
+    return float(np.linalg.norm(np.ptp(finite, axis=1))) if finite.size else 0.0
 
 
 def _preset(result: xr.Dataset, size: float) -> float:
@@ -366,31 +370,31 @@ def _preset(result: xr.Dataset, size: float) -> float:
     if not most > 1:
         return 1.0
     base = 10.0 ** np.floor(np.log10(most))
-    return float(max(one * base for one in FACTORS if one * base <= most * (1 + 1e-9)))
+    return float(max(factor * base for factor in FACTORS if factor * base <= most * (1 + 1e-9)))
 
 
 # ---- the plane ------------------------------------------------------------------------------------------------
 
 
-def _moved(result: xr.Dataset, shown: Space) -> dict[str, Any]:
+def _moved(result: xr.Dataset, bodies: Space) -> dict[str, Any]:
     """Of each link the mean error of its points, its rotation vector, the middle of the points, and its stretch."""
-    found = {}
-    for link, pose in shown.poses.items():
+    moved = {}
+    for link, pose in bodies.poses.items():
         turn = column(result, "link_error", link=link) if link in names(result, "link") else None
-        if turn is None or not shown.drawable.any():
+        if turn is None or not bodies.drawable.any():
             continue
-        own = {key: error for key in names(result, "point") if key.split(".", 1)[0] == link
+        point_errors = {key: error for key in names(result, "point") if key.split(".", 1)[0] == link
                and (error := column(result, "point_error", point=key)) is not None}  # fmt: skip
-        places = {key: _local(result, key, pose.matrix, pose.origin) for key in own}
-        if not own:
+        places = {key: _local(result, key, pose.matrix, pose.origin) for key in point_errors}
+        if not point_errors:
             continue
         about = np.mean(list(places.values()), axis=0)
-        shift = np.mean(list(own.values()), axis=0)
-        found[link] = {
-            "about": [float(f"{one:.7g}") for one in about], "shift": _vector(shift), "turn": _vector(turn),
-            "stretch": _stretch(shown, link, own, places, about, shift, turn),
+        shift = np.mean(list(point_errors.values()), axis=0)
+        moved[link] = {
+            "about": [float(f"{number:.7g}") for number in about], "shift": _vector(shift), "turn": _vector(turn),
+            "stretch": _stretch(bodies, link, point_errors, places, about, shift, turn),
         }  # fmt: skip
-    return found
+    return moved
 
 
 def _local(result: xr.Dataset, key: str, matrix: Array, origin: Array) -> Array:
@@ -401,27 +405,33 @@ def _local(result: xr.Dataset, key: str, matrix: Array, origin: Array) -> Array:
 
 
 def _stretch(
-    shown: Space, link: str, own: dict[str, Array], places: dict[str, Array], about: Array, shift: Array, turn: Array
+    bodies: Space,
+    link: str,
+    point_errors: dict[str, Array],
+    places: dict[str, Array],
+    about: Array,
+    shift: Array,
+    turn: Array,
 ) -> list[dict[str, Any]]:
     """By how much each point of a link lies elsewhere in it than in the ideal one, with where it is drawn."""
-    matrix = shown.poses[link].matrix
-    largest = max(float(np.nanmax(np.abs(error), initial=0.0)) for error in own.values())
+    matrix = bodies.poses[link].matrix
+    largest = max(float(np.nanmax(np.abs(error), initial=0.0)) for error in point_errors.values())
     rows = []
-    for key, error in own.items():
+    for key, error in point_errors.items():
         arm = np.einsum("ijn,j->in", matrix, places[key] - about)
         left = error - shift - np.cross(turn, arm, axis=0)
         by = np.nan_to_num(np.nanmedian(np.einsum("jin,jn->in", matrix, left), axis=1))
         rows.append(
-            {"at": _drawn(shown, link, key.split(".", 1)[1], places[key]), "by": [float(f"{n:.5g}") for n in by]}
+            {"at": _drawn(bodies, link, key.split(".", 1)[1], places[key]), "by": [float(f"{n:.5g}") for n in by]}
         )
     return rows if max(np.abs(row["by"]).max() for row in rows) > SLIGHT * largest else []
 
 
-def _drawn(shown: Space, link: str, point: str, place: Array) -> list[float]:
+def _drawn(bodies: Space, link: str, point: str, place: Array) -> list[float]:
     """Where a point of a link is drawn: that of a joint where its symbol is."""
-    joint = shown.joints.get(point)
-    at = shown.seat(point, joint["links"].index(link)) if joint and link in joint["links"] else place
-    return [float(f"{one:.7g}") for one in at]
+    joint = bodies.joints.get(point)
+    at = bodies.seat(point, joint["links"].index(link)) if joint and link in joint["links"] else place
+    return [float(f"{number:.7g}") for number in at]
 
 
 # ---- charts ---------------------------------------------------------------------------------------------------
@@ -430,20 +440,23 @@ def _drawn(shown: Space, link: str, point: str, place: Array) -> list[float]:
 def _outputs(result: xr.Dataset) -> list[dict[str, Any]]:
     """Transmission errors, m or °; the band of the worst case of the play if the result has it."""
     rows = []
-    for one in outputs(result):
-        centre, reach = (column(result, f"transmission_{name}", joint=one.joint) for name in ("centre", "reach"))
+    for output in outputs(result):
+        centre, reach = (column(result, f"transmission_{name}", joint=output.joint) for name in ("centre", "reach"))
         band = [] if centre is None or reach is None else [centre - reach, centre + reach]
-        factor, unit = prefixed(1.0, "rad") if one.unit == "rad" else (1.0, "m")
+        factor, unit = prefixed(1.0, "rad") if output.unit == "rad" else (1.0, "m")
         worst = {side: _series(edge * factor) for side, edge in zip(("low", "high"), band, strict=False)}
-        rows.append({"label": one.label, "unit": unit, "values": _series(one.error * factor), "worst": worst or None})
+        rows.append(
+            {"label": output.label, "unit": unit, "values": _series(output.error * factor), "worst": worst or None}
+        )
     return rows
 
 
-def _seat(one: Seats) -> dict[str, Any]:
+def _seat(seats: Seats) -> dict[str, Any]:
     return {
-        "joint": one.joint, "kind": one.kind, "clearance": one.clearance, "length": one.length, "links": one.links,
+        "joint": seats.joint, "kind": seats.kind, "clearance": seats.clearance, "length": seats.length,
+        "links": seats.links,
         "ends": [{"offset": _vector(offset), "force": _vector(force)}
-                 for offset, force in zip(one.offsets, one.forces, strict=True)],
+                 for offset, force in zip(seats.offsets, seats.forces, strict=True)],
     }  # fmt: skip
 
 

@@ -53,16 +53,16 @@ def mechanism(result: xr.Dataset, ideal: xr.Dataset | None = None, index: int | 
         raise MechanismError(Finding(f"there is no position {index} among the {count}", "index", remedy))
     if is_spatial(result):
         return space_figure.mechanism(result, index)
-    shown = picture(result)
+    drawing = picture(result)
     if index is None:  # an eighth into the longest of what can be drawn, so that links do not lie in one line
-        known = np.flatnonzero(np.all([np.isfinite(track).all(axis=0) for track in shown.tracks.values()], axis=0))
-        index = int(known[known.size // 8]) if known.size else 0
-    low, high = np.array(shown.box[:2]) - 0.09 * shown.size, np.array(shown.box[2:]) + 0.09 * shown.size
+        drawable = np.flatnonzero(np.all([np.isfinite(track).all(axis=0) for track in drawing.tracks.values()], axis=0))
+        index = int(drawable[drawable.size // 8]) if drawable.size else 0
+    low, high = np.array(drawing.box[:2]) - 0.09 * drawing.size, np.array(drawing.box[2:]) + 0.09 * drawing.size
     width, height = high - low
     figure = new("Mechanism", result, min(max(7.0 * height / width, 2.6), 8.0) + 0.5)
     axes = bare(figure.subplots(), low, high, facts(result, index))
     labels = Labels(figure)
-    draw(axes, shown, index, labels)
+    draw(axes, drawing, index, labels)
     labels.place()
     return figure
 

@@ -55,7 +55,7 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
 
 def page(
     result: xr.Dataset,
-    shown: dict[str, Any],
+    scene_of: dict[str, Any],
     motion: dict[str, Any] | None = None,
     quality: Sequence[dict[str, str]] = (),
     compared: bool = False,
@@ -66,18 +66,18 @@ def page(
     style, script = web_text("report.css"), bundle("report.js")
     runs = intervals(result)
     context = {
-        "name": shown["name"] or "Mechanism", "formula": shown["formula"], "compared": compared,
-        "motion": motion, "closed": shown["abscissa"]["closed"],
-        "spatial": shown.get("space") == "spatial",
-        "positions": result.sizes["position"], "thinned": _ordinal(shown),
-        "drawn": shown["count"], "method": result.attrs.get("method", ""),
+        "name": scene_of["name"] or "Mechanism", "formula": scene_of["formula"], "compared": compared,
+        "motion": motion, "closed": scene_of["abscissa"]["closed"],
+        "spatial": scene_of.get("space") == "spatial",
+        "positions": result.sizes["position"], "thinned": _ordinal(scene_of),
+        "drawn": scene_of["count"], "method": result.attrs.get("method", ""),
         "unanswered": sum(run.stop - run.start for run in runs),
         "summary": headline(result),
         "holding": _holding(result), "errors": error_rows(result), "losses": loss_rows(result),
-        "seats": bool(shown["built"] and shown["built"]["seats"]),
+        "seats": bool(scene_of["built"] and scene_of["built"]["seats"]),
         "balance": [*quality, *_balance(result)], "inputs": inputs_of(result),
         **said(result, style, _findings(result)), "script": Markup(script), "script_hash": hashed(script),
-        "scene": Markup(embedded(shown)),
+        "scene": Markup(embedded(scene_of)),
     }  # fmt: skip
     return template("report.html.j2").render(context)
 
@@ -90,24 +90,29 @@ def embedded(data: Any) -> str:
     return text
 
 
-def _ordinal(shown: dict[str, Any]) -> str:
+def _ordinal(scene_of: dict[str, Any]) -> str:
     """ "3rd" if every third position is shown, empty if all are."""
-    if shown["thinned"] is None:
+    if scene_of["thinned"] is None:
         return ""
-    stride = -(-shown["thinned"] // shown["count"])
+    stride = -(-scene_of["thinned"] // scene_of["count"])
     suffix = "th" if 10 <= stride % 100 <= 20 else {1: "st", 2: "nd", 3: "rd"}.get(stride % 10, "th")
     return f"{stride}{suffix}"
 
 
 def _holding(result: xr.Dataset) -> dict[str, Any] | None:
     """The ranges of the states of locking as a table and a strip; None where the result has none."""
-    found = attribute(result, "locking_ranges", "{}")
-    if not found:
+    ranges = attribute(result, "locking_ranges", "{}")
+    if not ranges:
         return None
-    rows = found["rows"]
+    rows = ranges["rows"]
     strip = [row for row in rows if row["state"]]
-    told = {"head": HEAD, "centred": "seat_offset" in result, "strip": strip, "more": max(0, len(rows) - MOST_RANGES)}
-    return {**found, **told, "rows": rows[:MOST_RANGES]}
+    holding = {
+        "head": HEAD,
+        "centred": "seat_offset" in result,
+        "strip": strip,
+        "more": max(0, len(rows) - MOST_RANGES),
+    }
+    return {**ranges, **holding, "rows": rows[:MOST_RANGES]}
 
 
 def _findings(result: xr.Dataset) -> list[dict[str, str]]:
@@ -195,12 +200,12 @@ def animation(result: xr.Dataset, ideal: xr.Dataset | None = None, height: int =
     """
     from markupsafe import Markup
 
-    shown = scene(result, ideal)
+    scene_of = scene(result, ideal)
     style, script = web_text("report.css"), bundle("report.js")
     context = {
-        "name": shown["name"] or "Mechanism", "version": result.attrs.get("trunnion_version", ""),
+        "name": scene_of["name"] or "Mechanism", "version": result.attrs.get("trunnion_version", ""),
         "style": Markup(style), "style_hash": hashed(style), "script": Markup(script), "script_hash": hashed(script),
-        "scene": Markup(embedded(shown)),
+        "scene": Markup(embedded(scene_of)),
     }  # fmt: skip
     return Animation(_template().render(context), height)
 

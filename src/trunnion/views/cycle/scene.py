@@ -60,11 +60,11 @@ def scene(
     result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
     picked = _picked(count, max_positions) if picked is None else picked
     over, steady = abscissa(result), "steady" in result.attrs
-    kept = result.isel(position=picked)
+    picked_rows = result.isel(position=picked)
     other = None if ideal is None else ideal.isel(position=picked)
-    stated = layout(result)
-    points = _points(kept)
-    shown = {
+    layout_of = layout(result)
+    points = _points(picked_rows)
+    scene_of = {
         "format": FORMAT,
         "name": result.attrs.get("name", ""),
         "formula": result.attrs.get("formula", ""),
@@ -72,29 +72,30 @@ def scene(
         "thinned": count if picked.size < count else None,
         "abscissa": {"label": over.label, "unit": over.unit, "closed": over.closed, "period": over.period,
                      "values": numbers(over.values[picked])},
-        "time": series(column(kept, "time")),
-        "status": [int(code) for code in kept["status"].values],
+        "time": series(column(picked_rows, "time")),
+        "status": [int(code) for code in picked_rows["status"].values],
         "ease": series(ease(result)[picked]),
-        "states": {str(run.status): run.text for run in intervals(kept, 0)},
+        "states": {str(run.status): run.text for run in intervals(picked_rows, 0)},
         "gaps": [{"from": over.say(int(run.start)), "to": over.say(int(run.stop) - 1), "text": run.text}
                  for run in intervals(result)],
         "points": points,
-        "links": _links(stated, kept, points),
-        "joints": _joints(stated, kept, other),
-        "loads": _loads(stated, kept, points),
-        "springs": _springs(kept, stated, points),
-        "gears": [{"name": name, **circle} for name, pair in stated["gears"].items() for circle in pair],
-        "drivers": _drivers(kept, other, stated),
+        "links": _links(layout_of, picked_rows, points),
+        "joints": _joints(layout_of, picked_rows, other),
+        "loads": _loads(layout_of, picked_rows, points),
+        "springs": _springs(picked_rows, layout_of, points),
+        "gears": [{"name": name, **circle} for name, pair in layout_of["gears"].items() for circle in pair],
+        "drivers": _drivers(picked_rows, other, layout_of),
         "units": units_of(result),
-        "sums": {name: series(column(kept, name)) for name in SUMS if name in kept and not (steady and name in DRIVEN)},
+        "sums": {name: series(column(picked_rows, name)) for name in SUMS
+                 if name in picked_rows and not (steady and name in DRIVEN)},
         "efficiency": _single(result, "efficiency"),
-        "built": built(kept, _lost(result, picked)),
+        "built": built(picked_rows, _lost(result, picked)),
     }  # fmt: skip
     if is_spatial(result):
-        shown |= space_scene(kept)
-    for load in shown["loads"]:
+        scene_of |= space_scene(picked_rows)
+    for load in scene_of["loads"]:
         load["course"] = course(result, picked, load["name"])
-    return shown
+    return scene_of
 
 
 def _lost(result: xr.Dataset, picked: NDArray[np.intp]) -> list[int]:
@@ -120,24 +121,26 @@ def _points(result: xr.Dataset) -> dict[str, dict[str, Any]]:
     return {name: {axis: series(row) for axis, row in zip("xy", track, strict=True)} for name, track in tracks.items()}
 
 
-def _links(stated: dict[str, Any], result: xr.Dataset, points: dict[str, Any]) -> list[dict[str, Any]]:
+def _links(layout_of: dict[str, Any], result: xr.Dataset, points: dict[str, Any]) -> list[dict[str, Any]]:
     """Links with the keys of their points, their angle, and which of their points are no joints."""
-    known = names(result, "link")
+    links_of = names(result, "link")
     rows = []
-    for name, link in stated["links"].items():
+    for name, link in layout_of["links"].items():
         keys = [f"{name}.{point}" for point in link["points"] if f"{name}.{point}" in points]
-        free = [key for key in keys if key[len(name) + 1 :] not in stated["joints"]]
-        angle = series(column(result, "link_angle", link=name)) if name in known and not is_spatial(result) else [0.0]
-        rows.append({"name": name, "ground": name == stated["ground"], "points": keys, "free": free, "angle": angle})
+        free = [key for key in keys if key[len(name) + 1 :] not in layout_of["joints"]]
+        angle = (
+            series(column(result, "link_angle", link=name)) if name in links_of and not is_spatial(result) else [0.0]
+        )
+        rows.append({"name": name, "ground": name == layout_of["ground"], "points": keys, "free": free, "angle": angle})
     return rows
 
 
-def _joints(stated: dict[str, Any], result: xr.Dataset, ideal: xr.Dataset | None) -> list[dict[str, Any]]:
+def _joints(layout_of: dict[str, Any], result: xr.Dataset, ideal: xr.Dataset | None) -> list[dict[str, Any]]:
     """Joints with their loads and the point they are drawn at: the second link's, where the reaction acts."""
-    known = names(result, "joint")
+    joints_of = names(result, "joint")
     rows = []
-    for name, joint in stated["joints"].items():
-        if name not in known:
+    for name, joint in layout_of["joints"].items():
+        if name not in joints_of:
             continue
         first, second = joint["links"]
         slides = joint["type"] == "prismatic"
@@ -164,27 +167,27 @@ def _vector(result: xr.Dataset, name: str, joint: str) -> Any:
     return {axis: series(column(result, name, joint=joint, axis=axis)) for axis in names(result, "axis")}
 
 
-def _loads(stated: dict[str, Any], result: xr.Dataset, points: dict[str, Any]) -> list[dict[str, Any]]:
+def _loads(layout_of: dict[str, Any], result: xr.Dataset, points: dict[str, Any]) -> list[dict[str, Any]]:
     """Loads that can be drawn: a force at a known point, a moment on a link, what resists a joint, with the sign in
     which it `acts`; those in space are told apart."""
     rows: list[dict[str, Any]] = []
-    if stated.get("space") == "spatial":
+    if layout_of.get("space") == "spatial":
         return rows
-    for name, load in stated["loads"].items():
+    for name, load in layout_of["loads"].items():
         at = f"{load.get('link')}.{load.get('at')}"
         force = [float(part) for part in load.get("force") or (0.0, 0.0)]
         rows.append({"name": name, "link": load.get("link"), "at": at if at in points else None,
                      "force": force, "moment": float(load.get("moment") or 0.0),
                      "frame": load.get("frame", "global"), "varies": bool(load.get("varies")),
                      "useful": bool(load.get("useful")), "joint": load.get("joint"), "resists": load.get("resists"),
-                     "acts": _acts(stated, result, load)})  # fmt: skip
+                     "acts": _acts(layout_of, result, load)})  # fmt: skip
     return rows
 
 
-def _acts(stated: dict[str, Any], result: xr.Dataset, load: dict[str, Any]) -> list[float | None]:
+def _acts(layout_of: dict[str, Any], result: xr.Dataset, load: dict[str, Any]) -> list[float | None]:
     """The sign in which a load that resists a joint acts on its second link; 0 where it does not."""
     joint = str(load.get("joint"))
-    motion = "joint_slide" if stated["joints"].get(joint, {}).get("type") in GUIDED else "joint_rotation"
+    motion = "joint_slide" if layout_of["joints"].get(joint, {}).get("type") in GUIDED else "joint_rotation"
     speed = column(result, f"{motion}_velocity", joint=joint) if joint in names(result, "joint") else None
     if speed is None:
         return []
@@ -194,15 +197,15 @@ def _acts(stated: dict[str, Any], result: xr.Dataset, load: dict[str, Any]) -> l
     return series(-np.where(sense * only < 0, 0.0, sense))
 
 
-def _springs(result: xr.Dataset, stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any]]:
+def _springs(result: xr.Dataset, layout_of: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any]]:
     """Springs between two known points, with their pull."""
     pulls = members(result, "spring_force", "spring")
-    ends = {name: list(spring.get("between") or ()) for name, spring in stated["springs"].items()}
+    ends = {name: list(spring.get("between") or ()) for name, spring in layout_of["springs"].items()}
     return [{"name": name, "ends": two, "pull": series(pulls.get(name))}
             for name, two in ends.items() if two and set(two) <= points.keys()]  # fmt: skip
 
 
-def _drivers(result: xr.Dataset, ideal: xr.Dataset | None, stated: dict[str, Any]) -> list[dict[str, Any]]:
+def _drivers(result: xr.Dataset, ideal: xr.Dataset | None, layout_of: dict[str, Any]) -> list[dict[str, Any]]:
     """Drivers with effort (an interval where friction leaves it open), power, and effort without friction."""
     units = units_along(result["drive_effort"], "driver")
     speeds = {} if result.attrs.get("kind") == "motion" else varying(result)
@@ -211,7 +214,7 @@ def _drivers(result: xr.Dataset, ideal: xr.Dataset | None, stated: dict[str, Any
         values = {key: series(column(result, f"drive_{key}", driver=name))
                   for key in ("effort", "effort_lower", "effort_upper", "power")}  # fmt: skip
         free = None if ideal is None else series(column(ideal, "drive_effort", driver=name))
-        kind = stated["joints"].get(name, {}).get("type", "revolute")
+        kind = layout_of["joints"].get(name, {}).get("type", "revolute")
         values["speed"] = series(speeds[name][0]) if name in speeds else []
         rows.append({"name": name, "unit": unit, "type": kind, "ideal": free, **values})
     return rows

@@ -104,7 +104,10 @@ def _curves(over: Abscissa, title: str, unit: str, rows: dict[str, Array]) -> Ch
 def _speed(result: xr.Dataset, over: Abscissa) -> Chart:
     drivers = [(i, name, "rad/s" if effort == "N m" else "m/s") for i, name, effort in drivers_of(result)]
     unit = drivers[0][2]
-    rows = {name if own == unit else f"{name} [{own}]": result["drive_rate"].values[i] for i, name, own in drivers}
+    rows = {
+        name if unit_own == unit else f"{name} [{unit_own}]": result["drive_rate"].values[i]
+        for i, name, unit_own in drivers
+    }
     return _curves(over, "speed", unit, rows)
 
 

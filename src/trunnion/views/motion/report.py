@@ -38,7 +38,9 @@ def report(result: xr.Dataset) -> str:
     over = {
         "length": _stated(motion.end),
         "asked": _stated(motion.asked) if motion.early else "",
-        "events": [{"seconds": f"{one.time:.9g}", "time": quantity(one.time, "s"), "cells": one[1:]} for one in events],
+        "events": [
+            {"seconds": f"{event.time:.9g}", "time": quantity(event.time, "s"), "cells": event[1:]} for event in events
+        ],
         "more": len(motion.events) - len(events),
         "account": _account(motion.rows),
         "pictures": [{"alt": title, "source": source(drawn)} for title, drawn in pictures(result)],
@@ -54,18 +56,18 @@ def _stated(seconds: float) -> str:
 
 def _account(rows: xr.Dataset) -> dict[str, list[tuple[str, str]]]:
     """What came in and went out until the end, and what is left; empty where nothing moves."""
-    known = energies(rows)
-    if not known:
+    energies_of = energies(rows)
+    if not energies_of:
         return {}
 
-    def lines(held: bool) -> list[tuple[str, str]]:
-        found = []
-        for name, text, course in known:
-            if (name in HELD) is held:
-                title = f"change of the {text}" if held else text
+    def lines(at_rest: bool) -> list[tuple[str, str]]:
+        rows_of = []
+        for name, text, course in energies_of:
+            if (name in HELD) is at_rest:
+                title = f"change of the {text}" if at_rest else text
                 value = float(course[-1]) * (-1 if name in LOST else 1)
-                found.append((title[:1].upper() + title[1:], quantity(value, "J")))
-        return found
+                rows_of.append((title[:1].upper() + title[1:], quantity(value, "J")))
+        return rows_of
 
     rest = quantity(float(rows["energy_residual"].values[-1]), "J")
     return {"works": lines(False), "held": lines(True), "rest": [("Difference", rest)]}
@@ -92,36 +94,40 @@ RESTS, NONE = -1, 99  # statuses that a cycle does not have
 STATES = {RESTS: "at rest: friction holds it", NONE: "there is no motion"}
 
 
-def motion_scene(shown: Shown) -> dict[str, Any]:
+def motion_scene(motion: Shown) -> dict[str, Any]:
     """The motion as JSON-able data, its rows thinned to MOST_ROWS with the peaks of the reactions kept; see
     `cycle.scene.scene`.
     """
-    rows = shown.rows
+    rows = motion.rows
     picked = _picked(rows)
-    found = scene(rows, picked=picked)
-    kept = rows.isel(position=picked)
-    status = np.where(kept["resting"].values == 1, RESTS, kept["status"].values)
-    status = np.where(np.isfinite(kept["kinetic_energy"].values), status, NONE)
+    scene_of = scene(rows, picked=picked)
+    picked_rows = rows.isel(position=picked)
+    status = np.where(picked_rows["resting"].values == 1, RESTS, picked_rows["status"].values)
+    status = np.where(np.isfinite(picked_rows["kinetic_energy"].values), status, NONE)
     over = abscissa(rows)
-    last = float(kept["time"].values[-1])
+    last = float(picked_rows["time"].values[-1])
     factor = over.values[-1] / float(rows["time"].values[-1]) if last > 0 else 1.0
-    own: dict[str, Any] = {
+    of_motion: dict[str, Any] = {
         "duration": last,
-        "free": _free(kept),
-        "contacts": _contacts(kept),
-        "energies": [{"label": text, "values": series(values)} for _, text, values in energies(kept)],
+        "free": _free(picked_rows),
+        "contacts": _contacts(picked_rows),
+        "energies": [{"label": text, "values": series(values)} for _, text, values in energies(picked_rows)],
         "events": [
-            {"at": float(f"{min(one.time, last) * factor:.9g}"), "word": one.word, "quiet": one.word in OF_IMPACTS}
-            for one in shown.events
+            {
+                "at": float(f"{min(event.time, last) * factor:.9g}"),
+                "word": event.word,
+                "quiet": event.word in OF_IMPACTS,
+            }
+            for event in motion.events
         ],
     }
-    return found | {
+    return scene_of | {
         "status": [int(code) for code in status],
-        "states": found["states"] | {str(code): text for code, text in STATES.items()},
+        "states": scene_of["states"] | {str(code): text for code, text in STATES.items()},
         "gaps": [],
-        "sums": {name: values for name, values in found["sums"].items() if name != "efficiency_instant"},
+        "sums": {name: values for name, values in scene_of["sums"].items() if name != "efficiency_instant"},
         "ease": [1.0],  # no peak is cut: a motion in time has no dead centre that forces it
-        "motion": own,
+        "motion": of_motion,
     }
 
 
@@ -148,9 +154,9 @@ def _contacts(rows: xr.Dataset) -> list[dict[str, Any]]:
 
 def _free(rows: xr.Dataset) -> list[dict[str, Any]]:
     """Coordinate and rate of every free driver."""
-    found = []
+    parts = []
     for i, name, effort in drivers_of(rows):
         unit = "rad" if effort == "N m" else "m"
         coordinate, rate = rows["drive_coordinate"].values[i], rows["drive_rate"].values[i]
-        found.append({"name": name, "unit": unit, "coordinate": series(coordinate), "rate": series(rate)})
-    return found
+        parts.append({"name": name, "unit": unit, "coordinate": series(coordinate), "rate": series(rate)})
+    return parts

@@ -78,14 +78,14 @@ def shown(result: xr.Dataset) -> Shown:
 def energies(rows: xr.Dataset) -> list[tuple[str, str, Array]]:
     """Name, title and course of every work and energy since the start, J, of those that are more than rounding."""
     changes = [(name, text, rows[name].values - rows[name].values[0]) for name, text in ENERGIES if name in rows]
-    return [one for one in changes if np.nanmax(np.abs(one[-1]), initial=0.0) > 0]
+    return [change for change in changes if np.nanmax(np.abs(change[-1]), initial=0.0) > 0]
 
 
 def drivers_of(result: xr.Dataset) -> list[tuple[int, str, str]]:
     """Number, name and unit of effort of every free driver; of all where none is, as pins in play move alone."""
     free, units = attribute(result, "free_drivers"), units_along(result["drive_effort"], "driver")
-    known = [str(name) for name in result["driver"].values]
-    return [(i, name, units[i]) for i, name in enumerate(known) if name in free or not free]
+    drivers = [str(name) for name in result["driver"].values]
+    return [(i, name, units[i]) for i, name in enumerate(drivers) if name in free or not free]
 
 
 def as_positions(result: xr.Dataset) -> xr.Dataset:
@@ -102,10 +102,10 @@ def _resting(result: xr.Dataset) -> xr.Dataset:
 def happenings(result: xr.Dataset) -> tuple[Happening, ...]:
     """The events of a motion in order, its end with them where it ends early."""
     rows = zip(attribute(result, "events"), result["event_time"].values, strict=True)
-    found = [Happening(float(time), WORDS.get(row[0], row[0]), row[1], _figure(*row)) for row, time in rows]
+    events = [Happening(float(time), WORDS.get(row[0], row[0]), row[1], _figure(*row)) for row, time in rows]
     ends = [row for row in attribute(result, "findings") if row.get("code") in ENDS]
-    found += [Happening(float(row["figures"]["time"]), "ends", row["where"].partition(".")[2], "") for row in ends]
-    return tuple(found)
+    events += [Happening(float(row["figures"]["time"]), "ends", row["where"].partition(".")[2], "") for row in ends]
+    return tuple(events)
 
 
 def _figure(kind: str, of: str, figure: float | None, unit: str) -> str:

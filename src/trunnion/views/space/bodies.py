@@ -78,8 +78,8 @@ class Space:
     @cached_property
     def joints(self) -> dict[str, dict[str, Any]]:
         """The joints whose links have poses."""
-        stated: dict[str, dict[str, Any]] = self.stated["joints"]
-        return {name: one for name, one in stated.items() if set(one["links"]) <= self.poses.keys()}
+        joints_stated: dict[str, dict[str, Any]] = self.stated["joints"]
+        return {name: entry for name, entry in joints_stated.items() if set(entry["links"]) <= self.poses.keys()}
 
     def element(self, joint: str, side: int) -> Array:
         """Point, z and x of a joint's element on its first (0) or second (1) link, rows (3, 3), in the link's frame."""
@@ -118,8 +118,8 @@ class Space:
         """All places of joints and points over the run, (n, 3)."""
         tracks = [self.at(name, side) for name in self.joints for side in (0, 1)]
         tracks += [self.track(key) for key in self.free]
-        found = np.concatenate([track.T for track in tracks]) if tracks else np.empty((0, 3))
-        return np.asarray(found[np.isfinite(found).all(axis=1)], dtype=float)
+        spots = np.concatenate([track.T for track in tracks]) if tracks else np.empty((0, 3))
+        return np.asarray(spots[np.isfinite(spots).all(axis=1)], dtype=float)
 
     @cached_property
     def extent(self) -> float:
@@ -136,40 +136,42 @@ class Space:
     @cached_property
     def shifts(self) -> dict[str, float]:
         """How far along its axis each joint is drawn from its point, m, so that joints on one spot are told apart."""
-        found: dict[str, float] = dict.fromkeys(self.joints, 0.0)
+        shifts: dict[str, float] = dict.fromkeys(self.joints, 0.0)
         places = [self.at(name)[:, self.drawable] for name in self.joints]
         spread = float(np.linalg.norm(np.ptp(np.hstack(places), axis=1))) if places else 0.0
         share = APART if spread < APART * self.size else ASIDE
         for name in self._crowded():
-            found[name] = share * self.size * self._sense(name, found)
-        return found
+            shifts[name] = share * self.size * self._sense(name, shifts)
+        return shifts
 
     def _crowded(self) -> list[str]:
         """Joints with an axis whose point lies on that of another joint of one of their links, with another axis."""
         index = int(np.argmax(self.drawable))
-        found = []
+        crowded = []
         for name, joint in self.joints.items():
             if not PAIRS[joint["type"]].one_axis:  # else its symbol may lie anywhere on the axis
                 continue
             others = [
-                one for one, other in self.joints.items() if one != name and set(joint["links"]) & set(other["links"])
+                neighbour
+                for neighbour, other in self.joints.items()
+                if neighbour != name and set(joint["links"]) & set(other["links"])
             ]
             for other in others:
                 near = np.linalg.norm(self.at(name)[:, index] - self.at(other)[:, index]) < NEAR * self.size
                 turned = np.linalg.norm(np.cross(self.axis(name)[:, index], self.axis(other)[:, index])) > 0.02
                 if near and (turned or not PAIRS[self.joints[other]["type"]].one_axis):
-                    found.append(name)
+                    crowded.append(name)
                     break
-        return found
+        return crowded
 
-    def _sense(self, name: str, found: dict[str, float]) -> float:
+    def _sense(self, name: str, shifts: dict[str, float]) -> float:
         """+1 or −1 along the axis: a joint of the ground away from those of the ground before it."""
         index = int(np.argmax(self.drawable))
         if self.ground not in self.joints[name]["links"]:
             return 1.0
         sum_before = sum(
-            (np.sign(shift) * self.axis(one)[:, index] for one, shift in found.items()
-             if shift and self.ground in self.joints[one]["links"]),
+            (np.sign(shift) * self.axis(neighbour)[:, index] for neighbour, shift in shifts.items()
+             if shift and self.ground in self.joints[neighbour]["links"]),
             np.zeros(3),
         )  # fmt: skip
         return -1.0 if float(self.axis(name)[:, index] @ sum_before) > 0 else 1.0
@@ -191,27 +193,27 @@ def is_spatial(result: xr.Dataset) -> bool:
 
 def space(result: xr.Dataset) -> Space:
     """Gather what the drawings need; raises MechanismError if no position can be drawn."""
-    shown = gathered(result)
-    if not shown.drawable.any():
+    bodies = gathered(result)
+    if not bodies.drawable.any():
         what = "no position of the mechanism can be assembled: there is nothing to draw"
         raise MechanismError(Finding(what, remedy="change the lengths or the range of the driver"))
-    return shown
+    return bodies
 
 
 def gathered(result: xr.Dataset) -> Space:
     """The same, whether or not a position can be drawn."""
-    stated, count = layout(result), result.sizes["position"]
+    layout_of, count = layout(result), result.sizes["position"]
     turns, origins = members(result, "link_rotation", "link"), members(result, "link_position", "link")
     poses = {link: BodyPose(rotation_matrix(turns[link]), origins[link]) for link in turns}
     still = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, count)), np.zeros((3, count))
-    poses[stated["ground"]] = BodyPose(*still)  # the global frame, also where nothing else is known
+    poses[layout_of["ground"]] = BodyPose(*still)  # the global frame, also where nothing else is known
     free = {}
     for key, track in members(result, "point_position", "point").items():
         link, point = key.split(".", 1)
-        if link in poses and point not in stated["joints"]:
+        if link in poses and point not in layout_of["joints"]:
             pose = poses[link]
             for index in np.flatnonzero(np.isfinite(track).all(axis=0) & pose.known)[:1]:  # the first that is known
                 free[key] = np.asarray(pose.matrix[:, :, index].T @ (track[:, index] - pose.origin[:, index]), float)
     radii = [float(row["value"]) for row in attribute(result, "inputs")
              if str(row["path"]).endswith("pin.radius") and isinstance(row.get("value"), int | float)]  # fmt: skip
-    return Space(stated, poses, free, max(radii, default=0.0))
+    return Space(layout_of, poses, free, max(radii, default=0.0))

@@ -75,17 +75,17 @@ def _limits(look: Scenery, arrows: list[tuple[Array, Array]]) -> tuple[Array, Ar
     return low - more, high + more
 
 
-def _telling(result: xr.Dataset, shown: Space) -> int:
+def _telling(result: xr.Dataset, bodies: Space) -> int:
     """The position of the largest usual force in a joint, or one in the first eighth where there is none."""
-    known = np.flatnonzero(shown.drawable)
+    drawable = np.flatnonzero(bodies.drawable)
     forces = _forces(result)
     if forces:
         sizes = np.array([np.fmax.reduce(np.linalg.norm(of, axis=1)) for of in forces.values()])
         most = usual_peak(ease(result), sizes)
-        each = np.where(np.isfinite(sizes) & (sizes <= most * (1 + 1e-12)), sizes, -1.0).max(axis=0)[known]
+        each = np.where(np.isfinite(sizes) & (sizes <= most * (1 + 1e-12)), sizes, -1.0).max(axis=0)[drawable]
         if most > 0 and each.max() > 0 and np.ptp(each) > 1e-6 * most:
-            return int(known[each.argmax()])
-    return int(known[known.size // 8])
+            return int(drawable[each.argmax()])
+    return int(drawable[drawable.size // 8])
 
 
 def sketch(axes: Axes, look: Scenery, index: int, only: tuple[str, ...] = (), curves: bool = True) -> None:
@@ -106,14 +106,14 @@ def sketch(axes: Axes, look: Scenery, index: int, only: tuple[str, ...] = (), cu
     paint(axes, look.camera, bodies, strokes, shown.size)
 
 
-def _colour(shown: Space, name: str, only: tuple[str, ...]) -> str:
+def _colour(bodies: Space, name: str, only: tuple[str, ...]) -> str:
     if not name:
         return JOINT
-    if name == shown.ground:
+    if name == bodies.ground:
         return GREY
     if only and name not in only:
         return PALE
-    return PALETTE[shown.moving.index(name) % len(PALETTE)]
+    return PALETTE[bodies.moving.index(name) % len(PALETTE)]
 
 
 def _pieces(track: Array) -> Array:
@@ -142,7 +142,7 @@ def _reactions(look: Scenery, result: xr.Dataset, index: int) -> tuple[list[tupl
     here = {name: of[..., index] for name, of in _forces(result).items()}
     sizes = {name: np.linalg.norm(of, axis=1) for name, of in here.items()}
     most = max((float(size) for of in sizes.values() for size in of if np.isfinite(size)), default=0.0)
-    found = []
+    arrows = []
     for name, forces in here.items():
         if name not in look.shown.joints:
             continue
@@ -155,8 +155,8 @@ def _reactions(look: Scenery, result: xr.Dataset, index: int) -> tuple[list[tupl
             start = look.camera.seen(place)[:2]
             end = start + look.camera.seen(force)[:2] * LENGTH * look.diagonal / most
             if np.hypot(*(end - start)) > 0.01 * look.diagonal:
-                found.append((start, end))
-    return found, most
+                arrows.append((start, end))
+    return arrows, most
 
 
 def _forces(result: xr.Dataset) -> dict[str, Array]:
@@ -217,13 +217,13 @@ def name_joints(
     axes: Axes, look: Scenery, index: int, labels: Labels, only: tuple[str, ...] = (), size: float = 9.5
 ) -> None:
     """Names of joints and free points, all or only some."""
-    shown, camera = look.shown, look.camera
-    spots = {name: camera.seen(shown.seated(name)[:, index])[:2] for name in shown.joints}
-    dots = {key.split(".", 1)[1]: camera.seen(shown.track(key)[:, index])[:2] for key in shown.free
-            if not key.startswith(f"{shown.ground}.")}  # fmt: skip
+    bodies, camera = look.shown, look.camera
+    spots = {name: camera.seen(bodies.seated(name)[:, index])[:2] for name in bodies.joints}
+    dots = {key.split(".", 1)[1]: camera.seen(bodies.track(key)[:, index])[:2] for key in bodies.free
+            if not key.startswith(f"{bodies.ground}.")}  # fmt: skip
     for name, spot in (spots | dots).items():
         if not only or name in only:
-            labels.add(axes, short(name), spot, size, 0.022 * shown.size)
+            labels.add(axes, short(name), spot, size, 0.022 * bodies.size)
 
 
 # ---- solids as facets -----------------------------------------------------------------------------------------------
@@ -292,11 +292,11 @@ def _cap(rim: Array, step: float) -> list[Array]:
 
 def _cut(points: Array, step: float) -> Array:
     """The line through the points with more of them, none farther from the next than a step."""
-    found = [points[:1]]
+    pieces = [points[:1]]
     for start, end in pairwise(points):
         count = max(1, int(np.ceil(np.linalg.norm(end - start) / step)))
-        found.append(start + np.linspace(0, 1, count + 1)[1:, None] * (end - start))
-    return np.concatenate(found)
+        pieces.append(start + np.linspace(0, 1, count + 1)[1:, None] * (end - start))
+    return np.concatenate(pieces)
 
 
 def _ball(middle: Array, radius: float) -> list[Array]:
@@ -319,14 +319,14 @@ def _box(points: Array, grown: float, step: float) -> list[Array]:
     u, v, w = (half * (1 + grown / np.linalg.norm(half)) for half in halves)
     if np.cross(u, v) @ w < 0:
         w = -w
-    found = []
+    faces = []
     for a, b, c in ((u, v, w), (v, w, u), (w, u, v)):
-        across, up = (np.linspace(-1, 1, 1 + int(np.ceil(2 * np.linalg.norm(one) / step))) for one in (a, b))
+        across, up = (np.linspace(-1, 1, 1 + int(np.ceil(2 * np.linalg.norm(side) / step))) for side in (a, b))
         for left, right in pairwise(across):
             for low, high in pairwise(up):
                 piece = np.array([left * a + low * b, right * a + low * b, right * a + high * b, left * a + high * b])
-                found += [middle + c + piece, middle - c + piece[::-1]]
-    return found
+                faces += [middle + c + piece, middle - c + piece[::-1]]
+    return faces
 
 
 def paint(
@@ -345,13 +345,15 @@ def paint(
             continue
         for grown in (OUTLINE * size, 0.0):
             for corners in facets(solid, size, grown):
-                seen = camera.seen(corners @ matrix.T + origin)
-                normal = normal_of(seen)
+                projected = camera.seen(corners @ matrix.T + origin)
+                normal = normal_of(projected)
                 if (normal[2] > 0) == (grown == 0.0):  # the outline is what looks away, the body what looks here
                     face = shaded(colour, normal) if grown == 0.0 else INK
-                    pieces.append((float(seen[:, 2].mean()), np.vstack([seen, seen[:1]])[:, :2], face, face, 0.35))
-    for one in strokes:
-        pieces += _lines(camera.seen(one.pieces), one.colour, one.width, 0.0)
+                    pieces.append(
+                        (float(projected[:, 2].mean()), np.vstack([projected, projected[:1]])[:, :2], face, face, 0.35)
+                    )
+    for stroke in strokes:
+        pieces += _lines(camera.seen(stroke.pieces), stroke.colour, stroke.width, 0.0)
     pieces.sort(key=lambda piece: piece[0])
     axes.add_collection(
         PolyCollection(

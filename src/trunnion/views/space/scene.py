@@ -24,25 +24,25 @@ STILL = 1e-6  # a link that turns slower than this share of its fastest has no s
 
 def space_scene(result: xr.Dataset) -> dict[str, Any]:
     """What a scene of a mechanism in space has besides curves; `solids` is empty if no position can be drawn."""
-    shown = gathered(result)
-    drawn = bool(shown.drawable.any())
+    bodies = gathered(result)
+    drawn = bool(bodies.drawable.any())
     links = [
-        {"name": link, "ground": link == shown.ground, "pose": _pose(result, link) if drawn else None,
-         "screw": _screw(result, shown, link) if drawn and link != shown.ground else None}
-        for link in shown.stated["links"]
+        {"name": link, "ground": link == bodies.ground, "pose": _pose(result, link) if drawn else None,
+         "screw": _screw(result, bodies, link) if drawn and link != bodies.ground else None}
+        for link in bodies.stated["links"]
     ]  # fmt: skip
     parts: dict[str, Any] = {"space": "spatial", "links": links, "solids": [], "free": [], "seats": {}, "loads": []}
     if not drawn:
         return parts
-    around, above = best(shown)
-    look = scenery(shown, looking(around, above))
+    around, above = best(bodies)
+    look = scenery(bodies, looking(around, above))
     return parts | {
-        "size": _number(shown.size), "scaled": bool(shown.extent), "middle": [_number(n) for n in shown.middle],
+        "size": _number(bodies.size), "scaled": bool(bodies.extent), "middle": [_number(n) for n in bodies.middle],
         "view": {"around": around, "above": above, "box": [_number(edge) for edge in look.box]},
         "solids": [solid.data() for solid in look.solids],
-        "free": [{"key": key, "link": key.split(".", 1)[0], "at": _vector(at)} for key, at in shown.free.items()],
-        "seats": {name: _seat(shown, name) | {"ends": _ends(result, shown, name)} for name in shown.joints},
-        "loads": _loads(shown), "apart": any(shown.shifts.values()),
+        "free": [{"key": key, "link": key.split(".", 1)[0], "at": _vector(at)} for key, at in bodies.free.items()],
+        "seats": {name: _seat(bodies, name) | {"ends": _ends(result, bodies, name)} for name in bodies.joints},
+        "loads": _loads(bodies), "apart": any(bodies.shifts.values()),
     }  # fmt: skip
 
 
@@ -59,24 +59,24 @@ def _pose(result: xr.Dataset, link: str) -> dict[str, Any]:
     if link not in names(result, "link"):
         return {"x": [0.0], "y": [0.0], "z": [0.0], "w": [1.0], "i": [0.0], "j": [0.0], "k": [0.0]}
     place = {axis: series(column(result, "link_position", link=link, axis=axis)) for axis in "xyz"}
-    turn = {to: series(column(result, "link_rotation", link=link, component=one))
-            for to, one in zip("wijk", "wxyz", strict=True)}  # fmt: skip
+    turn = {to: series(column(result, "link_rotation", link=link, component=source))
+            for to, source in zip("wijk", "wxyz", strict=True)}  # fmt: skip
     return place | turn
 
 
-def _seat(shown: Space, name: str) -> dict[str, Any]:
+def _seat(bodies: Space, name: str) -> dict[str, Any]:
     """Where a joint's symbol sits on its second link and along which axis; no axis of a ball, a cross or a weld."""
-    joint = shown.joints[name]
+    joint = bodies.joints[name]
     turning = PAIRS[joint["type"]].one_axis or PAIRS[joint["type"]].angle
-    axes = [{"link": joint["links"][1], "along": _vector(shown.element(name, 1)[1])}] if turning else []
+    axes = [{"link": joint["links"][1], "along": _vector(bodies.element(name, 1)[1])}] if turning else []
     if PAIRS[joint["type"]].crossed:
         axes = [
-            {"link": link, "along": _vector(shown.element(name, side)[1])} for side, link in enumerate(joint["links"])
+            {"link": link, "along": _vector(bodies.element(name, side)[1])} for side, link in enumerate(joint["links"])
         ]
-    return {"link": joint["links"][1], "at": _vector(shown.seat(name)), "axes": axes}
+    return {"link": joint["links"][1], "at": _vector(bodies.seat(name)), "axes": axes}
 
 
-def _ends(result: xr.Dataset, shown: Space, name: str) -> list[dict[str, Any]]:
+def _ends(result: xr.Dataset, bodies: Space, name: str) -> list[dict[str, Any]]:
     """Loads on the ends of a joint's bearing, N, in global axes, and the way from its middle to each in a link's frame.
 
     Those of a bearing lie along the axis of its first link, at −u first; of a cross two on the pin of each link.
@@ -88,22 +88,25 @@ def _ends(result: xr.Dataset, shown: Space, name: str) -> list[dict[str, Any]]:
     rows = []
     for order, end in enumerate(solid):
         side, sense = order // 2, 1.0 if order % 2 else -1.0
-        rows.append({"link": shown.joints[name]["links"][side], "along": _vector(sense * shown.element(name, side)[1]),
+        along = _vector(sense * bodies.element(name, side)[1])
+        rows.append({"link": bodies.joints[name]["links"][side], "along": along,
                      "force": {axis: series(part) for axis, part in zip("xyz", end, strict=True)}})  # fmt: skip
     return rows
 
 
-def _loads(shown: Space) -> list[dict[str, Any]]:
+def _loads(bodies: Space) -> list[dict[str, Any]]:
     """Forces at their points and moments on their links, with the place they are drawn at in the link's frame."""
     rows = []
-    for name, load in shown.stated["loads"].items():
+    for name, load in bodies.stated["loads"].items():
         link = load.get("link")
-        if link not in shown.poses:
+        if link not in bodies.poses:
             continue
-        seats = {joint: shown.seat(joint, one["links"].index(link)) for joint, one in shown.joints.items()
-                 if link in one["links"]}  # fmt: skip
-        known = seats | {key.split(".", 1)[1]: at for key, at in shown.free.items() if key.split(".", 1)[0] == link}
-        at = known.get(load.get("at") or load.get("joint") or "")
+        seats = {joint: bodies.seat(joint, entry["links"].index(link)) for joint, entry in bodies.joints.items()
+                 if link in entry["links"]}  # fmt: skip
+        places_of = seats | {
+            key.split(".", 1)[1]: at for key, at in bodies.free.items() if key.split(".", 1)[0] == link
+        }
+        at = places_of.get(load.get("at") or load.get("joint") or "")
         if at is None and load.get("at") is None and seats:
             at = np.mean(list(seats.values()), axis=0)
         if at is not None:
@@ -113,7 +116,7 @@ def _loads(shown: Space) -> list[dict[str, Any]]:
     return rows
 
 
-def _screw(result: xr.Dataset, shown: Space, link: str) -> dict[str, Any] | None:
+def _screw(result: xr.Dataset, bodies: Space, link: str) -> dict[str, Any] | None:
     """The instantaneous screw axis of a link against the ground: a point, a unit direction, pitch (m/rad)."""
     spin = column(result, "link_angular_velocity", link=link)
     key = next((key for key in names(result, "point") if key.split(".", 1)[0] == link), None)
@@ -122,7 +125,7 @@ def _screw(result: xr.Dataset, shown: Space, link: str) -> dict[str, Any] | None
     place, velocity = (column(result, f"point_{what}", point=key) for what in ("position", "velocity"))
     if place is None or velocity is None:
         return None
-    point, along, pitch = screw_axis(spin, place, velocity, shown.middle)
+    point, along, pitch = screw_axis(spin, place, velocity, bodies.middle)
     return {
         **{axis: series(part) for axis, part in zip("xyz", point, strict=True)},
         **{axis: series(part) for axis, part in zip("uvw", along, strict=True)},

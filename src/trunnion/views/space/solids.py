@@ -53,14 +53,14 @@ class Solid:
                 "paint": self.paint}  # fmt: skip
 
 
-def solids(shown: Space) -> list[Solid]:
+def solids(bodies: Space) -> list[Solid]:
     """All bodies of a mechanism."""
-    found = [one for link in shown.moving for one in _body(shown, link)]
-    for name, joint in shown.joints.items():
-        found += SYMBOLS[PAIRS[joint["type"]].body](shown, name)
-        if shown.ground in joint["links"]:
-            found += _foot(shown, name)
-    return found
+    shapes = [solid for link in bodies.moving for solid in _body(bodies, link)]
+    for name, joint in bodies.joints.items():
+        shapes += SYMBOLS[PAIRS[joint["type"]].body](bodies, name)
+        if bodies.ground in joint["links"]:
+            shapes += _foot(bodies, name)
+    return shapes
 
 
 def _rod(link: str, start: Array, end: Array, radius: float, paint: str = "") -> Solid:
@@ -74,79 +74,79 @@ def _box(link: str, middle: Array, halves: Array, paint: str = "") -> Solid:
 # ---- links ----------------------------------------------------------------------------------------------------
 
 
-def _body(shown: Space, link: str) -> list[Solid]:
+def _body(bodies: Space, link: str) -> list[Solid]:
     """Rods along the shortest tree through the joints of a link, finer ones to its free points."""
-    sides = {name: joint["links"].index(link) for name, joint in shown.joints.items() if link in joint["links"]}
-    seats = {name: shown.seat(name, side) for name, side in sides.items()}
-    found, forked = _of_cardan(shown, link, sides), set[str]()
-    for one, two in [] if found else _tree(seats):
-        route = np.array(_route(shown, (one, sides[one]), (two, sides[two])))
-        for name, end, way in ((one, 0, route[1] - route[0]), (two, -1, route[-2] - route[-1])):
-            route[end] += _clear(shown, name, sides[name], way)
-            if PAIRS[shown.joints[name]["type"]].body == "cross" and name not in forked:
+    sides = {name: joint["links"].index(link) for name, joint in bodies.joints.items() if link in joint["links"]}
+    seats = {name: bodies.seat(name, side) for name, side in sides.items()}
+    shapes, forked = _of_cardan(bodies, link, sides), set[str]()
+    for first, two in [] if shapes else _tree(seats):
+        route = np.array(_route(bodies, (first, sides[first]), (two, sides[two])))
+        for name, end, direction in ((first, 0, route[1] - route[0]), (two, -1, route[-2] - route[-1])):
+            route[end] += _clear(bodies, name, sides[name], direction)
+            if PAIRS[bodies.joints[name]["type"]].body == "cross" and name not in forked:
                 forked.add(name)
-                found += _fork(shown, link, shown.element(name, sides[name])[1], seats[name], route[end])
-        if np.linalg.norm(np.diff(route, axis=0), axis=1).min() > 1e-6 * shown.size:
-            found.append(Solid("rod", link, route, BAR * shown.size, link))
-    for key, place in shown.free.items():
+                shapes += _fork(bodies, link, bodies.element(name, sides[name])[1], seats[name], route[end])
+        if np.linalg.norm(np.diff(route, axis=0), axis=1).min() > 1e-6 * bodies.size:
+            shapes.append(Solid("rod", link, route, BAR * bodies.size, link))
+    for key, place in bodies.free.items():
         if key.split(".", 1)[0] == link and seats:
-            base = _nearest(place, list(seats.values()), found)
-            found.append(_rod(link, base, place, FINE * shown.size, link))
-            found.append(Solid("ball", link, place[None], 0.011 * shown.size, link))
-    return found
+            base = _nearest(place, list(seats.values()), shapes)
+            shapes.append(_rod(link, base, place, FINE * bodies.size, link))
+            shapes.append(Solid("ball", link, place[None], 0.011 * bodies.size, link))
+    return shapes
 
 
-def _fork(shown: Space, link: str, axis: Array, middle: Array, base: Array) -> list[Solid]:
+def _fork(bodies: Space, link: str, axis: Array, middle: Array, base: Array) -> list[Solid]:
     """The fork of a link on its pin of a cross: two prongs from the base, and an eye around either end of the pin."""
-    size, way = shown.size, base - middle
-    across = way - (way @ axis) * axis
-    if np.linalg.norm(across) < 0.3 * np.linalg.norm(way):  # the shaft lies along the pin
+    size, direction = bodies.size, base - middle
+    across = direction - (direction @ axis) * axis
+    if np.linalg.norm(across) < 0.3 * np.linalg.norm(direction):  # the shaft lies along the pin
         return []
-    found = []
+    shapes = []
     for sense in (-1.0, 1.0):
         eye = middle + sense * PIN * size * axis
         corner = eye + 0.55 * across
-        found.append(Solid("rod", link, np.array([base, corner, eye]), BAR * size, link))
-        found.append(_rod(link, eye - 0.013 * size * axis, eye + 0.013 * size * axis, 0.019 * size, link))
-    return found
+        shapes.append(Solid("rod", link, np.array([base, corner, eye]), BAR * size, link))
+        shapes.append(_rod(link, eye - 0.013 * size * axis, eye + 0.013 * size * axis, 0.019 * size, link))
+    return shapes
 
 
-def _of_cardan(shown: Space, link: str, sides: dict[str, int]) -> list[Solid]:
+def _of_cardan(bodies: Space, link: str, sides: dict[str, int]) -> list[Solid]:
     """A link of a Cardan joint, both of whose axes cross squarely in one place: the cross between two moving links, or
     the fork of a shaft in the ground. Nothing of other links.
     """
-    if len(sides) != 2 or not all(shown.shifts[name] for name in sides):
+    if len(sides) != 2 or not all(bodies.shifts[name] for name in sides):
         return []
-    size, (first, second) = shown.size, (shown.element(name, side) for name, side in sides.items())
+    size, (first, second) = bodies.size, (bodies.element(name, side) for name, side in sides.items())
     if np.linalg.norm(first[0] - second[0]) > NEAR * size or abs(float(first[1] @ second[1])) > SQUARE:
         return []
-    shafts = [name for name in sides if shown.ground in shown.joints[name]["links"]]
+    shafts = [name for name in sides if bodies.ground in bodies.joints[name]["links"]]
     pins = [name for name in sides if name not in shafts]
     if not shafts:
-        arms = {name: (abs(shown.shifts[name]) + HALF * size) * shown.element(name, sides[name])[1] for name in pins}
-        middles = {name: shown.element(name, sides[name])[0] for name in pins}
+        arms = {name: (abs(bodies.shifts[name]) + HALF * size) * bodies.element(name, sides[name])[1] for name in pins}
+        middles = {name: bodies.element(name, sides[name])[0] for name in pins}
         return [_rod(link, middles[name] - arm, middles[name] + arm, BAR * size, link) for name, arm in arms.items()]
     if len(pins) != 1:
         return []
     (shaft,), (pin,) = shafts, pins
-    start, centre = shown.seat(shaft, sides[shaft]), shown.element(shaft, sides[shaft])[0]
-    middle, axis, _ = shown.element(pin, sides[pin])
-    ends = [shown.seat(pin, sides[pin]), 2 * middle - shown.seat(pin, sides[pin])]
+    start, centre = bodies.seat(shaft, sides[shaft]), bodies.element(shaft, sides[shaft])[0]
+    middle, axis, _ = bodies.element(pin, sides[pin])
+    ends = [bodies.seat(pin, sides[pin]), 2 * middle - bodies.seat(pin, sides[pin])]
     prongs = [Solid("rod", link, np.array(_arc(start, end, centre, middle)), BAR * size, link) for end in ends]
     eye = _rod(link, ends[1] - HALF * size * axis, ends[1] + HALF * size * axis, SLEEVE * size)
     return [*prongs, eye]
 
 
-def _clear(shown: Space, name: str, side: int, way: Array) -> Array:
+def _clear(bodies: Space, name: str, side: int, direction: Array) -> Array:
     """How far a rod that leaves a joint starts from its middle, so that it meets its symbol from outside."""
-    body, length = PAIRS[shown.joints[name]["type"]].body, float(np.linalg.norm(way))
+    body, length = PAIRS[bodies.joints[name]["type"]].body, float(np.linalg.norm(direction))
     radius = {"ball": 0.85 * BALL, "rail": 0.9 * BLOCK, "cube": 0.02}.get(body, 0.0)
     if body == "cross":
-        return way * min(FORK * shown.size / length, 1 / 3) if length > 0 else way
+        return direction * min(FORK * bodies.size / length, 1 / 3) if length > 0 else direction
     if body == "sleeve":
-        across = abs(float(way @ shown.element(name, side)[1])) < 0.5 * length
+        across = abs(float(direction @ bodies.element(name, side)[1])) < 0.5 * length
         radius = 0.85 * SLEEVE if across else 0.0
-    return way * (radius * shown.size / length) if length > 3 * radius * shown.size > 0 else 0.0 * way
+    return direction * (radius * bodies.size / length) if length > 3 * radius * bodies.size > 0 else 0.0 * direction
 
 
 def _nearest(place: Array, seats: list[Array], rods: list[Solid]) -> Array:
@@ -156,7 +156,7 @@ def _nearest(place: Array, seats: list[Array], rods: list[Solid]) -> Array:
         for start, end in pairwise(rod.points):
             along = end - start
             candidates.append(start + np.clip((place - start) @ along / (along @ along), 0.0, 1.0) * along)
-    return min(candidates, key=lambda one: float(np.linalg.norm(place - one)))
+    return min(candidates, key=lambda candidate: float(np.linalg.norm(place - candidate)))
 
 
 def _tree(seats: dict[str, Array]) -> list[tuple[str, str]]:
@@ -164,27 +164,27 @@ def _tree(seats: dict[str, Array]) -> list[tuple[str, str]]:
     names = list(seats)
     inside, edges = names[:1], []
     while len(inside) < len(names):
-        pairs = [(one, two) for one in inside for two in names if two not in inside]
+        pairs = [(first, two) for first in inside for two in names if two not in inside]
         best = min(pairs, key=lambda pair: float(np.linalg.norm(seats[pair[0]] - seats[pair[1]])))
         edges.append(best)
         inside.append(best[1])
     return edges
 
 
-def _route(shown: Space, one: tuple[str, int], two: tuple[str, int]) -> list[Array]:
+def _route(bodies: Space, first: tuple[str, int], two: tuple[str, int]) -> list[Array]:
     """Corners of the rods from joint to joint: around the common point, else along an axis first and then across it."""
-    start, end = shown.seat(*one), shown.seat(*two)
-    if shown.shifts[one[0]] and shown.shifts[two[0]]:
-        centres = shown.element(*one)[0], shown.element(*two)[0]
-        if np.linalg.norm(centres[0] - centres[1]) < 0.2 * shown.size:
+    start, end = bodies.seat(*first), bodies.seat(*two)
+    if bodies.shifts[first[0]] and bodies.shifts[two[0]]:
+        centres = bodies.element(*first)[0], bodies.element(*two)[0]
+        if np.linalg.norm(centres[0] - centres[1]) < 0.2 * bodies.size:
             return _arc(start, end, *centres)
-    for (name, side), here, there in ((one, start, end), (two, end, start)):
-        if PAIRS[shown.joints[name]["type"]].body == "sleeve":
-            axis = shown.element(name, side)[1]
-            along = float((there - here) @ axis)
-            across = float(np.linalg.norm(there - here - along * axis))
-            if HALF * shown.size < abs(along) < 4 * across:
-                corners = [here, here + along * axis, there]
+    for (name, side), here, after in ((first, start, end), (two, end, start)):
+        if PAIRS[bodies.joints[name]["type"]].body == "sleeve":
+            axis = bodies.element(name, side)[1]
+            along = float((after - here) @ axis)
+            across = float(np.linalg.norm(after - here - along * axis))
+            if HALF * bodies.size < abs(along) < 4 * across:
+                corners = [here, here + along * axis, after]
                 return corners if here is start else corners[::-1]
     return [start, end]
 
@@ -203,53 +203,53 @@ def _arc(start: Array, end: Array, first: Array, second: Array) -> list[Array]:
 # ---- joints ---------------------------------------------------------------------------------------------------
 
 
-def _outer(shown: Space, name: str) -> int:
+def _outer(bodies: Space, name: str) -> int:
     """Side of the link that holds sleeve, rail or plate: the ground's, else the second of a pair that turns."""
-    joint = shown.joints[name]
-    if shown.ground in joint["links"]:
-        return int(joint["links"].index(shown.ground))
+    joint = bodies.joints[name]
+    if bodies.ground in joint["links"]:
+        return int(joint["links"].index(bodies.ground))
     return 0 if "slide" in PAIRS[joint["type"]].freedoms[:1] else 1
 
 
-def _reach(shown: Space, name: str) -> tuple[float, float]:
+def _reach(bodies: Space, name: str) -> tuple[float, float]:
     """Least and greatest slide, m."""
-    slides = shown.slides(name)
+    slides = bodies.slides(name)
     return float(np.nanmin(slides)), float(np.nanmax(slides))
 
 
-def _seats(shown: Space, name: str) -> tuple[Array, tuple[float, float], int]:
+def _seats(bodies: Space, name: str) -> tuple[Array, tuple[float, float], int]:
     """Of a pair that slides: middle of the outer part in its link, its reach along the axis of the inner link, side.
 
     The reach is told from the seat on the inner link, along the axis there.
     """
-    low, high = _reach(shown, name)
-    outer = _outer(shown, name)
-    seat, axis = shown.seat(name, outer), shown.element(name, outer)[1]
+    low, high = _reach(bodies, name)
+    outer = _outer(bodies, name)
+    seat, axis = bodies.seat(name, outer), bodies.element(name, outer)[1]
     if outer == 1:
         return seat, (low, high), outer
     middle = (low + high) / 2
     return seat + middle * axis, (middle - high, middle - low), outer
 
 
-def _turning(shown: Space, name: str) -> list[Solid]:
+def _turning(bodies: Space, name: str) -> list[Solid]:
     """Sleeve of the outer link on the shaft of the inner one; a revolute pair has collars, a helical one a thread."""
-    size, joint = shown.size, shown.joints[name]
-    pair, (middle, (low, high), outer) = PAIRS[joint["type"]], _seats(shown, name)
-    links, z = joint["links"], shown.element(name, outer)[1]
+    size, joint = bodies.size, bodies.joints[name]
+    pair, (middle, (low, high), outer) = PAIRS[joint["type"]], _seats(bodies, name)
+    links, z = joint["links"], bodies.element(name, outer)[1]
     inner = 1 - outer
-    seat, axis = shown.seat(name, inner), shown.element(name, inner)[1]
-    paint = shown.ground if links[outer] == shown.ground else ""
-    found = [_rod(links[outer], middle - HALF * size * z, middle + HALF * size * z, SLEEVE * size, paint)]
+    seat, axis = bodies.seat(name, inner), bodies.element(name, inner)[1]
+    paint = bodies.ground if links[outer] == bodies.ground else ""
+    shapes = [_rod(links[outer], middle - HALF * size * z, middle + HALF * size * z, SLEEVE * size, paint)]
     stub = (HALF + (0.03 if pair.slides else 0.012)) * size
     ends = seat + (min(low, 0.0) - stub) * axis, seat + (max(high, 0.0) + stub) * axis
-    found.append(_rod(links[inner], *ends, SHAFT * size, links[inner]))
+    shapes.append(_rod(links[inner], *ends, SHAFT * size, links[inner]))
     if not pair.slides:
         for side in (-1, 1):
             near = seat + ((low if side < 0 else high) + side * (HALF + 0.002) * size) * axis
-            found.append(_rod(links[inner], near, near + side * 0.008 * size * axis, COLLAR * size, links[inner]))
+            shapes.append(_rod(links[inner], near, near + side * 0.008 * size * axis, COLLAR * size, links[inner]))
     if pair.threaded:
-        found.append(_thread(links[inner], *ends, shown.element(name, inner)[2], SHAFT * 1.35 * size))
-    return found
+        shapes.append(_thread(links[inner], *ends, bodies.element(name, inner)[2], SHAFT * 1.35 * size))
+    return shapes
 
 
 def _thread(link: str, start: Array, end: Array, x: Array, radius: float) -> Solid:
@@ -264,60 +264,60 @@ def _thread(link: str, start: Array, end: Array, x: Array, radius: float) -> Sol
     return Solid("wire", link, points)
 
 
-def _sliding(shown: Space, name: str) -> list[Solid]:
+def _sliding(bodies: Space, name: str) -> list[Solid]:
     """A block of the inner link on the rail of the outer one."""
-    size, links = shown.size, shown.joints[name]["links"]
-    low, high = _reach(shown, name)
-    outer = _outer(shown, name)
-    _, z, x = shown.element(name, outer)
+    size, links = bodies.size, bodies.joints[name]["links"]
+    low, high = _reach(bodies, name)
+    outer = _outer(bodies, name)
+    _, z, x = bodies.element(name, outer)
     if outer == 1:  # the block is on the first link: seen from the second it goes the other way
         low, high = -high, -low
-    shift = shown.shifts[name]
+    shift = bodies.shifts[name]
     reach = (shift + low - 2.2 * BLOCK * size, shift + high + 2.2 * BLOCK * size)
-    base = shown.element(name, outer)[0]
+    base = bodies.element(name, outer)[0]
     rail = [(reach[1] - reach[0]) / 2 * z, 0.011 * size * x, 0.011 * size * np.cross(z, x)]
-    found = [_box(links[outer], base + (reach[0] + reach[1]) / 2 * z, np.array(rail), links[outer])]
-    _, w, v = shown.element(name, 1 - outer)
+    shapes = [_box(links[outer], base + (reach[0] + reach[1]) / 2 * z, np.array(rail), links[outer])]
+    _, w, v = bodies.element(name, 1 - outer)
     block = np.array([1.3 * BLOCK * size * w, BLOCK * size * v, BLOCK * size * np.cross(w, v)])
-    found.append(_box(links[1 - outer], shown.seat(name, 1 - outer), block))
-    return found
+    shapes.append(_box(links[1 - outer], bodies.seat(name, 1 - outer), block))
+    return shapes
 
 
-def _ball(shown: Space, name: str) -> list[Solid]:
-    return [Solid("ball", shown.joints[name]["links"][1], shown.seat(name)[None], BALL * shown.size)]
+def _ball(bodies: Space, name: str) -> list[Solid]:
+    return [Solid("ball", bodies.joints[name]["links"][1], bodies.seat(name)[None], BALL * bodies.size)]
 
 
-def _cross(shown: Space, name: str) -> list[Solid]:
+def _cross(bodies: Space, name: str) -> list[Solid]:
     """The two pins of a cross, each along the axis of its link; only the ground has eyes here, others a fork."""
-    size, found = shown.size, []
-    for side, link in enumerate(shown.joints[name]["links"]):
-        middle, z, _ = shown.element(name, side)
+    size, shapes = bodies.size, []
+    for side, link in enumerate(bodies.joints[name]["links"]):
+        middle, z, _ = bodies.element(name, side)
         arm = (PIN + 0.016) * size * z
-        found.append(_rod(link, middle - arm, middle + arm, 0.012 * size))
-        if link == shown.ground:
-            found += [_rod(link, middle + end * 0.72 * arm, middle + end * arm, 0.019 * size, link) for end in (-1, 1)]
-    return [*found, Solid("ball", shown.joints[name]["links"][1], shown.seat(name)[None], 0.019 * size)]
+        shapes.append(_rod(link, middle - arm, middle + arm, 0.012 * size))
+        if link == bodies.ground:
+            shapes += [_rod(link, middle + end * 0.72 * arm, middle + end * arm, 0.019 * size, link) for end in (-1, 1)]
+    return [*shapes, Solid("ball", bodies.joints[name]["links"][1], bodies.seat(name)[None], 0.019 * size)]
 
 
-def _flat(shown: Space, name: str) -> list[Solid]:
+def _flat(bodies: Space, name: str) -> list[Solid]:
     """A slab of the inner link on a disc of the outer one, as wide as it travels."""
-    size, links = shown.size, shown.joints[name]["links"]
-    outer = _outer(shown, name)
-    point, z, x = shown.element(name, outer)
+    size, links = bodies.size, bodies.joints[name]["links"]
+    outer = _outer(bodies, name)
+    point, z, x = bodies.element(name, outer)
     y = np.cross(z, x)
-    frame = shown.poses[links[outer]]
-    apart = shown.at(name, 1 - outer) - frame.place(point)
-    across = [np.einsum("in,in->n", apart, frame.direction(one)) for one in (x, y)]
+    frame = bodies.poses[links[outer]]
+    apart = bodies.at(name, 1 - outer) - frame.place(point)
+    across = [np.einsum("in,in->n", apart, frame.direction(axis)) for axis in (x, y)]
     radius = max(float(np.nanmax(np.hypot(*across))) + 1.6 * BLOCK * size, 3 * BLOCK * size)
-    found = [_rod(links[outer], point - 0.018 * size * z, point - 0.01 * size * z, radius, links[outer])]
-    _, w, v = shown.element(name, 1 - outer)
+    shapes = [_rod(links[outer], point - 0.018 * size * z, point - 0.01 * size * z, radius, links[outer])]
+    _, w, v = bodies.element(name, 1 - outer)
     slab = np.array([1.3 * BLOCK * size * v, 1.3 * BLOCK * size * np.cross(w, v), 0.01 * size * w])
-    return [*found, _box(links[1 - outer], shown.seat(name, 1 - outer), slab)]
+    return [*shapes, _box(links[1 - outer], bodies.seat(name, 1 - outer), slab)]
 
 
-def _cube(shown: Space, name: str) -> list[Solid]:
-    link = shown.joints[name]["links"][1]
-    return [_box(link, shown.seat(name), 0.02 * shown.size * np.eye(3))]
+def _cube(bodies: Space, name: str) -> list[Solid]:
+    link = bodies.joints[name]["links"][1]
+    return [_box(link, bodies.seat(name), 0.02 * bodies.size * np.eye(3))]
 
 
 SYMBOLS = {
@@ -328,14 +328,14 @@ SYMBOLS = {
 # ---- ground ---------------------------------------------------------------------------------------------------
 
 
-def _foot(shown: Space, name: str) -> list[Solid]:
+def _foot(bodies: Space, name: str) -> list[Solid]:
     """A post from the joint to a hatched plate: downwards, or along an axis that stands upright."""
-    size, ground, body = shown.size, shown.ground, PAIRS[shown.joints[name]["type"]].body
-    side = shown.joints[name]["links"].index(ground)
-    seat = _seats(shown, name)[0] if body == "sleeve" else shown.seat(name, side)
-    _, z, x = shown.element(name, side)
+    size, ground, body = bodies.size, bodies.ground, PAIRS[bodies.joints[name]["type"]].body
+    side = bodies.joints[name]["links"].index(ground)
+    seat = _seats(bodies, name)[0] if body == "sleeve" else bodies.seat(name, side)
+    _, z, x = bodies.element(name, side)
     if body == "rail":
-        low, high = _reach(shown, name)  # of the rail from its seat
+        low, high = _reach(bodies, name)  # of the rail from its seat
         seat = seat + np.clip(0.0, *((low, high) if side == 0 else (-high, -low))) * z
     down = -UP + (UP @ z) * z
     if body in ("ball", "cube"):
@@ -347,7 +347,7 @@ def _foot(shown: Space, name: str) -> list[Solid]:
     y = np.cross(down, x)
     plate = seat + FOOT * size * down
     half = 0.04 * size
-    found = [
+    shapes = [
         _rod(ground, seat, plate, 0.011 * size, ground),
         _box(ground, plate, np.array([half * x, half * y, 0.0035 * size * down]), ground),
     ]
@@ -355,8 +355,8 @@ def _foot(shown: Space, name: str) -> list[Solid]:
     for along, across in ((x, y), (y, x), (x, -y), (y, -x)):  # strokes away from the edges of the plate
         starts = [rim + half * ((share + 0.4) * along + across) for share in np.linspace(-1, 1, 6)[:-1]]
         stroke = 0.45 * half * (down - 0.7 * along)
-        found += [Solid("wire", ground, np.array([start, start + stroke]), 0.0, ground) for start in starts]
-    return found
+        shapes += [Solid("wire", ground, np.array([start, start + stroke]), 0.0, ground) for start in starts]
+    return shapes
 
 
 # ---- from where it is looked at -------------------------------------------------------------------------------------
@@ -386,15 +386,15 @@ def looking(around: float, above: float) -> Camera:
     return Camera(np.array([right, np.cross(towards, right), towards]))
 
 
-def best(shown: Space) -> tuple[float, float]:
+def best(bodies: Space) -> tuple[float, float]:
     """Angles (rad) around z and above the horizon from which the mechanism is spread widest, never seen on its edge.
 
     The widest spread is the largest area of the ellipse of inertia of all places in the picture. A view from the front
     right at 28° is preferred where others gain little.
     """
-    spots = shown.spots[:: -(-len(shown.spots) // MOST_SPOTS) or 1]
-    seats = [shown.seated(name)[:, shown.drawable].T for name in shown.joints]
-    spots = np.concatenate([spots, *(one[:: -(-len(one) // 50) or 1] for one in seats)])
+    spots = bodies.spots[:: -(-len(bodies.spots) // MOST_SPOTS) or 1]
+    seats = [bodies.seated(name)[:, bodies.drawable].T for name in bodies.joints]
+    spots = np.concatenate([spots, *(seat[:: -(-len(seat) // 50) or 1] for seat in seats)])
     spots = spots - spots.mean(axis=0)
     scores = {}
     for above in np.radians(HEIGHTS):
@@ -425,21 +425,21 @@ class Scenery:
         return float(np.hypot(right - left, above - below))
 
 
-def scenery(shown: Space, camera: Camera | None = None) -> Scenery:
+def scenery(bodies: Space, camera: Camera | None = None) -> Scenery:
     """Look at a mechanism, from the best side if not told."""
-    camera = camera or looking(*best(shown))
-    found = solids(shown)
+    camera = camera or looking(*best(bodies))
+    shapes = solids(bodies)
     corners = []
-    picked = np.flatnonzero(shown.drawable)
+    picked = np.flatnonzero(bodies.drawable)
     picked = picked[:: max(1, picked.size // 60)]
-    for solid in found:
-        pose = shown.poses[solid.link]
+    for solid in shapes:
+        pose = bodies.poses[solid.link]
         points = solid.points if solid.kind != "box" else _corners(solid.points)
         places = np.einsum("ijn,kj->nki", pose.matrix[:, :, picked], points) + pose.origin[:, picked].T[:, None]
-        seen = camera.seen(places.reshape(-1, 3))[:, :2]
-        corners += [seen.min(axis=0) - solid.radius, seen.max(axis=0) + solid.radius]
+        projected = camera.seen(places.reshape(-1, 3))[:, :2]
+        corners += [projected.min(axis=0) - solid.radius, projected.max(axis=0) + solid.radius]
     low, high = np.min(corners, axis=0), np.max(corners, axis=0)
-    return Scenery(shown, found, camera, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
+    return Scenery(bodies, shapes, camera, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
 
 
 def _corners(points: Array) -> Array:

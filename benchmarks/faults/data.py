@@ -215,8 +215,8 @@ _MODEL = (
     Fault(
         "defaults-over-what-is-stated",
         "model/tolerances.py",
-        "return {**shared, **found}",
-        "return {**found, **shared}",
+        "return {**shared, **varied}",
+        "return {**varied, **shared}",
         ("tests/model/test_tolerances.py",),
     ),
 )

@@ -413,8 +413,8 @@ _ENGINES = (
     Fault(
         "code-of-others-trusted",
         "engines/machine_code.py",
-        "and not told.st_mode & (stat.S_IWGRP | stat.S_IWOTH)",
-        "and bool(told.st_mode)",
+        "and not file_status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)",
+        "and bool(file_status.st_mode)",
         ("tests/reference/test_engines.py",),
     ),
     Fault(

@@ -88,10 +88,10 @@ def __getattr__(name: str) -> Any:
         return import_module(_MODULES[name])
     if name not in _PLACES:
         raise AttributeError(f"module 'trunnion' has no attribute '{name}'")
-    module, own = _PLACES[name]
+    module, attribute = _PLACES[name]
     if name in _RESULTS:
         import_module("trunnion.accessor")  # result.trunnion
-    return getattr(import_module(module), own)
+    return getattr(import_module(module), attribute)
 
 
 def __dir__() -> list[str]:

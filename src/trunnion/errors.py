@@ -20,9 +20,9 @@ def counted(count: int, noun: str, plural: str = "") -> str:
     return f"{count:,} {agreeing(count, noun, plural or noun + 's')}"
 
 
-def agreeing(count: int, one: str, many: str) -> str:
+def agreeing(count: int, singular: str, many: str) -> str:
     """The word that goes with a number: "is" of one, "are" of several or none."""
-    return one if count == 1 else many
+    return singular if count == 1 else many
 
 
 class Severity(StrEnum):
@@ -122,10 +122,10 @@ class Coded(IntEnum):
 
     def __new__(cls, value: int, text: str) -> Self:
         """A member: its code, and what it says."""
-        one = int.__new__(cls, value)
-        one._value_ = value
-        one.text = text
-        return one
+        member = int.__new__(cls, value)
+        member._value_ = value
+        member.text = text
+        return member
 
 
 class Status(Coded):

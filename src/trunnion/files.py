@@ -60,10 +60,12 @@ class _Run:
 
     def findings(self, path: Path, targets: Sequence[Target]) -> list[Finding]:
         """Which targets an input would be lost to."""
-        lost = (one for one in targets if same(one.path, path) and not (one.over and same(one.over, path)))
+        lost = (
+            target for target in targets if same(target.path, path) and not (target.over and same(target.over, path))
+        )
         return [
-            Finding(f"{_called(one.path, path)} is read here, and would be written over{_by(one)}", "", REMEDY)
-            for one in lost
+            Finding(f"{_called(target.path, path)} is read here, and would be written over{_by(target)}", "", REMEDY)
+            for target in lost
         ]
 
 
@@ -83,9 +85,9 @@ _RUN: ContextVar[_Run | None] = ContextVar("run", default=None)
 def writing(targets: Sequence[Target]) -> Iterator[None]:
     """A run that writes these; MechanismError if two are one file, or, while it lasts, if one is read."""
     findings = [
-        Finding(f"{_called(two.path, one.path)} is written by {one.option} already", two.option, REMEDY)
-        for one, two in combinations(targets, 2)
-        if same(one.path, two.path)
+        Finding(f"{_called(two.path, first.path)} is written by {first.option} already", two.option, REMEDY)
+        for first, two in combinations(targets, 2)
+        if same(first.path, two.path)
     ]
     if findings:
         raise MechanismError(findings)
@@ -113,19 +115,19 @@ def guard(path: Path) -> None:
     run = _RUN.get()
     if run is None:
         return
-    own = [one for one in run.written if same(one.path, path)] or [Target("", path)]
-    findings = [finding for read in run.read for finding in run.findings(read, own)]
+    targets = [target for target in run.written if same(target.path, path)] or [Target("", path)]
+    findings = [finding for read in run.read for finding in run.findings(read, targets)]
     if findings:
         raise MechanismError(findings)
 
 
-def same(one: Path, two: Path) -> bool:
+def same(first: Path, two: Path) -> bool:
     """Whether two paths are one file, under another name or through links; a device or a pipe is nobody's."""
     try:
-        kind = one.stat().st_mode
-        return (stat.S_ISREG(kind) or stat.S_ISDIR(kind)) and two.exists() and one.samefile(two)
+        kind = first.stat().st_mode
+        return (stat.S_ISREG(kind) or stat.S_ISDIR(kind)) and two.exists() and first.samefile(two)
     except (OSError, ValueError):
-        return not two.exists() and os.path.realpath(one) == os.path.realpath(two)
+        return not two.exists() and os.path.realpath(first) == os.path.realpath(two)
 
 
 # ---- writing --------------------------------------------------------------------------------------------------
@@ -139,19 +141,21 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     pipe is written to and stays what it is. Raises MechanismError if the folder is missing or not writable, `path` is
     a folder, or it is read in this run.
     """
-    asked = Path(path)
-    guard(asked)
-    with _unwritable(asked):
-        target, stream = _destination(asked)
-    beside = target.parent if target else Path(tempfile.gettempdir())
-    temporary = beside / f".{asked.stem[:40]}-{secrets.token_hex(4)}{asked.suffix}"  # known before it is there
+    destination = Path(path)
+    guard(destination)
+    with _unwritable(destination):
+        target, stream = _destination(destination)
+    folder = target.parent if target else Path(tempfile.gettempdir())
+    temporary = (
+        folder / f".{destination.stem[:40]}-{secrets.token_hex(4)}{destination.suffix}"
+    )  # known before it is there
     try:
-        with _unwritable(asked, "make the folder first, or write elsewhere"):
+        with _unwritable(destination, "make the folder first, or write elsewhere"):
             os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
-        with _unwritable(asked):
+        with _unwritable(destination):
             yield temporary
             if target is None:
-                _poured(temporary, stream, asked)
+                _poured(temporary, stream, destination)
                 return
             temporary.chmod(_mode(temporary, target))
             temporary.replace(target)
@@ -183,9 +187,9 @@ def _destination(path: Path) -> tuple[Path | None, int | None]:
     """The file to be replaced, behind all links; or None for what is written to, with its descriptor if it is one."""
     step = path
     for _ in range(MOST_LINKS):
-        if found := _DESCRIPTOR.fullmatch(os.path.normpath(os.path.abspath(step))):
-            number = next((k for k in range(3) if found[k + 1]), None)
-            return None, int(found[4] or found[5]) if number is None else number
+        if match := _DESCRIPTOR.fullmatch(os.path.normpath(os.path.abspath(step))):
+            number = next((k for k in range(3) if match[k + 1]), None)
+            return None, int(match[4] or match[5]) if number is None else number
         if not step.is_symlink():
             break
         step = step.parent / os.readlink(step)

@@ -156,10 +156,10 @@ def extreme(
     finite = np.isfinite(tops) & allowed
     tops = np.where(finite, tops, -np.inf)
     high, low = np.max(tops, axis=1), np.min(np.where(finite, bottoms, np.inf), axis=1)
-    known = np.isfinite(high)
-    high, low = np.where(known, high, 0.0), np.where(known, low, 0.0)
+    finite_rows = np.isfinite(high)
+    high, low = np.where(finite_rows, high, 0.0), np.where(finite_rows, low, 0.0)
     flat = np.maximum(FLAT * np.maximum(np.abs(high), np.abs(low)), floor)
-    lane, panel = np.nonzero(known[:, None] & (tops >= (high - NEAR * (high - low))[:, None]))
+    lane, panel = np.nonzero(finite_rows[:, None] & (tops >= (high - NEAR * (high - low))[:, None]))
     middle = GRID[np.clip(np.argmax(sign * grid.values[lane, panel], axis=1), 1, len(GRID) - 2)]
     width, pairs = np.full(len(lane), CELL), linear(coefficients, lambda array: array[:, lane, panel])
     rows = np.asarray(_fitted(primal(pairs), of, sign, middle, width))
@@ -167,15 +167,15 @@ def extreme(
     if np.any(width < CELL):
         rows = np.asarray(_fitted(primal(pairs), of, sign, middle, width))
     spot, value, level = _top(rows)
-    best = np.maximum.reduceat(value, np.searchsorted(lane, np.flatnonzero(known))) if len(lane) else value
+    best = np.maximum.reduceat(value, np.searchsorted(lane, np.flatnonzero(finite_rows))) if len(lane) else value
     most = np.full(len(tops), np.nan)
-    most[known] = best
+    most[finite_rows] = best
     first = np.zeros(len(tops), np.intp)
     constant = (grid.most - grid.least)[lane, panel] <= flat[lane]  # a plateau is told by where it begins
     place: Number = np.where(constant, -1.0, middle + width * spot)
     # one that is not level goes on rising beside its panel: only what is as high but for rounding counts there
     slack = np.where(level, flat[lane], ROUNDING * np.maximum(np.abs(high), np.abs(low))[lane])
-    first[known] = _first(lane, value >= most[lane] - slack)
+    first[finite_rows] = _first(lane, value >= most[lane] - slack)
     pick = first
     if isinstance(pairs, Dual):
         slopes = np.broadcast_to(derivative(_fitted(pairs, of, sign, middle, width)), rows.shape)
@@ -183,19 +183,19 @@ def extreme(
         tied = value >= (most - flat - TIED * (high - low))[lane]
         larger = np.lexsort((-np.abs(changes), ~tied, lane)) if len(lane) else lane
         pick = first.copy()
-        pick[known] = larger[np.searchsorted(lane, np.flatnonzero(known))]
+        pick[finite_rows] = larger[np.searchsorted(lane, np.flatnonzero(finite_rows))]
         slope, rate, bend = _at(slopes @ RATE, spot), _at(rows @ RATE, spot), _at(rows @ RATE @ RATE, spot)
         still = ~constant & (bend < 0.0) & (np.abs(rate) <= STILL * np.abs(bend))  # also at an edge that is no break
         place = Dual(place, width * np.where(still, -slope / np.where(bend == 0.0, 1.0, bend), 0.0))
-        reached: Number = Dual(sign * most, _picked(sign * changes, pick, known))
+        reached: Number = Dual(sign * most, _picked(sign * changes, pick, finite_rows))
     else:
         reached = sign * most
-    panels = np.where(known, _picked(panel.astype(float), first, known), 0)
+    panels = np.where(finite_rows, _picked(panel.astype(float), first, finite_rows), 0)
     return Top(
         reached,
         panels.astype(np.intp),
-        linear(place, lambda array: _picked(array, first, known)),
-        known & (high - low <= flat),
+        linear(place, lambda array: _picked(array, first, finite_rows)),
+        finite_rows & (high - low <= flat),
     )
 
 

@@ -102,8 +102,8 @@ def _fitted(knots: Sequence[Number], values: Sequence[Number], ends: Ends | None
     else:
         slopes = _slopes(knots, values, ends)
         curved = [
-            ((3 * chord - 2 * here - there) / h, (here + there - 2 * chord) / (h * h))
-            for chord, h, (here, there) in zip(chords, steps, pairwise(slopes), strict=True)
+            ((3 * chord - 2 * here - after_knot) / h, (here + after_knot - 2 * chord) / (h * h))
+            for chord, h, (here, after_knot) in zip(chords, steps, pairwise(slopes), strict=True)
         ]
     rows = [[*row, *more] for *row, more in zip(knots, values, slopes, curved, strict=False)]
     return Spline(knots, values, slopes, rows)

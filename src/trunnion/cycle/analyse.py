@@ -98,10 +98,10 @@ def analysed(
         for path in out:
             check_format(path)
     time = None if at is None else _time(run, at)
-    found = positions(
+    at_positions = positions(
         run, steps, method, progress, selection.margin, engine=engine, wanted=selection.variables, at=time
     )
-    result = result_of(run, found, selection)
+    result = result_of(run, at_positions, selection)
     for path in out:
         from trunnion.results.export import save
 

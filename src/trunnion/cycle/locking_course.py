@@ -124,10 +124,10 @@ class Passage(NamedTuple):
         delivered = -sum((effort * walk.rate(name) for name, effort in efforts.items()), np.zeros(shape))
         useful = useful_powers(walk, back.load_powers, back.springs)
         every = [back.body_power, *back.load_powers.values(), *(spring.power for spring in back.springs.values())]
-        given, acting = (
+        useful_power, acting = (
             sum((np.broadcast_to(power, shape) for power in powers), np.zeros(shape)) for powers in (useful, every)
         )
-        return cls(efforts, locks(back), delivered, acting, given)
+        return cls(efforts, locks(back), delivered, acting, useful_power)
 
 
 def passed(run: Run, walk: Forward, method: FrictionMethod) -> Passage:

@@ -103,7 +103,7 @@ def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] 
     """
     measures, findings, of_cycle, extremes, why = run.once(("measures", method), lambda: _over_cycle(run, method))
     values = _values_at(run, measures, time, method)
-    figures, findings, notes = np.array([of_cycle.get(one.name, np.nan) for one in measures]), [*findings], {**why}
+    figures, findings, notes = np.array([of_cycle.get(item.name, np.nan) for item in measures]), [*findings], {**why}
     lost = np.zeros(len(time), bool) if status is None else status == Status.CONTACT_LOST
     for i, measure in enumerate(measures if np.any(lost) else ()):
         if measure.rule == "deviation":
@@ -120,7 +120,7 @@ def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] 
             findings.append(Finding.note("measure.contact_lost", f"measures.{measure.name}", what, remedy, at=at))
         elif len(gone):
             notes[measure.name] = f"a pin loses contact at {len(gone)} of its {len(places)} positions"
-    values[[one.of.reduced for one in measures]] = np.nan  # a number of the whole cycle
+    values[[item.of.reduced for item in measures]] = np.nan  # a number of the whole cycle
     return Watched(run, measures, values, figures, findings, notes, extremes)
 
 
@@ -136,11 +136,11 @@ def _over_cycle(
         except MechanismError as error:
             what = f"the measure '{name}' is left out: {error.findings[0].what}"
             findings.append(Finding(what, f"measures.{name}", error.findings[0].remedy, Severity.NOTE))
-    figures = figures_of(run, [one for one in measures if one.rule != "deviation"], method)
-    single = [one for one in measures if one.rule == "deviation" and one.single(run.system)]
+    figures = figures_of(run, [item for item in measures if item.rule != "deviation"], method)
+    single = [item for item in measures if item.rule == "deviation" and item.single(run.system)]
     gaps = seating_of(run, method).gaps if run.seats and single else None
     least, most = (
-        figures_of(run, [replace(one, statistic=statistic) for one in single], method, gaps)
+        figures_of(run, [replace(item, statistic=statistic) for item in single], method, gaps)
         for statistic in ("minimum", "maximum")
     )
     for measure in measures:

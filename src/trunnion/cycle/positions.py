@@ -77,9 +77,9 @@ class Kept:
 ALL = Kept()
 
 
-def needed(wanted: Collection[str], system: System, erring: bool) -> set[str]:
+def needed(names_asked: Collection[str], system: System, erring: bool) -> set[str]:
     """The variables that have to be found for those that are wanted and for the books of the cycle."""
-    variables = {*wanted, *BOOKS}
+    variables = {*names_asked, *BOOKS}
     if erring:
         parts = {name for name, entry in results.VARIABLES.items() if entry.part}
         variables |= {*parts, *COMPARED}

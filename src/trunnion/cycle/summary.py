@@ -92,7 +92,8 @@ def member_units(system: System) -> dict[str, MemberUnits]:
     def units(dim: str, turning: Iterable[bool], words: Mapping[str, tuple[str, str]]) -> dict[str, MemberUnits]:
         turns = list(turning)
         return {
-            word: MemberUnits(dim, [turn if own else slide for own in turns]) for word, (turn, slide) in words.items()
+            word: MemberUnits(dim, [turn if turns_round else slide for turns_round in turns])
+            for word, (turn, slide) in words.items()
         }
 
     drives = {"effort": ("N m", "N"), "coordinate": ("rad", "m"), "rate": ("rad/s", "m/s")}

@@ -88,11 +88,11 @@ def vocabulary(mechanism: Mechanism, steps: int = 360) -> Vocabulary:
     """
     run = prepare(mechanism)
     cycle_measures = watched(run, run.cycle.times(steps if run.cycle.duration > 0 else 1), FrictionMethod())
-    figures = dict(zip((one.name for one in cycle_measures.measures), cycle_measures.figures, strict=True))
-    found = [*named(mechanism, mechanism.measures, run.values), *_others(run)]
-    starts = _at_the_start(run, found)
+    figures = dict(zip((item.name for item in cycle_measures.measures), cycle_measures.figures, strict=True))
+    listed = [*named(mechanism, mechanism.measures, run.values), *_others(run)]
+    starts = _at_the_start(run, listed)
     measures = []
-    for measure in found:
+    for measure in listed:
         value = float(figures.get(measure.name, np.nan))
         value = value if np.isfinite(value) else starts.get(measure.name, np.nan)
         unit, is_stated = measure.figure_unit(run.system, run.values), measure.name in mechanism.measures

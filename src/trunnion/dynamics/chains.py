@@ -44,7 +44,7 @@ def chain_of_joint(run: Run, walk: Forward, joint: str) -> Chain:
     """Single slides and turns for a joint of several freedoms. walk: at the start."""
     assert isinstance(walk, SpatialWalk)
     kind, (first, second) = run.system.joints[joint]
-    one, two = (_plain(element) for element in walk.ends(joint))
+    one_element, two = (_plain(element) for element in walk.ends(joint))
     if kind == "cylindrical":  # it keeps its elements, and with them its turn and its slide
         (turn, slide), rates = walk.coordinates(joint), walk.rates(joint)
         start = [(_number(turn), _number(rates[0])), (_number(slide), _number(rates[1]))]
@@ -52,7 +52,7 @@ def chain_of_joint(run: Run, walk: Forward, joint: str) -> Chain:
         at = [_point(np.array(frame.place), np.array(frame.z), np.array(frame.x)) for frame in local]
         return _chained(joint, (first, second), "RP", (2, 2), (at[0], at[1]), start)
     if kind == "universal":
-        kinds, basis = "RR", np.array([one.z, two.z, np.cross(one.z, two.z)])
+        kinds, basis = "RR", np.array([one_element.z, two.z, np.cross(one_element.z, two.z)])
     elif kind == "planar":
         kinds, basis = "PPR", np.array([two.x, two.y, two.z])
     else:
@@ -134,8 +134,8 @@ def _turning(run: Run, walk: Forward, first: str, second: str) -> Array:
         raise MechanismError(
             Finding(what, f"links.{second}", "let fewer joints of this link be in play, or it turn less")
         )
-    found: Array = best @ home.T
-    return found
+    rotation_of: Array = best @ home.T
+    return rotation_of
 
 
 def _tried(turned: Array) -> Iterator[Array]:

@@ -215,10 +215,10 @@ def _code(
             numbers = figures(_recorded(motion, {**constant, **recorded}, switches), at)
     except UntraceableError:
         return None
-    *wanted, doubt = [graph.as_float(number_of(graph, number)) for number in numbers]
+    *outputs_asked, doubt = [graph.as_float(number_of(graph, number)) for number in numbers]
     for number in graph.doubts:
         doubt = graph.apply("max", doubt, graph.as_float(number))
-    outputs = [*wanted, graph.as_float(doubt)]
+    outputs = [*outputs_asked, graph.as_float(doubt)]
     return Code(MachineCode(program(graph, outputs, vector_width())), paths, states, onsets, len(outputs))
 
 

@@ -122,11 +122,11 @@ class Guards:
             times = np.unique([*times, *(_root(stretch, n + k, 0.0, times[i], times[i + 1]) for i in turns)])
             places = stretch.state(times)[k]
             for level, outward in zip(self.limits[name], (-1.0, 1.0), strict=True):
-                beyond = outward * (places - level)
-                outside = np.flatnonzero(beyond > ROUNDING * max(1.0, abs(level)))
+                outside_by = outward * (places - level)
+                outside = np.flatnonzero(outside_by > ROUNDING * max(1.0, abs(level)))
                 if len(outside):
                     i = int(outside[0])
-                    inside = i > 0 and beyond[i - 1] < 0.0
+                    inside = i > 0 and outside_by[i - 1] < 0.0
                     time = _root(stretch, k, level, times[i - 1], times[i]) if inside else float(times[max(i - 1, 0)])
                     yield Ended("simulate.range", time, {"driver": name, "coordinate": level})
 
@@ -221,11 +221,11 @@ class DeadCentre:
         if self.shrunk < SHRUNK or not speed * second < 0.0:
             return None
         left, duration = -speed / second, -0.5 * speed * speed / second
-        beside = np.array(
+        near_rows = np.array(
             [float(row[0]), float(row[0]) + (1 - BESIDE) * duration, float(row[0]) + (1 + BESIDE) * duration]
         )
         rows = np.repeat(np.asarray(row, float)[:, None], 3, axis=1)
-        rows[0] = beside
+        rows[0] = near_rows
         at = self.layout.moment(np.full(3, float(solver.t)), rows)
         with np.errstate(all="ignore"):
             walk = self.motion.walk(at, np.zeros_like(at.q))

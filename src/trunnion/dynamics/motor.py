@@ -171,11 +171,15 @@ def drives(system: System, values: Values, number: Callable[[Any], Any] = float)
         if motor is None:
             drives_of[name] = Drive(None, {}, applied=applied)
             continue
-        own = {key.removeprefix(path): number(value) for key, value in values.items() if key.startswith(path)}
-        parameters: dict[str, Any] = {"integral": 0.0, **own, "over": motor.over}
+        own_parameters = {
+            key.removeprefix(path): number(value) for key, value in values.items() if key.startswith(path)
+        }
+        parameters: dict[str, Any] = {"integral": 0.0, **own_parameters, "over": motor.over}
         for key in ("place", "effort"):
-            parameters[f"points.{key}"] = [own[f"points.{k}.{key}"] for k in range(len(motor.points or ()))]
+            parameters[f"points.{key}"] = [own_parameters[f"points.{k}.{key}"] for k in range(len(motor.points or ()))]
         keys = ("ratio", "efficiency", "inertia", "off_from", "brake", "brake_from",
                  "clutch", "clutch_from", "clutch_until")  # fmt: skip
-        drives_of[name] = Drive(motor, parameters, applied=applied, **{key: own[key] for key in keys if key in own})
+        drives_of[name] = Drive(
+            motor, parameters, applied=applied, **{key: own_parameters[key] for key in keys if key in own_parameters}
+        )
     return drives_of

@@ -435,7 +435,7 @@ def _end(ended: Ended, driver: str, unit: str) -> Finding:
 
 def _locks(motion: FreeMotion, solution: Solution) -> Iterator[Finding]:
     """What locks as it runs."""
-    locks = [one for one in solution.events if one.kind == "lock"]
+    locks = [lock for lock in solution.events if lock.kind == "lock"]
     if not motion.resisted:
         for event in locks:
             what = f"the mechanism locks as it runs, at {readable(event.time, 's')}: it stops at once, and loses "
@@ -444,8 +444,11 @@ def _locks(motion: FreeMotion, solution: Solution) -> Iterator[Finding]:
             figures = {"time": event.time, "energy": event.figure}
             yield Finding.warning("simulate.locks", f"drivers.{event.of}", what, remedy, **figures)
     elif locks:
-        joints, energy = list(dict.fromkeys(one.of for one in locks)), float(np.nansum([one.figure for one in locks]))
-        times = len({one.time for one in locks})
+        joints, energy = (
+            list(dict.fromkeys(lock.of for lock in locks)),
+            float(np.nansum([lock.figure for lock in locks])),
+        )
+        times = len({lock.time for lock in locks})
         what = f"{', '.join(joints)} {agreeing(len(joints), 'locks', 'lock')} as the mechanism runs, "
         what += f"{counted(times, 'time')}, first at {readable(locks[0].time, 's')}: "
         what += f"{agreeing(len(joints), 'it stops', 'they stop')} at once, {readable(energy, 'J')} is lost, and what "

@@ -106,7 +106,7 @@ def as_stated(
         if name not in arrays_played or results.SAME_AS.get(name) in arrays_played:
             continue
         into, dims = arrays_played[name], variables[name].dims
-        places = [[(i, labels[dim].index(one)) for i, one in enumerate(names_of[dim]) if one in labels[dim]]
+        places = [[(i, labels[dim].index(label)) for i, label in enumerate(names_of[dim]) if label in labels[dim]]
                   for dim in dims if dim in names_of]  # fmt: skip
         if not places:
             into[...] = array

@@ -74,10 +74,10 @@ class MachineCode:
         code = _read(path)
         if code is None:
             return None
-        found = cls.__new__(cls)
-        found.path, found.compiled = path, False
-        found._link(tuple(tuple(names) for names in inputs), rows, width, code)
-        return found
+        machine_code = cls.__new__(cls)
+        machine_code.path, machine_code.compiled = path, False
+        machine_code._link(tuple(tuple(names) for names in inputs), rows, width, code)
+        return machine_code
 
     def keep_as(self, key: str) -> None:
         """Keep it under a key that is known before the program is."""
@@ -208,8 +208,8 @@ def _own(path: Path) -> bool:
     """Whether a file or folder is this user's and nobody else can write it; of Windows the user's folders are."""
     if not hasattr(os, "getuid"):
         return True
-    told = path.stat()
-    return told.st_uid == os.getuid() and not told.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    file_status = path.stat()
+    return file_status.st_uid == os.getuid() and not file_status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 def _keep(path: Path, code: bytes) -> None:

@@ -150,10 +150,10 @@ class Draft:
             return name
 
         for pair in (pair for pair in self.pairs.values() if pair.type == "fixed"):
-            one, other = first(pair.links[0]), first(pair.links[1])
+            one_end, other = first(pair.links[0]), first(pair.links[1])
             if other == first(self.ground) if self.ground else False:
-                one, other = other, one
-            leader[other] = one
+                one_end, other = other, one_end
+            leader[other] = one_end
         bodies: dict[str, Body] = {}
         for name, body in self.bodies.items():
             lead = first(name)

@@ -80,9 +80,9 @@ def _joint_of(part: Element) -> Element:
     made = SubElement(joint, "axis")
     SubElement(made, "xyz").text = "1 0 0" if axis is None else axis.get("xyz", "")
     if limit is not None and part.get("type") != "continuous" and {"lower", "upper"} <= limit.attrib.keys():
-        stated = SubElement(made, "limit")
+        limit_element = SubElement(made, "limit")
         for end in ("lower", "upper"):
-            SubElement(stated, end).text = limit.get(end)
+            SubElement(limit_element, end).text = limit.get(end)
     if mimic is not None:
         coupling = SubElement(made, "mimic", joint=mimic.get("joint", ""))
         SubElement(coupling, "multiplier").text = mimic.get("multiplier", "1")

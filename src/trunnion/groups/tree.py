@@ -222,19 +222,19 @@ class Tree(ABC):
     ) -> tuple[tuple[Any, ...], tuple[Element, ...], tuple[list[Any], ...]]:
         """Frames of all links, elements of all joints (global) and the screws of their freedoms."""
         frames: dict[int, Any] = {}
-        known: dict[tuple[int, int], Any] = {}
+        frames_of: dict[tuple[int, int], Any] = {}
 
         def placed(k: int, side: int) -> Any:
-            if (k, side) not in known:
+            if (k, side) not in frames_of:
                 link, local = self.joints[k].sides[side], elements[k][side]
-                known[k, side] = local if link == OUTER else self.algebra.compose(frames[link], local)
-            return known[k, side]
+                frames_of[k, side] = local if link == OUTER else self.algebra.compose(frames[link], local)
+            return frames_of[k, side]
 
         for step in self.steps:
             k, motion = step.joint, self.motion(step.joint)
             move = motion.place if step.near == 0 else motion.unplace
             far = move(placed(k, step.near), q[k], *elements[k][2:])
-            known[k, 1 - step.near] = far
+            frames_of[k, 1 - step.near] = far
             frames[step.child] = self.algebra.relative(far, elements[k][1 - step.near])
         pairs = tuple(Element(placed(k, 0), placed(k, 1), *elements[k][2:]) for k in range(len(self.joints)))
         screws = tuple(self.motion(k).screws(*pair) for k, pair in enumerate(pairs))
@@ -481,12 +481,15 @@ class Tree(ABC):
         twists = self.twists(pose, outer, speeds)
         carried = [self._carried(pose, k, speeds[k], twists, outer) for k in range(len(self.joints))]
         driven = self._driven_only(seconds)
-        found = self._accelerations(pose, outer_seconds, driven, carried)
+        second_motions = self._accelerations(pose, outer_seconds, driven, carried)
         rows: list[Number] = []
         for k in self.chords:
-            relative = self.algebra.minus(self.across(k, found, outer_seconds), carried[k])
+            relative = self.algebra.minus(self.across(k, second_motions, outer_seconds), carried[k])
             rows += self._opened(pose, k, relative, driven[k])
-        further, more = self.further_rates(pose, found, outer_seconds), self.further_carried(pose, twists, outer)
+        further, more = (
+            self.further_rates(pose, second_motions, outer_seconds),
+            self.further_carried(pose, twists, outer),
+        )
         rows += [rate + change for rate, change in zip(further, more, strict=True)] if more else further
         return twists, self._accelerations(pose, outer_seconds, self._closing(pose, driven, rows), carried)
 
@@ -560,15 +563,15 @@ class Tree(ABC):
     def _accelerations(
         self, pose: Pose, outer: Sequence[Any], seconds: Sequence[Sequence[Number]], carried: Sequence[Any]
     ) -> list[Any]:
-        algebra, found = self.algebra, dict[int, Any]()
+        algebra, second_motions = self.algebra, dict[int, Any]()
         for step in self.steps:
             k = step.joint
-            base = (outer[k] or algebra.ZERO) if step.parent == OUTER else found[step.parent]
+            base = (outer[k] or algebra.ZERO) if step.parent == OUTER else second_motions[step.parent]
             part = carried[k]
             for screw, value in zip(pose.screws[k], seconds[k], strict=True):
                 part = algebra.added(part, algebra.times(value, screw))
-            found[step.child] = algebra.added(base, part) if step.near == 0 else algebra.minus(base, part)
-        return [found[link] for link in range(self.links)]
+            second_motions[step.child] = algebra.added(base, part) if step.near == 0 else algebra.minus(base, part)
+        return [second_motions[link] for link in range(self.links)]
 
     # ---- reactions --------------------------------------------------------------------------------------------
 

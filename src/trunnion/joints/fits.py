@@ -116,7 +116,7 @@ def fit(size: float, hole: str, shaft: str) -> FitLimits:
         raise MechanismError(Finding(f"'{hole}/{shaft}' is not hole and shaft", remedy="write H7/g6, the hole first"))
     bore, pin = _deviations(size, hole), _deviations(size, shaft)
     least, most = bore[0] - pin[1], bore[1] - pin[0]
-    return FitLimits(_metres(bore), _metres(pin), *(_metre(one) for one in (least, (least + most) / 2, most)))
+    return FitLimits(_metres(bore), _metres(pin), *(_metre(limit) for limit in (least, (least + most) / 2, most)))
 
 
 def limits(size: float, tolerance_class: str) -> tuple[float, float]:
@@ -215,7 +215,7 @@ def _stated(shaft: str, letter: str, diameter: float) -> float:
     row = LOWER[shaft]
     deviation = row[_place(diameter, len(row))]
     if deviation is None:
-        first = next(STEPS[place - 1] for place, one in enumerate(row) if one is not None)
+        first = next(STEPS[place - 1] for place, entry in enumerate(row) if entry is not None)
         other = "u" if letter.islower() else "U"
         raise _refused(f"there is no '{letter}' of {diameter:g} mm", f"it begins above {first} mm; use '{other}'")
     return deviation

@@ -165,8 +165,8 @@ def step_of(run: Run, values: Mapping[str, Number], count: int) -> Array:
         slope = np.abs(np.broadcast_to(derivative(value), (count, 1)))
         number = np.abs(np.broadcast_to(primal(value), (count, 1)))
         with np.errstate(all="ignore"):
-            own = np.where(number > 1e-9 * size, STEP * number / slope, STEP_OF_NONE * size / slope)
-        step = np.where((slope > 0) & ((own < step) | (step == 0)), own, step)
+            step_size = np.where(number > 1e-9 * size, STEP * number / slope, STEP_OF_NONE * size / slope)
+        step = np.where((slope > 0) & ((step_size < step) | (step == 0)), step_size, step)
     return step
 
 

@@ -532,7 +532,7 @@ class Group:
             return numbers, np.zeros(time.shape, int) if tuned else status.reshape(time.shape)
 
         system = self.run.system
-        counts = [1 if one.of_attitude(system) and not tuned else self._counts[one.name] for one in self.measures]
+        counts = [1 if item.of_attitude(system) and not tuned else self._counts[item.name] for item in self.measures]
         scales = np.repeat([self._scales[measure.name] for measure in self.measures], counts)
         accuracy = accuracy_of(self.run.cycle, MARGINS if tuned and self.measures[0].wants_margin else accuracy)
         return Courses.many(look, breaks, lambda sizes: np.maximum(sizes, scales), accuracy)

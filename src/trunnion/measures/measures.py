@@ -201,11 +201,11 @@ class Measure:
         """
         if not self.formula:
             return tuple(numbers)
-        known: dict[str, Number] = {}
+        linked: dict[str, Number] = {}
         for (name, part), number in zip(self.formula.parts.items(), numbers, strict=True):
             turns = run.cycle.duration > 0 and part.turning(run.system)
-            known[name] = near(number, angle_at(run, part, primal(time))) if turns else number
-        return (self.formula.at(known, values),)
+            linked[name] = near(number, angle_at(run, part, primal(time))) if turns else number
+        return (self.formula.at(linked, values),)
 
     def coordinate(self, system: System) -> Measure:
         """The rotation or slide of a joint that a stroke, a dead centre or a transmission error is of."""

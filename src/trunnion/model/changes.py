@@ -87,5 +87,5 @@ def part_types(annotation: object) -> Iterator[type[BaseModel]]:
     """The kinds of entries that a field may be."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
-    for one in get_args(annotation):
-        yield from part_types(one)
+    for form in get_args(annotation):
+        yield from part_types(form)

@@ -203,8 +203,8 @@ def _points(
     """
     units, rows = _columns(path, kinds, label or str(path), names)
     if names:  # of another program, which writes numbers of SI without their unit
-        units = [stated or (kind.unit if kind in (KINDS["time"], KINDS["angle"], KINDS["length"]) else "")
-                 for stated, kind in zip(units, kinds, strict=True)]  # fmt: skip
+        units = [unit_text or (kind.unit if kind in (KINDS["time"], KINDS["angle"], KINDS["length"]) else "")
+                 for unit_text, kind in zip(units, kinds, strict=True)]  # fmt: skip
     points: list[list[float | str]] = []
     for _, cells in rows:
         points.append([f"{cell} {unit}" if unit else float(cell) for cell, unit in zip(cells, units, strict=True)])

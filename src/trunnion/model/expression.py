@@ -247,8 +247,11 @@ def _compile(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Evaluator
         case ast.UnaryOp(op=ast.UAdd(), operand=inner):
             return _compile(inner, operands)
         case ast.BinOp(op=ast.Pow(), left=base, right=exponent) if (power := _integer(exponent, operands)) is not None:
-            value, whole = _compile(base, operands), power  # an int, so that duals of negative numbers have powers
-            return lambda names: value(names) ** whole
+            value, integer_power = (
+                _compile(base, operands),
+                power,
+            )  # an int, so that duals of negative numbers have powers
+            return lambda names: value(names) ** integer_power
         case ast.BinOp(op=operator, left=left, right=right) if type(operator) in _OPERATORS:
             combine, first, second = _OPERATORS[type(operator)], _compile(left, operands), _compile(right, operands)
             return lambda names: combine(first(names), second(names))
@@ -407,10 +410,10 @@ def _power(
         raise UnitError(f"an exponent is {dimension_text(exponent)}", "an exponent must be a number without unit")
     if base is None or base == NUMBER:
         return base
-    whole = _integer(tree, operands)
-    if whole is None:
+    integer_power = _integer(tree, operands)
+    if integer_power is None:
         raise UnitError(f"{dimension_text(base)} is raised to a power that is not a whole number", "use sqrt or ^2")
-    return _scale(base, Fraction(whole))
+    return _scale(base, Fraction(integer_power))
 
 
 def _same(dimensions: list[Dimension | None], verb: str) -> Dimension | None:

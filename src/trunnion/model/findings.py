@@ -120,7 +120,12 @@ def _fields(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str
     """The keys that the part of the model at a location can have."""
     reached, named = [model], False
     for key in location:
-        fields = [one for kind in reached for name, one in kind.model_fields.items() if (one.alias or name) == key]
+        fields = [
+            candidate
+            for kind in reached
+            for name, candidate in kind.model_fields.items()
+            if (candidate.alias or name) == key
+        ]
         if named or not fields:  # the name of an entry, or its place in a list
             named = False
             continue
@@ -139,12 +144,12 @@ def repair(
     mended = {key: _mutable(value) for key, value in data.items()}
     lost: set[str] = set()
     # from the end, so that places in lists stay right
-    for one, finding in reversed(list(zip(_errors(error), findings, strict=True))):
-        location = _plain(one["loc"])
-        if one["type"] == "extra_forbidden":
+    for pydantic_error, finding in reversed(list(zip(_errors(error), findings, strict=True))):
+        location = _plain(pydantic_error["loc"])
+        if pydantic_error["type"] == "extra_forbidden":
             meant = re.fullmatch(r"did you mean '([^']*)'.*", finding.remedy)
             _at(mended, location, partial(_renamed, name=meant and meant[1]))
-        elif one["type"] == "quantity":
+        elif pydantic_error["type"] == "quantity":
             _at(mended, location, _unreadable)
         else:
             entry = location[: 2 if len(location) > 1 and location[0] not in ("gravity", "loop") else 1]

@@ -161,10 +161,10 @@ def number_with(quantity: Quantity, half: float, digits: int = DIGITS) -> str | 
         factor = literal("1", units[k] or unit_stated).value
         size = _down(half / factor, digits)
         if len(spans) == 1:
-            told = f"{size:.{DIGITS}g}"
+            written = f"{size:.{DIGITS}g}"
         else:
-            told = f"{middle / factor + (size if falling == (k == 0) else -size):+.{DIGITS}g}"
-        text = text[: spans[k][0]] + told + text[numbers[k].end("number") :]
+            written = f"{middle / factor + (size if falling == (k == 0) else -size):+.{DIGITS}g}"
+        text = text[: spans[k][0]] + written + text[numbers[k].end("number") :]
     try:
         again = Quantity.read(text, quantity.kind).tolerance
     except UnitError:

@@ -248,7 +248,9 @@ class Mechanism(Numbers):
             return self.parameter_set.resolve(name)
         except MechanismError:
             entry = self._unstated(name)
-            part = any(f".{name}." in f".{one}" for one in self.parameter_set.entries)  # of which some number is stated
+            part = any(
+                f".{name}." in f".{stated_path}" for stated_path in self.parameter_set.entries
+            )  # of which some number is stated
             if not entry and not part and (path := not_stated(self, name)):
                 remedy = "write it into the model file: then this name changes it"
                 raise MechanismError(Finding(f"the model states no {path}", name, remedy)) from None
@@ -267,9 +269,9 @@ class Mechanism(Numbers):
             raise MechanismError(Finding("a limit is stated with the other", name, remedy))
         if entry:
             return entry.location
-        found = self._unstated(name)
-        assert found is not None  # or it would have no path
-        return found[1]
+        unstated = self._unstated(name)
+        assert unstated is not None  # or it would have no path
+        return unstated[1]
 
     def _choice(self, name: str) -> Location | None:
         """Where a choice among words stands; None if the name is of a number."""
@@ -294,8 +296,8 @@ class Mechanism(Numbers):
         try:
             path = self.parameter_set.resolve(of)
         except MechanismError as error:
-            raise MechanismError([replace(one, where=name) for one in error.findings]) from None
-        names = (one for one in self.variations if self.parameter_set.resolve(one) == path)
+            raise MechanismError([replace(item, where=name) for item in error.findings]) from None
+        names = (item for item in self.variations if self.parameter_set.resolve(item) == path)
         of = next(names, of)
         short = key == "limits" and (of not in self.variations or self.variations[of].model_fields_set == {"limits"})
         return (section, of) if short else (section, of, key)

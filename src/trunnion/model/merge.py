@@ -108,14 +108,14 @@ def _radii(stated_fit: Fit, limits: FitChoice, dimensions: Mapping[str, Number])
     evaluable = set(size.names) <= dimensions.keys()
     value = float(size.evaluate(dimensions)) if evaluable else np.nan
     try:
-        found = fit(value, stated_fit.hole, stated_fit.shaft)
+        fit_limits = fit(value, stated_fit.hole, stated_fit.shaft)
     except MechanismError:  # a finding of its own
         return {"radius": _half(size, 0.0, None)}
     radii = {}
     # the smallest play is that of the largest pin in the smallest hole
     for key, (low, high), end in (
-        ("radius", found.shaft_limits, {"minimum": 1.0, "mean": 0.5, "maximum": 0.0}),
-        ("hole_radius", found.hole_limits, {"minimum": 0.0, "mean": 0.5, "maximum": 1.0}),
+        ("radius", fit_limits.shaft_limits, {"minimum": 1.0, "mean": 0.5, "maximum": 0.0}),
+        ("hole_radius", fit_limits.hole_limits, {"minimum": 0.0, "mean": 0.5, "maximum": 1.0}),
     ):
         share = end[limits]
         nominal, width = (low + share * (high - low)) / 2, (high - low) / 2

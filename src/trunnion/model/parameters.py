@@ -167,12 +167,12 @@ def _walk(value: object, path: str, location: Location, rules: Rules = ()) -> It
                 yield from _walk(getattr(value, key), f"{path}.{key}", (*location, key))
         case BaseModel():
             extra = value.parameters.items() if isinstance(value, Friction) else ()
-            stated = markers(type(value))
+            field_rules = markers(type(value))
             for key, item in (*((key, getattr(value, key)) for key in type(value).model_fields), *extra):
                 if item is None or isinstance(item, str):
                     continue  # most of what could be stated is not
                 below = path if isinstance(value, Point) and key == "at" else f"{path}.{key}"
-                yield from _walk(item, below, (*location, key), stated.get(key, ()))
+                yield from _walk(item, below, (*location, key), field_rules.get(key, ()))
         case Mapping():
             for key, item in value.items():
                 yield from _walk(item, f"{path}.{key}", (*location, key))
@@ -212,7 +212,7 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
     for key in ("pin", "guide", "friction", "losses", "stiffness", "seat"):
         part, default = getattr(joint, key), getattr(mechanism.joint_defaults, key, None)
         place = f"joints.{name}.{key}"
-        shared = {one.path: one.quantity for one in _walk(default, place, ())}
+        shared = {number.path: number.quantity for number in _walk(default, place, ())}
         for entry in _walk(part, place, (*location, key)):
             if isinstance(part, Friction):
                 entry = _of_law(part, entry)
@@ -257,9 +257,9 @@ def _of_law(friction: Friction, entry: Entry) -> Entry:
     declared = FRICTION_LAWS[friction.law or DEFAULT_LAW].parameters.get(parameter)
     if declared is None:
         return replace(entry, kind=ANY)
-    wanted = declared.unit or "1"
-    usual = next((kind for kind in KINDS.values() if kind.unit == wanted), None)
-    kind = usual or Kind(parameter, wanted, f"1 {wanted}", (unit(wanted)[1],))
+    law_unit = declared.unit or "1"
+    usual = next((kind for kind in KINDS.values() if kind.unit == law_unit), None)
+    kind = usual or Kind(parameter, law_unit, f"1 {law_unit}", (unit(law_unit)[1],))
     none = parameter == "pair_factor"  # at 0 there would be no friction, which is stated as such
     limits = Within(declared.minimum, declared.maximum, *(("(]", "friction: 0 is without friction") if none else ()))
     return replace(entry, kind=kind, rules=(limits,))

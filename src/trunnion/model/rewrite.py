@@ -143,7 +143,7 @@ def _edit(text: str, root: Node, location: Location, value: Any) -> tuple[int, i
         end = parent.end_mark.index - 1
         return end, end, f", {entry}"
     if parent is root and isinstance(value, Mapping):
-        lines = (f"  {_scalar(name, quoted=False)}: {_flow(one)}\n" for name, one in value.items())
+        lines = (f"  {_scalar(name, quoted=False)}: {_flow(child)}\n" for name, child in value.items())
         return len(text), len(text), f"{'' if text.endswith(chr(10)) else chr(10)}{key}:\n{''.join(lines)}"
     first, last = parent.value[0][0], parent.value[-1][1]
     if not (isinstance(last, ScalarNode) or last.flow_style):
@@ -267,8 +267,8 @@ def _change(tree: MutableMapping[Any, Any], before: Mapping[str, Any], after: Ma
 
 def _rows_changed(current: Any, before: Any, after: Any) -> bool:
     """Take rows out of a list of groups and put others in, whose other rows stay as written; whether that was all."""
-    lists = [one for one in (current, before, after) if isinstance(one, list)]
-    if len(lists) < 3 or not all(isinstance(row, Mapping) for one in lists for row in one):
+    lists = [parts for parts in (current, before, after) if isinstance(parts, list)]
+    if len(lists) < 3 or not all(isinstance(row, Mapping) for parts in lists for row in parts):
         return False
     rows = list(before)
     for index in range(len(rows) - 1, -1, -1):

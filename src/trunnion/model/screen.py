@@ -52,17 +52,17 @@ def _stated_units(mechanism: Any) -> dict[str, str]:
     return {si: unit_text for si, unit_text in (ANGLES | units).items() if si != unit_text}
 
 
-def _customary(stated: Mapping[str, str]) -> ScreenUnits:
+def _customary(units_stated: Mapping[str, str]) -> ScreenUnits:
     """Feet or inches for lengths that are stated so, pounds for forces, and what follows of both."""
-    length = LENGTHS.get(stated.get("m", ""), "")
-    pounds = any(POUNDS.search(stated.get(si, "")) for si in ("N", "N m", "kg", "Pa", "N/m", "W"))
+    length = LENGTHS.get(units_stated.get("m", ""), "")
+    pounds = any(POUNDS.search(units_stated.get(si, "")) for si in ("N", "N m", "kg", "Pa", "N/m", "W"))
     units = {"m": length, "m/s": f"{length}/s", "m/s^2": f"{length}/s^2"} if length else {}
     if pounds:
-        force = stated["N"] if POUNDS.search(stated.get("N", "")) else "lbf"
-        torque = stated["N m"] if POUNDS.search(stated.get("N m", "")) else f"{force} {length or 'ft'}"
+        force = units_stated["N"] if POUNDS.search(units_stated.get("N", "")) else "lbf"
+        torque = units_stated["N m"] if POUNDS.search(units_stated.get("N m", "")) else f"{force} {length or 'ft'}"
         units |= {"N": force, "N m": torque, "J": torque, "W": f"{torque}/s", "Pa": "psi", "N s": f"{force} s"}
         units |= {"N/m": f"{force}/{length or 'ft'}"}
-        units |= {si: stated[si] for si in ("W", "Pa") if POUNDS.search(stated.get(si, ""))}
+        units |= {si: units_stated[si] for si in ("W", "Pa") if POUNDS.search(units_stated.get(si, ""))}
     return {si: (1 / float(unit(text)[0]), text.replace("^2", "²")) for si, text in units.items()}
 
 

@@ -115,10 +115,10 @@ _check_model, _schema_model = known(COST_MODELS, "cost model")
 
 def _grade(value: object) -> object:
     """A grade as its number in a text: 7, "7" and "IT7" are "7"."""
-    found = re.fullmatch(r"(?:IT\s*)?([0-9]{1,2})", str(value).strip())
-    if not found or int(found[1]) not in GRADES:
+    match = re.fullmatch(r"(?:IT\s*)?([0-9]{1,2})", str(value).strip())
+    if not match or int(match[1]) not in GRADES:
         raise problem(f"'{str(value)[:20]}' is no IT grade", f"write one of {min(GRADES)} to {max(GRADES)}, as 7: 9.50")
-    return str(int(found[1]))
+    return str(int(match[1]))
 
 
 Grade = Annotated[str, BeforeValidator(_grade), WithJsonSchema({"type": "string", "pattern": "^(IT ?)?[0-9]{1,2}$"})]

@@ -87,11 +87,11 @@ def tolerated(mechanism: Numbers, numbers: ParameterSet | None = None) -> list[T
     numbers: those of the mechanism, where some of it could not be read.
     """
     numbers = numbers or mechanism.parameter_set
-    stated, found = variations(mechanism, numbers), written_limits(numbers)
+    varied, written = variations(mechanism, numbers), written_limits(numbers)
     return [
-        _tolerance(mechanism, numbers, entry, stated.get(path, ("", Variation()))[1], found.get(path))
+        _tolerance(mechanism, numbers, entry, varied.get(path, ("", Variation()))[1], written.get(path))
         for path, entry in numbers.entries.items()
-        if path in stated or (path in found and may_vary(entry))
+        if path in varied or (path in written and may_vary(entry))
     ]
 
 
@@ -125,7 +125,7 @@ def ends_motion(path: str) -> bool:
 
 def variations(mechanism: Numbers, numbers: ParameterSet) -> dict[str, tuple[str, Variation]]:
     """Name and entry of `tolerances` by path; names that mean nothing are left out, as findings of their own."""
-    found: dict[str, tuple[str, Variation]] = {}
+    varied: dict[str, tuple[str, Variation]] = {}
     shared: dict[str, tuple[str, Variation]] = {}
     for name, variation in mechanism.variations.items():
         try:
@@ -133,10 +133,10 @@ def variations(mechanism: Numbers, numbers: ParameterSet) -> dict[str, tuple[str
         except MechanismError:
             continue
         of_all = path.startswith(DEFAULTS)
-        for one in followers(numbers, path) if of_all else [path]:
-            if may_vary(numbers.entries[one]):
-                (shared if of_all else found).setdefault(one, (name, variation))
-    return {**shared, **found}
+        for follower in followers(numbers, path) if of_all else [path]:
+            if may_vary(numbers.entries[follower]):
+                (shared if of_all else varied).setdefault(follower, (name, variation))
+    return {**shared, **varied}
 
 
 def followers(numbers: ParameterSet, path: str) -> list[str]:
@@ -157,36 +157,38 @@ def _tolerance(
     mechanism: Numbers,
     numbers: ParameterSet,
     entry: Entry,
-    stated: Variation,
+    variation: Variation,
     written: tuple[float, float] | None,
 ) -> Tolerance:
     """written: limits that stand with the number itself."""
-    distribution, options = _distribution(mechanism, stated)
+    distribution, options = _distribution(mechanism, variation)
     values = {key: _value(option, numbers.dimension_values) for key, option in options.items()}
     sample = values.get("values")
-    if stated.limits is not None:
-        lower, upper = (_number(one, numbers.dimension_values) for one in (stated.limits.lower, stated.limits.upper))
+    if variation.limits is not None:
+        lower, upper = (
+            _number(limit, numbers.dimension_values) for limit in (variation.limits.lower, variation.limits.upper)
+        )
     elif written is not None:
         lower, upper = written
     elif isinstance(sample, tuple):
         lower, upper = min(sample), max(sample)
     else:
         lower, upper = (-np.pi, np.pi) if distribution == FULL_TURN else (np.nan, np.nan)
-    direction = towards(entry.path, numbers) if stated.direction else ""
+    direction = towards(entry.path, numbers) if variation.direction else ""
     nominal = float(numbers.nominal[entry.path])
     return Tolerance(entry.path, nominal, lower, upper, distribution, values, direction)
 
 
-def _distribution(mechanism: Numbers, stated: Variation) -> tuple[str, dict[str, Quantity | tuple[Quantity, ...]]]:
+def _distribution(mechanism: Numbers, variation: Variation) -> tuple[str, dict[str, Quantity | tuple[Quantity, ...]]]:
     """Its name and what it is told; defaults are for what the distribution takes and the entry does not say."""
     defaults = mechanism.tolerance_defaults
-    name = stated.distribution or defaults.distribution
+    name = variation.distribution or defaults.distribution
     options = {}
     for key in DISTRIBUTIONS[name]:
-        own = getattr(stated, key)
+        option = getattr(variation, key)
         # a default cpk is one beside the default cp
-        spoken = key == "cpk" and stated.cp is not None
-        value = own if own is not None or spoken else getattr(defaults, key, None)
+        spoken = key == "cpk" and variation.cp is not None
+        value = option if option is not None or spoken else getattr(defaults, key, None)
         if value is not None:
             options[key] = value
     return name, options
@@ -194,7 +196,7 @@ def _distribution(mechanism: Numbers, stated: Variation) -> tuple[str, dict[str,
 
 def _value(option: Quantity | tuple[Quantity, ...], dimensions: Mapping[str, Number]) -> float | tuple[float, ...]:
     if isinstance(option, tuple):
-        return tuple(_number(one, dimensions) for one in option)
+        return tuple(_number(item, dimensions) for item in option)
     return _number(option, dimensions)
 
 
@@ -209,26 +211,26 @@ def _number(quantity: Quantity, dimensions: Mapping[str, Number]) -> float:
 def correlation(mechanism: Numbers, numbers: ParameterSet | None = None) -> NDArray[np.float64]:
     """The matrix of the correlations of all tolerated numbers, in the order of `tolerated`."""
     numbers = numbers or mechanism.parameter_set
-    place = {one.path: index for index, one in enumerate(tolerated(mechanism, numbers))}
+    place = {tolerance.path: index for index, tolerance in enumerate(tolerated(mechanism, numbers))}
     matrix = np.eye(len(place))
     for correlation in mechanism.correlations:
         paths = [path for path in named_paths(numbers, correlation.of) if path in place]
         value = _number(correlation.coefficient, numbers.dimension_values)
-        for one, other in combinations(dict.fromkeys(paths), 2):
-            matrix[place[one], place[other]] = matrix[place[other], place[one]] = value
+        for first, other in combinations(dict.fromkeys(paths), 2):
+            matrix[place[first], place[other]] = matrix[place[other], place[first]] = value
     return matrix
 
 
 def named_paths(numbers: ParameterSet, names: Iterable[str]) -> list[str]:
     """The paths that names mean, those of `joint_defaults` as the numbers of the joints; unknown ones left out."""
-    found: list[str] = []
+    paths: list[str] = []
     for name in names:
         try:
             path = numbers.resolve(name)
         except MechanismError:
             continue
-        found += followers(numbers, path) if path.startswith(DEFAULTS) else [path]
-    return found
+        paths += followers(numbers, path) if path.startswith(DEFAULTS) else [path]
+    return paths
 
 
 # ---- other tolerances -----------------------------------------------------------------------------------------
@@ -242,41 +244,41 @@ def clearance_of(mechanism: Numbers, name: str, numbers: ParameterSet | None = N
     joint = name.removeprefix("joints.").removesuffix(".clearance")
     if not name.endswith(".clearance") or joint not in mechanism.effective_joints:
         return ""
-    known = (numbers or mechanism.parameter_set).entries
+    entries = (numbers or mechanism.parameter_set).entries
     paths = [f"joints.{joint}.{part}.clearance" for part in ("pin", "guide")]
-    return next((path for path in paths if path in known), "")
+    return next((path for path in paths if path in entries), "")
 
 
 def with_tolerances(mechanism: Numbers, half_widths: Mapping[str, float | str], digits: int = DIGITS) -> dict[str, Any]:
     """Plain data of the mechanism with other half widths of tolerances, and other clearances, SI or text, by name."""
     numbers = mechanism.parameter_set
     kinds = measured(mechanism, numbers.entries.values())
-    known = {one.path: one for one in tolerated(mechanism)}
-    stated = variations(mechanism, numbers)
+    tolerances = {item.path: item for item in tolerated(mechanism)}
+    varied = variations(mechanism, numbers)
     clearances: dict[str, str] = {}
     texts: list[tuple[Location, str]] = []
     entries: dict[str, Any] = {}
     findings: list[Finding] = []
-    for name, told in half_widths.items():
+    for name, half_width_text in half_widths.items():
         if play := clearance_of(mechanism, name):
-            half = _half(told, KINDS["length"], name, findings)
+            half = _half(half_width_text, KINDS["length"], name, findings)
             clearances[play] = written(half, KINDS["length"], digits)
             continue
         path = numbers.resolve(name)
-        tolerance = known.get(path)
+        tolerance = tolerances.get(path)
         if tolerance is None or not tolerance.can_be_chosen:
             what = "has no tolerance" if tolerance is None else "varies as measured or over a full turn"
             findings.append(Finding(f"'{name}' {what}, none can be replaced", remedy="state limits in tolerances: {…}"))
             continue
-        half = _half(told, kinds[path], name, findings)
-        key, variation = stated.get(path, ("", Variation()))
-        if variation.limits is None and (own := _in_place(mechanism, numbers.entries[path], half, digits)):
-            texts.append(own)
+        half = _half(half_width_text, kinds[path], name, findings)
+        key, variation = varied.get(path, ("", Variation()))
+        if variation.limits is None and (deviation := _in_place(mechanism, numbers.entries[path], half, digits)):
+            texts.append(deviation)
             continue
         text = limits_text((tolerance.lower + tolerance.upper) / 2, half, kinds[path], digits)
         own_key = key if key and not numbers.resolve(key).startswith(DEFAULTS) else path
         group = variation.model_copy(update={"limits": Limits.read(text)})
-        entries[own_key] = Variation(**{one: getattr(group, one) for one in {*variation.model_fields_set, "limits"}})
+        entries[own_key] = Variation(**{item: getattr(group, item) for item in {*variation.model_fields_set, "limits"}})
     if findings:
         raise MechanismError(findings)
     data = mechanism.data()
@@ -287,7 +289,7 @@ def with_tolerances(mechanism: Numbers, half_widths: Mapping[str, float | str], 
         holder, last = _holder(data, location)
         holder[last] = text
     if entries:
-        plain = {key: one.model_dump(mode="json", exclude_unset=True) for key, one in entries.items()}
+        plain = {key: item.model_dump(mode="json", exclude_unset=True) for key, item in entries.items()}
         data["tolerances"] = {**data.get("tolerances", {}), **plain}
     return data
 
@@ -297,7 +299,9 @@ def keep_limits(mechanism: Numbers, name: str, value: Any, data: dict[str, Any])
     without: another nominal value is no other tolerance.
     """
     numbers = mechanism.parameter_set
-    entry = next((one for one in (numbers.entries.get(path) for path in _paths(numbers, name)) if one), None)
+    entry = next(
+        (candidate for candidate in (numbers.entries.get(path) for path in _paths(numbers, name)) if candidate), None
+    )
     if entry is None or entry.quantity.tolerance is None or not may_vary(entry):
         return
     if entry.alias and not entry.alias.startswith(DEFAULTS):
@@ -308,14 +312,14 @@ def keep_limits(mechanism: Numbers, name: str, value: Any, data: dict[str, Any])
     except UnitError:  # a finding of its own
         return
     lower, upper = entry.quantity.tolerance
-    stated = data.setdefault("tolerances", {})
-    known = variations(mechanism, numbers).get(entry.path, ("", Variation()))
-    key = known[0] or entry.path
+    section = data.setdefault("tolerances", {})
+    previous = variations(mechanism, numbers).get(entry.path, ("", Variation()))
+    key = previous[0] or entry.path
     kind = measured(mechanism, numbers.entries.values())[entry.path]
     text = limits_text((lower + upper) / 2, (upper - lower) / 2, kind, DIGITS)
-    if known[1].limits is None:
-        own = stated.get(key, {})
-        stated[key] = {**(own if isinstance(own, dict) else {}), "limits": text}
+    if previous[1].limits is None:
+        own = section.get(key, {})
+        section[key] = {**(own if isinstance(own, dict) else {}), "limits": text}
 
 
 def _paths(numbers: ParameterSet, name: str) -> list[str]:
@@ -325,10 +329,10 @@ def _paths(numbers: ParameterSet, name: str) -> list[str]:
         return []
 
 
-def _half(told: float | str, kind: Kind, name: str, findings: list[Finding]) -> float:
+def _half(text: float | str, kind: Kind, name: str, findings: list[Finding]) -> float:
     """A half width in SI; 0 and a finding if it is none."""
     try:
-        return half_width(told, kind, name)
+        return half_width(text, kind, name)
     except MechanismError as error:
         findings += error.findings
         return 0.0
@@ -379,12 +383,12 @@ def kept(mechanism: Numbers, data: Mapping[str, Any]) -> dict[str, Any]:
         except MechanismError:
             return False
 
-    rest = {key: {name: one for name, one in data[key].items() if known(name)} for key in named}
+    rest = {key: {name: item for name, item in data[key].items() if known(name)} for key in named}
     rows = [{**row, "of": [name for name in row["of"] if known(name)]} for row in data.get("correlations", ())]
     together = [
         row
-        for row, stated in zip(rows, data.get("correlations", ()), strict=True)
-        if row["of"] == stated["of"] or len(row["of"]) > 1
+        for row, correlation_row in zip(rows, data.get("correlations", ()), strict=True)
+        if row["of"] == correlation_row["of"] or len(row["of"]) > 1
     ]
     return {**data, **rest, **({"correlations": together} if rows else {})}
 
@@ -396,12 +400,12 @@ def with_samples(mechanism: Numbers, name: str, path: str | os.PathLike[str]) ->
     if target not in numbers.entries:
         raise MechanismError(Finding(f"the model states no '{target}'", "--sample", "state it, then its deviations"))
     deviations = column(Path(path), measured(mechanism, numbers.entries.values())[target])
-    key, stated = variations(mechanism, numbers).get(target, (target, None))
+    key, variation = variations(mechanism, numbers).get(target, (target, None))
     data = mechanism.data()
-    kept = {} if stated is None or stated.limits is None else {"limits": stated.limits.source}
-    own = key if numbers.resolve(key) == target else target
-    entry = {**kept, "distribution": "sample", "values": deviations}
-    data["tolerances"] = {**data.get("tolerances", {}), own: entry}
+    limits_kept = {} if variation is None or variation.limits is None else {"limits": variation.limits.source}
+    own_key = key if numbers.resolve(key) == target else target
+    entry = {**limits_kept, "distribution": "sample", "values": deviations}
+    data["tolerances"] = {**data.get("tolerances", {}), own_key: entry}
     return data
 
 
@@ -443,7 +447,7 @@ def prices(mechanism: Numbers) -> list[Price]:
     """
     if not mechanism.costs:
         return []
-    fixed = {one.path for one in tolerated(mechanism) if not one.can_be_chosen}
+    fixed = {tolerance.path for tolerance in tolerated(mechanism) if not tolerance.can_be_chosen}
     paths = [(path, cost) for name, cost in mechanism.costs.items() for path in cost_paths(mechanism, name)]
     return [price(mechanism, path, cost) for path, cost in paths if path not in fixed]
 
@@ -475,7 +479,7 @@ def price(mechanism: Numbers, path: str, cost: Cost, numbers: ParameterSet | Non
         0.0 if cost.least is None else _number(cost.least, names),
         np.inf if cost.most is None else _number(cost.most, names),
         cost.group or "",
-        tuple(sorted(_choices(mechanism, path, cost, numbers), key=lambda one: (one.cost, one.tolerance))),
+        tuple(sorted(_choices(mechanism, path, cost, numbers), key=lambda choice: (choice.cost, choice.tolerance))),
     )
 
 
@@ -483,20 +487,20 @@ def _choices(mechanism: Numbers, path: str, cost: Cost, numbers: ParameterSet) -
     names = numbers.dimension_values
     if cost.options is not None:
         return [
-            ProcessChoice(name, _number(one.tolerance, names), _number(one.cost, names))
-            for name, one in cost.options.items()
+            ProcessChoice(name, _number(offer.tolerance, names), _number(offer.cost, names))
+            for name, offer in cost.options.items()
         ]
     if cost.process is None or cost.process not in mechanism.processes:
         return []
     size = float(numbers.nominal.get(path, np.nan))
-    found = []
-    for grade, one in mechanism.processes[cost.process].items():
+    choices = []
+    for grade, offer in mechanism.processes[cost.process].items():
         try:
             half = standard_tolerance(abs(size), int(grade)) / 2
         except MechanismError:  # a finding of its own
             half = np.nan
-        found.append(ProcessChoice(f"IT{grade}", half, _number(one, names)))
-    return found
+        choices.append(ProcessChoice(f"IT{grade}", half, _number(offer, names)))
+    return choices
 
 
 def _unit(text: str | None) -> float:
@@ -524,9 +528,9 @@ def cost_entries(mechanism: Numbers, names: ParameterNames, kinds: Mapping[str, 
             add(getattr(cost, key), f"{where}.{key}", KINDS["number"])
         for key in ("least", "most"):
             add(getattr(cost, key), f"{where}.{key}", kind)
-        for option, one in (cost.options or {}).items():
-            add(one.tolerance, f"{where}.options.{option}.tolerance", kind)
-            add(one.cost, f"{where}.options.{option}.cost", KINDS["number"])
+        for option, offer in (cost.options or {}).items():
+            add(offer.tolerance, f"{where}.options.{option}.tolerance", kind)
+            add(offer.cost, f"{where}.options.{option}.cost", KINDS["number"])
     for process, grades in mechanism.processes.items():
         for grade, paid in grades.items():
             add(paid, f"processes.{process}.{grade}", KINDS["number"])

@@ -85,7 +85,9 @@ class Kind:
 
     def accepts(self, dimension: Dimension | None) -> bool:
         """Whether a value of this dimension (None: a plain number, unknown) can stand here."""
-        return dimension is None or not self.dimensions or any(fits(dimension, one) for one in self.dimensions)
+        return (
+            dimension is None or not self.dimensions or any(fits(dimension, accepted) for accepted in self.dimensions)
+        )
 
 
 TURNING = ("angle", "angular speed", "moment", "moment of inertia", "torsional stiffness", "torsional damping")
@@ -126,8 +128,8 @@ def si_unit(dimension: Dimension | None) -> str:
     """SI unit of a dimension; empty for a plain number, whose unit only its use tells."""
     if dimension is None:
         return ""
-    known = next((kind.unit for kind in KINDS.values() if dimension in kind.dimensions), None)
-    return known or dimension_text(dimension).removeprefix("in ")
+    unit_of_kind = next((kind.unit for kind in KINDS.values() if dimension in kind.dimensions), None)
+    return unit_of_kind or dimension_text(dimension).removeprefix("in ")
 
 
 def dimension_text(dimension: Dimension) -> str:
@@ -340,7 +342,7 @@ _DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 def normalise(text: str) -> str:
     """The text with typographic signs as plain ones: − – × as - *, m² as m^2."""
-    return _SUPERSCRIPT.sub(lambda found: "^" + found[0].translate(_DIGITS), text.translate(_SIGNS))
+    return _SUPERSCRIPT.sub(lambda match: "^" + match[0].translate(_DIGITS), text.translate(_SIGNS))
 
 
 # Those that a misspelt one is compared with.
@@ -392,24 +394,24 @@ def pound_feet(text: str) -> str:
     Not of a model's: a minus may stand there, and `lb ft` is a mass times a length. No sensor measures that.
     """
 
-    def product(found: re.Match[str]) -> str:
-        return f"({found[2] or found[3]}f {found[1] or found[4]})"
+    def product(match: re.Match[str]) -> str:
+        return f"({match[2] or match[3]}f {match[1] or match[4]})"
 
     alone = _POUND_FEET_ALONE.fullmatch(text.strip())
     return product(alone) if alone else _POUND_FEET.sub(product, text)
 
 
-def _torque(found: re.Match[str]) -> str:
-    product = f"{found[1]}N {found[2]}"
-    return f"{product}{found[3]}" if found[3] else f"({product})"
+def _torque(match: re.Match[str]) -> str:
+    product = f"{match[1]}N {match[2]}"
+    return f"{product}{match[3]}" if match[3] else f"({product})"
 
 
 def _remedy(text: str, word: str) -> str:
     """What to write instead of a unit with a word that is none; empty where nothing is near."""
     bare = "".join(text.split())
-    if told := next((remedy for phrase, remedy in _PHRASES.items() if phrase.fullmatch(bare)), ""):
-        return told
-    if told := _MEANT.get(word.casefold(), ""):
-        return told
+    if remedy_text := next((remedy for phrase, remedy in _PHRASES.items() if phrase.fullmatch(bare)), ""):
+        return remedy_text
+    if remedy_text := _MEANT.get(word.casefold(), ""):
+        return remedy_text
     near = nearest(word, _USUAL.split())
     return near if near.startswith("did you mean") else ""

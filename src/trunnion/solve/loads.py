@@ -143,14 +143,14 @@ class Stated:
 
     def _of_table(self, name: str) -> tuple[list[Number], list[Number], Number]:
         """Knots and values of a table, and the place in it."""
-        mechanism, given, path = self.walk.system.mechanism, self.walk.values, f"tables.{name}.points"
+        mechanism, numbers, path = self.walk.system.mechanism, self.walk.values, f"tables.{name}.points"
         table, last = mechanism.tables[name], len(mechanism.tables[name].points) - 1
-        knots, values = ([given[f"{path}.{k}.{key}"] for k in range(last + 1)] for key in ("at", "value"))
+        knots, values = ([numbers[f"{path}.{k}.{key}"] for k in range(last + 1)] for key in ("at", "value"))
         if table.period is not None:
             paths = (f"{path}.0.at", f"{path}.{last}.at", f"tables.{name}.period")
             first, end, period = (mechanism.parameter_set.nominal[path] for path in paths)
             if end - first < period * (1 - 1e-9):  # the first point comes again as the last
-                knots, values = [*knots, knots[0] + given[f"tables.{name}.period"]], [*values, values[0]]
+                knots, values = [*knots, knots[0] + numbers[f"tables.{name}.period"]], [*values, values[0]]
         return knots, values, self.walk.time if table.over == "time" else self._drive[0]
 
 

@@ -525,7 +525,11 @@ class System:
             if gear.slides and (slide := self.mechanism.coupled(name)[1]) in ways:
                 around = 2 * np.pi * abs(float(np.ravel(primal(self.ratio(values, name)))[0]))
                 ways[slide] = min(ways[slide], around)
-        return Cycle(duration, periodic, max(float(spans[name].peak * duration / way) for name, way in ways.items()))
+        return Cycle(
+            duration,
+            periodic,
+            max(float(spans[name].peak * duration / duration_share) for name, duration_share in ways.items()),
+        )
 
     def _backward_ranges(self, nominal: Values, spans: Mapping[str, Span]) -> Iterator[Finding]:
         """Drivers whose range runs against their speed."""

@@ -69,9 +69,9 @@ def constraints(
         c, s = places[name][2:]
         at_x, at_y = np.array([1.0, 0.0, -y]), np.array([0.0, 1.0, x])
         across, along = c * at_y - s * at_x, c * at_x + s * at_y
-        held = [at_x, at_y, TURN] if PAIRS[kind].turns else [across, TURN, along]
+        constrained = [at_x, at_y, TURN] if PAIRS[kind].turns else [across, TURN, along]
         along_slides |= {} if PAIRS[kind].turns else {name: along}
-        for constraint in held[: 3 if name in drivers else 2]:
+        for constraint in constrained[: 3 if name in drivers else 2]:
             add(name, (sides, constraint))
     for name, ((first, second), ratio) in (gears or {}).items():
         scale = spread if second in along_slides else 1.0

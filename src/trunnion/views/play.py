@@ -86,8 +86,8 @@ def _panel(every: xr.Dataset, i: int) -> Panel:
     """The worst case of one measure over the drive."""
     result, over, unit = every.isel(measure=i), abscissa(every), units_along(every["value"], "measure")[i]
     rows, total, rss = (result[key].values for key in ("worst_case", "worst_case_total", "rss"))
-    most, shown = float(np.nanmax(total, initial=0.0)), usual_peak(ease(result), total)
-    factor, label = prefixed(shown, unit)
+    most, usual = float(np.nanmax(total, initial=0.0)), usual_peak(ease(result), total)
+    factor, label = prefixed(usual, unit)
     x, floor, marks = over.values, np.zeros(len(total)), list[Mark]()
     for k, (joint, row) in enumerate(zip(result["joint"].values, rows * factor, strict=True)):
         if np.nanmax(row, initial=0.0) > 0:
@@ -105,12 +105,12 @@ def _panel(every: xr.Dataset, i: int) -> Panel:
         # of an extreme the curve has the pins where they are, the figure also this place, which they may move
         at = np.array([_place(result, over)])
         place = " at ".join(attribute(every, "places")[i]).strip()
-        look = Look("ink", dash="none", mark="o", size=6, unclipped=shown >= most)  # on the frame, but not beyond it
+        look = Look("ink", dash="none", mark="o", size=6, unclipped=usual >= most)  # on the frame, but not beyond it
         marks.append(Line(at, np.array([extreme * factor]), place, look))
     marks += silent(every, over)
     top = None
-    if shown < most:
-        top = 1.05 * shown * factor
+    if usual < most:
+        top = 1.05 * usual * factor
         marks.append(outside(most, unit))
     title = f"worst case of {every['measure'].values[i]} [{label}]"
     return Panel("", [Chart(over, Axis(title, (0.0, top)), marks, zero=True)], PANEL)

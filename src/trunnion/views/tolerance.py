@@ -262,10 +262,10 @@ def histogram(read: MeasureReading) -> Panel:
         lower, upper = ((read.nominal + end - shift) * read.factor for end in read.room)
         passed, _, decimals = read.interval[0], *share_parts(*read.interval)[1:]
         lost = "beyond, or failed," if any(n for _, n in failures(read.result)) else "beyond"
-        beyond = None if passed == 1.0 else f"{lost} {share(1 - passed, decimals)}"
+        outside_text = None if passed == 1.0 else f"{lost} {share(1 - passed, decimals)}"
         window = (max(lower, float(x[0])), min(upper, float(x[-1])))
         marks = [Stairs(heights, x, f"within {share_interval(*read.interval)}", Look(WITHIN, order=2.1), window),
-                 Stairs(heights, x, beyond, Look(BEYOND))]  # fmt: skip
+                 Stairs(heights, x, outside_text, Look(BEYOND))]  # fmt: skip
     marks += _histogram_lines(read, shift)
     outside = int(tally[(edges[1:] <= low) | (edges[:-1] >= high)].sum())
     if outside:

@@ -129,10 +129,10 @@ def _quantities(mechanism: Numbers, unreadable: set[str]) -> Iterator[Finding]:
             yield Finding("is not used", f"dimensions.{name}", remedy, Severity.NOTE)
 
 
-def _dimensions(mechanism: Numbers, known: dict[str, Dimension | None], unreadable: set[str]) -> Iterator[Finding]:
+def _dimensions(mechanism: Numbers, by_name: dict[str, Dimension | None], unreadable: set[str]) -> Iterator[Finding]:
     """Names of the dimensions and what each measures: `known` receives it, `unreadable` the paths without a value."""
     dimensions = mechanism.dimensions
-    known.update(dict.fromkeys(dimensions))
+    by_name.update(dict.fromkeys(dimensions))
     deviations = dimension_errors(mechanism.entries) if mechanism.errors else {}
     order, circles = evaluation_order(dimensions, deviations)
     for circle in circles:
@@ -142,9 +142,9 @@ def _dimensions(mechanism: Numbers, known: dict[str, Dimension | None], unreadab
     for name in order:
         yield from expression_name(name, f"dimensions.{name}")
         quantity, path = dimensions[name], f"dimensions.{name}"
-        if set(quantity.names) <= known.keys() and path not in unreadable:
+        if set(quantity.names) <= by_name.keys() and path not in unreadable:
             try:
-                known[name] = quantity.check(known, ANY)
+                by_name[name] = quantity.check(by_name, ANY)
             except UnitError as error:
                 unreadable.add(path)
                 yield Finding(error.what, path, error.remedy)
@@ -194,7 +194,7 @@ def _others(mechanism: Numbers) -> Iterator[Finding]:
         link, _, point = name.partition(".")
         if isinstance(hint, str):
             if name not in points or name == mechanism.fixed_link:
-                moving = [one for one in points if one != mechanism.fixed_link]
+                moving = [point_name for point_name in points if point_name != mechanism.fixed_link]
                 what = f"'{hint}' chooses an assembly of a moving link, and '{name}' is none"
                 yield Finding(what, where, nearest(name, moving))
             continue

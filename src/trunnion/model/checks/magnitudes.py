@@ -44,23 +44,25 @@ def magnitudes(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
     lengths = [entry for path, entry in numbers.entries.items() if entry.kind is KINDS["length"] and path in values]
     places = [entry for entry in lengths if entry.path.startswith("links.") and ".points." in entry.path]
     pins = [entry for entry in lengths if entry.path.endswith((".pin.radius", ".guide.length")) and not entry.alias]
-    known = max((values[entry.path] for entry in places if not _plain(mechanism, entry)), default=0.0)
-    bare = _without_unit(mechanism, entries, nominal) if known > 0 else None
+    others_largest = max((values[entry.path] for entry in places if not _plain(mechanism, entry)), default=0.0)
+    bare = _without_unit(mechanism, entries, nominal) if others_largest > 0 else None
     bare = bare or {}
     doubtful: dict[str, float] = {}
     for path, kind in bare.items():
         if path.endswith(".limit.lower"):
             continue  # a plain limit is one number, told as the upper one
         narrow = path in plain or path.endswith(".limit.upper")
-        if kind is KINDS["length"] and values[path] > (WIDE if narrow else 1.0) * known:
+        if kind is KINDS["length"] and values[path] > (WIDE if narrow else 1.0) * others_largest:
             doubtful[path] = values[path]
         else:
             yield _meant(path, nominal[path], kind)
-    far = [entry for entry in (*places, *pins) if values[entry.path] > FAR * known > 0]
-    doubtful |= {path: values[path] for entry in far for path in _plain(mechanism, entry) if values[path] > FAR * known}
+    far = [entry for entry in (*places, *pins) if values[entry.path] > FAR * others_largest > 0]
+    doubtful |= {
+        path: values[path] for entry in far for path in _plain(mechanism, entry) if values[path] > FAR * others_largest
+    }
     if doubtful:
         path = max(doubtful, key=doubtful.__getitem__)
-        yield _forgotten(path, doubtful[path], known, len(doubtful) - 1)
+        yield _forgotten(path, doubtful[path], others_largest, len(doubtful) - 1)
     largest = 2 * max((values[entry.path] for entry in places), default=0.0)
     for entry in pins:
         if (
@@ -113,7 +115,7 @@ def _is_one(path: str, entry: Entry, kind: Kind) -> bool:
     """Whether a dimension measures what the entry does that speaks of it: as a plain factor it makes no sense there."""
     name = path.removeprefix("dimensions.")
     try:
-        entry.quantity.check({one: NUMBER if one == name else None for one in entry.quantity.names}, kind)
+        entry.quantity.check({operand: NUMBER if operand == name else None for operand in entry.quantity.names}, kind)
     except UnitError:
         return name in entry.quantity.names
     return False
@@ -132,7 +134,7 @@ def _plain(mechanism: Numbers, entry: Entry) -> list[str]:
             if name in mechanism.dimensions and f"dimensions.{name}" not in quantities:
                 quantities[f"dimensions.{name}"] = mechanism.dimensions[name]
                 left.append(mechanism.dimensions[name])
-    return [path for path, one in quantities.items() if not isinstance(one.source, str) and one.source != 0]
+    return [path for path, bare in quantities.items() if not isinstance(bare.source, str) and bare.source != 0]
 
 
 def bare_number(numbers: ParameterSet, path: str, value: float) -> Iterator[Finding]:

@@ -157,10 +157,10 @@ def measure_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Findin
                 what = f"is {value(key):g}, but this measure is looked for up to {up_to:g} alone"
                 yield Finding(what, f"{where}.{key}", "give a number below that")
         start, end = value("over.from"), value("over.to")
-        kinds = {one.kind.name for key, one in numbers.entries.items() if key.startswith(f"{where}.over.")}
+        kinds = {item.kind.name for key, item in numbers.entries.items() if key.startswith(f"{where}.over.")}
         if len(kinds) > 1:
             what = (
-                f"the range runs from {' to '.join(numbers.entries[f'{where}.over.{one}'].kind.name for one in ENDS)}"
+                f"the range runs from {' to '.join(numbers.entries[f'{where}.over.{item}'].kind.name for item in ENDS)}"
             )
             yield Finding(what, f"{where}.over", "give two coordinates of the first driver, or two times")
         elif start == end:

@@ -56,9 +56,12 @@ def direction_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:
             path = f"links.{name}.points.{point}"
             if place.x is None or len(place.x) != 3 or (place.axis is not None and len(place.axis) != 3):
                 continue
-            x, axis = np.array([values[f"{path}.x.{one}"] for one in "xyz"], dtype=float), np.array([0.0, 0.0, 1.0])
+            x, axis = (
+                np.array([values[f"{path}.x.{axis_name}"] for axis_name in "xyz"], dtype=float),
+                np.array([0.0, 0.0, 1.0]),
+            )
             if place.axis is not None:
-                axis = np.array([values[f"{path}.axis.{one}"] for one in "xyz"], dtype=float)
+                axis = np.array([values[f"{path}.axis.{axis_name}"] for axis_name in "xyz"], dtype=float)
             across, size = np.linalg.norm(np.cross(axis, x)), np.linalg.norm(axis) * np.linalg.norm(x)
             if size > 0 and across <= ALONG * size:
                 what = "lies along the axis" + ("" if place.axis is not None else " [0, 0, 1]")

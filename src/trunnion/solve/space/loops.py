@@ -347,8 +347,8 @@ def _cones(ask: Ask, columns: int, share: float, length: float) -> tuple[Array, 
     count = sum(ask.widths)
     rows, right = np.zeros((count + len(ask.widths), columns + count + 1)), np.zeros(count + len(ask.widths))
     row, column = 0, columns
-    for base, one, width in zip(ask.base, ask.share, ask.widths, strict=True):
-        rows[row, -1], right[row] = -one / share, base / length
+    for base, share_of, width in zip(ask.base, ask.share, ask.widths, strict=True):
+        rows[row, -1], right[row] = -share_of / share, base / length
         for k in range(width):
             rows[row + 1 + k, column + k] = -1.0
         row, column = row + width + 1, column + width

@@ -62,7 +62,10 @@ def ways(mechanism: Mechanism, groups: Sequence[GroupModes] | None = None) -> Fi
         result = analyse(mechanism.with_friction("off"), 1)
         return _sheet(result, groups, _in_space(mechanism, groups), columns=3, width=2.9)
     result = analyse(mechanism, 1)
-    drawn = [[_drawn(mechanism, layout(result), choice, way) for way in some(choice, MOST_DRAWN)] for choice in groups]
+    drawn = [
+        [_drawn(mechanism, layout(result), choice, assembly_mode) for assembly_mode in some(choice, MOST_DRAWN)]
+        for choice in groups
+    ]
     cells = [[Cell(mode.way, mode.shown.box, mode.draw) for mode in row] for row in drawn]
     return _sheet(result, groups, cells, columns=4, width=2.4)
 

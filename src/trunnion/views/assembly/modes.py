@@ -50,7 +50,7 @@ def some(choice: GroupModes, most: int) -> list[AssemblyMode]:
     return [*first[: len(first) - len(used)], *used]
 
 
-def places(choice: GroupModes, way: AssemblyMode) -> str:
+def places(choice: GroupModes, assembly_mode: AssemblyMode) -> str:
     """Where the inner joints of a group are in one of its ways: 'C (70, 130) mm'.
 
     With as many digits as tell the ways apart: stated as a hint, it selects this one.
@@ -58,7 +58,9 @@ def places(choice: GroupModes, way: AssemblyMode) -> str:
     rows = np.array([[n for joint in mode.joints.values() for n in joint] for mode in choice.ways])
     angles = np.degrees([list(mode.turns.values()) for mode in choice.ways])
     digits = max(5, 3 + _decimals(angles))
-    turned = [f"{name} {round(math.degrees(angle), 6):.{digits}g}°" for name, angle in list(way.turns.items())]
+    turned = [
+        f"{name} {round(math.degrees(angle), 6):.{digits}g}°" for name, angle in list(assembly_mode.turns.items())
+    ]
     turned = turned[:MOST_JOINTS]
     largest = float(np.max(np.abs(rows), where=np.isfinite(rows), initial=0.0))
     if not largest:
@@ -73,9 +75,9 @@ def places(choice: GroupModes, way: AssemblyMode) -> str:
 
     placed = [
         f"{name} ({', '.join(map(text, joint))})" if len(joint) > 1 else f"{name} at {text(joint[0])}"
-        for name, joint in list(way.joints.items())[:MOST_JOINTS]
+        for name, joint in list(assembly_mode.joints.items())[:MOST_JOINTS]
     ]
-    listed = ", ".join(placed) + ", …" * (len(way.joints) > MOST_JOINTS) + f" {unit}"
+    listed = ", ".join(placed) + ", …" * (len(assembly_mode.joints) > MOST_JOINTS) + f" {unit}"
     return "; ".join([listed, ", ".join(turned)]) if turned else listed
 
 

@@ -90,20 +90,20 @@ def _telling(result: xr.Dataset, bodies: Space) -> int:
 
 def sketch(axes: Axes, look: Scenery, index: int, only: tuple[str, ...] = (), curves: bool = True) -> None:
     """Bodies and curves at a position, without a letter; only: links that have a colour, all if none is named."""
-    shown = look.shown
+    bodies_of = look.shown
     bodies = [
-        (solid, shown.poses[solid.link].matrix[:, :, index], shown.poses[solid.link].origin[:, index],
-         _colour(shown, solid.paint, only))
+        (solid, bodies_of.poses[solid.link].matrix[:, :, index], bodies_of.poses[solid.link].origin[:, index],
+         _colour(bodies_of, solid.paint, only))
         for solid in look.solids
     ]  # fmt: skip
     strokes: list[Strokes] = []
     if curves:
-        free = [key for key in shown.free if key.split(".", 1)[0] != shown.ground]
-        inner = [name for name, joint in shown.joints.items()
-                 if shown.ground not in joint["links"] and not shown.shifts[name]]  # fmt: skip
-        strokes += [Strokes(_pieces(shown.track(key)), INK, 1.2) for key in free]
-        strokes += [Strokes(_dashed(shown.seated(name), 0.013 * shown.size), MUTED, 0.7) for name in inner]
-    paint(axes, look.camera, bodies, strokes, shown.size)
+        free = [key for key in bodies_of.free if key.split(".", 1)[0] != bodies_of.ground]
+        inner = [name for name, joint in bodies_of.joints.items()
+                 if bodies_of.ground not in joint["links"] and not bodies_of.shifts[name]]  # fmt: skip
+        strokes += [Strokes(_pieces(bodies_of.track(key)), INK, 1.2) for key in free]
+        strokes += [Strokes(_dashed(bodies_of.seated(name), 0.013 * bodies_of.size), MUTED, 0.7) for name in inner]
+    paint(axes, look.camera, bodies, strokes, bodies_of.size)
 
 
 def _colour(bodies: Space, name: str, only: tuple[str, ...]) -> str:

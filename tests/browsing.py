@@ -31,7 +31,7 @@ class User:
 
     def open(self):
         self.page.goto(self.studio.address)
-        self.page.wait_for_selector(".sheet svg")
+        self.page.wait_for_selector(".sheet svg, .hands .handle")
         self.until("s.about.value.version && s.answer.value")
 
     def state(self, words):

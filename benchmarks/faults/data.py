@@ -275,7 +275,7 @@ _CLI = (
         "cli/edge.py",
         "BAD_INPUT, FAULT, STOPPED = 2, 3, 130",
         "BAD_INPUT, FAULT, STOPPED = 1, 3, 130",
-        ("tests/manual/test_cli_errors.py", "tests/manual/test_cli_edge.py"),
+        ("tests/manual/test_cli_options.py", "tests/manual/test_cli_files.py"),
     ),
     Fault(
         "grid-points-of-one-axis",

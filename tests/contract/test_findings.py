@@ -1,4 +1,4 @@
-"""Every finding about a result has a code, and its sentence is made of its figures."""
+"""What the sources keep to: findings have codes and figures, kernels know no engine."""
 
 from __future__ import annotations
 
@@ -42,22 +42,6 @@ def test_every_code_is_written_out() -> None:
         assert re.fullmatch(r"[a-z_]+\.[a-z_]+", str(code.value)), code.value
 
 
-@pytest.mark.slow
-def test_no_sentence_ends_with_a_full_stop() -> None:
-    for path in sorted(Path(trunnion.__file__).parent.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            named = isinstance(node, ast.Assign | ast.AugAssign) and ast.unparse(node).startswith(("what ", "remedy "))
-            texts = [node.value] if named else node.args if isinstance(node, ast.Call) and _makes(node) else []
-            for text in texts:
-                last = text.values[-1] if isinstance(text, ast.JoinedStr) else text
-                if isinstance(last, ast.Constant):
-                    assert not str(last.value).endswith("."), f"{path.name}:{node.lineno}"
-
-
-def _makes(call: ast.Call) -> bool:
-    return ast.unparse(call.func) in MAKERS
-
-
 @pytest.mark.parametrize("severity", Severity)
 def test_a_finding_has_code_place_and_figures(severity: Severity) -> None:
     make = {Severity.NOTE: Finding.note, Severity.WARNING: Finding.warning, Severity.ERROR: Finding.error}[severity]
@@ -82,6 +66,23 @@ def test_what_was_put_in_has_a_code_by_its_section() -> None:
     assert codes == ["input.links", "input.kind", "input.parameter", "input.file"]
 
 
-def test_a_part_named_as_a_word_keeps_its_place() -> None:
-    assert str(Finding("A locks", "joints.A")) == "error: joint A locks"
-    assert str(Finding("a cylindrical joint does not exist", "joints.a")).startswith("error: joints.a: a cylindrical")
+SOURCE = Path(__file__).parents[2] / "src" / "trunnion"
+KERNELS = [
+    path.relative_to(SOURCE)
+    for folder in ("algebra", "joints", "groups", "solve")
+    for path in sorted((SOURCE / folder).rglob("*.py"))
+]
+ENTRANCE = Path("solve/walk_kernel.py")  # where a walk is handed to an engine
+VOCABULARY = Path("algebra/namespace.py")
+RECORDED = {"Traced", "Recorded", "UntraceableError"}
+
+
+@pytest.mark.parametrize("path", [path for path in KERNELS if path != ENTRANCE], ids=str)
+def test_a_kernel_knows_no_engine(path: Path) -> None:
+    tree = ast.parse((SOURCE / path).read_text("utf-8"))
+    for node in ast.walk(tree):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
+        modules = [node.module or "", *names] if isinstance(node, ast.ImportFrom) else names
+        assert not any(module.startswith("trunnion.engines") for module in modules), f"{path}:{node.lineno}"
+        used = {*names, getattr(node, "id", ""), getattr(node, "attr", "")}
+        assert path == VOCABULARY or not used & RECORDED, f"{path}:{node.lineno} asks whether numbers are recorded"

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import trunnion
@@ -48,19 +47,6 @@ def test_an_argument_is_the_same_in_every_function() -> None:
             assert (str(one.annotation), one.default) == known[1:], f"{name} of {function} and of {known[0]}"
 
 
-def test_a_type_has_one_name() -> None:
-    """What is a FrictionMethod here is not called otherwise there; so is what tells the progress."""
-    names: dict[str, set[str]] = {}
-    for made in FUNCTIONS.values():
-        for name, one in inspect.signature(made).parameters.items():
-            names.setdefault(str(one.annotation), set()).add(name)
-    for kind, name in (
-        ("FrictionMethod | None", "friction_method"), ("Mechanism", "mechanism"),
-        ("Callable[[int], None] | None", "progress"), ("Measurement", "measurement"),
-    ):  # fmt: skip
-        assert names[kind] == {name}
-
-
 @pytest.mark.parametrize("name", sorted(FUNCTIONS))
 def test_a_public_function_is_typed_and_told(name: str) -> None:
     """Every argument has a type and a word in the docstring; what can be wrong with it is said there."""
@@ -72,13 +58,6 @@ def test_a_public_function_is_typed_and_told(name: str) -> None:
         if argument not in ("mechanism", "measurement", "result", "path", "of"):
             assert argument in told, f"{argument} of {name} is not told"
     assert "Raises" in told or "MechanismError" in told
-
-
-def test_there_are_no_other_names() -> None:
-    with pytest.raises(AttributeError, match="analyze"):
-        trunnion.analyze  # type: ignore[attr-defined]  # noqa: B018
-    with pytest.raises(AttributeError, match="analyze"):
-        trunnion.rig.analyze  # type: ignore[attr-defined]  # noqa: B018
 
 
 CLASSES = [trunnion.Mechanism, trunnion.FrictionMethod, trunnion.rig.Observation, Accessor]
@@ -159,26 +138,6 @@ def test_nothing_is_no_mechanism_and_no_file(name: str) -> None:
         FUNCTIONS[name](None)
 
 
-def test_one_name_is_a_list_of_one() -> None:
-    mechanism = trunnion.read("examples/toleranced-fourbar.yaml")
-    name = next(iter(mechanism.measures))
-    one, several = (trunnion.tolerance(mechanism, names, "linear", steps=6) for names in (name, [name]))
-    assert one.identical(several)
-    assert trunnion.analyse(mechanism, np.int64(6), variables="drive_effort").sizes["position"] == 6
-
-
-def test_the_options_of_a_view_are_its_own(tmp_path: Path) -> None:
-    mechanism = trunnion.Mechanism(**MODELS["four-bar"]())
-    cycle = trunnion.analyse(mechanism, 6)
-    for draw in (trunnion.plot, trunnion.report):
-        with pytest.raises(TypeError, match="of a cycle takes no argument 'ideall' — did you mean 'ideal'"):
-            draw(cycle, ideall=cycle)
-    with pytest.raises(TypeError, match="did you mean 'ideal'"):
-        cycle.trunnion.report(idea=cycle)
-    with pytest.raises(TypeError, match="did you mean 'measure'"):
-        trunnion.sweep(mechanism, {"A.speed": [1, 2]}, 6).trunnion.plot(measures="efficiency")
-
-
 @pytest.mark.parametrize("keyword", [{"columns": ["all"]}, {"units_row": True}, {"units": "model"}])
 def test_what_is_said_of_a_file_needs_one(keyword: dict[str, Any], tmp_path: Path) -> None:
     mechanism = trunnion.Mechanism(**MODELS["four-bar"]())
@@ -195,19 +154,7 @@ def test_progress_is_told_to_the_end(verb: str) -> None:
     assert done[-1] == 6
 
 
-def test_a_mechanism_and_a_result_are_drawn_by_one_function() -> None:
-    mechanism = trunnion.Mechanism(**MODELS["four-bar"]())
-    assert trunnion.plot(mechanism).axes
-    assert trunnion.plot(trunnion.analyse(mechanism, 6), "reactions").axes
-    with pytest.raises(trunnion.MechanismError, match="one drawing"):
-        trunnion.plot(mechanism, "reactions")
-
-
 def test_importing_the_package_loads_nothing() -> None:
     script = "import sys, trunnion, trunnion.rig; print(len({'numpy', 'xarray', 'pydantic'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.strip() == "0"
-
-
-def test_the_package_says_that_it_is_typed() -> None:
-    assert (Path(trunnion.__file__).parent / "py.typed").is_file()

@@ -98,26 +98,12 @@ def test_fixed_pairs_make_one_body_with_the_mass_of_both() -> None:
     np.testing.assert_allclose(about(united, np.zeros(3)), about(one, np.zeros(3)) + about(two, np.zeros(3)))
 
 
-def test_the_ground_gives_its_name_to_what_is_fixed_to_it() -> None:
-    pairs = {"weld": Pair("weld", "fixed", ("bracket", "base"), np.zeros(3))}
-    draft = Draft("", {"bracket": Body("bracket"), "base": Body("base")}, pairs, "base").welded()
-    assert list(draft.bodies) == ["base"]
-    assert draft.ground == "base"
-
-
 def test_ground_and_drive_are_taken_where_the_file_says_neither_and_said_so() -> None:
     draft = replace(four_bar(), ground="", drives={})
     made = complete(draft)
     assert made.ground == "ground"
     assert len(made.drives) == 1
     assert [finding.code for finding in made.findings] == ["exchange.ground", "exchange.drive"]
-
-
-def test_a_part_or_joint_that_is_not_there_names_the_nearest() -> None:
-    with pytest.raises(trunnion.MechanismError, match=r"no part of the file.*did you mean 'crank'"):
-        complete(four_bar(), ground="crnk")
-    with pytest.raises(trunnion.MechanismError, match=r"no joint of the file"):
-        complete(four_bar(), drive="crank")
 
 
 def test_names_and_comments_of_any_kind_stay_names_and_comments(tmp_path: Path) -> None:
@@ -155,14 +141,6 @@ def test_a_speed_is_one_of_the_joint_that_it_drives() -> None:
     assert complete(draft).drives[driven] == pytest.approx(2 * np.pi)
     with pytest.raises(trunnion.MechanismError, match="a joint that slides, and A turns"):
         complete(draft, drive="A", speed=0.1, turns=False)
-
-
-@pytest.mark.parametrize(("option", "value"), [("speed", "abc"), ("gap", "AB"), ("gap", "inf"), ("density", "2*q")])
-def test_an_option_that_is_no_quantity_is_refused(tmp_path: Path, option: str, value: str) -> None:
-    path = tmp_path / "part.urdf"
-    path.write_text("<robot/>")
-    with pytest.raises(trunnion.MechanismError, match=option):
-        trunnion.exchange.import_file(path, **{option: value})
 
 
 def test_a_negative_mass_is_refused() -> None:

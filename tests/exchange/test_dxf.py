@@ -125,13 +125,6 @@ def test_blocks_are_read_where_they_are_inserted(
         assert pair.hole_radius == pytest.approx(5.05e-3 * scale, rel=1e-9)
 
 
-def test_what_lies_on_layer_0_of_a_block_is_on_the_layer_of_the_block(tmp_path: Path) -> None:
-    document = drawing(ground=[("circle", A, PIN)])
-    draw(document.blocks.new("arm"), "zero", [("circle", A, HOLE), ("circle", (50, 0), PIN)])
-    document.modelspace().add_blockref("arm", (0, 0), dxfattribs={"layer": "arm"})
-    assert [pair.links for pair in read(document, tmp_path).pairs.values()] == [("ground", "arm")]
-
-
 def test_units_are_those_of_the_file_else_stated_and_a_finding(tmp_path: Path) -> None:
     inches = read(drawing(units=1, **four_bar()), tmp_path)
     np.testing.assert_allclose(inches.pairs["D"].at, [120 * 0.0254, 0, 0], rtol=1e-15)
@@ -142,30 +135,12 @@ def test_units_are_those_of_the_file_else_stated_and_a_finding(tmp_path: Path) -
     np.testing.assert_allclose(stated.pairs["D"].at, [120 * 0.0254, 0, 0])
 
 
-def test_layer_0_is_the_ground_where_no_layer_has_such_a_name(tmp_path: Path) -> None:
-    marks = four_bar()
-    draft = read(drawing(zero=marks.pop("ground"), **marks), tmp_path)
-    assert draft.ground == "0"
-    marks = four_bar()
-    both = read(drawing(**marks, zero=[("line", (0, -50), (200, -50))]), tmp_path)
-    assert both.ground == "ground"
-    assert "ground" in codes(both)
-    assert read(drawing(**marks), tmp_path, ground="rocker").ground == "rocker"
-
-
 def test_lines_alone_make_joints_and_say_so(tmp_path: Path) -> None:
     lines = {layer: [mark for mark in marks if mark[0] == "line"] for layer, marks in four_bar().items()}
     draft = read(drawing(**lines), tmp_path)
     assert {frozenset(pair.links) for pair in draft.pairs.values()} == {frozenset(two) for two in FOUR_BAR.values()}
     assert codes(draft).count("bare_end") == 4
     assert all(pair.pin_radius is None for pair in draft.pairs.values())
-
-
-def test_one_circle_where_lines_of_several_layers_end_is_a_joint_with_that_pin(tmp_path: Path) -> None:
-    draft = read(drawing(ground=[("line", A, D), ("circle", A, 4)], crank=[("line", A, B)]), tmp_path)
-    (pair,) = draft.pairs.values()
-    assert pair.pin_radius == pytest.approx(4e-3)
-    assert pair.hole_radius is None
 
 
 @pytest.mark.parametrize(
@@ -236,12 +211,6 @@ def test_a_pin_beside_the_middle_of_a_slot_is_no_guide(pin: tuple[float, float],
     assert ("prismatic" in types) == (pin == (0.0, 40.0))
 
 
-def test_a_loose_pin_in_a_slot_is_asked(tmp_path: Path) -> None:
-    marks = slotted()
-    marks["crank"][-1] = ("circle", (0.0, 40.0), 4.0)
-    assert "slot" in codes(read(drawing(**marks), tmp_path))
-
-
 def slider(rail: list[tuple[Any, ...]], block: list[tuple[Any, ...]]) -> dict[str, list[tuple[Any, ...]]]:
     return {
         "ground": [("circle", A, PIN), *rail],
@@ -271,23 +240,6 @@ def test_lines_that_lie_on_each_other_are_a_guide(rail: list[Any], block: list[A
     assert draft.mobility(planar=True) == 1
 
 
-def test_a_box_in_a_box_is_no_guide_for_nobody_knows_which_way(tmp_path: Path) -> None:
-    draft = read(drawing(**slider([BOX], [BOX])), tmp_path)
-    assert not [pair for pair in draft.pairs.values() if pair.type == "prismatic"]
-    assert "line" in codes(draft)
-
-
-def test_links_in_line_are_no_guide(tmp_path: Path) -> None:
-    marks = {
-        "ground": [("line", (0, 0), (100, 0)), ("circle", (0, 0), PIN), ("circle", (100, 0), PIN)],
-        "crank": [("line", (0, 0), (30, 0)), ("circle", (0, 0), PIN), ("circle", (30, 0), PIN)],
-        "coupler": [("line", (30, 0), (130, 0)), ("circle", (30, 0), PIN), ("circle", (130, 0), PIN)],
-        "rocker": [("line", (130, 0), (100, 0)), ("circle", (130, 0), PIN), ("circle", (100, 0), PIN)],
-    }
-    draft = read(drawing(**marks), tmp_path)  # type: ignore[arg-type]
-    assert [pair.type for pair in draft.pairs.values()] == ["revolute"] * 4
-
-
 def test_hidden_layers_and_other_entities_are_left_and_listed(tmp_path: Path) -> None:
     document = drawing(**four_bar(), notes=[("circle", A, PIN)], Defpoints=[("point", B)])
     document.layers.add("notes").off()
@@ -300,46 +252,6 @@ def test_hidden_layers_and_other_entities_are_left_and_listed(tmp_path: Path) ->
     assert "SPLINE" in left.what
     assert "tilted CIRCLE" in left.what
     assert "hidden layer notes" in left.what
-
-
-def test_a_drawing_in_space_is_read_from_above_and_says_so(tmp_path: Path) -> None:
-    draft = read(drawing(ground=[("line", (0, 0, 0), (9, 0, 50))], crank=[("line", (0, 0, 0), (0, 9, 0))]), tmp_path)
-    assert "flat" in codes(draft)
-
-
-def test_layers_that_differ_by_case_are_one(tmp_path: Path) -> None:
-    document = drawing(ground=[("circle", A, PIN)], Arm=[("circle", A, PIN)])
-    draw(document.modelspace(), "ARM", [("circle", B, PIN)])
-    draft = read(document, tmp_path)
-    assert set(draft.bodies) == {"ground", "Arm"}
-    assert len(draft.bodies["Arm"].points) == 1
-
-
-def test_a_layer_without_a_joint_is_left_out_and_a_name_never_stands_for_two(tmp_path: Path) -> None:
-    frame = [("box", (-200, -100), (300, -100), (300, 200), (-200, 200))]
-    marks = four_bar()
-    marks["crank"][-1] = ("text", (1, 1), "J2")  # as a joint without a name would be called
-    marks["rocker"] = [*marks["rocker"][:3], ("text", (121, 1), "J2"), ("text", C, "a name\nof two lines.")]
-    marks["coupler"][-2] = ("text", (31, 41), "E")
-    draft = read(drawing(border=frame, **marks), tmp_path)
-    assert set(draft.bodies) == {"ground", "crank", "coupler", "rocker"}
-    assert "loose" in codes(draft)
-    assert len(draft.pairs) == 4
-    assert {"J2", "J2-2", "E"} < draft.pairs.keys()
-    assert list(draft.bodies["coupler"].points) == ["E-2"]
-    (tmp_path / "model.yaml").write_text(model_text(draft), "utf-8")
-    assert trunnion.check(trunnion.read(tmp_path / "model.yaml")).mobility == 1
-
-
-def test_layers_have_names_that_a_model_accepts(tmp_path: Path) -> None:
-    marks = {layer.replace("c", "part.", 1): drawn for layer, drawn in four_bar().items()}
-    draft = read(drawing(**marks), tmp_path)
-    assert set(draft.bodies) == {"ground", "part-rank", "part-oupler", "ropart-ker"}
-    (tmp_path / "model.yaml").write_text(model_text(draft), "utf-8")
-    assert trunnion.check(trunnion.read(tmp_path / "model.yaml")).mobility == 1
-
-
-# ---- hostile files ------------------------------------------------------------------------------------------------
 
 
 def text_of(count: int) -> bytes:
@@ -425,33 +337,6 @@ def tried(path: Path) -> tuple[Draft | None, tuple[Finding, ...]]:
         return None, error.findings
 
 
-@pytest.mark.slow
-def test_as_many_marks_as_are_read_take_seconds(tmp_path: Path) -> None:
-    """Marks that crowd in one place are the worst: 600 circles, and 1,300 texts near to them."""
-    marks = [("circle", (0, 0), 5.0)] * 300
-    texts = [("text", (0.01 * k, 0), f"T{k}") for k in range(1300)]
-    start = time.perf_counter()
-    read(drawing(a=[*marks, ("line", (0, 0), (100, 0))], ground=marks, names=texts), tmp_path)
-    assert time.perf_counter() - start < 60  # some 6 s where nothing else runs; it must not hang
-
-
-@pytest.mark.parametrize("share", [0.2, 0.5, 0.8, 0.99])
-def test_a_file_that_is_cut_off_is_mended_or_refused(share: float, tmp_path: Path) -> None:
-    data = saved(drawing(**four_bar()), tmp_path)
-    path = tmp_path / "cut.dxf"
-    path.write_bytes(data[: int(share * len(data))])
-    draft, findings = tried(path)
-    assert len(findings) == 1 or (draft and ("damaged" in codes(draft) or set(draft.pairs) == set(FOUR_BAR)))
-
-
-def test_a_file_that_is_cut_off_after_any_line_of_its_header_is_a_sentence(tmp_path: Path) -> None:
-    data, path = saved(drawing(**four_bar()), tmp_path), tmp_path / "cut.dxf"
-    for end in [place + 1 for place, sign in enumerate(data[:4000]) if sign == ord("\n")]:
-        path.write_bytes(data[:end])
-        draft, findings = tried(path)
-        assert draft or len(findings) == 1, end
-
-
 @settings(deadline=None, max_examples=40)
 @given(
     damage=st.lists(st.tuples(st.floats(0, 0.999), st.binary(max_size=5), st.integers(0, 5)), min_size=1, max_size=4)
@@ -486,14 +371,3 @@ def test_circles_of_two_arcs_are_pins_and_centre_lines_no_links(tmp_path: Path) 
     (pair,) = draft.pairs.values()
     assert (pair.type, pair.pin_radius, pair.hole_radius) == ("revolute", pytest.approx(0.01), pytest.approx(0.01002))
     assert any("2 centre line" in finding.what for finding in draft.findings)
-
-
-def test_a_ground_on_layer_0_is_written_again(tmp_path: Path) -> None:
-    path, model, again = (tmp_path / name for name in ("a.dxf", "a.yaml", "b.dxf"))
-    pins = {"circle": [("circle", (0, 0), 5), ("circle", (100, 0), 5)]}
-    drawing(zero=[*pins["circle"], ("line", (0, 0), (100, 0))], crank=[("circle", (0, 0), 5), ("circle", (0, 30), 5)],
-            rod=[("circle", (0, 30), 5), ("circle", (90, 60), 5)],
-            rocker=[("circle", (90, 60), 5), ("circle", (100, 0), 5)]).saveas(path)  # fmt: skip
-    model.write_text(model_text(import_file(path)), "utf-8")
-    trunnion.exchange.export_model(trunnion.read(model), again)
-    assert set(import_file(again).bodies) == {"0", "crank", "rod", "rocker"}

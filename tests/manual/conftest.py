@@ -25,9 +25,9 @@ Run = Callable[..., Outcome]
 
 @pytest.fixture
 def program(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """The program, in this process, in an empty folder and a terminal of 140 columns."""
+    """The program, in this process, in an empty folder and a terminal of 160 columns; a thin space is a space."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "140")
+    monkeypatch.setenv("COLUMNS", "160")
 
     def call(*arguments: object) -> Outcome:
         monkeypatch.setattr(sys, "argv", ["trunnion", *map(str, arguments)])
@@ -37,7 +37,7 @@ def program(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
             cli.main()
         except SystemExit as stop:
             code = int(stop.code or 0)
-        out, err = capsys.readouterr()
+        out, err = (text.replace("\u00a0", " ") for text in capsys.readouterr())
         assert "Traceback" not in err + out
         return Outcome(code, out, err)
 

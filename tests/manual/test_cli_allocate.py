@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 import trunnion
-from manual.conftest import Outcome, Run
+from manual.conftest import Run
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FOURBAR, GRADES, PISTON = (
@@ -21,21 +21,11 @@ FOURBAR, GRADES, PISTON = (
 QUICK = ("--steps", 24, "--samples", 100)
 
 
-@pytest.fixture
-def run(program: Run) -> Run:
-    """The verb; a thin space is a space."""
-
-    def call(*arguments: object) -> Outcome:
-        done = program("allocate", *arguments)
-        return Outcome(done.code, *(text.replace("\u00a0", " ") for text in done[1:]))
-
-    return call
-
-
 @pytest.mark.slow
-def test_tables_and_files(run: Run, tmp_path: Path) -> None:
+def test_tables_and_files(program: Run, tmp_path: Path) -> None:
     files = ["a.csv", "a.measures.csv", "a.offers.csv", "a.json", "a.nc", "a.parquet", "a.svg", "a.png"]
-    code, out, err = run(
+    code, out, err = program(
+        "allocate",
         FOURBAR,
         "--steps",
         72,
@@ -71,8 +61,8 @@ def test_tables_and_files(run: Run, tmp_path: Path) -> None:
     assert "Cost over accuracy" in page
 
 
-def test_the_model_is_written_with_its_comments(run: Run, tmp_path: Path) -> None:
-    code, out, _ = run(GRADES, *QUICK, "--write", "bought.yaml", "--set", "rocker.mass=0.35kg")
+def test_the_model_is_written_with_its_comments(program: Run, tmp_path: Path) -> None:
+    code, out, _ = program("allocate", GRADES, *QUICK, "--write", "bought.yaml", "--set", "rocker.mass=0.35kg")
     assert code == 0
     assert "wrote bought.yaml" in out
     assert "milled" in out
@@ -81,34 +71,9 @@ def test_the_model_is_written_with_its_comments(run: Run, tmp_path: Path) -> Non
     assert "tolerances: {l1: ±0.0435 mm, l2: ±0.03 mm, l3: ±0.0175 mm, l4: ±0.037 mm}" in text
     read = trunnion.read(tmp_path / "bought.yaml")
     assert read.parameters()["links.rocker.mass"] == pytest.approx(0.35)
-    again = run("bought.yaml", *QUICK)
+    again = program("allocate", "bought.yaml", *QUICK)
     assert again.code == 0
     assert "cost 28.6, as stated 28.6" in again.out
-
-
-def test_the_model_itself_is_not_overwritten(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "m.yaml").write_text(FOURBAR.read_text("utf-8"), "utf-8")
-    before = (tmp_path / "m.yaml").read_bytes()
-    code, _, err = run("m.yaml", *QUICK, "--write", "m.yaml")
-    assert code == 2
-    assert "is the model itself" in err
-    assert (tmp_path / "m.yaml").read_bytes() == before
-    code, _, _ = run("m.yaml", *QUICK, "--write", "m.yaml", "--force")
-    assert code == 0
-    assert (tmp_path / "m.yaml").read_bytes() != before
-    assert {path.name for path in tmp_path.iterdir()} == {"m.yaml"}
-
-
-def test_limits_that_nothing_keeps(run: Run, tmp_path: Path) -> None:
-    code, out, err = run(
-        GRADES, *QUICK, "--set", "measures.rocker-angle.limit=±0.05 deg", "--out", "a.json", "--out", "a.svg",
-        "--write", "b.yaml", "--report", "a.html",
-    )  # fmt: skip
-    assert code == 1
-    assert "no allocation meets the limits" in out
-    assert "error: measures.rocker-angle: the limit +0.05° is infeasible" in err
-    assert {path.name for path in tmp_path.iterdir()} == {"a.json", "a.html"}
-    assert json.loads((tmp_path / "a.json").read_text("utf-8"))["attrs"]["found"] == 0
 
 
 @pytest.mark.parametrize(
@@ -128,20 +93,11 @@ def test_limits_that_nothing_keeps(run: Run, tmp_path: Path) -> None:
         (["--samples", -1], "-1 samples"),
     ],
 )
-def test_faults(run: Run, options: list[object], text: str, tmp_path: Path) -> None:
-    code, _, err = run(FOURBAR, *QUICK, *options)
+def test_faults(program: Run, options: list[object], text: str, tmp_path: Path) -> None:
+    code, _, err = program("allocate", FOURBAR, *QUICK, *options)
     assert code == 2
     assert text in err
     assert not list(tmp_path.iterdir())
-
-
-def test_models_without_costs_or_limits(run: Run) -> None:
-    code, _, err = run(EXAMPLES / "toleranced-rssr.yaml", *QUICK)
-    assert code == 2
-    assert "no tolerance has a cost" in err or "has a limit" in err
-    code, _, err = run(EXAMPLES / "slider-crank.yaml", *QUICK)
-    assert code == 2
-    assert "no measure is stated" in err
 
 
 INLINE = """\
@@ -176,10 +132,10 @@ costs:
 """
 
 
-def test_limits_are_written_where_they_stand(run: Run, tmp_path: Path) -> None:
+def test_limits_are_written_where_they_stand(program: Run, tmp_path: Path) -> None:
     """Nothing but the limits is changed, rounded down to five digits: the model that is written keeps its limits."""
     (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
-    code, _, err = run("m.yaml", "--steps", 24, "--samples", 0, "--write", "b.yaml")
+    code, _, err = program("allocate", "m.yaml", "--steps", 24, "--samples", 0, "--write", "b.yaml")
     assert code == 0, err
     text = (tmp_path / "b.yaml").read_text("utf-8")
     pairs = [(old, new) for old, new in zip(INLINE.split("\n"), text.split("\n"), strict=True) if old != new]
@@ -203,10 +159,10 @@ def test_limits_are_written_where_they_stand(run: Run, tmp_path: Path) -> None:
     assert float(worst.max()) <= np.radians(0.2)
 
 
-def test_entries_are_added_without_moving_the_others(run: Run, tmp_path: Path) -> None:
+def test_entries_are_added_without_moving_the_others(program: Run, tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
     added = ("--set", "costs.l1.most=30 um", "--set", "tolerances.l2.distribution=uniform")
-    code, _, err = run("m.yaml", "--steps", 24, "--samples", 0, *added, "--write", "b.yaml")
+    code, _, err = program("allocate", "m.yaml", "--steps", 24, "--samples", 0, *added, "--write", "b.yaml")
     assert code == 0, err
     text = (tmp_path / "b.yaml").read_text("utf-8")
     assert "  l1: {model: power, B: 1,   k: 0.45, unit: mm, least: 1 um, most: 30 um}\n" in text
@@ -215,10 +171,10 @@ def test_entries_are_added_without_moving_the_others(run: Run, tmp_path: Path) -
     assert trunnion.read(tmp_path / "b.yaml").prices()[0].most == pytest.approx(3e-5)
 
 
-def test_no_model_of_limits_that_are_not_kept(run: Run, tmp_path: Path) -> None:
+def test_no_model_of_limits_that_are_not_kept(program: Run, tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
     narrow = ("--set", "measures.angle.limit=±0.01 deg", "--set", "measures.place.limit=±0.001 mm")
-    code, _, err = run("m.yaml", "--steps", 24, "--samples", 0, *narrow, "--write", "b.yaml")
+    code, _, err = program("allocate", "m.yaml", "--steps", 24, "--samples", 0, *narrow, "--write", "b.yaml")
     assert code == 1
     assert "'b.yaml' is not written: there is no allocation" in err
     assert not (tmp_path / "b.yaml").exists()

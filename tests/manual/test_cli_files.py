@@ -1,11 +1,16 @@
-"""No output of a run is one of its inputs; links stay links; pipes and devices are written to."""
+"""Ctrl-C, a full disk and faults end in one line; no output is an input, links stay links, pipes are written to."""
 
 from __future__ import annotations
 
 import json
 import os
+import resource
+import signal
 import stat
+import subprocess
+import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -16,8 +21,149 @@ from manual.test_cli import EXAMPLES
 from trunnion import read
 from trunnion.cli import app as cli
 from trunnion.cli.files import outputs
+from trunnion.cycle import analyse as analysing
 
-FOUR_BAR = EXAMPLES / "toleranced-fourbar.yaml"
+FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
+
+
+@pytest.mark.parametrize("fault", [KeyError("x\ny"), RecursionError("too deep"), AssertionError(), MemoryError()])
+def test_an_unforeseen_exception_is_one_line(
+    program: Run, monkeypatch: pytest.MonkeyPatch, fault: BaseException
+) -> None:
+    def broken(*_: object) -> None:
+        raise fault
+
+    monkeypatch.setattr(analysing, "analysed", broken)
+    done = program("analyse", FOUR_BAR)
+    assert done.code == 3
+    assert done.out == ""
+    assert len(done.err.splitlines()) == 1
+    if not isinstance(fault, MemoryError):
+        assert type(fault).__name__ in done.err
+        assert "please report" in done.err
+
+
+@pytest.mark.parametrize("words", [["--debug", "analyse"], ["analyse", "--debug"]])
+def test_debug_shows_where(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: list[str]
+) -> None:
+    from trunnion.cli import app as cli
+
+    def broken(*_: object) -> None:
+        raise KeyError("x")
+
+    monkeypatch.setattr(analysing, "analysed", broken)
+    monkeypatch.setattr(sys, "argv", ["trunnion", *words, str(FOUR_BAR)])
+    with pytest.raises(SystemExit) as stop:
+        cli.main()
+    assert stop.value.code == 3
+    err = capsys.readouterr().err
+    assert "Traceback" in err
+    assert "in broken" in err
+    assert "please report" in err.splitlines()[-1]
+
+
+PARTS = ["--steps", "300000", "--variables", "drive_effort"]  # so many positions are written some at a time
+
+
+def limited() -> None:
+    """No file grows beyond 5 kB."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, 5_000))
+
+
+@pytest.mark.spread(1, "r.xlsx")
+@pytest.mark.parametrize(
+    ("out", "words"),
+    [
+        *((f"r.{end}", ["analyse", "--steps", "1000"]) for end in ("csv", "json", "nc", "parquet", "xlsx", "zarr")),
+        *((f"parts.{end}", ["analyse", *PARTS]) for end in ("csv", "nc", "parquet", "zarr")),
+        *((f"r.{end}", ["plot", "--kind", "mechanism"]) for end in ("jpg", "pdf", "png", "svg")),
+        ("r.html", ["report"]),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_full_disk_is_a_finding(out: str, words: list[str], tmp_path: Path) -> None:
+    """A limit of the size of files stands for it: the process is not taken along, and nothing is left behind."""
+    verb, *options = words
+    done = subprocess.run(
+        [sys.executable, "-m", "trunnion", verb, str(FOUR_BAR), *options, "--out", str(tmp_path / out)],
+        capture_output=True, text=True, check=False, preexec_fn=limited,
+    )  # fmt: skip
+    assert done.returncode == 2, done.stderr
+    assert "cannot be written" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.spread(1, "zarr")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("end", ["csv", "nc", "parquet", "zarr", "xlsx"])
+def test_a_program_that_is_ended_leaves_no_draft(number: signal.Signals, end: str, tmp_path: Path) -> None:
+    """The old file stays, and no other; the exit status is that of the signal."""
+    out = tmp_path / f"r.{end}"
+    if end != "zarr":
+        out.write_text("old")
+    steps = PARTS if end != "xlsx" else ["--steps", "20000"]
+    before, words = list(tmp_path.iterdir()), ["analyse", str(FOUR_BAR), *steps, "--out", str(out)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "trunnion", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # under nohup, say, it is ignored
+    ) as process:  # fmt: skip
+        while len(list(tmp_path.iterdir())) == len(before) and process.poll() is None:
+            time.sleep(0.001)
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    assert err.splitlines()[-1] == "stopped"
+    assert list(tmp_path.iterdir()) == before
+    assert end == "zarr" or out.read_text() == "old"
+
+
+@pytest.mark.slow
+def test_workers_end_with_the_program(tmp_path: Path) -> None:
+    words = ["tolerance", str(EXAMPLES / "toleranced-fourbar.yaml"), "--samples", "2000000", "--engine", "numpy"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "trunnion", *words, "--jobs", "2", "--out", str(tmp_path / "t.csv")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        workers: list[str] = []
+        while len(workers) < 2 and process.poll() is None:
+            time.sleep(0.05)
+            workers = children.read_text().split() if children.exists() else ["", ""]
+        time.sleep(1.0)
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=60)  # ends when no worker holds the pipes any more
+    assert process.returncode == 143
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "seconds"),
+    [
+        (["simulate", "flywheel-press.yaml", "--time", "100000s"], 4.0),
+        pytest.param(["tolerance", "toleranced-rssr.yaml", "--samples", "10000000", "--jobs", "1"], 5.0,
+                     marks=pytest.mark.slow),
+        pytest.param(["sweep", "rssr.yaml", "--over", "a=20mm:30mm:1000", "--margin"], 3.0, marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_ctrl_c_leaves_the_files_of_before(words: list[str], seconds: float, tmp_path: Path) -> None:
+    """One rule for every verb: a part of a result replaces nothing, and the exit status is 130."""
+    old = tmp_path / "r.csv"
+    old.write_text("of before\n")
+    verb, model, *more = words
+    command = [sys.executable, "-m", "trunnion", verb, str(EXAMPLES / model), *more, "--out", str(old)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        time.sleep(seconds)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert err.startswith("stopped")
+    assert list(tmp_path.iterdir()) == [old]
+    assert old.read_text() == "of before\n"
+
+
+TOLERANCED = EXAMPLES / "toleranced-fourbar.yaml"
 
 # verb, then what it needs beside the model
 VERBS = {
@@ -34,7 +180,7 @@ VERBS = {
 def model(tmp_path: Path) -> Path:
     """A model whose name ends as a result's may."""
     path = tmp_path / "a.json"
-    read(FOUR_BAR).write(path)
+    read(TOLERANCED).write(path)
     return path
 
 
@@ -119,18 +265,6 @@ def test_a_pipe_is_written_to(program: Run, model: Path) -> None:
     reader.join(10)
     assert stat.S_ISFIFO(os.stat("pipe.json").st_mode)
     assert json.loads(got[0])["dims"]["position"] == 4
-
-
-def test_a_device_is_written_to(program: Run, model: Path) -> None:
-    Path("null.csv").symlink_to("/dev/null")
-    assert program("analyse", model, "--steps", 4, "--out", "null.csv").code == 0
-    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
-    assert Path("null.csv").is_symlink()
-    Path("full.csv").symlink_to("/dev/full")
-    done = program("analyse", model, "--steps", 4, "--out", "full.csv")
-    assert (done.code, "No space left" in done.err) == (2, True)
-    done = program("schema", "--out", "/dev/null")
-    assert done.code == 0
 
 
 def test_every_option_that_takes_a_path_is_an_output() -> None:

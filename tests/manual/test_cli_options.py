@@ -1,22 +1,26 @@
-"""Options that speak of the same numbers: what they mean together does not depend on which is applied first."""
+"""Options of several verbs: what they mean together; tables, notes and help of the terminal."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
 
+import pandas as pd
 import pytest
+import xarray as xr
+from rich.cells import cell_len
+from typer.main import get_command
 
 import trunnion
 from manual.conftest import Run
 from manual.test_cli import EXAMPLES
-from trunnion import MechanismError
-from trunnion.cli.files import flags_of
+from trunnion.cli import app as cli
 from trunnion.cli.options import PLOT_KINDS, over, points
-from trunnion.cli.tolerance import tolerance
+from trunnion.cli.terminal import QUIET, say, show_rows
+from trunnion.cycle.vocabulary import vocabulary
+from trunnion.errors import Finding, Severity
 from trunnion.views.cycle.plots import PLOTS
 
-TOLERANCED = EXAMPLES / "toleranced-fourbar.yaml"
 FOUR_BAR, CARDAN = EXAMPLES / "durango-fourbar.yaml", EXAMPLES / "pezzuti-cardan.yaml"
 STRIBECK = {"joint_defaults.friction.static": "0.5", "joint_defaults.friction.stribeck_speed": "0.1 m/s"}
 LAW = ("--friction", "stribeck")
@@ -40,42 +44,6 @@ def test_parameters_of_a_law_that_an_option_names(program: Run, verb: tuple[obje
     assert done[0] == done[1]
 
 
-def test_the_same_as_a_file_that_states_it() -> None:
-    data = trunnion.read(FOUR_BAR).data()
-    law = {"law": "stribeck", "coefficient": 0.4, "static": 0.5, "stribeck_speed": "0.1 m/s", "viscous": "0.2 s/m"}
-    meant = trunnion.Mechanism(**{**data, "joint_defaults": {**data["joint_defaults"], "friction": law}})
-    values = {**STRIBECK, "joint_defaults.friction.viscous": "0.2 s/m"}
-    assert trunnion.read(FOUR_BAR).with_friction("stribeck", values).parameters() == meant.parameters()
-
-
-def test_what_the_law_still_lacks_is_named(program: Run) -> None:
-    done = program("check", FOUR_BAR, *LAW, *SETTINGS[:2])
-    assert done.code == 2
-    assert "needs 'stribeck_speed'" in done.err
-    done = program("check", FOUR_BAR, "--friction", "coulomb", "--set", "B.friction.static=0.3")
-    assert done.code == 2
-    assert "B.friction.static" in done.err
-
-
-def test_a_parameter_that_only_the_sweep_states(program: Run) -> None:
-    values = ("--over", "joint_defaults.friction.static=0.4:0.5:2", *SETTINGS[2:])
-    done = program("sweep", FOUR_BAR, "--steps", 24, *values, *LAW, "--out", "a.csv")
-    assert done.code in (0, 1), done.err
-    assert "0.4" in done.out
-
-
-def test_a_number_with_limits_under_another_law() -> None:
-    """Limits that stand with a coefficient stay with it where both its law and its value are others."""
-    data = trunnion.read(FOUR_BAR).data()
-    data["joint_defaults"]["friction"] = "0.4 ± 0.05"
-    changed = trunnion.Mechanism(**data).with_friction("viscous", {
-        "joint_defaults.friction.coefficient": 0.3, "joint_defaults.friction.viscous": "0.1 s/m",
-    })  # fmt: skip
-    limits = {one.path: (one.lower, one.upper) for one in changed.tolerated()}
-    assert limits["joints.B.friction.coefficient"] == pytest.approx((-0.05, 0.05))
-    assert changed.parameters()["joints.B.friction.coefficient"] == 0.3
-
-
 def test_a_seat_that_is_set_stands_against_that_of_all_joints(program: Run, tmp_path: Path) -> None:
     slider = EXAMPLES / "toleranced-slider-crank.yaml"
     done = [
@@ -92,13 +60,6 @@ def test_a_seat_that_is_set_stands_against_that_of_all_joints(program: Run, tmp_
     assert "P.seat_1_x" not in texts[0]
     mechanism = trunnion.read(slider).with_seats("loaded").with_values({"P.seat": "free"})
     assert mechanism.effective_joints["P"].seat == "free"
-
-
-def test_a_default_parameter_can_be_set_before_it_is_stated() -> None:
-    mechanism = trunnion.read(FOUR_BAR).with_values({"joint_defaults.friction.pair_factor": 1.25})
-    assert mechanism.parameters()["joints.C.friction.pair_factor"] == 1.25
-    with pytest.raises(MechanismError, match=r"joint_defaults\.friction\.static"):
-        trunnion.read(FOUR_BAR).with_values({"joint_defaults.friction.static": 0.5})
 
 
 def test_points_of_a_grid_are_all_combinations() -> None:
@@ -121,38 +82,6 @@ def test_some_variables_as_in_python(program: Run, tmp_path: Path) -> None:
     assert (tmp_path / "some.csv").read_text().startswith("time,A.effort,status\n")
 
 
-@pytest.mark.parametrize(
-    ("value", "told"),
-    [("l2=40", True), ("l2=0.04", False), ("l2=40mm", False), ("A.speed=100", True), ("A.speed=14", False)],
-)
-def test_a_number_that_is_set_without_the_unit_of_the_file(program: Run, value: str, told: bool) -> None:
-    """It is told where the number is nearer to the one in the file than to that in SI units; also of a sweep."""
-    done = program("analyse", TOLERANCED, "--set", value, "--steps", 4)
-    assert ("is in SI units, where the model states" in done.err) == told
-    name, _, number = value.partition("=")
-    if told and name == "l2":
-        swept = trunnion.sweep(trunnion.read(TOLERANCED), {name: [float(number), 41.0]}, steps=4).trunnion.findings
-        assert [one.severity for one in swept if one.where == "dimensions.l2"] == ["warning"]
-
-
-def test_a_plain_angle_is_told_once(program: Run, tmp_path: Path) -> None:
-    """Of a dimension that turns the fork of a shaft."""
-    text = (EXAMPLES / "double-cardan.yaml").read_text(encoding="utf-8")
-    turned = text.replace(
-        "C: {at: [0, 0, m], axis: [1, 0, 0]}", "C: {at: [0, 0, m], axis: [cos(phase), sin(phase), 0]}"
-    )
-    (tmp_path / "shaft.yaml").write_text(
-        turned.replace("dimensions:", "dimensions:\n  phase: 10 deg"), encoding="utf-8"
-    )
-    for verb, *options in (
-        ("check", "--set", "phase=3"), ("analyse", "--set", "phase=3", "--steps", 4),
-        ("sweep", "--over", "phase=3:0:2", "--steps", 4),
-    ):  # fmt: skip
-        told = [line for line in program(verb, "shaft.yaml", *options).err.splitlines() if "dimensions.phase" in line]
-        assert len(told) == 1
-        assert told[0].startswith("warning")
-
-
 def test_one_position_instead_of_the_cycle(program: Run) -> None:
     """The numbers of `--at` are those of that row of the cycle, the summary of the cycle is the same."""
     mechanism = trunnion.read(FOUR_BAR)
@@ -168,10 +97,6 @@ def test_one_position_instead_of_the_cycle(program: Run) -> None:
     assert f"{float(whole['drive_effort'].isel(position=60, driver=0)) / 1e3:.6g}"[:5] in done.out
 
 
-def test_options_by_the_names_of_arguments() -> None:
-    assert {"target": "--yield", "out": "--out", "at": "--at", "set": "--set"}.items() <= flags_of(tolerance).items()
-
-
 @pytest.mark.parametrize(
     ("words", "option"),
     [(("--at", "20mm"), "--at"), (("--steps", 0), "--steps"), (("--variables", "x"), "--variables")],
@@ -181,3 +106,95 @@ def test_what_is_wrong_with_an_option_is_said_of_the_option(
 ) -> None:
     done = program("analyse", FOUR_BAR, *words)
     assert (done.code, done.err.startswith(f"error: {option}: ")) == (2, True), done.err
+
+
+SLIDER, LOOSE = EXAMPLES / "toleranced-slider-crank.yaml", EXAMPLES / "fourbar-with-play.yaml"
+
+
+@pytest.mark.slow
+def test_seats_of_all_joints_by_an_option(program: Run, tmp_path: Path) -> None:
+    """--seat loaded gives seats, errors and what they cost; free is the mechanism with its pins in the middle."""
+    done = program("analyse", SLIDER, "--seat", "loaded", "--out", tmp_path / "a.csv", "--out", tmp_path / "a.nc")
+    assert done.code == 0
+    assert "transmission error of S" in done.out
+    assert "seat iterations" in done.out
+    table = pd.read_csv(tmp_path / "a.csv")
+    for column in ("P.seat_1_x", "P.end_force_1_x", "P.contact_1_x", "P.seat_xi", "S.seat_2_y", "S.slide_error",
+                   "piston.Q.error_x", "P.contact_lost", "seat_rounds"):  # fmt: skip
+        assert column in table
+    size = (table["P.seat_1_x"] ** 2 + table["P.seat_1_y"] ** 2) ** 0.5
+    assert size.to_numpy() == pytest.approx(17e-6, rel=1e-9)  # 16 H7/f7: 16 to 52 µm wide
+    with xr.open_dataset(tmp_path / "a.nc") as whole:
+        assert whole.seat_offset.dims == ("joint", "end", "axis", "position")
+    free = program("analyse", LOOSE, "--seat", "free", "--out", tmp_path / "b.csv")
+    assert "P.seat_1_x" not in pd.read_csv(tmp_path / "b.csv")
+    assert "are at the middle of their play" in free.err + free.out
+
+
+def test_the_list_and_its_file(program: Run, tmp_path: Path) -> None:
+    code, out, _ = program("check", SLIDER, "--set", "crank=52mm", "--list", "--out", "list.json")
+    assert code == 0
+    assert all(
+        name in out for name in ("transmission_angle:Q", "velocity:piston.Q.x", "stroke-position", "O.pin.radius")
+    )
+    found = json.loads((tmp_path / "list.json").read_text("utf-8"))
+    numbers, measures = ({one["name"]: one for one in found[key]} for key in ("numbers", "measures"))
+    assert numbers["crank"] == {
+        "name": "crank", "path": "dimensions.crank", "unit": "m", "value": 0.052, "written": "52mm", "swept": True,
+    }  # fmt: skip
+    assert measures["drive-torque"]["stated"]
+    assert measures["effort:O"]["value"] == measures["drive-torque"]["value"]
+    assert measures["stroke:S"]["verbs"] == ["sweep"]
+    listed = vocabulary(trunnion.read(SLIDER).with_values({"crank": "52mm"})).data()
+    assert found == json.loads(json.dumps(listed))
+
+
+HEAD = ["", "linear", "searched", "Monte Carlo", "of variance"]
+ROWS = [
+    ["peak", "286.579\u00a0N\u00a0m at 245°", "−0.9887 to +0.9784\u00a0N\u00a0m", "286.58\u00a0N\u00a0m", "46\u00a0%"],
+    ["99.73 % range", "286.0893 to 287.0702\u00a0N\u00a0m", "", "286.0980 to 287.0377\u00a0N\u00a0m", "—"],
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("columns", [80, 90, 200])
+def test_numbers_keep_their_units(
+    columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    show_rows("title", HEAD, ROWS)
+    told = capsys.readouterr().out
+    assert max(cell_len(line) for line in told.splitlines()) <= columns
+    words = [word for row in [HEAD, *ROWS] for cell in row for word in cell.split(" ")]
+    assert all(word in told for word in words)
+
+
+def test_a_table_too_wide_for_whole_words_is_shown_in_parts(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each part names its rows, and no word is broken."""
+    monkeypatch.setenv("COLUMNS", "40")
+    show_rows("title", HEAD, ROWS)
+    told = capsys.readouterr().out
+    assert max(cell_len(line) for line in told.splitlines()) <= 40
+    assert told.count("peak") > 1
+    words = [word for row in [HEAD, *ROWS] for cell in row for word in cell.split(" ")]
+    assert all(word in told for word in words)
+
+
+@pytest.mark.parametrize("code", sorted(QUIET))
+def test_what_nearly_every_run_has_is_a_note(code: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """It is left to the report and to `check`; of the same code a warning is shown."""
+    note = Finding("x", code=code, severity=Severity.NOTE)
+    say([note])
+    assert not capsys.readouterr().err
+    say([note], every=True)
+    say([Finding("x", code=code, severity=Severity.WARNING)])
+    assert capsys.readouterr().err.count("x") == 2
+
+
+def test_the_help_has_each_verb_once_under_a_question_with_examples_that_are_read() -> None:
+    commands = get_command(cli.app).commands  # type: ignore[attr-defined]
+    assert sorted(name for names in cli.GROUPS.values() for name in names) == sorted(commands)
+    for name, command in commands.items():
+        for example in cli.EXAMPLES[name]:
+            command.make_context(name, example.split(), resilient_parsing=False)

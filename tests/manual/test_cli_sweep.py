@@ -1,9 +1,10 @@
-"""`trunnion sweep` as a user meets it: table, files, figure, findings, and faults with nothing half-written."""
+"""`trunnion sweep`, `play` and `assemble` as a user meets them: tables, files, figures, findings, faults."""
 
 from __future__ import annotations
 
 import csv
-import functools
+import json
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -13,17 +14,12 @@ import xarray as xr
 
 import trunnion
 from manual.conftest import Run
-from trunnion.views import sweep as view
+from played import four_bar
+from trunnion.results.attributes import summary_of
+from trunnion.views.play import figure, tables
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
-SLIDER = EXAMPLES / "inverted-slider-crank.yaml"
-
-
-@pytest.fixture
-def run(program: Run) -> Run:
-    """The verb."""
-    return functools.partial(program, "sweep")
 
 
 def rows(path: Path) -> list[dict[str, str]]:
@@ -35,9 +31,15 @@ def files(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-def test_table_csv_netcdf_and_figure(run: Run, tmp_path: Path) -> None:
-    done = run(
-        FOUR_BAR, "--over", "AB=1.6m:2.4m:3", "--steps", 36, *(f"--out=s{end}" for end in (".csv", ".nc", ".svg"))
+def test_table_csv_netcdf_and_figure(program: Run, tmp_path: Path) -> None:
+    done = program(
+        "sweep",
+        FOUR_BAR,
+        "--over",
+        "AB=1.6m:2.4m:3",
+        "--steps",
+        36,
+        *(f"--out=s{end}" for end in (".csv", ".nc", ".svg")),
     )
     assert done.code == 0
     assert files(tmp_path) == {"s.csv", "s.nc", "s.svg"}
@@ -59,9 +61,9 @@ def test_table_csv_netcdf_and_figure(run: Run, tmp_path: Path) -> None:
     assert ElementTree.parse(tmp_path / "s.svg").getroot().tag.endswith("svg")
 
 
-def test_a_grid_in_csv_has_a_row_a_point(run: Run, tmp_path: Path) -> None:
+def test_a_grid_in_csv_has_a_row_a_point(program: Run, tmp_path: Path) -> None:
     options = ("--over", "B.friction.coefficient=0.1,0.3", "--over", "AB=1.6m,2.6 m", "--steps", 72)
-    done = run(FOUR_BAR, *options, "--out", "g.csv", "--out", "g.png", "--units-row")
+    done = program("sweep", FOUR_BAR, *options, "--out", "g.csv", "--out", "g.png", "--units-row")
     assert done.code == 1  # AB = 2.6 m cannot be assembled all the way
     units, *found = rows(tmp_path / "g.csv")
     assert (units["AB"], units["A.effort_max"], units["B.reaction_max"], units["status"]) == ("m", "N m", "N", "")
@@ -77,9 +79,9 @@ def test_a_grid_in_csv_has_a_row_a_point(run: Run, tmp_path: Path) -> None:
     assert (tmp_path / "g.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_options_of_the_model_come_first(run: Run, tmp_path: Path) -> None:
+def test_options_of_the_model_come_first(program: Run, tmp_path: Path) -> None:
     same = ("--over", "AB=2m,2.1m", "--steps", 12)
-    run(FOUR_BAR, *same, "--friction", "off", "--set", "BC=6.2m", "--out", "s.csv")
+    program("sweep", FOUR_BAR, *same, "--friction", "off", "--set", "BC=6.2m", "--out", "s.csv")
     mechanism = trunnion.read(FOUR_BAR).with_values({"BC": "6.2 m"}).with_friction("off")
     wanted = trunnion.sweep(mechanism, {"AB": [2.0, 2.1]}, 12)
     found = rows(tmp_path / "s.csv")
@@ -120,26 +122,147 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_sweeps_are_refused_with_a_message(run: Run, tmp_path: Path, case: str) -> None:
+def test_bad_sweeps_are_refused_with_a_message(program: Run, tmp_path: Path, case: str) -> None:
     options, word = BAD[case]
-    done = run(FOUR_BAR, *options, *(["--out", "r.csv"] if case != "no folder" else []))
+    done = program("sweep", FOUR_BAR, *options, *(["--out", "r.csv"] if case != "no folder" else []))
     assert done.code == 2
     assert word in done.err
     assert not files(tmp_path)
 
 
-def test_a_figure_shows_units_and_gaps() -> None:
-    """One curve a value, its label as it was written; a gap is shaded and named, no line crosses it."""
-    mechanism = trunnion.read(FOUR_BAR)
-    grid = trunnion.sweep(mechanism, {"AB": ("2 m", "2.8 m", 5), "A.pin.radius": ["50 mm", "100 mm"]}, 36)
-    axes = view.figure(grid, "A.effort_max").axes[0]
-    labels = axes.get_legend_handles_labels()[1]
-    assert labels == ["A.pin.radius = 50 mm", "A.pin.radius = 100 mm"]
-    assert axes.get_xlabel() == "AB [m]"
-    assert axes.get_ylabel() == "maximum drive effort of A [kN m]"
-    curve = axes.get_lines()[0]
-    assert np.isnan(curve.get_ydata()).tolist() == np.isnan(grid["drive_effort_max"].values[0, :, 0]).tolist()
-    assert "cannot be assembled" in [text.get_text() for text in axes.texts]
-    for k, name in enumerate(("A.pin.radius = 50 mm", "A.pin.radius = 100 mm")):
-        shown = next(line for line in axes.get_lines() if line.get_label() == name)
-        assert np.allclose(shown.get_ydata() * 1e3, grid["drive_effort_max"].values[0, :, k], equal_nan=True)
+SLIDER = EXAMPLES / "toleranced-slider-crank.yaml"
+
+
+@pytest.mark.slow
+def test_tables_and_files(program: Run, tmp_path: Path) -> None:
+    files = [f"p{end}" for end in (".csv", ".json", ".nc", ".svg", ".png")]
+    code, out, _ = program("play", SLIDER, "--steps", 36, "--units-row", *(f"--out={name}" for name in files))
+    assert code == 0
+    assert {path.name for path in tmp_path.iterdir()} == set(files)
+    assert "stroke-position, largest at 90°" in out
+    assert "all, worst case" in out
+    assert all(f"wrote {name}" in out for name in files)
+    with (tmp_path / "p.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert rows[0]["stroke-position"] == "m"
+    result = trunnion.play(trunnion.read(SLIDER), steps=36)
+    column = [float(row["drive-torque.O.worst_case"]) for row in rows[1:]]
+    assert column == pytest.approx(result["worst_case"].sel(measure="drive-torque", joint="O").values)
+    with xr.open_dataset(tmp_path / "p.nc") as read:
+        np.testing.assert_array_equal(read["sensitivity"].values, result["sensitivity"].values)
+    assert json.loads((tmp_path / "p.json").read_text())["attrs"]["drive"] == "O"
+    ElementTree.parse(tmp_path / "p.svg")
+
+
+def test_a_limit_is_a_finding_with_the_line_of_the_file(program: Run, tmp_path: Path) -> None:
+    data = four_bar("C").data() | {"measures": {"swing": {"rotation": "D", "limit": "0.01 deg"}}}
+    trunnion.Mechanism(**data).write(tmp_path / "bar.yaml")
+    code, _, err = program("play", "bar.yaml", "--steps", 12, "--out", "bar.svg")
+    assert code == 1
+    assert "measures.swing.limit: the worst case to first order, " in err
+    assert err.startswith("bar.yaml:")
+    assert (tmp_path / "bar.svg").exists()
+
+
+def test_the_figure_stacks_the_joints_up_to_the_sum() -> None:
+    result = trunnion.play(trunnion.read(SLIDER), ["piston.Q.x"], steps=72)
+    (axes,) = figure(result).axes
+    total = next(line for line in axes.lines if line.get_label() == "sum: worst case, first order").get_xydata()
+    assert total[-1, 0] == pytest.approx(360)  # the turn closes
+    assert total[:-1, 1] == pytest.approx(result["worst_case_total"].values[0] * 1e6)
+    assert len(axes.collections) == 4
+    assert axes.get_ylabel() == "worst case of piston.Q.x [µm]"
+
+
+def test_a_place_and_joints_without_effect_are_told(tmp_path: Path) -> None:
+    """The table and the summary of a measure with a place have its figure there."""
+    model = tmp_path / "model.yaml"
+    text = (EXAMPLES / "fourbar-with-play.yaml").read_text(encoding="utf-8")
+    assert "measures:" not in text
+    model.write_text(
+        f"{text}\nmeasures:\n  place: {{angle: rocker, at: 90 deg}}\n  held: {{angle: crank}}\n", encoding="utf-8"
+    )
+    result = trunnion.play(trunnion.read(model), steps=8)
+    findings = {one.code: one for one in result.trunnion.findings}
+    there = float(result["worst_case_total"].sel(measure="place").isel(position=2))  # 90° of 0°, 45°, 90° …
+    assert float(result["extreme_worst_case"].sel(measure="place").sum()) == pytest.approx(there, rel=1e-9)
+    assert there < float(result["worst_case_total"].sel(measure="place").max())
+    assert summary_of(result)[0].value == pytest.approx(there, rel=1e-9)
+    assert tables(result)[0].title == "place, at 90°"
+    assert findings["play.no_effect"].figures["measure"] == "held"
+
+
+def test_an_extreme_is_of_its_place_and_other_statistics_are_left_out(tmp_path: Path) -> None:
+    """To first order an extreme changes as the course does at its place."""
+    model = tmp_path / "model.yaml"
+    text = (EXAMPLES / "fourbar-with-play.yaml").read_text(encoding="utf-8")
+    model.write_text(
+        f"{text}\nmeasures:\n  course: {{angle: rocker}}\n  least: {{angle: rocker, as: minimum}}\n"
+        "  most: {angle: rocker, as: maximum}\n  swing: {angle: rocker, as: peak-to-peak}\n",
+        encoding="utf-8",
+    )
+    result = trunnion.play(trunnion.read(model), steps=720)
+    assert result["measure"].values.tolist() == ["course", "least", "most"]
+    figures = {one.name: one.value for one in result.trunnion.summary}
+    course = result.sel(measure="course")
+    for name, pick in (("least", np.argmin), ("most", np.argmax)):
+        there = course.isel(position=int(pick(course["value"].values)))
+        own = result.sel(measure=name)
+        assert own["extreme_worst_case"].values == pytest.approx(there["worst_case"].values, rel=1e-2, abs=1e-9)
+        assert figures[f"{name}.worst_case"] == pytest.approx(float(own["extreme_worst_case"].sum()), rel=1e-12)
+        assert float(own["extreme_time"]) == pytest.approx(float(there["time"]), abs=2e-3)
+    assert figures["course.worst_case"] == pytest.approx(float(course["worst_case_total"].max()), rel=1e-4)
+    assert "play.measures_left_out" in [one.code for one in result.trunnion.findings]
+    titles = [one.title for one in tables(result)]
+    assert titles[1].startswith("least, the minimum at ")
+    assert figure(result).axes
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Path:
+    """The model of the page about the verb."""
+    page = (EXAMPLES.parent / "docs" / "how-to" / "assemble.md").read_text("utf-8")
+    found = re.search(r'```yaml title="leaning-four-bar.yaml"\n(.*?)```', page, re.DOTALL)
+    assert found
+    path = tmp_path / "lean.yaml"
+    path.write_text(found[1], encoding="utf-8")
+    return path
+
+
+@pytest.mark.slow
+def test_too_little_clearance(program: Run, model: Path, tmp_path: Path) -> None:
+    done = program(
+        "assemble",
+        model,
+        "--steps",
+        36,
+        *(f"--out=f{end}" for end in (".csv", ".json", ".nc", ".svg", ".png")),
+        "--units-row",
+    )
+    assert done.code == 1
+    assert "0.0143451" in done.out
+    assert "B 41 %" in done.out
+    assert "error: joints: the stated clearances are too small to close the loops between" in done.err
+    units, *found = rows(tmp_path / "f.csv")
+    assert (units["A.coordinate"], units["needed_clearance"], units["B.uniform_1_x"]) == ("rad", "m", "m")
+    assert len(found) == 36
+    assert {row["status"] for row in found} == {"fits", "short"}
+    again = xr.load_dataset(tmp_path / "f.nc")
+    mechanism = trunnion.read(model)
+    wanted = trunnion.assemble(mechanism, 36)
+    np.testing.assert_array_equal(again.needed_share, wanted.needed_share)
+    assert [float(row["needed_share"]) for row in found] == wanted.needed_share.values.tolist()
+    assert float(found[3]["D.stated_2_y"]) == float(wanted.stated_offset.sel(joint="D", end="2", axis="y")[3])
+    assert json.loads((tmp_path / "f.json").read_text("utf-8"))["data_vars"]["smallest_clearance"]["data"] > 1.4e-5
+    assert ElementTree.parse(tmp_path / "f.svg").getroot().tag.endswith("svg")
+    assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_nothing_to_ask(program: Run, tmp_path: Path) -> None:
+    done = program("assemble", EXAMPLES / "fourbar-in-space.yaml", "--steps", 12, "--out", "f.svg")
+    assert done.code == 0
+    assert "the loops close without any clearance" in done.err
+    done = program("assemble", EXAMPLES / "durango-fourbar.yaml", "--steps", 12, "--out", "p.svg", "--out", "p.csv")
+    assert done.code == 0
+    assert "in the plane no joint constrains twice" in done.err
+    assert {row["status"] for row in rows(tmp_path / "p.csv")} == {"fits"}

@@ -69,9 +69,6 @@ def near(found: Any, wanted: Any, share: float = 1e-6) -> None:
     np.testing.assert_allclose(found, wanted, rtol=0, atol=share * RHO)
 
 
-# ---- pin and hole ---------------------------------------------------------------------------------------------
-
-
 def test_the_hole_is_on_the_second_link() -> None:
     """The pin's axis lies at ρ (cos ξ, sin ξ) in the axes of the hole's link: the crank is off by as much, turned."""
     seat = {"xi": float(np.radians(30))}
@@ -124,9 +121,6 @@ def test_friction_turns_the_seat(turned_round: bool, factor: float) -> None:
     near(of(result, "seat_offset")[0, :2], RHO * np.array([np.cos(angle), np.sin(angle)]))
 
 
-# ---- ends -----------------------------------------------------------------------------------------------------
-
-
 def test_end_1_is_the_lower_one() -> None:
     """ξ = 0, β = 180°: end 1 at ξ + β/2, on +y, at z = −H/2, end 2 on −y; the crank leans the other way."""
     result = rotor(seat={"beta": float(np.pi), "xi": 0.0})
@@ -160,9 +154,6 @@ def test_the_farther_end_carries_less() -> None:
     force = of(rotor(seat="loaded", centre=[0, 0, aside]), "end_force")
     share = aside / LENGTH
     np.testing.assert_allclose(force[:, 0], WEIGHT * np.array([0.5 - share, 0.5 + share]), atol=1e-4)
-
-
-# ---- guide, ball, misalignment, lengths ------------------------------------------------------------------------
 
 
 def slider(seat: Data) -> xr.Dataset:
@@ -224,9 +215,6 @@ def test_errors_are_as_built_less_ideal() -> None:
     result = trunnion.analyse(data.with_values({"errors.crank": 1e-4}), steps=4)
     np.testing.assert_allclose(at(result, "point_error", "crank.B"), [1e-4, 0], atol=1e-12)
     np.testing.assert_allclose(at(result, "point_error", "crank.B", 1), [0, 1e-4], atol=1e-12)
-
-
-# ---- seats that travel ----------------------------------------------------------------------------------------
 
 
 def test_velocities_and_accelerations_contain_the_way_of_the_seats() -> None:

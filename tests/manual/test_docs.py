@@ -223,39 +223,6 @@ def test_every_table_is_placed() -> None:
     assert set(places) == set(hooks.TABLES)
 
 
-def test_theory_tells_every_friction_law() -> None:
-    """The table of the friction laws has a row for each."""
-    from trunnion.joints.friction import FRICTION_LAWS
-
-    text = (ROOT / "docs" / "theory" / "friction.md").read_text("utf-8")
-    assert re.findall(r"^\| `([a-z-]+)`", text, re.MULTILINE) == list(FRICTION_LAWS)
-
-
-def test_changelog_names_the_verbs() -> None:
-    """The verbs that the changelog lists are those of the command line."""
-    from trunnion.cli.app import app
-
-    found = re.search(r"Command line: (.+?)\.\n", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.DOTALL)
-    assert found
-    verbs = [command.name or getattr(command.callback, "__name__", "") for command in app.registered_commands]
-    assert sorted(re.findall(r"`(\w+)`", found[1])) == sorted(verbs)
-
-
-def test_search_needs_no_network() -> None:
-    """The worker that the search needs in pages opened from disk is one of the pages' own files."""
-    yaml = pytest.importorskip("yaml")
-    stated = yaml.safe_load((ROOT / "mkdocs.yml").read_text("utf-8"))
-    assert "offline" in stated["plugins"]
-    (script,) = stated["extra"]["polyfills"]
-    assert "iframe-worker" in script  # by this name the plugin knows that it need not fetch one
-    assert (ROOT / "docs" / script).is_file()
-
-
-def test_readme_is_short() -> None:
-    """At most 1000 words, outputs included: who wants more finds it in docs/."""
-    assert len((ROOT / "README.md").read_text("utf-8").split()) <= 1000
-
-
 @pytest.mark.parametrize("page", ["README.md", "docs/tutorial.md"])
 def test_parts_of_the_press_are_those_of_the_file(page: str) -> None:
     """Every line of the model that these pages show stands in the example that their commands run."""
@@ -263,12 +230,3 @@ def test_parts_of_the_press_are_those_of_the_file(page: str) -> None:
     shown = [line for one in blocks(ROOT / page) if one.language == "yaml" for line in one.text.splitlines()]
     assert shown
     assert set(shown) <= set(model)
-
-
-def test_readme_names_the_closed_forms() -> None:
-    """The README's list of groups with a closed form is that of the table."""
-    from trunnion.groups import GROUPS
-
-    found = re.search(r"Closed forms: ([A-Z, ]+?)\.", (ROOT / "README.md").read_text("utf-8"))
-    assert found
-    assert found[1].split(", ") == [name for name in GROUPS if len(name) == 3]

@@ -1,14 +1,51 @@
-"""Questions to the studio as the page asks them."""
+"""Questions to the studio as the page asks them, and what `analyse` has of the same models."""
 
 from __future__ import annotations
 
 import json
 import struct
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+import trunnion
+from trunnion.model.file import entries_of
+from trunnion.model.mechanism import Mechanism
 from trunnion.studio.answers import answer
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
+FLOAT = 1e-6  # columns are float32
+
+
+def model_of(text: str) -> Mechanism:
+    """The mechanism of a text."""
+    return Mechanism(**entries_of(text)[0])
+
+
+def analysed(text: str, steps: int = 360, friction: bool = True) -> Any:
+    """What `analyse` has of it."""
+    mechanism = model_of(text)
+    return trunnion.analyse(mechanism if friction else mechanism.with_friction("off"), steps)
+
+
+def column(values: Any) -> Any:
+    """Numbers of an answer; None is NaN."""
+    return np.array(values, float)
+
+
+def near(found: Any, expected: Any) -> None:
+    """A column is that of an analysis, as far as float32 has digits for its peak."""
+    expected = np.asarray(expected, float)
+    np.testing.assert_allclose(column(found), expected, atol=3 * FLOAT * np.nanmax(np.abs(expected)), rtol=0)
+
+
+def sound(kind: str, text: str, **question: Any) -> dict[str, Any]:
+    """The answer alone to a question about a text that has one."""
+    found = unpacked(answer(json.dumps({"ask": kind, "text": text, "revision": 1} | question).encode()))
+    assert "error" not in found, found
+    return found
 
 
 def ask(**question: Any) -> dict[str, Any]:

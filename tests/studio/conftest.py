@@ -1,22 +1,29 @@
-"""A studio that is served, a browser, and a user in front of it; one studio and one browser for all tests of a file."""
+"""A studio that is served, a browser, and a user in front of it; one studio and one browser for all tests of a file.
+
+Where there is no browser, its tests are left out: what must hold everywhere is tested without one.
+"""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import pytest
 
 from browsing import CHROMIUM, QUIET, User
 from served import served
+from studio.asking import EXAMPLES
 
-FOURBAR = Path(__file__).resolve().parents[2] / "examples" / "durango-fourbar.yaml"
+
+def pytest_collection_modifyitems(items):
+    items[:] = [item for item in items if CHROMIUM or "browser" not in getattr(item, "fixturenames", ())]
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory):
+def studio(request, tmp_path_factory):
+    """On the models that a file of tests states, the first of them open."""
     folder = tmp_path_factory.mktemp("models")
-    (folder / "four-bar.yaml").write_text(FOURBAR.read_text("utf-8"), encoding="utf-8")
-    with served(folder, "four-bar.yaml") as own:
+    models = getattr(request.module, "MODELS", {"four-bar": EXAMPLES["durango-fourbar"]})
+    for name, text in models.items():
+        (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
+    with served(folder, f"{next(iter(models))}.yaml", forms=getattr(request.module, "FORMS", ())) as own:
         yield own
 
 

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import trunnion
-from studio.asking import ask, edited, unpacked
+from studio.asking import EXAMPLES, analysed, ask, column, edited, model_of, unpacked
 from trunnion.errors import Status
 from trunnion.model.file import entries_of, text_of
-from trunnion.model.mechanism import Mechanism
 from trunnion.studio.answers import answer
 from trunnion.studio.message import packed
-from trunnion.studio.words import remedied
 
-ROOT = Path(__file__).resolve().parents[2]
-EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
 FOURBAR = "durango-fourbar"
 
 
@@ -88,7 +82,7 @@ def test_a_model_reads_no_other_file():
 
 def test_the_cycle_is_that_of_analyse():
     found = ask(ask="model", text=EXAMPLES[FOURBAR])
-    mechanism = Mechanism(**entries_of(EXAMPLES[FOURBAR])[0])
+    mechanism = model_of(EXAMPLES[FOURBAR])
     result = trunnion.analyse(mechanism, 360)
     (driver,) = found["scene"]["drivers"]
     np.testing.assert_allclose(driver["effort"], result.drive_effort.values[0], rtol=6e-7)
@@ -108,16 +102,6 @@ def test_every_example_opens(example):
     assert found["solved"] or set(why) <= {"mobility.redundant", "input.drivers", "input.tables"}, found["findings"]
 
 
-@pytest.mark.slow
-def test_a_margin_is_of_positions_that_there_are():
-    text = EXAMPLES[FOURBAR].replace("BC: 6.00 m", "BC: 3.00 m")
-    found = ask(ask="model", text=text)
-    status, margin = found["scene"]["status"], found["margin"]
-    assert any(code > 5 for code in status)
-    assert all(one is None for one, code in zip(margin, status, strict=True) if code > 5)
-    assert ask(ask="model", text=text, friction="off")["margin_least"] is None
-
-
 def pytest_generate_tests(metafunc):
     if "example" in metafunc.fixturenames:
         metafunc.parametrize("example", sorted(EXAMPLES))
@@ -126,63 +110,13 @@ def pytest_generate_tests(metafunc):
 # ---- drawing -------------------------------------------------------------------------------------------------------
 
 
-def test_a_four_bar_drawn_from_nothing_is_that_of_analyse():
-    text, places = drawn_four_bar()
-    found = ask(ask="model", text=text)
-    assert found["solved"], found["findings"]
-    for key, place in places.items():  # it begins as it was drawn
-        np.testing.assert_allclose(found["places"][key], place, atol=2e-7)
-    text, _ = edited(
-        text, places,
-        {"do": "set", "path": ["joint_defaults"], "value": {"pin": {"radius": "5 mm"}, "friction": 0.1}},
-        {"do": "load", "at": "C", "force": ["-100 N", "0 N"]},
-    )  # fmt: skip
-    shown = ask(ask="model", text=text)["scene"]["drivers"][0]["effort"]
-    result = trunnion.analyse(Mechanism(**entries_of(text)[0]), 360)
-    peak = np.abs(result.drive_effort.values).max()
-    assert abs(shown[60] - float(result.drive_effort.values[0, 60])) <= 1e-6 * peak
-
-
-def test_what_is_unfinished_says_what_is_missing():
-    text, places = edited("", {}, {"do": "link", "from": {"ground": [0, 0]}, "to": [0.05, 0.0]})
-    assert places["link1.B"] == pytest.approx([0.05, 0.0])
-    found = ask(ask="model", text=text)
-    assert not found["solved"]
-    assert "driver" in " ".join(one["what"] + one["remedy"] + one["where"] for one in found["findings"])
-
-
-def test_a_slider_crank_with_a_third_link_on_a_pin():
-    text, _ = edited(
-        "", {},
-        {"do": "link", "from": {"ground": [0, 0]}, "to": [0.0, 0.05]},
-        {"do": "link", "from": "link1.B", "to": [0.2, 0.0]},
-        {"do": "slide", "joint": "link2.C", "angle": 0.0},
-        {"do": "driver", "joint": "A"},
-        {"do": "link", "from": "B", "to": [0.1, 0.2]},
-        {"do": "link", "from": "link3.F", "to": {"ground": [0.2, 0.2]}},
-    )  # fmt: skip
-    found = ask(ask="model", text=text)
-    assert found["solved"], found["findings"]
-    assert sorted(one["type"] for one in found["scene"]["joints"]) == ["prismatic"] + ["revolute"] * 6
-    assert found["places"]["link1.B"] == pytest.approx(found["places"]["link3.E"])
-
-
-def test_what_is_deleted_takes_along_what_needs_it():
-    text, places = drawn_four_bar()
-    text, places = edited(text, places, {"do": "delete", "what": ["links", "link3"]})
-    entries = entries_of(text)[0]
-    assert list(entries["joints"]) == ["A", "B"]
-    assert list(entries["links"]["ground"]["points"]) == ["A"]
-    assert "C" in entries["links"]["link2"]["points"]
-
-
 def test_a_name_is_changed_wherever_it_stands():
     text = EXAMPLES[FOURBAR]
-    before = trunnion.analyse(Mechanism(**entries_of(text)[0]), 36)
+    before = analysed(text, 36)
     for what, new in ((["links", "coupler"], "rod"), (["joints", "C"], "K"), (["dimensions", "BC"], "length")):
         text, _ = edited(text, {}, {"do": "rename", "what": what, "to": new})
     assert not {"coupler", "BC"} & set(str(entries_of(text)[0]).replace("'", " ").split())
-    after = trunnion.analyse(Mechanism(**entries_of(text)[0]), 36)
+    after = analysed(text, 36)
     np.testing.assert_allclose(after.drive_effort, before.drive_effort, rtol=1e-12)
     assert len(text.splitlines()) == len(EXAMPLES[FOURBAR].splitlines())  # and what is on each, in its place
     assert "\n  AB: 2.00 m\n  length: 6.00 m\n  CD: 3.00 m\n" in text
@@ -198,31 +132,6 @@ def test_what_is_deleted_leaves_the_other_lines_as_they_are():
     gone = [line for line in before if line not in text.splitlines()]
     assert [line.split(":")[0].strip() for line in gone] == ["ground", "rocker", "C", "D", "brake", "assembly"]
     assert "  ground:  {points: {A: [0, 0]}}" in text.splitlines()
-
-
-@pytest.mark.parametrize(
-    ("remedy", "words"),
-    [
-        ("state pin: {radius: …} or a fit, or friction: 0", "state pin radius or a fit, or friction 0"),
-        ("state guide: {length: …}, or seat: free", "state guide length, or seat: free"),
-        ("add pin: {radius: 10 mm}", "add pin radius 10 mm"),
-        ("state options: {…} or a model", "state options or a model"),
-        ("add range: [0 mm, 50 mm]", "add range: [0 mm, 50 mm]"),
-        ("the bounds are in drive_effort_lower and drive_effort_upper", ""),
-        ("use more --steps", ""),
-        ("use more --steps: a peak between two positions is in the means, but not in the extremes", ""),
-        ("state another place, or analyse with --seat free", "state another place"),
-        ("`trunnion analyse --seat loaded` has the effect", "`trunnion analyse --seat loaded` has the effect"),
-    ],
-)
-def test_remedies_are_in_the_words_of_the_sheet(remedy, words):
-    assert remedied(remedy) == words
-
-
-def test_what_a_drag_changes_is_named_in_words():
-    text, _ = drawn_four_bar()
-    found = ask(ask="drag", text=text, point="C", index=0, to=[0.21, 0.13], keep=True)
-    assert {row[0] for row in found["changes"]} == {"x of C on link2", "x of D on link3"}
 
 
 # ---- dragging ------------------------------------------------------------------------------------------------------
@@ -286,17 +195,6 @@ def test_a_drop_writes_what_the_drag_showed():
     assert "chooses the branch" in text
 
 
-def test_a_dimension_that_stands_for_several_lengths_is_told_once():
-    dragged = ask(ask="drag", text=EXAMPLES["drawing-press"], point="K", index=200, to=[-0.11, -0.15])
-    names = [name for name, *_ in dragged["changes"]]
-    assert "L" in names
-    assert len(names) == len(set(names))
-
-
-def column(values):
-    return np.array(values, float)  # None is NaN
-
-
 @pytest.mark.parametrize("friction", ["stated", "off"])
 @pytest.mark.parametrize(
     ("name", "path", "written", "value"),
@@ -311,7 +209,7 @@ def test_a_number_that_is_tried_gives_the_cycle_of_a_model_that_has_it(name, pat
     for old, new in written.items():
         assert old in text
         text = text.replace(old, new)
-    mechanism = Mechanism(**entries_of(text)[0])
+    mechanism = model_of(text)
     result = trunnion.analyse(mechanism if friction == "stated" else mechanism.with_friction("off"), 360)
     shown = ask(ask="model", text=text, friction=friction)
     scene = shown["scene"]
@@ -397,17 +295,6 @@ def test_lengths_are_written_in_a_unit_that_suits_the_size(size, unit, factor):
     assert entries_of(text)[0]["links"]["bar"]["points"]["D"][0].endswith(f" {unit}")  # and so it stays
 
 
-def test_a_step_says_what_a_value_was_set_to():
-    text, path = EXAMPLES[FOURBAR], ["dimensions", "BC"]
-    assert ask(ask="edit", text=text, gestures=[{"do": "set", "path": path, "value": "5 m"}])["says"] == "Set BC to 5 m"
-    path = ["links", "crank", "mass"]
-    for value, said in (("2 kg", "Set mass of link crank to 2 kg"), (None, "Remove mass of link crank")):
-        assert ask(ask="edit", text=text, gestures=[{"do": "set", "path": path, "value": value}])["says"] == said
-    path = ["links", "coupler", "points", "E", 0]
-    said = ask(ask="edit", text=text, gestures=[{"do": "set", "path": path, "value": "5 mm"}])["says"]
-    assert said == "Set x of point E of link coupler to 5 mm"
-
-
 def test_what_has_no_length_is_refused():
     text, places = drawn_four_bar()
     found = ask(ask="edit", text=text, places=places, gestures=[{"do": "move", "point": "B", "to": places["link1.A"]}])
@@ -436,11 +323,7 @@ def test_the_least_margin_is_that_of_a_position_that_has_one():
     found = ask(ask="model", text=text)
     assert found["margin"][0] is None
     assert {one for one in found["margin"] if one is not None} == {10.0}
-    (figure,) = [
-        one
-        for one in trunnion.analyse(Mechanism(**entries_of(text)[0])).trunnion.summary
-        if one.name == "locking_margin"
-    ]
+    (figure,) = [one for one in analysed(text).trunnion.summary if one.name == "locking_margin"]
     assert found["margin_least"] == {"value": figure.value, "beyond": False, "at": figure.place.removeprefix("at ")}
 
 
@@ -490,7 +373,7 @@ def test_friction_that_is_not_whole_leaves_the_motion():
     assert found["solved"]
     assert found["bare"]
     assert "banana" in found["findings"][0]["what"]
-    plain = trunnion.analyse(Mechanism(**entries_of(EXAMPLES[FOURBAR])[0]).with_friction("off"), 360)
+    plain = trunnion.analyse(model_of(EXAMPLES[FOURBAR]).with_friction("off"), 360)
     np.testing.assert_allclose(found["scene"]["drivers"][0]["effort"], plain["drive_effort"].values[0], rtol=6e-7)
     assert "banana" in ask(ask="export", text=text, what="csv")["error"]
     worse = ask(ask="model", text=text.replace("BC: 6.00 m", "BC: 6.00 kg"))

@@ -4,39 +4,23 @@ from __future__ import annotations
 
 import json
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import trunnion
-from browsing import CHROMIUM
-from studio.asking import unpacked
-from trunnion.model.file import entries_of
-from trunnion.model.mechanism import Mechanism
+from studio.asking import EXAMPLES, analysed, model_of, near, sound, unpacked
+from trunnion.model.file import entries_of, text_of
 from trunnion.results.scales import without_noise
 from trunnion.studio.answers import answer
 
-EXAMPLES = {path.stem: path.read_text("utf-8") for path in (Path(__file__).parents[2] / "examples").glob("*.yaml")}
 WATT = EXAMPLES["watt-six-bar"]
-FLOAT = 1e-6  # columns are float32
-
-
-def ask(kind, text, **question):
-    found = unpacked(answer(json.dumps({"ask": kind, "text": text, "revision": 1} | question).encode()))
-    assert "error" not in found, found
-    return found
-
-
-def near(found, expected):
-    expected = np.asarray(expected, float)
-    np.testing.assert_allclose(np.array(found, float), expected, atol=3 * FLOAT * np.nanmax(abs(expected)), rtol=0)
 
 
 @pytest.mark.parametrize("name", ["watt-six-bar", "drawing-press", "rssr", "cardan-gears"])
 def test_what_passes_the_wires_is_what_the_groups_give(name):
     """The load on the earlier link, with friction; and every joint is inside one block or the wire to one."""
-    found, result = ask("blocks", EXAMPLES[name]), trunnion.analyse(Mechanism(**entries_of(EXAMPLES[name])[0]))
+    found, result = sound("blocks", EXAMPLES[name]), analysed(EXAMPLES[name])
     result = without_noise(result)
     inner = [joint for block in found["blocks"] for joint in block.get("inner", [])]
     wired = [wire["joint"] for wire in found["wires"]]
@@ -59,8 +43,8 @@ def test_the_loads_on_a_block_balance():
     """Of a block without mass or load the forces that it takes from the wires add up to nothing, at every position."""
     entries = entries_of(WATT)[0]
     bare = {name: {"points": link["points"]} for name, link in entries["links"].items()}
-    text = trunnion.model.file.text_of(entries | {"links": bare, "loads": {"f": {"joint": "G", "resisting_torque": 5}}})
-    found = ask("blocks", text)
+    text = text_of(entries | {"links": bare, "loads": {"f": {"joint": "G", "resisting_torque": 5}}})
+    found = sound("blocks", text)
     (first,) = [order for order, block in enumerate(found["blocks"]) if block["links"] == ["coupler", "bell-crank"]]
     for axis in "xy":
         forces = [
@@ -74,7 +58,7 @@ def test_the_loads_on_a_block_balance():
 
 
 def test_shares_of_the_friction_add_up_to_one():
-    shares = np.array([block["share"] for block in ask("blocks", WATT)["blocks"][1:]])
+    shares = np.array([block["share"] for block in sound("blocks", WATT)["blocks"][1:]])
     np.testing.assert_allclose(shares.sum(axis=0), 1, atol=1e-5)
 
 
@@ -84,9 +68,9 @@ def test_shares_of_the_friction_add_up_to_one():
 def built(*gestures):
     text, places = "", {}
     for one in gestures:
-        found = ask("edit", text, places=places, gestures=[one])
+        found = sound("edit", text, places=places, gestures=[one])
         text, places = found["text"], found["places"]
-    return Mechanism(**entries_of(text)[0])
+    return model_of(text)
 
 
 def block(kind, *pins, at="", **rest):
@@ -171,85 +155,80 @@ def test_what_cannot_be_placed_is_refused_in_words(gesture, words):
 
 # ---- the page ------------------------------------------------------------------------------------------------------
 
-if CHROMIUM:
-    WIDTHS = "[...document.querySelectorAll('.wire .load')].map((one) => one.getAttribute('stroke-width')).join()"
+WIDTHS = "[...document.querySelectorAll('.wire .load')].map((one) => one.getAttribute('stroke-width')).join()"
 
-    def opened(user, text):
-        user.of("actions", "m.takeText(given, 'Edit')", text)
-        user.until(f"s.solved.value && s.answer.value.text.length === {len(text)}")
 
-    def test_blocks_links_and_terms_light_each_other(user):
-        page = user.page
-        opened(user, WATT)
-        terms = page.locator(".formula .term")
-        assert terms.all_inner_texts() == ["I(0,1)R", "II(2,3)RRR", "II(4,5)RRR"]
-        terms.nth(1).click()
-        page.locator(".wiring .block.chosen").wait_for()
-        assert "coupler" in page.locator(".wiring .block.chosen").get_attribute("aria-label")
-        lit = page.locator("g.of-block").evaluate_all("list => list.map((one) => one.dataset.name).sort()")
-        assert lit == ["bell-crank", "coupler"]
-        user.of("state", "m.selection.value = {kind: 'links', name: 'agitator'}")
-        page.locator(".wiring .block.chosen[aria-label*=agitator]").wait_for()
-        rows = page.locator(".passing tbody tr")
-        assert rows.count() == 2
-        assert "from bell-crank" in rows.first.inner_text()
+def opened(user, text):
+    user.of("actions", "m.takeText(given, 'Edit')", text)
+    user.until(f"s.solved.value && s.answer.value.text.length === {len(text)}")
 
-    def test_blocks_are_walked_by_keys_and_loads_follow_the_position(user):
-        page = user.page
-        opened(user, WATT)
-        page.get_by_role("tab", name="Blocks").click()
-        page.locator(".wiring .block").first.focus()
-        for _ in range(2):
-            page.keyboard.press("ArrowDown")
-        page.keyboard.press("Enter")
-        page.locator("[data-block='2'][aria-pressed=true]").wait_for()
-        before = page.evaluate(WIDTHS)
-        user.of("state", "m.index.value = 120")
-        for _ in range(100):
-            if page.evaluate(WIDTHS) != before:
-                break
-            page.wait_for_timeout(20)
-        else:
-            pytest.fail("the wires do not follow the position")
 
-    def test_links_wires_and_curves_are_reached_by_keys(user):
-        page = user.page
-        opened(user, WATT)
-        page.get_by_role("button", name="Link coupler", exact=True).focus()
-        page.keyboard.press("Enter")
-        assert user.state("s.selection.value.name") == "coupler"
-        page.get_by_role("tab", name="Blocks").click()
-        page.get_by_role("button", name=re.compile("^Wire G from")).focus()
-        page.keyboard.press("Enter")
-        assert user.state("s.selection.value") == {"kind": "joints", "name": "G"}
-        page.get_by_role("tab", name="Plots").click()
-        page.locator(".charts .chart").first.focus()
-        user.keys("Shift+ArrowRight", "ArrowLeft")
-        assert user.state("s.index.value") == 9
-        effort = trunnion.analyse(Mechanism(**entries_of(WATT)[0]))["drive_effort"].values[0, 9]
-        assert f"torque {effort:.2f} [N m]" in page.locator(".notice").inner_text()
+def test_blocks_links_and_terms_light_each_other(user):
+    page = user.page
+    opened(user, WATT)
+    terms = page.locator(".formula .term")
+    assert terms.all_inner_texts() == ["I(0,1)R", "II(2,3)RRR", "II(4,5)RRR"]
+    terms.nth(1).click()
+    page.locator(".wiring .block.chosen").wait_for()
+    assert "coupler" in page.locator(".wiring .block.chosen").get_attribute("aria-label")
+    lit = page.locator("g.of-block").evaluate_all("list => list.map((one) => one.dataset.name).sort()")
+    assert lit == ["bell-crank", "coupler"]
+    user.of("state", "m.selection.value = {kind: 'links', name: 'agitator'}")
+    page.locator(".wiring .block.chosen[aria-label*=agitator]").wait_for()
+    rows = page.locator(".passing tbody tr")
+    assert rows.count() == 2
+    assert "from bell-crank" in rows.first.inner_text()
 
-    def test_a_mechanism_is_built_of_blocks_by_the_keyboard(user):
-        page = user.page
-        user.new_sheet()
-        page.get_by_role("tab", name="Blocks").click()
-        page.get_by_label("Place of pin 1").fill("0 mm, 0 mm")
-        page.get_by_label("End at").fill("0 mm, 40 mm")
-        page.get_by_role("button", name="Place the block").press("Enter")
-        user.until("Object.keys(s.answer.value?.entries?.links ?? {}).length === 2")
-        page.get_by_label("Kind of block").select_option("RRR")
-        page.get_by_label("Pin 1", exact=True).select_option("link1.B")
-        page.get_by_label("Place of pin 2").fill("120 mm, 0 mm")
-        page.get_by_label("Inner pin at").fill("100 mm, 80 mm")
-        page.get_by_role("button", name="Place the block").press("Enter")
-        user.until("s.solved.value")
-        assert page.locator(".formula .term").all_inner_texts() == ["I(0,1)R", "II(2,3)RRR"]
 
-    def test_the_scrub_track_is_red_where_it_is_near_to_locking(user):
-        text = EXAMPLES["drawing-press"]
-        opened(user, text.replace("friction: 0.1", "friction: 0.3"))
-        near = user.page.locator(".margin-band").evaluate("one => one.style.background")
-        shares = [float(one) for one in re.findall(r"var\(--bad\) ([\d.]+)%", near)]
-        margin = np.minimum(np.array(ask("model", text.replace("friction: 0.1", "friction: 0.3"))["margin"], float), 4)
-        assert shares[0] == pytest.approx(100 * np.clip((4 - margin[0]) / 3, 0, 1), abs=1)
-        assert max(shares) > 50
+def test_blocks_are_walked_by_keys_and_loads_follow_the_position(user):
+    page = user.page
+    opened(user, WATT)
+    page.get_by_role("tab", name="Blocks").click()
+    page.locator(".wiring .block").first.focus()
+    for _ in range(2):
+        page.keyboard.press("ArrowDown")
+    page.keyboard.press("Enter")
+    page.locator("[data-block='2'][aria-pressed=true]").wait_for()
+    before = page.evaluate(WIDTHS)
+    user.of("state", "m.index.value = 120")
+    for _ in range(100):
+        if page.evaluate(WIDTHS) != before:
+            break
+        page.wait_for_timeout(20)
+    else:
+        pytest.fail("the wires do not follow the position")
+
+
+def test_links_wires_and_curves_are_reached_by_keys(user):
+    page = user.page
+    opened(user, WATT)
+    page.get_by_role("button", name="Link coupler", exact=True).focus()
+    page.keyboard.press("Enter")
+    assert user.state("s.selection.value.name") == "coupler"
+    page.get_by_role("tab", name="Blocks").click()
+    page.get_by_role("button", name=re.compile("^Wire G from")).focus()
+    page.keyboard.press("Enter")
+    assert user.state("s.selection.value") == {"kind": "joints", "name": "G"}
+    page.get_by_role("tab", name="Plots").click()
+    page.locator(".charts .chart").first.focus()
+    user.keys("Shift+ArrowRight", "ArrowLeft")
+    assert user.state("s.index.value") == 9
+    effort = analysed(WATT)["drive_effort"].values[0, 9]
+    assert f"torque {effort:.2f} [N m]" in page.locator(".notice").inner_text()
+
+
+def test_a_mechanism_is_built_of_blocks_by_the_keyboard(user):
+    page = user.page
+    user.new_sheet()
+    page.get_by_role("tab", name="Blocks").click()
+    page.get_by_label("Place of pin 1").fill("0 mm, 0 mm")
+    page.get_by_label("End at").fill("0 mm, 40 mm")
+    page.get_by_role("button", name="Place the block").press("Enter")
+    user.until("Object.keys(s.answer.value?.entries?.links ?? {}).length === 2")
+    page.get_by_label("Kind of block").select_option("RRR")
+    page.get_by_label("Pin 1", exact=True).select_option("link1.B")
+    page.get_by_label("Place of pin 2").fill("120 mm, 0 mm")
+    page.get_by_label("Inner pin at").fill("100 mm, 80 mm")
+    page.get_by_role("button", name="Place the block").press("Enter")
+    user.until("s.solved.value")
+    assert page.locator(".formula .term").all_inner_texts() == ["I(0,1)R", "II(2,3)RRR"]

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-import trunnion
-from studio.asking import ask, edited, solved
+from studio.asking import EXAMPLES, analysed, ask, edited, model_of, solved
 from trunnion.model.file import entries_of
-from trunnion.model.mechanism import Mechanism
 
 WHITWORTH = (
     {"do": "link", "from": {"ground": [0, 0.04]}, "to": [0.06, 0.1]},
@@ -71,26 +67,6 @@ def test_a_slot_beside_the_line_of_its_link():
     pin, end = tracks(found, "link2.D"), tracks(found, "link1.B")
     angle = np.arctan2(pin[:, 1], pin[:, 0]) - np.arcsin(0.02 / np.hypot(*pin.T))
     np.testing.assert_allclose(end, 0.15 * np.stack([np.cos(angle), np.sin(angle)], axis=1), atol=2e-6)
-
-
-def test_a_pin_on_a_link_becomes_a_pin_in_its_slot():
-    text, places = edited(
-        "", {},
-        {"do": "link", "from": {"ground": [0, 0]}, "to": [0.1, 0.2]},
-        {"do": "link", "from": {"ground": [0, 0.05]}, "to": {"on": "link1", "at": [0.05, 0.1]}},
-    )  # fmt: skip
-    assert entries_of(text)[0]["joints"]["D"]["links"] == ["link1", "link2"]
-    text, _ = edited(
-        text,
-        places,
-        {"do": "slide", "joint": "D", "along": "link1", "near": 0.0},
-        {"do": "driver", "joint": "C"},
-    )
-    entries = entries_of(text)[0]
-    assert entries["joints"]["D"]["links"] == ["link2", "block1"]
-    assert "D" not in entries["links"]["link1"]["points"]
-    pin, end = tracks(solved(text), "link2.D"), tracks(solved(text), "link1.B")
-    np.testing.assert_allclose(pin[:, 0] * end[:, 1] - pin[:, 1] * end[:, 0], 0.0, atol=1e-8)
 
 
 def test_a_link_itself_slides():
@@ -154,19 +130,6 @@ def test_what_cannot_be_done_is_refused_in_words(gesture):
     assert "links." not in found["error"]
 
 
-def test_an_end_on_a_link_makes_it_ternary():
-    text, places = edited(
-        "", {},
-        {"do": "link", "from": {"ground": [0, 0]}, "to": [0, 0.05]},
-        {"do": "link", "from": "link1.B", "to": [0.2, 0.05]},
-        {"do": "link", "from": {"on": "link2", "at": [0.1, 0.05]}, "to": {"ground": [0.1, 0]}},
-    )  # fmt: skip
-    entries = entries_of(text)[0]
-    assert list(entries["links"]["link2"]["points"]) == ["B", "C", "D"]
-    assert entries["joints"]["D"]["links"] == ["link2", "link3"]
-    assert places["link2.D"] == pytest.approx([0.1, 0.05])
-
-
 def test_a_spring_begins_on_a_link_and_ends_on_the_ground():
     text, _ = edited(
         "", {},
@@ -181,11 +144,6 @@ def test_a_spring_begins_on_a_link_and_ends_on_the_ground():
     assert entries["loads"]["load1"] == {"link": "link1", "at": "E", "force": ["0 N", "-2 kN"]}
 
 
-def test_a_typed_length_stays_as_it_was_typed():
-    text, _ = edited("", {}, {"do": "link", "from": [0, 0], "to": [0.0635, 0], "length": "2.5 in"})
-    assert entries_of(text)[0]["links"]["link1"]["points"]["B"] == ["2.5 in", 0]
-
-
 @pytest.mark.parametrize(("fine", "written"), [(0.0, "84.852814 mm"), (2e-5, "84.85 mm"), (1e-2, "84.9 mm")])
 def test_lengths_are_written_no_finer_than_they_are_drawn(fine, written):
     given = {"text": "", "places": {}, "fine": fine}
@@ -195,41 +153,6 @@ def test_lengths_are_written_no_finer_than_they_are_drawn(fine, written):
     pinned = ask(ask="edit", gestures=[{"do": "pin", "point": "link1.B"}], **asked)
     if fine < 1e-3:  # the grid again, and not what rounding left of it
         assert entries_of(pinned["text"])[0]["links"]["ground"]["points"]["B"] == ["60 mm", "100 mm"]
-
-
-def test_a_link_is_pinned_where_it_has_no_point_yet():
-    text, places = edited("", {}, {"do": "link", "from": [0, 0], "to": [0.1, 0]})
-    text, places = edited(text, places, {"do": "pin", "point": {"on": "link1", "at": [0.04, 0]}})
-    entries = entries_of(text)[0]
-    assert entries["links"]["link1"]["points"]["C"] == entries["links"]["ground"]["points"]["C"] == ["40 mm", 0]
-    assert entries["joints"]["C"]["links"] == ["ground", "link1"]
-    ground = {"do": "pin", "point": {"on": "ground", "at": [0.2, 0]}}
-    assert "ground" in ask(ask="edit", text=text, places=places, gestures=[ground])["error"]
-
-
-def test_a_half_drawn_linkage_is_no_error():
-    text, places, told = "", {}, []
-    for gesture in WHITWORTH:
-        text, places = edited(text, places, gesture)
-        told.append(ask(ask="model", text=text)["missing"])
-    assert told == [
-        ["It can move in 1 way: drive a joint, or draw on from B."],
-        ["It can move in 2 ways: draw on from B or D, pin or guide it."],
-        ["It can move in 1 way: drive a joint."],
-        ["It can move in 2 ways: draw on from F, pin or guide it."],
-        ["It can move in 1 way: drive a joint."],
-        [],
-    ]
-    text, _ = edited("", {}, {"do": "link", "from": [0, 0], "to": [1, 0]})
-    assert ask(ask="model", text=text)["missing"] == ["Nothing is held yet: pin an end of a link to the ground."]
-    arms = [{"do": "link", "from": {"ground": [x, 0]}, "to": to} for x, to in ((0, [1, 1]), (2, "link1.B"))]
-    still, _ = edited("", {}, *arms)
-    found = ask(ask="model", text=still)
-    assert found["missing"] == ["It stands still: its joints let no link move. Take one away, or let an end slide."]
-    assert (found["ready"][0]["what"], found["ready"][0]["ok"]) == ("motion", False)
-    assert "stands still" in found["ready"][0]["why"]
-    wrong = text.replace("1 m,", "1 banana,").replace(" mm", " banana")
-    assert ask(ask="model", text=wrong)["missing"] == []
 
 
 def test_what_slides_goes_with_its_joint():
@@ -302,14 +225,6 @@ def test_a_text_that_is_not_sound_is_answered_with_what_is_found(old):
 # ---- values and names ----------------------------------------------------------------------------------------------
 
 
-def test_a_dimension_in_use_is_not_emptied():
-    text = "trunnion: 1\ndimensions: {r: 5 mm, s: 2 mm}\nlinks:\n  ground: {points: {A: [0, r]}}\n"
-    refused = ask(ask="edit", text=text, gestures=[{"do": "set", "path": ["dimensions", "r"], "value": None}])
-    assert refused["error"].startswith("r is in use: by point A of link ground")
-    text, _ = edited(text, {}, {"do": "set", "path": ["dimensions", "s"], "value": None})
-    assert entries_of(text)[0]["dimensions"] == {"r": "5 mm"}
-
-
 def test_everything_that_is_drawn_has_a_name_of_its_own():
     text, places = edited(
         "", {}, *WHITWORTH,
@@ -350,7 +265,7 @@ def test_a_load_against_the_motion_takes_power_from_a_slide_whichever_way_it_goe
     ahead = np.roll(x, -1) - np.roll(x, 1)
     clear = np.abs(ahead) > 0.02 * np.abs(ahead).max()
     np.testing.assert_array_equal(np.array(loads["load1"]["acts"])[clear], -np.sign(ahead)[clear])
-    work = trunnion.analyse(Mechanism(**entries_of(text)[0]), 720)["useful_power_mean"].item() * 1.0  # of a turn in 1 s
+    work = analysed(text, 720)["useful_power_mean"].item() * 1.0  # of a turn in 1 s
     assert work == pytest.approx(250.0 * 2 * np.ptp(x), rel=1e-4)
     text, _ = edited(text, places, {"do": "set", "path": ["loads", "load1", "only"], "value": "negative"})
     (acts,) = (load["acts"] for load in solved(text)["scene"]["loads"] if load["name"] == "load1")
@@ -361,13 +276,13 @@ def test_the_mass_of_a_flat_bar_is_that_of_its_section() -> None:
     """m = ρ l b t, J = m (l² + b²)/12 about the middle: 7850 · 0.1 · 0.02 · 0.01 = 0.157 kg, 1.36067e-4 kg m²."""
     text, places = edited("", {}, {"do": "link", "from": {"ground": [0, 0]}, "to": [0.06, 0.08]})
     bar = {"do": "bar-mass", "link": "link1", "width": "20 mm", "thickness": "10 mm"}
-    link = Mechanism(**entries_of(edited(text, places, bar | {"density": "7850 kg/m^3"})[0])[0]).parameters()
+    link = model_of(edited(text, places, bar | {"density": "7850 kg/m^3"})[0]).parameters()
     assert link["links.link1.mass"] == pytest.approx(0.157, rel=1e-6)
     assert link["links.link1.inertia"] == pytest.approx(0.157 * (0.1**2 + 0.02**2) / 12, rel=1e-5)
     assert (link["links.link1.centre.x"], link["links.link1.centre.y"]) == pytest.approx((0.05, 0))
     for given, middle in (({}, (0.05, 0)), ({"at": [0.06, 0]}, (0.036, -0.048))):  # 60 mm along x, at 53.13° to the bar
         after, _ = edited(text, places, {"do": "centre", "link": "link1"} | given)
-        found = Mechanism(**entries_of(after)[0]).parameters()
+        found = model_of(after).parameters()
         assert [found[f"links.link1.centre.{axis}"] for axis in "xy"] == pytest.approx(middle)
     for wrong, words in (
         ({"width": "-1 mm"}, "not above 0"),
@@ -425,9 +340,7 @@ def test_a_watt_six_bar_of_links_that_were_joined_is_the_typed_one():
         {"do": "load", "against": "E", "size": "6 N m"},
         {"do": "set", "path": ["joint_defaults"], "value": {"pin": {"radius": "7 mm"}, "friction": 0.06}},
     )  # fmt: skip
-    drawn, typed = (
-        trunnion.analyse(Mechanism(**entries_of(one)[0]), 360)["drive_effort"].values for one in (text, TYPED)
-    )
+    drawn, typed = (analysed(one, 360)["drive_effort"].values for one in (text, TYPED))
     assert np.isfinite(drawn).all()
     np.testing.assert_allclose(drawn, typed, rtol=0, atol=1e-12 * np.abs(typed).max())
     shifted = {"do": "group", "what": "shift", "links": ["link4"], "by": [0.03, 0]}
@@ -438,16 +351,13 @@ def test_a_watt_six_bar_of_links_that_were_joined_is_the_typed_one():
     assert places["link2.G"] == pytest.approx(spot["F"], abs=1e-6)  # it stays
 
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-
-
 def grouped(example, **given):
     """An example's efforts, and those after all its moving links are changed together."""
-    text = (EXAMPLES / f"{example}.yaml").read_text("utf-8")
+    text = EXAMPLES[example]
     entries = entries_of(text)[0]
     links = [name for name in entries["links"] if name != entries.get("ground") and name not in ("ground", "frame")]
     after, _ = edited(text, solved(text)["places"], {"do": "group", "links": links} | given)
-    return [trunnion.analyse(Mechanism(**entries_of(one)[0]), 72)["drive_effort"].values for one in (text, after)]
+    return [analysed(one, 72)["drive_effort"].values for one in (text, after)]
 
 
 @pytest.mark.parametrize("example", ["watt-six-bar", "durango-fourbar", "geared-five-bar", "spring-balanced-lamp"])
@@ -497,7 +407,7 @@ def test_what_no_hint_assembles_is_mirrored_as_it_is_drawn():
     """The other assembly would be taken without a hint of where the mirrored joint is."""
 
     def run(text):
-        return trunnion.analyse(Mechanism(**entries_of(text)[0]), steps=12)
+        return analysed(text, 12)
 
     before = run(FOUR_BAR)
     places = {str(key): before.point_position.sel(point=key).values[:, 0].tolist() for key in before.point.values}

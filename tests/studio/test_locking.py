@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import trunnion
 from brief import brief
-from browsing import CHROMIUM
-from studio.asking import ask
+from studio.asking import EXAMPLES, ask
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
-PRESS = (EXAMPLES / "drawing-press.yaml").read_text("utf-8").replace("friction: 0.1", "friction: 0.45")
+PRESS = EXAMPLES["drawing-press"].replace("friction: 0.1", "friction: 0.45")
 STEPS = 45
 
 
@@ -31,7 +28,7 @@ def mechanism_of(text, friction):
 @pytest.mark.parametrize(("name", "index"), [("elliptic-trammel", 180), ("scotch-yoke", 270)])
 def test_the_margin_does_not_jump_where_a_joint_turns_round(name, index):
     """Beside it the margin is smooth on at least one side, and the least of the cycle is the figure of `analyse`."""
-    text = (EXAMPLES / f"{name}.yaml").read_text("utf-8")
+    text = EXAMPLES[name]
     found, cycle = (ask(ask=kind, text=text) for kind in ("model", "cycle"))
     margin = np.array(found["margin"], float)
     sides = np.array([np.roll(margin, 1), np.roll(margin, -1)])
@@ -83,27 +80,25 @@ def test_the_margin_without_a_block_is_that_without_the_friction_of_its_joints()
         np.testing.assert_allclose(np.array(margin, float), expected, rtol=1e-6)
 
 
-if CHROMIUM:
-
-    def test_a_joint_that_locks_is_ringed_and_a_remedy_is_tried(user):
-        page = user.page
-        user.of("actions", "m.takeText(given, 'Edit')", PRESS)
-        user.until(f"s.solved.value && s.answer.value.text.length === {len(PRESS)}")
-        user.of("state", "m.index.value = 200")
-        page.locator(".message-card.bad").click()
-        assert user.state("s.index.value") == 0  # where it is the nearest to locking
-        assert user.state("s.selection.value.name") == "B"
-        assert page.locator(".laid.of-lock").text_content().startswith("B locks: it runs up to 0.72 times")
-        page.get_by_role("button", name="line 28").click()
-        assert "B: {type: prismatic" in page.get_by_label("Model file").evaluate(
-            "area => area.value.slice(area.selectionStart, area.selectionEnd)"
-        )
-        page.get_by_role("tab", name="Findings").click()
-        page.get_by_role("button", name="Try friction coefficient of B").click()
-        user.until("s.answer.value.margin_least.value > 1")
-        least = float(brief(mechanism_of(PRESS, {"B": 0.291}), STEPS)["locking_margin"].min())
-        assert f"least locking margin 0.766 at 0 mm, now {least:.3g} at" in page.locator(".tried").inner_text()
-        assert page.locator(".lock-ring").count() == 0
-        page.get_by_role("button", name="Take it back").click()
-        user.until(f"s.text.value.length === {len(PRESS)} && s.answer.value.margin_least.value < 1")
-        page.locator(".lock-ring").wait_for(state="attached")
+def test_a_joint_that_locks_is_ringed_and_a_remedy_is_tried(user):
+    page = user.page
+    user.of("actions", "m.takeText(given, 'Edit')", PRESS)
+    user.until(f"s.solved.value && s.answer.value.text.length === {len(PRESS)}")
+    user.of("state", "m.index.value = 200")
+    page.locator(".message-card.bad").click()
+    assert user.state("s.index.value") == 0  # where it is the nearest to locking
+    assert user.state("s.selection.value.name") == "B"
+    assert page.locator(".laid.of-lock").text_content().startswith("B locks: it runs up to 0.72 times")
+    page.get_by_role("button", name="line 28").click()
+    assert "B: {type: prismatic" in page.get_by_label("Model file").evaluate(
+        "area => area.value.slice(area.selectionStart, area.selectionEnd)"
+    )
+    page.get_by_role("tab", name="Findings").click()
+    page.get_by_role("button", name="Try friction coefficient of B").click()
+    user.until("s.answer.value.margin_least.value > 1")
+    least = float(brief(mechanism_of(PRESS, {"B": 0.291}), STEPS)["locking_margin"].min())
+    assert f"least locking margin 0.766 at 0 mm, now {least:.3g} at" in page.locator(".tried").inner_text()
+    assert page.locator(".lock-ring").count() == 0
+    page.get_by_role("button", name="Take it back").click()
+    user.until(f"s.text.value.length === {len(PRESS)} && s.answer.value.margin_least.value < 1")
+    page.locator(".lock-ring").wait_for(state="attached")

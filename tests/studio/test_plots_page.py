@@ -12,21 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import trunnion
-from browsing import CHROMIUM
-from studio.asking import unpacked
-from trunnion.model.file import entries_of
-from trunnion.model.mechanism import Mechanism
+from studio.asking import EXAMPLES, analysed, unpacked
 from trunnion.studio.answers import answer
 
 ROOT = Path(__file__).resolve().parents[2]
-EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
 FLOAT = 1e-6  # of the peak
-
-
-def analysed(text, friction=True):
-    mechanism = Mechanism(**entries_of(text)[0])
-    return trunnion.analyse(mechanism if friction else mechanism.with_friction("off"), 360)
 
 
 def number(text):
@@ -34,183 +24,174 @@ def number(text):
     return float(text.replace("\u202f", "").replace("−", "-").split("\u00a0")[0].split()[0])
 
 
-if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browser; this is the page's own part
+def laid(user, words):
+    return user.of("layers", f"(l => {words})(m)")
 
-    def laid(user, words):
-        return user.of("layers", f"(l => {words})(m)")
 
-    def variant(user, words):
-        return user.of("variants", f"(v => {words})(m)")
+def variant(user, words):
+    return user.of("variants", f"(v => {words})(m)")
 
-    def until(user, module, words):
-        """Wait for what a module knows."""
-        for _ in range(400):
-            if user.of(module, f"Boolean({words})"):
-                return user.idle()
-            user.page.wait_for_timeout(25)
-        return pytest.fail(f"never: {words}")
 
-    def written(user, text):
-        user.of("actions", "m.takeText(given, 'Edit')", text)
-        user.until(f"s.solved.value && s.answer.value.text.length === {len(text)}")
+def until(user, module, words):
+    """Wait for what a module knows."""
+    for _ in range(400):
+        if user.of(module, f"Boolean({words})"):
+            return user.idle()
+        user.page.wait_for_timeout(25)
+    return pytest.fail(f"never: {words}")
 
-    def show(user, *names):
-        user.page.click("summary:has-text('Show')")
-        for name in names:
-            user.page.get_by_label(name, exact=True).click()
-        user.keys("Escape")
 
-    def go(user, index):
-        user.of("motion", "m.crank.go(given)", index)
+def written(user, text):
+    user.of("actions", "m.takeText(given, 'Edit')", text)
+    user.until(f"s.solved.value && s.answer.value.text.length === {len(text)}")
 
-    def laid_words(user):
-        return user.page.locator(".layer.overlay text").all_text_contents()
 
-    @pytest.mark.slow
-    def test_one_click_on_a_link_gives_the_curve_of_the_place_with_its_velocity_and_acceleration(user):
-        until(user, "sheet", "m.sheet.view.sized && !m.sheet.view.fresh")
-        user.page.wait_for_timeout(300)  # the page may ask for its first answer twice
-        user.idle()
-        (bx, by), (cx, cy) = user.handle("B"), user.handle("C")
-        tracks = user.page.locator(".track.free").count()
-        user.page.mouse.click(0.5 * (bx + cx), 0.5 * (by + cy) - 10)
-        until(user, "layers", "m.laid.value?.point?.link === 'coupler'")
-        user.page.wait_for_selector(".overlay .track.free")
-        assert user.page.locator(".track.free").count() == tracks + 1
-        user.page.click("role=tab[name=Plots]")
-        user.idle()
-        assert "Velocity of a place on coupler" in user.page.locator(".chart .title").all_inner_texts()
-        traced = laid(user, "l.laid.value.point")
-        user.page.click("button:has-text('Make it a point')")
-        user.until("s.selection.value?.kind === 'points' && s.solved.value")
-        key = user.state("s.selection.value.name")
-        assert key.startswith("coupler.")
-        until(user, "layers", f"m.laid.value?.point?.key === '{key}'")
-        result = analysed(user.state("s.text.value"))
-        go(user, 60)
-        told = {words[0]: number(words[4:]) for words in laid_words(user) if words[1:4] == " = "}
-        for sign, name in (("v", "velocity"), ("a", "acceleration")):
-            own = result[f"point_{name}"].sel(point=key).values
-            for axis, row in zip("xy", own, strict=True):
-                near = {"rtol": 0, "atol": FLOAT * np.abs(own).max()}
-                np.testing.assert_allclose(laid(user, f"l.laid.value.point.{name}.{axis}"), row, **near)
-                near["atol"] *= 1e3  # the file has it to a tenth of the grid
-                np.testing.assert_allclose(traced[name][axis], row, **near)
-            assert told[sign] == pytest.approx(float(np.hypot(*own[:, 60])), rel=2e-3)
-        words = " ".join(laid_words(user))
-        assert "m/s²" in words
-        assert re.search(r"velocity \d+", words)
-        titles = user.page.locator(".chart .title").all_inner_texts()
-        assert {f"Velocity of {key}", f"Acceleration of {key}"} <= set(titles)
+def show(user, *names):
+    user.page.click("summary:has-text('Show')")
+    for name in names:
+        user.page.get_by_label(name, exact=True).click()
+    user.keys("Escape")
 
-    @pytest.mark.slow
-    def test_layers_are_switched(user):
-        names = (
-            "Friction circles",
-            "Transmission angles",
-            "Instant centres against the ground",
-            "Instant centres between links",
-        )
-        kinds = {"circle.friction-circle": 5, "path.transmission": 2, "path.centre": 6}  # one circle is of the key
-        for kind in kinds:
-            assert user.page.locator(kind).count() == 0
-        show(user, *names, "Values of the reactions")
-        user.page.wait_for_selector("path.centre")
-        go(user, 60)
-        for kind, count in kinds.items():
-            assert user.page.locator(kind).count() == count, kind
-        result, words = analysed(user.state("s.text.value")), laid_words(user)
-        reaction = result["reaction_force"].sel(joint="B").values[:, 60]
-        (told,) = [one.removeprefix("B on coupler ") for one in words if one.startswith("B on coupler ")]
-        assert told.endswith("kN")
-        assert 1000 * number(told) == pytest.approx(float(np.hypot(*reaction)), rel=1e-3)
-        assert [one for one in words if one.startswith("C: r = ")] == ["C: r = 3.000\u00a0mm"]
-        assert any("friction circles × " in one for one in words)
-        (angle,) = [one for one in words if one.startswith("transmission angle")]
-        assert angle.endswith("°")
-        show(user, *names)
-        user.idle()
-        assert sum(user.page.locator(kind).count() for kind in kinds) == 0
 
-    @pytest.mark.slow
-    def test_two_variants_are_compared(user):
-        user.page.click("role=tab[name=Plots]")
-        user.page.click("button:has-text('Keep as variant A')")
-        before = user.state("s.text.value")
-        after = before.replace("BC: 6.00 m", "BC: 5.50 m")
-        written(user, after)
-        user.page.wait_for_selector(".changes td")
-        results = [analysed(text) for text in (before, after)]
-        peaks = [float(np.abs(one["drive_effort"]).max()) / 1000 for one in results]
-        cells = user.page.locator(".changes tr", has_text="peak torque").locator("td").all_inner_texts()
-        assert [number(one) for one in cells[:2]] == pytest.approx(peaks, rel=1e-3)
-        assert number(cells[2]) == pytest.approx(100 * (peaks[1] / peaks[0] - 1), abs=0.06)
-        legend = user.page.locator(".chart").first.locator(".legend .label").all_inner_texts()
-        assert legend == ["torque", "torque, variant A"]
-        user.state("s.selection.value = { kind: 'joints', name: 'C' }")
-        user.idle()
-        moving = user.page.locator(".chart", has_text="Velocity of").locator(".legend .label").all_inner_texts()
-        assert moving[0] == "magnitude"
-        assert user.page.locator(".chart", has_text="Velocity of").locator("path.curve.variant").count() == 3
-        overlaid = variant(user, "v.compared.value[0].scene.drivers[0].effort")
-        own = results[0]["drive_effort"].values[0]
-        np.testing.assert_allclose(overlaid, own, atol=FLOAT * np.abs(own).max())
-        assert user.page.locator("path.outline-of-variant").count() == 4  # three links and the key
-        user.page.click("button:has-text('Go back to A')")
-        user.until("s.solved.value && s.text.value.includes('BC: 6.00 m')")
-        assert user.page.locator(".changes").count() == 0
-        assert user.page.locator("path.outline-of-variant").count() == 0
-        user.page.locator(".sheet > svg").focus()
-        user.keys("Control+z")
-        assert user.state("s.text.value") == after
-        user.page.click("button:has-text('Drop A')")
-        user.idle()
-        assert user.page.locator(".changes").count() == 0
+def go(user, index):
+    user.of("motion", "m.crank.go(given)", index)
+
+
+def laid_words(user):
+    return user.page.locator(".layer.overlay text").all_text_contents()
+
+
+@pytest.mark.slow
+def test_one_click_on_a_link_gives_the_curve_of_the_place_with_its_velocity_and_acceleration(user):
+    until(user, "sheet", "m.sheet.view.sized && !m.sheet.view.fresh")
+    user.page.wait_for_timeout(300)  # the page may ask for its first answer twice
+    user.idle()
+    (bx, by), (cx, cy) = user.handle("B"), user.handle("C")
+    tracks = user.page.locator(".track.free").count()
+    user.page.mouse.click(0.5 * (bx + cx), 0.5 * (by + cy) - 10)
+    until(user, "layers", "m.laid.value?.point?.link === 'coupler'")
+    user.page.wait_for_selector(".overlay .track.free")
+    assert user.page.locator(".track.free").count() == tracks + 1
+    user.page.click("role=tab[name=Plots]")
+    user.idle()
+    assert "Velocity of a place on coupler" in user.page.locator(".chart .title").all_inner_texts()
+    traced = laid(user, "l.laid.value.point")
+    user.page.click("button:has-text('Make it a point')")
+    user.until("s.selection.value?.kind === 'points' && s.solved.value")
+    key = user.state("s.selection.value.name")
+    assert key.startswith("coupler.")
+    until(user, "layers", f"m.laid.value?.point?.key === '{key}'")
+    result = analysed(user.state("s.text.value"))
+    go(user, 60)
+    told = {words[0]: number(words[4:]) for words in laid_words(user) if words[1:4] == " = "}
+    for sign, name in (("v", "velocity"), ("a", "acceleration")):
+        own = result[f"point_{name}"].sel(point=key).values
+        for axis, row in zip("xy", own, strict=True):
+            near = {"rtol": 0, "atol": FLOAT * np.abs(own).max()}
+            np.testing.assert_allclose(laid(user, f"l.laid.value.point.{name}.{axis}"), row, **near)
+            near["atol"] *= 1e3  # the file has it to a tenth of the grid
+            np.testing.assert_allclose(traced[name][axis], row, **near)
+        assert told[sign] == pytest.approx(float(np.hypot(*own[:, 60])), rel=2e-3)
+    words = " ".join(laid_words(user))
+    assert "m/s²" in words
+    assert re.search(r"velocity \d+", words)
+    titles = user.page.locator(".chart .title").all_inner_texts()
+    assert {f"Velocity of {key}", f"Acceleration of {key}"} <= set(titles)
+
+
+@pytest.mark.slow
+def test_layers_are_switched(user):
+    names = (
+        "Friction circles",
+        "Transmission angles",
+        "Instant centres against the ground",
+        "Instant centres between links",
+    )
+    kinds = {"circle.friction-circle": 5, "path.transmission": 2, "path.centre": 6}  # one circle is of the key
+    for kind in kinds:
+        assert user.page.locator(kind).count() == 0
+    show(user, *names, "Values of the reactions")
+    user.page.wait_for_selector("path.centre")
+    go(user, 60)
+    for kind, count in kinds.items():
+        assert user.page.locator(kind).count() == count, kind
+    result, words = analysed(user.state("s.text.value")), laid_words(user)
+    reaction = result["reaction_force"].sel(joint="B").values[:, 60]
+    (told,) = [one.removeprefix("B on coupler ") for one in words if one.startswith("B on coupler ")]
+    assert told.endswith("kN")
+    assert 1000 * number(told) == pytest.approx(float(np.hypot(*reaction)), rel=1e-3)
+    assert [one for one in words if one.startswith("C: r = ")] == ["C: r = 3.000\u00a0mm"]
+    assert any("friction circles × " in one for one in words)
+    (angle,) = [one for one in words if one.startswith("transmission angle")]
+    assert angle.endswith("°")
+    show(user, *names)
+    user.idle()
+    assert sum(user.page.locator(kind).count() for kind in kinds) == 0
+
+
+@pytest.mark.slow
+def test_two_variants_are_compared(user):
+    user.page.click("role=tab[name=Plots]")
+    user.page.click("button:has-text('Keep as variant A')")
+    before = user.state("s.text.value")
+    after = before.replace("BC: 6.00 m", "BC: 5.50 m")
+    written(user, after)
+    user.page.wait_for_selector(".changes td")
+    results = [analysed(text) for text in (before, after)]
+    peaks = [float(np.abs(one["drive_effort"]).max()) / 1000 for one in results]
+    cells = user.page.locator(".changes tr", has_text="peak torque").locator("td").all_inner_texts()
+    assert [number(one) for one in cells[:2]] == pytest.approx(peaks, rel=1e-3)
+    assert number(cells[2]) == pytest.approx(100 * (peaks[1] / peaks[0] - 1), abs=0.06)
+    legend = user.page.locator(".chart").first.locator(".legend .label").all_inner_texts()
+    assert legend == ["torque", "torque, variant A"]
+    user.state("s.selection.value = { kind: 'joints', name: 'C' }")
+    user.idle()
+    moving = user.page.locator(".chart", has_text="Velocity of").locator(".legend .label").all_inner_texts()
+    assert moving[0] == "magnitude"
+    assert user.page.locator(".chart", has_text="Velocity of").locator("path.curve.variant").count() == 3
+    overlaid = variant(user, "v.compared.value[0].scene.drivers[0].effort")
+    own = results[0]["drive_effort"].values[0]
+    np.testing.assert_allclose(overlaid, own, atol=FLOAT * np.abs(own).max())
+    assert user.page.locator("path.outline-of-variant").count() == 4  # three links and the key
+    user.page.click("button:has-text('Go back to A')")
+    user.until("s.solved.value && s.text.value.includes('BC: 6.00 m')")
+    assert user.page.locator(".changes").count() == 0
+    assert user.page.locator("path.outline-of-variant").count() == 0
+    user.page.locator(".sheet > svg").focus()
+    user.keys("Control+z")
+    assert user.state("s.text.value") == after
+    user.page.click("button:has-text('Drop A')")
+    user.idle()
+    assert user.page.locator(".changes").count() == 0
 
 
 def test_every_column_of_the_table_can_be_a_curve() -> None:
     """Names, units and values are those of the table that is written."""
-    text = (ROOT / "examples" / "durango-fourbar.yaml").read_text("utf-8")
+    text = EXAMPLES["durango-fourbar"]
     question = {"ask": "curves", "text": text, "revision": 1, "names": ["coupler.angle_velocity", "A.effort", "none"]}
     found = unpacked(answer(json.dumps(question).encode()))
-    result = trunnion.analyse(Mechanism(**entries_of(text)[0]))
+    result = analysed(text)
     assert dict(found["names"])["coupler.angle_velocity"] == "rad/s"
     assert found["columns"].keys() == {"coupler.angle_velocity", "A.effort"}
     expected = result["link_angle_velocity"].sel(link="coupler").values
     np.testing.assert_allclose(found["columns"]["coupler.angle_velocity"]["values"], expected, atol=1e-5)
 
 
-if CHROMIUM:
-
-    def test_curves_are_chosen_over_another_and_the_table_of_joints_has_the_largest(user):
-        page = user.page
-        page.get_by_role("tab", name="Plots").click()
-        page.locator("#columns option").nth(20).wait_for(state="attached")
-        for name in ("coupler.angle_velocity", "rocker.angle_velocity"):
-            page.get_by_label("Curve to add").press_sequentially(name)  # though rocker.angle is a column too
-            page.keyboard.press("Enter")
-        chart = page.locator(".own-curves figure")
-        chart.wait_for()
-        page.locator(".own-curves path.curve").nth(1).wait_for(state="attached")
-        page.get_by_label("Over", exact=True).fill("rocker.angle")
-        page.get_by_label("Over", exact=True).press("Enter")
-        page.locator(".own-curves .axis", has_text="rocker.angle [°]").wait_for()
-        assert "NaN" not in page.locator(".own-curves path.curve").first.get_attribute("d")
-        page.locator(".of-joints summary").click()
-        rows = page.locator(".of-joints tbody tr")
-        assert rows.count() == 4
-        assert rows.first.inner_text().split("\t")[0] == "A"
-
-    def test_the_panel_is_made_wider_by_keys_and_by_the_mouse(user):
-        panel, divider = user.page.locator("aside.panel"), user.page.get_by_role("separator", name="Width of the panel")
-        before = panel.bounding_box()["width"]
-        divider.focus()
-        user.page.keyboard.press("ArrowLeft")
-        user.page.keyboard.press("ArrowLeft")
-        assert panel.bounding_box()["width"] == pytest.approx(before + 48, abs=1)
-        box = divider.bounding_box()
-        user.page.mouse.move(box["x"] + 2, box["y"] + 200)
-        user.page.mouse.down()
-        user.page.mouse.move(box["x"] - 98, box["y"] + 200)
-        user.page.mouse.up()
-        assert panel.bounding_box()["width"] == pytest.approx(before + 148, abs=4)
+def test_curves_are_chosen_over_another_and_the_table_of_joints_has_the_largest(user):
+    page = user.page
+    page.get_by_role("tab", name="Plots").click()
+    page.locator("#columns option").nth(20).wait_for(state="attached")
+    for name in ("coupler.angle_velocity", "rocker.angle_velocity"):
+        page.get_by_label("Curve to add").press_sequentially(name)  # though rocker.angle is a column too
+        page.keyboard.press("Enter")
+    chart = page.locator(".own-curves figure")
+    chart.wait_for()
+    page.locator(".own-curves path.curve").nth(1).wait_for(state="attached")
+    page.get_by_label("Over", exact=True).fill("rocker.angle")
+    page.get_by_label("Over", exact=True).press("Enter")
+    page.locator(".own-curves .axis", has_text="rocker.angle [°]").wait_for()
+    assert "NaN" not in page.locator(".own-curves path.curve").first.get_attribute("d")
+    page.locator(".of-joints summary").click()
+    rows = page.locator(".of-joints tbody tr")
+    assert rows.count() == 4
+    assert rows.first.inner_text().split("\t")[0] == "A"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import http.client
 import json
 import os
-import re
 import stat
 import subprocess
 import sys
@@ -16,22 +15,12 @@ from urllib.parse import quote
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 import trunnion
 from served import served as serving
-from studio.asking import unpacked
-from trunnion.cli.app import app
-from trunnion.errors import MechanismError
-from trunnion.model.file import entries_of
-from trunnion.model.mechanism import Mechanism
-from trunnion.studio.page import document, script
-
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "src" / "trunnion" / "studio" / "web"
-EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
+from studio.asking import EXAMPLES, analysed, model_of, unpacked
 
 
 @pytest.fixture(scope="module")
@@ -138,15 +127,6 @@ def test_the_arguments_of_the_browser_hold_no_token(tmp_path):
         process.terminate()
 
 
-@pytest.mark.parametrize("link", ["loop.yaml", "gone.yaml"])
-def test_a_link_to_nothing_is_a_finding_of_the_command(tmp_path, link):
-    (tmp_path / "loop.yaml").symlink_to("loop.yaml")
-    (tmp_path / "gone.yaml").symlink_to("nothing.yaml")
-    done = CliRunner().invoke(app, ["studio", str(tmp_path / link), "--no-open"])
-    assert isinstance(done.exception, MechanismError)
-    assert "does not exist" in str(done.exception)
-
-
 @pytest.mark.parametrize(
     "headers",
     [
@@ -183,7 +163,7 @@ def test_files_of_the_folder_alone(served):
 
 
 def test_what_the_first_picture_is_drawn_of(served):
-    result = trunnion.analyse(Mechanism(**entries_of(EXAMPLES["hoecken"])[0]), 360)
+    result = analysed(EXAMPLES["hoecken"], 360)
     found = unpacked(raw(served, "GET", "/first/R%C3%A4der.yaml")[2])
     assert found["text"] == EXAMPLES["hoecken"]
     for key, track in found["tracks"].items():
@@ -198,17 +178,6 @@ def test_pictures_of_examples(served):
     crank = next(track for track in found["paths"] if np.ptp(np.hypot(track["x"], track["y"])) < 1e-6)
     assert max(crank["x"]) == pytest.approx(2.0, rel=0.01)  # m, as the file states
     assert fetched(served, "GET", "/thumbnail/none")[0] == 404
-
-
-def test_the_page_fetches_few_files():
-    exported = set(re.findall(r"module_studio_\w+", script()[script().rindex("export {") :]))
-    own = {one.stem for one in PAGE.glob("*.js")} - {"cell"}  # that of a notebook
-    assert exported == {f"module_studio_{name}" for name in own}
-    page = document("n", "")
-    files = [f"/studio/vendor/{one.name}" for one in PAGE.glob("vendor/*.js")] + ["/modules.js"]
-    assert all(f'<link rel="modulepreload" href="{file}">' in page for file in files)
-    assert page.count("<link") == len(files) + 4
-    assert "{{" not in page
 
 
 @pytest.mark.parametrize(
@@ -329,13 +298,6 @@ def socket_of(studio, origin=None, token=None, **headers):
     return connect(address, origin=origin, subprotocols=protocols, additional_headers=headers)
 
 
-def test_questions_over_the_socket(served):
-    with socket_of(served, f"http://127.0.0.1:{served.port}") as line:
-        line.send(json.dumps({"ask": "model", "revision": 3, "text": EXAMPLES["hoecken"]}))
-        found = unpacked(line.recv())
-        assert (found["revision"], found["solved"]) == (3, True)
-
-
 def test_figures_of_a_cycle_hold_nothing_up(served):
     text = EXAMPLES["jansen"]
     with socket_of(served, f"http://127.0.0.1:{served.port}") as line:
@@ -396,12 +358,12 @@ def test_nobody_else_may_ask(served, how):
 
 
 def test_a_dropped_file_of_another_program_becomes_a_model(served, tmp_path) -> None:
-    mechanism = Mechanism(**entries_of(EXAMPLES["durango-fourbar"])[0])
+    mechanism = model_of(EXAMPLES["durango-fourbar"])
     path = tmp_path / "arm.urdf"
     trunnion.exchange.export_model(mechanism, path, at="60 deg")
     status, _, content = raw(served, "PUT", "/import/arm.urdf", path.read_bytes())
     assert status == 200
-    model = Mechanism(**entries_of(json.loads(content)["text"])[0])
+    model = model_of(json.loads(content)["text"])
     assert set(model.links) == set(mechanism.links)
     status, _, content = raw(served, "PUT", "/import/arm.urdf", b"<robot><link")
     assert status == 400

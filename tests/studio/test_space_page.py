@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-import trunnion
-from browsing import CHROMIUM, User
-from served import served
-from studio.asking import edited
+from studio.asking import EXAMPLES, analysed, edited
 from trunnion.model.file import entries_of
-from trunnion.model.mechanism import Mechanism
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FINE = 2e-6  # m: coordinates are written to the thousandth of a step of the grid
-
-
-def analysed(text, steps=360):
-    return trunnion.analyse(Mechanism(**entries_of(text)[0]), steps=steps)
+MODELS = {name: EXAMPLES[name] for name in ("rssr", "rssr-with-play")}
 
 
 def place(result, key, index):
@@ -28,7 +18,7 @@ def place(result, key, index):
 
 def test_rows_of_a_loop_come_and_go_and_the_others_stay_as_written():
     """With names and comments; what speaks of a name that changes follows; the ground stays the last link."""
-    text = (EXAMPLES / "pezzuti-cardan.yaml").read_text("utf-8")
+    text = EXAMPLES["pezzuti-cardan"]
     before = entries_of(text)[0]
     longer, _ = edited(text, {}, {"do": "add-row"})
     rows = entries_of(longer)[0]["loop"]
@@ -49,7 +39,7 @@ def test_rows_of_a_loop_come_and_go_and_the_others_stay_as_written():
 @pytest.mark.parametrize(("example", "joint"), [("rssp", "B"), ("rssr", "C"), ("rssr", "A")])
 def test_a_joint_moved_in_space_goes_so_far_and_nothing_else_does(example, joint):
     """At the position that is shown; whatever its coordinates are written as."""
-    text, by = (EXAMPLES / f"{example}.yaml").read_text("utf-8"), np.array([2e-3, -1e-3, 5e-4])
+    text, by = EXAMPLES[example], np.array([2e-3, -1e-3, 5e-4])
     gesture = {"do": "move", "point": joint, "by": by.tolist(), "index": 30, "size": 0.2}
     old, new = analysed(text), analysed(edited(text, {}, gesture)[0])
     for key in map(str, old["point"].values):
@@ -69,140 +59,90 @@ def quantity(words, unit):
     return float(number) * {"": 1, "m": 1e-3, "µ": 1e-6, "k": 1e3}[prefixed.removesuffix(unit)]
 
 
-if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the page's own part
+def spot(user, name):
+    """The middle of a handle of the picture, px."""
+    user.page.wait_for_selector(".hands .handle", timeout=5000)
+    box = user.page.locator(f'.hands .handle[data-name="{name}"]').bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
-    @pytest.fixture(scope="module")
-    def studio(tmp_path_factory):
-        folder = tmp_path_factory.mktemp("models")
-        for name in ("rssr", "rssr-with-play"):
-            (folder / f"{name}.yaml").write_text((EXAMPLES / f"{name}.yaml").read_text("utf-8"), encoding="utf-8")
-        with served(folder, "rssr.yaml") as own:
-            yield own
 
-    class SpaceUser(User):
-        def open(self):
-            self.page.goto(self.studio.address)
-            self.until("s.about.value.version && s.solved.value")
-            self.page.wait_for_selector(".hands .handle", timeout=5000)
+def test_what_is_chosen_in_the_picture_is_lit_and_moved_along_an_axis(user):
+    """By click, key and arrow; the joint goes so far along x; nothing else moves at the position that is shown."""
+    user.page.mouse.click(*spot(user, "rod"))  # the middle of its body
+    assert user.state("s.selection.value") == {"kind": "links", "name": "rod"}
+    assert "Link" in user.page.locator(".of-part").inner_text()
+    user.page.locator('.hands .handle[data-name="B"]').focus()
+    user.keys("Enter")
+    assert user.state("s.selection.value") == {"kind": "joints", "name": "B"}
+    assert user.page.locator(".joint-axis.lit").count() == 0  # a ball has none
+    user.state("s.index.value = 40")
+    user.page.mouse.click(*spot(user, "C"))
+    before = user.state("s.text.value")
+    (x, y), arm = spot(user, "C"), user.page.locator(".arm.of-x .wide").bounding_box()
+    tip = arm["x"] + arm["width"] - 3, arm["y"] + arm["height"] / 2
+    user.page.mouse.move(*tip)
+    user.page.mouse.down()
+    user.page.mouse.move(tip[0] + 20, tip[1] + 4)
+    user.page.mouse.move(tip[0] + 44, tip[1] + 8)
+    said = user.state("s.notice.value.words")
+    user.page.mouse.up()
+    user.until("s.past.value.length === 1")
+    by = float(said.split("x ")[1].split()[0]) / 1e3
+    old, new = analysed(before), analysed(user.state("s.text.value"))
+    assert 2e-3 < by < 3e-2
+    np.testing.assert_allclose(place(new, "rod.C", 40) - place(old, "rod.C", 40), [by, 0, 0], atol=FINE)
+    for key in ("crank.B", "rocker.D"):
+        np.testing.assert_allclose(place(new, key, 40), place(old, key, 40), atol=FINE)
+    moved = spot(user, "C")
+    assert moved[0] > x + 5
+    assert abs(moved[1] - y) < 25
+    user.keys("Control+z")
+    user.until("s.past.value.length === 0")
+    assert user.state("s.text.value") == before
 
-        def spot(self, name):
-            box = self.page.locator(f'.hands .handle[data-name="{name}"]').bounding_box()
-            return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
-    @pytest.fixture
-    def user(browser, studio):
-        context = browser.new_context(viewport={"width": 1280, "height": 720})
-        found = SpaceUser(context.new_page(), studio)
-        found.open()
-        yield found
-        wrong = list(found.wrong)
-        context.close()
-        assert not wrong, wrong
+def test_end_loads_and_the_section_of_a_pin_have_the_numbers_of_analyse(user):
+    """Arrows times the scale that is stated; offset and tilt from the seats of both ends."""
+    user.of("actions", "m.openFile('rssr-with-play.yaml')")
+    user.until("s.solved.value && s.answer.value.scene.built")
+    user.state("s.index.value = 60")
+    user.page.get_by_label("end loads of bearings").check()
+    user.page.get_by_label("reactions", exact=True).uncheck()
+    user.page.click("button[aria-label='Look along the y axis']")
+    user.page.mouse.click(*spot(user, "D"))
+    user.idle()
+    result = analysed(user.state("s.text.value"))
+    size = user.page.locator(".key text", has_text="on an end").text_content()
+    scale = arrow(user.page.locator(".key .reference").last.get_attribute("d"))[0] / quantity(size, "N")
+    drawn = [arrow(one.get_attribute("d")) for one in user.page.locator(".reaction.of-end").all()]
+    loads = [result["end_load"].sel(joint=joint).isel(position=60).values for joint in "AD"]
+    expected = np.concatenate([load[np.isfinite(load).all(axis=1)][:, [0, 2]] for load in loads]) * scale
+    np.testing.assert_allclose(drawn, expected * [1, -1], atol=0.4)  # px: ends are written to a tenth
+    told = user.page.locator(".pin-section").evaluate_all("all => all.map(one => one.getAttribute('aria-label'))")
+    ends = result["seat_offset"].sel(joint="D").isel(position=60).values
+    for axis, words in enumerate(told):
+        assert words.startswith(f"Section of D in z and {'xy'[axis]}:")
+        offset, tilt = words.split("offset ")[1].split(", tilt ")
+        np.testing.assert_allclose(quantity(offset, "m"), ends[:, axis].mean(), rtol=2e-3)
+        np.testing.assert_allclose(quantity(tilt, "rad"), np.diff(ends[:, axis])[0] / 0.02, rtol=2e-3)
 
-    def test_what_is_chosen_in_the_picture_is_lit_and_moved_along_an_axis(user):
-        """By click, key and arrow; the joint goes so far along x; nothing else moves at the position that is shown."""
-        user.page.mouse.click(*user.spot("rod"))  # the middle of its body
-        assert user.state("s.selection.value") == {"kind": "links", "name": "rod"}
-        assert "Link" in user.page.locator(".of-part").inner_text()
-        user.page.locator('.hands .handle[data-name="B"]').focus()
-        user.keys("Enter")
-        assert user.state("s.selection.value") == {"kind": "joints", "name": "B"}
-        assert user.page.locator(".joint-axis.lit").count() == 0  # a ball has none
-        user.state("s.index.value = 40")
-        user.page.mouse.click(*user.spot("C"))
-        before = user.state("s.text.value")
-        (x, y), arm = user.spot("C"), user.page.locator(".arm.of-x .wide").bounding_box()
-        tip = arm["x"] + arm["width"] - 3, arm["y"] + arm["height"] / 2
-        user.page.mouse.move(*tip)
-        user.page.mouse.down()
-        user.page.mouse.move(tip[0] + 20, tip[1] + 4)
-        user.page.mouse.move(tip[0] + 44, tip[1] + 8)
-        said = user.state("s.notice.value.words")
-        user.page.mouse.up()
-        user.until("s.past.value.length === 1")
-        by = float(said.split("x ")[1].split()[0]) / 1e3
-        old, new = analysed(before), analysed(user.state("s.text.value"))
-        assert 2e-3 < by < 3e-2
-        np.testing.assert_allclose(place(new, "rod.C", 40) - place(old, "rod.C", 40), [by, 0, 0], atol=FINE)
-        for key in ("crank.B", "rocker.D"):
-            np.testing.assert_allclose(place(new, key, 40), place(old, key, 40), atol=FINE)
-        moved = user.spot("C")
-        assert moved[0] > x + 5
-        assert abs(moved[1] - y) < 25
-        user.keys("Control+z")
-        user.until("s.past.value.length === 0")
-        assert user.state("s.text.value") == before
 
-    @pytest.mark.slow
-    def test_a_joint_is_moved_by_keys_buttons_and_in_the_plane_of_the_picture(user):
-        before = analysed(user.state("s.text.value"), 36)
-        user.page.click("button[aria-label='Look along the y axis']")
-        user.page.locator('.hands .handle[data-name="D"]').focus()
-        user.keys("ArrowRight", "ArrowRight")
-        user.keys("Escape")  # both are taken back
-        user.keys("ArrowUp")
-        user.until("s.past.value.length === 1")
-        field = user.page.get_by_role("textbox", name="Step")
-        step = float(field.input_value().split()[0]) / 1e3
-        field.fill("2.5 mm")
-        field.press("Enter")
-        user.page.get_by_role("button", name="D by one step along y").click()
-        user.until("s.past.value.length === 2")
-        after = analysed(user.state("s.text.value"), 36)
-        change = place(after, "rocker.D", 0) - place(before, "rocker.D", 0)
-        np.testing.assert_allclose(change, [0, 2.5e-3, step], atol=FINE)
-        x, y = user.spot("D")
-        user.page.mouse.move(x, y)
-        user.page.mouse.down()
-        user.page.mouse.move(x + 10, y + 10)
-        user.page.mouse.move(x + 30, y - 20)
-        user.page.mouse.up()
-        user.until("s.past.value.length === 3")
-        last = place(analysed(user.state("s.text.value"), 36), "rocker.D", 0) - place(after, "rocker.D", 0)
-        assert min(last[0], last[2]) > 1e-3
-        assert abs(last[1]) < 1e-12  # seen along y, y stays
-
-    def test_end_loads_and_the_section_of_a_pin_have_the_numbers_of_analyse(user):
-        """Arrows times the scale that is stated; offset and tilt from the seats of both ends."""
-        user.of("actions", "m.openFile('rssr-with-play.yaml')")
-        user.until("s.solved.value && s.answer.value.scene.built")
-        user.state("s.index.value = 60")
-        user.page.get_by_label("end loads of bearings").check()
-        user.page.get_by_label("reactions", exact=True).uncheck()
-        user.page.click("button[aria-label='Look along the y axis']")
-        user.page.mouse.click(*user.spot("D"))
+def test_a_cardan_joint_is_built_from_an_empty_sheet_by_its_table(user):
+    """One revolute and three cylindrical joints; tan(out) = tan(in) / cos(angle of the shafts) to 1e-12."""
+    user.page.click("summary:has-text('File')")
+    user.page.click("button:has-text('New sheet')")
+    user.page.click("button:has-text('A loop in space, by its table')")
+    user.until("s.solved.value")
+    before = spot(user, "D")
+    for label, typed in (("joint of row 4", "out"), ("twist α of out", "155"), ("offset s of A", "12 mm")):
+        user.page.get_by_label(label).fill(typed)
+        user.page.get_by_label(label).press("Enter")
         user.idle()
-        result = analysed(user.state("s.text.value"))
-        size = user.page.locator(".key text", has_text="on an end").text_content()
-        scale = arrow(user.page.locator(".key .reference").last.get_attribute("d"))[0] / quantity(size, "N")
-        drawn = [arrow(one.get_attribute("d")) for one in user.page.locator(".reaction.of-end").all()]
-        loads = [result["end_load"].sel(joint=joint).isel(position=60).values for joint in "AD"]
-        expected = np.concatenate([load[np.isfinite(load).all(axis=1)][:, [0, 2]] for load in loads]) * scale
-        np.testing.assert_allclose(drawn, expected * [1, -1], atol=0.4)  # px: ends are written to a tenth
-        told = user.page.locator(".pin-section").evaluate_all("all => all.map(one => one.getAttribute('aria-label'))")
-        ends = result["seat_offset"].sel(joint="D").isel(position=60).values
-        for axis, words in enumerate(told):
-            assert words.startswith(f"Section of D in z and {'xy'[axis]}:")
-            offset, tilt = words.split("offset ")[1].split(", tilt ")
-            np.testing.assert_allclose(quantity(offset, "m"), ends[:, axis].mean(), rtol=2e-3)
-            np.testing.assert_allclose(quantity(tilt, "rad"), np.diff(ends[:, axis])[0] / 0.02, rtol=2e-3)
-
-    def test_a_cardan_joint_is_built_from_an_empty_sheet_by_its_table(user):
-        """One revolute and three cylindrical joints; tan(out) = tan(in) / cos(angle of the shafts) to 1e-12."""
-        user.page.click("summary:has-text('File')")
-        user.page.click("button:has-text('New sheet')")
-        user.page.click("button:has-text('A loop in space, by its table')")
-        user.until("s.solved.value")
-        before = user.spot("D")
-        for label, typed in (("joint of row 4", "out"), ("twist α of out", "155"), ("offset s of A", "12 mm")):
-            user.page.get_by_label(label).fill(typed)
-            user.page.get_by_label(label).press("Enter")
-            user.idle()
-        assert np.hypot(*np.subtract(user.spot("out"), before)) > 5  # the picture follows
-        assert "twist: 155 deg" in user.state("s.text.value")
-        result = analysed(user.state("s.text.value"), 90)
-        into, out = (result["joint_rotation"].sel(joint=joint).values for joint in ("A", "out"))
-        out = out - out[0]
-        residual = np.sin(out) * np.cos(into) * np.cos(np.radians(25)) - np.cos(out) * np.sin(into)
-        assert np.abs(residual).max() < 1e-12
-        assert np.ptp(out) > 6
+    assert np.hypot(*np.subtract(spot(user, "out"), before)) > 5  # the picture follows
+    assert "twist: 155 deg" in user.state("s.text.value")
+    result = analysed(user.state("s.text.value"), 90)
+    into, out = (result["joint_rotation"].sel(joint=joint).values for joint in ("A", "out"))
+    out = out - out[0]
+    residual = np.sin(out) * np.cos(into) * np.cos(np.radians(25)) - np.cos(out) * np.sin(into)
+    assert np.abs(residual).max() < 1e-12
+    assert np.ptp(out) > 6

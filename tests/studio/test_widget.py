@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import trunnion
-from browsing import CHROMIUM, QUIET
 from studio.asking import unpacked
 
 pytest.importorskip("anywidget")
@@ -74,51 +73,46 @@ def test_it_follows_what_is_saved_and_asked_in_the_cell(widget) -> None:
         widget.mechanism  # noqa: B018
 
 
-if CHROMIUM:
+@pytest.fixture
+def cell(browser, widget):
+    """A frame of the widget in a page of its own, and the widget."""
+    page, wrong = browser.new_page(viewport={"width": 1200, "height": 760}), []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda message: message.type == "error" and wrong.append(message.text))
+    waiting = []
+    page.expose_function("kernel", lambda message, buffers: waiting.append((message, buffers)))
+    widget.send = lambda content, buffers=None: page.evaluate(
+        "([content, body]) => window.told(content, body)",
+        [content, base64.b64encode(bytes(buffers[0])).decode() if buffers else None],
+    )
 
-    @pytest.fixture
-    def cell(widget):
-        """A frame of the widget in a page of its own, and the widget."""
-        from playwright.sync_api import sync_playwright
+    def pump(until, longest=400):
+        for _ in range(longest):
+            page.wait_for_timeout(25)
+            while waiting:
+                message, buffers = waiting.pop(0)
+                widget._asked(widget, message, [base64.b64decode(one) for one in buffers])
+            if until():
+                return
+        pytest.fail(f"the cell does not answer: {wrong}")
 
-        with sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
-            page, wrong = browser.new_page(viewport={"width": 1200, "height": 760}), []
-            page.on("pageerror", lambda error: wrong.append(str(error)))
-            page.on("console", lambda message: message.type == "error" and wrong.append(message.text))
-            waiting = []
-            page.expose_function("kernel", lambda message, buffers: waiting.append((message, buffers)))
-            widget.send = lambda content, buffers=None: page.evaluate(
-                "([content, body]) => window.told(content, body)",
-                [content, base64.b64encode(bytes(buffers[0])).decode() if buffers else None],
-            )
+    notebook = "<!doctype html><title>notebook</title>"
+    page.route("http://notebook.test/", lambda route: route.fulfill(body=notebook, content_type="text/html"))
+    page.goto("http://notebook.test/")
+    page.evaluate("bridge => { window.bridge = bridge; }", widget._esm)
+    page.add_script_tag(content=HOST, type="module")
+    yield page.frame_locator("iframe"), pump
+    assert not wrong, wrong
+    page.close()
 
-            def pump(until, longest=400):
-                for _ in range(longest):
-                    page.wait_for_timeout(25)
-                    while waiting:
-                        message, buffers = waiting.pop(0)
-                        widget._asked(widget, message, [base64.b64decode(one) for one in buffers])
-                    if until():
-                        return
-                pytest.fail(f"the cell does not answer: {wrong}")
 
-            notebook = "<!doctype html><title>notebook</title>"
-            page.route("http://notebook.test/", lambda route: route.fulfill(body=notebook, content_type="text/html"))
-            page.goto("http://notebook.test/")
-            page.evaluate("bridge => { window.bridge = bridge; }", widget._esm)
-            page.add_script_tag(content=HOST, type="module")
-            yield page.frame_locator("iframe"), pump
-            assert not wrong, wrong
-            browser.close()
-
-    def test_a_cell_opens_drags_and_gives_the_changed_mechanism_back(cell, widget) -> None:
-        frame, pump = cell
-        pump(lambda: frame.locator(".formula .term").count() == 2)
-        assert frame.locator(".formula .term").all_inner_texts() == ["I(0,1)R", "II(2,3)RRR"]
-        frame.get_by_role("tab", name="Properties").click()
-        field = frame.get_by_label("AB", exact=True)
-        field.fill("2.2 m")
-        field.press("Enter")
-        pump(lambda: "2.2 m" in widget.text)
-        assert widget.mechanism.parameters()["dimensions.AB"] == pytest.approx(2.2)
+def test_a_cell_opens_drags_and_gives_the_changed_mechanism_back(cell, widget) -> None:
+    frame, pump = cell
+    pump(lambda: frame.locator(".formula .term").count() == 2)
+    assert frame.locator(".formula .term").all_inner_texts() == ["I(0,1)R", "II(2,3)RRR"]
+    frame.get_by_role("tab", name="Properties").click()
+    field = frame.get_by_label("AB", exact=True)
+    field.fill("2.2 m")
+    field.press("Enter")
+    pump(lambda: "2.2 m" in widget.text)
+    assert widget.mechanism.parameters()["dimensions.AB"] == pytest.approx(2.2)

@@ -18,37 +18,12 @@ NASTY = {
     "C": '<img src=x onerror="alert(2)">',
     "D": "_$x$ & <!-- 曲柄",
 }
-GUIDE = [float(np.cos(np.pi / 6)), 0.5]
-PUSHER = {
-    "name": "Inclined pusher",
-    "links": {
-        "frame": {"points": {"S": {"at": [0, 0], "axis": GUIDE}, "T": {"at": [0, -0.02], "axis": [1, 0]}}},
-        "block": {"points": {"S": {"at": [0, 0], "axis": GUIDE}, "Q": [0, 0]}},
-        "rod": {"points": {"Q": [0, 0], "R": [0.2, 0]}},
-        "foot": {"points": {"R": [0, 0], "T": {"at": [0, 0], "axis": [1, 0]}}},
-    },
-    "joints": {
-        "S": {"type": "prismatic", "links": ["frame", "block"]},
-        "Q": {"type": "revolute", "links": ["block", "rod"]},
-        "R": {"type": "revolute", "links": ["rod", "foot"]},
-        "T": {"type": "prismatic", "links": ["frame", "foot"]},
-    },
-    "joint_defaults": {"pin": {"radius": 0.01}, "guide": {"length": 0.1}, "friction": 0.1},
-    "drivers": {"S": {"speed": 0.05, "range": [0, 0.08]}},
-    "loads": {"push": {"link": "foot", "at": "R", "force": [-50.0, 0], "useful": True}},
-    "assembly": {"R": [0.2, -0.02]},
-}
 
 
 @cache
 def _analysed(count, ideal):
     mechanism = trunnion.read(DURANGO)
     return trunnion.analyse(mechanism.with_friction("off") if ideal else mechanism, count)
-
-
-@cache
-def _pushed(count):
-    return trunnion.analyse(trunnion.Mechanism(**PUSHER), count)
 
 
 def four_bar(count=360, ideal=False, rename=None, gap=None):
@@ -82,5 +57,5 @@ def blank(result, start, stop, status):
 
 
 def slider(count=90):
-    """A block pushed along an inclined guide, dragging a rod: a prismatic drive, lengths of millimetres."""
-    return _pushed(count).copy(deep=True)
+    """A press whose cylinder drives its slide: a prismatic drive, lengths of millimetres."""
+    return trunnion.analyse(trunnion.read(DURANGO.with_name("drawing-press.yaml")), count).copy(deep=True)

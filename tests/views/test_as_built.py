@@ -1,6 +1,9 @@
-"""Figures of errors and seats: numbers, units, magnification, gaps, loss of contact; none without what they need."""
+"""Errors and seats: figures, scene and tables; magnified in the page; none without what they need."""
 
 from __future__ import annotations
+
+import re
+import shutil
 
 import numpy as np
 import pytest
@@ -12,16 +15,14 @@ import trunnion
 from trunnion.errors import MechanismError, Status
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.deviations import (
-    broken,
     continued,
     losses,
     seated,
     with_worst_case,
 )
-from trunnion.views.cycle.plots import READY, drawable, save
+from trunnion.views.cycle.plots import drawable, save
+from trunnion.views.cycle.scene import scene
 from trunnion.views.cycle.seats import PIN
-from trunnion.views.sweep import figure as sweep_figure
-from trunnion.views.sweep import tables
 
 
 @pytest.fixture(scope="module")
@@ -34,24 +35,8 @@ def cardan():
     return loaded("pezzuti-cardan")
 
 
-@pytest.fixture(scope="module")
-def balls():
-    return loaded("rssr", 36, **{"B.pin.clearance": "0.05 mm", "C.pin.clearance": "0.05 mm"})
-
-
 def _label(axes, name):
     return next(line for line in axes.lines if line.get_label() == name)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("which", ["slider", "cardan", "balls"])
-def test_every_figure_is_drawn(which, request, tmp_path):
-    result = request.getfixturevalue(which)
-    kinds = drawable(result)
-    assert ("beta" in kinds) == (which != "balls")
-    assert {"error", "seat"} <= set(kinds)
-    for name in READY.keys() & set(kinds):
-        assert save(plots.figure(result, name), tmp_path / f"{name}.svg").stat().st_size > 10_000
 
 
 @pytest.mark.slow
@@ -113,9 +98,6 @@ def test_positions_without_an_answer_are_gaps(slider, tmp_path):
         plots.figure(everywhere, "seat")
 
 
-# ---- seats ----------------------------------------------------------------------------------------------------
-
-
 def _drawn(figure):
     """Diagrams by title."""
     return {axes.get_title(loc="left"): axes for axes in figure.axes if axes.get_title(loc="left")}
@@ -154,7 +136,18 @@ def test_a_seat_that_is_given_is_drawn_where_it_is():
     assert axes[0].lines[1].get_ydata() == pytest.approx(30.0)
 
 
-# ---- β and ξ --------------------------------------------------------------------------------------------------
+def test_beta_stays_within_a_turn():
+    """Ends of which one goes round and round against the other."""
+    way = np.linspace(0.0, 6 * np.pi, 400)
+    beta = np.angle(np.exp(1j * way))  # as it is told, in (−π, π]
+    xi = np.angle(np.exp(1j * (0.3 + np.round((beta - way) / (2 * np.pi)) * np.pi)))
+    shown, direction = continued(beta, xi)
+    assert np.abs(shown).max() <= 2 * np.pi * (1 + 1e-6)
+    for sign in (1.0, -1.0):  # the same places of both ends
+        one, other = xi + sign * beta / 2, direction + sign * shown / 2
+        assert np.allclose(np.cos(one - other), 1.0)
+    steps = np.abs(np.diff(shown))
+    assert np.count_nonzero(steps > 1.0) <= 3  # whole turns only, at which the curve is broken
 
 
 def test_no_line_crosses_a_jump_and_losses_are_marked(slider, cardan):
@@ -171,50 +164,87 @@ def test_no_line_crosses_a_jump_and_losses_are_marked(slider, cardan):
     assert sorted(marks) == pytest.approx(sorted(5.0 * np.repeat(losses(slider)["S"], 1)))
 
 
-def test_the_seam_of_the_description_is_no_jump():
-    """A pin whose ends lie opposite each other: β goes through π and ξ turns by half a turn, the seat hardly moves."""
-    true = np.pi + 0.1 * np.sin(np.linspace(0, 6, 50))
-    wrapped = np.where(true > np.pi, true - 2 * np.pi, true)
-    xi = np.where(true > np.pi, 0.3 - np.pi + 2 * np.pi, 0.3)
-    beta, direction = continued(wrapped, xi)
-    assert beta == pytest.approx(true)
-    assert direction == pytest.approx(np.full(50, 0.3))
-    hole = continued(np.array([np.nan, 3.1, -3.1]), np.array([np.nan, 0.0, np.pi]))
-    assert np.isnan(hole[0][0])
-    assert hole[0][1:] == pytest.approx([3.1, 2 * np.pi - 3.1])
+@pytest.fixture(scope="module")
+def misaligned():
+    return trunnion.analyse(trunnion.Mechanism.read(EXAMPLES / "pezzuti-cardan-as-built.yaml"), 72)
 
 
-def test_a_jump_is_a_step_far_above_its_neighbours():
-    x = np.arange(8.0)
-    steady = np.array([0.0, 20, 40, 60, 80, 100, 120, 140])
-    assert not np.isnan(broken(x, steady, 60.0)[1]).any()
-    small = np.array([0.0, 1, 2, 30, 31, 32, 33, 34])
-    cut_x, cut_y = broken(x, small, 60.0)
-    assert np.flatnonzero(np.isnan(cut_y)).tolist() == [3]
-    assert cut_x[3] == 2.5
-    halfway = np.array([0.0, 1, 2, 20, 40, 41, 42, 43])  # a jump that a position without contact lies inside of
-    assert not np.isnan(broken(x, halfway, 60.0)[1]).any()
-    assert np.flatnonzero(np.isnan(broken(x, halfway, 60.0, np.array([3]))[1])).tolist() == [3, 5]
+def _full(series, count):
+    return np.array(series * count if len(series) == 1 else series, dtype=float)
 
 
-# ---- sweeps ---------------------------------------------------------------------------------------------------
+def test_points_less_their_errors_are_those_of_the_ideal_mechanism():
+    shown = scene(four_bar(AB="0.1 mm"))
+    ideal = scene(trunnion.analyse(_without_errors(), 72))
+    for key, track in ideal["points"].items():
+        for axis in "xy":
+            here = _full(shown["points"][key][axis], 72) - _full(shown["built"]["points"][key][axis], 72)
+            assert here == pytest.approx(_full(track[axis], 72), abs=1e-8)
+    turned = {link["name"]: _full(link["angle"], 72) for link in shown["links"]}
+    for link in ideal["links"]:
+        error = _full(shown["built"]["links"][link["name"]], 72)
+        assert turned[link["name"]] - error == pytest.approx(_full(link["angle"], 72), abs=1e-6)
+
+
+def _without_errors():
+    from as_built_models import FOUR_BAR
+    from ruamel.yaml import YAML
+
+    return trunnion.Mechanism.model_validate(YAML(typ="safe").load(FOUR_BAR.replace(", seat: {xi: 30 deg}", "")))
 
 
 @pytest.mark.slow
-def test_a_sweep_is_drawn_beside_the_ideal_mechanism(slider, tmp_path):
-    mechanism = trunnion.Mechanism.read(EXAMPLES / "pezzuti-cardan-as-built.yaml")
-    swept = trunnion.sweep(mechanism, {"misalignment": ["0 deg", "20 deg"]}, 18)
-    axes = sweep_figure(swept).axes[0]
-    built, ideal = (_label(axes, name).get_ydata() for name in ("as built", "ideal"))
-    assert built == pytest.approx(swept["efficiency"].values)
-    assert ideal == pytest.approx(swept["efficiency_ideal"].values)
-    lost = swept["status"].values == Status.CONTACT_LOST
-    told = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert ("contact lost at some position" in told) == lost.any()
-    table = tables(swept)[0]
-    assert table.head[:3] == ["misalignment [deg]", "efficiency", "efficiency ideal"]
-    assert ([row[-1] == "contact lost" for row in table.rows] == lost).all()
-    save(sweep_figure(swept, "output.transmission_error_max"), tmp_path / "error.png")
-    free = trunnion.sweep(mechanism.with_values({"joint_defaults.friction.coefficient": 0.1}),
-                          {"misalignment": ["10 deg", "20 deg"], "input.speed": [10, 100]}, 12)  # fmt: skip
-    assert "ideal, dashed" in [text.get_text() for text in sweep_figure(free).axes[0].get_legend().get_texts()]
+def test_a_link_in_space_is_moved_turned_and_stretched_to_its_errors(misaligned):
+    """The mean shift, the turn about the middle and the stretch of each point add up to the error of that point."""
+    built = scene(misaligned)["built"]
+    for link, told in built["links"].items():
+        shift, turn = (np.array([_full(told[what][axis], 72) for axis in "xyz"]) for what in ("shift", "turn"))
+        own = [key for key in misaligned.point.values if key.split(".")[0] == link]
+        errors = np.array([misaligned.point_error.sel(point=key).transpose("axis", "position").values for key in own])
+        places = np.array(
+            [misaligned.point_position.sel(point=key).transpose("axis", "position").values for key in own]
+        )
+        arms = places - places.mean(axis=0)
+        rigid = shift + np.cross(turn[None], arms, axis=1)
+        left = np.linalg.norm(errors - rigid, axis=1)
+        bys = (
+            np.array([np.linalg.norm(row["by"]) for row in told["stretch"]]) if told["stretch"] else np.zeros(len(own))
+        )
+        assert left == pytest.approx(np.repeat(bys[:, None], 72, axis=1), abs=2e-9)
+
+
+if shutil.which("node"):  # as in test_scene.py
+    from test_scene import page, run
+
+    def test_arithmetic_of_magnified_errors():
+        run("built.test.mjs")
+
+    def test_errors_are_magnified_in_the_plane(slider, tmp_path):
+        shown = page(slider, tmp_path)["built"]
+        assert shown["presets"][0] == "× 1"
+        assert shown["seats"] == ["O", "P", "Q", "S"]
+        assert all(re.search(r"play × \d+; longest load", text) for text in shown["remarks"])
+        assert shown["lost"] > 0
+        assert shown["clear"] == 1  # the block of S, as long as its guide, hides nothing
+        assert {"Position errors, largest", "Transmission error, slide of S", "ξ, direction of the seats"} <= set(
+            shown["titles"]
+        )
+        for factor in (1, 100, 1000):
+            told = shown["at"][str(factor)]
+            (said,) = told["said"]
+            assert said.startswith(f"errors × {factor}")
+            assert told["output"] == [f"× {factor}"]
+            assert (told["ideal"] > 0) == (factor > 1)
+            assert len(told["apart"]) == len(told["holes"]) == 3
+            for pin, (x, y, radius) in zip(told["apart"], told["holes"], strict=True):
+                assert np.hypot(pin[0] - x, pin[1] - y) == pytest.approx(radius - 5, abs=0.2)  # at the wall
+
+    @pytest.mark.slow
+    def test_errors_are_magnified_in_space(misaligned, tmp_path):
+        shown = page(misaligned, tmp_path)["built"]
+        assert shown["seats"] == [
+            f"{joint}, end {end}" for joint in ("input", "pin-1", "pin-2", "output") for end in (1, 2)
+        ]
+        counts = {factor: told["painted"] for factor, told in shown["at"].items()}
+        assert counts["100"] > counts["1"] > 500
+        assert shown["at"]["100"]["said"] == ["errors × 100, ideal as pale lines"]

@@ -1,11 +1,10 @@
-"""The report and the figures of a motion in time: time everywhere, events marked, what came in and what is left."""
+"""Report and figures of a motion in time: events, what came in and what is left, joints in play, spectra."""
 
 from __future__ import annotations
 
+import functools
 import json
 import math
-import re
-import subprocess
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -15,18 +14,23 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
-from test_browser import NODE, run
 from test_report import Page
+from test_scene import NODE, run
 
+import trunnion
 from mechanisms import four_bar
+from playing import rattling
+from playing_space import rattling_in_space
 from timed import slider_crank, three_posts, wheel
 from trunnion import analyse, simulate
+from trunnion.dynamics.spectrum import spectrum
 from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.tables import columns
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.scene import scene
 from trunnion.views.motion.figure import KINDS, OF_CONTACTS, figure
-from trunnion.views.motion.report import MOST_ROWS, _account, motion_scene, report
+from trunnion.views.motion.report import MOST_ROWS, motion_scene, report
 from trunnion.views.motion.shown import shown
 
 FREE = {"O": {"speed": 100, "free": True, "initial": {"speed": 60}}}
@@ -104,29 +108,6 @@ def test_speeds_and_energies_are_those_of_the_result(motion: tuple[str, xr.Datas
     assert len(json.dumps(scene, allow_nan=False)) < 1_500_000
 
 
-@pytest.mark.slow
-def test_what_came_in_is_what_is_left() -> None:
-    """The figures of the account add up, those of the table as those of the result."""
-    page = Page(report(start()))
-    lines = "Work of the drivers|Lost to friction|Change of the kinetic energy"
-    rows = re.findall(rf"({lines})\s*([−\d.]+)\s(\S*J)", " ".join(page.words))
-    scale = {"J": 1.0, "kJ": 1e3, "mJ": 1e-3}
-    told = {label: float(text.replace("−", "-")) * scale[unit] for label, text, unit in rows}
-    result = start()
-    assert told["Work of the drivers"] == pytest.approx(float(result["work_drive"][-1]), rel=1e-3)
-    assert told["Lost to friction"] == pytest.approx(-float(result["work_friction"][-1]), rel=1e-3)
-    change = float(result["kinetic_energy"][-1] - result["kinetic_energy"][0])
-    assert told["Change of the kinetic energy"] == pytest.approx(change, rel=1e-3)
-
-
-def test_what_contacts_take_goes_out_and_what_they_hold_is_left() -> None:
-    rows = shown(ends_early()).rows
-    ramp = xr.DataArray(np.linspace(0.0, 1.0, rows.sizes["position"]), dims="position")
-    told = _account(rows.assign(work_contact=2 * ramp, contact_energy=ramp))
-    assert dict(told["works"])["Lost in contacts"] == "−2.000\u00a0J"
-    assert dict(told["held"])["Change of the elastic energy of contacts"] == "1.000\u00a0J"
-
-
 def test_a_motion_that_ends_early_is_shown_to_its_end() -> None:
     result = ends_early()
     motion = shown(result)
@@ -147,15 +128,6 @@ def test_many_rows_are_thinned_and_events_are_not() -> None:
     assert [one["word"] for one in scene["motion"]["events"]] == ["starts"]
     assert f"{scene['count']} rows shown with every peak" in " ".join(report(result).split())
     assert scene["time"][-1] == pytest.approx(1.0)
-
-
-def test_thinned_rows_keep_the_peaks() -> None:
-    """A force that is large in a single row is drawn in its full size."""
-    result = simulate(wheel({"kind": "constant", "effort": 4}), 1.0, 3 * MOST_ROWS)
-    forces = np.zeros(result["reaction_force"].shape)
-    forces[0, 0, 1000] = 17.0
-    scene = motion_scene(shown(result.assign(reaction_force=(result["reaction_force"].dims, forces))))
-    assert max(abs(value) for value in scene["joints"][0]["reaction"]["x"]) == 17.0
 
 
 def test_the_speed_over_a_cycle_is_drawn_where_it_varies() -> None:
@@ -191,30 +163,7 @@ def test_every_figure_bears_every_motion(motion: tuple[str, xr.Dataset], kind: s
     plt.close(drawn)
 
 
-def _with_events(times: dict[float, str]) -> xr.Dataset:
-    """A motion of which other things are told to happen."""
-    result = ends_early().drop_vars("event_time")
-    result.attrs["events"] = json.dumps([[kind, "A", None, ""] for kind in times.values()])
-    return result.assign(event_time=("event", np.array(list(times))))
-
-
-CLOSE_BY = {0.05: "motor-off", 0.06: "brake", 0.07: "clutch-slips", 0.25: "rest", 0.251: "impact"}
-
-
 if NODE:
-
-    def test_words_of_events_on_the_page_stand_in_rows(tmp_path: Path) -> None:
-        told = page(_with_events(CLOSE_BY), tmp_path)["motion"]
-        assert told["lines"] == 5 * len(told["titles"])
-        assert told["marks"] == 6 * len(told["titles"])  # an impact has a mark on the axis alone
-        words = told["words"][:5]
-        assert [word for word, *_ in words] == ["motor off", "brake on", "clutch slips", "rests", "ends"]
-        rows = [y for *_, y in words]
-        assert rows[0] - 12 == rows[1] == rows[2] + 12
-        assert rows[3] == rows[0]
-        for k, (word, x, y) in enumerate(words):
-            for other, left, height in words[:k]:
-                assert height != y or abs(x - left) >= 3 * (len(word) + len(other))
 
     def page(result: xr.Dataset, folder: Path) -> Any:
         path = folder / "scene.json"
@@ -251,17 +200,84 @@ if NODE:
         assert not told["played"]["playing"]
         assert told["played"]["again"] == 0
 
-    def test_speeds_that_can_be_seen() -> None:
-        script = (
-            "import('{}').then(({{speeds}}) => "
-            "console.log(JSON.stringify([0.01, 0.3, 2, 30, 600].map((seconds) => speeds(seconds)))))"
-        )
-        module = Path(__file__).resolve().parents[2] / "src/trunnion/views/web/player.js"
-        done = subprocess.run([NODE, "-e", script.format(module.as_uri())], capture_output=True, text=True, timeout=60)
-        found = json.loads(done.stdout)
-        assert [one["usual"] for one in found] == [0.001, 0.05, 1, 1, 10]
-        assert all(1 in one["list"] and one["usual"] in one["list"] for one in found)
-
 
 def _full(series: list[float], count: int) -> list[float]:
     return series * count if len(series) == 1 else series
+
+
+@functools.cache
+def rattled() -> xr.Dataset:
+    return trunnion.simulate(rattling(), duration=7e-4, steps=700)
+
+
+def test_the_path_of_the_pin_lies_in_its_hole() -> None:
+    made = figure(rattled(), "orbit")
+    (axes,) = made.axes
+    lines = {len(line.get_xdata()): line for line in axes.lines}
+    (wall,), path = axes.patches, lines[701]
+    assert wall.get_radius() == pytest.approx(500.0)  # µm
+    assert np.nanmax(np.hypot(*path.get_data())) == pytest.approx(500 + 77.9, abs=0.3)
+    assert "45.8" in axes.get_title(loc="left")
+
+
+def test_each_end_of_a_pin_in_space_has_its_hole() -> None:
+    result = trunnion.simulate(rattling_in_space(), duration=3e-4, steps=100)
+    panels = figure(result, "orbit").axes
+    assert [axes.get_title(loc="left").partition(":")[0] for axes in panels] == ["Q.end_1", "Q.end_2"]
+    for axes in panels:
+        path = next(line for line in axes.lines if len(line.get_xdata()) == 101)
+        assert np.nanmax(np.hypot(*path.get_data())) == pytest.approx(500 + 77.9, abs=0.5)
+    named = [name for name, *_ in columns(result) if "offset" in name]
+    assert named[:3] == [f"Q.end_1.contact_offset.{axis}" for axis in "xyz"]
+    assert len(named) == 3 * 4
+
+
+@pytest.mark.slow
+def test_the_report_has_force_gap_orbit_and_spectrum() -> None:
+    page = Page(report(rattled()))
+    assert not page.open
+    (contact,) = page.scene()["motion"]["contacts"]
+    assert contact["name"] == "Q"
+    assert max(contact["force"]) == pytest.approx(float(rattled()["contact_normal_force"].max()), rel=1e-6)
+    assert contact["gap"] == pytest.approx(rattled()["contact_gap"].values[0], rel=1e-6)
+    pictures = [attrs["alt"] for tag, attrs in page.tags if tag == "img"]
+    assert len(pictures) == 2
+    assert "holes" in pictures[0]
+    assert "frequency" in pictures[1]
+
+
+def test_columns_of_contacts_and_impacts() -> None:
+    times = {name: (unit, values) for name, unit, values in columns(rattled())}
+    assert times["Q.contact_gap"][0] == "m"
+    assert times["Q.contact_gap"][1][0] == pytest.approx(5e-4)
+    assert times["Q.contact_offset.x"][1][0] == pytest.approx(0.0, abs=1e-15)
+    assert {"work_contact", "contact_energy", "Q.reaction_x"} <= times.keys()
+    impacts = {name: (unit, values) for name, unit, values in columns(rattled(), "impacts")}
+    assert list(impacts["contact"][1]) == ["Q", "Q"]
+    assert impacts["approach"][0] == "m/s"
+    assert impacts["approach"][1][0] == pytest.approx(4.38578315, rel=1e-8)
+
+
+def test_the_spectrum_of_harmonics_is_theirs() -> None:
+    """Hann's window: a constant, and amplitudes on frequencies, each with half of it beside; Parseval's equation."""
+    count, step = 400, 1e-3
+    time = step * np.arange(count)
+    forces = 7.0 + 3.0 * np.cos(2 * np.pi * 50 * time + 0.4) + 0.5 * np.sin(2 * np.pi * 180 * time)
+    frequency, amplitude = spectrum(time, forces)
+    assert frequency[[1, -1]] == pytest.approx([2.5, 500])
+    at = {place: k for k, place in enumerate(np.round(frequency, 6))}
+    assert amplitude[[at[0.0], at[50.0], at[180.0]]] == pytest.approx([7.0, 3.0, 0.5], rel=1e-12)
+    assert amplitude[[at[47.5], at[52.5]]] == pytest.approx([1.5, 1.5], rel=1e-12)
+    assert amplitude[at[100.0]] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("last", [700, 701])
+def test_the_spectrum_holds_the_square_of_the_force(last: int) -> None:
+    """Parseval: Σ (w F)²/(Σw)² N is the sum of the squares of the two-sided amplitudes, for even and odd numbers."""
+    time, force = rattled()["time"].values[:last], rattled()["contact_normal_force"].values[:, :last]
+    window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(last) / last)
+    _, amplitude = spectrum(time, force)
+    ends = amplitude[0, 0] ** 2 + (amplitude[0, -1] ** 2 if last % 2 == 0 else 0.0)
+    inner = np.sum(amplitude[0, 1 : -1 if last % 2 == 0 else None] ** 2) / 2
+    assert ends + inner == pytest.approx(last * np.sum((window * force[0]) ** 2) / np.sum(window) ** 2, rel=1e-12)
+    assert rattled()["contact_force_amplitude"].shape == (1, rattled().sizes["frequency"])

@@ -93,14 +93,6 @@ def test_a_load_that_works_next_to_a_dead_centre_is_shown():
     assert usual_peak(np.append(np.ones(99), 0.01), np.append(np.ones(99), 1000.0)) == 1.25
 
 
-def test_the_greatest_of_all_without_a_dead_centre():
-    one = np.ones(100)
-    assert usual_peak(np.ones(4), np.array([1.0, -2.0, 3.0, np.nan]), None) == 3.0
-    assert usual_peak(one, np.append(np.ones(99), 1000.0)) == 1000.0
-    assert usual_peak(np.zeros(3), np.array([1.0, 2.0, 3.0])) == 3.0  # all of it next to one
-    assert usual_peak(np.empty(0), np.array([])) == 0.0
-
-
 def result_of(condition, status=None, margin=None):
     count = len(condition)
     status = np.zeros(count) if status is None else status
@@ -127,28 +119,16 @@ def test_beside_positions_without_an_answer(code):
     assert np.flatnonzero(ease(result_of(condition, status)) < 1.0).tolist() == [8, 9]
 
 
-@pytest.mark.spread(1)
-@pytest.mark.parametrize("verb", ["plot", "report", "analyse", "sweep", "play"])
-def test_every_verb_that_draws_can_show_all(verb, tmp_path):
-    """The page is told that no position may be cut; the others take the switch."""
-    file = tmp_path / "engine.yaml"
-    drivers = "S: {speed: 0.01 m/s, range: [110 mm, 164.9999 mm]}"
-    load = "{joint: O, resisting_torque: 5 N m, useful: true}"
-    file.write_text(SLIDER_CRANK.format(mu=0.001, mass="0 kg", drivers=drivers, load=load), encoding="utf-8")
-    page, picture = tmp_path / "page.html", tmp_path / "picture.svg"
-    more = {
-        "plot": ["--kind", "torque", "--out", picture], "report": ["--out", page], "analyse": ["--report", page],
-        "sweep": ["--over", "work.resisting_torque=1Nm,2Nm", "--measure", "S.effort_max", "--out", picture],
-        "play": ["--set", "P.pin.clearance=0.1mm", "--measure", "rotation:O", "--out", picture],
-    }[verb]  # fmt: skip
+def test_plot_and_report_can_show_all(tmp_path):
+    """The page is told that no position may be cut."""
+    file, page, picture = (tmp_path / name for name in ("engine.yaml", "page.html", "picture.svg"))
+    engine().write(file)
     for switch in ([], ["--uncut"]):
-        done = CliRunner().invoke(app, [verb, str(file), "--steps", "400", *map(str, more), *switch])
-        assert page.exists() or picture.exists(), done.output + repr(done.exception)
-        text = (page if page.exists() else picture).read_text(encoding="utf-8")
-        if page.exists():
-            assert ('"ease":[1.0]' in text.replace(" ", "")) == bool(switch)
-        elif verb == "plot":
-            assert ("near a dead centre" in text) != bool(switch)
+        for words in (["plot", "--kind", "torque", "--out", picture], ["report", "--out", page]):
+            done = CliRunner().invoke(app, [words[0], str(file), "--steps", "400", *map(str, words[1:]), *switch])
+            assert page.exists() or picture.exists(), done.output + repr(done.exception)
+        assert ('"ease":[1.0]' in page.read_text("utf-8").replace(" ", "")) == bool(switch)
+        assert ("near a dead centre" in picture.read_text("utf-8")) != bool(switch)
 
 
 def test_a_run_goes_on_from_the_last_position_to_the_first():

@@ -1,21 +1,27 @@
-"""Every figure bears every kind of result, says what it shows, and is written whole or not at all."""
+"""Figures over the drive: every kind of result, its numbers, units, gaps, places, peaks, locking; written whole."""
 
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
-from stand_in import four_bar, slider
+from hypothesis import given
+from hypothesis import strategies as st
+from stand_in import blank, four_bar, slider
 
+import trunnion
+from trunnion.cycle.locking import LockingState
 from trunnion.errors import MechanismError, Status
+from trunnion.views.common.cycle import abscissa, intervals, thin
+from trunnion.views.common.drawing import cylinder, picture
 from trunnion.views.cycle import plots
+from trunnion.views.cycle.courses import turned_from_start
 from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
 
 PLAIN = [name for name in PLOTS if name not in READY]  # of results without errors
-SIGNATURES = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
 
 
 @pytest.mark.sample(9)
@@ -36,13 +42,6 @@ def test_every_figure_of_every_result(name, case, tmp_path):
     assert all(link.startswith("#") for link in links)  # nothing is fetched
 
 
-@pytest.mark.parametrize("name", ["torque", "reactions"])
-def test_overlaid_comparison_changes_no_limits_of_the_drive(name, plain, ideal):
-    alone, both = plots.figure(plain, name), plots.figure(plain, name, ideal)
-    assert isinstance(both, Figure)
-    assert alone.axes[0].get_xlim() == pytest.approx(both.axes[0].get_xlim(), rel=0.05, abs=0.1)
-
-
 def _texts(figure):
     return [text.get_text() for axes in figure.axes for text in [*axes.texts, axes.xaxis.label, axes.yaxis.label]]
 
@@ -60,20 +59,16 @@ def test_torque_is_that_of_the_result_in_kilonewton_metres_and_closes_the_turn(p
     assert _curve(figure, "without friction")[:-1, 1] == pytest.approx(ideal.drive_effort.values[0] / 1000)
 
 
-def test_a_sliding_drive_has_a_force_over_millimetres():
-    figure = plots.figure(slider(), "torque")
-    assert {"force S [N]", "drive slide S [mm]"} <= set(_texts(figure))
-
-
 def test_the_range_of_an_effort_where_friction_rests_is_drawn():
     result = slider()
-    result["drive_effort_lower"] -= 4.0
-    result["drive_effort_upper"] += 6.0
+    peak = float(np.abs(result["drive_effort"]).max())
+    result["drive_effort_lower"] -= 0.4 * peak
+    result["drive_effort_upper"] += 0.6 * peak
     (bars,) = plots.figure(result, "torque").axes[0].containers
     assert bars.get_label() == "range, friction at rest"
-    middle = result.drive_effort.values[0] + 1.0
     ends = np.array([segment[:, 1] for segment in bars[2][0].get_segments()])
-    assert ends == pytest.approx(np.transpose([middle - 5.0, middle + 5.0]))
+    expected = np.transpose([result[f"drive_effort_{end}"].values[0] for end in ("lower", "upper")])
+    assert ends * 1e3 == pytest.approx(expected)  # kN
 
 
 def test_a_gap_breaks_the_curve_and_names_its_cause():
@@ -90,44 +85,9 @@ def test_friction_power_adds_up(plain):
     assert sum(lines[joint] for joint in "ABCD") == pytest.approx(lines["all joints"])
 
 
-def test_a_position_that_is_not_there_is_refused(plain):
-    with pytest.raises(MechanismError, match="no position 360 among the 360 — name one from 0 to 359"):
-        mechanism(plain, index=360)
-
-
 def test_a_position_without_an_answer_says_so():
     figure = mechanism(four_bar(gap=(10, 20, Status.LOCKED)), index=12)
     assert "locked by friction" in figure.axes[0].get_title(loc="left")
-
-
-def test_the_same_figure_gives_the_same_file(plain, tmp_path):
-    first, second = (save(plots.figure(plain, "power"), tmp_path / name).read_bytes() for name in ("a.svg", "b.svg"))
-    assert first == second
-
-
-@pytest.mark.spread(2)
-@pytest.mark.parametrize("suffix", SIGNATURES)
-def test_formats(suffix, plain, tmp_path):
-    path = save(plots.figure(plain, "polar"), tmp_path / f"polar{suffix}")
-    assert path.read_bytes().startswith(SIGNATURES[suffix])
-    assert [file.name for file in tmp_path.iterdir()] == [path.name]
-
-
-def test_an_unknown_format_is_refused_before_anything_is_written(plain, tmp_path):
-    with pytest.raises(MechanismError, match=r"\.png, \.svg, \.pdf or \.jpg"):
-        save(plots.figure(plain, "torque"), tmp_path / "torque.bmp")
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_failed_write_leaves_the_old_file_and_no_draft(plain, tmp_path, monkeypatch):
-    target = tmp_path / "torque.png"
-    target.write_text("old")
-    figure = plots.figure(plain, "torque")
-    monkeypatch.setattr(figure, "savefig", lambda *_, **__: (_ for _ in ()).throw(OSError("disk full")))
-    with pytest.raises(MechanismError, match="disk full"):
-        save(figure, target)
-    assert [file.name for file in tmp_path.iterdir()] == ["torque.png"]
-    assert target.read_text() == "old"
 
 
 def test_a_spring_is_dotted_where_it_does_not_act() -> None:
@@ -140,3 +100,182 @@ def test_a_spring_is_dotted_where_it_does_not_act() -> None:
     for index, line in ((3, ":"), (20, "-")):
         coils = [one for one in mechanism(result, index=index).axes[0].lines if len(one.get_xdata()) == 20]
         assert [one.get_linestyle() for one in coils] == [line]
+
+
+def test_a_drive_turning_backwards_closes_too(plain):
+    back = plain.assign_coords(drive=-plain.drive)
+    back.drive.attrs = plain.drive.attrs
+    assert abscissa(back).period == pytest.approx(-360.0)
+
+
+def test_intervals_name_each_run_without_an_answer(plain):
+    twice = blank(blank(plain, 10, 20, Status.LOCKED), 300, 360, Status.NOT_ASSEMBLED)
+    twice["status"][5] = Status.ZERO_SLIP  # solved, only flagged
+    runs = intervals(twice)
+    assert [(run.start, run.stop, run.text) for run in runs] == [
+        (10, 20, Status.LOCKED.text),
+        (300, 360, Status.NOT_ASSEMBLED.text),
+    ]
+
+
+@given(st.lists(st.floats(-1e6, 1e6) | st.just(np.nan), min_size=1, max_size=400), st.integers(4, 60))
+def test_thinning_keeps_both_peaks_and_every_long_gap(values, most):
+    column = np.array(values)
+    picked = thin(column, most)
+    kept = column[picked]
+    assert (np.diff(picked) > 0).all()
+    assert picked.size <= 2 * most + 2 or picked.size == column.size
+    if np.isfinite(column).any():
+        assert np.nanmax(kept) == np.nanmax(column)
+        assert np.nanmin(kept) == np.nanmin(column)
+    assert np.isnan(kept).any() == np.isnan(column).any()
+
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def _line(axes, label):
+    return next(line for line in axes.lines if line.get_label() == label)
+
+
+def test_a_stroke_a_maximum_and_a_minimum_are_one_course_with_their_figures():
+    data = trunnion.read(EXAMPLES / "slider-crank.yaml").data()
+    data["measures"] = {
+        "stroke": {"slide": "S", "as": "peak-to-peak"},
+        "far": {"slide": "S", "as": "maximum"},
+        "near": {"slide": "S", "as": "minimum"},
+        "swing": {"angle": "rod"},
+    }
+    result = trunnion.analyse(trunnion.Mechanism(**data), 36)
+    figure = plots.figure(result, "measures")
+    slide, angle = figure.axes
+    assert slide.get_ylabel() == "slide of S [mm]"
+    assert angle.get_ylabel() == "swing [°]"
+    assert _line(slide, "slide of S").get_ydata()[:-1] == pytest.approx(1e3 * result["measure_value"].values[0])
+    levels = {line.get_label(): line.get_ydata()[0] for line in slide.lines if ": " in str(line.get_label())}
+    assert levels["far: maximum 165.0\u00a0mm"] == pytest.approx(165.0)
+    assert levels["near: minimum 95.00\u00a0mm"] == pytest.approx(95.0)
+    assert np.isnan(levels["stroke: peak to peak 70.00\u00a0mm"])
+
+
+def test_a_shaft_that_turns_fully_ends_a_turn_further():
+    figure = plots.figure(four_bar(72), "motion")
+    crank = _line(figure.axes[0], "crank").get_xydata()
+    assert crank[-1] - crank[0] == pytest.approx([360.0, 360.0])
+    rocker = _line(figure.axes[0], "rocker").get_xydata()
+    assert rocker[-1] - rocker[0] == pytest.approx([360.0, 0.0])
+
+
+def test_a_crank_in_space_turns_on_and_a_rocker_comes_back():
+    angle = np.linspace(0.0, 4 * np.pi, 97)
+    axis = np.array([0.6, 0.0, 0.8])
+    turn = np.vstack([np.cos(angle / 2), axis[:, None] * np.sin(angle / 2)])
+    flipped = turn * np.where(np.arange(97) % 3 == 0, -1.0, 1.0)  # q and −q are one orientation
+    assert turned_from_start(flipped) == pytest.approx(angle, abs=1e-7)
+    there_and_back = np.append(turn[:, :40], turn[:, 39::-1], axis=1)
+    assert turned_from_start(there_and_back) == pytest.approx([*angle[:40], *angle[39::-1]], abs=1e-7)
+    hole = flipped.copy()
+    hole[:, 20:25] = np.nan
+    assert np.isnan(turned_from_start(hole)[20:25]).all()
+    assert turned_from_start(hole)[25:] == pytest.approx(angle[25:], abs=1e-7)
+
+
+def test_curves_that_coincide_are_named_together_and_have_the_colour_of_the_first():
+    result = four_bar(36)
+    forces = result["reaction_force"].values
+    forces[3] = -forces[2]
+    figure = plots.figure(result.assign(reaction_force=(result["reaction_force"].dims, forces)), "reactions")
+    labels = figure.axes[0].get_legend_handles_labels()[1]
+    assert labels == ["A", "B", "C = D"]
+    alone = plots.figure(result.isel(joint=[0, 1, 2]), "reactions")
+    assert _line(figure.axes[0], "C = D").get_color() == _line(alone.axes[0], "C").get_color()
+
+
+def test_a_cylinder_is_a_barrel_with_a_rod_in_it():
+    """0.95 m shut, a stroke of 0.75 m: the barrel stays off the rod's eye, and the rod off the foot."""
+    result = trunnion.analyse(trunnion.read(EXAMPLES / "inverted-slider-crank.yaml"), 24)
+    shown = picture(result)
+    parts = cylinder(shown, "S")
+    assert (parts.barrel, parts.rod) == ("barrel.A", "rod.B")
+    rod, barrel = parts.long
+    apart = np.hypot(*(shown.tracks[parts.rod] - shown.tracks[parts.barrel]))
+    assert [apart.min(), apart.max()] == pytest.approx([0.95, 1.70], rel=1e-6)
+    assert barrel < apart.min()
+    assert rod < apart.min()
+    assert rod + barrel > apart.max()
+    drawn = plots.figure(result, "mechanism", at="375 mm")
+    ends = [line.get_xydata() for line in drawn.axes[0].lines if line.get_linewidth() == 17.0]
+    foot = shown.tracks["barrel.A"][:, 0]
+    assert [end[0] for end in ends] == [pytest.approx(foot)]
+    press = picture(trunnion.analyse(trunnion.read(EXAMPLES / "slider-crank.yaml"), 12))
+    assert cylinder(press, "S") is None  # on the ground
+
+
+STEPS = 24
+HOIST = {
+    "trunnion": 1,
+    "links": {"ground": {"points": {"A": [0, 0]}}, "crank": {"points": {"A": [0, 0], "P": [0.02, 0]}}},
+    "joints": {"A": {"type": "revolute", "links": ["ground", "crank"], "pin": {"radius": 0.012}, "friction": 0.5}},
+    "drivers": {"A": {"speed": 1.0, "range": [0.0, 2.5]}},
+    "loads": {"weight": {"link": "crank", "at": "P", "force": [0.0, -100.0], "useful": True}},
+}
+
+
+@pytest.fixture(scope="module")
+def press():
+    return trunnion.read(EXAMPLES / "drawing-press.yaml")
+
+
+@pytest.fixture(scope="module")
+def cycle(press):
+    return trunnion.analyse(press, STEPS)
+
+
+def labels(axes) -> list[str]:
+    return axes.get_legend_handles_labels()[1]
+
+
+def test_margin_and_multiples_are_drawn_as_computed(press):
+    found = trunnion.locking(press, STEPS)
+    upper, lower = plots.figure(found, "locking").axes
+    lines = {line.get_label(): line for line in upper.lines}
+    margin = found["locking_margin"].values
+    drawn = np.asarray(lines["locking margin, all friction"].get_ydata(), float)
+    assert drawn == pytest.approx(np.where(np.isfinite(margin), margin, np.nan), nan_ok=True)
+    alone = found["critical_multiple"].sel(joint="B").values
+    shown = np.asarray(lines["B alone"].get_ydata(), float)
+    assert shown[np.isfinite(shown)] == pytest.approx(alone[np.isfinite(alone)])
+    assert labels(lower)[0] == "forward"
+    ahead = np.asarray(lower.lines[1].get_ydata(), float)
+    assert ahead == pytest.approx(100 * found["efficiency_instant"].values)
+
+
+def test_colours_change_where_the_state_does_and_the_drive_effort_its_sign():
+    """Ends of the shaded ranges are those found between the positions."""
+    hoist = trunnion.Mechanism.model_validate(HOIST)
+    found = trunnion.locking(hoist, STEPS)
+    upper = plots.figure(found, "locking").axes[0]
+    spans = {patch.get_label(): patch for patch in upper.patches}
+    limit = np.degrees(np.arccos(0.3))
+    held = spans[LockingState.SELF_LOCKING_FORWARD.short]
+    assert (held.get_x(), held.get_x() + held.get_width()) == pytest.approx((90, 180 - limit), abs=0.01)
+    (line,) = [line for line in upper.lines if line.get_label() == "drive effort changes sign"]
+    assert line.get_xdata()[0] == pytest.approx(180 - limit, abs=0.01)
+    colours = {patch.get_facecolor() for patch in upper.patches}
+    assert len(colours) == 4
+
+
+@pytest.mark.parametrize("kind", ["torque", "reactions", "power", "locking", "motion"])
+def test_a_place_is_marked_in_every_panel(cycle, kind):
+    figure = plots.figure(cycle, kind, at="59 mm")
+    place = cycle["drive"].values[int(np.argmin(np.abs(cycle["drive"].values - 59)))]
+    for axes in figure.axes:
+        assert any(np.ptp(line.get_xdata()) == 0 and line.get_xdata()[0] == pytest.approx(place) for line in axes.lines)
+
+
+def test_the_mechanism_is_drawn_at_a_place(cycle):
+    place = cycle["drive"].values[12]
+    drawn = plots.figure(cycle, "mechanism", at=float(place) / 1000)  # a plain number is SI
+    assert f"{place:.4g} mm" in drawn.axes[0].get_title(loc="left")
+    turning = trunnion.analyse(trunnion.read(EXAMPLES / "durango-fourbar.yaml"), 36)
+    assert "= 350°" in plots.figure(turning, "mechanism", at="-10 deg").axes[0].get_title(loc="left")

@@ -1,23 +1,27 @@
-"""The report is one file that fetches nothing, holds every figure, and lets no name become code."""
+"""Reports are one file that fetches nothing, holds every figure, and lets no name become code."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
 import json
-import math
 import re
 from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from stand_in import NASTY, four_bar
+from stand_in_tolerances import CASES
 
-from trunnion.errors import Status
-from trunnion.results.attributes import figure_rows, summary_of
-from trunnion.results.figure import MORE_THAN, Figure
-from trunnion.views.common.bundle import bundle, module, web_text
+import trunnion
+from trunnion import play, read, sweep
+from trunnion.views.common.bundle import bundle
 from trunnion.views.cycle.report import embedded, report
-from trunnion.views.page import headline
+from trunnion.views.play import tables as play_tables
+from trunnion.views.readings import readings
+from trunnion.views.tolerance import drawable
+from trunnion.views.tolerance import report as tolerance_report
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -103,32 +107,6 @@ def test_nan_cannot_slip_into_the_page():
         embedded([float("nan")])
 
 
-@pytest.mark.parametrize(
-    ("figure", "label", "told"),
-    [
-        (Figure("A.effort_min", "drive torque of A", 7.0, "W", "least", "at 350°"), "drive torque of A, least, at 350°",
-         ("7.000\u00a0W", "least, at 350°")),
-        (Figure("efficiency", "efficiency", 0, note="no net work"), "efficiency (no net work)",
-         ("0", "no net work")),
-        (Figure("locking_margin", "locking margin", 10, aspect=MORE_THAN, note="times the friction"),
-         "locking margin (times the friction), more than", ("> 10", "times the friction")),
-        (Figure("efficiency", "efficiency", math.nan), "efficiency", ("—", "")),
-        (Figure("grashof", "type", "crank-rocker"), "type", ("crank-rocker", "")),
-    ],
-)  # fmt: skip
-def test_a_figure_is_told_by_its_subject_its_value_and_a_remark(plain, figure, label, told):
-    plain.attrs["summary"] = json.dumps(figure_rows([figure]))
-    assert figure.label == label
-    assert summary_of(plain) == [figure]
-    assert headline(plain) == [(figure.subject, [told])]
-
-
-def test_a_gap_is_told_even_if_no_finding_speaks_of_it():
-    words = " ".join("".join(Page(report(four_bar(gap=(132, 229, Status.NOT_ASSEMBLED)))).words).split())
-    assert "cannot be assembled, from 132° to 228° (drive angle A)" in words
-    assert "97 not solved" in words
-
-
 def test_modules_keep_to_the_forms_that_can_be_bundled():
     script = bundle("report.js")
     assert script.count("(() => {") >= 7
@@ -150,18 +128,6 @@ def test_bundle_puts_modules_in_order_and_each_in_its_own_scope():
     assert "return { two };" in script
 
 
-def test_a_module_of_modules_keeps_its_libraries():
-    sources = {
-        "own/a.js": 'import lib from "lib";\nimport { x as y } from "lib";\nimport * as b from "../web/b.js";\n'
-        "export const one = lib(y) + b.two;\n",
-        "web/b.js": "export const two = 2; // </p>\n",
-    }
-    text = module("own/a.js", sources.__getitem__, ["lib"])
-    assert text.startswith('import * as module_lib from "lib";\nconst module_web_b = (() => {\n')
-    assert "const { default: lib } = module_lib;\nconst { x: y } = module_lib;\nconst b = module_web_b;\n" in text
-    assert text.endswith("export { module_web_b, module_own_a };\n")
-
-
 @pytest.mark.parametrize(
     "source",
     ["export default 1;\n", 'import x from "./b.js";\n', "export { a };\n", 'import("./b.js");\n', "// </script>\n"],
@@ -171,14 +137,54 @@ def test_bundle_refuses_what_it_does_not_know(source):
         bundle("a.js", {"a.js": source}.__getitem__)
 
 
-def test_bundle_refuses_modules_that_import_each_other():
-    sources = {"a.js": 'import { b } from "./b.js";\n', "b.js": 'import { a } from "./a.js";\n'}
-    with pytest.raises(ValueError, match="a → b → a"):
-        bundle("a.js", sources.__getitem__)
+SOURCE = "data:image/svg+xml;base64,"
 
 
-def test_classes_used_by_the_page_are_styled():
-    """Each class that a module sets for looks has a rule in the style sheet."""
-    style = web_text("report.css")
-    for name in ("without-answer", "unsolved", "reaction", "cursor", "message", "band", "track", "drive", "key"):
-        assert re.search(rf"\.{name}\b", style), name
+@pytest.mark.sample(6)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in CASES if name != "twelve measures"])
+def test_every_kind_of_tolerance_makes_a_well_formed_page(name):
+    result = CASES[name]()
+    page = Page(tolerance_report(result))
+    assert not page.open
+    pictures = [attrs["src"] for tag, attrs in page.tags if tag == "img"]
+    assert len(pictures) == len(drawable(readings(result)[0]))
+    for picture in pictures:
+        ElementTree.fromstring(base64.b64decode(picture.removeprefix(SOURCE)))
+
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+JOINT = "joints.A.friction.coefficient"
+
+
+def _page(text: str) -> str:
+    """A page that fetches nothing and runs nothing."""
+    assert text.startswith("\n<!doctype html>") or text.startswith("<!doctype html>")
+    assert "<script" not in text
+    assert not re.search(r'(?:src|href)="(?!data:|#)', text)
+    return text
+
+
+def test_play() -> None:
+    result = play(read(EXAMPLES / "fourbar-with-play.yaml"), ["rotation:C", "rotation:D"], steps=12)
+    page = _page(trunnion.report(result))
+    assert page.count("<img") == 2
+    for table in play_tables(result):
+        assert all(f">{cell}</td>" in page for row in table.rows for cell in row if cell)
+    assert "0.02 mm" in page  # the input data
+
+
+def test_sweep() -> None:
+    result = sweep(read(EXAMPLES / "toleranced-fourbar.yaml"), {JOINT: [0.0, 0.1, 0.2]}, steps=12)
+    page = _page(trunnion.report(result, measures=["efficiency", "friction_power_mean"]))
+    assert page.count("<img") == 2
+    for value in result["efficiency"].values:
+        assert f">{value:.6g}</td>" in page
+
+
+def test_names_cannot_become_code(tmp_path: Path) -> None:
+    text = (EXAMPLES / "fourbar-with-play.yaml").read_text("utf-8")
+    named = re.sub(r"^name:.*$", 'name: "<script>alert(1)</script>"', text, count=1, flags=re.MULTILINE)
+    (tmp_path / "model.yaml").write_text(named, "utf-8")
+    page = _page(trunnion.report(play(read(tmp_path / "model.yaml"), steps=6)))
+    assert "&lt;script&gt;" in page

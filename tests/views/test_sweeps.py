@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
 
-from trunnion import MechanismError, Status, save
+from trunnion import Status, save
 from trunnion.views.scales import Scale, arrange, on_scale
 from trunnion.views.sweep import figure, tables
 
@@ -29,9 +29,6 @@ def names(plan):
             [one.name for one in plan.fixed])  # fmt: skip
 
 
-# ---- what runs along what -------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("x", "family", "expected"),
     [
@@ -49,22 +46,6 @@ def test_names_are_laid_out_in_their_order_or_as_told(x, family, expected):
     assert names(arrange(result, x, family)) == expected
 
 
-@pytest.mark.parametrize(
-    ("x", "family", "word"),
-    [
-        ("mislignment", "", "did you mean 'misalignment'"),
-        ("", "speed", "is not swept over"),
-        ("r", "r", "cannot be both"),
-    ],
-)
-def test_names_that_are_not_swept_are_refused(x, family, word):
-    with pytest.raises(MechanismError, match=word):
-        arrange(swept({"misalignment": ANGLE, "r": RADIUS}), x, family)
-
-
-# ---- curves ---------------------------------------------------------------------------------------------------
-
-
 def test_both_families_come_from_one_sweep():
     """The curves of Fig. 9 of Pezzuti et al. (2006), left and right, with units as given."""
     result = swept(GRID, cardan)
@@ -78,15 +59,6 @@ def test_both_families_come_from_one_sweep():
     assert [axes.get_ylabel() for axes in left.axes] == ["efficiency", "input.speed [rpm]"]
     assert [axes.get_ylabel() for axes in right.axes] == ["efficiency", "misalignment [°]"]
     assert (left.axes[0].get_xlabel(), right.axes[0].get_xlabel()) == ("misalignment [°]", "input.speed [rpm]")
-
-
-def test_of_many_panels_some_are_drawn_and_the_rest_is_said():
-    grid = {"misalignment": scale([0, 10]), "input.speed": FEW, "mu": scale(np.linspace(0, 0.5, 6)), "r": RADIUS}
-    sheet = figure(swept(grid))
-    titles = [axes.get_title(loc="left") for axes in sheet.axes if axes.get_title(loc="left")]
-    assert len(titles) == 12
-    assert (titles[0], titles[-1]) == ("mu = 0, r = 10 mm", "mu = 0.5, r = 30 mm")
-    assert "(12 of 18 panels)" in sheet.get_suptitle()
 
 
 def test_unsorted_values_are_drawn_in_order_and_the_gap_is_told():
@@ -111,9 +83,6 @@ def test_scales_are_logarithmic_where_the_values_are_spaced_so():
     assert axes.get_xscale() == "log"
     assert [text.get_text() for text in axes.get_xticklabels()] == ["1", "2", "5", "10", "20"]
     assert axes.get_xlabel() == "c [µm]"
-
-
-# ---- maps -----------------------------------------------------------------------------------------------------
 
 
 def gappy(angle, speed, *_):
@@ -164,15 +133,6 @@ def test_lines_of_a_map_lie_where_the_field_has_their_number():
         assert np.log10(c) + angle / 30 == pytest.approx(level, abs=6e-3)
 
 
-def test_a_map_has_both_names_with_units_and_a_scale_with_that_of_the_measure():
-    sheet = figure(swept(GRID, cardan), "input.effort_max", x="input.speed", kind="map")
-    axes, bar = sheet.axes
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("input.speed [rpm]", "misalignment [°]")
-    assert bar.get_ylabel() == "maximum drive effort of input [kN m]"
-    assert axes.get_xlim() == pytest.approx((50, 1500))
-    assert [text.get_text() for text in bar.get_yticklabels()][:2] == ["7.0", "7.5"]
-
-
 def test_a_margin_that_is_known_where_it_locks_is_drawn_there():
     result = swept(GRID, cardan, gappy)
     axes = figure(result, "locking_margin", kind="map").axes[0]
@@ -181,21 +141,6 @@ def test_a_margin_that_is_known_where_it_locks_is_drawn_there():
     assert look["cannot be assembled"].get_facecolor()[3] == 1
     assert "∞" in look
 
-
-@pytest.mark.parametrize(
-    "names", [{"misalignment": ANGLE}, {"misalignment": ANGLE, "r": scale([1])}, {"a": scale([2, 2]), "b": FEW}]
-)
-def test_a_map_needs_two_names_that_vary(names):
-    with pytest.raises(MechanismError, match="needs two that vary"):
-        figure(swept(names), kind="map")
-
-
-def test_no_such_kind():
-    with pytest.raises(MechanismError, match="did you mean 'map'"):
-        figure(swept(GRID), kind="maps")
-
-
-# ---- odd cases ------------------------------------------------------------------------------------------------
 
 PANELS = {"misalignment": ANGLE, "input.speed": FEW, "joint_defaults.friction.coefficient": FRICTION, "r": RADIUS}
 TINY = scale(np.linspace(-3e-7, 3e-7, 5), "m")
@@ -258,9 +203,6 @@ def test_odd_cases_are_drawn_and_nothing_is_cut_off(case):
             assert not axes.get_legend().get_window_extent().overlaps(title)
 
 
-# ---- tables and files -----------------------------------------------------------------------------------------
-
-
 def test_a_table_for_each_value_of_further_names():
     grid = {"misalignment": scale(range(50)), "input.speed": SPEED, "mu": FRICTION, "r": scale([1])}
     result = swept(grid, lambda a, s, m, r: a + s + m, lambda a, s, *_: 5 if (a, s) == (0, 50) else 0)
@@ -299,13 +241,6 @@ def test_a_table_has_the_ends_of_an_effort_that_lie_beyond_zero(least, most, sho
         result[f"drive_effort_{end}"].attrs = given.attrs
     (table,) = tables(result)
     assert [one for one in table.head if one.startswith("input.effort")] == [f"input.effort {k} [N m]" for k in shown]
-
-
-def test_a_measure_that_the_sweep_lacks_is_told():
-    with pytest.raises(MechanismError, match="does not hold it"):
-        figure(swept(GRID, margin=False), "locking_margin")
-    with pytest.raises(MechanismError, match="no mechanism of the sweep has errors"):
-        figure(swept(GRID), "efficiency_ideal")
 
 
 def test_the_file_has_a_row_a_point_of_any_number_of_names(tmp_path):

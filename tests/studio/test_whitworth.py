@@ -1,0 +1,207 @@
+"""A Whitworth with a ram, as a user draws it: tolerances, loads, dimensions, its animation; in the page by keys."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from studio.asking import EXAMPLES, analysed, ask, edited, solved
+from trunnion.model.file import entries_of
+from trunnion.views.cycle.scene import scene
+
+TEXT = """\
+trunnion: 1
+name: Ram
+space: planar
+dimensions:
+  crank: 30 mm
+links:
+  ground:
+    points: {A: [0, 0], C: [0, -80 mm], G: {at: [-100 mm, 100 mm], axis: [1, 0]}}
+  link1:
+    points: {A: [0, 0], B: [crank, 0]}
+  link2:
+    points: {C: [0, 0], D: [180 mm, 0], F: {at: [0, 0], axis: [1, 0]}}
+  link3:
+    points: {D: [0, 0], E: [100 mm, 0]}
+  block1:
+    points: {B: [0, 0], F: {at: [0, 0], axis: [1, 0]}}
+  block2:
+    points: {E: [0, 0], G: {at: [0, 0], axis: [1, 0]}}
+joints:
+  A: {type: revolute, links: [ground, link1]}
+  C: {type: revolute, links: [ground, link2]}
+  D: {type: revolute, links: [link2, link3]}
+  F: {type: prismatic, links: [link2, block1]}
+  B: {type: revolute, links: [link1, block1]}
+  G: {type: prismatic, links: [ground, block2]}
+  E: {type: revolute, links: [link3, block2]}
+assembly: {D: [0 mm, 100 mm], F: 110 mm, B: [0 mm, 30 mm], E: [-100 mm, 100 mm]}
+drivers:
+  A: {speed: 60 rpm, start: 90 deg}
+loads:
+  load1: {link: block2, at: G, force: ["-150 N * max(-1, min(1, G.slide_velocity / (1 mm/s)))", 0 N]}
+joint_defaults:
+  friction: 0.12
+  pin: {radius: 8 mm}
+  guide: {length: 40 mm}
+"""
+
+
+WHITWORTH = EXAMPLES["whitworth-quick-return"]
+TOLERANCED = TEXT.replace("crank: 30 mm", "crank: 30 mm ± 0.5 mm")
+MODELS = {"ram": TOLERANCED}
+
+
+def cycle(crank):
+    return analysed(TEXT.replace("crank: 30 mm", f"crank: {crank} mm"), 720)
+
+
+@pytest.mark.slow
+def test_worst_cases_are_those_of_the_numbers_at_their_limits():
+    found = ask(ask="tolerances", text=TOLERANCED, steps=360)
+    torque, stroke, ratio = found["rows"]
+    ends = [cycle(crank) for crank in (29.5, 30, 30.5)]
+    peaks = [float(np.abs(one["drive_effort"]).max()) for one in ends]
+    ways = [float(np.ptp(one["joint_slide"].sel(joint="G").values)) for one in ends]
+    for row, (low, middle, high) in ((torque, peaks), (stroke, ways)):
+        assert row["nominal"] == pytest.approx(middle, rel=1e-3)
+        assert row["worst"] == pytest.approx([-(high - low) / 2, (high - low) / 2], rel=0.03)
+        assert row["deviation"] == pytest.approx((high - low) / 6, rel=0.03)  # limits at three standard deviations
+    assert torque["label"] == "largest torque, drive A"
+    assert stroke["texts"][0] == "135.0\u00a0mm"
+    assert ratio["label"] == "time ratio of G"
+
+
+def test_a_stroke_that_no_tolerance_changes_is_told_as_that():
+    """The stroke of a Whitworth in line with its lever is 2 s whatever the crank; its time ratio is (2π − φ)/φ."""
+    text = WHITWORTH.replace("r: 120 mm", "r: 120 mm ± 0.5 mm")
+    stroke, ratio = ask(ask="tolerances", text=text, steps=360)["rows"][1:]
+    assert stroke["texts"] == ["200.0\u00a0mm", "± 0\u00a0m", "0\u00a0m"]
+    assert stroke["worst"] == [0, 0]
+    short = [2 * np.arccos(60 / crank) for crank in (119.5, 120, 120.5)]
+    low, middle, high = ((2 * np.pi - one) / one for one in short)
+    assert ratio["nominal"] == pytest.approx(middle, rel=1e-7)
+    assert ratio["worst"] == pytest.approx([-(low - high) / 2, (low - high) / 2], rel=1e-4)
+
+
+@pytest.mark.slow
+def test_the_table_stands_under_the_plots(user):
+    user.until("s.solved.value")
+    user.page.click("role=tab[name=Plots]")
+    words = user.page.text_content(".tolerances table")
+    assert "stroke of G" in words
+    assert "± 2.250" in words
+    assert "Samples, yield and shares" in user.page.text_content(".tolerances p")
+    user.of("actions", "m.setValue(['dimensions', 'crank'], '30 mm')")
+    user.until("s.answer.value.numbers['dimensions.crank'] === 0.03 && !s.text.value.includes('±')")
+    assert user.page.locator(".tolerances").count() == 0
+
+
+FORCE = "-150 N * max(-1, min(1, G.slide_velocity / (1 mm/s)))"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("force", "law"),
+    [(FORCE, lambda v: -150 * np.clip(v / 1e-3, -1, 1)), ("-400 N*s/m * G.slide_velocity", lambda v: -400 * v)],
+)
+def test_a_force_is_that_of_each_position(force, law):
+    text = TEXT.replace(FORCE, force)
+    speed = analysed(text, 360)["joint_slide_velocity"].sel(joint="G").values
+    (load,) = solved(text)["scene"]["loads"]
+    x, y = load["course"]["force"]
+    np.testing.assert_allclose(x, law(speed), atol=1e-4)
+    assert np.all(np.asarray(y) == 0)
+    assert np.ptp(np.sign(x)) == 2  # it has turned round
+
+
+def test_of_thinned_positions_it_is_that_of_those_shown_and_of_others_unknown():
+    result = analysed(TEXT, 360)
+    (load,) = scene(result, max_positions=90)["loads"]
+    (whole,) = scene(result)["loads"]
+    assert load["course"]["force"][0] == whole["course"]["force"][0][::4]
+    assert scene(result.isel(position=slice(0, 90)))["loads"][0]["course"] is None
+
+
+@pytest.mark.slow
+def test_names_forces_and_loads_are_drawn():
+    frames = {}
+    for force in ("150 N", "0 N"):
+        text = TEXT.replace("-150 N * max", f"-{force} * max")
+        content = ask(ask="export", text=text, what="gif", steps=12)
+        shown = Image.open(io.BytesIO(content["bytes"]))
+        shown.seek(3)
+        frames[force] = np.asarray(shown.convert("RGB"), int)
+    assert shown.n_frames == 12
+    differs = np.abs(frames["150 N"] - frames["0 N"]).sum(axis=2) > 60
+    assert 200 < differs.sum() < 0.05 * differs.size
+
+
+PIN = ["links", "link3", "points", "E"]
+
+
+def put(text, path, value):
+    return edited(text, {}, {"do": "set", "path": path, "value": value})[0]
+
+
+@pytest.mark.parametrize(
+    ("typed", "rod"),
+    [("rod", "100 mm"), ("rod = 120 mm", "120 mm"), ("rod=120 mm ± 0.05", "120 mm ± 0.05")],
+)
+def test_a_name_typed_for_a_number_makes_a_dimension(typed, rod):
+    text = put(TEXT, PIN, [typed, "0"])
+    entries = entries_of(text)[0]
+    assert entries["dimensions"] == {"crank": "30 mm", "rod": rod}
+    assert entries["links"]["link3"]["points"]["E"] == ["rod", 0]
+    assert ask(ask="model", text=text)["solved"]
+
+
+@pytest.mark.parametrize("typed", ["crank", "2 * crank", "max(crank, 5 mm)", "drive", "off"])
+def test_words_that_mean_something_make_none(typed):
+    entries = entries_of(put(TEXT, ["joint_defaults", "friction"], typed))[0]
+    assert entries["dimensions"] == {"crank": "30 mm"}
+    assert entries["joint_defaults"]["friction"] == typed
+
+
+@pytest.mark.parametrize(
+    ("force", "says"),
+    [
+        ("-150 N * sign(G.slide_velocity)", "max(-1, min(1, v / (1 mm/s)))"),
+        ("-150 N * velocity_of_it", "G.slide_velocity"),
+    ],
+)
+def test_what_an_expression_cannot_say_is_told_with_what_can(force, says):
+    text = put(TEXT, ["loads", "load1", "force"], [force, "0 N"])
+    (error,) = [one for one in ask(ask="model", text=text)["findings"] if one["severity"] == "error"]
+    assert says in error["remedy"]
+
+
+def focused(user):
+    return user.page.evaluate("document.activeElement.textContent.trim()")
+
+
+@pytest.mark.slow
+def test_a_menu_is_gone_through_by_arrows(user):
+    user.page.focus("summary:has-text('File')")
+    seen = []
+    for key in ("ArrowDown", "ArrowDown", "ArrowUp", "End", "ArrowDown"):
+        user.keys(key)
+        seen.append(focused(user))
+    assert seen == ["New sheet", "Open …", "New sheet", "Keys …", "New sheet"]
+    user.keys("Escape")
+    assert focused(user) == "File"
+    assert user.page.locator("details[open]").count() == 0
+
+
+def test_with_a_mistake_the_mechanism_stays_as_it_was_drawn(user):
+    user.until("s.solved.value")
+    slot = "document.querySelector('.slot .slit').getAttribute('d').match(/-?[\\d.]+/g).map(Number)"
+    x1, y1, x2, y2 = user.page.evaluate(slot)
+    user.of("actions", "m.typed(given)", TEXT.replace("[100 mm, 0]", "[rodd, 0]"))
+    user.until("s.answer.value.findings.some(({ severity }) => severity === 'error')")
+    a1, b1, a2, b2 = user.page.evaluate(slot)
+    assert (b2 - b1) * (x2 - x1) == pytest.approx((y2 - y1) * (a2 - a1), abs=1.0)

@@ -117,13 +117,6 @@ def test_the_resolution_is_a_step_above_zero() -> None:
                        "channels": {"M": {"column": "M", "measures": "effort:A"}}})  # fmt: skip
 
 
-def test_a_time_stamp_is_no_stretch(tmp_path: Path) -> None:
-    mapping = recorded(tmp_path, "Zeit [ms];Winkel [°];Moment [Nm];Drehzahl [U/min]")
-    mapping["channels"]["M"]["zero"] = {"over": ["22.11.2026 11:40:00", "22.11.2026 11:40:01"]}
-    with pytest.raises(MechanismError, match="counted in seconds from the first row"):
-        read_measured(mapping, [tmp_path / "lauf.csv"])
-
-
 def test_sampling_that_is_slow_is_no_fault_of_the_readings(tmp_path: Path) -> None:
     mapping = recorded(tmp_path, "Zeit [ms];Winkel [°];Moment [Nm];Drehzahl [U/min]") | {"positions": 180}
     found = trunnion.rig.read(mapping, [tmp_path / "lauf.csv"])  # type: ignore[arg-type]

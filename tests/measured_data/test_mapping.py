@@ -98,9 +98,9 @@ CHANGES: list[tuple[dict[str, Any], str, str]] = [
     ({"set": {"a": {"mean": "speed"}}}, "set.a.mean", "no channel 'speed'"),
     ({"set": {"a": {"mean": "brake", "column": "x"}}}, "set.a", "one of mean and column"),
     ({"set": {"a": "2 * AB"}}, "set.a", "refers to AB"),
-    ({"cycle": "3 N"}, "cycle", "no angle and no time"),
-    ({"cycle": 0}, "cycle", "not above zero"),
-    ({"cycle": "-1 turn"}, "cycle", "not above zero"),
+    ({"cycle": "3 N"}, "cycle", "no angle and no time above zero"),
+    ({"cycle": 0}, "cycle", "no angle and no time above zero"),
+    ({"cycle": "-1 turn"}, "cycle", "no angle and no time above zero"),
     ({"channels/brake/gain": 0}, "channels.brake", "the gain is zero"),
     ({"channels/brake/range": "0 N m"}, "channels.brake.range", "0 N m is not above zero"),
     ({"channels/brake/gain": "1,5"}, "channels.brake.gain", "not a number with a unit"),
@@ -118,7 +118,7 @@ def test_what_a_mapping_cannot_say(changes: dict[str, Any], where: str, told: st
 
 
 def test_a_model_is_no_mapping(tmp_path: Path) -> None:
-    with pytest.raises(MechanismError, match="is a model file, not a mapping file"):
+    with pytest.raises(MechanismError, match="is no mapping file"):
         read_mapping({"trunnion": 1, "channels": mapping()["channels"]})
 
 
@@ -267,7 +267,7 @@ def test_schema(program: Run) -> None:
     jsonschema.validate(mapping({"filter": {"cut_off": "50 Hz"}, "set": {"a": {"mean": "brake"}, "b": "3 N"}}), schema)
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(mapping({"filtre": {"cut_off": "50 Hz"}}), schema)
-    assert schema["required"] == ["trunnion-data"]
+    assert schema["required"] == ["trunnion-data", "channels"]
 
 
 @pytest.mark.parametrize(

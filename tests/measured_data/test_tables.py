@@ -129,7 +129,7 @@ def test_groups_of_tdms(tmp_path: Path) -> None:
     with pytest.raises(MechanismError, match=r"there is no column 'T'; the file has 'in/T', 'out/T', 'n'"):
         read_table(path, ["T"])
     _tdms(path, {"a": [1.0, 2.0], "b": [1.0]})
-    with pytest.raises(MechanismError, match=r"different numbers of samples: 'a' 2, 'b' 1"):
+    with pytest.raises(MechanismError, match=r"different numbers of samples or rates: 'a' 2, 'b' 1"):
         read_table(path, ["a", "b"])
 
 
@@ -150,12 +150,12 @@ def test_kinds_of_parquet(tmp_path: Path) -> None:
 
 BAD: dict[str, tuple[str, bytes, str]] = {
     "empty": ("a.csv", b"", "is empty"),
-    "blank": ("a.csv", b"\n\n", "has only comments"),
+    "blank": ("a.csv", b"\n\n", "is empty but for comments"),
     "header only": ("a.csv", b"t,T1\n", "has a header but no rows"),
-    "no header": ("a.csv", b"0,1\n1,2\n", "has no header: its first line is 0, 1"),
-    "too many cells": ("a.csv", b"t,T1\n0,1\n1,2,3\n", "has 3 cells, the header has 2"),
-    "decimal commas": ("a.csv", b"t,T1\n0,5,1,5\n1,0,2,5\n", "has 4 cells, the header has 2"),
-    "far below": ("a.csv", b"t,T1\n" + b"0,1\n" * 500 + b"1,2,3\n", "has 3 cells, the header has 2"),
+    "no header": ("a.csv", b"0,1\n1,2\n", "no line has the columns"),
+    "too many cells": ("a.csv", b"t,T1\n0,1\n1,2,3\n", "row 2 below the header has more cells than its 2"),
+    "decimal commas": ("a.csv", b"t,T1\n0,5,1,5\n1,0,2,5\n", "row 1 below the header has more cells than its 2"),
+    "far below": ("a.csv", b"t,T1\n" + b"0,1\n" * 500 + b"1,2,3\n", "Expected 2 fields in line 502, saw 3"),
     "binary": ("a.csv", b"\x00\x01\x02PK", "is not a text file"),
     "not parquet": ("a.parquet", b"t,T1\n0,1\n", "is not Parquet"),
     "not tdms": ("a.tdms", b"t,T1\n0,1\n" * 20, "is not TDMS"),
@@ -251,7 +251,7 @@ def test_fewer_texts_than_numbers_are_dropouts(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("0,0;211,9;0,839\n0,1;212,6;0,873\n", "has no header: its first line is 0,0, 211,9, 0,839"),
+        ("0,0;211,9;0,839\n0,1;212,6;0,873\n", "no line has the columns 'T1', 't'; the first lines are: 0,0;211,9"),
         (
             "Report of rig 3;;\nDay: 1;;\n0,1;1;2\n",
             "no line has the columns 'T1', 't'; the first lines are: Report of rig",

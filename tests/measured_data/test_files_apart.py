@@ -88,17 +88,6 @@ def test_pound_feet_as_they_are_written(text: str) -> None:
     assert dimensions(text)[1] == dimensions("N m")[1]
 
 
-@pytest.mark.parametrize(
-    ("text", "size"), [("in-lb", 0.1129848), ("oz-in", 0.00706155), ("mV/(ft-lb)", 1e-3 / 1.3558179)]
-)
-def test_pound_inches_and_gains(text: str, size: float) -> None:
-    assert dimensions(text)[0] == pytest.approx(size)
-
-
-def test_a_mass_times_an_area_stays_one() -> None:
-    assert dimensions("lb ft^2")[0] == pytest.approx(0.45359237 * 0.3048**2)
-
-
 # ---- settings of an amplifier ---------------------------------------------------------------------------------
 
 
@@ -117,15 +106,6 @@ def test_a_file_has_settings_of_its_own(tmp_path: Path) -> None:
     assert (first.accuracy.gain, second.accuracy.gain) == (0.001, 0.01)
     (clip,) = of(found, "data.readings.clipped")
     assert clip.file.endswith("b.csv")
-
-
-def test_a_zero_and_a_unit_of_one_file(tmp_path: Path) -> None:
-    written(tmp_path / "a.csv")
-    written(tmp_path / "b.csv", "", FOOT_POUND)
-    found = mapping(
-        tmp_path, [{"file": "a.csv"}, {"file": "b.csv", "channels": {"M": {"unit": "ft-lb", "zero": "1 N m"}}}]
-    )
-    assert [np.nanmean(one.courses["M"].mean) for one in found.conditions] == pytest.approx([4, 3], abs=0.02)
 
 
 @pytest.mark.parametrize(
@@ -160,8 +140,3 @@ def test_a_gap_in_a_turn_is_not_the_drives(tmp_path: Path) -> None:
     assert found.done[0].startswith(f"{turns} whole turns;")
     found = mapping(tmp_path, [{"file": "a.csv"}, {"file": written(tmp_path / "b.csv").name}])
     assert found.done[0].startswith(f"{turns} to {TURNS} whole turns in each of 2 conditions;")
-
-
-def test_time_stamps_of_many_files_are_told_once(tmp_path: Path) -> None:
-    files = [{"file": written(tmp_path / f"{name}.csv").name} for name in "ab"]
-    assert sum("first time stamp" in sentence for sentence in mapping(tmp_path, files).done) == 1

@@ -101,6 +101,13 @@ CHANGES: list[tuple[dict[str, Any], str, str]] = [
     ({"cycle": "3 N"}, "cycle", "no angle and no time above zero"),
     ({"cycle": 0}, "cycle", "no angle and no time above zero"),
     ({"cycle": "-1 turn"}, "cycle", "no angle and no time above zero"),
+    (
+        {"angle": None, "cycle": "0.1 s", "files": [{"file": "a.csv", "angle": {"zero": "2 deg"}}]},
+        "files.0.angle",
+        "no column gives an angle",
+    ),
+    ({"channels/brake/measures": "torque:A"}, "channels.brake.measures", "not a quantity that a sensor measures"),
+    ({"channels/brake/resolution": 0}, "channels.brake.resolution", "0 is not above zero"),
     ({"channels/brake/gain": 0}, "channels.brake", "the gain is zero"),
     ({"channels/brake/range": "0 N m"}, "channels.brake.range", "0 N m is not above zero"),
     ({"channels/brake/gain": "1,5"}, "channels.brake.gain", "not a number with a unit"),
@@ -117,11 +124,6 @@ def test_what_a_mapping_cannot_say(changes: dict[str, Any], where: str, told: st
     assert failure.value.findings[0].remedy
 
 
-def test_a_model_is_no_mapping(tmp_path: Path) -> None:
-    with pytest.raises(MechanismError, match="is no mapping file"):
-        read_mapping({"trunnion": 1, "channels": mapping()["channels"]})
-
-
 @pytest.mark.parametrize("name", ["../run.csv", "/run.csv", "a/../../run.csv", "link/run.csv"])
 def test_only_files_below_its_folder(tmp_path: Path, name: str, columns: Columns) -> None:
     """A mapping is data from a stranger, and so is a link beside it; the command line may name any file."""
@@ -134,20 +136,10 @@ def test_only_files_below_its_folder(tmp_path: Path, name: str, columns: Columns
         read_measured(path)
 
 
-def test_files_beside_the_mapping(tmp_path: Path, columns: Columns) -> None:
-    read(columns, tmp_path)
-    path = tmp_path / "m.json"
-    path.write_text(json.dumps(mapping({"files": [{"file": "run.csv", "set": {"beta": "15 deg"}}]})), encoding="utf-8")
-    for found in (read_measured(path), read_measured(path, [tmp_path / "run.csv"])):
-        (one,) = found.conditions
-        assert one.name == "beta 15 deg"
-        assert one.values == {"beta": pytest.approx(np.radians(15))}
-    with pytest.raises(MechanismError, match="no data file is named"):
-        read_measured(mapping())
-
-
 def test_files_of_the_command_line_keep_what_was_set(tmp_path: Path, columns: Columns) -> None:
     """By the file, else by its name."""
+    with pytest.raises(MechanismError, match="no data file is named"):
+        read_measured(mapping())
     (tmp_path / "elsewhere").mkdir()
     for name in ("run.csv", "new.csv", "elsewhere/run.csv", "elsewhere/two.csv"):
         (tmp_path / name).write_text(text_of(columns), "utf-8")
@@ -160,6 +152,7 @@ def test_files_of_the_command_line_keep_what_was_set(tmp_path: Path, columns: Co
     beta, gamma = {"beta": pytest.approx(np.radians(15))}, {"gamma": pytest.approx(np.radians(1))}
     for name in ("run.csv", "elsewhere/run.csv"):
         assert read_(name) == [{**gamma, **beta}]
+    assert [one.name for one in read_measured(path, [tmp_path / "run.csv"]).conditions] == ["gamma 1 deg, beta 15 deg"]
     assert read_("elsewhere/two.csv", "new.csv") == [gamma] * 2  # nothing is stated of them
 
 
@@ -285,41 +278,3 @@ def test_gains_as_data_sheets_have_them(text: str, same: str) -> None:
     assert first.dimensions == second.dimensions
     with pytest.raises(UnitError):
         read_amount("1 V/(0 rpm)")
-
-
-def test_remedies_speak_of_mappings() -> None:
-    with pytest.raises(MechanismError) as caught:
-        read_mapping(mapping({"positions": 1, "files": [{"file": ""}]}))
-    assert caught.value.findings
-    assert not [one for one in caught.value.findings if "model files" in one.remedy]
-
-
-def test_a_column_with_its_unit_in_braces_is_to_be_quoted(tmp_path: Path) -> None:
-    """What is to be written instead is read as the name."""
-    wrong = 'trunnion-data: 1\nchannels:\n  T: {column: Drehmoment [Nm], measures: "effort:input"}\n'
-    path = tmp_path / "m.yaml"
-    path.write_text(wrong)
-    with pytest.raises(MechanismError) as caught:
-        read_mapping(path)
-    (found,) = caught.value.findings
-    assert found.line == 3
-    name = found.remedy.partition(": ")[2]
-    assert name == '"Drehmoment [Nm]"'
-    path.write_text(wrong.replace("Drehmoment [Nm]", name))
-    assert not [one for one in _findings(path) if "YAML" in one.what]
-
-
-def _findings(path: Path) -> list[Any]:
-    try:
-        read_mapping(path)
-    except MechanismError as error:
-        return list(error.findings)
-    return []
-
-
-@pytest.mark.parametrize(("stated", "remedy"), [("torque:A", "did you mean 'effort'?"), ("xyz:A", "effort:DRIVER")])
-def test_an_unknown_quantity_is_answered_with_the_nearest_few(stated: str, remedy: str) -> None:
-    with pytest.raises(MechanismError) as failure:
-        read_mapping(mapping({"channels/brake/measures": stated}))
-    assert remedy in failure.value.findings[0].remedy
-    assert failure.value.findings[0].remedy.count(":") < 5

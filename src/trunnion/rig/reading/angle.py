@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import convolve1d, median_filter, minimum_filter1d, uniform_filter1d
 
 from trunnion.errors import Finding, MechanismError
+from trunnion.rig.reading.channels import missing
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.tables import DataTable
 from trunnion.rig.reading.timebase import GAP, Say, Timeline, at_times, counted, unit_of, warning
@@ -48,35 +49,26 @@ class Coordinate:
 
 
 def coordinate(source: AngleSource, table: DataTable, line: Timeline, speed: Array | None, say: Say) -> Coordinate:
-    """The coordinate of the driver by its source.
-
-    Parameters
-    ----------
-    source : the entry `angle` of the mapping.
-    table : columns of the file.
-    line : times of its rows.
-    speed : that of the channel, rad/s, of a source `speed`.
-    say : takes findings, and sentences about what was done.
-    """
-    index = np.empty(0)
+    """The coordinate of the driver by its source; speed: that of the channel, rad/s, of a source `speed`."""
+    index, column = np.empty(0), table.columns.get(source.column or "")
     if source.index is not None:
         index = edges(line.rows(table.columns[source.index.column].values), line).times
         if not index.size:
             what, remedy = f"the column '{source.index.column}' has no pulse", "check the column, or remove index"
             say(warning("index.none", "angle.index", what, remedy))
     spoilt, lag, cut = np.empty((0, 2)), 0.0, 0.0
+    if column is not None:
+        readings = np.array(line.rows(column.values))
+        say(missing("angle", column, readings, line.seconds))
     if source.from_ == "pulses":
-        values, spoilt, lag = _of_pulses(source, line.rows(table.columns[str(source.column)].values), line, index, say)
-    elif source.from_ == "column":
-        column = table.columns[str(source.column)]
-        values = line.rows(column.values) * unit_of("angle", str(source.column), column, source.unit, "rad", say)[1]
-        if lost := int(np.count_nonzero(~np.isfinite(values))):
-            what = f"{counted(lost, 'cell')} of '{source.column}' of {values.size:,} are no number; left out"
-            say(warning("angle.missing", "angle", what, "check the angle sensor and its cable"))
-        values = joined(values)
+        values, spoilt, lag = _of_pulses(source, readings, line, index, say)
+    elif column is not None:
+        _, factor = unit_of("angle", str(source.column), column, source.unit, "rad", say)
+        values = joined(readings * factor)
         if source.resolution is not None and np.count_nonzero(np.isfinite(values)) >= FEWEST:
-            values, lag = _refined(values, float(source.resolution.evaluate()), line, say)
-            cut = source.sign * float(source.resolution.evaluate()) / math.sqrt(12.0)
+            step = float(source.resolution.evaluate())
+            values, lag = _refined(values, step, line, say)
+            cut = source.sign * step / math.sqrt(12.0)
     elif source.speed is not None:
         values = float(source.speed.evaluate()) * line.seconds
         say(f"the angle is that of a constant speed of {float(source.speed.evaluate()):.6g} rad/s")
@@ -84,7 +76,7 @@ def coordinate(source: AngleSource, table: DataTable, line: Timeline, speed: Arr
         assert speed is not None
         finite, values = np.isfinite(speed), np.full(speed.size, np.nan)
         if np.count_nonzero(finite) > 1:  # where it is missing it is interpolated
-            bridged = speed if finite.all() else np.interp(line.seconds, line.seconds[finite], speed[finite])
+            bridged = np.interp(line.seconds, line.seconds[finite], speed[finite])
             steps = 0.5 * (bridged[1:] + bridged[:-1]) * np.diff(line.seconds)
             values = np.concatenate([[0.0], np.cumsum(steps)])
         say("the angle is the integral of the speed from the first row; its zero creeps with the sensor's error")
@@ -137,14 +129,17 @@ def _of_pulses(
     """The angle between pulses by interpolation in time, counted anew from every index pulse."""
     assert source.per_turn is not None
     finite, until = np.isfinite(readings), np.inf
-    if not finite.all():
-        what = f"{counted(int(np.count_nonzero(~finite)), 'cell')} of '{source.column}' of {readings.size:,} are no "
-        what += "number; the previous reading is used there"
-        say(warning("counter.missing", "angle", what, "check the counter and its cable"))
     if source.kind == "level":
         pulses = edges(readings, line)
-        if pulses.times.size > 2:
-            until = _check_level(pulses.times, line, index.size > 1, say)
+        gaps = np.flatnonzero(np.diff(line.seconds) > GAP * line.step)
+        gaps = gaps[line.seconds[gaps + 1] < pulses.times.max(initial=-np.inf)]
+        if gaps.size and index.size < 2:
+            until = float(line.seconds[gaps[0]])
+            what = f"no pulses are counted in gaps of time: the turns after {until:.5g} s are left out"
+            say(warning("pulses.gap", "angle", what, "record a count or an index"))
+        if pulses.times.size > 2 and (samples := float(np.median(np.diff(pulses.times))) / line.step) < 2.5:
+            what = f"a pulse of the encoder has {samples:.3g} samples: edges are missed"
+            say(warning("pulses.few_samples", "angle", what, "sample at least 4 times a pulse, or record a count"))
     else:
         pulses = _counted(source, readings[finite], line.seconds[finite], line.step)
     if pulses.times.size < 2:
@@ -215,21 +210,6 @@ def edges(readings: Array, line: Timeline) -> Pulses:
     return Pulses(seconds, np.arange(seconds.size, dtype=np.float64), crossings=bool(between))
 
 
-def _check_level(times: Array, line: Timeline, indexed: bool, say: Say) -> float:
-    """Until when the pulses of a level are all seen, s."""
-    usual = float(np.median(np.diff(times))) / line.step
-    if usual < 2.5:
-        what, remedy = f"a pulse of the encoder has {usual:.3g} samples", "sample at least 4 times a pulse"
-        say(warning("pulses.few_samples", "angle", f"{what}: edges are missed", f"{remedy}, or record a count"))
-    gaps = np.flatnonzero(np.diff(line.seconds[line.seconds < times[-1]]) > GAP * line.step)
-    if indexed or not gaps.size:
-        return np.inf
-    until = float(line.seconds[gaps[0]])
-    what = f"no pulses are counted in gaps of time: the angle is not known after {until:.5g} s"
-    say(warning("pulses.gap", "angle", f"{what}; the turns from there on are left out", "record a count or an index"))
-    return until
-
-
 def by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say) -> tuple[Array, Array]:
     """Counts from the first index pulse, set right at each; times of the turns in which pulses were lost.
 
@@ -289,22 +269,12 @@ def _refined(values: Array, step: float, line: Timeline, say: Say) -> tuple[Arra
 
 
 def smoothed(values: Array, off: float, per_turn: float, over: Array | None = None) -> tuple[Array, Array]:
-    """Smooth values at pulses by local cubics (Savitzky and Golay, doi:10.1021/ac60214a047).
+    """Values at pulses by local cubics (Savitzky and Golay, doi:10.1021/ac60214a047), and the turns of each span.
 
     Each takes the longest span in which no value is farther from the cubic than it may be, and their root mean square
-    is that of rounding.
-
-    Parameters
-    ----------
-    values : times, s, of pulses one count apart, or angles, rad, of pulses one sample apart.
-    off : by which each may be off, as uniformly as rounding.
-    per_turn : pulses of a turn.
-    over : counts of the times, or times of the angles, where some are more than one apart, as near one count a sample:
-        the values are smoothed less a straight line over them.
-
-    Returns
-    -------
-    The values, and the turns of each span; 0 where not even the shortest is so.
+    is that of rounding; 0 where not even the shortest is so. values: times, s, of pulses one count apart, or angles,
+    rad, of pulses one sample apart; off: by which each may be off; per_turn: pulses of a turn; over: counts of the
+    times, or times of the angles, where some are more than one apart: smoothed is what is left of a line over them.
     """
     result, spans = values.copy(), np.zeros(values.size)
     if off <= 0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import comb
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +15,13 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.mapping import Channel, Filter
 from trunnion.rig.reading.tables import Column
-from trunnion.rig.reading.timebase import Say, Timeline, at_times, counted, note, places, runs, unit_of, warning
+from trunnion.rig.reading.timebase import Say, Timeline, counted, lost, note, runs, unit_of, warning
 from trunnion.rig.reading.turns import Turns, turn_means
 from trunnion.rig.reading.units import Amount, SensorScale, alike, default_unit
 
 __all__ = [
     "LOOKED_AT", "WIDTH", "Drift", "Sensor", "check_filter", "clipped", "common_drift", "faults", "filtered",
-    "mean_uncertainty", "missing", "noise_of", "resolution", "sensor_of", "signs", "speeds", "spikes", "steady",
+    "mean_uncertainty", "missing", "noise_of", "resolution", "sensor_of", "signs", "spikes", "steady",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -132,8 +133,7 @@ def _zero_over(
             raise MechanismError(Finding(what, where, remedy, code="data.zero.no_readings"))
         far = spikes(part)
         if far.any():
-            what = f"spikes: {counted(int(far.sum()), 'reading')} of {part.size:,} in the unloaded stretch, "
-            say(warning("readings.spikes", where, f"{what}{at_times(when[far])}; left out", "check shielding"))
+            say(warning("readings.spikes", where, lost("spikes", far, when), "check shielding"))
         times.append(when[~far])
         parts.append(part[~far])
     say(f"zero of {name}: mean over the unloaded stretch")
@@ -247,45 +247,36 @@ def missing(where: str, column: Column, readings: Array, seconds: Array) -> Find
     """Cells without a number, which all become NaN: infinite ones too."""
     readings[np.isinf(readings)] = np.nan
     mask = np.isnan(readings)
-    if not mask.any():
-        return None
     example = f" ({counted(column.texts, 'text')} such as '{column.example}')" if column.texts else ""
-    what = f"dropouts: {counted(int(mask.sum()), 'cell')} of {readings.size:,} without a number{example}"
-    return warning("readings.missing", where, f"{what}, {places(mask, seconds)}; left out", "check cable and logger")
+    what = lost(f"dropouts{example}", mask, seconds, "cell")
+    return warning("readings.missing", where, what, "check sensor, cable and logger") if mask.any() else None
 
 
 def clipped(where: str, readings: Array, limit: float, unit: str, seconds: Array) -> Finding | None:
     """Readings at the end of the range or beyond, which become NaN; an error where most of the channel is."""
     rows = np.abs(readings) >= CLIP * limit
     count, finite = int(np.count_nonzero(rows)), int(np.count_nonzero(np.isfinite(readings)))
-    if not count:
-        return None
-    what = f"clipped: {counted(count, 'reading')} of {finite:,} at or beyond the end of the range of {limit:.6g} {unit}"
+    what = lost(f"clipped at the end of the range of {limit:.6g} {unit} or beyond", rows, seconds)
     if count > MOST * finite:  # what is left says nothing of the channel
         remedy = "check column, unit, gain and range of the channel in the mapping; else use a larger range"
         figures = {"count": count, "readings": finite}
         raise MechanismError(Finding(what, where, remedy, code="data.readings.clipped", figures=figures))
-    what = f"{what}, {places(rows, seconds)}; left out, so that means there are too small"
     readings[rows] = np.nan
-    return warning("readings.clipped", where, what, "use a larger range or a smaller load")
+    return warning("readings.clipped", where, what, "use a larger range or a smaller load") if count else None
 
 
 def faults(
-    where: str, readings: Array, seconds: Array, turns: tuple[Array, Array], beside: int, moves: bool = True
+    where: str, readings: Array, seconds: Array, turns: tuple[Array, Array], beside: int, moves: bool
 ) -> Iterator[Finding]:
     """Stuck readings and spikes while the drive runs, which become NaN; what most turns have is the signal's.
 
-    Parameters
-    ----------
-    where, readings, seconds : channel, its readings and their times.
-    turns : when they begin and end, s; with fewer than `FEW` nothing tells a fault from the signal.
-    beside : rows before and after the turns that reach into them, by interpolation or a filter.
-    moves : whether the readings are to change.
+    turns: when they begin and end, s; with fewer than `FEW` nothing tells a fault from the signal. beside: rows before
+    and after the turns that reach into them, by interpolation or a filter. moves: whether the readings are to change.
     """
     begin, end = turns
     first, last = int(np.searchsorted(seconds, begin[0])), int(np.searchsorted(seconds, end[-1], "right"))
-    running = readings[first:last]
-    finite = running[np.isfinite(running)]
+    running, near = slice(first, last), slice(max(first - beside, 0), last + beside)
+    finite = readings[running][np.isfinite(readings[running])]
     if finite.size < 10:
         return
     if finite.min() == finite.max():
@@ -293,17 +284,11 @@ def faults(
         remedy = "check that the sensor is connected and the column the right one"
         yield (warning if moves else note)("readings.constant", where, what, remedy)
         return
-    if begin.size < FEW:
-        return
-    near = slice(max(first - beside, 0), last + beside)
-    for rows, when, mask, code, remedy in (
-        (running, seconds[first:last], _stuck(running), "stuck", "check sensor and logger"),
-        (readings[near], seconds[near], spikes(readings[near]), "spikes", "check shielding and earth"),
-    ):
-        if 0 < runs(mask)[0].size < 0.5 * begin.size:
-            rows[mask] = np.nan
-            what = f"{code}: {counted(int(mask.sum()), 'reading')} of {finite.size:,}, {places(mask, when)}; left out"
-            yield warning(f"readings.{code}", where, what, remedy)
+    for code, rows, remedy in (("stuck", running, "check sensor and logger"), ("spikes", near, "check shielding")):
+        mask = (_stuck if code == "stuck" else spikes)(readings[rows])
+        if begin.size >= FEW and 0 < runs(mask)[0].size < 0.5 * begin.size:
+            readings[rows][mask] = np.nan
+            yield warning(f"readings.{code}", where, lost(code, mask, seconds[rows]), remedy)
 
 
 def _stuck(part: Array) -> Mask:
@@ -336,8 +321,7 @@ def spikes(part: Array) -> Mask:
 # ---- turns ----------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Drift:
+class Drift(NamedTuple):
     """A zero that creeps: slope and its standard error, SI a second, and what it amounts to over the turns.
 
     span: from the middle of the first turn to that of the last, over which the change is.
@@ -360,38 +344,33 @@ def common_drift(parts: Sequence[tuple[Turns, Array]]) -> Drift | None:
             mean, middle = mean[finite], middle[finite]
             rows.append(np.stack([middle, middle - middle.mean(), mean - mean.mean()]))
             largest = max(largest, float(np.nanmax(np.abs(course))))
-    if not rows:
-        return None
-    middle, t, y = np.concatenate(rows, axis=1)
+    middle, t, y = np.concatenate(rows or [np.empty((3, 0))], axis=1)
     free, square = t.size - len(rows) - 1, float(np.sum(t**2))
     if free < 4 or square == 0:
         return None
     slope = float(np.sum(t * y)) / square
     scatter = float(np.sqrt(np.sum((y - slope * t) ** 2) / free))
     error, span = scatter / np.sqrt(square), float(np.ptp(middle))
-    change = slope * span
-    if change == 0 or abs(slope) < CERTAIN * error or abs(change) < max(PLAIN * scatter, SHARE * largest):
-        return None
-    return Drift(slope, error, change, scatter, span)
+    plain = abs(slope) >= CERTAIN * error and abs(slope * span) >= max(PLAIN * scatter, SHARE * largest)
+    return Drift(slope, error, slope * span, scatter, span) if plain and slope * span else None
 
 
 def steady(turns: Turns, step: float, where: str) -> Finding | None:
     """Turns that are not equally fast, by more than the sampling can tell."""
-    lengths = turns.end - turns.begin
-    spread = float(np.ptp(1 / lengths)) / float(np.mean(1 / lengths)) if lengths.size > 1 else 0.0
-    if spread <= STEADY + 2 * step / float(np.mean(lengths)):
+    speeds = 60 / (turns.end - turns.begin)
+    spread = float(np.ptp(speeds) / np.mean(speeds))
+    if spread <= STEADY + 2 * step / float(np.mean(turns.end - turns.begin)):
         return None
-    slow, fast = 60 / float(lengths.max()), 60 / float(lengths.min())
-    what = f"the speed is not steady: {slow:.4g} to {fast:.4g} cycles a minute, {100 * spread:.3g} % between turns"
+    what = f"the speed is not steady: {speeds.min():.4g} to {speeds.max():.4g} cycles a minute, {100 * spread:.3g} % "
     remedy = "state files: over: to use the steady part, or improve the speed control"
-    return warning("speed.unsteady", where, what, remedy)
+    return warning("speed.unsteady", where, f"{what}between turns", remedy)
 
 
 def signs(
     sensors: Mapping[str, Sensor], courses: Mapping[str, Array], zeros: Mapping[str, float], turning: float
 ) -> Iterator[Finding]:
-    """Channels that are likely to have the wrong sign: an angle against the speed of its driver, a power into a driver
-    or out at a load below zero in all turns of a file.
+    """Channels that are likely to have the wrong sign or unit: a speed of the driver that is not that of the angle, a
+    power into a driver or out at a load below zero in nearly all turns of a file.
 
     courses: turns of all conditions; zeros: standard uncertainty of the zero of each channel, SI, within which the mean
     of a power shows no sign; turning: mean speed of the driver by its angle, rad/s with its sign.
@@ -401,55 +380,32 @@ def signs(
         kind, _, subject = sensor.channel.measures.partition(":")
         subjects.get(kind, {})[subject] = name
     rates, drivers, loads = subjects.values()
-    free = [name for joint, name in rates.items() if joint not in drivers]
-    pairs = [(name, rates.get(driver, ""), "into") for driver, name in drivers.items()]
-    pairs += [
-        (name, rates.get(load, free[0] if len(free) == 1 else ""), "delivered to") for load, name in loads.items()
-    ]
-    against, gives = "", False
-    if len(drivers) == 1 and turning and (rate := pairs[0][1]):
-        finding = speeds(rate, sensors[rate], courses[rate], turning)
-        against = rate if finding is not None and finding.code == "data.rate.sign" else ""
-        if finding is not None:
-            yield finding
+    free, ratio = [name for joint, name in rates.items() if joint not in drivers], 1.0
+    rate = rates.get(next(iter(drivers))) if len(drivers) == 1 and turning else None
+    if rate and (speed := courses[rate][np.isfinite(courses[rate])]).size:
+        one_way = np.all(speed * speed[0] > 0)  # over equal angles its mean in time is the harmonic one
+        ratio = turning / (float(1 / np.mean(1 / speed)) if one_way else float(np.mean(speed)))
+        if abs(ratio - 1) > APART:
+            unit, size = sensors[rate].read_in if sensors[rate].read_in[0] else (sensors[rate].scale.unit, 1.0)
+            what = f"the angle turns at {turning / size:.4g} {unit}, {ratio:.4g} times what '{rate}' reads"
+            remedy = (
+                f"write sign: {-sensors[rate].channel.sign} or turn angle.sign, if that alone is wrong; else check "
+            )
+            yield warning("rate.ratio", f"channels.{rate}", what, f"{remedy}unit and gain, and per_turn of angle")
+    pairs = [(name, rates.get(driver), "into") for driver, name in drivers.items() if abs(ratio + 1) > APART]
+    other = free[0] if len(free) == 1 else None
+    pairs += [(name, rates.get(load, other), "out at") for load, name in loads.items()]
     for name, rate, side in pairs:
-        if not rate and (side != "into" or len(drivers) > 1):
-            continue
-        if side != "into" and not gives:  # a load may drive, if no motor does
+        if rate is None and (side == "out at" or len(drivers) > 1):
             continue
         speed = courses[rate] if rate else np.full_like(courses[name], turning)
         power = turn_means(courses[name] * speed)
         power = power[np.isfinite(power)]
         below = int(np.count_nonzero(power < 0))
-        plain = bool(power.size) and abs(np.mean(power)) > 2 * abs(float(np.nanmean(zeros[name] * speed)))
-        wrong = plain and below > NEARLY_ALL * power.size
-        gives = gives or wrong or bool(power.size and np.mean(power > 0) > NEARLY_ALL)
-        if wrong and not (rate and rate == against):  # else the speed is at fault
-            what = (
-                f"sign: the power {side} {sensors[name].channel.measures.partition(':')[2]} is negative in {below:,} "
-            )
-            what += f"of {counted(power.size, 'turn')} ({power.mean():.4g} W)"
-            remedy = (
-                f"write sign: {-sensors[name].channel.sign}, or turn the speed or sign: in angle:, if that is wrong"
-            )
+        plain = power.size and abs(np.mean(power)) > 2 * abs(float(np.nanmean(zeros[name] * speed)))
+        if plain and below > NEARLY_ALL * power.size:
+            channel = sensors[name].channel
+            what = f"sign: the power {side} {channel.measures.partition(':')[2]} is negative in {below:,} of "
+            what += f"{counted(power.size, 'turn')} ({power.mean():.4g} W)"
+            remedy = f"write sign: {-channel.sign}, or turn the speed or sign: in angle:, if that is wrong"
             yield warning("power.sign", f"channels.{name}", what, remedy)
-
-
-def speeds(name: str, sensor: Sensor, course: Array, turning: float) -> Finding | None:
-    """An angle that turns at another mean speed, rad/s, than the channel of its driver reads, or the other way."""
-    finite = course[np.isfinite(course)]
-    if not finite.any():
-        return None
-    # over equal angles the mean of a speed in time is the harmonic one
-    one_way = np.all(finite > 0) or np.all(finite < 0)
-    speed = float(1 / np.mean(1 / finite)) if one_way else float(np.mean(finite))
-    ratio = turning / speed if speed else np.inf
-    if abs(ratio - 1) <= APART:
-        return None
-    unit, size = sensor.read_in if sensor.read_in[0] else (sensor.scale.unit, 1.0)
-    where, what = f"channels.{name}", f"the angle turns at {turning / size:.4g} {unit}, '{name}' reads "
-    what += f"{speed / size:.4g} {unit}"
-    if abs(ratio + 1) <= APART:
-        return warning("rate.sign", where, f"sign: {what}", f"write sign: {-sensor.channel.sign}, or turn angle.sign")
-    remedy = "check unit and gain of the channel, and per_turn or unit of angle"
-    return warning("rate.ratio", where, f"{what}, {ratio:.4g} times", remedy)

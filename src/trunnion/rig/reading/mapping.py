@@ -39,7 +39,7 @@ from trunnion.rig.reading.units import dimensions as unit_dimensions
 
 __all__ = [
     "Accuracies", "AngleSource", "Channel", "DataMapping", "File", "Filter", "FixedAngle", "FixedNumber", "FixedTime",
-    "FromData", "Mapped", "TimeBase", "Zero", "read_mapping", "schema_text",
+    "FromData", "Mapped", "Pulses", "TimeBase", "Zero", "read_mapping", "schema_text",
 ]  # fmt: skip
 
 Sign = Literal[1, -1]
@@ -214,7 +214,25 @@ class Accuracies(Part):
     zero: Size = PLAIN_ZERO
 
 
-class Channel(Part):
+class FileChannel(Part):
+    """A channel in one data file, as of another setting of its amplifier: what it states in place of the channel's."""
+
+    unit: UnitText | None = None
+    gain: Number | None = None
+    zero: ChannelZero = PLAIN_ZERO
+    range: Positive | None = None
+    resolution: Positive | None = None
+    accuracy: Accuracies = Accuracies()
+
+    def of(self, channel: Channel) -> Channel:
+        """The channel as it is in the file; UnitError if the two do not go together."""
+        changed = channel.model_copy(update={key: getattr(self, key) for key in self.model_fields_set})
+        if changed.unit is not None:
+            changed.scale(changed.unit)
+        return changed
+
+
+class Channel(FileChannel):
     """A column that measures something of the model, and how its readings become that.
 
     Quantity = sign · (reading − zero) · gain, or / gain, as its unit tells. per_turn: pulses of a speed that is worked
@@ -223,13 +241,7 @@ class Channel(Part):
 
     column: str
     measures: MeasureText
-    unit: UnitText | None = None
-    gain: Number | None = None
     sign: Sign = 1
-    zero: ChannelZero = PLAIN_ZERO
-    range: Positive | None = None
-    resolution: Positive | None = None
-    accuracy: Accuracies = Accuracies()
     per_turn: Pulses | None = None
 
     @model_validator(mode="after")
@@ -257,25 +269,6 @@ class FileAngle(Part):
     """The angle in one data file: its zero, in place of that of `angle`."""
 
     zero: FixedAngle
-
-
-class FileChannel(Part):
-    """A channel in one data file, as of another setting of its amplifier: what it states in place of the channel's."""
-
-    unit: UnitText | None = None
-    gain: Number | None = None
-    zero: ChannelZero | None = None
-    range: Positive | None = None
-    resolution: Positive | None = None
-    accuracy: Accuracies | None = None
-
-    def of(self, channel: Channel) -> Channel:
-        """The channel as it is in the file; UnitError if the two do not go together."""
-        stated = {key: getattr(self, key) for key in type(self).model_fields if getattr(self, key) is not None}
-        changed = channel.model_copy(update=stated)
-        if changed.unit is not None:
-            changed.scale(changed.unit)
-        return changed
 
 
 class File(Part):
@@ -382,19 +375,10 @@ def read_mapping(source: str | os.PathLike[str] | Mapping[str, Any]) -> Mapped:
         mapping = DataMapping.model_validate(data)
         findings = list(_unsound(mapping, folder))
     except ValidationError as error:
-        findings = [_in_mapping(finding) for finding in schema_findings(error, DataMapping, data)]
+        findings = schema_findings(error, DataMapping, data)
     if findings:
         raise MechanismError(place(findings, file, lines, data) if file else findings)
     return Mapped(mapping, folder, file, lines, data)
-
-
-def _in_mapping(finding: Finding) -> Finding:
-    """A finding of the schema with a remedy for a mapping."""
-    if finding.what == "'trunnion-data' is missing":
-        return Finding("is no mapping file: 'trunnion-data' is missing", "", "begin the file with trunnion-data: 1")
-    if finding.remedy == "see the examples of model files":
-        return Finding(finding.what, finding.where, "see the examples of mappings in docs/how-to/measured-data.md")
-    return finding
 
 
 def _unsound(mapping: DataMapping, folder: Path) -> Iterator[Finding]:
@@ -439,18 +423,11 @@ def _inside(name: str, folder: Path) -> bool:
         return False
 
 
-class _Generator(SchemaGenerator):
-    """Amounts as they would be written in a file."""
-
-    def encode_default(self, dft: Any) -> Any:
-        return dft.source if isinstance(dft, Amount) else super().encode_default(dft)
-
-
 def schema_text() -> str:
     """The JSON Schema (2020-12) of a mapping file, for editors that complete and check as you type."""
     schema = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **DataMapping.model_json_schema(schema_generator=_Generator),
+        **DataMapping.model_json_schema(schema_generator=SchemaGenerator),
         "title": "Trunnion mapping file",
     }
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,6 @@ Array = NDArray[np.float64]
 SPARSE = 0.25  # samples a position, below which nearly all values are interpolated
 PASSED = 1.25  # times what a cubic between samples leaves of white noise, at the least
 PERIODS = 5.0  # of the cut-off of a filter, over which a reading reaches
-UNUSED = 0.5  # of the turns recorded, below which a warning says how few are used
 MOST_VALUES = 500  # that a column may state; more, and it is a measurement
 DIGITS = 9  # by which two of its values are the same
 StepKey = tuple[str, str, float]  # channel, unit of its readings, factor: one step of the readings
@@ -102,17 +102,15 @@ def _done(conditions: Sequence[Condition], recordings: Sequence[_Recording]) -> 
 
 def _distinct(conditions: Sequence[Condition]) -> list[Condition]:
     """Conditions with different names: the file is added where two are alike, then a number."""
-    names, taken = [condition.name for condition in conditions], set[str]()
-    renamed = []
+    names = [condition.name for condition in conditions]
+    renamed: dict[str, Condition] = {}
     for condition in conditions:
-        files = ", ".join(Path(file).stem for file in condition.files)
-        plain = f"{condition.name} ({files})" if names.count(condition.name) > 1 else condition.name
-        name, number = plain, 2
-        while name in taken:
-            name, number = f"{plain} {number}", number + 1
-        taken.add(name)
-        renamed.append(replace(condition, name=name))
-    return renamed
+        plain = condition.name
+        if names.count(plain) > 1:
+            plain = f"{plain} ({', '.join(Path(file).stem for file in condition.files)})"
+        name = next(text for k in count(1) if (text := f"{plain} {k}" if k > 1 else plain) not in renamed)
+        renamed[name] = replace(condition, name=name)
+    return list(renamed.values())
 
 
 @dataclass
@@ -120,15 +118,13 @@ class _Part:
     """One condition of a file.
 
     texts: numbers of the model that were set, as written, by name; values: the same and what is measured, SI; units:
-    of those that were stated with a unit, SI; window: rows from the first to the last for which it was set; rows: those
-    of them for which it was; courses: of the channels, (turn, position); left: what of the error by steps its turns
-    repeat.
+    of those that were stated with a unit, SI; rows: for which it was set, (row,); courses: of the channels, (turn,
+    position); left: what of the error by steps its turns repeat.
     """
 
     texts: dict[str, str]
     values: dict[str, float]
     units: dict[str, str]
-    window: slice
     rows: NDArray[np.bool_]
     turns: Turns = field(init=False)
     courses: dict[str, Array] = field(default_factory=dict)
@@ -197,18 +193,15 @@ class _Recording:
         allowed = (self.line.seconds >= begin) & (self.line.seconds <= end)
         share, spoilt = self._cycles(allowed)
         for part in self._settings():
-            rows = allowed[part.window] & part.rows
-            part.turns = cut(share, self.line, part.window, rows, mapping.positions, spoilt, say, part.where)
-            steps = np.abs(np.diff(share[part.window])[rows[1:] & rows[:-1]])
-            gone, count = float(np.nansum(steps[~np.isinf(steps)])), part.turns.numbers.size
-            if not count:
-                what = f"there is no whole turn: {gone:.3g} cycles in {counted(int(rows.sum()), 'row')}"
-                say(Finding(what, part.where, "check angle, or record for longer", code="data.turns.none"))
-                continue
-            if count < UNUSED * gone - 2:
-                what = f"{counted(count, 'turn')} of {gone:,.0f} recorded can be used"
-                say(warning("turns.lost", part.where, what, "correct what the other findings name"))
-            self.parts.append(part)
+            rows = allowed & part.rows
+            part.turns = cut(share, self.line, rows, mapping.positions, spoilt, say, part.where)
+            if part.turns.numbers.size:
+                self.parts.append(part)
+            else:
+                cycles = share[rows & np.isfinite(share)]
+                what = f"there is no whole turn: {np.ptp(cycles) if cycles.size else 0:.3g} cycles in "
+                what, remedy = what + counted(int(rows.sum()), "row"), "check angle, or record for longer"
+                say(Finding(what, part.where, remedy, code="data.turns.none"))
         if self.parts:
             self._check_sampling()
             self._find_faults()
@@ -248,7 +241,7 @@ class _Recording:
                 columns[path] = self.line.rows(column.values), unit, factor
                 units |= {path: unit_name(dimensions(unit)[1])} if unit else {}
         if not columns:
-            return [_Part(texts, values, units, slice(0, size), np.ones(size, dtype=np.bool_))]
+            return [_Part(texts, values, units, np.ones(size, dtype=np.bool_))]
         raw = np.column_stack([numbers for numbers, _, _ in columns.values()])
         stated = np.isfinite(raw).all(axis=1)
         if not stated.all():
@@ -262,9 +255,7 @@ class _Recording:
         number, parts = np.full(size, -1), []
         number[stated] = which.ravel()
         for k in dict.fromkeys(which.ravel().tolist()):  # in the order of the file
-            rows = np.flatnonzero(number == k)
-            window = slice(int(rows[0]), int(rows[-1]) + 1)
-            part = _Part(dict(texts), dict(values), dict(units), window, number[window] == k)
+            part = _Part(dict(texts), dict(values), dict(units), number == k)
             for (path, (_, unit, factor)), value in zip(columns.items(), levels[k].tolist(), strict=True):
                 part.texts[path], part.values[path] = f"{value:.6g} {unit}".strip(), value * factor
             parts.append(part)
@@ -415,33 +406,11 @@ def _rounded(values: Array) -> Array:
 
 
 def _table(path: Path, mapping: DataMapping) -> DataTable:
-    """The columns of a file that the mapping names; a missing one is reported with the entry that names it."""
-    named: dict[str, str | None] = {"time.column": mapping.time.column if mapping.time else None}
-    if mapping.angle is not None:
-        named["angle.column"] = mapping.angle.column
-        named["angle.index.column"] = mapping.angle.index.column if mapping.angle.index else None
-    named |= {f"channels.{name}.column": channel.column for name, channel in mapping.channels.items()}
-    named |= {f"set.{name}.column": setting.column
-              for name, setting in mapping.set.items() if isinstance(setting, FromData)}  # fmt: skip
-    columns = {where: column for where, column in named.items() if column is not None}
-    of_time = "time.column" if path.suffix.lower() == ".tdms" else ""  # which may state its sampling by itself
-    needed = [column for where, column in columns.items() if where != of_time]
-    try:
-        table = read_table(path, needed, [columns[of_time]] if of_time in columns else [])
-    except MechanismError as error:
-        missing = error.findings[0].figures.get("missing", ())
-        where = ", ".join(key for key, column in columns.items() if column in missing)
-        raise MechanismError([replace(one, where=where) for one in error.findings]) from None
-    findings = []
-    for where, name in columns.items():
-        column = table.columns.get(name)
-        numbers = int(np.count_nonzero(~np.isnan(column.values))) if column else 0
-        if column and where != "time.column" and not column.stamps and column.texts > numbers:
-            what = f"'{name}' has text in {column.texts:,} cells and a number in {numbers:,}; the first text is "
-            remedy = "name a column of numbers; a unit belongs in the heading"
-            figures = {"texts": column.texts, "numbers": numbers}
-            text = Finding(f"{what}'{column.example}'", where, remedy, code="data.readings.text", figures=figures)
-            findings.append(text)
-    if findings:
-        raise MechanismError(findings)
-    return table
+    """The columns of a file that the mapping names."""
+    sources = (mapping.angle, mapping.angle.index if mapping.angle else None, *mapping.channels.values())
+    settings = (setting for setting in mapping.set.values() if isinstance(setting, FromData))
+    names = [source.column for source in (*sources, *settings) if source is not None and source.column is not None]
+    time = [mapping.time.column] if mapping.time and mapping.time.column else []
+    if path.suffix.lower() == ".tdms":  # which may state its sampling by itself
+        return read_table(path, names, time)
+    return read_table(path, [*time, *names])

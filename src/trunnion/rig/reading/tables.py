@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import reading
-from trunnion.model.names import nearest, unguarded
+from trunnion.model.names import unguarded
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.units import dimensions
 
-__all__ = ["FORMATS", "Column", "DataTable", "read_table", "ungrouped"]
+__all__ = ["FORMATS", "Column", "DataTable", "read_table"]
 
 Array = NDArray[np.float64]
 NAMED = 40  # columns in a message
@@ -93,7 +93,7 @@ def read_table(path: Path, names: Iterable[str], optional: Iterable[str] = ()) -
     Raises
     ------
     MechanismError
-        Where the file cannot be read; where a column is missing, its figures name it.
+        Where the file cannot be read, or a column is missing.
     """
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
@@ -114,8 +114,8 @@ def read_table(path: Path, names: Iterable[str], optional: Iterable[str] = ()) -
     return table
 
 
-def _failed(path: Path, what: str, remedy: str, line: int | None = None, **figures: Any) -> MechanismError:
-    return MechanismError(Finding(what, file=str(path), line=line, remedy=remedy, figures=figures))
+def _failed(path: Path, what: str, remedy: str, line: int | None = None) -> MechanismError:
+    return MechanismError(Finding(what, file=str(path), line=line, remedy=remedy))
 
 
 def _places(path: Path, present: Sequence[str], names: Sequence[str], optional: Sequence[str]) -> dict[str, int]:
@@ -123,9 +123,7 @@ def _places(path: Path, present: Sequence[str], names: Sequence[str], optional: 
     if missing := [name for name in names if name not in present]:
         listed = ", ".join(f"'{name}'" for name in present[:NAMED]) + (", …" if len(present) > NAMED else "")
         what = f"there is no column {', '.join(map(repr, missing))}; the file has {listed or 'none'}"
-        near = nearest(missing[0], present)
-        like = near.startswith("did you mean") and len(missing[0]) > 3  # T1 is not meant where T2 is written
-        raise _failed(path, what, near if like else "name one of these in the mapping", missing=missing)
+        raise _failed(path, what, "name one of these in the mapping")
     wanted = [name for name in (*names, *optional) if name in present]
     if doubled := [name for name in wanted if present.count(name) > 1]:
         raise _failed(path, f"the column '{doubled[0]}' stands there {present.count(doubled[0])} times", "rename one")
@@ -135,13 +133,11 @@ def _places(path: Path, present: Sequence[str], names: Sequence[str], optional: 
 # ---- cells ----------------------------------------------------------------------------------------------------
 
 NOTHING = frozenset({"", "nan", "n/a", "na", "#n/a", "null", "none", "-nan", "inf", "-inf", "+inf", "infinity"})
-GROUPED = {  # thousands with a sign between them; of a point or a comma only where decimals tell which of them it is
-    ",": re.compile(r"[-+]?\d{1,3}(?:(?:\.\d{3})+,\d+|(?:[\u00a0\u202f ]\d{3})+(?:,\d+)?)"),
-    ".": re.compile(r"[-+]?\d{1,3}(?:(?:,\d{3})+\.\d+|(?:[\u00a0\u202f ]\d{3})+(?:\.\d+)?)"),
-}
-_BETWEEN = re.compile(r"[.,\u00a0\u202f ](?=\d{3}(?:\D|$))")
 _COMMA = re.compile(r"[-+]?(?:\d{1,3}(?:[.\u00a0\u202f ]\d{3})+|\d*),\d+(?:[eE][-+]?\d+)?")
-_POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
+_GROUPED = {  # with a sign between thousands: only where decimals tell which of point and comma it is
+    ",": re.compile(r"[-+]?\d{1,3}(?:([.\u00a0\u202f ])\d{3})+,\d+"),
+    ".": re.compile(r"[-+]?\d{1,3}(?:([,\u00a0\u202f ])\d{3})+\.\d+"),
+}
 _WHOLE = re.compile(r"\d:\d\d:\d\d(?![\d.])", re.ASCII)  # seconds without a fraction
 _DAYTIME, _YEAR = re.compile(r"\d{1,2}:", re.ASCII), re.compile(r"\d{4}-", re.ASCII)
 _TIME = re.compile(r"(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[ T]\s*)?\d{1,2}:[0-5]\d:[0-5]\d.*", re.ASCII)
@@ -155,16 +151,11 @@ def _number(text: object) -> float:
         return np.nan
 
 
-def ungrouped(text: str, decimal: str) -> str:
-    """A number without signs between thousands and with a decimal point: 1450.33 of `1.450,33`."""
-    if GROUPED[decimal].fullmatch(text):
-        integer, sign, fraction = text.partition(decimal)
-        text = _BETWEEN.sub("", integer) + sign + fraction
-    return text if decimal == "." else text.replace(decimal, ".")
+def _column(cells: Any, unit: str = "", decimal: str = ".", thousands: str | None = None) -> Column:
+    """Cells of any kind as floats, infinite ones as they are; time stamps as seconds since the first.
 
-
-def _column(cells: Any, unit: str = "", decimal: str = ".") -> Column:
-    """Cells of any kind as floats, infinite ones as they are; time stamps as seconds since the first."""
+    decimal, thousands: signs in texts; another point or comma may be either, and makes no number.
+    """
     cells = np.asarray(cells)
     if cells.dtype.kind in "fiub":
         return Column(np.asarray(cells, dtype=np.float64), unit)
@@ -174,7 +165,8 @@ def _column(cells: Any, unit: str = "", decimal: str = ".") -> Column:
         since = ticks[dated][0] if cells.dtype.kind == "M" and dated.any() else 0
         return Column(np.where(dated, (ticks - since) * 1e-9, np.nan), unit)
     rows = ["" if cell is None or (isinstance(cell, float) and np.isnan(cell)) else str(cell).strip() for cell in cells]
-    values = np.array([_number(ungrouped(row.replace("−", "-"), decimal)) for row in rows])
+    signs = str.maketrans({".": "?", ",": "?", "−": "-"} | ({thousands: ""} if thousands else {}) | {decimal: "."})
+    values = np.array([_number(row.translate(signs)) for row in rows])
     texts = [row for row, value in zip(rows, values, strict=True) if np.isnan(value) and row.casefold() not in NOTHING]
     stamps = texts and _TIME.fullmatch(texts[0]) and not np.isfinite(values).any()
     return Column(values, unit, len(texts), texts[0][:40] if texts else "", tuple(rows) if stamps else ())
@@ -208,13 +200,15 @@ def _read_text(path: Path, names: Sequence[str], optional: Sequence[str]) -> Dat
         units = [unit or text for unit, text in zip(units, [*map(_bare, below), *[""] * len(units)], strict=False)]
     sample = [row[place] for _, row in rows[:FIRST] for place in places.values() if place < len(row)]
     decimal = "," if separator != "," and any(_COMMA.fullmatch(cell) for cell in sample) else "."
+    thousands = next((match[1] for cell in sample if (match := _GROUPED[decimal].fullmatch(cell))), None)
     version = tuple(int(part) for part in re.findall(r"\d+", pd.__version__)[:2])
     exact: dict[str, Any] = {} if version >= (3, 1) else {"float_precision": "round_trip"}
     width = max(len(heads), *(len(row) for _, row in rows)) if rows else len(heads)  # separators end some lines
     columns_used = sorted(set(places.values())) if width > WIDE else None
     try:
         frame = pd.read_csv(
-            path, sep=separator, decimal=decimal, header=None, names=list(range(width)), usecols=columns_used,
+            path, sep=separator, decimal=decimal, thousands=thousands, header=None, names=list(range(width)),
+            usecols=columns_used,
             skiprows=header + 1, comment="#", encoding=encoding, encoding_errors="replace", low_memory=False,
             skipinitialspace=True, **exact,
         )  # fmt: skip
@@ -227,19 +221,9 @@ def _read_text(path: Path, names: Sequence[str], optional: Sequence[str]) -> Dat
         what = f"row {longer[0] + 1} below the header has more cells than its {len(heads)}"
         remedy = "correct it; numbers with a decimal comma need a semicolon or tab between them"
         raise _failed(path, what, remedy)
-    columns = {name: _text_column(path, name, frame[place], units[place], decimal) for name, place in places.items()}
+    columns = {name: _column(frame[place].to_numpy(), units[place], decimal, thousands)
+               for name, place in places.items()}  # fmt: skip
     return DataTable(str(path), columns, encoding=encoding)
-
-
-def _text_column(path: Path, name: str, series: Any, unit: str, decimal: str) -> Column:
-    """A column of text; beside decimal commas a point may be one of thousands or of decimals, and is refused."""
-    cells = series.to_numpy()
-    if decimal == "," and cells.dtype.kind not in "fiub":
-        points = (cell for cell in cells.tolist() if isinstance(cell, str) and _POINT.fullmatch(cell.strip()))
-        if (point := next(points, None)) is not None:
-            what = f"decimal and thousands signs are mixed: '{point.strip()[:20]}' in '{name}' beside decimal commas"
-            raise _failed(path, what, "export it without a sign between thousands, and with one sign for decimals")
-    return _column(cells, unit, decimal)
 
 
 def _first_lines(path: Path) -> tuple[list[tuple[int, str]], str]:
@@ -279,7 +263,7 @@ def _header(path: Path, lines: list[tuple[int, str]], wanted: set[str]) -> tuple
         first = " / ".join(line.strip()[:60] for _, line in lines[:3])
         what = f"no line has the columns {', '.join(map(repr, sorted(wanted)))}; the first lines are: {first}"
         remedy = "name the columns of the file in the mapping, or write their names above the numbers"
-        raise _failed(path, what, remedy, 1, missing=sorted(wanted))
+        raise _failed(path, what, remedy, 1)
     return best[1:]
 
 
@@ -336,9 +320,6 @@ def _read_parquet(path: Path, names: Sequence[str], optional: Sequence[str]) -> 
         raise _failed(path, f"is not Parquet: {str(error).splitlines()[0][:120]}", "check the file") from None
     columns = {}
     for name in places:
-        if pa.types.is_nested(schema.field(name).type):
-            what = f"the column '{name}' has {schema.field(name).type} in each cell, not a number"
-            raise _failed(path, what[:200], "write one column for each number")
         meta = schema.field(name).metadata or {}
         unit = (meta.get(b"unit") or meta.get(b"units") or b"").decode("utf-8", "replace")
         columns[name] = _column(table.column(name).to_pandas(), unit)

@@ -16,7 +16,7 @@ from trunnion.rig.reading.tables import Column, DataTable
 from trunnion.rig.reading.units import HERTZ, alike, dimensions
 
 __all__ = [
-    "GAP", "Say", "Timeline", "at_times", "counted", "gathered", "note", "places", "runs", "timeline", "unit_of",
+    "GAP", "Say", "Timeline", "at_times", "counted", "gathered", "lost", "note", "runs", "timeline", "unit_of",
     "warning",
 ]  # fmt: skip
 
@@ -39,10 +39,6 @@ class Timeline:
     step: float
     even: bool = True
     spoilt: Array = field(default_factory=lambda: np.empty(0))
-
-    def part(self, window: slice) -> Timeline:
-        """The rows of a window, those of all that are kept."""
-        return replace(self, seconds=self.seconds[window], kept=None)
 
     def rows(self, values: Array) -> Array:
         """The values of the rows that are kept."""
@@ -74,39 +70,31 @@ def timeline(table: DataTable, base: TimeBase | None, say: Say) -> Timeline:
 
 def _rising(seconds: Array, say: Say) -> Timeline:
     """Times that rise, from a column: rows whose time does not rise are left out."""
-    finite, total = np.isfinite(seconds), seconds.size
-    highest = np.maximum.accumulate(np.where(finite, seconds, -np.inf))
-    kept = np.flatnonzero(finite & (seconds > np.concatenate([[-np.inf], highest[:-1]])))
-    if lost := int(np.count_nonzero(~finite)):
-        what = f"no time in {counted(lost, 'row')} of {total:,}; left out"
-        say(warning("time.missing", "time", what, "check the logger, or state time: {rate: …}"))
+    highest = np.fmax.accumulate(seconds)
+    rises = np.isfinite(seconds) & (seconds > np.concatenate([[-np.inf], np.nan_to_num(highest[:-1], nan=-np.inf)]))
+    kept = np.flatnonzero(rises)
     if kept.size < 3:
-        what = f"the time rises in {kept.size} of {counted(total, 'row')}"
+        what = f"the time rises in {kept.size} of {counted(seconds.size, 'row')}"
         raise MechanismError(Finding(what, "time", "check that time.column is the right one"))
-    stated = seconds[finite]
-    steps = np.diff(stated)
-    repeated, back = np.flatnonzero(steps == 0), np.flatnonzero(steps < 0)
-    if repeated.size:
-        what = f"the time repeats in {counted(repeated.size, 'row')} of {stated.size:,}, {at_times(stated[repeated])}"
-        remedy = "check the logger; if the column is rounded, state time: {rate: …} instead"
-        say(warning("time.repeats", "time", f"{what}; these rows are left out", remedy))
-    if back.size:
-        what = f"the time runs backward {counted(back.size, 'time')}, {at_times(stated[back])}, by up to "
-        what += f"{-steps.min():.4g} s; rows are left out until it has passed"
-        remedy = "split the file where a new recording begins, or check the logger's clock"
+    stated = seconds[np.isfinite(seconds)]
+    back = np.diff(stated) < 0
+    if kept.size < seconds.size:
+        what = f"{counted(int(np.sum(~rises)), 'row')} of {seconds.size:,} left out: their time does not rise, "
+        what += f"{at_times(highest[~rises])}, and runs backward {counted(int(back.sum()), 'time')} by up to "
+        what += f"{max(-np.diff(stated).min(), 0) + 0.0:.4g} s"
+        remedy = "check the logger's clock, split the file where a recording begins, or state time: {rate: …}"
         say(warning("time.backward", "time", what, remedy))
     clean = seconds[kept]
     steps = np.diff(clean)
     step = float(np.median(steps))
     wide = steps > GAP * step
     if (gaps := np.flatnonzero(wide)).size:
-        lost = int(np.sum(np.rint(steps[gaps] / step) - 1))
-        longest = int(gaps[np.argmax(steps[gaps])])
-        what = f"{counted(gaps.size, 'gap')} in time, {counted(lost, 'sample')} missing, the longest "
+        samples, longest = int(np.sum(np.rint(steps[gaps] / step) - 1)), int(gaps[np.argmax(steps[gaps])])
+        what = f"{counted(gaps.size, 'gap')} in time, {counted(samples, 'sample')} missing, the longest "
         what += f"{steps[longest]:.4g} s at {clean[longest]:.5g} s"
         say(warning("time.gaps", "time", what, "the positions in them have fewer turns; check the logger's buffer"))
     even = float(np.std(steps[~wide] / step)) < UNEVEN
-    return Timeline(clean, kept if kept.size < total else None, step, even, stated[back])
+    return Timeline(clean, kept if kept.size < seconds.size else None, step, even, stated[:-1][back])
 
 
 def unit_of(where: str, name: str, column: Column, stated: str | None, assumed: str, say: Say) -> tuple[str, float]:
@@ -185,11 +173,7 @@ def at_times(seconds: Sequence[float] | NDArray[np.float64], most: int = 3) -> s
     return f"at {', '.join(f'{t:.5g}' for t in seconds[:most])}{', …' if len(seconds) > most else ''} s"
 
 
-def places(mask: NDArray[np.bool_], time: NDArray[np.float64]) -> str:
-    """Where the stretches of a mask are: the first times, and how long the longest is."""
-    starts, lengths = runs(mask)
-    longest = int(np.argmax(lengths))
-    if lengths[longest] < 3:
-        return at_times(time[starts])
-    end = min(starts[longest] + lengths[longest], time.size - 1)
-    return f"{at_times(time[starts])}, up to {time[end] - time[starts[longest]]:.3g} s long"
+def lost(kind: str, mask: NDArray[np.bool_], time: NDArray[np.float64], noun: str = "reading") -> str:
+    """Rows of a mask in words: what they are, how many, when the stretches of them begin; they are left out."""
+    count = f"{kind}: {counted(int(mask.sum()), noun)} of {mask.size:,}"
+    return f"{count}, {at_times(time[runs(mask)[0]])}; left out"

@@ -29,10 +29,10 @@ APART = 0.5  # of the usual length of a turn, by which one may differ from it
 
 @dataclass(frozen=True)
 class Turns:
-    """Whole turns of one condition in a file, among the rows of a window.
+    """Whole turns of one condition in a file.
 
-    share: (row of the window,), the cycle counted on, rising, whole at the start of each; numbers: of the turns;
-    begin, end: their times, s; rows: those that belong to them; positions: how many a turn; line: time of the rows;
+    share: (row,), the cycle counted on, rising, whole at the start of each; numbers: of the turns; begin, end: their
+    times, s; rows: those that belong to them, (row,); positions: how many a turn; line: time of the rows.
     """
 
     share: Array
@@ -42,7 +42,6 @@ class Turns:
     rows: Mask
     positions: int
     line: Timeline
-    window: slice
 
     @property
     def density(self) -> float:
@@ -50,22 +49,19 @@ class Turns:
         return float(np.mean(self.end - self.begin)) / (self.line.step * self.positions) if self.numbers.size else 0.0
 
 
-def cut(
-    shares: Array, times: Timeline, window: slice, allowed: Mask, positions: int, spoilt: Array, say: Say, where: str
-) -> Turns:
-    """Find the whole turns among the rows of a window.
+def cut(share: Array, line: Timeline, allowed: Mask, positions: int, spoilt: Array, say: Say, where: str) -> Turns:
+    """Find the whole turns among the rows that may be used.
 
     Parameters
     ----------
-    shares : cycles gone through, rising with time, NaN where not known.
-    times : of the rows.
-    window, allowed : rows that are looked at, and which of them may be used.
+    share : cycles gone through, rising with time, NaN where not known, (row,).
+    line : time of the rows.
+    allowed : rows that may be used.
     positions : of a turn.
     spoilt : stretches of time to leave out, (stretch, 2).
     say : takes findings about turns that are left out.
     where : what these are about.
     """
-    share, line = shares[window], times.part(window)
     begin, end, numbers = _whole(share, line)
     refused = np.concatenate([[0], np.cumsum(~allowed)])  # turns some of whose rows are not allowed
     low, high = (np.searchsorted(line.seconds, edge) for edge in (begin + 0.5 * line.step, end - 0.5 * line.step))
@@ -85,7 +81,7 @@ def cut(
         keep &= (begin > high - slack) | (end < low + slack)
     begin, end = begin[keep], end[keep]
     rows = _rows_of(share, begin, end, line, allowed, positions)
-    return Turns(share, numbers[keep], begin, end, rows, positions, line, window)
+    return Turns(share, numbers[keep], begin, end, rows, positions, line)
 
 
 def _whole(share: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]]:
@@ -136,10 +132,9 @@ def resampled(turns: Turns, channel: Array, angle: Array | None = None) -> Array
     angle: readings of a channel that is an angle, rad, before they were `joined`. Every turn is given as many whole
     turns at a position as these have in the fullest one.
     """
-    values = channel[turns.window]
     if not turns.numbers.size:
         return np.empty((0, turns.positions))
-    course = _averaged(turns, values) if turns.density >= DENSE else _interpolated(turns, values)
+    course = _averaged(turns, channel) if turns.density >= DENSE else _interpolated(turns, channel)
     if angle is None or not np.isfinite(course).any():
         return course
     raw, first = resampled(turns, angle), int(np.argmax(np.count_nonzero(np.isfinite(course), axis=1)))
@@ -255,7 +250,7 @@ def left_in_turns(turns: Turns, course: Array, readings: Array, noise: float) ->
     share, samples = in_step(turns, course), float(np.median(turns.end - turns.begin)) / turns.line.step
     every = share > ALIKE
     if every:  # then what a reading differs by from that a turn later is noise
-        rows = np.where(turns.rows, readings[turns.window], np.nan)
+        rows = np.where(turns.rows, readings, np.nan)
         apart = rows[round(samples) :] - rows[: -round(samples)]
         apart = apart[np.isfinite(apart)]
         noise = noise_before(float(np.sqrt(np.mean(apart**2) / 2))) if apart.size else 0.0

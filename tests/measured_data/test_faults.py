@@ -81,6 +81,12 @@ FAULTS: list[tuple[Any, str, tuple[str, ...], str]] = [
 ]
 
 
+def test_a_narrow_peak_of_the_signal_is_no_spike(run: Columns, tmp_path: Path) -> None:
+    """Narrower than the samples lie apart, so that few turns have a reading on it, in the same place of each."""
+    run["T1"][[4000, 5001, 7000, 8001]] += 5
+    assert read(run, tmp_path).findings == ()
+
+
 @pytest.mark.spread(7)
 @pytest.mark.parametrize(("spoil", "where", "figures", "remedy"), FAULTS, ids=[one[0].__name__ for one in FAULTS])
 def test_faults_are_named(

@@ -106,6 +106,8 @@ def test_numbers_that_are_none(tmp_path: Path) -> None:
     found = read_table(path, ["t", "x"]).columns["x"]
     assert (found.texts, found.example) == (2, "ERR")  # ERR and True
     np.testing.assert_array_equal(found.values, [np.nan, np.nan, np.inf, np.nan, np.inf, -1e308, 1e20, np.nan, np.nan])
+    path.write_text("t;x\n" + "0;0,5\n" * 500 + "0;1.450,25\n0;1.450\n", encoding="utf-8")
+    assert read_table(path, ["x"]).columns["x"].values[-2:].tolist() == [1450.25, 1450.0]
     path.write_text("t;x\n0;1,5\n1;1.450\n2;980,25\n", encoding="utf-8")
     found = read_table(path, ["t", "x"]).columns["x"]
     assert (found.texts, found.example) == (1, "1.450")

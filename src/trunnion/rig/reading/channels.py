@@ -35,6 +35,7 @@ STUCK = 30  # equal readings in a row at least
 WIDTH = 7  # samples of the median that spikes are told from: up to three in a row are found
 FAR = 12.0  # robust standard deviations from it
 SEEN = 0.1  # of the span from the 1st to the 99th percentile, that a spike exceeds
+CHANCE = 0.005  # that a fault comes as near as that to the place of another
 FEW = 4  # turns from which what comes back in them can be told from faults
 STEADY = 0.03  # of the mean speed, between the slowest and the fastest turn
 CERTAIN = 6.0  # standard errors from which a slope is one
@@ -286,9 +287,23 @@ def faults(
         return
     for code, rows, remedy in (("stuck", running, "check sensor and logger"), ("spikes", near, "check shielding")):
         mask = (_stuck if code == "stuck" else spikes)(readings[rows])
-        if begin.size >= FEW and 0 < runs(mask)[0].size < 0.5 * begin.size:
+        often = runs(mask)[0].size >= 0.5 * begin.size
+        if code == "spikes":
+            mask[np.flatnonzero(mask)[_returning(seconds[rows][mask], begin, end)]] = False
+        if begin.size >= FEW and mask.any() and not often:
             readings[rows][mask] = np.nan
             yield warning(f"readings.{code}", where, lost(code, mask, seconds[rows]), remedy)
+
+
+def _returning(time: Array, begin: Array, end: Array) -> Mask:
+    """What another turn has in the same place, as a peak narrower than the samples lie apart."""
+    turn = np.clip(np.searchsorted(begin, time, side="right") - 1, 0, begin.size - 1)
+    phase = ((time - begin[turn]) / (end - begin)[turn]) % 1.0
+    order, returns = np.argsort(phase), np.zeros(time.size, dtype=np.bool_)
+    after = np.roll(order, -1)
+    near = ((phase[after] - phase[order]) % 1.0 < CHANCE / max(time.size, 1)) & (turn[after] != turn[order])
+    returns[order[near]] = returns[after[near]] = True
+    return returns
 
 
 def _stuck(part: Array) -> Mask:

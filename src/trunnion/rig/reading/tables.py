@@ -151,10 +151,11 @@ def _number(text: object) -> float:
         return np.nan
 
 
-def _column(cells: Any, unit: str = "", decimal: str = ".", thousands: str | None = None) -> Column:
+def _column(cells: Any, unit: str = "", decimal: str = ".") -> Column:
     """Cells of any kind as floats, infinite ones as they are; time stamps as seconds since the first.
 
-    decimal, thousands: signs in texts; another point or comma may be either, and makes no number.
+    decimal: sign in texts; another point or comma is passed over where a cell of the column shows that it stands
+    between thousands, and makes no number elsewhere.
     """
     cells = np.asarray(cells)
     if cells.dtype.kind in "fiub":
@@ -165,7 +166,8 @@ def _column(cells: Any, unit: str = "", decimal: str = ".", thousands: str | Non
         since = ticks[dated][0] if cells.dtype.kind == "M" and dated.any() else 0
         return Column(np.where(dated, (ticks - since) * 1e-9, np.nan), unit)
     rows = ["" if cell is None or (isinstance(cell, float) and np.isnan(cell)) else str(cell).strip() for cell in cells]
-    signs = str.maketrans({".": "?", ",": "?", "−": "-"} | ({thousands: ""} if thousands else {}) | {decimal: "."})
+    between = {match[1]: "" for row in rows if (match := _GROUPED[decimal].fullmatch(row))}
+    signs = str.maketrans({".": "?", ",": "?", "−": "-"} | between | {decimal: "."})
     values = np.array([_number(row.translate(signs)) for row in rows])
     texts = [row for row, value in zip(rows, values, strict=True) if np.isnan(value) and row.casefold() not in NOTHING]
     stamps = texts and _TIME.fullmatch(texts[0]) and not np.isfinite(values).any()
@@ -200,14 +202,13 @@ def _read_text(path: Path, names: Sequence[str], optional: Sequence[str]) -> Dat
         units = [unit or text for unit, text in zip(units, [*map(_bare, below), *[""] * len(units)], strict=False)]
     sample = [row[place] for _, row in rows[:FIRST] for place in places.values() if place < len(row)]
     decimal = "," if separator != "," and any(_COMMA.fullmatch(cell) for cell in sample) else "."
-    thousands = next((match[1] for cell in sample if (match := _GROUPED[decimal].fullmatch(cell))), None)
     version = tuple(int(part) for part in re.findall(r"\d+", pd.__version__)[:2])
     exact: dict[str, Any] = {} if version >= (3, 1) else {"float_precision": "round_trip"}
     width = max(len(heads), *(len(row) for _, row in rows)) if rows else len(heads)  # separators end some lines
     columns_used = sorted(set(places.values())) if width > WIDE else None
     try:
         frame = pd.read_csv(
-            path, sep=separator, decimal=decimal, thousands=thousands, header=None, names=list(range(width)),
+            path, sep=separator, decimal=decimal, header=None, names=list(range(width)),
             usecols=columns_used,
             skiprows=header + 1, comment="#", encoding=encoding, encoding_errors="replace", low_memory=False,
             skipinitialspace=True, **exact,
@@ -221,7 +222,7 @@ def _read_text(path: Path, names: Sequence[str], optional: Sequence[str]) -> Dat
         what = f"row {longer[0] + 1} below the header has more cells than its {len(heads)}"
         remedy = "correct it; numbers with a decimal comma need a semicolon or tab between them"
         raise _failed(path, what, remedy)
-    columns = {name: _column(frame[place].to_numpy(), units[place], decimal, thousands)
+    columns = {name: _column(frame[place].to_numpy(), units[place], decimal)
                for name, place in places.items()}  # fmt: skip
     return DataTable(str(path), columns, encoding=encoding)
 

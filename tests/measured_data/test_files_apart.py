@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -23,14 +24,7 @@ def torque(angle: Any) -> Any:
     return 4 + 13 * np.sin(angle)
 
 
-def written(
-    path: Path,
-    unit: str = "N m",
-    size: float = 1.0,
-    limit: float = np.inf,
-    end: Sequence[str] = (),
-    gap: slice | None = None,
-) -> Path:
+def written(path: Path, unit: str = "N m", size: float = 1.0, limit: float = np.inf, gap: slice | None = None) -> Path:
     """A run with a torque in a unit of a size in N m, read up to a limit, with a clock, without the rows of a gap."""
     noise = np.random.default_rng(3)
     t = np.arange(int(RATE * 60 / SPEED * (TURNS + 0.5))) / RATE
@@ -44,14 +38,12 @@ def written(
     ]
     if gap is not None:
         del rows[gap]
-    path.write_text("\n".join([*rows, *end]) + "\n", encoding="utf-8")
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
     return path
 
 
 def mapping(folder: Path, files: Sequence[dict[str, Any]], **channel: Any) -> Measurement:
     """The measurement of files below a folder."""
-    import json
-
     text = {
         "trunnion-data": 1,
         "files": list(files),

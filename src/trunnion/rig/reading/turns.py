@@ -50,17 +50,10 @@ class Turns:
 
 
 def cut(share: Array, line: Timeline, allowed: Mask, positions: int, spoilt: Array, say: Say, where: str) -> Turns:
-    """Find the whole turns among the rows that may be used.
+    """Find the whole turns among the rows that are allowed.
 
-    Parameters
-    ----------
-    share : cycles gone through, rising with time, NaN where not known, (row,).
-    line : time of the rows.
-    allowed : rows that may be used.
-    positions : of a turn.
-    spoilt : stretches of time to leave out, (stretch, 2).
-    say : takes findings about turns that are left out.
-    where : what these are about.
+    share: cycles gone through, rising with time, NaN where not known, (row,); positions: of a turn; spoilt: stretches
+    of time to leave out, (stretch, 2); say: takes findings about turns that are left out; where: what these are about.
     """
     begin, end, numbers = _whole(share, line)
     refused = np.concatenate([[0], np.cumsum(~allowed)])  # turns some of whose rows are not allowed

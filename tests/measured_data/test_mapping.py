@@ -94,7 +94,6 @@ CHANGES: list[tuple[dict[str, Any], str, str]] = [
     ({"angle/wrap": 9, "angle/kind": "level"}, "angle", "only a running count wraps"),
     ({"time": {"column": "t", "rate": "1 kHz"}}, "time", "either a column or a rate"),
     ({"time": {"rate": "0 Hz"}}, "time.rate", "not a frequency above zero"),
-    ({"angle/zero": -3}, "angle.zero", "-3 has no unit"),
     ({"set": {"a": {"mean": "speed"}}}, "set.a.mean", "no channel 'speed'"),
     ({"set": {"a": {"mean": "brake", "column": "x"}}}, "set.a", "one of mean and column"),
     ({"set": {"a": "2 * AB"}}, "set.a", "refers to AB"),

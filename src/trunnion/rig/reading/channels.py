@@ -417,7 +417,7 @@ def signs(
         power = turn_means(courses[name] * speed)
         power = power[np.isfinite(power)]
         below = int(np.count_nonzero(power < 0))
-        plain = power.size and abs(np.mean(power)) > 2 * abs(float(np.nanmean(zeros[name] * speed)))
+        plain = power.size and abs(np.mean(power)) > 2 * abs(zeros[name] * float(np.nanmean(speed)))
         if plain and below > NEARLY_ALL * power.size:
             channel = sensors[name].channel
             what = f"sign: the power {side} {channel.measures.partition(':')[2]} is negative in {below:,} of "

@@ -22,20 +22,7 @@ from trunnion.model.names import nearest
 from trunnion.model.quantity import Angle, AnyQuantity, Dimensionless, Quantity, Rate, Time
 from trunnion.model.schema import SchemaGenerator
 from trunnion.model.units import ANGLE, KINDS, UnitError
-from trunnion.rig.reading.units import (
-    Amount,
-    Frequency,
-    MeasureText,
-    Number,
-    Positive,
-    SensorScale,
-    Size,
-    UnitText,
-    alike,
-    bounded,
-    scale,
-)
-from trunnion.rig.reading.units import dimensions as unit_dimensions
+from trunnion.rig.reading import units
 
 __all__ = [
     "Accuracies", "AngleSource", "Channel", "DataMapping", "File", "Filter", "FixedAngle", "FixedNumber", "FixedTime",
@@ -44,7 +31,7 @@ __all__ = [
 
 Sign = Literal[1, -1]
 Pulses = Annotated[int, Field(ge=1, le=10_000_000)]  # of a turn
-PLAIN_ZERO = Amount(0.0, 0.0, "", {})
+PLAIN_ZERO = units.Amount(0.0, 0.0, "", {})
 
 
 def fixed(quantity: Quantity) -> Quantity:
@@ -57,14 +44,7 @@ def fixed(quantity: Quantity) -> Quantity:
     return quantity
 
 
-def _with_unit(quantity: Quantity) -> Quantity:
-    """An angle with its unit: a plain number would be in rad, whatever the readings are in."""
-    if quantity.evaluate() != 0 and not any(sign.isalpha() or sign == "°" for sign in str(quantity.source)):
-        raise problem(f"{quantity.source} has no unit", f"write {quantity.source} deg, or {quantity.source} rad")
-    return quantity
-
-
-FixedAngle = Annotated[Angle, AfterValidator(fixed), AfterValidator(_with_unit)]
+FixedAngle = Annotated[Angle, AfterValidator(fixed)]
 FixedNumber = Annotated[Dimensionless, AfterValidator(fixed)]
 FixedRate = Annotated[Rate, AfterValidator(fixed)]
 FixedTime = Annotated[Time, AfterValidator(fixed)]
@@ -75,20 +55,20 @@ def _of_unit(si: str, example: str) -> AfterValidator:
     """Units, and amounts with one, that measure the same as that of SI."""
 
     def check(entry: Any) -> Any:
-        text = entry.unit if isinstance(entry, Amount) else entry
-        if text and not alike(unit_dimensions(text)[1], unit_dimensions(si)[1]):
+        text = entry.unit if isinstance(entry, units.Amount) else entry
+        if text and not units.alike(units.dimensions(text)[1], units.dimensions(si)[1]):
             raise problem(f"the unit '{text}' is not {example}", f"write {example}")
         return entry
 
     return AfterValidator(check)
 
 
-Moment = Annotated[Number, _of_unit("s", "a unit of time such as ms")]
-TimeUnit = Annotated[UnitText, _of_unit("s", "a unit of time such as ms")]
-AngleUnit = Annotated[UnitText, _of_unit("rad", "a unit of angle such as deg")]
+Moment = Annotated[units.Number, _of_unit("s", "a unit of time such as ms")]
+TimeUnit = Annotated[units.UnitText, _of_unit("s", "a unit of time such as ms")]
+AngleUnit = Annotated[units.UnitText, _of_unit("rad", "a unit of angle such as deg")]
 
 
-def _ordered(span: tuple[Amount, Amount]) -> tuple[Amount, Amount]:
+def _ordered(span: tuple[units.Amount, units.Amount]) -> tuple[units.Amount, units.Amount]:
     """A stretch of time that begins before it ends."""
     if not span[0].value < span[1].value:
         raise problem(f"[{span[0].source}, {span[1].source}] ends before it begins", "write [0 s, 0.5 s]")
@@ -111,7 +91,7 @@ class FromData(Part):
 
     mean: str | None = None
     column: str | None = None
-    unit: UnitText | None = None
+    unit: units.UnitText | None = None
 
     @model_validator(mode="after")
     def _one(self) -> FromData:
@@ -132,7 +112,7 @@ class TimeBase(Part):
 
     column: str | None = None
     unit: TimeUnit | None = None
-    rate: Frequency | None = None
+    rate: units.Frequency | None = None
     dayfirst: bool = True
 
     @model_validator(mode="after")
@@ -171,7 +151,7 @@ class AngleSource(Part):
     zero: FixedAngle = Quantity(0.0, KINDS["angle"])
     index: Index | None = None
     sign: Sign = 1
-    resolution: Annotated[FixedAngle, bounded(above=True)] | None = None
+    resolution: Annotated[FixedAngle, units.bounded(above=True)] | None = None
 
     @model_validator(mode="after")
     def _of_its_kind(self) -> AngleSource:
@@ -202,7 +182,7 @@ class Zero(Part):
 
 
 ChannelZero = Annotated[
-    Annotated[Zero, Tag(":group")] | Annotated[Number, Tag(":value")],
+    Annotated[Zero, Tag(":group")] | Annotated[units.Number, Tag(":value")],
     forms("a number with its unit, or {over: [0 s, 0.5 s]}"),
 ]
 
@@ -210,18 +190,18 @@ ChannelZero = Annotated[
 class Accuracies(Part):
     """Standard uncertainties of a sensor: of its gain, relative, and of its zero."""
 
-    gain: Annotated[FixedNumber, bounded(above=False)] = Quantity(0.0, KINDS["number"])
-    zero: Size = PLAIN_ZERO
+    gain: Annotated[FixedNumber, units.bounded(above=False)] = Quantity(0.0, KINDS["number"])
+    zero: units.Size = PLAIN_ZERO
 
 
 class FileChannel(Part):
     """A channel in one data file, as of another setting of its amplifier: what it states in place of the channel's."""
 
-    unit: UnitText | None = None
-    gain: Number | None = None
+    unit: units.UnitText | None = None
+    gain: units.Number | None = None
     zero: ChannelZero = PLAIN_ZERO
-    range: Positive | None = None
-    resolution: Positive | None = None
+    range: units.Positive | None = None
+    resolution: units.Positive | None = None
     accuracy: Accuracies = Accuracies()
 
     def of(self, channel: Channel) -> Channel:
@@ -240,7 +220,7 @@ class Channel(FileChannel):
     """
 
     column: str
-    measures: MeasureText
+    measures: units.MeasureText
     sign: Sign = 1
     per_turn: Pulses | None = None
 
@@ -255,12 +235,12 @@ class Channel(FileChannel):
                 raise problem(error.what, error.remedy) from None
         return self
 
-    def scale(self, unit: str) -> SensorScale:
+    def scale(self, unit: str) -> units.SensorScale:
         """How readings in a unit become the quantity; UnitError if they, or an amount of the channel, cannot."""
-        of_unit = scale(self.measures, unit, self.gain)
+        of_unit = units.scale(self.measures, unit, self.gain)
         stated = {"zero": self.zero, "range": self.range, "resolution": self.resolution}
         for key, amount in {**stated, "accuracy.zero": self.accuracy.zero}.items():
-            if isinstance(amount, Amount):
+            if isinstance(amount, units.Amount):
                 of_unit.reading(amount, key)
         return of_unit
 
@@ -284,7 +264,7 @@ class File(Part):
 class Filter(Part):
     """Butterworth low-pass, forward and backward: without delay."""
 
-    cut_off: Frequency
+    cut_off: units.Frequency
     order: Annotated[int, Field(ge=1, le=12)] = 4
 
 

@@ -17,21 +17,8 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import si_unit
+from trunnion.rig.reading import channels
 from trunnion.rig.reading.angle import coordinate
-from trunnion.rig.reading.channels import (
-    LOOKED_AT,
-    WIDTH,
-    Sensor,
-    check_filter,
-    common_drift,
-    faults,
-    filtered,
-    noise_of,
-    resolution,
-    sensor_of,
-    signs,
-    steady,
-)
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Zero, read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
 from trunnion.rig.reading.tables import DataTable, read_table
@@ -80,7 +67,7 @@ def read_measured(
                 recording.find_turns()
             for key, readings in recording.levels():
                 levels.setdefault(key, []).append(readings)
-        steps = {key: resolution(np.concatenate(rows)) for key, rows in levels.items()}
+        steps = {key: channels.resolution(np.concatenate(rows)) for key, rows in levels.items()}
         for recording in recordings:
             with recording.failing():
                 conditions += recording.conditions(steps)
@@ -152,7 +139,7 @@ class _Recording:
         self.mapping, self.path, self.entry = mapping, path, entry
         self.findings: list[Finding] = []
         self.done: list[str] = []
-        self.sensors: dict[str, Sensor] = {}
+        self.sensors: dict[str, channels.Sensor] = {}
         self.readings: dict[str, Array] = {}
         self.parts: list[_Part] = []
         self.cycle, self.start = float(mapping.cycle.evaluate()), float(mapping.start.evaluate())
@@ -184,11 +171,11 @@ class _Recording:
             say(f"read in the encoding {self.table.encoding}")
         self.line = timeline(self.table, mapping.time, say)
         if mapping.filter is not None:
-            check_filter(mapping.filter, self.line, say)
+            channels.check_filter(mapping.filter, self.line, say)
         for name, channel in mapping.channels.items():
             column = self.table.columns[channel.column]
             self.readings[name] = np.array(self.line.rows(column.values))
-            self.sensors[name] = sensor_of(name, channel, column, self.readings[name], self.line, say)
+            self.sensors[name] = channels.sensor_of(name, channel, column, self.readings[name], self.line, say)
         begin, end = (time.value for time in self.entry.over) if self.entry.over else (-np.inf, np.inf)
         allowed = (self.line.seconds >= begin) & (self.line.seconds <= end)
         share, spoilt = self._cycles(allowed)
@@ -269,7 +256,7 @@ class _Recording:
             if turns.numbers.size < 2:
                 what = "has one turn: there is no scatter, so no uncertainty"
                 say(warning("turns.one", part.where, what, "record two turns or more"))
-            say(steady(turns, self.line.step, part.where))
+            say(channels.steady(turns, self.line.step, part.where))
             if turns.density < 1:
                 samples = f"{turns.density * positions:.4g} samples a turn for {positions} positions"
                 what = f"the sampling is slow: {samples}; between them it is interpolated"
@@ -294,17 +281,17 @@ class _Recording:
         self.running = slice(first, int(np.searchsorted(self.line.seconds, end[-1], "right")))
         reach = float(np.median(end - begin)) / self.mapping.positions
         reach += PERIODS / self.mapping.filter.cut_off.value if self.mapping.filter is not None else 0.0
-        beside = WIDTH + int(reach / self.line.step)
+        beside = channels.WIDTH + int(reach / self.line.step)
         for name, channel in self.mapping.channels.items():
             where, moves = f"channels.{name}", not channel.measures.startswith("rate:")
-            for finding in faults(where, self.readings[name], self.line.seconds, (begin, end), beside, moves):
+            for finding in channels.faults(where, self.readings[name], self.line.seconds, (begin, end), beside, moves):
                 self.say(finding)
 
     def levels(self) -> Iterator[tuple[StepKey, Array]]:
         """Different readings of each channel while the drive runs."""
         for name, sensor in self.sensors.items() if self.parts else ():
             readings = self.readings[name][self.running]
-            yield _key(name, sensor), np.unique(readings[np.isfinite(readings)])[:LOOKED_AT]
+            yield _key(name, sensor), np.unique(readings[np.isfinite(readings)])[: channels.LOOKED_AT]
 
     # ---- courses ----------------------------------------------------------------------------------------------
 
@@ -317,19 +304,19 @@ class _Recording:
         if not self.mapping.timed:
             together = {name: np.concatenate([part.courses[name] for part in self.parts]) for name in self.sensors}
             zeros = {name: accuracy.zero for name, accuracy in accuracies.items()}
-            for finding in signs(self.sensors, together, zeros, self._speed(self.parts)):
+            for finding in channels.signs(self.sensors, together, zeros, self._speed(self.parts)):
                 self.say(finding)
         return [self._condition(part, accuracies) for part in self.parts]
 
-    def _courses(self, name: str, sensor: Sensor, step: float) -> Accuracy:
+    def _courses(self, name: str, sensor: channels.Sensor, step: float) -> Accuracy:
         """Put the courses of a channel into the parts; the accuracy of its sensor."""
         line, size, low_pass = self.line, sensor.size, self.mapping.filter
         readings, step = self.readings.pop(name), sensor.step or step
-        noise, values = noise_of(readings[self.running]), sensor.quantity(readings)
+        noise, values = channels.noise_of(readings[self.running]), sensor.quantity(readings)
         angle = values if sensor.scale.unit == "rad" else None
         values = values if angle is None else joined(angle)
         if low_pass is not None:
-            values = filtered(values, line, low_pass)
+            values = channels.filtered(values, line, low_pass)
         for part in self.parts:
             part.courses[name] = resampled(part.turns, values, angle)
         if low_pass is None:  # the scatter of turns may show less noise than neighbouring readings do
@@ -343,7 +330,8 @@ class _Recording:
             part.left[name] = left_in_turns(part.turns, course, readings / step, noise / step)
         own = size * sensor.zero_uncertainty
         parts = [(part.turns, part.courses[name]) for part in self.parts]
-        drift = None if sensor.channel.measures.startswith("rate:") else common_drift(parts)  # a speed may creep
+        creeps = sensor.channel.measures.startswith("rate:")  # a speed may
+        drift = None if creeps else channels.common_drift(parts)
         if drift is not None:
             what = f"drift: the mean of a turn changes by {drift.change:.3g} {sensor.scale.unit} in {drift.span:.4g} s"
             what += f", {abs(drift.change) / max(drift.scatter, 1e-300):.3g} times the scatter of the turns"
@@ -394,7 +382,7 @@ class _Recording:
 # ---- helpers --------------------------------------------------------------------------------------------------
 
 
-def _key(name: str, sensor: Sensor) -> StepKey:
+def _key(name: str, sensor: channels.Sensor) -> StepKey:
     return name, sensor.unit, sensor.scale.factor
 
 

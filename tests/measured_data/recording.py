@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding
 from trunnion.rig.reading.measurement import Condition, Measurement
 from trunnion.rig.reading.read import read_measured
 
@@ -102,9 +101,9 @@ def read(columns: Columns | pd.DataFrame, folder: Path, changes: Mapping[str, An
     return read_measured(mapping(changes), [path])
 
 
-def faults(measurement: Measurement, word: str) -> list[Finding]:
-    """The findings that speak of something."""
-    return [one for one in measurement.findings if word in one.what]
+def codes(measurement: Measurement) -> set[str]:
+    """What the findings are about."""
+    return {one.code for one in measurement.findings}
 
 
 def off(condition: Condition, channel: str = "torque-in") -> float:

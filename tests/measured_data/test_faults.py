@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from measured_data.recording import Columns, faults, off, read, recorded
+from measured_data.recording import Columns, codes, off, read, recorded
 from trunnion.errors import MechanismError, Severity
 
 
@@ -31,8 +31,7 @@ def test_a_sound_recording_has_no_finding(run: Columns, tmp_path: Path) -> None:
     assert one.courses["torque-in"].turns.shape == (19, 90)  # of 20 turns from 21° on
     assert one.speed == pytest.approx(600 * np.pi / 30, rel=2e-6)  # of 1.9 s, pulses known to a part of 0.2 ms
     assert off(one) < 0.06  # noise of 0.05 N m
-    assert any("whole turns" in sentence for sentence in found.done)
-    assert any("zero of torque-in" in sentence for sentence in found.done)
+    assert found.done[0].startswith("19 whole turns; rows before")
 
 
 def _cells(run: Columns) -> None:
@@ -73,11 +72,11 @@ def _unsteady(run: Columns) -> None:
 FAULTS: list[tuple[Any, str, tuple[str, ...], str]] = [
     (_cells, "channels.torque-in", ("dropouts: 201 cells", "at 1, 1.2 s"), "cable"),
     (_spikes, "channels.torque-in", ("spikes: 3 readings", "0.82, 1.05, 1.4002 s"), "shielding"),
-    (_stuck, "channels.torque-in", ("stuck", "400 samples", "0.0798 s long"), "sensor"),
+    (_stuck, "channels.torque-in", ("stuck: 399 readings", "at 1.0002 s"), "sensor"),
     (_drift, "channels.torque-in", ("drift", "N m in 1.8 s"), "drift: remove"),
     (_gap, "time", ("1 gap", "300 samples missing", "0.0602 s at 0.9998 s"), "buffer"),
-    (_repeated, "time", ("repeats in 2 rows", "at 1, 1 s"), "logger"),
-    (_backward, "time", ("runs backward 1 time", "0.0198 s"), "split the file"),
+    (_repeated, "time", ("2 rows of 11,000 left out", "at 1, 1 s", "backward 0 times"), "logger"),
+    (_backward, "time", ("100 rows", "backward 1 time", "0.0198 s"), "split the file"),
     (_unsteady, "turns", ("speed is not steady",), "over:"),
 ]
 
@@ -85,18 +84,17 @@ FAULTS: list[tuple[Any, str, tuple[str, ...], str]] = [
 def test_a_narrow_peak_of_the_signal_is_no_spike(run: Columns, tmp_path: Path) -> None:
     """Narrower than the samples lie apart, so that few turns have a reading on it, in the same place of each."""
     run["T1"][[4000, 5001, 7000, 8001]] += 5
-    found = read(run, tmp_path)
-    assert not [one for one in found.findings if "spikes" in one.what]
+    assert read(run, tmp_path).findings == ()
 
 
 @pytest.mark.spread(7)
-@pytest.mark.parametrize(("spoil", "where", "told", "remedy"), FAULTS, ids=[one[0].__name__ for one in FAULTS])
+@pytest.mark.parametrize(("spoil", "where", "figures", "remedy"), FAULTS, ids=[one[0].__name__ for one in FAULTS])
 def test_faults_are_named(
-    run: Columns, tmp_path: Path, spoil: Any, where: str, told: tuple[str, ...], remedy: str
+    run: Columns, tmp_path: Path, spoil: Any, where: str, figures: tuple[str, ...], remedy: str
 ) -> None:
     spoil(run)
     found = read(run, tmp_path)
-    named = [one for one in found.findings if one.where == where and all(text in one.what for text in told)]
+    named = [one for one in found.findings if one.where == where and all(text in one.what for text in figures)]
     assert len(named) == 1, [str(one) for one in found.findings]
     assert remedy in named[0].remedy
     assert named[0].severity is Severity.WARNING
@@ -108,16 +106,21 @@ def test_faults_are_named(
 def test_texts_among_numbers(run: Columns, tmp_path: Path) -> None:
     frame = pd.DataFrame(run).astype({"T1": object})
     frame.loc[5000:5004, "T1"] = "ERR"
-    (one,) = faults(read(frame, tmp_path), "dropouts")
-    assert "5 cells" in one.what
-    assert "5 texts such as 'ERR'" in one.what
+    (one,) = read(frame, tmp_path).findings
+    assert "(5 texts such as 'ERR'): 5 cells" in one.what
 
 
 def test_clipped_at_the_range(run: Columns, tmp_path: Path) -> None:
+    """A few readings are left out; of a range that nearly all exceed, as of a unit taken for another, nothing is."""
+    with pytest.raises(MechanismError) as refused:
+        read(run, tmp_path, {"channels/torque-in/range": "24 mN m"})
+    (one,) = (one for one in refused.value.findings if one.code == "data.readings.clipped")
+    assert (one.severity, one.where) == (Severity.ERROR, "channels.torque-in")
+    assert one.figures["count"] > 0.9 * one.figures["readings"]
     run["T1"] = np.clip(run["T1"], -2.4, 2.4)
-    (one,) = faults(read(run, tmp_path, {"channels/torque-in/range": "24 N m"}), "clipped")
-    assert "at or beyond the end of the range of 2.4 V" in one.what
-    assert "larger range" in one.remedy
+    (one,) = read(run, tmp_path, {"channels/torque-in/range": "24 N m"}).findings
+    assert one.code == "data.readings.clipped"
+    assert "range of 2.4 V" in one.what
 
 
 @pytest.mark.parametrize("code", [99999.0, -187.3])
@@ -128,8 +131,8 @@ def test_a_code_for_an_overload_changes_nothing_else(run: Columns, tmp_path: Pat
     run["T2"][[4000, 5250, 7001]] = code
     for changes in ({}, {"channels/brake/range": "50 N m"}):
         found = read(run, tmp_path, changes)
-        (one,) = faults(found, "3 readings") or faults(found, "3 cells")
-        assert "left out" in one.what
+        assert codes(found) == {"data.readings.clipped" if changes else "data.readings.spikes"}
+        assert "3 readings of" in found.findings[0].what
         accuracy = found.conditions[0].courses["brake"].accuracy
         assert (accuracy.resolution, accuracy.cut) == (sound.resolution, sound.cut)
         assert accuracy.left.share == pytest.approx(sound.left.share, rel=0.01)
@@ -138,12 +141,10 @@ def test_a_code_for_an_overload_changes_nothing_else(run: Columns, tmp_path: Pat
 
 
 def test_up_to_how_many_positions_samples_are_averaged(tmp_path: Path) -> None:
-    """500 samples a turn are four at each of 125 positions, in two digits 120: there the scatter falls."""
+    """500 samples a turn are four at each of 125 positions: with fewer positions the scatter falls."""
     columns = recorded()
     rows = {count: read(columns, tmp_path, {"positions": count}) for count in (130, 120)}
-    told = {count: next(one for one in found.done if one.startswith("values at")) for count, found in rows.items()}
-    assert "with up to 125 positions they are means" in told[130]
-    assert "mean of the samples" in told[120]
+    assert any("with up to 125 positions they are means" in one for one in rows[130].done)
     scatter = {count: np.median(found.conditions[0].courses["brake"].scatter) for count, found in rows.items()}
     assert scatter[120] < 0.7 * scatter[130]
 
@@ -165,32 +166,23 @@ def test_a_bad_reading_beside_the_turns_does_not_reach_into_them(
         spoilt["T1"][row] = 9999.0
         found = read(spoilt, tmp_path, changes)
         assert off(found.conditions[0]) < best + (0.1 if rate > 1000 else 0.5), row - first
-        assert faults(found, "left out"), row - first
+        assert any("left out" in one.what for one in found.findings), row - first
 
 
 def test_a_slope_at_the_end_of_a_file_is_no_spike(tmp_path: Path) -> None:
     run = recorded(rate=400.0)
     for end in range(-20, -1):
-        assert not faults(read({name: values[:end] for name, values in run.items()}, tmp_path), "spikes")
+        found = read({name: values[:end] for name, values in run.items()}, tmp_path)
+        assert "data.readings.spikes" not in codes(found)
 
 
 def test_a_spike_in_an_unloaded_stretch_does_not_move_the_zero(run: Columns, tmp_path: Path) -> None:
     run["T1"][300] = 9999.0
     found = read(run, tmp_path)
-    (one,) = faults(found, "1 reading of 950 in the unloaded stretch, at 0.06 s")
-    assert one.where == "channels.torque-in.zero"
+    (one,) = found.findings
+    assert (one.code, one.where) == ("data.readings.spikes", "channels.torque-in.zero")
+    assert "1 reading of 950, at 0.06 s" in one.what
     assert off(found.conditions[0]) < 0.06
-
-
-def test_a_channel_that_is_nearly_all_clipped_is_refused(run: Columns, tmp_path: Path) -> None:
-    """A unit a thousand times too large: nothing of the channel is left to go on with."""
-    with pytest.raises(MechanismError) as refused:
-        read(run, tmp_path, {"channels/torque-in/range": "24 mN m"})
-    (one,) = (one for one in refused.value.findings if one.code == "data.readings.clipped")
-    assert one.severity is Severity.ERROR
-    assert one.where == "channels.torque-in"
-    assert one.figures["count"] > 0.9 * one.figures["readings"]
-    assert "unit" in one.remedy
 
 
 def test_coarse_readings_are_no_faults(run: Columns, tmp_path: Path) -> None:
@@ -199,44 +191,45 @@ def test_coarse_readings_are_no_faults(run: Columns, tmp_path: Path) -> None:
         run[name] = np.rint(run[name] / 0.02) * 0.02
     run["n1"] = np.rint(run["n1"])
     (one,) = read(run, tmp_path).findings
-    assert one.severity is Severity.NOTE
-    assert "reads 600 in every one" in one.what
+    assert (one.code, one.severity) == ("data.readings.constant", Severity.NOTE)
 
 
-def test_what_comes_back_every_turn_is_the_signals_own(run: Columns, tmp_path: Path) -> None:
+@pytest.mark.parametrize("turns", [2, 3, 20])
+def test_what_comes_back_every_turn_is_the_signals_own(run: Columns, tmp_path: Path, turns: int) -> None:
     """A load that works over half a turn, without noise, is zero or constant there and steps."""
     phase = run["angle"] % (2 * np.pi)
     run["T2"] = np.where(run["t"] < 0.2, 0.0, np.where(phase < 2, 30.0 + np.sin(phase), 0.0))
-    run["T1"][np.diff(np.floor(run["angle"] / (2 * np.pi)), append=3) > 0] += 1.0  # a knock once a turn
-    assert read(run, tmp_path).findings == ()
+    knocks = np.diff(np.floor(run["angle"] / (2 * np.pi)), append=3) > 0
+    run["T1"][knocks if turns == 20 else 2000] += 1.0
+    found = read({name: values[: 1500 + 500 * turns] for name, values in run.items()}, tmp_path)
+    assert not [one for one in found.findings if "left out" in one.what]
+    for course in found.conditions[0].courses.values():
+        assert np.isfinite(course.turns).all()
 
 
 @pytest.mark.parametrize(
-    ("column", "channel", "told"),
+    ("column", "channel", "figures"),
     [
-        (
-            "T1",
-            "torque-in",
-            "turns (-1257 W): the sign of torque-in is wrong, unless the load drives the motor",
-        ),
-        ("n1", "speed-in", "sign: the angle turns at 600 rpm, 'speed-in' reads -600 rpm"),
-        ("T2", "brake", "power delivered to brake is negative in all 19 turns"),
+        ("T1", "torque-in", "negative in 19 of 19 turns (-1257 W)"),
+        ("n1", "speed-in", "the angle turns at 600 rpm, -1 times"),
+        ("T2", "brake", "negative in 19 of 19 turns"),
     ],
 )
-def test_wrong_signs(run: Columns, tmp_path: Path, column: str, channel: str, told: str) -> None:
+def test_wrong_signs(run: Columns, tmp_path: Path, column: str, channel: str, figures: str) -> None:
     run[column] *= -1
-    found = read(run, tmp_path)
-    assert [one.where for one in found.findings] == [f"channels.{channel}"]
-    assert told in found.findings[0].what
-    assert "write sign: -1" in found.findings[0].remedy
+    (one,) = read(run, tmp_path).findings
+    assert one.where == f"channels.{channel}"
+    assert figures in one.what
+    assert "write sign: -1" in one.remedy
     assert read(run, tmp_path, {f"channels/{channel}/sign": -1}).findings == ()
 
 
-def test_drift_is_removed_when_asked(run: Columns, tmp_path: Path) -> None:
+@pytest.mark.parametrize("zero", [["0 s", "0.19 s"], ["-20 s", "0.19 s"]])
+def test_drift_is_removed_from_when_the_zero_was_read(run: Columns, tmp_path: Path, zero: list[str]) -> None:
+    """Also of a stretch that is stated far longer than the file has it before."""
     run["T1"] += 0.05 * (run["t"] - 0.1)
-    found = read(run, tmp_path, {"drift": "remove"})
-    (one,) = faults(found, "drift")
-    assert "a straight line is subtracted" in one.what
+    found = read(run, tmp_path, {"channels/torque-in/zero": {"over": zero}, "drift": "remove"})
+    assert codes(found) == {"data.zero.drift_files"}
     assert off(found.conditions[0]) < 0.06
     assert found.conditions[0].courses["torque-in"].accuracy.zero > 0
 
@@ -247,16 +240,9 @@ def test_drift_is_told_over_the_time_it_took(run: Columns, tmp_path: Path, condi
     run["T1"] += 0.05 * run["t"]
     run["m"] = np.where(run["t"] < 1.2, 5.0, 5.0 * conditions)
     changes = {"set": {"misalignment": {"column": "m", "unit": "deg"}}, "drift": "remove"}
-    (one,) = faults(read(run, tmp_path, changes), "drift: ")
+    (one,) = read(run, tmp_path, changes).findings
     change, seconds = re.findall(r"changes by ([-0-9.e]+) N m in ([0-9.]+) s", one.what)[0]
     assert float(change) / float(seconds) == pytest.approx(0.5, rel=0.01)
-
-
-def test_drift_is_taken_off_from_when_the_zero_was_read(run: Columns, tmp_path: Path) -> None:
-    """The stretch is stated far longer than the file has it before: the zero is that of the readings within."""
-    run["T1"] += 0.05 * (run["t"] - 0.1)
-    early = {"channels/torque-in/zero": {"over": ["-20 s", "0.19 s"]}, "drift": "remove"}
-    assert off(read(run, tmp_path, early).conditions[0]) < 0.06
 
 
 def test_a_zero_that_differs_between_unloaded_stretches_is_uncertain(run: Columns, tmp_path: Path) -> None:
@@ -283,47 +269,26 @@ def test_lost_pulses_by_the_index(run: Columns, tmp_path: Path) -> None:
         run["encoder"][edges[edges > after][0] :] -= many
     run["encoder"] = np.maximum.accumulate(run["encoder"])
     found = read(run, tmp_path, changes)
-    (one,) = faults(found, "encoder")
-    assert "4 pulses lost in 2 turns" in one.what
+    (one,) = found.findings
+    assert "4 pulses lost, 0 too many in 2 turns" in one.what
     assert found.conditions[0].courses["torque-in"].turns.shape[0] == 17
     assert off(found.conditions[0]) < 0.06
 
 
 def test_sampling_too_slow(run: Columns, tmp_path: Path) -> None:
     thin = {name: values[::100] for name, values in run.items()}
-    found = read(thin, tmp_path)
-    assert "5 samples a turn for 90 positions" in faults(found, "sampling is slow")[0].what
+    assert "data.sampling.slow" in codes(read(thin, tmp_path))
     with pytest.raises(MechanismError, match=r"sampling is too slow for the filter: 50 Hz, a cut-off of 40 Hz"):
         read(thin, tmp_path, {"filter": {"cut_off": "40 Hz"}})
     level = {**run, "encoder": (run["angle"] / (2 * np.pi) * 60 % 1 < 0.5) * 5.0}
     thin = {name: values[::5] for name, values in level.items()}
-    assert faults(read(thin, tmp_path, {"angle/kind": "level"}), "edges are missed")
+    assert "data.pulses.few_samples" in codes(read(thin, tmp_path, {"angle/kind": "level"}))
 
 
-def test_few_turns(run: Columns, tmp_path: Path) -> None:
+def test_few_turns_and_a_sensor_that_never_changes(run: Columns, tmp_path: Path) -> None:
     short = {name: values[:2000] for name, values in run.items()}
-    (one,) = read(short, tmp_path).findings
-    assert "one turn: there is no scatter" in one.what
+    assert codes(read(short, tmp_path)) == {"data.turns.one"}
     with pytest.raises(MechanismError, match=r"no whole turn: 0\.\d+ cycles in 1,300 rows"):
         read({name: values[:1300] for name, values in run.items()}, tmp_path)
-
-
-def test_a_sensor_that_never_changes(run: Columns, tmp_path: Path) -> None:
     run["T2"][:] = 3.3
-    assert faults(read(run, tmp_path), "reads 3.3 in every one")
-
-
-@pytest.mark.parametrize("turns", [2, 3])
-def test_with_few_turns_nothing_is_left_out_that_may_be_the_signals_own(
-    run: Columns, tmp_path: Path, turns: int
-) -> None:
-    """A load that works over half a turn, without noise, is zero or constant there and steps."""
-    phase = run["angle"] % (2 * np.pi)
-    run["T2"] = np.where(run["t"] < 0.2, 0.0, np.where(phase < 2, 30.0 + np.sin(phase), 0.0))
-    run["T1"][2000] += 5.0  # a knock
-    short = {name: values[: 1500 + 500 * turns] for name, values in run.items()}
-    found = read(short, tmp_path)
-    assert found.conditions[0].courses["brake"].turns.shape[0] == turns
-    assert not faults(found, "left out")
-    for course in found.conditions[0].courses.values():
-        assert np.isfinite(course.turns).all()
+    assert codes(read(run, tmp_path)) == {"data.readings.constant"}

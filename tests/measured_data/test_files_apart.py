@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -23,14 +24,7 @@ def torque(angle: Any) -> Any:
     return 4 + 13 * np.sin(angle)
 
 
-def written(
-    path: Path,
-    unit: str = "N m",
-    size: float = 1.0,
-    limit: float = np.inf,
-    end: Sequence[str] = (),
-    gap: slice | None = None,
-) -> Path:
+def written(path: Path, unit: str = "N m", size: float = 1.0, limit: float = np.inf, gap: slice | None = None) -> Path:
     """A run with a torque in a unit of a size in N m, read up to a limit, with a clock, without the rows of a gap."""
     noise = np.random.default_rng(3)
     t = np.arange(int(RATE * 60 / SPEED * (TURNS + 0.5))) / RATE
@@ -44,14 +38,12 @@ def written(
     ]
     if gap is not None:
         del rows[gap]
-    path.write_text("\n".join([*rows, *end]) + "\n", encoding="utf-8")
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
     return path
 
 
 def mapping(folder: Path, files: Sequence[dict[str, Any]], **channel: Any) -> Measurement:
     """The measurement of files below a folder."""
-    import json
-
     text = {
         "trunnion-data": 1,
         "files": list(files),
@@ -88,17 +80,6 @@ def test_pound_feet_as_they_are_written(text: str) -> None:
     assert dimensions(text)[1] == dimensions("N m")[1]
 
 
-@pytest.mark.parametrize(
-    ("text", "size"), [("in-lb", 0.1129848), ("oz-in", 0.00706155), ("mV/(ft-lb)", 1e-3 / 1.3558179)]
-)
-def test_pound_inches_and_gains(text: str, size: float) -> None:
-    assert dimensions(text)[0] == pytest.approx(size)
-
-
-def test_a_mass_times_an_area_stays_one() -> None:
-    assert dimensions("lb ft^2")[0] == pytest.approx(0.45359237 * 0.3048**2)
-
-
 # ---- settings of an amplifier ---------------------------------------------------------------------------------
 
 
@@ -117,15 +98,6 @@ def test_a_file_has_settings_of_its_own(tmp_path: Path) -> None:
     assert (first.accuracy.gain, second.accuracy.gain) == (0.001, 0.01)
     (clip,) = of(found, "data.readings.clipped")
     assert clip.file.endswith("b.csv")
-
-
-def test_a_zero_and_a_unit_of_one_file(tmp_path: Path) -> None:
-    written(tmp_path / "a.csv")
-    written(tmp_path / "b.csv", "", FOOT_POUND)
-    found = mapping(
-        tmp_path, [{"file": "a.csv"}, {"file": "b.csv", "channels": {"M": {"unit": "ft-lb", "zero": "1 N m"}}}]
-    )
-    assert [np.nanmean(one.courses["M"].mean) for one in found.conditions] == pytest.approx([4, 3], abs=0.02)
 
 
 @pytest.mark.parametrize(
@@ -160,8 +132,3 @@ def test_a_gap_in_a_turn_is_not_the_drives(tmp_path: Path) -> None:
     assert found.done[0].startswith(f"{turns} whole turns;")
     found = mapping(tmp_path, [{"file": "a.csv"}, {"file": written(tmp_path / "b.csv").name}])
     assert found.done[0].startswith(f"{turns} to {TURNS} whole turns in each of 2 conditions;")
-
-
-def test_time_stamps_of_many_files_are_told_once(tmp_path: Path) -> None:
-    files = [{"file": written(tmp_path / f"{name}.csv").name} for name in "ab"]
-    assert sum("first time stamp" in sentence for sentence in mapping(tmp_path, files).done) == 1

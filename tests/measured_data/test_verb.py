@@ -71,14 +71,11 @@ def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
     code, out, err = program("data", "rig.json", "a.csv", "b.csv")
     assert code == 1
     assert "beta 15 deg" in out  # the other condition has its file for a name
-    assert err.startswith(
-        "b.csv: warning: channels.brake: sign: the power delivered to brake is negative in all 19 turns"
-    )
+    assert err.startswith("b.csv: warning: channels.brake: sign: the power out at brake is negative in 19 of 19 turns")
     pd.DataFrame(columns).drop(columns=["T1", "n2"]).to_csv(tmp_path / "b.csv", index=False)
     code, out, err = program("data", "rig.json", "a.csv", "b.csv", "--out", "c.csv")
     assert (code, out) == (2, "")
-    assert "channels.torque-in.column, channels.speed-out.column: there is no column 'T1', 'n2'; the file has" in err
-    assert "'t', 'T2', 'n1', 'encoder', 'angle' — name one of these" in err
+    assert "b.csv: error: there is no column 'T1', 'n2'; the file has 't', 'T2', 'n1', 'encoder', 'angle'" in err
     assert not (tmp_path / "c.csv").exists()
     code, _, err = program("data", "rig.json", "--out", "c.ods")
     assert code == 2
@@ -110,29 +107,23 @@ def test_nothing_was_set(tmp_path: Path) -> None:
 
 def test_results_are_not_written_over_what_is_read(program: Run, rig: Path, tmp_path: Path) -> None:
     (tmp_path / "link.csv").symlink_to(tmp_path / "a.csv")
-    before = (tmp_path / "a.csv").read_bytes(), rig.read_bytes()
-    for name in ("a.csv", "link.csv", "rig.json"):
-        code, _, err = program("data", "rig.json", "--out", name)
+    (tmp_path / "b.csv").write_bytes((tmp_path / "a.csv").read_bytes())
+    before = {name: (tmp_path / name).read_bytes() for name in ("a.csv", "b.csv", "rig.json")}
+    for named, out in (([], "a.csv"), ([], "link.csv"), ([], "rig.json"), (["b.csv"], "b.csv")):
+        code, _, err = program("data", "rig.json", *named, "--out", out)
         assert code == 2
-        assert f"error: '{name}'" in err
         assert "is read here, and would be written over by --out — name another file" in err
-    (tmp_path / "b.csv").write_bytes(before[0])
-    code, _, err = program("data", "rig.json", "b.csv", "--out", "b.csv")
-    assert code == 2
-    assert ((tmp_path / "a.csv").read_bytes(), rig.read_bytes()) == before
-    assert (tmp_path / "b.csv").read_bytes() == before[0]
+    assert {name: (tmp_path / name).read_bytes() for name in before} == before
     assert program("data", "rig.json", "b.csv", "--out", "a.csv").code == 0  # it is not read here
 
 
 def test_no_text_of_a_table_is_a_formula(tmp_path: Path) -> None:
     """Names of conditions and of what was set come from files; a spreadsheet must not execute them."""
-    (tmp_path / "=cmd|calc!A1.csv").write_text(text_of(recorded(turns=3)), "utf-8")
-    changes = {"set": {"@beta": "-15 deg"}, "files": None}
-    found = trunnion.rig.read(mapping({"set": {}}), [tmp_path / "=cmd|calc!A1.csv"])
-    trunnion.save(dataset(found), tmp_path / "one.csv")
-    table = pd.read_csv(tmp_path / "one.csv")
-    assert set(table["condition"]) == {"'=cmd|calc!A1"}
-    found = trunnion.rig.read(mapping(changes), [tmp_path / "=cmd|calc!A1.csv"])
+    path = tmp_path / "=cmd|calc!A1.csv"
+    path.write_text(text_of(recorded(turns=3)), "utf-8")
+    trunnion.save(dataset(trunnion.rig.read(mapping(), [path])), tmp_path / "one.csv")
+    assert set(pd.read_csv(tmp_path / "one.csv")["condition"]) == {"'=cmd|calc!A1"}
+    found = trunnion.rig.read(mapping({"set": {"@beta": "-15 deg"}}), [path])
     trunnion.save(dataset(found), tmp_path / "two.csv", units_row=True)
     with (tmp_path / "two.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))
@@ -141,4 +132,4 @@ def test_no_text_of_a_table_is_a_formula(tmp_path: Path) -> None:
     own = read_table(tmp_path / "two.csv", ["@beta", "phase"])  # our own reader knows the name
     assert own.columns["@beta"].values == pytest.approx(np.radians(-15))
     with pytest.raises(MechanismError, match="begins with '='"):
-        trunnion.rig.read(mapping({"channels": {"=T1": mapping()["channels"]["brake"]}}), [tmp_path / "one.csv"])
+        trunnion.rig.read(mapping({"channels": {"=T1": mapping()["channels"]["brake"]}}), [path])

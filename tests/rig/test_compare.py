@@ -363,7 +363,7 @@ def test_a_timed_cycle_is_the_models():
         return compare(replace(whole, conditions=tuple(replace(one, duration=seconds) for one in whole.conditions)))
 
     assert codes(lasting(np.pi / 2 * 1.001)) == {Verdict.WITHIN}
-    with pytest.raises(MechanismError, match=r"the cycle of the data is 1\.7 s, that of the model 1\.5708 s"):
+    with pytest.raises(MechanismError, match=r"the cycle of the data is 1\.7 s, that of the model 1\.570796327 s"):
         lasting(1.7)
 
 

@@ -113,7 +113,7 @@ sensors:
     [
         ("turns: 2", "turrns: 2", 2, "the key 'turrns' is unknown", "'turns'"),
         ("1 kHz", "1 kg", 3, "'1 kg' is not a frequency", "2 kHz"),
-        ("1 kHz", "fast", 3, "not a number", "12 mV"),
+        ("1 kHz", "fast", 3, "not a number", "12.5 mV"),
         ("per_turn: 60", "per_turn: 0", 4, "greater than or equal to 1", ""),
         ("trunnion-rig: 1", "trunnion-rig: 2", 1, "version 2", "trunnion-rig: 1"),
         ("trunnion-rig: 1", "trunnion: 1", 1, "is no rig file", "trunnion-rig: 1"),
@@ -123,7 +123,7 @@ sensors:
         ("range: 10 N m", "per_turn: 60", 6, "a speed only", "rate:"),
         ("range: 10 N m", "column: t", 6, "that of time too", "column"),
         ("turns: 2", "over: {l2: 3:2}", 2, "no range", "FROM:TO:COUNT"),
-        ("turns: 2", "over: {l2: 3 mm:2 cm:4}", 2, "different units", "same unit"),
+        ("turns: 2", "over: {l2: 3 mm:2 cm:4}", 2, "no range", "same unit"),
         ("turns: 2", "over: {l2: [1]}, conditions: [{l2: 3 mm}]", 2, "a grid and rows", "not both"),
         ("effort:A", "effort:B", 6, "no driver 'B'", "known: 'A'"),
         ("range: 10 N m", "range: 10 V", 6, "'10 V' is not in N m", "state it in N m"),

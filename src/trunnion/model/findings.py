@@ -89,7 +89,7 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
     elif kind in _MEANINGS:
         what, remedy = (text.format(**{"key": key, **context}) for text in _MEANINGS[kind])
     else:
-        what, remedy = error["msg"][:1].lower() + error["msg"][1:], "see the examples of model files"
+        what, remedy = error["msg"][:1].lower() + error["msg"][1:], "see the examples"
     if kind == "missing":
         location = location[:-1]
     return Finding(what, _path(location, data), remedy)

@@ -13,7 +13,6 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema
 
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.quantity import Quantity
 
 __all__ = ["SCHEMA_FILE", "SchemaGenerator", "json_schema", "schema_text"]
 
@@ -24,7 +23,7 @@ class SchemaGenerator(GenerateJsonSchema):
     """Defaults as they would be written in a file; no titles that repeat the keys."""
 
     def encode_default(self, dft: Any) -> Any:
-        return dft.source if isinstance(dft, Quantity) else super().encode_default(dft)
+        return super().encode_default(getattr(dft, "source", dft))
 
     def field_title_should_be_set(self, schema: Any) -> bool:
         return False

@@ -58,11 +58,10 @@ class Modelled:
 
         A force is an interval where a relative speed is zero, and as a speed no number to rely on beside a dead centre.
         """
-        there = np.isfinite(self.courses[channel])
+        finite, solved = np.isfinite(self.courses[channel]), self.status == Status.SOLVED
         if self.measures[channel].of_places:
-            return there
-        best = self.status == Status.SOLVED  # all that are solved if there are no such
-        return there & (best if np.any(best) else self.status < Status.CONTACT_LOST)
+            return finite
+        return finite & (solved if np.any(solved) else self.status < Status.CONTACT_LOST)
 
 
 def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str, section: str = "channels") -> Measure:
@@ -71,14 +70,9 @@ def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str, section:
     try:
         measure = named(mechanism, [name], run.values)[0]
     except MechanismError as error:
-        raise MechanismError([replace(one, where=where) for one in error.findings]) from None
+        raise MechanismError([replace(finding, where=where) for finding in error.findings]) from None
     if not measure.everywhere or not measure.single(run.system):
         what = f"'{name}' is no number of a single position, as a sensor shows it"
-        if measure.in_time:
-            what += ": it is of a motion in time"
-        elif not measure.everywhere:
-            of = f"as {measure.statistic}" if measure.statistic else "at a place or over a range"
-            what += f": the model gives it {of}"
         remedy = "a sensor measures such as effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT or link.point.x"
         raise MechanismError(Finding(what, where, remedy))
     return measure
@@ -86,8 +80,7 @@ def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str, section:
 
 def refuse_unit(run: Run, measure: Measure, channel: str, course: Signal) -> None:
     """MechanismError where a channel has another unit than what it measures of the model, such as N in place of N m."""
-    unit = measure.unit(run.system)
-    if course.unit != unit:
+    if course.unit != (unit := measure.unit(run.system)):
         what = f"is in {course.unit}, and {course.measures} is in {unit}"
         remedy = "name another column, or state unit and gain, or what else it measures"
         raise MechanismError(Finding(what, f"channels.{channel}", remedy))
@@ -104,7 +97,7 @@ def modelled(
 
     Raises MechanismError for values or measures that the model does not have, all in one go.
     """
-    with _told_of(condition):
+    with _of_condition(condition):
         run = prepare(in_condition(mechanism, condition))
     findings: list[Finding] = []
     measures: dict[str, Measure] = {}
@@ -117,26 +110,28 @@ def modelled(
             findings += error.findings if channel in channels else ()
     if findings:
         raise MechanismError(findings)
-    if run.determinacy is not None and not all(one.of_motion for one in measures.values()):
+    if run.determinacy is not None and not all(measure.of_motion for measure in measures.values()):
         run.determinacy.refuse()
-    time = np.asarray(condition.phase, float) * run.cycle.duration
-    by_measure, status = courses_of(run, list({one.name: one for one in measures.values()}.values()), time, method)
-    unit, drive, (first, last) = coordinate_unit(run.system, run.values), time, (0.0, run.cycle.duration)
+    phase, duration = np.asarray(condition.phase, float), run.cycle.duration
+    time = phase * duration
+    single = list({measure.name: measure for measure in measures.values()}.values())
+    by_measure, status = courses_of(run, single, time, method)
+    unit, drive, first, last = coordinate_unit(run.system, run.values), time, 0.0, duration
     if unit != "s":  # else the driver names no position
-        name, ends = next(iter(run.system.mechanism.drivers)), np.array([0.0, run.cycle.duration * (1 - 1e-12)])
-        drive, edges = (_row(run.system.drive(run.values, name, at)[0], at) for at in (time, ends))
-        first, last = (float(end) for end in edges)
-    same_cycle(run, condition, run.cycle.duration, first, last - first if unit == "rad" else float("nan"))
+        name, ends = next(iter(run.system.mechanism.drivers)), np.array([0.0, duration * (1 - 1e-12)])
+        drive, (first, last) = (_row(run.system.drive(run.values, name, at)[0], at) for at in (time, ends))
+    same_cycle(run, condition, duration, float(first), float(last - first) if unit == "rad" else float("nan"))
     courses, left_open = {}, dict[str, Array]()
     for channel, measure in measures.items():
         courses[channel] = course = _row(by_measure[measure.name][0], time)
+        measured = condition.courses[channel]
         if measure.turning(run.system):  # both count their turns each in its own way
-            turns = np.round((condition.courses[channel].mean - course) / (2 * np.pi))
+            turns = np.round((measured.mean - course) / (2 * np.pi))
             courses[channel] = course + 2 * np.pi * np.nan_to_num(turns)
-        elif (per_turn := condition.courses[channel].per_turn) and run.cycle.periodic:
-            courses[channel] = over_pulses(course, np.asarray(condition.phase, float), run.cycle.duration, per_turn)
+        elif measured.per_turn and run.cycle.periodic:
+            courses[channel] = over_pulses(course, phase, duration, measured.per_turn)
             left_open[channel] = RIPPLE * np.abs(course - courses[channel])
-    return Modelled(run, drive, unit, last - first, status, courses, measures, left_open)
+    return Modelled(run, drive, unit, float(last - first), status, courses, measures, left_open)
 
 
 def over_pulses(speed: Array, phase: Array, duration: float, per_turn: int) -> Array:
@@ -163,20 +158,20 @@ def in_condition(mechanism: Mechanism, condition: Condition) -> Mechanism:
     for name, unit in condition.units.items():
         if unit != "1" and np.isfinite(condition.values.get(name, np.nan)):
             stated[name] = f"{condition.values[name]} {unit}"
-    with _told_of(condition):
+    with _of_condition(condition):
         return mechanism.with_values(stated)
 
 
 @contextmanager
-def _told_of(condition: Condition) -> Iterator[None]:
+def _of_condition(condition: Condition) -> Iterator[None]:
     """What is wrong with a condition says in which."""
     try:
         yield
     except MechanismError as error:
         tail, file = f" (in condition {condition.name})", str(next(iter(condition.files), ""))
         raise MechanismError(
-            one if one.what.endswith(tail) else replace(one, what=one.what + tail, file=one.file or file)
-            for one in error.findings
+            replace(finding, what=finding.what.removesuffix(tail) + tail, file=finding.file or file)
+            for finding in error.findings
         ) from None
 
 
@@ -198,7 +193,7 @@ def each(
         if progress:
             progress(done)
     if findings:
-        raise MechanismError(gathered(one for one in findings if one.severity is not Severity.NOTE))
+        raise MechanismError(gathered(finding for finding in findings if finding.severity is not Severity.NOTE))
     return results
 
 
@@ -210,33 +205,31 @@ def same_cycle(run: Run, condition: Condition, duration: float, begin: float, sp
     """MechanismError where the cycle of the data is not the model's, starts elsewhere, or runs backwards.
 
     duration: of the model's, s; begin, span: where the driver is at its start, and how far it turns, rad; NaN where its
-    turns name no position.
+    turns name no position. What the data do not tell is NaN.
     """
+    findings: list[Finding] = []
+
+    def differs(key: str, data: float, model: float, unit: str) -> None:
+        what = f"the {key} of the data is {data + 0.0:.10g} {unit}, that of the model {model + 0.0:.10g} {unit}"
+        findings.append(Finding(what, key, f"state {key}: {model + 0.0:.10g} {unit} in the mapping"))
+
     if abs(condition.duration - duration) > SLOWER * duration:
-        what = f"the cycle of the data is {condition.duration:g} s, that of the model {duration:g} s"
-        remedy = f"state cycle: {duration:g} s in the mapping, or set: the number of the model that makes it"
-        raise MechanismError(Finding(what, "cycle", remedy))
-    if not np.isfinite(span):
-        return
+        differs("cycle", condition.duration, duration, "s")
     if condition.speed * span < 0:
         driver, rpm = next(iter(run.system.mechanism.drivers), ""), np.pi / 30
         what = f"the angle runs backwards: {condition.speed / rpm:.4g} rpm measured, "
         what += f"{span / duration / rpm:.4g} rpm stated of {driver}"
         remedy = f"if it does turn so, set {as_key(f'{driver}.speed')} below zero; else add sign: -1 to angle:, or "
         figures, file = {"measured": condition.speed, "stated": span / duration}, str(next(iter(condition.files), ""))
-        finding = Finding(what, "angle", f"{remedy}remove it", file=file, code="data.angle.backwards", figures=figures)
-        raise MechanismError(finding)
-    if not np.isfinite([condition.start, condition.cycle]).all():
-        return
-    findings: list[Finding] = []
-    if abs(condition.cycle - abs(span)) > 1e-6 * abs(span):
-        what = f"the cycle of the data is {_degrees(condition.cycle)}, that of the model {_degrees(abs(span))}"
-        findings.append(Finding(what, "cycle", f"state cycle: {_degrees(abs(span))} in the mapping"))
-    off = condition.start - begin
-    off -= 2 * np.pi * np.round(off / (2 * np.pi)) if run.cycle.periodic else 0.0
-    if abs(off) > 1e-6:
-        what = f"the cycle of the data starts at {_degrees(condition.start)}, that of the model at {_degrees(begin)}"
-        findings.append(Finding(what, "start", f"state start: {_degrees(begin)} in the mapping"))
+        remedy += "remove it"
+        findings.append(Finding(what, "angle", remedy, file=file, code="data.angle.backwards", figures=figures))
+    elif np.isfinite([span, condition.start, condition.cycle]).all():
+        off = condition.start - begin
+        off -= 2 * np.pi * np.round(off / (2 * np.pi)) if run.cycle.periodic else 0.0
+        if abs(condition.cycle - abs(span)) > 1e-6 * abs(span):
+            differs("cycle", np.degrees(condition.cycle), np.degrees(abs(span)), "deg")
+        if abs(off) > 1e-6:
+            differs("start", np.degrees(condition.start), np.degrees(begin), "deg")
     if findings:
         raise MechanismError(findings)
 
@@ -244,7 +237,3 @@ def same_cycle(run: Run, condition: Condition, duration: float, begin: float, sp
 def apart(measured: float, stated: float, share: float = FAR) -> bool:
     """Whether a measured speed is off that of the model by more than a share of it; not where one is unknown."""
     return bool(abs(measured - stated) > share * abs(stated))
-
-
-def _degrees(angle: float) -> str:
-    return f"{np.degrees(angle) + 0.0:.10g} deg"

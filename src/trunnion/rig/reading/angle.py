@@ -8,7 +8,6 @@ leaves it. What lessens it is the shaft, which cannot follow such errors.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,16 +15,15 @@ from numpy.typing import NDArray
 from scipy.ndimage import convolve1d, median_filter, minimum_filter1d, uniform_filter1d
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.rig.reading.channels import unit_differs
+from trunnion.rig.reading.channels import missing
 from trunnion.rig.reading.mapping import AngleSource
-from trunnion.rig.reading.tables import Column, DataTable
-from trunnion.rig.reading.timebase import GAP, Timeline, at_times, counted, warning
+from trunnion.rig.reading.tables import DataTable
+from trunnion.rig.reading.timebase import GAP, Say, Timeline, at_times, counted, unit_of, warning
+from trunnion.rig.reading.turns import TURN, joined
 
 __all__ = ["Coordinate", "coordinate", "local_polynomials", "seen_edges", "smoothed", "unresolved"]
 
 Array = NDArray[np.float64]
-Say = Callable[[Finding | str], None]  # takes a finding, or a sentence about what was done
-TURN = 2 * np.pi
 SPANS = (2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # turns over which pulses are smoothed, the longest first
 ORDER = 3
 FEWEST = 5  # pulses in a span
@@ -51,57 +49,41 @@ class Coordinate:
 
 
 def coordinate(source: AngleSource, table: DataTable, line: Timeline, speed: Array | None, say: Say) -> Coordinate:
-    """The coordinate of the driver by its source.
-
-    Parameters
-    ----------
-    source : the entry `angle` of the mapping.
-    table : columns of the file.
-    line : times of its rows.
-    speed : that of the channel, rad/s, of a source `speed`.
-    say : takes findings, and sentences about what was done.
-    """
-    zero, index = float(source.zero.evaluate()), np.empty(0)
+    """The coordinate of the driver by its source; speed: that of the channel, rad/s, of a source `speed`."""
+    index, column = np.empty(0), table.columns.get(source.column or "")
     if source.index is not None:
         index = edges(line.rows(table.columns[source.index.column].values), line).times
         if not index.size:
             what, remedy = f"the column '{source.index.column}' has no pulse", "check the column, or remove index"
             say(warning("index.none", "angle.index", what, remedy))
+    spoilt, lag, cut = np.empty((0, 2)), 0.0, 0.0
+    if column is not None:
+        readings = np.array(line.rows(column.values))
+        say(missing("angle", column, readings, line.seconds))
     if source.from_ == "pulses":
-        return _of_pulses(source, table, line, index, zero, say)
-    if source.from_ == "column":
-        values = _of_column(source, table.columns[str(source.column)], line, say)
-    elif source.from_ == "time":
-        assert source.speed is not None
+        values, spoilt, lag = _of_pulses(source, readings, line, index, say)
+    elif column is not None:
+        _, factor = unit_of("angle", str(source.column), column, source.unit, "rad", say)
+        values = joined(readings * factor)
+        if source.resolution is not None and np.count_nonzero(np.isfinite(values)) >= FEWEST:
+            step = float(source.resolution.evaluate())
+            values, lag = _refined(values, step, line, say)
+            cut = source.sign * step / math.sqrt(12.0)
+    elif source.speed is not None:
         values = float(source.speed.evaluate()) * line.seconds
         say(f"the angle is that of a constant speed of {float(source.speed.evaluate()):.6g} rad/s")
     else:
         assert speed is not None
         finite, values = np.isfinite(speed), np.full(speed.size, np.nan)
         if np.count_nonzero(finite) > 1:  # where it is missing it is interpolated
-            bridged = speed if finite.all() else np.interp(line.seconds, line.seconds[finite], speed[finite])
+            bridged = np.interp(line.seconds, line.seconds[finite], speed[finite])
             steps = 0.5 * (bridged[1:] + bridged[:-1]) * np.diff(line.seconds)
             values = np.concatenate([[0.0], np.cumsum(steps)])
         say("the angle is the integral of the speed from the first row; its zero creeps with the sensor's error")
-    values, lag, cut = _refined(source, values, line, say)
-    values, spoilt = source.sign * values, np.empty((0, 2))
+    values = source.sign * values
     if index.size > 1 and source.from_ in ("time", "speed"):
         values, spoilt = _tied(values, index, line.seconds, say)
-    return Coordinate(values + zero, spoilt, lag, source.sign * cut)
-
-
-def _of_column(source: AngleSource, column: Column, line: Timeline, say: Say) -> Array:
-    factor = column.factor("angle", str(source.column), source.unit, "rad", say)
-    if source.unit and (finding := unit_differs("angle", str(source.column), source.unit, column)):
-        say(finding)
-    values = line.rows(column.values) * factor
-    known = np.flatnonzero(np.isfinite(values))
-    if known.size < values.size:
-        what = f"{counted(values.size - known.size, 'cell')} of '{source.column}' of {values.size:,} are no number"
-        remedy = "check the angle sensor and its cable"
-        say(warning("angle.missing", "angle", f"{what}; these rows are left out", remedy))
-    values[known] = np.unwrap(values[known])
-    return values
+    return Coordinate(values + float(source.zero.evaluate()), spoilt, lag, cut)
 
 
 def _tied(values: Array, index: Array, seconds: Array, say: Say) -> tuple[Array, Array]:
@@ -142,34 +124,36 @@ class Pulses:
 
 
 def _of_pulses(
-    source: AngleSource, table: DataTable, line: Timeline, index: Array, zero: float, say: Say
-) -> Coordinate:
+    source: AngleSource, readings: Array, line: Timeline, index: Array, say: Say
+) -> tuple[Array, Array, float]:
     """The angle between pulses by interpolation in time, counted anew from every index pulse."""
     assert source.per_turn is not None
-    readings = line.rows(table.columns[str(source.column)].values)
-    finite = np.isfinite(readings)
-    if not finite.all():
-        what = f"{counted(int(np.count_nonzero(~finite)), 'cell')} of '{source.column}' of {readings.size:,} are no "
-        what += "number; the previous reading is used there"
-        say(warning("counter.missing", "angle", what, "check the counter and its cable"))
-    until = np.inf
+    finite, until = np.isfinite(readings), np.inf
     if source.kind == "level":
         pulses = edges(readings, line)
-        until = _check_level(pulses, line, index.size > 1, say)
+        gaps = np.flatnonzero(np.diff(line.seconds) > GAP * line.step)
+        gaps = gaps[line.seconds[gaps + 1] < pulses.times.max(initial=-np.inf)]
+        if gaps.size and index.size < 2:
+            until = float(line.seconds[gaps[0]])
+            what = f"no pulses are counted in gaps of time: the turns after {until:.5g} s are left out"
+            say(warning("pulses.gap", "angle", what, "record a count or an index"))
+        if pulses.times.size > 2 and (samples := float(np.median(np.diff(pulses.times))) / line.step) < 2.5:
+            what = f"a pulse of the encoder has {samples:.3g} samples: edges are missed"
+            say(warning("pulses.few_samples", "angle", what, "sample at least 4 times a pulse, or record a count"))
     else:
         pulses = _counted(source, readings[finite], line.seconds[finite], line.step)
     if pulses.times.size < 2:
         what = f"the column '{source.column}' has {counted(pulses.times.size, 'pulse')}: there are no turns"
         raise MechanismError(Finding(what, "angle", "check that angle.column is the encoder's, and angle.kind"))
-    counts, spoilt, step, slack = pulses.counts, np.empty((0, 2)), line.step, pulses.slack(line.step)
+    when, counts, spoilt, step = pulses.times, pulses.counts, np.empty((0, 2)), line.step
+    slack, pitch, lag = pulses.slack(step), TURN / source.per_turn, 0.0
     if index.size > 1:
-        at = np.interp(index[[0, -1]], pulses.times, counts)
+        at = np.interp(index[[0, -1]], when, counts)
         index = seen_edges(index, float(np.abs(at[1] - at[0])) / source.per_turn, step)
         counts, spoilt = by_index(pulses, index, source.per_turn, step, say)
     elif index.size == 1:
-        counts = counts - np.interp(index[0], pulses.times, counts)
-    angles, pitch = source.sign * TURN / source.per_turn * counts, TURN / source.per_turn
-    when, lag = pulses.times, 0.0
+        counts = counts - np.interp(index[0], when, counts)
+    angles = pitch * counts
     if not pulses.crossings and slack < 1:  # a count for each event: its time is not known
         when, spans = smoothed(when, 0.5 * step, source.per_turn, counts)
         lag = unresolved((pulses.times - when)[spans > 0], step)
@@ -180,7 +164,7 @@ def _of_pulses(
     say(f"the angle is interpolated between pulses {np.degrees(pitch):.4g} deg apart, and smoothed within a sample")
     values = np.interp(line.seconds, when, angles, left=np.nan, right=np.nan)
     values[line.seconds > until] = np.nan
-    return Coordinate(values + zero, spoilt, lag)
+    return values, spoilt, lag
 
 
 def _counted(source: AngleSource, readings: Array, seconds: Array, step: float) -> Pulses:
@@ -208,43 +192,22 @@ def _counted(source: AngleSource, readings: Array, seconds: Array, step: float) 
 
 
 def edges(readings: Array, line: Timeline) -> Pulses:
-    """Rising edges of a level: it passes the middle, having been in the lower quarter since the last one."""
+    """Rising edges of a level: it passes the middle, having been in the lower two fifths since the last one."""
     finite = np.isfinite(readings)
-    last = np.maximum.accumulate(np.where(finite, np.arange(readings.size), 0))
-    levels = readings[last] if finite.any() else np.empty(0)
-    levels = np.where(np.isfinite(levels), levels, readings[int(np.argmax(finite))]) if levels.size else levels
-    low, high = (float(end) for end in np.percentile(levels, (0.1, 99.9))) if levels.size else (0.0, 0.0)
-    low, high = (low, high) if high > low or not levels.size else (float(levels.min()), float(levels.max()))
-    if high <= low:
+    levels = readings[np.maximum.accumulate(np.where(finite, np.arange(readings.size), int(np.argmax(finite))))]
+    if not finite.any() or levels.min() == levels.max():
         return Pulses(np.empty(0), np.empty(0))
-    state = np.zeros(levels.size, dtype=np.int8)
-    state[levels > low + 0.6 * (high - low)] = 1
-    state[levels < low + 0.4 * (high - low)] = -1
-    known = np.flatnonzero(state)
-    after = known[1:][(state[known[1:]] == 1) & (state[known[:-1]] == -1)]
+    low, high = (float(end) for end in np.percentile(levels, (0.1, 99.9)))
+    low, high = (low, high) if high > low else (float(levels.min()), float(levels.max()))
+    state = np.where(levels > low + 0.6 * (high - low), 1, np.where(levels < low + 0.4 * (high - low), -1, 0))
+    sure = np.flatnonzero(state)
+    after = sure[1:][(state[sure[1:]] == 1) & (state[sure[:-1]] == -1)]
     before = np.maximum(after - 1, 0)
     rise = np.where(levels[after] == levels[before], 1.0, levels[after] - levels[before])
     share = np.clip((low + 0.5 * (high - low) - levels[before]) / rise, 0, 1)
     seconds = line.seconds[before] + share * (line.seconds[after] - line.seconds[before])
     between = np.count_nonzero(state == 0) > 0.02 * state.size
     return Pulses(seconds, np.arange(seconds.size, dtype=np.float64), crossings=bool(between))
-
-
-def _check_level(pulses: Pulses, line: Timeline, indexed: bool, say: Say) -> float:
-    """Until when the pulses of a level are all seen, s."""
-    if pulses.times.size < 3:
-        return np.inf
-    usual = float(np.median(np.diff(pulses.times))) / line.step
-    if usual < 2.5:
-        what, remedy = f"a pulse of the encoder has {usual:.3g} samples", "sample at least 4 times a pulse"
-        say(warning("pulses.few_samples", "angle", f"{what}: edges are missed", f"{remedy}, or record a count"))
-    gaps = np.flatnonzero(np.diff(line.seconds[line.seconds < pulses.times[-1]]) > GAP * line.step)
-    if indexed or not gaps.size:
-        return np.inf
-    until = float(line.seconds[gaps[0]])
-    what = f"no pulses are counted in gaps of time: the angle is not known after {until:.5g} s"
-    say(warning("pulses.gap", "angle", f"{what}; the turns from there on are left out", "record a count or an index"))
-    return until
 
 
 def by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say) -> tuple[Array, Array]:
@@ -259,8 +222,7 @@ def by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say)
     if abs(usual - per_turn) >= max(0.75, 0.01 * per_turn):
         what = f"from one index pulse to the next the encoder counts {usual:.4g}, angle.per_turn is {per_turn:,}"
         say(warning("pulses.per_turn", "angle.per_turn", what, "correct per_turn, if the index comes once a turn"))
-    turns = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(between / per_turn), 1.0))])
-    over = (at - at[0]) * way - per_turn * turns
+    over = (at - at[0]) * way - per_turn * np.cumsum([0.0, *np.maximum(np.rint(between / per_turn), 1.0)])
     fraction = float(np.angle(np.mean(np.exp(2j * np.pi * over)))) / (2 * np.pi)
     level = over - fraction
     if pulses.slack(step) > 0.25 and level.size >= 9:
@@ -270,10 +232,10 @@ def by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say)
     wrong = change != 0
     if np.any(wrong):
         lost, more = -int(change[change < 0].sum()), int(change[change > 0].sum())
-        told = [f"{counted(lost, 'pulse')} lost"] * (lost > 0) + [f"{counted(more, 'pulse')} too many"] * (more > 0)
-        where = f"in {counted(int(np.count_nonzero(wrong)), 'turn')} of {change.size}, {at_times(index[:-1][wrong])}"
-        what = f"the encoder: {' and '.join(told)} {where}; corrected at the index, these turns are left out"
-        say(warning("pulses.lost", "angle", what, "check encoder, cable and counter"))
+        what = f"the encoder: {counted(lost, 'pulse')} lost, {more:,} too many in "
+        what += f"{counted(int(np.count_nonzero(wrong)), 'turn')} of {change.size}, {at_times(index[:-1][wrong])}"
+        remedy = "check encoder, cable and counter"
+        say(warning("pulses.lost", "angle", f"{what}; corrected at the index, these turns are left out", remedy))
     turn = np.clip(np.searchsorted(index, pulses.times, side="right") - 1, 0, index.size - 1)
     spoilt = np.column_stack([index[:-1][wrong], index[1:][wrong]])
     return pulses.counts - at[0] - way * fraction - way * level[turn], spoilt
@@ -292,43 +254,27 @@ def seen_edges(index: Array, turns: float, step: float) -> Array:
 # ---- smoothing ------------------------------------------------------------------------------------------------
 
 
-def _refined(source: AngleSource, values: Array, line: Timeline, say: Say) -> tuple[Array, float, float]:
-    """An angle that is read in steps, between them as the shaft turns; standard uncertainty, s, of what is left.
-
-    And that, rad, of what all readings may be off by: rounded or cut off, up to half a step, rectangular.
-    """
-    known = np.flatnonzero(np.isfinite(values))
-    if source.resolution is None or known.size < FEWEST:
-        return values, 0.0, 0.0
-    step = float(source.resolution.evaluate())
-    raw, seconds = values[known], line.seconds[known]
+def _refined(values: Array, step: float, line: Timeline, say: Say) -> tuple[Array, float]:
+    """An angle that is read in steps, between them as the shaft turns; standard uncertainty, s, of what is left."""
+    finite = np.flatnonzero(np.isfinite(values))
+    raw, seconds = values[finite], line.seconds[finite]
     passed, lasted = np.abs(np.diff(raw)), np.diff(seconds)
     turning = passed / lasted > 0.1 * np.mean(passed / lasted)
     rate = float(np.sum(passed[turning]) / max(np.sum(lasted[turning]), 1e-300)) or 1.0
     smooth, spans = smoothed(raw, 0.5 * step, TURN / (rate * line.step), seconds)
     refined = values.copy()
-    refined[known] = smooth
+    refined[finite] = smooth
     say(f"the angle is read in steps of {np.degrees(step):.4g} deg, and smoothed within them")
-    return refined, unresolved((raw - smooth)[spans > 0], step) / rate, step / math.sqrt(12.0)
+    return refined, unresolved((raw - smooth)[spans > 0], step) / rate
 
 
 def smoothed(values: Array, off: float, per_turn: float, over: Array | None = None) -> tuple[Array, Array]:
-    """Smooth values at pulses by local cubics (Savitzky and Golay, doi:10.1021/ac60214a047).
+    """Values at pulses by local cubics (Savitzky and Golay, doi:10.1021/ac60214a047), and the turns of each span.
 
     Each takes the longest span in which no value is farther from the cubic than it may be, and their root mean square
-    is that of rounding.
-
-    Parameters
-    ----------
-    values : times, s, of pulses one count apart, or angles, rad, of pulses one sample apart.
-    off : by which each may be off, as uniformly as rounding.
-    per_turn : pulses of a turn.
-    over : counts of the times, or times of the angles, where some are more than one apart, as near one count a sample:
-        the values are smoothed less a straight line over them.
-
-    Returns
-    -------
-    The values, and the turns of each span; 0 where not even the shortest is so.
+    is that of rounding; 0 where not even the shortest is so. values: times, s, of pulses one count apart, or angles,
+    rad, of pulses one sample apart; off: by which each may be off; per_turn: pulses of a turn; over: counts of the
+    times, or times of the angles, where some are more than one apart: smoothed is what is left of a line over them.
     """
     result, spans = values.copy(), np.zeros(values.size)
     if off <= 0:

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, Tag, ValidationError, WithJsonSchema, model_validator
-from pydantic_core import PydanticCustomError
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.entry import Name, Part, forms, problem
@@ -23,44 +22,16 @@ from trunnion.model.names import nearest
 from trunnion.model.quantity import Angle, AnyQuantity, Dimensionless, Quantity, Rate, Time
 from trunnion.model.schema import SchemaGenerator
 from trunnion.model.units import ANGLE, KINDS, UnitError
-from trunnion.rig.reading.units import (
-    Amount,
-    Frequency,
-    MeasureText,
-    Number,
-    Positive,
-    SensorScale,
-    Size,
-    UnitText,
-    alike,
-    bounded,
-    scale,
-)
-from trunnion.rig.reading.units import dimensions as unit_dimensions
+from trunnion.rig.reading import units
 
 __all__ = [
     "Accuracies", "AngleSource", "Channel", "DataMapping", "File", "Filter", "FixedAngle", "FixedNumber", "FixedTime",
-    "FromData", "Mapped", "TimeBase", "Zero", "read_mapping", "schema_text",
+    "FromData", "Mapped", "Pulses", "TimeBase", "Zero", "read_mapping", "schema_text",
 ]  # fmt: skip
 
 Sign = Literal[1, -1]
-
-
-class FromData(Part):
-    """A value that the data tell: the mean of a channel over the turns, of the speed by the angle with `mean: angle`
-    where no channel has that name, or a column that states it."""
-
-    mean: str | None = None
-    column: str | None = None
-    unit: UnitText | None = None
-
-    @model_validator(mode="after")
-    def _one(self) -> FromData:
-        if (self.mean is None) == (self.column is None):
-            raise problem("a value is taken from one of mean and column", "write {mean: channel} or {column: name}")
-        if self.mean is not None and self.unit is not None:
-            raise problem("a mean has the unit of its channel", "remove unit")
-        return self
+Pulses = Annotated[int, Field(ge=1, le=10_000_000)]  # of a turn
+PLAIN_ZERO = units.Amount(0.0, 0.0, "", {})
 
 
 def fixed(quantity: Quantity) -> Quantity:
@@ -73,66 +44,81 @@ def fixed(quantity: Quantity) -> Quantity:
     return quantity
 
 
-def _with_unit(quantity: Quantity) -> Quantity:
-    """An angle with its unit: a plain number would be in rad, whatever the readings are in."""
-    if quantity.evaluate() != 0 and not any(sign.isalpha() or sign == "°" for sign in str(quantity.source)):
-        raise problem(f"{quantity.source} has no unit", f"write {quantity.source} deg, or {quantity.source} rad")
-    return quantity
-
-
-FixedAngle = Annotated[Angle, AfterValidator(fixed), AfterValidator(_with_unit)]
+FixedAngle = Annotated[Angle, AfterValidator(fixed)]
 FixedNumber = Annotated[Dimensionless, AfterValidator(fixed)]
 FixedRate = Annotated[Rate, AfterValidator(fixed)]
 FixedTime = Annotated[Time, AfterValidator(fixed)]
 FixedQuantity = Annotated[AnyQuantity, AfterValidator(fixed)]
+
+
+def _of_unit(si: str, example: str) -> AfterValidator:
+    """Units, and amounts with one, that measure the same as that of SI."""
+
+    def check(entry: Any) -> Any:
+        text = entry.unit if isinstance(entry, units.Amount) else entry
+        if text and not units.alike(units.dimensions(text)[1], units.dimensions(si)[1]):
+            raise problem(f"the unit '{text}' is not {example}", f"write {example}")
+        return entry
+
+    return AfterValidator(check)
+
+
+Moment = Annotated[units.Number, _of_unit("s", "a unit of time such as ms")]
+TimeUnit = Annotated[units.UnitText, _of_unit("s", "a unit of time such as ms")]
+AngleUnit = Annotated[units.UnitText, _of_unit("rad", "a unit of angle such as deg")]
+
+
+def _ordered(span: tuple[units.Amount, units.Amount]) -> tuple[units.Amount, units.Amount]:
+    """A stretch of time that begins before it ends."""
+    if not span[0].value < span[1].value:
+        raise problem(f"[{span[0].source}, {span[1].source}] ends before it begins", "write [0 s, 0.5 s]")
+    return span
+
+
+def _spans(value: object) -> object:
+    """One stretch [from, to] as a list of stretches."""
+    single = isinstance(value, (list, tuple)) and value and not isinstance(value[0], (list, tuple))
+    return [value] if single else value
+
+
+Span = Annotated[tuple[Moment, Moment], AfterValidator(_ordered)]
+_PAIR = {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2, "maxItems": 2}
+
+
+class FromData(Part):
+    """A value that the data tell: the mean of a channel over the turns, of the speed by the angle with `mean: angle`
+    where no channel has that name, or a column that states it."""
+
+    mean: str | None = None
+    column: str | None = None
+    unit: units.UnitText | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> FromData:
+        if (self.mean is None) == (self.column is None) or (self.mean is not None and self.unit is not None):
+            what = "a value is taken from one of mean and column, and a mean has the unit of its channel"
+            raise problem(what, "write {mean: channel} or {column: name, unit: deg}")
+        return self
+
+
 Setting = Annotated[
     Annotated[FromData, Tag(":group")] | Annotated[FixedQuantity, Tag(":value")],
     forms("a number with its unit, {mean: channel} or {column: name, unit: deg}"),
 ]
 
 
-def _span(value: object) -> object:
-    """One stretch [from, to] as a list of stretches."""
-    if isinstance(value, (list, tuple)) and value and not isinstance(value[0], (list, tuple)):
-        return [value]
-    return value
-
-
-def _ordered(span: tuple[Number, Number]) -> tuple[Number, Number]:
-    """A stretch of time that begins before it ends."""
-    begin, end = span
-    for one in span:
-        if not one.plain and not alike(one.dimensions, {"s": 1}):  # type: ignore[dict-item]
-            raise problem(f"'{one.source}' is no time", "write [0 s, 0.5 s]")
-    if not begin.value < end.value:
-        raise problem(f"[{begin.source}, {end.source}] ends before it begins", "write [0 s, 0.5 s]")
-    return span
-
-
-Span = Annotated[tuple[Number, Number], AfterValidator(_ordered)]
-_PAIR = {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2, "maxItems": 2}
-
-
-class FileAngle(Part):
-    """The angle in one data file: its zero, in place of that of `angle`."""
-
-    zero: FixedAngle
-
-
 class TimeBase(Part):
     """Where time comes from: a column with its unit, or a sampling rate. dayfirst: 3/4/2026 is the third of April."""
 
     column: str | None = None
-    unit: UnitText | None = None
-    rate: Frequency | None = None
+    unit: TimeUnit | None = None
+    rate: units.Frequency | None = None
     dayfirst: bool = True
 
     @model_validator(mode="after")
     def _one(self) -> TimeBase:
         if (self.column is None) == (self.rate is None):
             raise problem("time is either a column or a rate", "write {column: t, unit: s} or {rate: 2 kHz}")
-        if self.unit is not None:
-            _unit_of(self.unit, "s", "a unit of time such as ms")
         return self
 
 
@@ -142,42 +128,7 @@ class Index(Part):
     column: str
 
 
-class AngleSource(Part):
-    """Where the coordinate of the driver comes from."""
-
-    from_: Literal["pulses", "column", "time", "speed"] = Field(alias="from")
-    column: str | None = None
-    unit: UnitText | None = None
-    per_turn: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
-    kind: Literal["count", "level"] | None = None
-    wrap: Annotated[int, Field(ge=2)] | None = None
-    speed: FixedRate | None = None
-    channel: str | None = None
-    zero: FixedAngle = Quantity(0.0, KINDS["angle"])
-    index: Index | None = None
-    sign: Sign = 1
-    resolution: Annotated[FixedAngle, bounded(above=True)] | None = None
-
-    @model_validator(mode="after")
-    def _of_its_kind(self) -> AngleSource:
-        needed, allowed = _KEYS[self.from_]
-        keys = {key for own in _KEYS.values() for part in own for key in part}
-        stated = {key for key in keys if getattr(self, key) is not None}
-        if missing := [key for key in needed if key not in stated]:
-            raise problem(f"from: {self.from_} needs {' and '.join(missing)}", "add it")
-        if extra := sorted(stated - {*needed, *allowed}):
-            remedy = f"remove it; the keys of from: {self.from_} are {', '.join((*needed, *allowed))}"
-            raise problem(f"from: {self.from_} does not use {', '.join(extra)}", remedy)
-        if self.wrap is not None and self.kind == "level":
-            raise problem("only a running count wraps", "remove wrap, or write kind: count")
-        if self.unit is not None:
-            _unit_of(self.unit, "rad", "a unit of angle such as deg")
-        if self.speed is not None and self.speed.evaluate() == 0:
-            raise problem("the speed is zero: there are no turns", "write the speed of the driver, such as 1500 rpm")
-        return self
-
-
-# keys each source needs, and those it may have
+# keys that each source of the angle needs, and those it may have
 _KEYS = {
     "pulses": (("column", "per_turn"), ("kind", "wrap", "index")),
     "column": (("column",), ("unit", "index", "resolution")),
@@ -186,19 +137,52 @@ _KEYS = {
 }
 
 
+class AngleSource(Part):
+    """Where the coordinate of the driver comes from."""
+
+    from_: Literal["pulses", "column", "time", "speed"] = Field(alias="from")
+    column: str | None = None
+    unit: AngleUnit | None = None
+    per_turn: Pulses | None = None
+    kind: Literal["count", "level"] | None = None
+    wrap: Annotated[int, Field(ge=2)] | None = None
+    speed: FixedRate | None = None
+    channel: str | None = None
+    zero: FixedAngle = Quantity(0.0, KINDS["angle"])
+    index: Index | None = None
+    sign: Sign = 1
+    resolution: Annotated[FixedAngle, units.bounded(above=True)] | None = None
+
+    @model_validator(mode="after")
+    def _of_its_kind(self) -> AngleSource:
+        needed, allowed = _KEYS[self.from_]
+        keys = {key for parts in _KEYS.values() for part in parts for key in part}
+        stated = {key for key in keys if getattr(self, key) is not None}
+        if missing := [key for key in needed if key not in stated]:
+            raise problem(f"from: {self.from_} needs {' and '.join(missing)}", "add it")
+        if extra := sorted(stated - {*needed, *allowed}):
+            remedy = f"remove it; the keys of from: {self.from_} are {', '.join((*needed, *allowed))}"
+            raise problem(f"from: {self.from_} does not use {', '.join(extra)}", remedy)
+        if self.wrap is not None and self.kind == "level":
+            raise problem("only a running count wraps", "remove wrap, or write kind: count")
+        if self.speed is not None and self.speed.evaluate() == 0:
+            raise problem("the speed is zero: there are no turns", "write the speed of the driver, such as 1500 rpm")
+        return self
+
+
 class Zero(Part):
     """The zero of a channel as the mean over stretches of time in which nothing loads the sensor."""
 
     over: Annotated[
         tuple[Span, ...],
-        BeforeValidator(_span),
+        BeforeValidator(_spans),
         Field(min_length=1, max_length=20),
         WithJsonSchema({"anyOf": [_PAIR, {"type": "array", "items": _PAIR, "minItems": 1, "maxItems": 20}]}),
     ]
 
 
 ChannelZero = Annotated[
-    Annotated[Zero, Tag(":group")] | Annotated[Number, Tag(":value")],
+    Annotated[Zero, Tag(":group")] | Annotated[units.Number, Tag(":value")],
     forms("a number with its unit, or {over: [0 s, 0.5 s]}"),
 ]
 
@@ -206,11 +190,29 @@ ChannelZero = Annotated[
 class Accuracies(Part):
     """Standard uncertainties of a sensor: of its gain, relative, and of its zero."""
 
-    gain: Annotated[FixedNumber, bounded(above=False)] = Quantity(0.0, KINDS["number"])
-    zero: Size = Amount(0.0, 0.0, "", {})
+    gain: Annotated[FixedNumber, units.bounded(above=False)] = Quantity(0.0, KINDS["number"])
+    zero: units.Size = PLAIN_ZERO
 
 
-class Channel(Part):
+class FileChannel(Part):
+    """A channel in one data file, as of another setting of its amplifier: what it states in place of the channel's."""
+
+    unit: units.UnitText | None = None
+    gain: units.Number | None = None
+    zero: ChannelZero = PLAIN_ZERO
+    range: units.Positive | None = None
+    resolution: units.Positive | None = None
+    accuracy: Accuracies = Accuracies()
+
+    def of(self, channel: Channel) -> Channel:
+        """The channel as it is in the file; UnitError if the two do not go together."""
+        changed = channel.model_copy(update={key: getattr(self, key) for key in self.model_fields_set})
+        if changed.unit is not None:
+            changed.scale(changed.unit)
+        return changed
+
+
+class Channel(FileChannel):
     """A column that measures something of the model, and how its readings become that.
 
     Quantity = sign · (reading − zero) · gain, or / gain, as its unit tells. per_turn: pulses of a speed that is worked
@@ -218,54 +220,35 @@ class Channel(Part):
     """
 
     column: str
-    measures: MeasureText
-    unit: UnitText | None = None
-    gain: Number | None = None
+    measures: units.MeasureText
     sign: Sign = 1
-    zero: ChannelZero = Amount(0.0, 0.0, "", {})
-    range: Positive | None = None
-    resolution: Positive | None = None
-    accuracy: Accuracies = Accuracies()
-    per_turn: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
+    per_turn: Pulses | None = None
 
     @model_validator(mode="after")
     def _fitting(self) -> Channel:
         if self.per_turn is not None and not self.measures.startswith("rate:"):
             raise problem("pulses measure a speed only", "measure rate:JOINT, or remove per_turn")
         if self.unit is not None:
-            self.scale(self.unit)
+            try:
+                self.scale(self.unit)
+            except UnitError as error:
+                raise problem(error.what, error.remedy) from None
         return self
 
-    def scale(self, unit: str) -> SensorScale:
-        """How readings in a unit become the quantity; an error of pydantic if they cannot."""
-        try:
-            found = scale(self.measures, unit, self.gain, self.column)
-            stated = {"zero": self.zero, "range": self.range, "resolution": self.resolution}
-            for key, amount in {**stated, "accuracy.zero": self.accuracy.zero}.items():
-                if isinstance(amount, Amount):
-                    found.reading(amount, key)
-        except UnitError as error:
-            raise problem(error.what, error.remedy) from None
-        return found
+    def scale(self, unit: str) -> units.SensorScale:
+        """How readings in a unit become the quantity; UnitError if they, or an amount of the channel, cannot."""
+        of_unit = units.scale(self.measures, unit, self.gain)
+        stated = {"zero": self.zero, "range": self.range, "resolution": self.resolution}
+        for key, amount in {**stated, "accuracy.zero": self.accuracy.zero}.items():
+            if isinstance(amount, units.Amount):
+                of_unit.reading(amount, key)
+        return of_unit
 
 
-class FileChannel(Part):
-    """A channel in one data file, as of another setting of its amplifier: what it states in place of the channel's."""
+class FileAngle(Part):
+    """The angle in one data file: its zero, in place of that of `angle`."""
 
-    unit: UnitText | None = None
-    gain: Number | None = None
-    zero: ChannelZero | None = None
-    range: Positive | None = None
-    resolution: Positive | None = None
-    accuracy: Accuracies | None = None
-
-    def of(self, channel: Channel) -> Channel:
-        """The channel as it is in the file; an error of pydantic if the two do not go together."""
-        stated = {key: getattr(self, key) for key in type(self).model_fields if getattr(self, key) is not None}
-        found = channel.model_copy(update=stated)
-        if found.unit is not None:
-            found.scale(found.unit)
-        return found
+    zero: FixedAngle
 
 
 class File(Part):
@@ -281,8 +264,16 @@ class File(Part):
 class Filter(Part):
     """Butterworth low-pass, forward and backward: without delay."""
 
-    cut_off: Frequency
+    cut_off: units.Frequency
     order: Annotated[int, Field(ge=1, le=12)] = 4
+
+
+def _cycle(quantity: Quantity) -> Quantity:
+    """An angle or a time above zero."""
+    kinds = (ANGLE, KINDS["time"].dimensions[0], None)
+    if quantity.check({}) not in kinds or not float(quantity.evaluate()) > 0:
+        raise problem(f"'{quantity.source}' is no angle and no time above zero", "write it as 360 deg or 0.5 s")
+    return quantity
 
 
 class DataMapping(Part):
@@ -294,40 +285,27 @@ class DataMapping(Part):
     files: tuple[File, ...] = ()
     time: TimeBase | None = None
     angle: AngleSource | None = None
-    channels: Annotated[Mapping[Name, Channel], Field(min_length=1)] = {}
+    channels: Annotated[Mapping[Name, Channel], Field(min_length=1)]
     set: Mapping[str, Setting] = {}
     filter: Filter | None = None
-    cycle: FixedQuantity = Quantity.read("1 turn")
+    cycle: Annotated[FixedQuantity, AfterValidator(_cycle)] = Quantity.read("1 turn")
     start: FixedAngle = Quantity(0.0, KINDS["angle"])
     positions: Annotated[int, Field(ge=2, le=100_000)] = 360
     drift: Literal["report", "remove"] = "report"
 
     def of_file(self, entry: File) -> DataMapping:
-        """The same with what a file states of its own angle and its own channels."""
-        changes: dict[str, Any] = {}
+        """The same with what a file states of its own angle, its own channels, and what was set."""
+        channels = {name: entry.channels[name].of(channel) if name in entry.channels else channel
+                    for name, channel in self.channels.items()}  # fmt: skip
+        changes: dict[str, Any] = {"channels": channels, "set": {**self.set, **entry.set}}
         if entry.angle is not None and self.angle is not None:
             changes["angle"] = self.angle.model_copy(update={"zero": entry.angle.zero})
-        if entry.channels:
-            changes["channels"] = {
-                name: entry.channels[name].of(one) if name in entry.channels else one
-                for name, one in self.channels.items()
-            }
-        return self.model_copy(update=changes) if changes else self
-
-    def settings(self, entry: File) -> dict[str, FromData | Quantity]:
-        """What was set, for all files and for this one."""
-        return {**self.set, **entry.set}
+        return self.model_copy(update=changes)
 
     @property
     def timed(self) -> bool:
         """Whether the cycle is a time."""
         return self.cycle.check({}) == KINDS["time"].dimensions[0]
-
-
-def _unit_of(text: str, si: str, needed: str) -> None:
-    """An error of pydantic if a unit does not measure the same as that of SI."""
-    if not alike(unit_dimensions(text)[1], unit_dimensions(si)[1]):
-        raise problem(f"the unit '{text}' is not {needed}", f"write {needed}")
 
 
 # ---- the file -------------------------------------------------------------------------------------------------
@@ -349,7 +327,7 @@ class Mapped:
 
     def files(self, named: Iterable[str | os.PathLike[str]] | None) -> list[tuple[Path, File]]:
         """Data files with their entries; one of the command line has the entry of the same file, else of its name."""
-        entries, paths = self.mapping.files, [Path(one) for one in named or ()]
+        entries, paths = self.mapping.files, [Path(path) for path in named or ()]
         if not paths and not entries:
             remedy = "write files: [{file: run-01.csv}], or name them after the mapping"
             raise MechanismError(self.placed([Finding("no data file is named", "files", remedy)]))
@@ -357,8 +335,8 @@ class Mapped:
             return [(self.folder / entry.file, entry) for entry in entries]
         stated = {(self.folder / entry.file).resolve(): entry for entry in entries}
         names = [Path(entry.file).name for entry in entries]
-        alike = {name: entry for entry, name in zip(entries, names, strict=True) if names.count(name) == 1}
-        return [(path, stated.get(path.resolve()) or alike.get(path.name) or File(file=path.name or "."))
+        single = {name: entry for entry, name in zip(entries, names, strict=True) if names.count(name) == 1}
+        return [(path, stated.get(path.resolve()) or single.get(path.name) or File(file=path.name or "."))
                 for path in paths]  # fmt: skip
 
 
@@ -377,86 +355,59 @@ def read_mapping(source: str | os.PathLike[str] | Mapping[str, Any]) -> Mapped:
         mapping = DataMapping.model_validate(data)
         findings = list(_unsound(mapping, folder))
     except ValidationError as error:
-        findings = [_explained(one, data) for one in schema_findings(error, DataMapping, data)]
+        findings = schema_findings(error, DataMapping, data)
     if findings:
         raise MechanismError(place(findings, file, lines, data) if file else findings)
     return Mapped(mapping, folder, file, lines, data)
 
 
-def _explained(finding: Finding, data: Mapping[str, Any]) -> Finding:
-    """A file of another kind is told as such."""
-    if finding.what == "'trunnion-data' is missing":
-        if "trunnion" in data:
-            return Finding("is a model file, not a mapping file", "trunnion", "name the mapping, then the data files")
-        return Finding(finding.what, finding.where, "begin the file with trunnion-data: 1")
-    if finding.remedy == "see the examples of model files":
-        return Finding(finding.what, finding.where, "see the examples of mappings in docs/how-to/measured-data.md")
-    return finding
-
-
 def _unsound(mapping: DataMapping, folder: Path) -> Iterator[Finding]:
-    """What one part alone cannot tell: names of channels, the cycle, entries of files that do not fit the mapping."""
-    channels, settings, angle = mapping.channels, {"set": mapping.set}, mapping.angle
-    settings |= {f"files.{k}.set": file.set for k, file in enumerate(mapping.files)}
-    if not channels:
-        yield Finding("'channels' is missing", "", "write channels: {torque: {column: …, measures: …}}")
+    """What an entry alone cannot tell: names of channels, the cycle, entries of files that do not fit the mapping."""
+    channels, angle = mapping.channels, mapping.angle
     sources = [*channels, *(["angle"] if angle else [])]  # the mean speed by the angle
-    for key, name, value in ((key, name, value) for key, values in settings.items() for name, value in values.items()):
-        if isinstance(value, FromData) and value.mean is not None and value.mean not in sources:
-            yield Finding(f"there is no channel '{value.mean}'", f"{key}.{name}.mean", nearest(value.mean, sources))
-    if angle is not None and (source := angle.channel) is not None:
-        if source not in channels:
-            yield Finding(f"there is no channel '{source}'", "angle.channel", nearest(source, channels))
-        elif not channels[source].measures.startswith("rate:"):
-            what = f"the channel '{source}' measures {channels[source].measures}, not a speed"
+    settings = {"set": mapping.set} | {f"files.{k}.set": file.set for k, file in enumerate(mapping.files)}
+    named = {f"{key}.{name}.mean": value.mean for key, values in settings.items() for name, value in values.items()
+             if isinstance(value, FromData) and value.mean is not None and value.mean not in sources}  # fmt: skip
+    if angle is not None and angle.channel is not None:
+        if angle.channel not in channels:
+            named["angle.channel"] = angle.channel
+        elif not channels[angle.channel].measures.startswith("rate:"):
+            what = f"the channel '{angle.channel}' measures {channels[angle.channel].measures}, not a speed"
             yield Finding(what, "angle.channel", "name a channel that measures rate:DRIVER")
-    if mapping.cycle.check({}) not in (ANGLE, KINDS["time"].dimensions[0], None):
-        yield Finding(f"'{mapping.cycle.source}' is no angle and no time", "cycle", "write it as 360 deg or 0.5 s")
-    elif not float(mapping.cycle.evaluate()) > 0:
-        yield Finding("the cycle is not above zero", "cycle", "write it as 360 deg or 0.5 s")
-    elif angle is None and not mapping.timed:
+    named |= {f"files.{k}.channels.{name}": name
+              for k, file in enumerate(mapping.files) for name in file.channels if name not in channels}  # fmt: skip
+    for where, name in named.items():
+        yield Finding(f"there is no channel '{name}'", where, nearest(name, sources))
+    if angle is None and not mapping.timed:
         remedy = "add angle: {from: …}, or write cycle: as a time"
         yield Finding("'angle' is missing: no column gives the coordinate of the driver", "", remedy)
-    for number, entry in enumerate(mapping.files):
-        yield from _unsound_file(mapping, folder, f"files.{number}", entry)
+    for k, file in enumerate(mapping.files):
+        if not _inside(file.file, folder):
+            what = f"'{file.file[:80]}' is not below the folder of the mapping"
+            yield Finding(what, f"files.{k}.file", "put it there, or name it on the command line")
+        if file.angle is not None and angle is None:
+            what = "states a zero of the angle, but no column gives an angle"
+            yield Finding(what, f"files.{k}.angle", "add angle: {from: …}, or remove it")
+        for name in file.channels.keys() & channels.keys():
+            try:
+                file.channels[name].of(channels[name])
+            except UnitError as error:
+                yield Finding(error.what, f"files.{k}.channels.{name}", error.remedy)
 
 
-def _unsound_file(mapping: DataMapping, folder: Path, where: str, entry: File) -> Iterator[Finding]:
-    """A file outside the folder of the mapping, which is data from a stranger; entries that do not fit the mapping."""
+def _inside(name: str, folder: Path) -> bool:
+    """Whether a file lies below a folder: the mapping is data from a stranger, and so are links beside it."""
     try:
-        inside = not Path(entry.file).is_absolute()
-        inside = inside and (folder / entry.file).resolve().is_relative_to(folder.resolve())
+        return not Path(name).is_absolute() and (folder / name).resolve().is_relative_to(folder.resolve())
     except (OSError, ValueError, RuntimeError):
-        inside = False
-    if not inside:
-        what = f"'{entry.file[:80]}' is not below the folder of the mapping"
-        yield Finding(what, f"{where}.file", "put it there, or name it on the command line")
-    if entry.angle is not None and mapping.angle is None:
-        what = "states a zero of the angle, but no column gives an angle"
-        yield Finding(what, f"{where}.angle", "add angle: {from: …}, or remove it")
-    for name, change in entry.channels.items():
-        if name not in mapping.channels:
-            yield Finding(f"there is no channel '{name}'", f"{where}.channels.{name}", nearest(name, mapping.channels))
-            continue
-        try:
-            change.of(mapping.channels[name])
-        except PydanticCustomError as error:
-            remedy = str((error.context or {}).get("remedy", ""))
-            yield Finding(error.message(), f"{where}.channels.{name}", remedy)
-
-
-class _Generator(SchemaGenerator):
-    """Amounts as they would be written in a file."""
-
-    def encode_default(self, dft: Any) -> Any:
-        return dft.source if isinstance(dft, Amount) else super().encode_default(dft)
+        return False
 
 
 def schema_text() -> str:
     """The JSON Schema (2020-12) of a mapping file, for editors that complete and check as you type."""
     schema = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **DataMapping.model_json_schema(schema_generator=_Generator),
+        **DataMapping.model_json_schema(schema_generator=SchemaGenerator),
         "title": "Trunnion mapping file",
     }
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"

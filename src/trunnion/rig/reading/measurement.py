@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -211,32 +211,29 @@ def dataset(measurement: Measurement) -> xr.Dataset:
     `set` has what was set, by the names of the model's values; NaN where a condition has none.
     """
     conditions, first = measurement.conditions, measurement.channels
-    channels, phase = list(first), max((one.phase for one in conditions), key=len)
-    names = list(dict.fromkeys(name for one in conditions for name in one.values))
-    figures = {"mean": "mean", "scatter": "scatter", "uncertainty": "uncertainty", "turns": "count"}
-    courses = {
-        name: np.full((len(conditions), len(channels), len(phase)), 0 if name == "turns" else np.nan,
-                      np.intp if name == "turns" else float)
-        for name in figures
-    }  # fmt: skip
-    for i, one in enumerate(conditions):
-        for channel, course in one.courses.items():
-            for name, figure in figures.items():
-                row = getattr(course, figure)
-                courses[name][i, channels.index(channel), : len(row)] = row
-    values = np.array([[one.values.get(name, np.nan) for name in names] for one in conditions])
-    speeds = np.array([one.speed for one in conditions])
-    arrays = {**courses, "set": values.reshape(len(conditions), len(names)), "speed": speeds}
+    channels, phase = list(first), max((condition.phase for condition in conditions), key=len)
+    names = list(dict.fromkeys(name for condition in conditions for name in condition.values))
+    size = len(conditions), len(channels), len(phase)
+    arrays: dict[str, NDArray[Any]] = {key: np.full(size, np.nan) for key in ("mean", "scatter", "uncertainty")}
+    arrays["turns"] = np.zeros(size, dtype=np.intp)
+    for i, condition in enumerate(conditions):
+        for channel, course in condition.courses.items():
+            rows = {"mean": course.mean, "scatter": course.scatter, "uncertainty": course.uncertainty}
+            for key, row in (rows | {"turns": course.count}).items():
+                arrays[key][i, channels.index(channel), : len(row)] = row
+    values = [[condition.values.get(name, np.nan) for name in names] for condition in conditions]
+    arrays["set"] = np.array(values).reshape(len(conditions), len(names))
+    arrays["speed"] = np.array([condition.speed for condition in conditions])
     units = {"channel": MemberUnits("channel", [first[name].unit for name in channels])}
-    variables = described(arrays, VARIABLES, units)
-    labels = {"condition": [one.name for one in conditions], "channel": channels, "setting": names}
+    labels = {"condition": [condition.name for condition in conditions], "channel": channels, "setting": names}
     attributes = {
         "name": measurement.name,
         "measured": [first[name].measures for name in channels],
         "done": list(measurement.done),
         "findings": finding_rows(measurement.findings),
     }
-    return dataset_of("measurement", variables, labels, attributes, described({"phase": phase}, VARIABLES))
+    variables, coordinates = described(arrays, VARIABLES, units), described({"phase": phase}, VARIABLES)
+    return dataset_of("measurement", variables, labels, attributes, coordinates)
 
 
 # ---- efficiency ------------------------------------------------------------------------------------------------
@@ -349,96 +346,96 @@ def pairs_of(condition: Condition, joints: Mapping[str, str] | None = None) -> P
 def efficiency_of(condition: Condition, joints: Mapping[str, str] | None = None) -> Efficiency:
     """The efficiency of one condition, with its standard uncertainty.
 
-    joints: see `pairs_of`. With fewer than two whole turns the scatter is not known, and the uncertainty is NaN.
-    Raises MechanismError where the channels do not tell both powers, no turn is whole, or no power goes in.
+    η = P_out/P_in of the means over whole turns: dη = (dP_out − η dP_in)/P_in, and a power changes with a torque by ω,
+    with a speed by T, each by the time that the driver dwells at a position; the dwell with 1/ω of its channel.
+
+    Parameters
+    ----------
+    condition : with the courses of torques and speeds.
+    joints : see `pairs_of`.
+
+    Returns
+    -------
+    Efficiency; with fewer than two whole turns the scatter is not known, and the uncertainty is NaN.
+
+    Raises
+    ------
+    MechanismError
+        Where the channels do not tell both powers, no turn is whole, or no power goes in.
     """
     pairs = pairs_of(condition, joints)
     if pairs is None:
-        there = ", ".join(f"{name} ({course.measures})" for name, course in condition.courses.items()) or "none"
-        what = f"the channels do not measure input and output power; there are {there}"
+        measured = ", ".join(f"{name} ({course.measures})" for name, course in condition.courses.items()) or "none"
+        what = f"the channels do not measure input and output power; there are {measured}"
         remedy = "measure effort: and rate: of the driver, load: of a load on a joint and rate: of that joint"
         raise MechanismError(Finding(what, condition.name, remedy))
     dwell, timing = _dwell(pairs, condition)
-    powers_in, powers_out, whole = _filled(
-        *(np.sum([dwell * force.turns * speed.turns for force, speed in side], axis=0)  # NaN where one has a gap
-          for side in (pairs.driven, pairs.loaded))
-    )  # fmt: skip
-    left_out = int(np.count_nonzero(~whole))
+    sides = (pairs.driven, pairs.loaded)
+    powers = [np.sum([dwell * force.turns * speed.turns for force, speed in side], axis=0) for side in sides]
+    (powers_in, powers_out), whole = _filled(*powers)
     if not np.any(whole):
         what = f"no turn is whole in all channels of {len(whole)}"
         raise MechanismError(Finding(what, condition.name, "see the gaps reported by `trunnion data`"))
     power_in, power_out = float(np.mean(powers_in)), float(np.mean(powers_out))
     if not power_in:
-        zero = " or ".join(one.channel for pair in pairs.driven for one in pair)
-        what = f"there is no input power: {zero} reads 0 throughout"
+        what = f"there is no input power: {' or '.join(one.channel for pair in pairs.driven for one in pair)} reads 0"
         raise MechanismError(Finding(what, condition.name, "check these channels: a sensor may have failed"))
     value = power_out / power_in
     with np.errstate(all="ignore"):
         per_turn = powers_out / powers_in
-    weights = _weights(pairs, value, power_in, whole, dwell, timing)
+    weights: dict[str, tuple[Signal, Array]] = {}  # ∂η/∂x of the readings of each channel, (turn, position)
+    for side, factor in zip(sides, (-value, 1.0), strict=True):
+        for force, speed in side:
+            by = factor / power_in * dwell
+            parts = [(force, by * speed.turns[whole]), (speed, by * force.turns[whole])]
+            if timing is not None:
+                parts.append((timing, -by * force.turns[whole] * speed.turns[whole] / timing.mean))
+            for course, weight in parts:  # a channel in several powers has the sum
+                before = weights.get(course.channel, (course, 0.0))[1]
+                weights[course.channel] = course, before + weight
     scatter = float(np.std(per_turn, ddof=1)) / len(per_turn) ** 0.5 if len(per_turn) > 1 else float("nan")
-    contributions = [UncertaintyContribution("", "repeatability", scatter, 1.0)] if scatter != 0 else []
+    contributions = [UncertaintyContribution("", "repeatability", scatter, 1.0)]
     for name, (course, weight) in weights.items():  # of what it reads, x → (1 + gain) x + zero
-        by_zero, read = float(np.nanmean(weight)), course.turns - course.accuracy.datum
-        every = [
-            UncertaintyContribution(name, "gain", course.accuracy.gain, float(np.nanmean(weight * read))),
-            UncertaintyContribution(name, "zero", course.accuracy.zero, by_zero),
-            UncertaintyContribution(name, "resolution", course.unresolved, by_zero),
+        accuracy, by_zero = course.accuracy, float(np.nanmean(weight))
+        by_gain = float(np.nanmean(weight * (course.turns[whole] - accuracy.datum)))
+        contributions += [
+            UncertaintyContribution(name, "gain", accuracy.gain, by_gain),
+            UncertaintyContribution(name, "zero", accuracy.zero, by_zero),
+            UncertaintyContribution(name, "resolution", replace(course, turns=course.turns[whole]).unresolved, by_zero),
         ]
-        contributions += [one for one in every if one.input > 0]
+    contributions = [one for one in contributions if not one.input <= 0]  # NaN stays
     uncertainty = float(np.sqrt(sum(one.effect * one.effect for one in contributions)))
+    left_out = int(np.count_nonzero(~whole))
     return Efficiency(value, uncertainty, power_in, power_out, per_turn, tuple(contributions), left_out)
 
 
-def _dwell(pairs: Pairs, condition: Condition) -> tuple[Array, list[Signal]]:
+def _dwell(pairs: Pairs, condition: Condition) -> tuple[Array, Signal | None]:
     """Time that the driver spends at each position, (position,), 1 in the mean, and the course it was taken from.
 
     By the driver whose mean speed is that of the angle; equal, of no course, if it does not turn one way throughout or
     the cycle is a time. By the mean course, not that of each turn: 1/ω of a noisy ω is too large by its variance.
     """
     if np.isfinite(condition.speed):
-        speeds = [(abs(abs(float(np.mean(speed.mean))) - abs(condition.speed)), speed) for _, speed in pairs.driven]
-        driver = min(speeds, key=lambda one: one[0])[1]
+        speeds = [speed for _, speed in pairs.driven]
+        driver = min(speeds, key=lambda speed: abs(abs(float(np.mean(speed.mean))) - abs(condition.speed)))
         if np.isfinite(driver.mean).all() and np.min(driver.mean) * np.max(driver.mean) > 0:
             dwell = 1 / np.abs(driver.mean)
-            return dwell / np.mean(dwell), [driver]
-    return np.ones(len(condition.phase)), []
+            return dwell / np.mean(dwell), driver
+    return np.ones(len(condition.phase)), None
 
 
-def _filled(powers_in: Array, powers_out: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+def _filled(*powers: Array) -> tuple[list[Array], NDArray[np.bool_]]:
     """Mean powers of each whole turn, W, and which turns are.
 
     A position that few of a turn lack is given both powers of the other turns there, in the mean: to leave it out would
     put the turn's mean off by what a course has of its own there. A turn that lacks more is left out.
     """
-    there = np.isfinite(powers_in) & np.isfinite(powers_out)
-    whole = np.mean(~there, axis=1) <= LACKING
-    whole &= np.any(there[whole], axis=0).all()  # else nothing is known of a position
-    found = []
-    for powers in (powers_in[whole], powers_out[whole]):
-        known = there[whole]
-        usual = np.sum(powers, axis=0, where=known) / np.maximum(np.sum(known, axis=0), 1)
-        found.append(np.mean(np.where(known, powers, usual), axis=1))
-    return found[0], found[1], whole
-
-
-def _weights(
-    pairs: Pairs, value: float, power_in: float, whole: NDArray[np.bool_], dwell: Array, timing: Sequence[Signal]
-) -> dict[str, tuple[Signal, Array]]:
-    """∂η/∂x of the readings of each channel, at every position of all whole turns; its mean is that of a zero.
-
-    η = P_out/P_in: dη = (dP_out − η dP_in)/P_in, and a power changes with a torque by ω, with a speed by T, each by the
-    dwell there; the dwell itself with 1/ω of its channel. A channel in several powers has the sum.
-    """
-    found: dict[str, tuple[Signal, Array]] = {}
-    for side, factor in ((pairs.driven, -value), (pairs.loaded, 1.0)):
-        for force, speed in side:
-            by = factor / power_in * dwell
-            parts = [(force, by * speed.turns[whole]), (speed, by * force.turns[whole])]
-            power = force.turns[whole] * speed.turns[whole]
-            parts += [(one, -by * power / one.mean) for one in timing]
-            for own, weight in parts:
-                before = found.get(own.channel)
-                found[own.channel] = (own, weight if before is None else before[1] + weight)
-    return {name: (Signal(name, one.measures, one.unit, one.turns[whole], one.accuracy), weight)
-            for name, (one, weight) in found.items()}  # fmt: skip
+    finite = np.all(np.isfinite(powers), axis=0)
+    whole = np.mean(~finite, axis=1) <= LACKING
+    whole &= np.any(finite[whole], axis=0).all()  # else nothing is known of a position
+    finite = finite[whole]
+    count = np.maximum(np.sum(finite, axis=0), 1)
+    usual = [np.sum(power[whole], axis=0, where=finite) / count for power in powers]
+    return [
+        np.mean(np.where(finite, power[whole], mean), axis=1) for power, mean in zip(powers, usual, strict=True)
+    ], whole

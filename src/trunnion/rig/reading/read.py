@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -15,31 +16,13 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.quantity import Quantity
-from trunnion.model.units import UnitError, si_unit
+from trunnion.model.units import si_unit
+from trunnion.rig.reading import channels
 from trunnion.rig.reading.angle import coordinate
-from trunnion.rig.reading.channels import (
-    LOOKED_AT,
-    WIDTH,
-    ChannelReading,
-    Zeroed,
-    check_filter,
-    clipped,
-    common_drift,
-    faults,
-    filtered,
-    missing,
-    noise_of,
-    reading,
-    resolution,
-    signs,
-    speeds,
-    steady,
-    zeroed,
-)
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Zero, read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
-from trunnion.rig.reading.tables import Column, DataTable, read_table
-from trunnion.rig.reading.timebase import counted, gathered, note, timeline, warning
+from trunnion.rig.reading.tables import DataTable, read_table
+from trunnion.rig.reading.timebase import counted, gathered, note, timeline, unit_of, warning
 from trunnion.rig.reading.turns import DENSE, LeftOfSteps, Turns, cut, joined, left_in_turns, resampled, time_mean
 from trunnion.rig.reading.units import dimensions, unit_name
 
@@ -49,9 +32,9 @@ Array = NDArray[np.float64]
 SPARSE = 0.25  # samples a position, below which nearly all values are interpolated
 PASSED = 1.25  # times what a cubic between samples leaves of white noise, at the least
 PERIODS = 5.0  # of the cut-off of a filter, over which a reading reaches
-UNUSED = 0.5  # of the turns recorded, below which a warning says how few are used
 MOST_VALUES = 500  # that a column may state; more, and it is a measurement
 DIGITS = 9  # by which two of its values are the same
+StepKey = tuple[str, str, float]  # channel, unit of its readings, factor: one step of the readings
 
 
 @strict_arguments
@@ -75,15 +58,16 @@ def read_measured(
         With every finding, where mapping or files cannot be read or there is no turn at all.
     """
     mapped = read_mapping(mapping)
-    entries = mapped.files(files)
-    recordings: list[_Recording] = []
+    recordings = [_Recording(mapped.mapping.of_file(entry), path, entry) for path, entry in mapped.files(files)]
     conditions: list[Condition] = []
+    levels: dict[StepKey, list[Array]] = {}  # a file whose readings span a few steps does not show them by itself
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers near the end of the floats
-        for path, entry in entries:
-            recordings.append(_Recording(mapped.mapping.of_file(entry), path, entry))
-            with recordings[-1].failing():
-                recordings[-1].find_turns()
-        steps = _steps(recordings)
+        for recording in recordings:
+            with recording.failing():
+                recording.find_turns()
+            for key, readings in recording.levels():
+                levels.setdefault(key, []).append(readings)
+        steps = {key: channels.resolution(np.concatenate(rows)) for key, rows in levels.items()}
         for recording in recordings:
             with recording.failing():
                 conditions += recording.conditions(steps)
@@ -94,46 +78,26 @@ def read_measured(
     return Measurement(name, tuple(_distinct(conditions)), tuple(findings), _done(conditions, recordings))
 
 
-def _steps(recordings: Sequence[_Recording]) -> dict[tuple[object, ...], float]:
-    """The step of each channel with one scale, in readings, from the levels of all files that have it.
-
-    A file whose readings span a few steps only does not show them by itself.
-    """
-    levels: dict[tuple[object, ...], list[Array]] = {}
-    for recording in recordings:
-        for name, sensor in recording.sensors.items():
-            levels.setdefault((name, sensor.unit, sensor.scale.factor), []).append(recording.levels(name))
-    return {key: resolution(np.concatenate(rows)) for key, rows in levels.items()}
-
-
 def _done(conditions: Sequence[Condition], recordings: Sequence[_Recording]) -> tuple[str, ...]:
     """How many turns are used, and what was done to the data, each sentence once."""
     counts = [len(next(iter(one.courses.values())).turns) for one in conditions]
     each = f"{min(counts):,}" if min(counts) == max(counts) else f"{min(counts):,} to {max(counts):,}"
     where = "" if len(counts) == 1 else f" in each of {len(counts):,} conditions"
-    sentences = [f"{each} whole turns{where}; rows before, between and after them are not used"]
-    for text in dict.fromkeys(text for one in recordings for text in one.done):
-        names = [one.path.name for one in recordings if text in one.done]
-        some = f"{', '.join(names[:4])}{' …' * (len(names) > 4)}: " if len(names) < len(recordings) else ""
-        sentences.append(f"{some}{text}")
-    return tuple(sentences)
+    sentences = dict.fromkeys(sentence for recording in recordings for sentence in recording.done)
+    return (f"{each} whole turns{where}; rows before, between and after them are not used", *sentences)
 
 
 def _distinct(conditions: Sequence[Condition]) -> list[Condition]:
     """Conditions with different names: the file is added where two are alike, then a number."""
-    taken: set[str] = set()
     names = [condition.name for condition in conditions]
-    renamed = []
+    renamed: dict[str, Condition] = {}
     for condition in conditions:
-        name = condition.name
-        if names.count(name) > 1 and condition.files:
-            name = f"{name} ({', '.join(Path(file).stem for file in condition.files)})"
-        plain, number = name, 2
-        while name in taken:
-            name, number = f"{plain} {number}", number + 1
-        taken.add(name)
-        renamed.append(replace(condition, name=name))
-    return renamed
+        plain = condition.name
+        if names.count(plain) > 1:
+            plain = f"{plain} ({', '.join(Path(file).stem for file in condition.files)})"
+        name = next(text for k in count(1) if (text := f"{plain} {k}" if k > 1 else plain) not in renamed)
+        renamed[name] = replace(condition, name=name)
+    return list(renamed.values())
 
 
 @dataclass
@@ -141,17 +105,14 @@ class _Part:
     """One condition of a file.
 
     texts: numbers of the model that were set, as written, by name; values: the same and what is measured, SI; units:
-    of those that were stated with a unit, SI; means: channels whose mean is the value; window: rows from the first to
-    the last for which it was set; rows: those of them for which it was; courses: of the channels, (turn, position);
-    left: what of the error by steps its turns repeat.
+    of those that were stated with a unit, SI; rows: for which it was set, (row,); courses: of the channels, (turn,
+    position); left: what of the error by steps its turns repeat.
     """
 
     texts: dict[str, str]
     values: dict[str, float]
     units: dict[str, str]
-    means: dict[str, str]
-    window: slice
-    rows: NDArray[np.bool_] = field(init=False)
+    rows: NDArray[np.bool_]
     turns: Turns = field(init=False)
     courses: dict[str, Array] = field(default_factory=dict)
     left: dict[str, LeftOfSteps] = field(default_factory=dict)
@@ -168,15 +129,21 @@ class _Part:
 
 
 class _Recording:
-    """One data file on its way to conditions."""
+    """One data file on its way to conditions.
+
+    Its turns are found first, and what is wrong of its readings left out; the courses follow when the steps of the
+    readings are known from all files.
+    """
 
     def __init__(self, mapping: DataMapping, path: Path, entry: File) -> None:
         self.mapping, self.path, self.entry = mapping, path, entry
         self.findings: list[Finding] = []
         self.done: list[str] = []
-        self.sensors: dict[str, ChannelReading] = {}
+        self.sensors: dict[str, channels.Sensor] = {}
+        self.readings: dict[str, Array] = {}
         self.parts: list[_Part] = []
         self.cycle, self.start = float(mapping.cycle.evaluate()), float(mapping.start.evaluate())
+        self.way, self.lag, self.cut = 1.0, 0.0, 0.0
         self.failed = False
 
     def say(self, finding: Finding | str | None) -> None:
@@ -196,117 +163,88 @@ class _Recording:
             for finding in error.findings:
                 self.say(finding)
 
-    # ---- readings ---------------------------------------------------------------------------------------------
-
     def find_turns(self) -> None:
         """Read the file, find the turns of each condition, and leave out what is wrong of the readings in them."""
         mapping, say = self.mapping, self.say
-        self.table = _table(self.path, mapping, self.entry)
+        self.table = _table(self.path, mapping)
         if not self.table.encoding.startswith("utf-8"):
             say(f"read in the encoding {self.table.encoding}")
         self.line = timeline(self.table, mapping.time, say)
         if mapping.filter is not None:
-            check_filter(mapping.filter, self.line, say)
-        self.readings: dict[str, Array] = {}
-        self.zeros: dict[str, Zeroed] = {}
+            channels.check_filter(mapping.filter, self.line, say)
         for name, channel in mapping.channels.items():
-            column, where = self.table.columns[channel.column], f"channels.{name}"
-            sensor = self.sensors[name] = reading(name, channel, column, say)
-            values = self.readings[name] = np.array(self.line.rows(column.values))
-            say(missing(where, column, values, self.line.seconds))
-            if sensor.limit is not None:
-                say(clipped(where, values, sensor.limit, sensor.unit, self.line.seconds))
-            self.zeros[name] = zeroed(name, channel, sensor, values, self.line, say)
-        self.used = np.ones(self.line.seconds.size, dtype=np.bool_)
-        if self.entry.over is not None:
-            begin, end = (one.value for one in self.entry.over)
-            self.used = (self.line.seconds >= begin) & (self.line.seconds <= end)
-        share, spoilt = self._cycles()
+            column = self.table.columns[channel.column]
+            self.readings[name] = np.array(self.line.rows(column.values))
+            self.sensors[name] = channels.sensor_of(name, channel, column, self.readings[name], self.line, say)
+        begin, end = (time.value for time in self.entry.over) if self.entry.over else (-np.inf, np.inf)
+        allowed = (self.line.seconds >= begin) & (self.line.seconds <= end)
+        share, spoilt = self._cycles(allowed)
         for part in self._settings():
-            allowed = self.used[part.window] & part.rows
-            part.turns = cut(share, self.line, part.window, allowed, mapping.positions, spoilt, say, part.where)
-            steps = np.abs(np.diff(share[part.window])[allowed[1:] & allowed[:-1]])
-            gone, whole = float(np.nansum(steps[~np.isinf(steps)])), part.turns.numbers.size
-            if not whole:
-                what = f"there is no whole turn: {gone:.3g} cycles in {counted(int(allowed.sum()), 'row')}"
-                say(Finding(what, part.where, "check angle, or record for longer", code="data.turns.none"))
-                continue
-            if whole < UNUSED * gone - 2:
-                what = f"{counted(whole, 'turn')} of {gone:,.0f} recorded can be used"
-                say(warning("turns.lost", part.where, what, "correct what the other findings name"))
-            self.parts.append(part)
+            rows = allowed & part.rows
+            part.turns = cut(share, self.line, rows, mapping.positions, spoilt, say, part.where)
+            if part.turns.numbers.size:
+                self.parts.append(part)
+            else:
+                cycles = share[rows & np.isfinite(share)]
+                what = f"there is no whole turn: {np.ptp(cycles) if cycles.size else 0:.3g} cycles in "
+                what, remedy = what + counted(int(rows.sum()), "row"), "check angle, or record for longer"
+                say(Finding(what, part.where, remedy, code="data.turns.none"))
         if self.parts:
             self._check_sampling()
             self._find_faults()
 
-    def _cycles(self) -> tuple[Array, Array]:
+    def _cycles(self, allowed: NDArray[np.bool_]) -> tuple[Array, Array]:
         """Cycles gone through by row, and stretches of time in which they are wrong; which way the coordinate runs."""
-        mapping, self.way, self.lag, self.cut = self.mapping, 1.0, 0.0, 0.0
+        mapping, speed = self.mapping, None
         if mapping.timed:
             return self.line.seconds / self.cycle, np.empty((0, 2))
         assert mapping.angle is not None
-        speed = None
         if (name := mapping.angle.channel) is not None:
-            sensor = self.sensors[name]
-            if sensor.scale.unit != "rad/s":
-                what = f"the channel '{name}' is a speed in {sensor.scale.unit}, not of a turning driver"
+            if (unit := self.sensors[name].scale.unit) != "rad/s":
+                what = f"the channel '{name}' is a speed in {unit}, not of a turning driver"
                 raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s"))
-            sign = mapping.channels[name].sign
-            speed = sensor.quantity(self.readings[name], self.zeros[name], sign)
+            speed = self.sensors[name].quantity(self.readings[name])
         angle = coordinate(mapping.angle, self.table, self.line, speed, self.say)
         self.lag, self.cut = angle.lag, angle.cut
-        known = np.flatnonzero(np.isfinite(angle.values) & self.used)
-        if known.size < 3:
+        finite = np.flatnonzero(np.isfinite(angle.values) & allowed)
+        if finite.size < 3:
             raise MechanismError(Finding("no row in use has a coordinate of the driver", "angle", "check angle.column"))
-        self.way = 1.0 if angle.values[known[-1]] >= angle.values[known[0]] else -1.0
+        self.way = 1.0 if angle.values[finite[-1]] >= angle.values[finite[0]] else -1.0
         backward = np.repeat(self.line.spoilt[:, None], 2, axis=1)  # times
         return self.way * (angle.values - self.start) / self.cycle, np.concatenate([angle.spoilt, backward])
 
     def _settings(self) -> list[_Part]:
         """The conditions of the file: one, or as many as the columns that state them take different values."""
-        whole, size = _Part({}, {}, {}, {}, slice(0, self.line.seconds.size)), self.line.seconds.size
-        columns: dict[str, tuple[Column, float, str]] = {}  # with the factor to SI and the unit
-        for path, one in self.mapping.settings(self.entry).items():
-            if isinstance(one, Quantity):
-                whole.values[path], whole.texts[path] = float(one.evaluate()), str(one.source)
-                kind = None if one.expression and one.expression.bare else one.check({})
-                whole.units |= {path: si_unit(kind)} if kind is not None else {}
-            elif one.mean is not None:
-                whole.means[path] = one.mean
-            else:
-                column = self.table.columns[str(one.column)]
-                unit = one.unit or column.unit
-                try:
-                    factor, exponents = dimensions(unit) if unit else (1.0, {})
-                except UnitError as error:
-                    remedy = f"state the unit: set: {{{path}: {{column: …, unit: …}}}}; in the file, {error.remedy}"
-                    raise MechanismError(Finding(error.what, f"set.{path}", remedy)) from None
-                columns[path] = column, factor, unit
-                whole.units |= {path: unit_name(exponents)} if unit else {}
+        texts, values, units, size = dict[str, str](), dict[str, float](), dict[str, str](), self.line.seconds.size
+        columns: dict[str, tuple[Array, str, float]] = {}  # values, unit and factor to SI
+        for path, setting in self.mapping.set.items():
+            if isinstance(setting, Quantity):
+                values[path], texts[path] = float(setting.evaluate()), str(setting.source)
+                kind = None if setting.expression and setting.expression.bare else setting.check({})
+                units |= {path: si_unit(kind)} if kind is not None else {}
+            elif setting.column is not None:
+                column = self.table.columns[setting.column]
+                unit, factor = unit_of(f"set.{path}", setting.column, column, setting.unit, "", self.say)
+                columns[path] = self.line.rows(column.values), unit, factor
+                units |= {path: unit_name(dimensions(unit)[1])} if unit else {}
         if not columns:
-            whole.rows = np.ones(size, dtype=np.bool_)
-            return [whole]
-        raw = np.column_stack([self.line.rows(column.values) for column, _, _ in columns.values()])
+            return [_Part(texts, values, units, np.ones(size, dtype=np.bool_))]
+        raw = np.column_stack([numbers for numbers, _, _ in columns.values()])
         stated = np.isfinite(raw).all(axis=1)
-        if not stated.any():
-            what = "the columns that state the condition have no numbers"
-            raise MechanismError(Finding(what, "set", "check set: {…: {column: …}}"))
         if not stated.all():
             what = f"{counted(int(np.count_nonzero(~stated)), 'row')} of {size:,} without a condition; left out"
             self.say(warning("setting.missing", "set", what, "check the column"))
         levels, which = np.unique(_rounded(raw[stated]), axis=0, return_inverse=True)
-        if len(levels) > MOST_VALUES:
+        if not 0 < len(levels) <= MOST_VALUES:
             what = f"the columns that state the condition have {len(levels):,} different values"
-            raise MechanismError(Finding(what, "set", "a measured value is not a setting: write {mean: channel}"))
+            remedy = "check the column; a measured value is not a setting: write {mean: channel}"
+            raise MechanismError(Finding(what, "set", remedy))
         number, parts = np.full(size, -1), []
         number[stated] = which.ravel()
         for k in dict.fromkeys(which.ravel().tolist()):  # in the order of the file
-            rows = np.flatnonzero(number == k)
-            window = slice(int(rows[0]), int(rows[-1]) + 1)
-            part = _Part(dict(whole.texts), dict(whole.values), dict(whole.units), whole.means, window)
-            for (path, (_, factor, unit)), value in zip(columns.items(), levels[k].tolist(), strict=True):
+            part = _Part(dict(texts), dict(values), dict(units), number == k)
+            for (path, (_, unit, factor)), value in zip(columns.items(), levels[k].tolist(), strict=True):
                 part.texts[path], part.values[path] = f"{value:.6g} {unit}".strip(), value * factor
-            part.rows = number[window] == k
             parts.append(part)
         return parts
 
@@ -318,7 +256,7 @@ class _Recording:
             if turns.numbers.size < 2:
                 what = "has one turn: there is no scatter, so no uncertainty"
                 say(warning("turns.one", part.where, what, "record two turns or more"))
-            say(steady(turns, self.line.step, part.where))
+            say(channels.steady(turns, self.line.step, part.where))
             if turns.density < 1:
                 samples = f"{turns.density * positions:.4g} samples a turn for {positions} positions"
                 what = f"the sampling is slow: {samples}; between them it is interpolated"
@@ -337,109 +275,104 @@ class _Recording:
 
     def _find_faults(self) -> None:
         """Leave out stuck readings and spikes from before the first turn to after the last."""
-        begin, end = (np.sort(np.concatenate([getattr(one.turns, key) for one in self.parts]))
+        begin, end = (np.sort(np.concatenate([getattr(part.turns, key) for part in self.parts]))
                       for key in ("begin", "end"))  # fmt: skip
-        low = int(np.searchsorted(self.line.seconds, begin[0]))
-        high = int(np.searchsorted(self.line.seconds, end[-1], "right"))
-        self.running = slice(low, high)
+        first = int(np.searchsorted(self.line.seconds, begin[0]))
+        self.running = slice(first, int(np.searchsorted(self.line.seconds, end[-1], "right")))
         reach = float(np.median(end - begin)) / self.mapping.positions
         reach += PERIODS / self.mapping.filter.cut_off.value if self.mapping.filter is not None else 0.0
-        beside = WIDTH + int(reach / self.line.step)
+        beside = channels.WIDTH + int(reach / self.line.step)
         for name, channel in self.mapping.channels.items():
-            where, readings, moves = f"channels.{name}", self.readings[name], not channel.measures.startswith("rate:")
-            for finding in faults(where, readings, self.line.seconds, (begin, end), beside, moves):
+            where, moves = f"channels.{name}", not channel.measures.startswith("rate:")
+            for finding in channels.faults(where, self.readings[name], self.line.seconds, (begin, end), beside, moves):
                 self.say(finding)
 
-    def levels(self, name: str) -> Array:
-        """Different readings of a channel while the drive runs."""
-        readings = self.readings[name][self.running] if self.parts else np.empty(0)
-        return np.unique(readings[np.isfinite(readings)])[:LOOKED_AT]
+    def levels(self) -> Iterator[tuple[StepKey, Array]]:
+        """Different readings of each channel while the drive runs."""
+        for name, sensor in self.sensors.items() if self.parts else ():
+            readings = self.readings[name][self.running]
+            yield _key(name, sensor), np.unique(readings[np.isfinite(readings)])[: channels.LOOKED_AT]
 
     # ---- courses ----------------------------------------------------------------------------------------------
 
-    def conditions(self, steps: Mapping[tuple[object, ...], float]) -> list[Condition]:
-        """The conditions of the file, each with its turns. steps: of the channels, by name, unit and factor."""
+    def conditions(self, steps: Mapping[StepKey, float]) -> list[Condition]:
+        """The conditions of the file, each with its turns. steps: of the readings."""
         if not self.parts:
             return []
-        channels = self.mapping.channels
-        accuracies = {name: self._courses(name, steps) for name in channels}
-        together = {name: np.concatenate([part.courses[name] for part in self.parts]) for name in channels}
+        accuracies = {name: self._courses(name, sensor, steps[_key(name, sensor)])
+                      for name, sensor in self.sensors.items()}  # fmt: skip
         if not self.mapping.timed:
-            turning = self._speed(self.parts)
+            together = {name: np.concatenate([part.courses[name] for part in self.parts]) for name in self.sensors}
             zeros = {name: accuracy.zero for name, accuracy in accuracies.items()}
-            units = {name: sensor.shown for name, sensor in self.sensors.items()}
-            self.say(speeds(channels, together, units, turning))
-            for finding in signs(channels, together, zeros, turning):
+            for finding in channels.signs(self.sensors, together, zeros, self._speed(self.parts)):
                 self.say(finding)
         return [self._condition(part, accuracies) for part in self.parts]
 
-    def _courses(self, name: str, steps: Mapping[tuple[object, ...], float]) -> Accuracy:
+    def _courses(self, name: str, sensor: channels.Sensor, step: float) -> Accuracy:
         """Put the courses of a channel into the parts; the accuracy of its sensor."""
-        channel, sensor, zero, line = self.mapping.channels[name], self.sensors[name], self.zeros[name], self.line
-        where, size = f"channels.{name}", abs(sensor.scale.factor)
-        readings = self.readings.pop(name)
-        step = sensor.resolution or steps[name, sensor.unit, sensor.scale.factor]
-        noise = noise_of(readings[self.running])
-        values = sensor.quantity(readings, zero, channel.sign)
+        line, size, low_pass = self.line, sensor.size, self.mapping.filter
+        readings, step = self.readings.pop(name), sensor.step or step
+        noise, values = channels.noise_of(readings[self.running]), sensor.quantity(readings)
         angle = values if sensor.scale.unit == "rad" else None
         values = values if angle is None else joined(angle)
-        if self.mapping.filter is not None:
-            values = filtered(values, line, self.mapping.filter)
+        if low_pass is not None:
+            values = channels.filtered(values, line, low_pass)
         for part in self.parts:
             part.courses[name] = resampled(part.turns, values, angle)
-        if self.mapping.filter is None:  # the scatter of turns may show less noise than neighbouring readings do
-            scatters = (float(np.median(between_turns(part.courses[name]))) / size for part in self.parts)
-            rows = [one * max(part.turns.density, 1.0) ** 0.5 for one, part in zip(scatters, self.parts, strict=True)]
-            noise = min([noise, *(PASSED * one for one in rows if one >= 0)])
+        if low_pass is None:  # the scatter of turns may show less noise than neighbouring readings do
+            for part in self.parts:
+                scatter = float(np.median(between_turns(part.courses[name]))) / size
+                scatter *= PASSED * max(part.turns.density, 1.0) ** 0.5
+                noise = min(noise, scatter) if scatter >= 0 else noise
         coarse = bool(step) and noise < step / 2  # more noise carries readings over the steps
         for part in self.parts if coarse else ():
             course = part.courses[name] / (size * step)
             part.left[name] = left_in_turns(part.turns, course, readings / step, noise / step)
-        own = size * zero.uncertainty
+        own = size * sensor.zero_uncertainty
         parts = [(part.turns, part.courses[name]) for part in self.parts]
-        drift = None if channel.measures.startswith("rate:") else common_drift(parts)  # a speed that creeps is real
+        creeps = sensor.channel.measures.startswith("rate:")  # a speed may
+        drift = None if creeps else channels.common_drift(parts)
         if drift is not None:
-            remove = self.mapping.drift == "remove"
-            since = float(line.seconds[0]) if np.isnan(zero.since) else zero.since
             what = f"drift: the mean of a turn changes by {drift.change:.3g} {sensor.scale.unit} in {drift.span:.4g} s"
             what += f", {abs(drift.change) / max(drift.scatter, 1e-300):.3g} times the scatter of the turns"
-            what += f"; a straight line is subtracted, zero at {since:.4g} s" * remove
-            remedy = "let sensor and bearings warm up" + ", or state drift: remove" * (not remove)
-            self.say(warning("zero.drift_files", where, what, remedy))
-            for part in self.parts if remove else ():
-                part.courses[name] = resampled(part.turns, values - drift.slope * (line.seconds - since), angle)
-            own = float(np.hypot(own, drift.error * drift.span / 2 if remove else 0.0))  # of the line at either end
-        datum = sensor.datum(channel.zero, zero.value, channel.sign)
-        total = float(np.hypot(sensor.accuracy_zero, own))
-        return Accuracy(total, sensor.accuracy_gain, size * step * coarse, own, datum=datum)
+            remedy = "let sensor and bearings warm up, or state drift: remove"
+            if self.mapping.drift == "remove":
+                since = float(line.seconds[0]) if np.isnan(sensor.since) else sensor.since
+                what += f"; a straight line is subtracted, zero at {since:.4g} s"
+                for part in self.parts:
+                    part.courses[name] = resampled(part.turns, values - drift.slope * (line.seconds - since), angle)
+                own = float(np.hypot(own, drift.error * drift.span / 2))  # of the line at either end
+            self.say(warning("zero.drift_files", f"channels.{name}", what, remedy))
+        gain = float(sensor.channel.accuracy.gain.evaluate())
+        total = float(np.hypot(sensor.accuracy, own))
+        return Accuracy(total, gain, size * step * coarse, own, datum=sensor.datum)
 
     def _speed(self, parts: Sequence[_Part]) -> float:
         """Of the driver, with its sign, rad/s."""
-        return (
-            self.way * self.cycle / float(np.mean(np.concatenate([one.turns.end - one.turns.begin for one in parts])))
-        )
+        lengths = np.concatenate([part.turns.end - part.turns.begin for part in parts])
+        return self.way * self.cycle / float(np.mean(lengths))
 
     def _condition(self, part: _Part, accuracies: Mapping[str, Accuracy]) -> Condition:
         """A condition with its courses, and values that are means of channels."""
         mapping, courses = self.mapping, dict[str, Signal]()
-        for name, channel in mapping.channels.items():
-            sensor, accuracy = self.sensors[name], accuracies[name]
-            course = Signal(name, channel.measures, sensor.scale.unit, part.courses[name], accuracy, sensor.read_in,
-                            channel.per_turn or 0)  # fmt: skip
+        for name, sensor in self.sensors.items():
+            course = Signal(name, sensor.channel.measures, sensor.scale.unit, part.courses[name], accuracies[name],
+                            sensor.read_in, sensor.channel.per_turn or 0)  # fmt: skip
             cut_off = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
-            courses[name] = replace(course, accuracy=replace(accuracy, cut=cut_off, left=part.left.get(name)))
+            accuracy = replace(accuracies[name], cut=cut_off, left=part.left.get(name))
+            courses[name] = replace(course, accuracy=accuracy)
         speed = np.nan if mapping.timed else self._speed([part])
-        for path, name in part.means.items():
-            if name not in courses:  # of the angle
-                part.values[path], part.units[path] = speed, "rad/s"
+        for path, setting in mapping.set.items():
+            if not isinstance(setting, FromData) or setting.mean is None:
                 continue
-            if not np.isfinite(courses[name].turns).any():
-                what = f"the channel '{name}', whose mean it is, has no value in any turn"
-                raise MechanismError(Finding(what, f"set.{path}", "correct the channel, or state it"))
-            part.values[path], part.units[path] = time_mean(part.turns, courses[name].turns), courses[name].unit
-        start, span, duration = self.start, self.cycle, np.nan
-        if mapping.timed:
-            start, span, duration = np.nan, np.nan, self.cycle
+            mean = courses.get(setting.mean)  # else of the angle
+            part.values[path], part.units[path] = speed, "rad/s"
+            if mean is not None:
+                part.values[path], part.units[path] = time_mean(part.turns, mean.turns), mean.unit
+                if not np.isfinite(mean.turns).any():
+                    what = f"the channel '{setting.mean}', whose mean it is, has no value in any turn"
+                    raise MechanismError(Finding(what, f"set.{path}", "correct the channel, or state it"))
+        start, span, duration = (np.nan, np.nan, self.cycle) if mapping.timed else (self.start, self.cycle, np.nan)
         return Condition(
             part.name or self.path.stem, part.values, np.arange(mapping.positions) / mapping.positions, courses,
             (str(self.path),), speed, start, span, lag=self.lag, cut=self.cut, units=part.units, duration=duration,
@@ -449,47 +382,23 @@ class _Recording:
 # ---- helpers --------------------------------------------------------------------------------------------------
 
 
+def _key(name: str, sensor: channels.Sensor) -> StepKey:
+    return name, sensor.unit, sensor.scale.factor
+
+
 def _rounded(values: Array) -> Array:
     """Values to so many significant digits."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        digits = np.where(values == 0, 0, np.floor(np.log10(np.abs(values))))
-        scale = 10.0 ** (DIGITS - 1 - np.where(np.isfinite(digits), digits, 0))
-        return np.asarray(np.rint(values * scale) / scale)
+    digits = np.where(values == 0, 0, np.floor(np.log10(np.abs(values))))
+    scale = 10.0 ** (DIGITS - 1 - np.where(np.isfinite(digits), digits, 0))
+    return np.asarray(np.rint(values * scale) / scale)
 
 
-def _table(path: Path, mapping: DataMapping, entry: File) -> DataTable:
-    """The columns of a file that the mapping names; a missing one is reported with the entry that names it."""
-    named: dict[str, str | None] = {"time.column": mapping.time.column if mapping.time else None}
-    if mapping.angle is not None:
-        named["angle.column"] = mapping.angle.column
-        named["angle.index.column"] = mapping.angle.index.column if mapping.angle.index else None
-    named |= {f"channels.{name}.column": channel.column for name, channel in mapping.channels.items()}
-    for name, value in mapping.settings(entry).items():
-        named[f"set.{name}.column"] = value.column if isinstance(value, FromData) else None
-    columns = {where: column for where, column in named.items() if column is not None}
-    of_time = "time.column" if path.suffix.lower() == ".tdms" else ""  # which may state its sampling by itself
-    needed = [column for where, column in columns.items() if where != of_time]
-    try:
-        table = read_table(path, needed, [columns[of_time]] if of_time in columns else [])
-    except MechanismError as error:
-        missing = error.findings[0].figures.get("missing", ())
-        where = ", ".join(key for key, column in columns.items() if column in missing)
-        raise MechanismError([replace(one, where=where) for one in error.findings]) from None
-    texts = (_of_text(where, table, column) for where, column in columns.items() if where != "time.column")
-    if findings := [one for one in texts if one is not None]:
-        raise MechanismError(findings)
-    return table
-
-
-def _of_text(where: str, table: DataTable, name: str) -> Finding | None:
-    """A column most of whose cells are text, and no times; where: the entry that names it."""
-    column = table.columns[name]
-    numbers = int(np.count_nonzero(~np.isnan(column.values)))
-    if column.stamps or column.texts <= numbers:
-        return None
-    what = f"'{name}' has text in {column.texts:,} cells and a number in {numbers:,}; the first text is "
-    remedy, figures = (
-        "name a column of numbers; a unit belongs in the heading",
-        {"texts": column.texts, "numbers": numbers},
-    )
-    return Finding(f"{what}'{column.example}'", where, remedy, code="data.readings.text", figures=figures)
+def _table(path: Path, mapping: DataMapping) -> DataTable:
+    """The columns of a file that the mapping names."""
+    sources = (mapping.angle, mapping.angle.index if mapping.angle else None, *mapping.channels.values())
+    settings = (setting for setting in mapping.set.values() if isinstance(setting, FromData))
+    names = [source.column for source in (*sources, *settings) if source is not None and source.column is not None]
+    time = [mapping.time.column] if mapping.time and mapping.time.column else []
+    if path.suffix.lower() == ".tdms":  # which may state its sampling by itself
+        return read_table(path, names, time)
+    return read_table(path, [*time, *names])

@@ -20,7 +20,7 @@ from trunnion.model.expression import LITERAL
 from trunnion.model.file import place, read_entries
 from trunnion.model.findings import schema_findings
 from trunnion.model.units import normalise
-from trunnion.rig.reading.mapping import Accuracies, FixedAngle, FixedTime
+from trunnion.rig.reading.mapping import Accuracies, FixedAngle, FixedTime, Pulses
 from trunnion.rig.reading.units import Frequency, Number, Positive, Size
 
 __all__ = ["FORMATS", "Encoder", "Idle", "Rig", "Schedule", "Sensor", "placed_in_rig"]
@@ -58,8 +58,8 @@ class Schedule(Part):
     def rows(self) -> list[dict[str, Value]]:
         """What is set in each condition; of a grid the last name runs fastest. MechanismError for what is no range."""
         rows: list[dict[str, Value]] = [{}]
-        for name, given in self.over.items():
-            values = _spread(given, f"schedule.over.{name}")
+        for name, entry in self.over.items():
+            values = _spread(entry, f"schedule.over.{name}")
             if len(rows) * len(values) > MOST_CONDITIONS:
                 what = f"the grid has more than {MOST_CONDITIONS:,} conditions"
                 raise MechanismError(Finding(what, "schedule.over", "use fewer values"))
@@ -70,7 +70,7 @@ class Schedule(Part):
 class Encoder(Part):
     """Pulses of the first driver: a running count, or the level of the signal; with an index pulse once a turn."""
 
-    per_turn: Annotated[int, Field(ge=1, le=10_000_000)]
+    per_turn: Pulses
     kind: Literal["count", "level"] = "count"
     column: Name = "encoder"
     zero: FixedAngle = Field(default="0 deg", validate_default=True)
@@ -99,7 +99,7 @@ class Sensor(Part):
     offset: Size = Field(default=0, validate_default=True)
     drift: Number = Field(default=0, validate_default=True)
     bandwidth: Frequency | None = None
-    per_turn: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
+    per_turn: Pulses | None = None
 
 
 class TimeColumn(Part):
@@ -142,8 +142,7 @@ class Rig(Part):
         path = Path(path)
         data, lines = read_entries(path, "a rig file", "start from examples/rig/cardan-rig.yaml")
         if "trunnion-rig" not in data:
-            key = next((f"; it has '{one}', as {noun} do" for one, noun in _KEYS.items() if one in data), "")
-            what = f"is no rig file: the key 'trunnion-rig' is missing{key}"
+            what = "is no rig file: the key 'trunnion-rig' is missing"
             raise MechanismError(Finding(what, "", "begin the file with trunnion-rig: 1", line=1, file=str(path)))
         try:
             return cls(**data)
@@ -161,90 +160,63 @@ class Rig(Part):
         return self.sensors[sensor].column or sensor
 
 
-_KEYS = {"trunnion": "models", "trunnion-data": "mappings"}
-
-
 def placed_in_rig(findings: Iterable[Finding], path: Path) -> list[Finding]:
     """Findings of a later stage with file and line of the entry of the rig file that they speak of, where it has it."""
     try:
         data, lines = read_entries(path, "a rig file")
     except MechanismError:
         return list(findings)
-    own = {one.alias or name for name, one in Rig.model_fields.items()}
+    keys = {field.alias or name for name, field in Rig.model_fields.items()}
     return [
-        one if one.file or one.where.split(".")[0] not in own else place([one], str(path), lines, data)[0]
-        for one in findings
-    ]
+        finding if finding.file or finding.where.split(".")[0] not in keys
+        else place([finding], str(path), lines, data)[0] for finding in findings
+    ]  # fmt: skip
 
 
-def _spread(given: str | Sequence[Value], where: str) -> list[Value]:
+def _spread(entry: str | Sequence[Value], where: str) -> list[Value]:
     """The values of a list, or of a text FROM:TO:COUNT, whose values are in the unit of its ends."""
-    if not isinstance(given, str):
-        return list(given)
-    parts = [part.strip() for part in given.split(":")]
+    if not isinstance(entry, str):
+        return list(entry)
+    parts = [part.strip() for part in entry.split(":")]
     if len(parts) == 1:
-        return [given]
-    remedy = "write FROM:TO:COUNT with a unit at both ends, such as 0 deg:30 deg:7, or a list"
-    if len(parts) != 3 or not parts[2].isdigit() or not 2 <= int(parts[2]) <= MOST_VALUES:
-        raise MechanismError(Finding(f"'{given}' is no range", where, remedy))
-    ends = [_number(part) for part in parts[:2]]
-    if None in ends:
-        raise MechanismError(Finding(f"'{given}' is no range", where, remedy))
-    (low, unit), (high, other) = (end for end in ends if end is not None)
-    if unit != other and low and high:
-        what = f"the ends of '{given}' are in different units, '{unit}' and '{other}'"
-        raise MechanismError(Finding(what, where, "write both in the same unit"))
-    unit, count = unit or other, int(parts[2]) - 1
-    values = [float((low * (count - k) + high * k) / count) for k in range(count + 1)]
+        return [entry]
+    ends = [LITERAL.fullmatch(normalise(part).strip().removeprefix("-").strip()) for part in parts[:2]]
+    units = [(end["unit"] or end["per"] or "") if end else "" for end in ends]
+    signs = [-1 if normalise(part).strip().startswith("-") else 1 for part in parts]
+    numbers = [sign * Fraction(end["number"]) for end, sign in zip(ends, signs, strict=False) if end]
+    count = int(parts[2]) if len(parts) == 3 and parts[2].isdigit() else 0
+    if not 2 <= count <= MOST_VALUES or len(numbers) < 2 or (units[0] != units[1] and all(numbers)):
+        remedy = "write FROM:TO:COUNT with the same unit at both ends, such as 0 deg:30 deg:7, or a list"
+        raise MechanismError(Finding(f"'{entry}' is no range", where, remedy))
+    (low, high), last = numbers, count - 1
+    unit = units[0] or units[1]
+    values = [float((low * (last - k) + high * k) / last) for k in range(count)]
     return [f"{value:.12g} {unit}" if unit else value for value in values]
 
 
-def _number(text: str) -> tuple[Fraction, str] | None:
-    """A number and its unit as it is written."""
-    plain = normalise(text).strip()
-    found = LITERAL.fullmatch(plain.removeprefix("-").strip())
-    if not found:
-        return None
-    return Fraction(found["number"]) * (-1 if plain.startswith("-") else 1), found["unit"] or found["per"] or ""
-
-
-# ---- what cannot be, whatever the mechanism -------------------------------------------------------------------
-
-
 def _unsound(rig: Rig) -> Iterable[Finding]:
+    """What cannot be, whatever the mechanism."""
     if rig.schedule.over and rig.schedule.conditions:
         yield Finding("has a grid and rows", "schedule", "state `over` or `conditions`, not both")
     pauses = rig.schedule.pauses
     for key, quantity in (("before", pauses.before), ("after", pauses.after)):
         if not 0 <= float(quantity.evaluate()) < 1e6:
             yield Finding(f"the time {quantity.source} is out of range", f"schedule.idle.{key}", "write 0.5 s")
-    yield from _shared_columns(rig)
-    for name, sensor in rig.sensors.items():
-        yield from _unsound_sensor(f"sensors.{name}", sensor)
-
-
-def _shared_columns(rig: Rig) -> Iterable[Finding]:
-    taken = {rig.time.column: "time"}
-    others = [(f"sensors.{name}", rig.column(name)) for name in rig.sensors]
+    columns = [("time", rig.time.column), *((f"sensors.{name}", rig.column(name)) for name in rig.sensors)]
     if rig.encoder:
-        others.append(("encoder", rig.encoder.column))
-    if rig.encoder and rig.encoder.index:
-        others.append(("encoder.index", rig.encoder.index))
-    for where, column in others:
-        if column in taken:
-            yield Finding(f"the column '{column}' is that of {taken[column]} too", where, "state another `column`")
-        taken.setdefault(column, where)
-
-
-def _unsound_sensor(where: str, sensor: Sensor) -> Iterable[Finding]:
-    for wrong, key, what, remedy in (
-        (sensor.bits and not (sensor.span or sensor.range), "bits", "has bits and neither span nor range",
-         "state what they are spread over: span: 10 V"),
-        (sensor.span and not sensor.bits, "span", "is a span without bits", "state bits: 16"),
-        (sensor.sensitivity and sensor.sensitivity.value == 0, "sensitivity", "is zero",
-         "state reading per quantity: 100 mV/(N m)"),
-        (sensor.per_turn and not sensor.measures.startswith("rate:"), "per_turn", "pulses measure a speed only",
-         "measure rate:JOINT, or remove per_turn"),
-    ):  # fmt: skip
-        if wrong:
-            yield Finding(what, f"{where}.{key}", remedy)
+        columns += [("encoder", rig.encoder.column), ("encoder.index", rig.encoder.index or "")]
+    first: dict[str, str] = {}
+    for where, column in columns:
+        if column and first.setdefault(column, where) != where:
+            yield Finding(f"the column '{column}' is that of {first[column]} too", where, "state another `column`")
+    for name, sensor in rig.sensors.items():
+        if sensor.bits and not (sensor.span or sensor.range):
+            remedy = "state what they are spread over: span: 10 V"
+            yield Finding("has bits and neither span nor range", f"sensors.{name}.bits", remedy)
+        if sensor.span and not sensor.bits:
+            yield Finding("is a span without bits", f"sensors.{name}.span", "state bits: 16")
+        if sensor.sensitivity and sensor.sensitivity.value == 0:
+            yield Finding("is zero", f"sensors.{name}.sensitivity", "state reading per quantity: 100 mV/(N m)")
+        if sensor.per_turn and not sensor.measures.startswith("rate:"):
+            remedy = "measure rate:JOINT, or remove per_turn"
+            yield Finding("pulses measure a speed only", f"sensors.{name}.per_turn", remedy)

@@ -21,16 +21,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError
 from trunnion.files import reading
-from trunnion.model.names import nearest, unguarded
+from trunnion.model.names import unguarded
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.units import alike, dimensions
+from trunnion.rig.reading.units import dimensions
 
-__all__ = ["FORMATS", "Column", "DataTable", "read_table", "ungrouped"]
+__all__ = ["FORMATS", "Column", "DataTable", "read_table"]
 
 Array = NDArray[np.float64]
-SHOWN = 40  # columns named in a message
+NAMED = 40  # columns in a message
 
 
 @dataclass(frozen=True)
@@ -46,25 +46,6 @@ class Column:
     example: str = ""
     stamps: tuple[str, ...] = ()
 
-    def factor(self, where: str, name: str, stated: str | None, si: str, say: Callable[[Finding], None]) -> float:
-        """What a 1 in the column is, SI: in the unit that is stated, else in the file's, else it is SI.
-
-        where: the entry that names the column, `time` or `angle`; say: takes a note that there is no unit.
-        """
-        unit = stated or self.unit
-        if not unit:
-            what = f"the column '{name}' has no unit; {si} is assumed"
-            say(Finding(what, where, f"state {where}.unit", Severity.NOTE, code=f"data.{where}.no_unit"))
-        try:
-            factor, kind = dimensions(unit or si)
-        except UnitError as error:
-            remedy = f"state {where}.unit in the mapping; in the file, {error.remedy}"
-            raise MechanismError(Finding(f"the column '{name}': {error.what}", where, remedy)) from None
-        if not alike(kind, dimensions(si)[1]):
-            what = f"the column '{name}' has the unit '{unit}', which is no {where}"
-            raise MechanismError(Finding(what, where, "name another column"))
-        return factor
-
     def seconds(self, dayfirst: bool = True) -> Array:
         """Seconds since the first time stamp, or since the first time of day; NaN of what is neither."""
         import pandas as pd
@@ -78,8 +59,8 @@ class Column:
                 warnings.simplefilter("ignore", UserWarning)  # of an order that the first stamp shows to be another
                 times = pd.to_datetime(texts, errors="coerce", utc=True, **order)
         since = times - times.loc[times.first_valid_index()] if times.notna().any() else times
-        whole = since.astype("timedelta64[ns]").to_numpy().astype(np.int64)  # exact, unlike seconds since 1970
-        return np.where(times.notna(), whole * 1e-9, np.nan)
+        ticks = since.astype("timedelta64[ns]").to_numpy().astype(np.int64)  # exact, unlike seconds since 1970
+        return np.where(times.notna(), ticks * 1e-9, np.nan)
 
 
 @dataclass(frozen=True)
@@ -112,7 +93,7 @@ def read_table(path: Path, names: Iterable[str], optional: Iterable[str] = ()) -
     Raises
     ------
     MechanismError
-        Where the file cannot be read; where a column is missing, its figures name it.
+        Where the file cannot be read, or a column is missing.
     """
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
@@ -123,8 +104,6 @@ def read_table(path: Path, names: Iterable[str], optional: Iterable[str] = ()) -
     if not path.is_file():
         what = "is not a file" if path.exists() else "cannot be read: there is no such file"
         raise _failed(path, what, "check the path")
-    if path.stat().st_size == 0:
-        raise _failed(path, "is empty", "check that the recording was saved")
     reading(path)
     try:
         table = reader(path, list(dict.fromkeys(names)), list(dict.fromkeys(optional)))
@@ -141,17 +120,12 @@ def _failed(path: Path, what: str, remedy: str, line: int | None = None) -> Mech
 
 def _places(path: Path, present: Sequence[str], names: Sequence[str], optional: Sequence[str]) -> dict[str, int]:
     """Place of each column among those that are present; one finding for all that are missing."""
-    missing = [name for name in names if name not in present]
-    if missing:
-        listed = ", ".join(f"'{name}'" for name in present[:SHOWN]) + (", …" if len(present) > SHOWN else "")
+    if missing := [name for name in names if name not in present]:
+        listed = ", ".join(f"'{name}'" for name in present[:NAMED]) + (", …" if len(present) > NAMED else "")
         what = f"there is no column {', '.join(map(repr, missing))}; the file has {listed or 'none'}"
-        near = nearest(missing[0], present)
-        like = near.startswith("did you mean") and len(missing[0]) > 3  # T1 is not meant where T2 is written
-        remedy = near if like else "name one of these in the mapping"
-        raise MechanismError(Finding(what, file=str(path), remedy=remedy, figures={"missing": missing}))
+        raise _failed(path, what, "name one of these in the mapping")
     wanted = [name for name in (*names, *optional) if name in present]
-    doubled = [name for name in wanted if present.count(name) > 1]
-    if doubled:
+    if doubled := [name for name in wanted if present.count(name) > 1]:
         raise _failed(path, f"the column '{doubled[0]}' stands there {present.count(doubled[0])} times", "rename one")
     return {name: present.index(name) for name in wanted}
 
@@ -159,13 +133,11 @@ def _places(path: Path, present: Sequence[str], names: Sequence[str], optional: 
 # ---- cells ----------------------------------------------------------------------------------------------------
 
 NOTHING = frozenset({"", "nan", "n/a", "na", "#n/a", "null", "none", "-nan", "inf", "-inf", "+inf", "infinity"})
-GROUPED = {  # thousands with a sign between them; of a point or a comma only where decimals tell which of them it is
-    ",": re.compile(r"[-+]?\d{1,3}(?:(?:\.\d{3})+,\d+|(?:[\u00a0\u202f ]\d{3})+(?:,\d+)?)"),
-    ".": re.compile(r"[-+]?\d{1,3}(?:(?:,\d{3})+\.\d+|(?:[\u00a0\u202f ]\d{3})+(?:\.\d+)?)"),
-}
-_BETWEEN = re.compile(r"[.,\u00a0\u202f ](?=\d{3}(?:\D|$))")
 _COMMA = re.compile(r"[-+]?(?:\d{1,3}(?:[.\u00a0\u202f ]\d{3})+|\d*),\d+(?:[eE][-+]?\d+)?")
-_POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
+_GROUPED = {  # with a sign between thousands: only where decimals tell which of point and comma it is
+    ",": re.compile(r"[-+]?\d{1,3}(?:([.\u00a0\u202f ])\d{3})+,\d+"),
+    ".": re.compile(r"[-+]?\d{1,3}(?:([,\u00a0\u202f ])\d{3})+\.\d+"),
+}
 _WHOLE = re.compile(r"\d:\d\d:\d\d(?![\d.])", re.ASCII)  # seconds without a fraction
 _DAYTIME, _YEAR = re.compile(r"\d{1,2}:", re.ASCII), re.compile(r"\d{4}-", re.ASCII)
 _TIME = re.compile(r"(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[ T]\s*)?\d{1,2}:[0-5]\d:[0-5]\d.*", re.ASCII)
@@ -179,30 +151,27 @@ def _number(text: object) -> float:
         return np.nan
 
 
-def ungrouped(text: str, decimal: str) -> str:
-    """A number without signs between thousands and with a decimal point: 1450.33 of `1.450,33`."""
-    if GROUPED[decimal].fullmatch(text):
-        integer, sign, fraction = text.partition(decimal)
-        text = _BETWEEN.sub("", integer) + sign + fraction
-    return text if decimal == "." else text.replace(decimal, ".")
-
-
 def _column(cells: Any, unit: str = "", decimal: str = ".") -> Column:
-    """Cells of any kind as floats, infinite ones as they are; time stamps as seconds since the first."""
+    """Cells of any kind as floats, infinite ones as they are; time stamps as seconds since the first.
+
+    decimal: sign in texts; another point or comma is passed over where a cell of the column shows that it stands
+    between thousands, and makes no number elsewhere.
+    """
     cells = np.asarray(cells)
     if cells.dtype.kind in "fiub":
         return Column(np.asarray(cells, dtype=np.float64), unit)
     if cells.dtype.kind in "mM":
-        there = ~np.isnat(cells)
+        dated = ~np.isnat(cells)
         ticks = cells.astype(f"{'timedelta' if cells.dtype.kind == 'm' else 'datetime'}64[ns]").astype(np.int64)
-        since = ticks[there][0] if cells.dtype.kind == "M" and there.any() else 0
-        return Column(np.where(there, (ticks - since) * 1e-9, np.nan), unit)
+        since = ticks[dated][0] if cells.dtype.kind == "M" and dated.any() else 0
+        return Column(np.where(dated, (ticks - since) * 1e-9, np.nan), unit)
     rows = ["" if cell is None or (isinstance(cell, float) and np.isnan(cell)) else str(cell).strip() for cell in cells]
-    values = np.array([_number(ungrouped(row.replace("−", "-"), decimal)) for row in rows])
+    between = {match[1]: "" for row in rows if (match := _GROUPED[decimal].fullmatch(row))}
+    signs = str.maketrans({".": "?", ",": "?", "−": "-"} | between | {decimal: "."})
+    values = np.array([_number(row.translate(signs)) for row in rows])
     texts = [row for row, value in zip(rows, values, strict=True) if np.isnan(value) and row.casefold() not in NOTHING]
-    if texts and _TIME.fullmatch(texts[0]) and not np.isfinite(values).any():
-        return Column(values, unit, len(texts), texts[0], tuple(rows))
-    return Column(values, unit, len(texts), texts[0][:40] if texts else "")
+    stamps = texts and _TIME.fullmatch(texts[0]) and not np.isfinite(values).any()
+    return Column(values, unit, len(texts), texts[0][:40] if texts else "", tuple(rows) if stamps else ())
 
 
 # ---- text -----------------------------------------------------------------------------------------------------
@@ -212,117 +181,91 @@ LONGEST = 1 << 24  # signs in which a line has to end
 WIDE = 40  # columns from which those that are not asked for are passed over, and too many cells in a row not seen
 GERMAN = ("Grad", "U/min", "Umin", "Umdr./min")  # units in headings, if not all are read without the mapping's word
 _NO_UNIT = ("", "-", "–", "1")
-_UNIT = re.compile(r"^(.*?)\s*\[([^\[\]]*)\]\s*$", re.DOTALL)
-_BEHIND = re.compile(r"^(.*?\S)\s*(?:\(([^()]+)\)|(?:\s/|\sin)\s+(\S.*))$", re.DOTALL)  # T (V), T / V, T in V
-
-
-@dataclass(frozen=True)
-class _Layout:
-    """How a text file is written. skip: lines before the first row; width: cells of a row."""
-
-    names: list[str]
-    units: list[str]
-    separator: str
-    decimal: str
-    encoding: str
-    skip: int
-    width: int
+_HEADING = re.compile(  # T [V]; and with units that are in use T (V), T / V, T in V
+    r"(?P<name>.*?)\s*\[(?P<sure>[^\[\]]*)\]|(?P<before>.*?\S)\s*(?:\((?P<round>[^()]+)\)|(?:\s/|\sin)\s+(?P<last>\S.*))",
+    re.DOTALL,
+)
 
 
 def _read_text(path: Path, names: Sequence[str], optional: Sequence[str]) -> DataTable:
-    """The columns of a text file."""
+    """The columns of a text file. Header, separator, decimal sign and units are told by its first lines."""
     import pandas as pd
 
-    layout = _layout(path, {*names, *optional})
-    places = _places(path, layout.names, names, optional)
+    lines, encoding = _first_lines(path)
+    wanted = {*names, *optional}
+    header, separator, heads = _header(path, lines, wanted)
+    labels, units = map(list, zip(*heads, strict=True))
+    places = _places(path, labels, names, optional)
+    rows = [(place, _cells(line, separator)) for place, line in lines if place > header]
+    if rows and _words(rows[0][1]):  # a row of units
+        header, below = rows.pop(0)
+        units = [unit or text for unit, text in zip(units, [*map(_bare, below), *[""] * len(units)], strict=False)]
+    sample = [row[place] for _, row in rows[:FIRST] for place in places.values() if place < len(row)]
+    decimal = "," if separator != "," and any(_COMMA.fullmatch(cell) for cell in sample) else "."
     version = tuple(int(part) for part in re.findall(r"\d+", pd.__version__)[:2])
     exact: dict[str, Any] = {} if version >= (3, 1) else {"float_precision": "round_trip"}
+    width = max(len(heads), *(len(row) for _, row in rows)) if rows else len(heads)  # separators end some lines
+    columns_used = sorted(set(places.values())) if width > WIDE else None
     try:
         frame = pd.read_csv(
-            path, sep=layout.separator, decimal=layout.decimal, header=None, names=list(range(layout.width)),
-            usecols=sorted(set(places.values())) if layout.width > WIDE else None, skiprows=layout.skip, comment="#",
-            encoding=layout.encoding, encoding_errors="replace", low_memory=False, skipinitialspace=True, **exact,
+            path, sep=separator, decimal=decimal, header=None, names=list(range(width)),
+            usecols=columns_used,
+            skiprows=header + 1, comment="#", encoding=encoding, encoding_errors="replace", low_memory=False,
+            skipinitialspace=True, **exact,
         )  # fmt: skip
     except pd.errors.EmptyDataError:
-        frame = pd.DataFrame(columns=list(range(layout.width)), dtype=float)
-    except pd.errors.ParserError as error:
-        row = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", str(error))
-        what = f"has {row[3]} cells, the header has {row[1]}" if row else f"is not CSV: {str(error).strip()[-120:]}"
-        raise _failed(path, what, "correct that line", int(row[2]) if row else None) from None
-    columns = {}
-    for name, place in places.items():
-        cells = frame[place].to_numpy()
-        if layout.decimal == "," and cells.dtype.kind not in "fiub":
-            points = (cell for cell in cells.tolist() if isinstance(cell, str) and _POINT.fullmatch(cell.strip()))
-            if (point := next(points, None)) is not None:  # of thousands or of decimals
-                what = (
-                    f"decimal and thousands signs are mixed: '{point.strip()[:20]}' in '{name}' beside decimal commas"
-                )
-                remedy = "export it without a sign between thousands, and with one sign for decimals"
-                raise _failed(path, what, remedy)
-        columns[name] = _column(cells, layout.units[place], layout.decimal)
-    return DataTable(str(path), columns, encoding=layout.encoding)
+        frame = pd.DataFrame(columns=list(range(width)), dtype=float)
+    except pd.errors.ParserError as error:  # "Expected 2 fields in line 502, saw 3"
+        raise _failed(path, f"is not CSV: {str(error).strip()[-120:]}", "correct that line") from None
+    more = [place for place in frame if place >= len(heads)]
+    if (longer := np.flatnonzero(frame[more].notna().any(axis=1))).size:
+        what = f"row {longer[0] + 1} below the header has more cells than its {len(heads)}"
+        remedy = "correct it; numbers with a decimal comma need a semicolon or tab between them"
+        raise _failed(path, what, remedy)
+    columns = {name: _column(frame[place].to_numpy(), units[place], decimal)
+               for name, place in places.items()}  # fmt: skip
+    return DataTable(str(path), columns, encoding=encoding)
 
 
-def _first_lines(path: Path) -> tuple[list[str], str]:
-    """The first lines and their encoding: UTF-16 by its mark, UTF-8 where that can be, else Windows-1252."""
+def _first_lines(path: Path) -> tuple[list[tuple[int, str]], str]:
+    """The first lines that are no comments, by their places, and their encoding: UTF-16 by its mark, else UTF-8 or
+    Windows-1252."""
     with path.open("rb") as file:
         marked = file.read(2) in (b"\xff\xfe", b"\xfe\xff")
+    lines: list[str] = []
     for encoding in ["utf-16"] if marked else ["utf-8-sig", "cp1252", "latin-1"]:
         try:
             with path.open(encoding=encoding) as stream:
                 lines = [stream.readline(LONGEST) for _ in range(2 * FIRST)]
+            break
         except UnicodeDecodeError:
             continue
-        if any("\0" in line for line in lines):
-            raise _failed(path, "is not a text file", "check that it is CSV; use .tdms or .parquet for binary files")
-        if any(len(line) == LONGEST for line in lines):
-            what = f"has no end of a line in its first {LONGEST >> 20} MiB"
-            raise _failed(path, what, "check that it is CSV, with a row of the table in each line", 1)
-        return [line.rstrip("\n") for line in lines], encoding
-    raise _failed(path, "is not a text file", "save it as UTF-8")
-
-
-def _layout(path: Path, wanted: set[str]) -> _Layout:
-    """Names, units and signs of a file from its first lines."""
-    lines, encoding = _first_lines(path)
-    stated = [(place, line) for place, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
+    if any("\0" in line or len(line) == LONGEST for line in lines):
+        remedy = "check that it is CSV, with a row of the table in each line"
+        raise _failed(path, f"is not a text file: a NUL, or no end of a line in {LONGEST >> 20} MiB", remedy, 1)
+    stated = [(place, line.rstrip("\n")) for place, line in enumerate(lines)
+              if line.strip() and not line.lstrip().startswith("#")]  # fmt: skip
     if not stated:
-        raise _failed(path, "has only comments", "check that the recording was saved", 1)
+        raise _failed(path, "is empty but for comments", "check that the recording was saved", 1)
+    return stated, encoding
 
-    def split(line: str) -> tuple[str, list[str]]:
+
+def _header(path: Path, lines: list[tuple[int, str]], wanted: set[str]) -> tuple[int, str, list[tuple[str, str]]]:
+    """Place, separator, and names with units of the line that has the most of the columns; loggers write above it."""
+    best: tuple[int, int, str, list[tuple[str, str]]] = (0, 0, "", [])
+    for place, line in lines[:FIRST]:
         bare = re.sub(r'"[^"]*"', "", line)
         separator = next((sign for sign in ";\t" if sign in bare), ",")
-        return separator, _cells(line, separator)
-
-    def hits(place: int) -> int:
-        return len({_named(cell, wanted)[0] for cell in split(stated[place][1])[1]} & wanted)
-
-    header = max(range(min(len(stated), FIRST)), key=hits)  # loggers write some lines above the header
-    separator, cells = split(stated[header][1])
-    named = [_named(cell, wanted) for cell in cells]
-    if hits(header) == 0 and sum(bool(name) for name, _ in named) < len(wanted):
-        first = " / ".join(line.strip()[:60] for _, line in stated[:3])
+        heads = [_heading(cell, wanted) for cell in _cells(line, separator)]
+        hits = len({name for name, _ in heads} & wanted)
+        if hits > best[0]:
+            best = hits, place, separator, heads
+    if not best[0]:
+        first = " / ".join(line.strip()[:60] for _, line in lines[:3])
         what = f"no line has the columns {', '.join(map(repr, sorted(wanted)))}; the first lines are: {first}"
-        raise _failed(path, what, "write the names of the columns above the numbers, or name another file", 1)
-    if all(not np.isnan(_number(ungrouped(name, ","))) for name, _ in named if name):
-        remedy = "write the names of the columns in the first line, such as t [s],T1 [V]"
-        what = f"has no header: its first line is {', '.join(cells[:4])}"
-        raise _failed(path, what, remedy, stated[header][0] + 1)
-    rows = [(place, _cells(line, separator)) for place, line in stated[header + 1 :][:FIRST]]
-    skip, units = stated[header][0] + 1, [unit for _, unit in named]
-    if rows and _words(rows[0][1]):  # a row of units
-        below = ["" if cell.strip("[]() ") in _NO_UNIT else cell.strip("[]() ") for cell in rows[0][1]]
-        units = [unit or (below[k] if k < len(below) else "") for k, unit in enumerate(units)]
-        skip, rows = rows[0][0] + 1, rows[1:]
-    sample = [cell for _, row in rows for (name, _), cell in zip(named, row, strict=False) if name in wanted]
-    comma = separator != "," and any(_COMMA.fullmatch(cell) for cell in sample)
-    for place, row in rows:
-        if any(row[len(cells) :]):
-            remedy = "correct that line; numbers with a decimal comma need a semicolon or tab between them"
-            raise _failed(path, f"has {len(row)} cells, the header has {len(cells)}", remedy, place + 1)
-    width = max([len(cells), *(len(row) for _, row in rows)])  # separators at the end of lines
-    return _Layout([name for name, _ in named], units, separator, "," if comma else ".", encoding, skip, width)
+        remedy = "name the columns of the file in the mapping, or write their names above the numbers"
+        raise _failed(path, what, remedy, 1)
+    return best[1:]
 
 
 def _cells(line: str, separator: str) -> list[str]:
@@ -332,35 +275,33 @@ def _cells(line: str, separator: str) -> list[str]:
         return [line]
 
 
-def _named(cell: str, wanted: set[str]) -> tuple[str, str]:
-    """Name and unit of a header's cell: `T [V]`, and where it is a unit `T / V`, `T in V` or `T (V)`.
+def _bare(cell: str) -> str:
+    """A unit without brackets; empty where it says that there is none."""
+    text = cell.strip("[]() ")
+    return "" if text in _NO_UNIT else text
 
-    A name that is wanted with its unit in it stays whole.
-    """
+
+def _heading(cell: str, wanted: set[str]) -> tuple[str, str]:
+    """Name and unit of a header's cell. A name that is wanted with its unit in it stays whole."""
     cell = unguarded(cell.strip().strip('"').strip())
-    match, unit = _UNIT.match(cell), ""
-    if match:
-        unit = "" if match[2].strip() in _NO_UNIT else match[2].strip()
-    elif match := _BEHIND.match(cell):
-        unit = (match[2] or match[3]).strip()
-        if not (_is_unit(unit) or unit in GERMAN):
+    match = _HEADING.fullmatch(cell)
+    if match is None:
+        return cell, ""
+    unit = match["sure"] if match["sure"] is not None else match["round"] or match["last"]
+    if match["sure"] is None and unit not in GERMAN:
+        try:
+            dimensions(unit.strip())
+        except UnitError:
             return cell, ""
-    return (cell if cell in wanted or match is None else match[1]), unit
+    return cell if cell in wanted else match["name"] or match["before"] or "", _bare(unit)
 
 
 def _words(cells: Sequence[str]) -> bool:
     """Whether there is no number and no time in a row, and at least one unit or more words than one."""
-    texts = [cell.strip("[]() ") for cell in cells if cell and cell != "1"]
-    if any(not np.isnan(_number(cell.replace(",", "."))) or _TIME.fullmatch(cell) for cell in texts):
+    texts = [text for cell in cells if (text := cell.strip("[]() ")) and text != "1"]
+    if any(not np.isnan(_number(text.replace(",", "."))) or _TIME.fullmatch(text) for text in texts):
         return False
-    return any(re.search(r"[^\W\d_]|[°%‰]", cell) and cell.casefold() not in NOTHING for cell in texts)
-
-
-def _is_unit(text: str) -> bool:
-    try:
-        return bool(text) and bool(dimensions(text))
-    except UnitError:
-        return False
+    return any(re.search(r"[^\W\d_]|[°%‰]", text) and text.casefold() not in NOTHING for text in texts)
 
 
 # ---- Parquet and TDMS -----------------------------------------------------------------------------------------
@@ -380,9 +321,6 @@ def _read_parquet(path: Path, names: Sequence[str], optional: Sequence[str]) -> 
         raise _failed(path, f"is not Parquet: {str(error).splitlines()[0][:120]}", "check the file") from None
     columns = {}
     for name in places:
-        if pa.types.is_nested(schema.field(name).type):
-            what = f"the column '{name}' has {schema.field(name).type} in each cell, not a number"
-            raise _failed(path, what[:200], "write one column for each number")
         meta = schema.field(name).metadata or {}
         unit = (meta.get(b"unit") or meta.get(b"units") or b"").decode("utf-8", "replace")
         columns[name] = _column(table.column(name).to_pandas(), unit)
@@ -398,34 +336,26 @@ def _read_tdms(path: Path, names: Sequence[str], optional: Sequence[str]) -> Dat
 
     try:
         with path.open("rb") as stream, TdmsFile.open(stream) as file:
-            return _channels(path, file, names, optional)
+            every = [channel for group in file.groups() for channel in group.channels()]
+            short = [channel.name for channel in every]
+            full = {f"{channel.group_name}/{channel.name}": channel for channel in every}
+            present = [channel.name if short.count(channel.name) == 1 else name for name, channel in full.items()]
+            channels = {**full, **dict(zip(present, full.values(), strict=True))}
+            listed = [*present, *(name for name in (*names, *optional) if name in full and name not in present)]
+            chosen = {name: channels[name] for name in _places(path, listed, names, optional)}
+            steps = {(float(one.properties.get("wf_start_offset", 0.0)), float(one.properties["wf_increment"]))
+                     for one in chosen.values() if one.properties.get("wf_increment")}  # fmt: skip
+            if len({len(one) for one in chosen.values()}) > 1 or len({round(step, 15) for _, step in steps}) > 1:
+                of_each = (f"'{name}' {len(one):,}" for name, one in chosen.items())
+                what = f"its channels have different numbers of samples or rates: {', '.join(of_each)}"
+                raise _failed(path, what, "record them at one rate")
+            columns = {name: _column(one[:], str(one.properties.get("unit_string", "") or ""))
+                       for name, one in chosen.items()}  # fmt: skip
     except (MechanismError, OSError):
         raise
     except Exception as error:  # nptdms raises what its parsing of a broken file meets: struct, Value-, Key-, EOFError
         raise _failed(path, f"is not TDMS: {str(error)[:120] or type(error).__name__}", "check the file") from None
-
-
-def _channels(path: Path, file: Any, names: Sequence[str], optional: Sequence[str]) -> DataTable:
-    full = {f"{group.name}/{channel.name}": channel for group in file.groups() for channel in group.channels()}
-    short = [channel.name for channel in full.values()]
-    alias = {name: one.name if short.count(one.name) == 1 else name for name, one in full.items()}
-    channels = {alias[name]: channel for name, channel in full.items()}
-    asked = {name: alias.get(name, name) for name in (*names, *optional)}
-    _places(path, list(alias.values()), [asked[name] for name in names], [asked[name] for name in optional])
-    chosen = {name: channels[short] for name, short in asked.items() if short in channels}
-    if len({len(channel) for channel in chosen.values()}) > 1:
-        lengths = ", ".join(f"'{name}' {len(channel):,}" for name, channel in chosen.items())
-        raise _failed(path, f"its channels have different numbers of samples: {lengths}", "record them at one rate")
-    columns, intervals = {}, set()
-    for name, channel in chosen.items():
-        columns[name] = _column(channel[:], str(channel.properties.get("unit_string", "") or ""))
-        step = channel.properties.get("wf_increment")
-        if isinstance(step, (int, float)) and step > 0:
-            intervals.add((float(channel.properties.get("wf_start_offset", 0.0)), float(step)))
-    if len({round(step, 15) for _, step in intervals}) > 1:
-        rates = " and ".join(f"{1 / step:g} Hz" for _, step in sorted(intervals))
-        raise _failed(path, f"its channels are sampled at {rates}", "record them at one rate")
-    return DataTable(str(path), columns, next(iter(sorted(intervals)), None))
+    return DataTable(str(path), columns, min((pair for pair in steps if pair[1] > 0), default=None))
 
 
 Reader = Callable[[Path, Sequence[str], Sequence[str]], DataTable]

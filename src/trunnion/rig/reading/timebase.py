@@ -10,12 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Severity, counted
+from trunnion.model.units import UnitError
 from trunnion.rig.reading.mapping import TimeBase
-from trunnion.rig.reading.tables import DataTable
+from trunnion.rig.reading.tables import Column, DataTable
+from trunnion.rig.reading.units import HERTZ, alike, dimensions
 
-__all__ = ["GAP", "Timeline", "at_times", "counted", "gathered", "note", "places", "runs", "timeline", "warning"]
+__all__ = [
+    "GAP", "Say", "Timeline", "at_times", "counted", "gathered", "lost", "note", "runs", "timeline", "unit_of",
+    "warning",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
+Say = Callable[[Finding | str | None], None]  # takes a finding, or a sentence about what was done
 GAP = 1.5  # times the usual step
 UNEVEN = 0.2  # of the usual step, standard deviation
 
@@ -34,30 +40,23 @@ class Timeline:
     even: bool = True
     spoilt: Array = field(default_factory=lambda: np.empty(0))
 
-    def part(self, window: slice) -> Timeline:
-        """The rows of a window, those of all that are kept."""
-        return replace(self, seconds=self.seconds[window], kept=None)
-
     def rows(self, values: Array) -> Array:
         """The values of the rows that are kept."""
         return values if self.kept is None else values[self.kept]
 
 
-def timeline(table: DataTable, base: TimeBase | None, say: Callable[[Finding | str], None]) -> Timeline:
-    """Time of the rows of a table by the mapping, else by what the file itself states of its sampling.
-
-    say: takes findings, and sentences about what was done.
-    """
+def timeline(table: DataTable, base: TimeBase | None, say: Say) -> Timeline:
+    """Time of the rows of a table by the mapping, else by what the file itself states of its sampling."""
     if base is not None and base.column in table.columns:
         column = table.columns[str(base.column)]
         if column.stamps:
             say("time is counted in s from the first time stamp")
-            return _stated(column.seconds(base.dayfirst), say)
+            return _rising(column.seconds(base.dayfirst), say)
         if column.texts == column.values.size:
             what = f"the column '{base.column}' has texts, such as '{column.example}', where times are needed"
             remedy = "write them in s, as 11:40:00.0002 or as 2026-11-22 11:40:00.0002, or state time: {rate: …}"
             raise MechanismError(Finding(what, "time.column", remedy))
-        return _stated(column.values * column.factor("time", str(base.column), base.unit, "s", say), say)
+        return _rising(column.values * unit_of("time", str(base.column), column, base.unit, "s", say)[1], say)
     if base is not None and base.rate is not None:
         start, step = 0.0, 1.0 / base.rate.value
     elif table.interval is not None:
@@ -69,45 +68,64 @@ def timeline(table: DataTable, base: TimeBase | None, say: Callable[[Finding | s
     return Timeline(start + np.arange(table.rows, dtype=np.float64) * step, None, step)
 
 
-def _stated(seconds: Array, say: Callable[[Finding | str], None]) -> Timeline:
+def _rising(seconds: Array, say: Say) -> Timeline:
     """Times that rise, from a column: rows whose time does not rise are left out."""
-    finite, total = np.isfinite(seconds), seconds.size
-    highest = np.maximum.accumulate(np.where(finite, seconds, -np.inf))
-    kept = np.flatnonzero(finite & (seconds > np.concatenate([[-np.inf], highest[:-1]])))
-    if lost := int(np.count_nonzero(~finite)):
-        what = f"no time in {counted(lost, 'row')} of {total:,}; left out"
-        say(warning("time.missing", "time", what, "check the logger, or state time: {rate: …}"))
+    highest = np.fmax.accumulate(seconds)
+    rises = np.isfinite(seconds) & (seconds > np.concatenate([[-np.inf], np.nan_to_num(highest[:-1], nan=-np.inf)]))
+    kept = np.flatnonzero(rises)
     if kept.size < 3:
-        what = f"the time rises in {kept.size} of {counted(total, 'row')}"
+        what = f"the time rises in {kept.size} of {counted(seconds.size, 'row')}"
         raise MechanismError(Finding(what, "time", "check that time.column is the right one"))
-    stated = seconds[finite]
-    steps = np.diff(stated)
-    repeated, back = np.flatnonzero(steps == 0), np.flatnonzero(steps < 0)
-    if repeated.size:
-        coarse = repeated.size > 0.05 * stated.size
-        remedy = "the column is rounded: state time: {rate: …} instead" if coarse else "check the logger"
-        what = f"the time repeats in {counted(repeated.size, 'row')} of {stated.size:,}, {at_times(stated[repeated])}"
-        say(warning("time.repeats", "time", f"{what}; these rows are left out", remedy))
-    if back.size:
-        what = f"the time runs backward {counted(back.size, 'time')}, {at_times(stated[back])}, by up to "
-        what += f"{-steps.min():.4g} s; rows are left out until it has passed"
-        remedy = "split the file where a new recording begins, or check the logger's clock"
+    stated = seconds[np.isfinite(seconds)]
+    back = np.diff(stated) < 0
+    if kept.size < seconds.size:
+        what = f"{counted(int(np.sum(~rises)), 'row')} of {seconds.size:,} left out: their time does not rise, "
+        what += f"{at_times(highest[~rises])}, and runs backward {counted(int(back.sum()), 'time')} by up to "
+        what += f"{max(-np.diff(stated).min(), 0) + 0.0:.4g} s"
+        remedy = "check the logger's clock, split the file where a recording begins, or state time: {rate: …}"
         say(warning("time.backward", "time", what, remedy))
     clean = seconds[kept]
     steps = np.diff(clean)
     step = float(np.median(steps))
     wide = steps > GAP * step
     if (gaps := np.flatnonzero(wide)).size:
-        missing = float(np.sum(np.rint(steps[gaps] / step) - 1))
-        longest = int(gaps[np.argmax(steps[gaps])])
-        what = (
-            f"{counted(gaps.size, 'gap')} in time, {missing:,.0f} {'sample' if missing == 1 else 'samples'} missing, "
-        )
-        what += f"the longest {steps[longest]:.4g} s at {clean[longest]:.5g} s"
-        remedy = "the positions in them have fewer turns; check the logger's buffer"
-        say(warning("time.gaps", "time", what, remedy))
+        samples, longest = int(np.sum(np.rint(steps[gaps] / step) - 1)), int(gaps[np.argmax(steps[gaps])])
+        what = f"{counted(gaps.size, 'gap')} in time, {counted(samples, 'sample')} missing, the longest "
+        what += f"{steps[longest]:.4g} s at {clean[longest]:.5g} s"
+        say(warning("time.gaps", "time", what, "the positions in them have fewer turns; check the logger's buffer"))
     even = float(np.std(steps[~wide] / step)) < UNEVEN
-    return Timeline(clean, kept if kept.size < total else None, step, even, stated[back])
+    return Timeline(clean, kept if kept.size < seconds.size else None, step, even, stated[:-1][back])
+
+
+def unit_of(where: str, name: str, column: Column, stated: str | None, assumed: str, say: Say) -> tuple[str, float]:
+    """Unit of a column, and its factor to SI: the mapping's, else the file's, else one that is assumed.
+
+    where: the entry of the mapping that has the key `unit`. What the file states otherwise is a finding.
+    """
+    unit = stated or column.unit or assumed
+    if not (stated or column.unit) and assumed:
+        what = f"the column '{name}' has no unit; SI is assumed ({assumed})"
+        say(note("unit.none", where, what, f"state {where}.unit"))
+    try:
+        factor, kind = dimensions(unit) if unit else (1.0, {})
+    except UnitError as error:
+        remedy = f"state {where}.unit in the mapping; in the file, {error.remedy}"
+        raise MechanismError(Finding(f"the column '{name}': {error.what}", where, remedy)) from None
+    if where in ("time", "angle") and not alike(kind, dimensions(assumed)[1]):
+        what = f"the column '{name}' has the unit '{unit}', which is no {where}"
+        raise MechanismError(Finding(what, where, "name another column"))
+    if stated and column.unit:
+        try:
+            size, of_file = dimensions(column.unit)
+        except UnitError:
+            return unit, factor
+        turns = of_file == HERTZ and alike(kind, dimensions("rad/s")[1])  # 1/min where the mapping has to say rpm
+        turns = turns and bool(np.isclose(factor / size, (1, 2 * np.pi)).any())
+        if not turns and not (alike(of_file, kind) and size == factor):
+            times = f": all values are {factor / size:.3g} times those of the file" if alike(of_file, kind) else ""
+            what = f"the file has the unit '{column.unit}' for '{name}', the mapping '{stated}', which is taken{times}"
+            say(warning("unit.differs", where, what, f"correct {where}.unit, or remove it"))
+    return unit, factor
 
 
 # ---- findings about data, and places in time -------------------------------------------------------------------
@@ -137,8 +155,8 @@ def gathered(findings: Iterable[Finding], same: bool = False) -> list[Finding]:
         first, files = group[0], list(dict.fromkeys(Path(one.file).name for one in group if one.file))
         if len(group) > 1:
             where = first.where if len({one.where for one in group}) == 1 else f"{first.where.partition(' ')[0]}s"
-            some = ", ".join(files[:4]) + (", …" if len(files) > 4 else "")
-            what = f"{first.what} — {len(group)} such findings" + (f": {some}" if files else "")
+            named = ", ".join(files[:4]) + (", …" if len(files) > 4 else "")
+            what = f"{first.what} — {len(group)} such findings" + (f": {named}" if files else "")
             first = replace(first, what=what, where=where, file="", line=None)
         merged.append(first)
     return merged
@@ -155,11 +173,7 @@ def at_times(seconds: Sequence[float] | NDArray[np.float64], most: int = 3) -> s
     return f"at {', '.join(f'{t:.5g}' for t in seconds[:most])}{', …' if len(seconds) > most else ''} s"
 
 
-def places(mask: NDArray[np.bool_], time: NDArray[np.float64]) -> str:
-    """Where the stretches of a mask are: the first times, and how long the longest is."""
-    starts, lengths = runs(mask)
-    longest = int(np.argmax(lengths))
-    if lengths[longest] < 3:
-        return at_times(time[starts])
-    end = min(starts[longest] + lengths[longest], time.size - 1)
-    return f"{at_times(time[starts])}, up to {time[end] - time[starts[longest]]:.3g} s long"
+def lost(kind: str, mask: NDArray[np.bool_], time: NDArray[np.float64], noun: str = "reading") -> str:
+    """Rows of a mask in words: what they are, how many, when the stretches of them begin; they are left out."""
+    count = f"{kind}: {counted(int(mask.sum()), noun)} of {mask.size:,}"
+    return f"{count}, {at_times(time[runs(mask)[0]])}; left out"

@@ -7,14 +7,12 @@ to the position along the slope there; with fewer it is interpolated by a cubic 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding
-from trunnion.rig.reading.timebase import GAP, Timeline, at_times, counted, note
+from trunnion.rig.reading.timebase import GAP, Say, Timeline, at_times, counted, note
 
 __all__ = [
     "DENSE", "LeftOfSteps", "Turns", "covariance_of_steps", "cut", "in_step", "joined", "left_in_turns",
@@ -31,10 +29,10 @@ APART = 0.5  # of the usual length of a turn, by which one may differ from it
 
 @dataclass(frozen=True)
 class Turns:
-    """Whole turns of one condition in a file, among the rows of a window.
+    """Whole turns of one condition in a file.
 
-    share: (row of the window,), the cycle counted on, rising, whole at the start of each; numbers: of the turns;
-    begin, end: their times, s; rows: those that belong to them; positions: how many a turn; line: time of the rows;
+    share: (row,), the cycle counted on, rising, whole at the start of each; numbers: of the turns; begin, end: their
+    times, s; rows: those that belong to them, (row,); positions: how many a turn; line: time of the rows.
     """
 
     share: Array
@@ -44,7 +42,6 @@ class Turns:
     rows: Mask
     positions: int
     line: Timeline
-    window: slice
 
     @property
     def density(self) -> float:
@@ -52,48 +49,32 @@ class Turns:
         return float(np.mean(self.end - self.begin)) / (self.line.step * self.positions) if self.numbers.size else 0.0
 
 
-def cut(
-    shares: Array,
-    times: Timeline,
-    window: slice,
-    allowed: Mask,
-    positions: int,
-    spoilt: Array,
-    say: Callable[[Finding], None],
-    where: str,
-) -> Turns:
-    """Find the whole turns among the rows of a window.
+def cut(share: Array, line: Timeline, allowed: Mask, positions: int, spoilt: Array, say: Say, where: str) -> Turns:
+    """Find the whole turns among the rows that are allowed.
 
-    Parameters
-    ----------
-    shares : cycles gone through, rising with time, NaN where not known.
-    times : of the rows.
-    window, allowed : rows that are looked at, and which of them may be used.
-    positions : of a turn.
-    spoilt : stretches of time to leave out.
-    say : takes findings about turns that are left out.
-    where : what these are about.
+    share: cycles gone through, rising with time, NaN where not known, (row,); positions: of a turn; spoilt: stretches
+    of time to leave out, (stretch, 2); say: takes findings about turns that are left out; where: what these are about.
     """
-    share, line = shares[window], times.part(window)
-    finite = np.isfinite(share)
     begin, end, numbers = _whole(share, line)
-    inside = _covered(begin, end, allowed, line)
+    refused = np.concatenate([[0], np.cumsum(~allowed)])  # turns some of whose rows are not allowed
+    low, high = (np.searchsorted(line.seconds, edge) for edge in (begin + 0.5 * line.step, end - 0.5 * line.step))
+    inside = allowed.all() | ((refused[np.maximum(high, low)] == refused[low]) & (high > low))
     begin, end, numbers = begin[inside], end[inside], numbers[inside]
     lengths, usual = end - begin, float(np.median(end - begin)) if numbers.size else 1.0
-    odd, hit = np.abs(lengths / usual - 1) > APART, np.zeros(numbers.size, dtype=np.bool_)
+    odd = np.abs(lengths / usual - 1) > APART
     if odd.any():
         left_out = int(np.sum(np.maximum(np.rint(lengths[odd] / usual), 1)))  # over a gap it may be several
         span = f"{lengths[odd].min():.4g} to {lengths[odd].max():.4g} s"
         what = f"{counted(left_out, 'turn')} left out, {at_times(begin[odd])}: {span} long where {usual:.4g} s is usual"
         remedy = "the drive starts, stops or rests there, or rows are missing; use files: over: for the steady part"
         say(note("turns.unusual", where, what, remedy))
+    keep = ~odd
     for low, high in spoilt:
         slack = min(line.step, 0.25 * (high - low))  # an index may lie where a turn begins
-        hit |= (begin <= high - slack) & (end >= low + slack)
-    keep = ~odd & ~hit
-    numbers, begin, end = numbers[keep], begin[keep], end[keep]
-    rows = _rows_of(share, begin, end, line, finite & allowed, positions)
-    return Turns(share, numbers, begin, end, rows, positions, line, window)
+        keep &= (begin > high - slack) | (end < low + slack)
+    begin, end = begin[keep], end[keep]
+    rows = _rows_of(share, begin, end, line, allowed, positions)
+    return Turns(share, numbers[keep], begin, end, rows, positions, line)
 
 
 def _whole(share: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]]:
@@ -107,24 +88,15 @@ def _whole(share: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]
     low, high = (int(np.ceil(rising[0] - slack)), int(np.floor(rising[-1] + slack))) if usual else (0, 0)
     if rising.size < 3 or high - low < 1 or high - low > rising.size:
         return np.empty(0), np.empty(0), np.empty(0, dtype=np.intp)
-    whole = np.arange(low, high + 1)
-    after = np.clip(np.searchsorted(rising, whole, side="right"), 1, rising.size - 1)
-    before = after - 1
-    step = rising[after] - rising[before]
-    part = np.clip((whole - rising[before]) / np.where(step > 0, step, 1.0), -1.01, 2.01)
-    crossed = seconds[before] + part * (seconds[after] - seconds[before])
-    return crossed[:-1], crossed[1:], whole[:-1]
+    edges = np.arange(low, high + 1)
+    after = np.clip(np.searchsorted(rising, edges, side="right"), 1, rising.size - 1)
+    step = rising[after] - rising[after - 1]
+    part = np.clip((edges - rising[after - 1]) / np.where(step > 0, step, 1.0), -1.01, 2.01)
+    crossed = seconds[after - 1] + part * (seconds[after] - seconds[after - 1])
+    return crossed[:-1], crossed[1:], edges[:-1]
 
 
-def _covered(begin: Array, end: Array, allowed: Mask, line: Timeline) -> Mask:
-    """Whether all rows of each turn are allowed."""
-    refused = np.concatenate([[0], np.cumsum(~allowed)])
-    slack = 0.5 * line.step
-    low, high = np.searchsorted(line.seconds, begin + slack), np.searchsorted(line.seconds, end - slack)
-    return np.asarray(allowed.all() | ((refused[np.maximum(high, low)] == refused[low]) & (high > low)))
-
-
-def _rows_of(share: Array, begin: Array, end: Array, line: Timeline, known: Mask, positions: int) -> Mask:
+def _rows_of(share: Array, begin: Array, end: Array, line: Timeline, allowed: Mask, positions: int) -> Mask:
     """Rows within turns, half a position before and after included, that move."""
     if not begin.size:
         return np.zeros(share.size, dtype=np.bool_)
@@ -133,45 +105,33 @@ def _rows_of(share: Array, begin: Array, end: Array, line: Timeline, known: Mask
     level = np.zeros(share.size + 1, dtype=np.int64)
     np.add.at(level, np.searchsorted(line.seconds, begin - margin), 1)
     np.add.at(level, np.searchsorted(line.seconds, end + margin, side="right"), -1)
-    rows = (np.cumsum(level[:-1]) > 0) & known
     wide = max(int(usual / line.step / 100), 1)
-    moved = np.full(share.size, np.inf)
-    moved[wide:-wide] = (share[2 * wide :] - share[: -2 * wide]) / (
-        line.seconds[2 * wide :] - line.seconds[: -2 * wide]
-    )
-    return np.asarray(rows & ~(moved < STANDING / usual))
+    speed = np.full(share.size, np.inf)
+    lasts = line.seconds[2 * wide :] - line.seconds[: -2 * wide]
+    speed[wide:-wide] = (share[2 * wide :] - share[: -2 * wide]) / lasts
+    return np.asarray((np.cumsum(level[:-1]) > 0) & np.isfinite(share) & allowed & ~(speed < STANDING / usual))
+
+
+def joined(angle: Array) -> Array:
+    """An angle by row, rad, without the jumps of readings that begin anew after a turn; NaN stay."""
+    finite, without = np.isfinite(angle), angle.copy()
+    without[finite] = np.unwrap(angle[finite])
+    return without
 
 
 def resampled(turns: Turns, channel: Array, angle: Array | None = None) -> Array:
     """Values of a channel, which has one a row of the file, as (turn, position); NaN where no sample has one.
 
-    angle: readings of a channel that is an angle, rad, before they were `joined`: they tell its whole turns.
+    angle: readings of a channel that is an angle, rad, before they were `joined`. Every turn is given as many whole
+    turns at a position as these have in the fullest one.
     """
-    if angle is not None:
-        return _counted_alike(resampled(turns, channel), resampled(turns, angle))
-    values = channel[turns.window]
     if not turns.numbers.size:
         return np.empty((0, turns.positions))
-    if turns.density >= DENSE:
-        return _averaged(turns, values)
-    return _interpolated(turns, values)
-
-
-def joined(angle: Array) -> Array:
-    """An angle by row, rad, without the jumps of readings that begin anew after a turn; NaN stay."""
-    known, found = np.isfinite(angle), angle.copy()
-    found[known] = np.unwrap(angle[known])
-    return found
-
-
-def _counted_alike(course: Array, raw: Array) -> Array:
-    """A course of a joined angle, (turn, position), rad, with as many whole turns at a position in every turn: those of
-    the readings, raw, in the fullest one."""
-    known = np.isfinite(course)
-    if not known.any():
+    course = _averaged(turns, channel) if turns.density >= DENSE else _interpolated(turns, channel)
+    if angle is None or not np.isfinite(course).any():
         return course
-    first = int(np.argmax(np.count_nonzero(known, axis=1)))
-    at = np.flatnonzero(known[first])
+    raw, first = resampled(turns, angle), int(np.argmax(np.count_nonzero(np.isfinite(course), axis=1)))
+    at = np.flatnonzero(np.isfinite(course[first]))
     near = np.interp(np.arange(course.shape[1]), at, course[first, at])
     off = float(np.nan_to_num(np.nanmedian(raw[first, at] - near[at])))
     near += TURN * np.round(off / TURN)
@@ -183,48 +143,49 @@ def _averaged(turns: Turns, values: Array) -> Array:
     rows = turns.rows & np.isfinite(values)
     scaled = turns.share[rows] * turns.positions
     place = np.floor(scaled + 0.5)
-    low = int(turns.numbers[0]) * turns.positions
-    size = (int(turns.numbers[-1]) - int(turns.numbers[0]) + 1) * turns.positions
-    number = place.astype(np.int64) - low
+    size = int(turns.numbers[-1] - turns.numbers[0] + 1) * turns.positions
+    number = place.astype(np.int64) - int(turns.numbers[0]) * turns.positions
     inside = (number >= 0) & (number < size)
-    number, off, used = number[inside], (scaled - place)[inside], values[rows][inside]
+    number, off, sample = number[inside], (scaled - place)[inside], values[rows][inside]
     count = np.bincount(number, minlength=size).astype(np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.bincount(number, weights=used, minlength=size) / count
+        mean = np.bincount(number, weights=sample, minlength=size) / count
         centre = np.bincount(number, weights=off, minlength=size) / count
     rise = np.diff(mean) / np.maximum(1.0 + np.diff(centre), 0.5)
     sides = np.stack([np.append(rise, np.nan), np.insert(rise, 0, np.nan)])
-    there = np.isfinite(sides)
-    slope = np.where(there, sides, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
-    mean = mean - slope * centre
-    return np.asarray(mean.reshape(-1, turns.positions)[turns.numbers - turns.numbers[0]])
+    beside = np.isfinite(sides)
+    slope = np.where(beside, sides, 0.0).sum(axis=0) / np.maximum(beside.sum(axis=0), 1)
+    return np.asarray((mean - slope * centre).reshape(-1, turns.positions)[turns.numbers - turns.numbers[0]])
+
+
+def _rising(turns: Turns) -> NDArray[np.intp]:
+    """Rows that are farther in the cycle than all before."""
+    highest = np.maximum.accumulate(np.where(np.isfinite(turns.share), turns.share, -np.inf))
+    return np.flatnonzero(turns.share > np.concatenate([[-np.inf], highest[:-1]]))
 
 
 def _interpolated(turns: Turns, values: Array) -> Array:
     """A cubic through the four samples about a position; a straight line between two where one of them is missing."""
-    line = turns.line
-    known = np.isfinite(turns.share)
-    highest = np.maximum.accumulate(np.where(known, turns.share, -np.inf))
-    rows = np.flatnonzero(known & (turns.share > np.concatenate([[-np.inf], highest[:-1]])))
-    x, y, seconds = turns.share[rows], values[rows], line.seconds[rows]
-    wanted = (turns.numbers[:, None] + np.arange(turns.positions) / turns.positions).ravel()
+    rows, step = _rising(turns), turns.line.step
     if rows.size < 2:
         return np.full((turns.numbers.size, turns.positions), np.nan)
-    after = np.clip(np.searchsorted(x, wanted, side="right"), 1, x.size - 1)
-    part = (wanted - x[after - 1]) / (x[after] - x[after - 1])
-    found = y[after - 1] + part * (y[after] - y[after - 1])
+    x, y, seconds = turns.share[rows], values[rows], turns.line.seconds[rows]
+    at = (turns.numbers[:, None] + np.arange(turns.positions) / turns.positions).ravel()
+    after = np.clip(np.searchsorted(x, at, side="right"), 1, x.size - 1)
+    part = (at - x[after - 1]) / (x[after] - x[after - 1])
+    course = y[after - 1] + part * (y[after] - y[after - 1])
     four = np.clip(after[:, None] + np.arange(-2, 2), 0, x.size - 1)
     apart = np.diff(seconds[four], axis=1)
-    smooth = np.all(np.isfinite(y[four]), axis=1) & np.all(apart > 0, axis=1) & np.all(apart < 3 * line.step, axis=1)
-    near, at = x[four[smooth]], wanted[smooth]
+    smooth = np.isfinite(y[four]).all(axis=1) & ((apart > 0) & (apart < 3 * step)).all(axis=1)
+    near, by_cubic = x[four[smooth]], np.zeros(int(np.count_nonzero(smooth)))
     for i in range(4):  # Lagrange's form
-        weight = np.prod([(at - near[:, j]) / (near[:, i] - near[:, j]) for j in range(4) if j != i], axis=0)
-        found[smooth] = (found[smooth] if i else 0.0) + weight * y[four[smooth]][:, i]
-    at_end = np.abs(part - np.clip(part, 0, 1)) > 1.01  # no sample beyond: up to one step is extrapolated
-    usual = float(np.median(np.diff(seconds)))
-    gap = seconds[after] - seconds[after - 1] > GAP * line.step * np.maximum(1, np.rint(usual / line.step))
-    found[at_end | gap] = np.nan
-    return np.asarray(found.reshape(-1, turns.positions))
+        factors = [(at[smooth] - near[:, j]) / (near[:, i] - near[:, j]) for j in range(4) if j != i]
+        by_cubic += np.prod(factors, axis=0) * y[four[smooth]][:, i]
+    course[smooth] = by_cubic
+    far = np.abs(part - np.clip(part, 0, 1)) > 1.01  # no sample beyond: up to one step is extrapolated
+    usual = max(1.0, float(np.rint(np.median(np.diff(seconds)) / step)))
+    course[far | (seconds[after] - seconds[after - 1] > GAP * step * usual)] = np.nan
+    return np.asarray(course.reshape(-1, turns.positions))
 
 
 def turn_means(course: Array) -> Array:
@@ -242,14 +203,12 @@ def time_mean(turns: Turns, course: Array) -> float:
 
     The mean over the positions is that over the angle: of a speed that varies within the turn it is too high.
     """
-    known = np.isfinite(turns.share)
-    highest = np.maximum.accumulate(turns.share[known])
-    rising = np.flatnonzero(np.diff(highest, prepend=-np.inf) > 0)
+    rows = _rising(turns)
     edges = turns.numbers[:, None] + (np.arange(turns.positions + 1) - 0.5) / turns.positions
-    dwell = np.diff(np.interp(edges, highest[rising], turns.line.seconds[known][rising]), axis=1)
-    there = np.isfinite(course)
-    total = float(np.sum(dwell, where=there))
-    return float(np.sum(dwell * course, where=there)) / total if total > 0 else float("nan")
+    dwell = np.diff(np.interp(edges, turns.share[rows], turns.line.seconds[rows]), axis=1)
+    finite = np.isfinite(course)
+    total = float(np.sum(dwell, where=finite))
+    return float(np.sum(dwell * course, where=finite)) / total if total > 0 else float("nan")
 
 
 # ---- the error by steps that all turns repeat ------------------------------------------------------------------
@@ -284,7 +243,7 @@ def left_in_turns(turns: Turns, course: Array, readings: Array, noise: float) ->
     share, samples = in_step(turns, course), float(np.median(turns.end - turns.begin)) / turns.line.step
     every = share > ALIKE
     if every:  # then what a reading differs by from that a turn later is noise
-        rows = np.where(turns.rows, readings[turns.window], np.nan)
+        rows = np.where(turns.rows, readings, np.nan)
         apart = rows[round(samples) :] - rows[: -round(samples)]
         apart = apart[np.isfinite(apart)]
         noise = noise_before(float(np.sqrt(np.mean(apart**2) / 2))) if apart.size else 0.0

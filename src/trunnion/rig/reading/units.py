@@ -1,13 +1,13 @@
 """Units of sensors: numbers such as `12 mV`, gains such as `100 mV/(N m)`, and from a reading to what it measures.
 
-The model's own quantities know mechanics only; its units are used wherever a unit is one of mechanics.
+The table of units is the model's; here volts, ampere, kelvin and hertz count too.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any
@@ -26,11 +26,10 @@ __all__ = [
 
 Dimensions = Mapping[str, Fraction]
 HERTZ: Dimensions = {"s": Fraction(-1)}
+_VOLT: Dimensions = {"kg": Fraction(1), "m": Fraction(2), "s": Fraction(-3), "A": Fraction(-1)}
 _AMOUNT = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
 _RATIO = re.compile(r"([^/()]+?)\s*/\s*\(\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?)\s*([^/()0-9][^()]*)\)", re.DOTALL)
-_USUAL = ("s", "ms", "Hz", "kHz", "V", "mV", "A", "mA", "N", "kN", "N m", "rpm", "rad/s", "deg", "rad", "mm", "%")
-_COUNTED = {"rad", "m"}  # Hz over a speed, 60 Hz/(rev/s), are pulses over an angle or length
-_VOLT: Dimensions = {"kg": Fraction(1), "m": Fraction(2), "s": Fraction(-3), "A": Fraction(-1)}
+_EXAMPLE = "write a number with its unit and a decimal point, such as 12.5 mV"
 
 
 @dataclass(frozen=True)
@@ -54,12 +53,10 @@ def dimensions(text: str) -> tuple[float, Dimensions]:
     try:
         factor, exponents, names = root(written)
     except UnitError as error:
-        near = nearest(text, _USUAL)
-        near = near if near.startswith("did you mean") else "write a unit such as mV, N m, rpm or deg"
-        raise UnitError(error.what, error.remedy or near) from None
+        raise UnitError(error.what, error.remedy or "write a unit such as mV, N m, rpm or deg") from None
     if "count" in exponents:
         raise UnitError(f"the unit '{text}' is not one of a sensor", "use units of mechanics, volts, ampere or kelvin")
-    pulses = "Hz" in names and exponents and exponents.keys() <= _COUNTED
+    pulses = "Hz" in names and exponents and exponents.keys() <= {"rad", "m"}  # 60 Hz/(rev/s) are pulses of a turn
     if not {"A", "K"} & exponents.keys() and exponents != HERTZ and not pulses:
         unit(written)
     return float(factor), exponents
@@ -68,13 +65,11 @@ def dimensions(text: str) -> tuple[float, Dimensions]:
 def read_amount(source: object) -> Amount:
     """A number or a text such as `12 mV`; UnitError if it is neither."""
     if isinstance(source, bool) or not isinstance(source, (int, float, str)):
-        what = "is empty" if source is None else "is not a number with a unit"
-        raise UnitError(what, "write a number with its unit such as 12 mV")
-    found = _AMOUNT.fullmatch(normalise(source)) if isinstance(source, str) else None
-    if isinstance(source, str) and (not found or found[2].startswith(",")):
-        remedy = "write a decimal point, not a comma" if re.search(r"[0-9],[0-9]", source) else "write it as 12 mV"
-        raise UnitError(f"'{source[:40]}' is not a number with a unit", remedy)
-    number, text = (found[1], found[2]) if found else (str(source), "")
+        raise UnitError("is empty" if source is None else "is not a number with a unit", _EXAMPLE)
+    parts = _AMOUNT.fullmatch(normalise(str(source)))
+    if isinstance(source, str) and (not parts or parts[2].startswith(",")):
+        raise UnitError(f"'{source[:40]}' is not a number with a unit", _EXAMPLE)
+    number, text = parts.groups() if parts else (str(source), "")  # inf and nan of YAML
     divisor = 1.0
     if ratio := _RATIO.fullmatch(text):  # 1 V/(1000 rpm)
         text, divisor = f"{ratio[1]}/({ratio[3]})", float(ratio[2])
@@ -104,7 +99,7 @@ def unit_name(exponents: Dimensions) -> str:
     exponents = {key: power for key, power in exponents.items() if power}
     if exponents == dict(_VOLT):
         return "V"
-    if not set(exponents) - set(BASES[:4]):
+    if exponents.keys() <= set(BASES[:4]):
         length, mass, time, angle = (Fraction(exponents.get(name, 0)) for name in BASES[:4])
         return si_unit((length, mass, time, angle))
     return " ".join(name + ("" if power == 1 else f"^{power}") for name, power in exponents.items())
@@ -113,33 +108,26 @@ def unit_name(exponents: Dimensions) -> str:
 # ---- entries of a file ----------------------------------------------------------------------------------------
 
 
+def _entry(read: Callable[[Any], Any]) -> PlainValidator:
+    """How pydantic reads an entry; its error is a finding's."""
+
+    def check(value: object) -> Any:
+        try:
+            return read(value)
+        except UnitError as error:
+            raise problem(error.what, error.remedy or _EXAMPLE) from None
+
+    return PlainValidator(check)
+
+
 def _unit(value: object) -> str:
-    """A unit; a finding's error if it is none."""
     if not isinstance(value, str):
-        raise problem("is not a unit", "write a unit such as mV or N m")
-    try:
-        dimensions(value)
-    except UnitError as error:
-        raise problem(error.what, error.remedy) from None
+        raise UnitError("is not a unit", "write a unit such as mV or N m")
+    dimensions(value)
     return value
 
 
-def _amount(value: object) -> Amount:
-    """A number with its unit; a finding's error if it is none."""
-    if isinstance(value, Amount):
-        return value
-    if isinstance(value, str) and re.search(r"\d:\d\d:\d\d", value):
-        what = f"'{value}' is a time stamp; times are counted in seconds from the first row of the file"
-        raise problem(what, "write a time in seconds, such as [0 s, 0.5 s]")
-    try:
-        return read_amount(value)
-    except UnitError as error:
-        raise problem(error.what, error.remedy or "write a number with its unit such as 12 mV") from None
-
-
-def _frequency(value: object) -> Amount:
-    """A frequency above zero, plain numbers in Hz."""
-    amount = _amount(value)
+def _hertz(amount: Amount) -> Amount:
     if not (amount.value > 0 and (amount.plain or amount.dimensions == HERTZ)):
         raise problem(f"'{amount.source}' is not a frequency above zero", "write it as 2 kHz or 500 Hz")
     return amount
@@ -158,49 +146,45 @@ def bounded(above: bool) -> AfterValidator:
     return AfterValidator(check)
 
 
-_WRITTEN, _SOURCE = {"type": ["number", "string"]}, PlainSerializer(lambda amount: amount.source)
-UnitText = Annotated[str, PlainValidator(_unit), WithJsonSchema({"type": ["string"], "examples": ["mV"]})]
-Number = Annotated[Amount, PlainValidator(_amount), _SOURCE, WithJsonSchema({**_WRITTEN, "examples": ["12 mV"]})]
-Positive = Annotated[Number, bounded(above=True)]
-Size = Annotated[Number, bounded(above=False)]
-Frequency = Annotated[Amount, PlainValidator(_frequency), _SOURCE, WithJsonSchema({**_WRITTEN, "examples": ["2 kHz"]})]
-
-
-# ---- from readings to quantities ------------------------------------------------------------------------------
-
-OTHER_COLUMN = "name another column"
-# SI units that a kind of measure may have, the first being what a plain number is taken for
-QUANTITIES = {name: tuple(one.unit for one in kind.quantities) for name, kind in MEASURES.items()}
-
-
-def _kind(measures: str) -> str:
-    """Entry of QUANTITIES that a measure is of; empty for a name of the model's measures."""
-    head, colon, _ = measures.partition(":")
-    if colon:
-        return head
-    return "point" if re.fullmatch(r"[^.]+\.[^.]+\.[xyz]", measures) else ""
-
-
 def _measures(text: str) -> str:
     """A measure that has a course: KIND:NAME, link.point.x or the name of one of the model."""
     kind, (_, colon, subject) = _kind(text), text.partition(":")
     if (kind and kind not in QUANTITIES) or (colon and not subject.strip()) or not text.strip():
         near = nearest(kind, QUANTITIES)
-        what = f"'{text[:80]}' is not a quantity that a sensor measures"
         remedy = "write effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT or link.point.x"
+        what = f"'{text[:80]}' is not a quantity that a sensor measures"
         raise problem(what, near if near.startswith("did") else remedy)
     return text
 
 
+_WRITTEN, _SOURCE = {"type": ["number", "string"]}, PlainSerializer(lambda amount: amount.source)
+_AMOUNT_ENTRY = _entry(lambda value: value if isinstance(value, Amount) else read_amount(value))
+UnitText = Annotated[str, _entry(_unit), WithJsonSchema({"type": ["string"], "examples": ["mV"]})]
+Number = Annotated[Amount, _AMOUNT_ENTRY, _SOURCE, WithJsonSchema({**_WRITTEN, "examples": ["12 mV"]})]
+Positive = Annotated[Number, bounded(above=True)]
+Size = Annotated[Number, bounded(above=False)]
+_RATE = WithJsonSchema({**_WRITTEN, "examples": ["2 kHz"]})
+Frequency = Annotated[Amount, _AMOUNT_ENTRY, AfterValidator(_hertz), _SOURCE, _RATE]
 MeasureText = Annotated[str, AfterValidator(_measures)]
+
+
+# ---- from readings to quantities ------------------------------------------------------------------------------
+
+# SI units that a kind of measure may have, the first being what a plain number is taken for
+QUANTITIES = {name: tuple(kind.unit for kind in measure.quantities) for name, measure in MEASURES.items()}
+
+
+def _kind(measures: str) -> str:
+    """Entry of QUANTITIES that a measure is of; empty for a name of the model's measures."""
+    head, colon, _ = measures.partition(":")
+    return head if colon else "point" if re.fullmatch(r"[^.]+\.[^.]+\.[xyz]", measures) else ""
 
 
 @dataclass(frozen=True)
 class SensorScale:
     """Quantity (SI) = factor · reading.
 
-    unit: SI unit of the quantity; of_reading, of_quantity: dimensions of both; raw: of a reading in SI; measures,
-    column: what the channel is said to measure, and where.
+    unit: SI unit of the quantity; raw: of a reading in SI; of_reading, of_quantity: dimensions of both.
     """
 
     factor: float
@@ -208,8 +192,6 @@ class SensorScale:
     raw: float
     of_reading: Dimensions
     of_quantity: Dimensions
-    measures: str = ""
-    column: str = ""
 
     @property
     def direct(self) -> bool:
@@ -227,11 +209,9 @@ class SensorScale:
             return amount.value / self.raw
         if alike(amount.dimensions, self.of_quantity):
             return amount.value / (self.factor if key == "zero" else abs(self.factor))
-        raise UnitError(
-            f"{key}: '{amount.source}' is neither of the readings ({unit_name(self.of_reading)}) nor of what they "
-            f"measure ({self.unit})",
-            f"write it in {self.unit}, or as a plain number in the unit of the readings",
-        )
+        what = f"{key}: '{amount.source}' is neither of the readings ({unit_name(self.of_reading)}) nor of what they "
+        remedy = f"write it in {self.unit}, or as a plain number in the unit of the readings"
+        raise UnitError(f"{what}measure ({self.unit})", remedy)
 
 
 def default_unit(measures: str) -> str:
@@ -239,10 +219,10 @@ def default_unit(measures: str) -> str:
     return QUANTITIES.get(_kind(measures), ("",))[0]
 
 
-def scale(measures: str, unit: str, gain: Amount | None, column: str = "") -> SensorScale:
+def scale(measures: str, unit: str, gain: Amount | None) -> SensorScale:
     """How readings in a unit become what is measured; UnitError if they do not. A plain gain multiplies.
 
-    The gain is reading per quantity or quantity per reading: whichever gives what is measured. column: for messages.
+    The gain is reading per quantity or quantity per reading: whichever gives what is measured.
     """
     raw, of_reading = dimensions(unit) if unit else (1.0, {})
     gain = gain or Amount(1.0, 1.0, "", {})
@@ -252,19 +232,12 @@ def scale(measures: str, unit: str, gain: Amount | None, column: str = "") -> Se
     possible = QUANTITIES.get(kind, ())
     for power in (1, -1):
         product = multiplied(of_reading, gain.dimensions, power)
-        name = next((one for one in possible if alike(product, dimensions(one)[1])), "")
-        if not kind and not {"A", "K"} & {key for key, value in product.items() if value}:
+        name = next((name for name in possible if alike(product, dimensions(name)[1])), "")
+        if not kind and not {"A", "K"} & {key for key, exponent in product.items() if exponent}:
             name = unit_name(product)
         if name:
-            factor = raw * gain.value**power
-            return SensorScale(factor, name, raw, of_reading, dimensions(name)[1], measures, column)
-    if gain.plain and alike(of_reading, HERTZ) and kind == "rate":
-        what = f"readings in '{unit}' do not give {measures}, for they may count turns or radians"
-        raise UnitError(what, "write the unit as rpm or rad/s")
+            return SensorScale(raw * gain.value**power, name, raw, of_reading, dimensions(name)[1])
     needed = " or ".join(possible or ("a quantity of mechanics",))
-    if gain.plain and kind and column and any(of_reading.values()) and not {"A", "K"} & of_reading.keys():
-        what = f"the column '{column}' is in {unit}; {measures} is in {needed}"
-        raise UnitError(what, f"{OTHER_COLUMN}, or correct its unit")
-    told = "" if gain.plain else f" with the gain '{gain.source}'"
-    remedy = f"state the gain, such as 100 mV/({needed.split(' or ')[0]})" if gain.plain else "check unit and gain"
-    raise UnitError(f"readings in '{unit or '1'}'{told} do not give {measures} in {needed}", remedy)
+    by_gain = "" if gain.plain else f" with the gain '{gain.source}'"
+    remedy = f"correct the unit (write rpm for 1/min), or state the gain, such as 100 mV/({needed.split(' or ')[0]})"
+    raise UnitError(f"readings in '{unit or '1'}'{by_gain} do not give {measures} in {needed}", remedy)

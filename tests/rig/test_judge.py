@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from rig_measurements import course
-from trunnion.rig.judge import going_on, judge
+from trunnion.rig.judge import judge
 from trunnion.rig.reading.measurement import Accuracy
 
 COVERED = stats.norm.cdf(2) - stats.norm.cdf(-2)  # of k = 2
@@ -31,25 +31,11 @@ def test_uncertainty_of_a_bias(resolution: float, zero: float) -> None:
         course("torque", 5.0 + offsets[:, None] + np.zeros((4, positions)), Accuracy(zero, 0.0, resolution)),
         np.full(positions, 4.0),
         np.ones(positions, bool),
+        np.arange(positions),
     )
     own = float(np.sum(offsets**2)) / 3 / 4
     steps = resolution**2 / 12 / positions
     total = own + steps + zero**2
     factor = stats.t.ppf(0.5 + COVERED / 2, 3 * total**2 / own**2)
-    assert found.bias == pytest.approx(1.0)
-    assert found.bias_expanded == pytest.approx(factor * total**0.5, rel=1e-6)
-
-
-def test_how_turns_follow_each_other() -> None:
-    """Σ mₖ mₖ₊₁/Σ mₖ² + 1/n of the means of the turns: of +1, −1, … six times −5/6 + 1/6."""
-    turns = np.repeat([[1.0], [-1.0]] * 3, 4, axis=1).reshape(6, 4)
-    found, count = going_on(course("torque", 10.0 + turns))
-    assert (found, count) == (pytest.approx(-4 / 6), 6)
-    rising = np.arange(5.0)[:, None] + np.zeros((5, 4))  # −2 … 2: (2 + 0 + 0 + 2)/10 + 1/5
-    assert going_on(course("torque", rising))[0] == pytest.approx(0.6)
-
-
-def test_independent_turns_follow_each_other_by_nothing_in_the_mean() -> None:
-    random = np.random.default_rng(0)
-    found = [going_on(course("torque", random.normal(size=(8, 1))))[0] for _ in range(1000)]
-    assert np.mean(found) == pytest.approx(0.0, abs=0.03)
+    assert found["bias"] == pytest.approx(1.0)
+    assert found["bias_expanded"] == pytest.approx(factor * total**0.5, rel=1e-6)

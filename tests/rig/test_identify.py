@@ -383,7 +383,7 @@ def test_estimates_are_written_with_the_digits_they_have(cardan: trunnion.Mechan
         ({"hold_out": ["run-9"]}, "there is no condition 'run-9'"),
         ({"hold_out": 1.5}, "cannot be held out"),
         ({"hold_out": [""]}, "there is no condition ''"),
-        ({"hold_out": ["run"]}, "in the names of 5 conditions"),
+        ({"hold_out": ["run"]}, "there is no condition 'run'"),
         ({"guard": 100}, "no position can be used: .* friction reverses"),
         ({"hold_out": [f"run-{k}" for k in range(1, 6)]}, "all conditions are held out"),
         ({"start": {"mass": 1.0}}, "is not one of the parameters"),

@@ -142,8 +142,6 @@ def test_a_wrong_unit_is_no_error_of_a_gain_that_is_stated(folder: Path) -> None
     errors = [one for one in result.trunnion.findings if one.severity == "error"]
     assert [one.code for one in errors] == ["fit.misfit"]
     assert cause(result).figures["size"] == pytest.approx(0.7376 - 1, abs=0.005)
-    assert "130 times its stated standard uncertainty" in cause(result).what
-    assert "accuracy" not in cause(result).remedy
     assert np.all(np.abs(result["sensor_error"].values) <= 5 + 1e-9)
 
 

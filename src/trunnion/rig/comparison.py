@@ -301,8 +301,8 @@ def _arrays(channels: list[str], sets: list[str], rows: Sequence[ConditionCompar
     for k, row in enumerate(rows):
         arrays["value"][:, k] = [row.condition.values.get(name, np.nan) for name in sets]
         for channel, figures in row.figures.items():
-            own = channels.index(channel) if channel else 0
-            at = {"channel": own, "condition": k, "position": slice(0, len(row.condition.phase))}
+            at: dict[str, int | slice] = {"condition": k, "position": slice(0, len(row.condition.phase))}
+            at["channel"] = channels.index(channel) if channel else 0
             for name, figure in figures.items():
                 arrays[name][tuple(at[dim] for dim in VARIABLES[name].dims)] = figure
     measured = any("efficiency" in row.figures[""] for row in rows)

@@ -235,17 +235,11 @@ def converted(channel: SensorChannel, value: Array) -> Array:
     return np.round(value * channel.per, channel.decimals) + 0.0  # + 0.0: no negative zero
 
 
-def pulses(angle: Array, per_turn: int, zero: float) -> NDArray[np.int64]:
-    """Running count of an encoder, at the coordinates (rad) of the driver."""
-    return np.floor((angle - zero) * (per_turn / (2 * np.pi)) + 1e-9).astype(np.int64)
+def pulses(angle: Array, per_turn: int, zero: float) -> tuple[NDArray[np.int64], Array]:
+    """Running count of an encoder at the coordinates (rad) of the driver, and the part of the pulse that has passed.
 
-
-def level(angle: Array, per_turn: int, zero: float) -> NDArray[np.int64]:
-    """Level of the signal of an encoder: high in the first half of each pulse."""
-    part: Array = (angle - zero) * (per_turn / (2 * np.pi)) + 1e-9
-    return (part - np.floor(part) < 0.5).astype(np.int64)
-
-
-def index_level(angle: Array, per_turn: int, zero: float) -> NDArray[np.int64]:
-    """The index of an encoder: high for the first pulse of each turn."""
-    return np.asarray(pulses(angle, per_turn, zero) % per_turn == 0, np.int64)
+    Its level is high in the first half of each pulse, its index for the first pulse of each turn.
+    """
+    passed = (angle - zero) * (per_turn / (2 * np.pi)) + 1e-9
+    count = np.floor(passed)
+    return count.astype(np.int64), np.asarray(passed - count)

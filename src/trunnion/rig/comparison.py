@@ -198,7 +198,12 @@ def _compared(
             for kind, (size, share) in causes(gap, course, signal.accuracy.datum, drive, free).items():
                 figures[name] |= {f"{kind}_error": size, f"{kind}_explains": share}
     doubt = ("", "")
-    if missing := _unmeasured(mechanism, condition) if powers else []:
+    efforts = {signal.measures for signal in condition.courses.values()}
+    needed = {f"effort:{name}": f"drivers.{name}" for name in mechanism.drivers}
+    needed |= {f"load:{name}": f"loads.{name}" for name in useful_loads(mechanism)}
+    missing = [name for measure, name in needed.items() if measure not in efforts]
+    missing += [f"springs.{name}" for name in useful_springs(mechanism)]
+    if powers and missing:
         remedy = "measure effort: of every driver and load: of every useful load, each with its rate:"
         doubt = f"the power of {', '.join(missing)} is not measured", remedy
     elif powers and of_powers.keys() <= model.courses.keys():
@@ -250,14 +255,6 @@ def _frictionless(
         if free.data() != stated.data():
             return modelled(free, replace(condition, values={}, units={}), channels, method).courses
     return {}
-
-
-def _unmeasured(mechanism: Mechanism, condition: Condition) -> list[str]:
-    """Drivers, useful loads and springs whose effort no channel measures, by their entries in the model."""
-    measured = {signal.measures for signal in condition.courses.values()}
-    missing = [f"drivers.{name}" for name in mechanism.drivers if f"effort:{name}" not in measured]
-    missing += [f"loads.{name}" for name in useful_loads(mechanism) if f"load:{name}" not in measured]
-    return missing + [f"springs.{name}" for name in useful_springs(mechanism)]
 
 
 def _efficiency(
@@ -377,30 +374,38 @@ def hashed_files(conditions: Iterable[Condition]) -> list[dict[str, Any]]:
 
 
 def _findings(mechanism: Mechanism, channels: Sequence[str], rows: Sequence[ConditionComparison]) -> list[Finding]:
-    """Errors first."""
-    findings = [
-        *_no_answer(rows),
-        *other_speed(next(iter(mechanism.drivers), ""), [(row.condition, row.model.speed) for row in rows]),
-        *(finding for name in channels for finding in _of_channel(name, [row for row in rows if name in row.signals])),
-        *_of_efficiency(rows),
-        *dict.fromkeys(one for row in rows for one in row.model.run.chosen.findings),
-    ]
+    """Errors first: positions without an answer, speeds, channels and efficiencies that do not agree or are unknown."""
+    findings = [*dict.fromkeys(one for row in rows for one in row.model.run.chosen.findings)]
+    findings += other_speed(next(iter(mechanism.drivers), ""), [(row.condition, row.model.speed) for row in rows])
+    for code in Status:
+        if cases := [row for row in rows if not code.solved and np.any(row.model.status == code)]:
+            count, positions = int(np.count_nonzero(cases[0].model.status == code)), len(cases[0].condition.phase)
+            values = "".join(f" --set {name}={value:.6g}" for name, value in cases[0].condition.values.items())
+            what = f"the model has no solution {_in_which(cases, rows)}, the first at {count:,} of "
+            what += f"{counted(positions, 'position')}: {code.text}"
+            remedy = f"run analyse{values} to see where in the cycle, and why"
+            figures = {"count": count, "positions": positions, "status": code.text}
+            findings.append(Finding.error("compare.no_answer", "", what, remedy, **figures))
+    for name in channels:
+        findings += _of_channel(name, [row for row in rows if name in row.signals])
+    cases, own = [row for row in rows if "efficiency" in row.figures[""]], "efficiency"
+    if off := [row for row in cases if row.figures[""]["efficiency_within"] == 0]:
+        most = max(off, key=lambda row: abs(row.figures[""][own] - row.figures[""]["efficiency_model"]))
+        measured, half, model = (most.figures[""][f"{own}{key}"] for key in ("", "_expanded", "_model"))
+        what = f"does not agree within U {_in_which(off, cases)}: at most in {most.condition.name}, measured "
+        what += f"{measured:.4f} ± {half:.2g}, model {model:.4f}"
+        remedy = "check the channels; `trunnion identify` fits the friction of the model to them"
+        figures = {"measured": measured, "expanded": half, "model": model}
+        findings.append(Finding.error("compare.efficiency", own, what, remedy, **figures))
+    for what, remedy in dict.fromkeys(row.doubt for row in rows if row.doubt[0]):
+        where = _in_which([row for row in rows if row.doubt == (what, remedy)], rows)
+        findings.append(Finding.warning("compare.efficiency_unknown", own, f"not known {where}: {what}", remedy))
     accuracies = [(name, one.accuracy) for row in rows for name, one in row.signals.items()]
-    stated = {name for name, accuracy in accuracies if accuracy.zero or accuracy.gain}
-    if bare := [name for name in channels if name not in stated]:
+    if bare := [name for name in channels if not any(a.zero or a.gain for own, a in accuracies if own == name)]:
         what = f"no accuracy of zero and gain is stated for {', '.join(bare)}: U includes only the scatter between "
         remedy = "state accuracy: {gain: …, zero: …} in the mapping"
         findings.append(Finding.note("compare.no_accuracy", "channels", f"{what}turns", remedy, channels=bare))
     return sorted(findings, key=lambda finding: list(Severity).index(finding.severity))
-
-
-def _in_which(rows: Iterable[ConditionComparison | Condition], count: int) -> str:
-    """In which of so many conditions."""
-    names = [(row if isinstance(row, Condition) else row.condition).name for row in rows]
-    if len(names) == count:
-        return "in every condition" if count > 1 else f"in {names[0]}"
-    named = "; ".join(names[:MOST_NAMED]) + "; …" * (len(names) > MOST_NAMED)
-    return f"in {len(names)} of {counted(count, 'condition')} ({named})"
 
 
 def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
@@ -414,9 +419,8 @@ def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Find
         own, size = off[0].signals[name].shown
         rms_text = f"{rms / size:.3g} {own}" if own not in ("rad", "1") else readable(rms, own, 3)
         offset = " apart from a constant offset" * (Verdict.NOT not in by_verdict)
-        down, up = ("down to ", "up to ") if len(off) > 1 else ("", "")
-        what = f"does not agree within U {_in_which(off, len(rows))}{offset}: {down}{within:.0f} % of the positions "
-        what += f"agree, RMS of the residual {up}{rms_text}"
+        what = f"does not agree within U {_in_which(off, rows)}{offset}: at worst {within:.0f} % of the positions "
+        what += f"agree, and the RMS of the residual is {rms_text}"
         remedy = "see what would explain it; `trunnion identify` fits friction and other numbers of the model"
         yield Finding.error("compare.not_within", where, what, remedy, within_percent=within, rms=rms)
     for verdict, code, what in (
@@ -425,57 +429,32 @@ def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Find
     ):
         if verdict in by_verdict:
             remedy = "measure more turns, or see the gaps reported by `trunnion data`"
-            what = f"{what}, {_in_which(by_verdict[verdict], len(rows))}"
-            yield Finding.warning(f"compare.{code}", where, what, remedy)
+            yield Finding.warning(f"compare.{code}", where, f"{what}, {_in_which(by_verdict[verdict], rows)}", remedy)
 
 
-def _of_efficiency(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
-    """Where the efficiencies do not agree, and where they are not known."""
-    cases = [row for row in rows if "efficiency" in row.figures[""]]
-    gaps = {}
-    for row in cases:
-        measured, half, model = (row.figures[""][f"efficiency{key}"] for key in ("", "_expanded", "_model"))
-        if row.figures[""]["efficiency_within"] == 0:
-            what = f"measured {measured:.4f} ± {half:.2g}, model {model:.4f} in {row.condition.name}"
-            gaps[abs(measured - model)] = what, {"measured": measured, "expanded": half, "model": model}
-    if gaps:
-        worst, figures = gaps[max(gaps)]
-        what = f"does not agree within U in {len(gaps)} of {counted(len(cases), 'condition')}: {worst}"
-        remedy = "check the channels; `trunnion identify` fits the friction of the model to them"
-        yield Finding.error("compare.efficiency", "efficiency", what, remedy, **figures)
-    for what, remedy in dict.fromkeys(row.doubt for row in rows if row.doubt[0]):
-        where = _in_which([row for row in rows if row.doubt == (what, remedy)], len(rows))
-        yield Finding.warning("compare.efficiency_unknown", "efficiency", f"not known {where}: {what}", remedy)
+def _in_which(some: Sequence[ConditionComparison], every: Sequence[ConditionComparison]) -> str:
+    return in_which([row.condition.name for row in some], len(every))
+
+
+def in_which(names: Sequence[str], count: int) -> str:
+    """In which of so many conditions."""
+    if len(names) == count:
+        return "in every condition" if count > 1 else f"in {names[0]}"
+    named = "; ".join(names[:MOST_NAMED]) + "; …" * (len(names) > MOST_NAMED)
+    return f"in {len(names)} of {counted(count, 'condition')} ({named})"
 
 
 def other_speed(driver: str, rows: Sequence[tuple[Condition, float]]) -> Iterator[Finding]:
     """Of a driver whose speed, rad/s, in the model differs from that of the conditions; an error if by much."""
-    off = [(condition, speed) for condition, speed in rows if apart(condition.speed, speed, SLOWER)]
-    if not off:
+    if not (off := [(one, speed) for one, speed in rows if apart(one.speed, speed, SLOWER)]):
         return
     sensor = {signal.measures: signal for one, _ in rows for signal in one.courses.values()}.get(f"rate:{driver}")
     own, size = sensor.shown if sensor is not None and sensor.read_in[0] else ("rpm", np.pi / 30)
-    first, speed = off[0]
-    what = (
-        f"the measured speed of the driver differs from that of the model {_in_which([c for c, _ in off], len(rows))}"
-    )
-    what += f": {first.speed / size:.4g} {own} measured, {speed / size:.4g} {own} in the model in {first.name}"
+    (first, speed), which = off[0], in_which([one.name for one, _ in off], len(rows))
+    what = f"the measured speed of the driver differs from that of the model {which}: {first.speed / size:.4g} {own} "
+    what += f"measured, {speed / size:.4g} {own} in the model in {first.name}"
     mean = f"{{mean: {sensor.channel if sensor is not None else 'angle'}}}"
     remedy = f"state set: {{{as_key(f'{driver}.speed')}: {mean}}} in the mapping: the model then runs at this speed"
     severity = Severity.ERROR if any(apart(one.speed, model) for one, model in off) else Severity.WARNING
     figures = {"measured": first.speed, "model": speed, "driver": driver}
     yield Finding.weighed(severity, "compare.speed", f"drivers.{driver}", what, remedy, **figures)
-
-
-def _no_answer(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
-    """An error for every status that leaves positions of the model without numbers."""
-    for code in Status:
-        if code.solved or not (cases := [row for row in rows if np.any(row.model.status == code)]):
-            continue
-        count, positions = int(np.count_nonzero(cases[0].model.status == code)), len(cases[0].condition.phase)
-        values = "".join(f" --set {name}={value:.6g}" for name, value in cases[0].condition.values.items())
-        what = f"the model has no solution {_in_which(cases, len(rows))}, the first at {count:,} of "
-        what += f"{counted(positions, 'position')}: {code.text}"
-        remedy = f"run analyse{values} to see where in the cycle, and why"
-        figures = {"count": count, "positions": positions, "status": code.text}
-        yield Finding.error("compare.no_answer", "", what, remedy, **figures)

@@ -10,7 +10,7 @@ from trunnion.errors import Finding, Severity
 from trunnion.results.quantities import with_uncertainty
 from trunnion.rig.comparison import other_speed
 from trunnion.rig.identification.fit import shared_zero
-from trunnion.rig.identification.result import Identified, MisfitCause
+from trunnion.rig.identification.result import Identified
 
 __all__ = ["findings_of"]
 
@@ -54,13 +54,17 @@ def _fit(identified: Identified) -> Iterator[Finding]:
         figures = {"reduced": test.reduced, "chance": test.chance}
         yield Finding.weighed(severity, "fit.misfit", "fit", what, remedy, **figures)
     if identified.causes:
-        first, unknowns = identified.causes[0], identified.fit.model.unknowns
-        what = " or ".join(_story(identified, cause) for cause in identified.causes)
-        values = {one.name: float(value) for one, value in zip(unknowns, first.estimates, strict=True)}
+        first, stories = identified.causes[0], []
+        units = {block.channel: block.signal.unit for block in identified.fit.blocks} | {"": "rad"}
+        for kind, channel, size, expanded, explains, _ in identified.causes:
+            by, unit = (100.0, "%") if kind == "gain" else (1.0, units[channel])
+            of = f"the {kind} of {channel or 'the drive'} off by {with_uncertainty(by * size, by * expanded, unit)}"
+            stories.append(f"{of} ({100 * explains:.1f} %)")
+        values = {one.name: float(value) for one, value in zip(identified.fit.model.unknowns, first[-1], strict=True)}
         estimates = _joined([f"{name} = {value:.4g}" for name, value in values.items()])
         yield Finding.warning(
-            "fit.cause", "fit", f"what would explain the misfit: {what}; with the first {estimates} (SI)",
-            "check sensor, unit and zero, and lengths and loads of the model, which may act alike",
+            "fit.cause", "fit", f"what would explain the misfit: {' or '.join(stories)}; with the first {estimates} "
+            "(SI)", "check sensor, unit and zero, and lengths and loads of the model, which may act alike",
             kind=first.kind, channel=first.channel, size=first.size, expanded=first.expanded,
             explains_percent=100 * first.explains, values=values,
         )  # fmt: skip
@@ -68,15 +72,6 @@ def _fit(identified: Identified) -> Iterator[Finding]:
         what = f"the held-out data differ from the prediction by {ratio:.1f} times its standard uncertainty"
         remedy = "the model lacks an effect that differs there"
         yield Finding.warning("held_out.missed", "hold_out", what, remedy, times=ratio)
-
-
-def _story(identified: Identified, cause: MisfitCause) -> str:
-    """A cause with its size."""
-    units = {block.channel: block.signal.unit for block in identified.fit.blocks}
-    unit, by = {"angle": ("rad", 1.0), "gain": ("%", 100.0)}.get(cause.kind, (units.get(cause.channel, ""), 1.0))
-    size = with_uncertainty(by * cause.size, by * cause.expanded, unit)
-    what = {"angle": "an offset of the drive angle", "gain": f"a gain error of {cause.channel}"}
-    return f"{what.get(cause.kind, f'a zero error of {cause.channel}')} of {size} ({100 * cause.explains:.1f} %)"
 
 
 def _repetitions(identified: Identified) -> Iterator[Finding]:

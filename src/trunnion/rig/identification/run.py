@@ -6,7 +6,7 @@ Settings of the conditions and paths of the unknowns → one prepared model → 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -213,42 +213,32 @@ def held_out(mechanism: Mechanism, measurement: Measurement, hold_out: HoldOut) 
     A condition is named by its name, the name of its file, a setting such as `misalignment=15 deg`, or a part of its
     name that is a value or a word there. MechanismError for what names none.
     """
-    if hold_out is None:
-        return frozenset(), 0.0
     if isinstance(hold_out, (int, float)):
         if not 0 < hold_out < 1:
             what = f"a share of {hold_out:g} of the turns cannot be held out"
             raise MechanismError(Finding(what, "hold_out", "give a share between 0 and 1, or names of conditions"))
         return frozenset(), float(hold_out)
     conditions, held = measurement.conditions, set[str]()
-    for text in [hold_out] if isinstance(hold_out, str) else hold_out:
-        exact = [
-            one.name
-            for one in conditions
-            if text in (one.name, *(name for file in one.files for name in (PurePath(file).stem, PurePath(file).name)))
-        ]
-        part = rf"(?<![\w.-]){re.escape(text.strip())}(?![\w.-])"
-        parts = [one.name for one in conditions if text.strip() and re.search(part, one.name)]
-        matching = exact or _with_setting(mechanism, conditions, text) or parts
-        if not matching:
+    for text in [hold_out] if isinstance(hold_out, str) else hold_out or ():
+        exact, parts, part = set[str](), set[str](), text.strip()
+        name, equals, value = (one.strip() for one in text.partition("="))
+        for one in conditions:
+            if text in (one.name, *(end for file in one.files for end in (PurePath(file).stem, PurePath(file).name))):
+                exact.add(one.name)
+            elif part and re.search(rf"(?<![\w.-]){re.escape(part)}(?![\w.-])", one.name):
+                parts.add(one.name)
+            elif equals:
+                path, settings = mechanism.path_of(name), {mechanism.path_of(key): v for key, v in one.values.items()}
+                number = float(value) if re.fullmatch(r"[-+.\deE]+", value) else value
+                stated = float(np.ravel(mechanism.with_values({path: number}).parameters()[path])[0])
+                if np.isclose(settings.get(path, np.nan), stated, rtol=SAME, atol=0):
+                    exact.add(one.name)
+        if not exact | parts:
             names = "; ".join(one.name for one in conditions[:MOST_NAMED]) + "; …" * (len(conditions) > MOST_NAMED)
             remedy = f"name one of {names}; or a file, or NAME=VALUE"
             raise MechanismError(Finding(f"there is no condition '{text}'", "hold_out", remedy))
-        held |= set(matching)
+        held |= exact or parts
     return frozenset(held), 0.0
-
-
-def _with_setting(mechanism: Mechanism, conditions: Sequence[Condition], text: str) -> list[str]:
-    """Names of the conditions with a setting NAME=VALUE."""
-    name, equals, value = (part.strip() for part in text.partition("="))
-    if not equals:
-        return []
-    path, number = mechanism.path_of(name), value
-    with suppress(ValueError):  # with a unit
-        number = float(value)  # type: ignore[assignment]
-    stated = float(np.ravel(mechanism.with_values({path: number}).parameters()[path])[0])
-    settings = {one.name: {mechanism.path_of(key): own for key, own in one.values.items()} for one in conditions}
-    return [name for name, own in settings.items() if np.isclose(own.get(path, np.nan), stated, rtol=SAME, atol=0)]
 
 
 # ---- the model ------------------------------------------------------------------------------------------------
@@ -312,18 +302,15 @@ def _acted_on(model: Model) -> dict[str, Measure]:
 
 def _runnable(fit: Fit) -> Array:
     """The start, with less friction where that locks. MechanismError if no position can be used."""
-
-    def unanswered(x: Array) -> int:
-        return sum(int(np.count_nonzero(status >= Status.NOT_CONVERGED)) for status in fit.courses(x).status)
-
-    unknowns, low = fit.model.unknowns, fit.bounds[0]
-    rubs = [p for p, one in enumerate(unknowns) if any(".friction." in path for path in one.paths)]
-    best, lost = fit.start, unanswered(fit.start)
-    for k in range(1, HALVINGS + 1) if rubs else ():
-        less = fit.start.copy()
-        less[rubs] = np.maximum(fit.start[rubs] * 0.5**k, low[rubs])
-        if lost and (left := unanswered(less)) < lost:
-            best, lost = less, left
+    rubs = [p for p, one in enumerate(fit.model.unknowns) if any(".friction." in path for path in one.paths)]
+    starts, lost = [fit.start], list[int]()
+    for k in range(HALVINGS + 1):
+        lost.append(sum(np.count_nonzero(one >= Status.NOT_CONVERGED) for one in fit.courses(starts[-1]).status))
+        if not (lost[-1] and rubs):
+            break
+        starts.append(fit.start.copy())
+        starts[-1][rubs] = np.maximum(fit.start[rubs] * 0.5 ** (k + 1), fit.bounds[0][rubs])
+    best = starts[int(np.argmin(lost))]
     masks = replace(fit, variances=fit.first_scatter()).allowed(best)
     if not any(np.any(masks[k]) for k in fit.fitted):
         codes = np.concatenate([np.asarray(status) for status in fit.courses(best).status])
@@ -335,46 +322,28 @@ def _runnable(fit: Fit) -> Array:
 
 
 def _causes(fit: Fit, start: Array, reduced: float) -> list[MisfitCause]:
-    """Errors that explain most of a misfit, each by itself, the best first: a fit with one free error more."""
-    causes = []
-    for error, unit in _free_errors(fit):
-        try:
-            more, best, size = _with_error(fit, start, error, unit)
-        except ValueError:  # no answer of the model there
+    """Errors that explain most of a misfit, each by itself, the best first: a fit with one free error more.
+
+    A zero and a gain of each channel, and an offset of the angle, to first order; nothing is stated of them.
+    """
+    causes, channels = [], list(dict.fromkeys(fit.blocks[k].channel for k in fit.fitted))
+    for kind, channel in (*product(("zero", "gain"), channels), ("angle", "")):
+        own, unit = [block for block in fit.blocks if block.channel == channel], 0.01
+        sizes = np.array([unit * (block.channel == channel) for block in fit.blocks])
+        if kind == "zero":
+            usual = rms(np.concatenate([block.signal.turns.ravel() for block in own])) or 1.0
+            sizes, unit = sizes * usual, unit * usual
+        elif kind == "angle":
+            sizes = np.array([-unit / fit.model.turns[one.condition] for one in fit.blocks])
+            sizes *= [one.signal.turns.shape[1] > 2 for one in fit.blocks]
+        if not (np.isfinite(sizes).all() and np.any(sizes)):
             continue
-        spread = spread_of(more, best)
-        wide = float(quantile(spread.freedom[-1]) * spread.deviation[-1]) * unit
-        share = (reduced - spread.test.reduced) / (reduced - 1)
-        nothing_left = error.kind == "gain" and size < 2e-6 - 1  # of the model
-        if share >= EXPLAINS and wide < abs(size) < (np.pi if error.kind == "angle" else np.inf) and not nothing_left:
-            causes.append(MisfitCause(error.kind, error.channel, size, wide, min(share, 1.0), best[: fit.count]))
+        error = SensorError(f"{kind} of {channel}", channel, kind, sizes, stated=False)
+        with suppress(ValueError):  # no answer of the model there
+            more, best = refined(replace(fit, sensors=[*fit.sensors, error], inflation=1.0), np.append(start, 0.0))
+            spread, size = spread_of(more, best.x), float(best.x[-1]) * unit
+            wide = float(quantile(spread.freedom[-1]) * spread.deviation[-1]) * unit
+            share = (reduced - spread.test.reduced) / (reduced - 1)
+            if share >= EXPLAINS and abs(size) > wide and not (kind == "gain" and size < 2e-6 - 1):  # nothing is left
+                causes.append(MisfitCause(kind, channel, size, wide, min(share, 1.0), best.x[: fit.count]))
     return sorted(causes, key=lambda one: -round(one.explains, 2))  # of equal ones first the simplest
-
-
-def _with_error(fit: Fit, start: Array, error: SensorError, unit: float) -> tuple[Fit, Array, float]:
-    """The fit with an error more, where it ends, and how large the error is there; of an angle in several rounds."""
-    model, moved, size = fit.model, fit, 0.0
-    for _ in range(ROUNDS):  # the positions follow the angle until it is settled
-        more = replace(moved, sensors=[*fit.sensors, error], inflation=1.0)
-        more, best = refined(more, np.append(start, 0.0))
-        size, start, step = size + float(best.x[-1]) * unit, best.x[:-1], abs(best.x[-1] * unit)
-        if error.kind != "angle" or not model.run.cycle.periodic or step < SETTLED or abs(size) > np.pi:
-            break
-        phases = zip(model.phases, model.turns, strict=True)
-        shifted = replace(model, phases=tuple((phase + size / turn) % 1.0 for phase, turn in phases))
-        moved = replace(fit, courses_at=Evaluations(shifted))
-    return more, best.x, size
-
-
-def _free_errors(fit: Fit) -> Iterator[tuple[SensorError, float]]:
-    """A zero and a gain of each channel, and an offset of the angle, of which nothing is stated; and their units."""
-    model = fit.model
-    for kind, channel in product(("zero", "gain"), dict.fromkeys(fit.blocks[k].channel for k in fit.fitted)):
-        if kind == "zero" or not model.measures[channel].turning(model.run.system):
-            own = np.array([block.channel == channel for block in fit.blocks])
-            turns = np.concatenate([block.signal.turns.ravel() for block in fit.blocks if block.channel == channel])
-            unit = 0.01 * (1.0 if kind == "gain" else rms(turns) or 1.0)
-            yield SensorError(f"{kind} of {channel}", channel, kind, unit * own, stated=False), unit
-    sizes = [-DEGREE / model.turns[one.condition] * (one.signal.turns.shape[1] > 2) for one in fit.blocks]
-    if np.isfinite(sizes).all() and any(sizes):
-        yield SensorError("offset of the drive angle", "", "angle", np.array(sizes), stated=False), DEGREE

@@ -56,7 +56,7 @@ def _fit(identified: Identified) -> Iterator[Finding]:
     if identified.causes:
         first, stories = identified.causes[0], []
         units = {block.channel: block.signal.unit for block in identified.fit.blocks} | {"": "rad"}
-        for kind, channel, size, expanded, explains, _ in identified.causes:
+        for kind, channel, size, expanded, explains, *_ in identified.causes:
             by, unit = (100.0, "%") if kind == "gain" else (1.0, units[channel])
             of = f"the {kind} of {channel or 'the drive'} off by {with_uncertainty(by * size, by * expanded, unit)}"
             stories.append(f"{of} ({100 * explains:.1f} %)")
@@ -108,10 +108,10 @@ def _sensors(identified: Identified) -> Iterator[Finding]:
         remedy = "state accuracy: {zero: …, gain: …} in the mapping"
         yield Finding.warning("sensor.no_accuracy", "sensors", f"{what}narrow", remedy)
     for s, sensor in enumerate(fit.sensors) if not (identified.causes or identified.spread.test.gross) else ():
-        times, beyond = abs(float(identified.x[fit.count + s])), s in identified.beyond
+        beyond, times = s in identified.beyond, abs(identified.beyond.get(s, float(identified.x[fit.count + s])))
         if sensor.stated and times > OFF:
             what = f"differs from its stated value by {times:.1f} standard uncertainties"
-            what += " at least, which no stated error does: the estimates mean nothing" * beyond
+            what += ", which no stated error does: the estimates mean nothing" * beyond
             remedy = "check the sensor, its unit, its stated accuracy, and lengths and loads of the model"
             where, severity = "angle.zero" if sensor.angle else sensor.name, (Severity.WARNING, Severity.ERROR)[beyond]
             yield Finding.weighed(severity, "sensor.off", where, what, remedy, times=times, beyond=beyond)

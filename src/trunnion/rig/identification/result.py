@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,7 +19,7 @@ from trunnion.results.attributes import attribute, finding_rows, findings_of, or
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import decimals
 from trunnion.rig.comparison import data_findings, hashed_files, written_unit
-from trunnion.rig.identification.fit import FAR, Fit, Solution, sizes_of
+from trunnion.rig.identification.fit import FAR, Fit, Solution, sizes_of, solved
 from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, Inseparable, quantile
 from trunnion.rig.reading.mapping import DataMapping
 from trunnion.rig.reading.measurement import Measurement, rms
@@ -91,7 +91,8 @@ class MisfitCause(NamedTuple):
 
     kind: zero, gain or angle; channel: empty of the angle; size: in the unit of the channel, relative, or rad by which
     the readings are ahead of the model; expanded: U of it, 95 %; explains: share of the part of χ² above what scatter
-    leads to expect; estimates: of the unknowns with it, (unknown,).
+    leads to expect; times: its size in the standard uncertainties that are stated of it, 0 where none is; estimates:
+    of the unknowns with it, (unknown,).
     """
 
     kind: str
@@ -99,6 +100,7 @@ class MisfitCause(NamedTuple):
     size: float
     expanded: float
     explains: float
+    times: float
     estimates: Array
 
 
@@ -141,15 +143,19 @@ class Identified:
         return np.asarray((self.half > np.minimum(sizes_of(self.fit, self.x), (high - low) / 2)) & ~self.lost)
 
     @cached_property
-    def beyond(self) -> list[int]:
-        """Errors of sensors, by place, at the most that anything stated may come to: no stated one is so."""
-        sensors = zip(self.fit.sensors, self.x[self.fit.count :], strict=True)
-        return [s for s, (one, size) in enumerate(sensors) if one.stated and abs(size) > NEAR_LIMIT * FAR]
+    def beyond(self) -> dict[int, float]:
+        """What errors of sensors at their limit come to with nothing stated of them, by place; no stated one is so."""
+        fit, beyond = self.fit, dict[int, float]()
+        for s, (error, size) in enumerate(zip(fit.sensors, self.x[fit.count :], strict=True)):
+            if error.stated and abs(size) > NEAR_LIMIT * error.most:
+                free = [*fit.sensors[:s], replace(error, stated=False), *fit.sensors[s + 1 :]]
+                beyond[s] = float(solved(replace(fit, sensors=free), self.x).x[fit.count + s])
+        return {s: size for s, size in beyond.items() if abs(size) >= FAR}
 
     @property
     def refuted(self) -> bool:
         """Whether the estimates stand for something else: a gross misfit, or an error beyond what is stated of it."""
-        return self.spread.test.gross or bool(self.beyond)
+        return self.spread.test.gross or bool(self.beyond) or any(one.times > FAR for one in self.causes[:1])
 
     @cached_property
     def intervals(self) -> dict[str, NDArray[Any]]:

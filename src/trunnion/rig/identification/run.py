@@ -305,7 +305,7 @@ def _runnable(fit: Fit) -> Array:
     rubs = [p for p, one in enumerate(fit.model.unknowns) if any(".friction." in path for path in one.paths)]
     starts, lost = [fit.start], list[int]()
     for k in range(HALVINGS + 1):
-        lost.append(sum(np.count_nonzero(one >= Status.NOT_CONVERGED) for one in fit.courses(starts[-1]).status))
+        lost.append(sum(int(np.sum(one >= Status.NOT_CONVERGED)) for one in fit.courses(starts[-1]).status))
         if not (lost[-1] and rubs):
             break
         starts.append(fit.start.copy())
@@ -345,5 +345,8 @@ def _causes(fit: Fit, start: Array, reduced: float) -> list[MisfitCause]:
             wide = float(quantile(spread.freedom[-1]) * spread.deviation[-1]) * unit
             share = (reduced - spread.test.reduced) / (reduced - 1)
             if share >= EXPLAINS and abs(size) > wide and not (kind == "gain" and size < 2e-6 - 1):  # nothing is left
-                causes.append(MisfitCause(kind, channel, size, wide, min(share, 1.0), best.x[: fit.count]))
+                alike = [one for one in fit.sensors if one.stated and (one.kind, one.channel) == (kind, channel)]
+                stated = max((one.angle if kind == "angle" else np.abs(one.sizes).max() for one in alike), default=0.0)
+                times = abs(size) / stated if stated else 0.0
+                causes.append(MisfitCause(kind, channel, size, wide, min(share, 1.0), times, best.x[: fit.count]))
     return sorted(causes, key=lambda one: -round(one.explains, 2))  # of equal ones first the simplest

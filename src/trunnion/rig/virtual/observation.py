@@ -64,7 +64,7 @@ class Case:
     @property
     def worst(self) -> Status:
         """The gravest status of a position."""
-        return Status(int(self.status.max()))
+        return next(one for one in Status if one == self.status.max())
 
     @property
     def rows(self) -> int:

@@ -23,7 +23,7 @@ def findings_of(identified: Identified) -> list[Finding]:
     """Errors and warnings first."""
     fit, conditions = identified.fit, identified.measurement.conditions
     driver, fitted = next(iter(identified.mechanism.drivers), ""), {fit.blocks[k].condition for k in fit.fitted}
-    rows = [*other_speed(driver, [(conditions[k], identified.driven(k)[2]) for k in sorted(fitted)])]
+    rows = [*other_speed(driver, [(conditions[k], identified.cycles[k].speed) for k in sorted(fitted)])]
     for part in (_fit, _repetitions, _sensors, _parameters):
         rows += part(identified)
     return sorted(rows, key=lambda finding: list(Severity).index(finding.severity))

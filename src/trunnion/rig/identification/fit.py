@@ -152,7 +152,7 @@ def sensor_errors(model: Model, conditions: Sequence[Condition], blocks: Sequenc
             group = name if name.startswith(FILE_ZERO) else ""
             own = f"{name}: {' '.join(condition.files or (str(block.condition),))}" if group else name
             add(k, size, own, name.partition(" of ")[2].removeprefix("each file of "), name.partition(" ")[0], group)
-        turn, duration = model.turns[block.condition], model.durations[block.condition]
+        duration, _, turn = model.cycles[block.condition]
         if block.signal.turns.shape[1] > 2:
             add(k, condition.lag / (duration or inf), f"{FILE_ANGLE}: {condition.name}", "", "angle", FILE_ANGLE)
             if condition.cut and np.isfinite(turn):  # may be anything up to half a step

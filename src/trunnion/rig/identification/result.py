@@ -20,6 +20,7 @@ from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import decimals
 from trunnion.rig.comparison import data_findings, hashed_files, written_unit
 from trunnion.rig.identification.fit import FAR, Fit, Solution, sizes_of, solved
+from trunnion.rig.identification.signals import DriveCycle
 from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, Inseparable, quantile
 from trunnion.rig.reading.mapping import DataMapping
 from trunnion.rig.reading.measurement import Measurement, rms
@@ -229,10 +230,11 @@ class Identified:
         """Rms of all predictions over what is expected of them; NaN if nothing is held out."""
         return rms(self.by_block["held_out_after"] / self.by_block["held_out_expected"])
 
-    def driven(self, condition: int) -> tuple[float, float, float]:
-        """Angles of the first driver where the cycle begins and ends, rad, and its speed, rad/s, with the estimates."""
-        values = np.where(self.lost, self.fit.start, self.x)[: self.fit.count]
-        return self.fit.model.driven(condition, np.asarray(values))
+    @cached_property
+    def cycles(self) -> list[DriveCycle]:
+        """The cycle in every condition, with the estimates."""
+        values = np.asarray(np.where(self.lost, self.fit.start, self.x)[: self.fit.count])
+        return [self.fit.model.cycle(k, values) for k in range(len(self.measurement.conditions))]
 
 
 def dataset(identified: Identified, findings: Sequence[Finding]) -> xr.Dataset:
@@ -273,7 +275,7 @@ def dataset(identified: Identified, findings: Sequence[Finding]) -> xr.Dataset:
         "channel": list(model.measures),
         "condition": [one.name for one in conditions],
     }
-    ends = (identified.driven(k)[:2] for k in range(len(conditions)))
+    ends = [(one.begin, one.begin + one.turn) for one in identified.cycles]
     attributes = {
         "name": mechanism.name,
         "identified": measurement.name,

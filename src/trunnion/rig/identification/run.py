@@ -134,8 +134,8 @@ def identify(
     at = np.array([one.before[0] if encoder in one.paths else one.start for one in sought])
 
     def check(k: int) -> None:
-        first, last, _ = model.driven(k, at)
-        same_cycle(run, conditions[k], model.durations[k], first, last - first)
+        cycle = model.cycle(k, at)
+        same_cycle(run, conditions[k], model.cycles[k].duration, cycle.begin, cycle.turn)
 
     each(range(len(conditions)), check)
     errors = sensor_errors(model, conditions, blocks)
@@ -147,7 +147,7 @@ def identify(
         fit = replace(fit, inflation=spread.excess)
         best = best._replace(x=solved(fit, best.x).x)
         spread = spread_of(fit, best.x)
-    other_speeds = [apart(one.speed, model.driven(k, best.x[: fit.count])[2]) for k, one in enumerate(conditions)]
+    other_speeds = [apart(one.speed, model.cycle(k, best.x[: fit.count]).speed) for k, one in enumerate(conditions)]
     causes = _causes(fit, begin, spread.test.reduced) if spread.test.misfit and not any(other_speeds) else []
     groups = inseparable(fit, best.x, spread)
     identified = Identified(mechanism, measurement, fit, best, spread, groups, causes, encoder)
@@ -334,7 +334,7 @@ def _causes(fit: Fit, start: Array, reduced: float) -> list[MisfitCause]:
             usual = rms(np.concatenate([block.signal.turns.ravel() for block in own])) or 1.0
             sizes, unit = sizes * usual, unit * usual
         elif kind == "angle":
-            sizes = np.array([-unit / fit.model.turns[one.condition] for one in fit.blocks])
+            sizes = np.array([-unit / fit.model.cycles[one.condition].turn for one in fit.blocks])
             sizes *= [one.signal.turns.shape[1] > 2 for one in fit.blocks]
         if not (np.isfinite(sizes).all() and np.any(sizes)):
             continue

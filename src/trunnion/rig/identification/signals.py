@@ -30,7 +30,7 @@ from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.switches import Mechanisms, bends
 from trunnion.solve.system import sticking
 
-__all__ = ["Courses", "Model", "Parameters", "Said", "Unknown", "described", "limits", "unknowns"]
+__all__ = ["Courses", "DriveCycle", "Model", "Parameters", "Said", "Unknown", "described", "limits", "unknowns"]
 
 Array = NDArray[np.float64]
 Parameters = Mapping[str, Sequence[str] | str] | Sequence[str]
@@ -45,6 +45,22 @@ class Said(NamedTuple):
 
     value: Array
     slope: Array
+
+
+class DriveCycle(NamedTuple):
+    """Duration of a cycle, s, the angle of the first driver where it begins, and what it turns by, rad.
+
+    NaN where its turns name no position.
+    """
+
+    duration: float
+    begin: float
+    turn: float
+
+    @property
+    def speed(self) -> float:
+        """Mean, rad/s."""
+        return self.turn / self.duration if self.duration else nan
 
 
 class Courses(NamedTuple):
@@ -171,15 +187,9 @@ class Model:
         return np.array([one.start for one in self.unknowns])
 
     @cached_property
-    def durations(self) -> tuple[float, ...]:
-        """Duration of the cycle in every condition, s, with the unknowns at their start."""
-        return tuple(self._duration(k, self._start) for k in range(len(self.phases)))
-
-    @cached_property
-    def turns(self) -> tuple[float, ...]:
-        """What the first driver turns by in the cycle, rad, by condition; NaN where its turns name no position."""
-        ends = (self.driven(k, self._start) for k in range(len(self.phases)))
-        return tuple(last - first for first, last, _ in ends)
+    def cycles(self) -> tuple[DriveCycle, ...]:
+        """The cycle in every condition, with the unknowns at their start."""
+        return tuple(self.cycle(k, self._start) for k in range(len(self.phases)))
 
     @cached_property
     def bends(self) -> tuple[Array, ...]:
@@ -188,26 +198,25 @@ class Model:
         Points of load tables, ends of `between`, springs that let go, motion laws; see `switches`.
         """
         places = []
-        for k, duration in enumerate(self.durations):
+        for k, (duration, *_) in enumerate(self.cycles):
             values = self.run.system.mechanism.parameters(self._overrides(k, self._start))
             cycle = replace(self.run.cycle, duration=duration)
             times = bends(Mechanisms(self.run.system, self.run.chosen.assembly, values, [cycle]))[0]
             places.append(times / (duration or 1.0))
         return tuple(places)
 
-    def driven(self, condition: int, at: Array) -> tuple[float, float, float]:
-        """Angles of the first driver where the cycle begins and ends, rad, and its mean speed, rad/s.
-
-        NaN where its turns name no position.
-        """
-        system, duration = self.run.system, self._duration(condition, at)
-        if duration == 0 or coordinate_unit(system, self.run.values) != "rad":
-            return nan, nan, nan
+    def cycle(self, condition: int, at: Array) -> DriveCycle:
+        """The cycle at some values of the unknowns. Gear pairs that no driver turns are taken to turn as nominally."""
+        system, cycle = self.run.system, self.run.cycle
         values = system.mechanism.parameters(self._overrides(condition, at))
-        ends = np.array([0.0, duration * (1 - 1e-12)])
-        drive = system.drive(values, next(iter(system.mechanism.drivers)), ends)[0]
+        if cycle.duration == 0:
+            return DriveCycle(0.0, nan, nan)
+        duration = float(cycle.duration * system.cycle(values).duration / system.cycle(self.run.values).duration)
+        if coordinate_unit(system, self.run.values) != "rad":
+            return DriveCycle(duration, nan, nan)
+        drive = system.drive(values, next(iter(system.mechanism.drivers)), np.array([0.0, duration * (1 - 1e-12)]))[0]
         first, *_, last = np.ravel(np.asarray(primal(drive), float)).tolist()
-        return first, last, (last - first) / duration
+        return DriveCycle(duration, first, last - first)
 
     # ---- the batch --------------------------------------------------------------------------------------------
 
@@ -236,19 +245,11 @@ class Model:
         unknowns = zip(at, self.unknowns, strict=True)
         return {**self.settings[condition], **{path: float(value) for value, one in unknowns for path in one.paths}}
 
-    def _duration(self, condition: int, at: Array) -> float:
-        """Of the cycle, s. Gear pairs that no driver turns are taken to turn as in the nominal cycle."""
-        system, cycle = self.run.system, self.run.cycle
-        if cycle.duration == 0:
-            return 0.0
-        values = system.mechanism.parameters(self._overrides(condition, at))
-        return float(cycle.duration * system.cycle(values).duration / system.cycle(self.run.values).duration)
-
     @cached_property
     def _timing(self) -> tuple[int, ...]:
         """Unknowns that make the cycle longer or shorter."""
         places = range(len(self.unknowns))
-        return tuple(p for p in places if self._duration(0, self._moved(self._start, p, 1e3)) != self.durations[0])
+        return tuple(p for p in places if self.cycle(0, self._moved(self._start, p, 1e3))[0] != self.cycles[0][0])
 
     def _moved(self, at: Array, p: int, steps: float) -> Array:
         return np.asarray(at + steps * STEP * (abs(at[p]) or 1.0) * (np.arange(len(at)) == p))
@@ -258,12 +259,12 @@ class Model:
         many = len(self.unknowns)
         phase = np.repeat(np.stack([self.phases[k] for k in part]), many, axis=0)
         if not self._timing:
-            return phase * np.repeat([self.durations[k] for k in part], many)[:, None]
-        duration = np.repeat([self._duration(k, at) for k in part], many)[:, None]
+            return phase * np.repeat([self.cycles[k].duration for k in part], many)[:, None]
+        duration = np.repeat([self.cycle(k, at).duration for k in part], many)[:, None]
         slope = np.zeros_like(duration)
         for i, k in enumerate(part):
             for p in self._timing:
-                low, high = (self._duration(k, self._moved(at, p, sign)) for sign in (-1.0, 1.0))
+                low, high = (self.cycle(k, self._moved(at, p, sign)).duration for sign in (-1.0, 1.0))
                 slope[i * many + p] = (high - low) / (2 * STEP * (abs(at[p]) or 1.0))
         return Dual(phase * duration, phase * slope)
 

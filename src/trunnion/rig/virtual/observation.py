@@ -265,7 +265,7 @@ class Observation:
         files.check_form(form)
         files.check_folder(self.rig, folder, form)
         texts = {files.MAPPING: self.mapping(form), files.TRUTH: self.truth()}
-        return files.write(self.records(), self.units, texts, folder, form, progress)
+        return files.write(self.records(), self.units, texts, folder, form, progress or (lambda count: None))
 
 
 def check_seed(seed: int) -> None:

@@ -19,7 +19,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.measure_table import MEASURES
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.rig_file import Sensor
-from trunnion.rig.reading.units import Amount, SensorScale, alike, dimensions, multiplied
+from trunnion.rig.reading.units import SensorScale, alike, dimensions, multiplied
 from trunnion.rig.reading.units import scale as scale_of
 
 __all__ = ["SensorChannel", "SensorErrors", "draw", "resolved", "stream"]
@@ -34,9 +34,9 @@ class SensorChannel:
     """A sensor put to a mechanism: its numbers in the SI unit of what it measures.
 
     unit: SI, of what is measured; reading: unit of the file; per: readings per SI unit, below 0 where the sensitivity
-    is; zero: standard uncertainty
-    while it runs; offset: of what it reads at rest; drift: per second; step: 0 without a converter; range and span:
-    inf without one; per_turn: pulses, 0 of a sensor that tells at once; stated: as in the file.
+    is; zero: standard uncertainty while it runs; offset: of what it reads at rest; drift: per second; step: 0 without a
+    converter; range and span: inf without one; per_turn: pulses, 0 of a sensor that tells at once; stated: as in the
+    file.
     """
 
     name: str
@@ -110,46 +110,36 @@ def draw(channel: SensorChannel, seed: int) -> SensorErrors:
 
 def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel:
     """A sensor of what is measured in an SI unit; MechanismError for quantities that do not fit it."""
-    findings: list[Finding] = []
-    where = f"sensors.{name}"
     try:
         reading, scale = _scale(sensor, unit)
     except UnitError as error:
-        key = "sensitivity" if sensor.sensitivity else "unit"
-        raise MechanismError(Finding(error.what, f"{where}.{key}", error.remedy)) from None
-
-    def number(key: str, amount: Amount | None, absent: float = 0.0, over: str = "") -> float:
-        """An amount of what is measured or of the readings, in the SI unit; a drift has a sign, others have none."""
+        where = f"sensors.{name}.{'sensitivity' if sensor.sensitivity else 'unit'}"
+        raise MechanismError(Finding(error.what, where, error.remedy)) from None
+    stated = {"range": sensor.range, "span": sensor.span, "noise": sensor.noise, "accuracy.zero": sensor.accuracy.zero,
+              "offset": sensor.offset, "drift": sensor.drift}  # fmt: skip
+    sizes, findings = dict.fromkeys(stated, math.inf), list[Finding]()
+    for key, amount in stated.items():  # of what is measured or of the readings; a drift has a sign, others have none
+        over = "/s" * (key == "drift")
         if amount is None or amount.plain:
-            return absent if amount is None else amount.value
+            sizes[key] = math.inf if amount is None else amount.value
+            continue
         own = replace(amount, dimensions=multiplied(amount.dimensions, {"s": Fraction(bool(over))}))
         try:
-            return (scale.factor if over else abs(scale.factor)) * scale.reading(own, "zero" if over else key)
+            sizes[key] = (scale.factor if over else abs(scale.factor)) * scale.reading(own, "zero" if over else key)
         except UnitError:
-            units = dict.fromkeys(f"{one}/{over}" if over else one for one in (unit, reading))
+            units = dict.fromkeys(f"{one}{over}" for one in (unit, reading))
             what = f"'{amount.source}' is not in {' or in '.join(units)}"
             remedy = f"state it in {', or as a reading in '.join(units)}"
-            findings.append(Finding(what, f"{where}.{key}", remedy))
-            return absent
-
-    limit = number("range", sensor.range, math.inf)
-    span = number("span", sensor.span, limit) if sensor.bits else math.inf
-    channel = SensorChannel(
-        name, column, sensor.measures, unit, reading, 1 / scale.factor, limit,
-        noise=number("noise", sensor.noise),
-        step=2 * span / 2**sensor.bits if sensor.bits else 0.0,
-        span=span,
-        gain=float(sensor.accuracy.gain.evaluate()),
-        zero=number("accuracy.zero", sensor.accuracy.zero),
-        offset=number("offset", sensor.offset),
-        drift=number("drift", sensor.drift, over="s"),
-        bandwidth=sensor.bandwidth.value if sensor.bandwidth else None,
-        per_turn=sensor.per_turn or 0,
-        stated=sensor,
-    )  # fmt: skip
+            findings.append(Finding(what, f"sensors.{name}.{key}", remedy))
     if findings:
         raise MechanismError(findings)
-    return channel
+    span = sizes["span" if sensor.span else "range"] if sensor.bits else math.inf
+    return SensorChannel(
+        name, column, sensor.measures, unit, reading, 1 / scale.factor, sizes["range"], sizes["noise"],
+        2 * span / 2**sensor.bits if sensor.bits else 0.0, span, float(sensor.accuracy.gain.evaluate()),
+        sizes["accuracy.zero"], sizes["offset"], sizes["drift"],
+        sensor.bandwidth.value if sensor.bandwidth else None, sensor.per_turn or 0, sensor,
+    )  # fmt: skip
 
 
 def _scale(sensor: Sensor, unit: str) -> tuple[str, SensorScale]:
@@ -185,8 +175,7 @@ def smoothed(true: Array, bandwidth: float | None, rate: float) -> Array:
     kept = math.exp(-step)
     last = 1 - (1 - kept) / step
     start = np.array([(1 - last) * true[0]])  # as if it had always been at its first value
-    found, _ = lfilter([last, 1 - kept - last], [1.0, -kept], true, zi=start)
-    return np.asarray(found)
+    return np.asarray(lfilter([last, 1 - kept - last], [1.0, -kept], true, zi=start)[0])
 
 
 def pulsed(true: Array, running: slice, per_turn: int, rate: float) -> Array:

@@ -392,7 +392,7 @@ def _findings(mechanism: Mechanism, channels: Sequence[str], rows: Sequence[Cond
     if off := [row for row in cases if row.figures[""]["efficiency_within"] == 0]:
         most = max(off, key=lambda row: abs(row.figures[""][own] - row.figures[""]["efficiency_model"]))
         measured, half, model = (most.figures[""][f"{own}{key}"] for key in ("", "_expanded", "_model"))
-        what = f"does not agree within U {_in_which(off, cases)}: at most in {most.condition.name}, measured "
+        what = f"does not agree within U {_in_which(off, cases)}; the most in {most.condition.name}: measured "
         what += f"{measured:.4f} ± {half:.2g}, model {model:.4f}"
         remedy = "check the channels; `trunnion identify` fits the friction of the model to them"
         figures = {"measured": measured, "expanded": half, "model": model}

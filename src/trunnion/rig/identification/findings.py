@@ -48,7 +48,7 @@ def _fit(identified: Identified) -> Iterator[Finding]:
     if test.misfit:
         worth = "the estimates mean nothing" if identified.refuted else "the intervals are widened accordingly"
         what = f"the model does not fit: reduced χ² {_ratio(test.reduced)} (1 is expected from the scatter between "
-        what += f"turns), p-value {test.chance:.2g}; {worth}"
+        what += f"turns), p-value {max(test.chance, 1e-4):.2g}{' or less' * (test.chance < 1e-4)}; {worth}"
         remedy = "see the residuals; identify another parameter as well, or use another friction law"
         severity = Severity.ERROR if identified.refuted else Severity.WARNING
         figures = {"reduced": test.reduced, "chance": test.chance}
@@ -60,13 +60,13 @@ def _fit(identified: Identified) -> Iterator[Finding]:
             by, unit = (100.0, "%") if kind == "gain" else (1.0, units[channel])
             of = f"the {kind} of {channel or 'the drive'} off by {with_uncertainty(by * size, by * expanded, unit)}"
             stories.append(f"{of} ({100 * explains:.1f} %)")
-        values = {one.name: float(value) for one, value in zip(identified.fit.model.unknowns, first[-1], strict=True)}
-        estimates = _joined([f"{name} = {value:.4g}" for name, value in values.items()])
+        rows = [*zip(identified.fit.model.unknowns, first.estimates, first.halves, strict=True)]
+        estimates = _joined([f"{one.name} = {with_uncertainty(value, half, one.unit)}" for one, value, half in rows])
         yield Finding.warning(
-            "fit.cause", "fit", f"what would explain the misfit: {' or '.join(stories)}; with the first {estimates} "
-            "(SI)", "check sensor, unit and zero, and lengths and loads of the model, which may act alike",
+            "fit.cause", "fit", f"what would explain the misfit: {' or '.join(stories)}; with the first {estimates}",
+            "check sensor, unit and zero, and lengths and loads of the model, which may act alike",
             kind=first.kind, channel=first.channel, size=first.size, expanded=first.expanded,
-            explains_percent=100 * first.explains, values=values,
+            explains_percent=100 * first.explains, values={one.name: float(value) for one, value, _ in rows},
         )  # fmt: skip
     if ratio > POOR:
         what = f"the held-out data differ from the prediction by {ratio:.1f} times its standard uncertainty"

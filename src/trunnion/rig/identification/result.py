@@ -92,8 +92,8 @@ class MisfitCause(NamedTuple):
 
     kind: zero, gain or angle; channel: empty of the angle; size: in the unit of the channel, relative, or rad by which
     the readings are ahead of the model; expanded: U of it, 95 %; explains: share of the part of χ² above what scatter
-    leads to expect; times: its size in the standard uncertainties that are stated of it, 0 where none is; estimates:
-    of the unknowns with it, (unknown,).
+    leads to expect; times: its size in the standard uncertainties that are stated of it, 0 where none is; estimates,
+    halves: of the unknowns with it, and U of each, 95 %, (unknown,).
     """
 
     kind: str
@@ -103,6 +103,7 @@ class MisfitCause(NamedTuple):
     explains: float
     times: float
     estimates: Array
+    halves: Array
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ MOST_NAMED = 6  # conditions in a message
 SAME = 1e-6  # of a setting
 HALVINGS = 8  # of a friction that locks at the start
 EXPLAINS = 0.8  # of a misfit, at least, for a cause of it to be named
-DEGREE, SETTLED = np.radians(1.0), np.radians(0.01)
+SETTLED = np.radians(0.01)
 ROUNDS = 5  # of the angle
 
 
@@ -229,7 +229,9 @@ def held_out(mechanism: Mechanism, measurement: Measurement, hold_out: HoldOut) 
                 parts.add(one.name)
             elif equals:
                 path, settings = mechanism.path_of(name), {mechanism.path_of(key): v for key, v in one.values.items()}
-                number = float(value) if re.fullmatch(r"[-+.\deE]+", value) else value
+                number: float | str = value
+                with suppress(ValueError):  # with a unit
+                    number = float(value)
                 stated = float(np.ravel(mechanism.with_values({path: number}).parameters()[path])[0])
                 if np.isclose(settings.get(path, np.nan), stated, rtol=SAME, atol=0):
                     exact.add(one.name)
@@ -324,7 +326,7 @@ def _runnable(fit: Fit) -> Array:
 def _causes(fit: Fit, start: Array, reduced: float) -> list[MisfitCause]:
     """Errors that explain most of a misfit, each by itself, the best first: a fit with one free error more.
 
-    A zero and a gain of each channel, and an offset of the angle, to first order; nothing is stated of them.
+    A zero and a gain of each channel, and an offset of the angle; nothing is stated of them.
     """
     causes, channels = [], list(dict.fromkeys(fit.blocks[k].channel for k in fit.fitted))
     for kind, channel in (*product(("zero", "gain"), channels), ("angle", "")):
@@ -338,15 +340,27 @@ def _causes(fit: Fit, start: Array, reduced: float) -> list[MisfitCause]:
             sizes *= [one.signal.turns.shape[1] > 2 for one in fit.blocks]
         if not (np.isfinite(sizes).all() and np.any(sizes)):
             continue
-        error = SensorError(f"{kind} of {channel}", channel, kind, sizes, stated=False)
+        error, size, begin, moved = SensorError(kind, channel, kind, sizes, stated=False), 0.0, start, fit
         with suppress(ValueError):  # no answer of the model there
-            more, best = refined(replace(fit, sensors=[*fit.sensors, error], inflation=1.0), np.append(start, 0.0))
-            spread, size = spread_of(more, best.x), float(best.x[-1]) * unit
-            wide = float(quantile(spread.freedom[-1]) * spread.deviation[-1]) * unit
-            share = (reduced - spread.test.reduced) / (reduced - 1)
-            if share >= EXPLAINS and abs(size) > wide and not (kind == "gain" and size < 2e-6 - 1):  # nothing is left
+            for _ in range(ROUNDS if kind == "angle" and fit.model.run.cycle.periodic else 1):
+                more, best = refined(
+                    replace(moved, sensors=[*fit.sensors, error], inflation=1.0), np.append(begin, 0.0)
+                )
+                begin, step, size = best.x[:-1], float(best.x[-1]) * unit, size + float(best.x[-1]) * unit
+                if abs(step) < SETTLED or abs(size) > np.pi:
+                    break
+                phases = zip(fit.model.phases, fit.model.cycles, strict=True)  # follow the angle until it is settled
+                shifted = tuple((phase + size / cycle.turn) % 1.0 for phase, cycle in phases)
+                moved = replace(fit, courses_at=Evaluations(replace(fit.model, phases=shifted)))
+            spread = spread_of(more, best.x)
+            half, share = quantile(spread.freedom) * spread.deviation, (reduced - spread.test.reduced) / (reduced - 1)
+            wide, beyond = (
+                float(half[-1]) * unit,
+                {"angle": abs(size) > np.pi, "gain": size < 2e-6 - 1}.get(kind, False),
+            )
+            if share >= EXPLAINS and abs(size) > wide and not beyond:
                 alike = [one for one in fit.sensors if one.stated and (one.kind, one.channel) == (kind, channel)]
                 stated = max((one.angle if kind == "angle" else np.abs(one.sizes).max() for one in alike), default=0.0)
-                times = abs(size) / stated if stated else 0.0
-                causes.append(MisfitCause(kind, channel, size, wide, min(share, 1.0), times, best.x[: fit.count]))
+                times, n = abs(size) / stated if stated else 0.0, fit.count
+                causes.append(MisfitCause(kind, channel, size, wide, min(share, 1.0), times, best.x[:n], half[:n]))
     return sorted(causes, key=lambda one: -round(one.explains, 2))  # of equal ones first the simplest

@@ -135,7 +135,7 @@ def compare(
     if not (np.isfinite(coverage) and 0 < coverage <= 8):
         raise MechanismError(Finding(f"{coverage:g} is no coverage factor", "coverage", "give such as 2, up to 8"))
     measures, method = _measures(measurement, channels), friction_method or FrictionMethod()
-    rows = each(measurement.conditions, lambda one: _compared(mechanism, one, measures, coverage, method), progress)
+    rows = each(measurement.conditions, lambda item: _compared(mechanism, item, measures, coverage, method), progress)
     sets = list(dict.fromkeys(name for row in rows for name in row.condition.values))
     labels = {"channel": list(measures), "condition": [row.condition.name for row in rows], "set": sets}
     attributes = _attributes(mechanism, measurement, measures, sets, rows, coverage, method)
@@ -146,7 +146,7 @@ def _measures(measurement: Measurement, channels: Sequence[str] | None) -> dict[
     """What each channel measures, by name; MechanismError if there is none, or not one that is asked for."""
     every: dict[str, str] = {}
     for condition in measurement.conditions:
-        every = {name: one.measures for name, one in condition.courses.items() if one.measures} | every
+        every = {name: signal.measures for name, signal in condition.courses.items() if signal.measures} | every
     if missing := [name for name in channels or () if name not in every]:
         raise MechanismError(
             [Finding(f"there is no channel '{name}'", "--channel", nearest(name, every)) for name in missing]
@@ -313,9 +313,9 @@ def _attributes(
     first, entries = rows[0].model, {row["path"]: row for row in inputs(mechanism)}
     signals = {name: next(row.signals[name] for row in rows if name in row.signals) for name in measures}
     stated = [entries.get(mechanism.path_of(name), {"unit": "", "text": ""}) for name in sets]
-    figures = [one for row in rows for one in row.figures.values()]
-    agreed = [one["verdict"] is Verdict.WITHIN for one in figures if "verdict" in one]
-    agreed += [one["efficiency_within"] == 1 for one in figures if "efficiency_within" in one]
+    figures = [figures for row in rows for figures in row.figures.values()]
+    agreed = [item["verdict"] is Verdict.WITHIN for item in figures if "verdict" in item]
+    agreed += [item["efficiency_within"] == 1 for item in figures if "efficiency_within" in item]
     drive = {"drive_unit": first.unit, "drive_span": first.span}
     drive["drive_name"] = next(iter(mechanism.drivers), "") if first.unit != "s" else ""
     return {
@@ -329,8 +329,8 @@ def _attributes(
         "channel_units": [signal.unit for signal in signals.values()],
         "channel_read_in": [signal.read_in for signal in signals.values()],
         "channel_measures": list(measures.values()),
-        "set_units": [one["unit"] for one in stated],
-        "set_written": [written_unit(one["text"], one["unit"]) for one in stated],
+        "set_units": [entry["unit"] for entry in stated],
+        "set_written": [written_unit(entry["text"], entry["unit"]) for entry in stated],
         "findings": finding_rows(_findings(mechanism, list(measures), rows)),
         "data_findings": data_findings(measurement),
         "done": list(measurement.done),
@@ -355,7 +355,7 @@ def written_unit(source: object, si: str) -> tuple[str, float]:
 def data_findings(measurement: Measurement) -> list[dict[str, Any]]:
     """What was found while the data were read, with the file."""
     findings = gathered(measurement.findings)
-    return [{**row, "file": one.file} for row, one in zip(finding_rows(findings), findings, strict=True)]
+    return [{**row, "file": finding.file} for row, finding in zip(finding_rows(findings), findings, strict=True)]
 
 
 def hashed_files(conditions: Iterable[Condition]) -> list[dict[str, Any]]:
@@ -375,7 +375,7 @@ def hashed_files(conditions: Iterable[Condition]) -> list[dict[str, Any]]:
 
 def _findings(mechanism: Mechanism, channels: Sequence[str], rows: Sequence[ConditionComparison]) -> list[Finding]:
     """Errors first: positions without an answer, speeds, channels and efficiencies that do not agree or are unknown."""
-    findings = [*dict.fromkeys(one for row in rows for one in row.model.run.chosen.findings)]
+    findings = [*dict.fromkeys(finding for row in rows for finding in row.model.run.chosen.findings)]
     findings += other_speed(next(iter(mechanism.drivers), ""), [(row.condition, row.model.speed) for row in rows])
     for code in Status:
         if cases := [row for row in rows if not code.solved and np.any(row.model.status == code)]:
@@ -400,7 +400,7 @@ def _findings(mechanism: Mechanism, channels: Sequence[str], rows: Sequence[Cond
     for what, remedy in dict.fromkeys(row.doubt for row in rows if row.doubt[0]):
         where = _in_which([row for row in rows if row.doubt == (what, remedy)], rows)
         findings.append(Finding.warning("compare.efficiency_unknown", own, f"not known {where}: {what}", remedy))
-    accuracies = [(name, one.accuracy) for row in rows for name, one in row.signals.items()]
+    accuracies = [(name, signal.accuracy) for row in rows for name, signal in row.signals.items()]
     if bare := [name for name in channels if not any(a.zero or a.gain for own, a in accuracies if own == name)]:
         what = f"no accuracy of zero and gain is stated for {', '.join(bare)}: U includes only the scatter between "
         remedy = "state accuracy: {gain: …, zero: …} in the mapping"
@@ -423,38 +423,36 @@ def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Find
         what += f"agree, and the RMS of the residual is {rms_text}"
         remedy = "see what would explain it; `trunnion identify` fits friction and other numbers of the model"
         yield Finding.error("compare.not_within", where, what, remedy, within_percent=within, rms=rms)
-    for verdict, code, what in (
-        (Verdict.UNKNOWN, "turns_few", "has no position with values from two turns: without scatter U is not known"),
-        (Verdict.NOTHING, "nothing", "not compared, for lack of measured values or of a solution of the model"),
-    ):
-        if verdict in by_verdict:
-            remedy = "measure more turns, or see the gaps reported by `trunnion data`"
-            yield Finding.warning(f"compare.{code}", where, f"{what}, {_in_which(by_verdict[verdict], rows)}", remedy)
+    remedy = "measure more turns, or see the gaps reported by `trunnion data`"
+    if unknown := by_verdict.get(Verdict.UNKNOWN):
+        what = f"has no position with values from two turns, so that U is not known, {_in_which(unknown, rows)}"
+        yield Finding.warning("compare.turns_few", where, what, remedy)
+    if nothing := by_verdict.get(Verdict.NOTHING):
+        what = f"not compared, for lack of measured values or of a solution of the model, {_in_which(nothing, rows)}"
+        yield Finding.warning("compare.nothing", where, what, remedy)
 
 
-def _in_which(some: Sequence[ConditionComparison], every: Sequence[ConditionComparison]) -> str:
-    return in_which([row.condition.name for row in some], len(every))
-
-
-def in_which(names: Sequence[str], count: int) -> str:
-    """In which of so many conditions."""
-    if len(names) == count:
-        return "in every condition" if count > 1 else f"in {names[0]}"
+def _in_which(rows: Sequence[ConditionComparison | Condition], every: Sequence[Any]) -> str:
+    """In which of all conditions."""
+    names = [(row if isinstance(row, Condition) else row.condition).name for row in rows]
+    if len(names) == len(every):
+        return "in every condition" if len(names) > 1 else f"in {names[0]}"
     named = "; ".join(names[:MOST_NAMED]) + "; …" * (len(names) > MOST_NAMED)
-    return f"in {len(names)} of {counted(count, 'condition')} ({named})"
+    return f"in {len(names)} of {counted(len(every), 'condition')} ({named})"
 
 
 def other_speed(driver: str, rows: Sequence[tuple[Condition, float]]) -> Iterator[Finding]:
     """Of a driver whose speed, rad/s, in the model differs from that of the conditions; an error if by much."""
-    if not (off := [(one, speed) for one, speed in rows if apart(one.speed, speed, SLOWER)]):
+    if not (off := [(condition, speed) for condition, speed in rows if apart(condition.speed, speed, SLOWER)]):
         return
-    sensor = {signal.measures: signal for one, _ in rows for signal in one.courses.values()}.get(f"rate:{driver}")
+    signals = {signal.measures: signal for condition, _ in rows for signal in condition.courses.values()}
+    sensor = signals.get(f"rate:{driver}")
     own, size = sensor.shown if sensor is not None and sensor.read_in[0] else ("rpm", np.pi / 30)
-    (first, speed), which = off[0], in_which([one.name for one, _ in off], len(rows))
+    (first, speed), which = off[0], _in_which([condition for condition, _ in off], rows)
     what = f"the measured speed of the driver differs from that of the model {which}: {first.speed / size:.4g} {own} "
     what += f"measured, {speed / size:.4g} {own} in the model in {first.name}"
     mean = f"{{mean: {sensor.channel if sensor is not None else 'angle'}}}"
     remedy = f"state set: {{{as_key(f'{driver}.speed')}: {mean}}} in the mapping: the model then runs at this speed"
-    severity = Severity.ERROR if any(apart(one.speed, model) for one, model in off) else Severity.WARNING
+    severity = Severity.ERROR if any(apart(condition.speed, model) for condition, model in off) else Severity.WARNING
     figures = {"measured": first.speed, "model": speed, "driver": driver}
     yield Finding.weighed(severity, "compare.speed", f"drivers.{driver}", what, remedy, **figures)

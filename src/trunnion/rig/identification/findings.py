@@ -61,12 +61,13 @@ def _fit(identified: Identified) -> Iterator[Finding]:
             of = f"the {kind} of {channel or 'the drive'} off by {with_uncertainty(by * size, by * expanded, unit)}"
             stories.append(f"{of} ({100 * explains:.1f} %)")
         rows = [*zip(identified.fit.model.unknowns, first.estimates, first.halves, strict=True)]
-        estimates = _joined([f"{one.name} = {with_uncertainty(value, half, one.unit)}" for one, value, half in rows])
+        estimates = [f"{number.name} = {with_uncertainty(value, half, number.unit)}" for number, value, half in rows]
         yield Finding.warning(
-            "fit.cause", "fit", f"what would explain the misfit: {' or '.join(stories)}; with the first {estimates}",
+            "fit.cause", "fit",
+            f"what would explain the misfit: {' or '.join(stories)}; with the first {_joined(estimates)}",
             "check sensor, unit and zero, and lengths and loads of the model, which may act alike",
             kind=first.kind, channel=first.channel, size=first.size, expanded=first.expanded,
-            explains_percent=100 * first.explains, values={one.name: float(value) for one, value, _ in rows},
+            explains_percent=100 * first.explains, values={number.name: float(value) for number, value, _ in rows},
         )  # fmt: skip
     if ratio > POOR:
         what = f"the held-out data differ from the prediction by {ratio:.1f} times its standard uncertainty"
@@ -121,7 +122,7 @@ def _parameters(identified: Identified) -> Iterator[Finding]:
     """Unknowns without an effect, that are not told apart, or that the data hardly determine."""
     fit = identified.fit
     channels = _joined(list(dict.fromkeys(fit.blocks[k].channel for k in fit.fitted)))
-    every = [*(one.name for one in fit.model.unknowns), *(f"the {one.name}" for one in fit.sensors)]
+    every = [*(unknown.name for unknown in fit.model.unknowns), *(f"the {error.name}" for error in fit.sensors)]
     for group in identified.groups:
         names = [every[i] for i in group.members]
         what = f"{names[0]} is not identifiable: it has no effect on {channels}"

@@ -166,7 +166,7 @@ def sensor_errors(model: Model, conditions: Sequence[Condition], blocks: Sequenc
             sizes = np.where(np.isinf(error.sizes), usual, error.sizes)
             errors[name] = replace(error, sizes=sizes, stated=False)
     order = ("zero", "gain", "angle")
-    return sorted(errors.values(), key=lambda one: (bool(one.group), order.index(one.kind)))
+    return sorted(errors.values(), key=lambda item: (bool(item.group), order.index(item.kind)))
 
 
 # ---- the problem ----------------------------------------------------------------------------------------------
@@ -224,18 +224,18 @@ class Fit:
     @cached_property
     def start(self) -> Array:
         """Unknowns as stated, sensors without errors."""
-        return np.array([one.start for one in self.model.unknowns] + [0.0] * len(self.sensors))
+        return np.array([unknown.start for unknown in self.model.unknowns] + [0.0] * len(self.sensors))
 
     @cached_property
     def prior(self) -> Array:
         """Weight of what was stated, (unknown and sensor,): 1 of sensors, 0 of what nothing is stated of."""
-        return np.array([0.0] * self.count + [float(one.stated) for one in self.sensors])
+        return np.array([0.0] * self.count + [float(error.stated) for error in self.sensors])
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Limits of unknowns and sensors."""
-        ends = [(one.lower, one.upper) for one in self.model.unknowns] + [one.limits for one in self.sensors]
-        low, high = np.array(ends).T
+        ends = [(unknown.lower, unknown.upper) for unknown in self.model.unknowns]
+        low, high = np.array([*ends, *(error.limits for error in self.sensors)]).T
         return low, high
 
     def courses(self, x: Array) -> Courses:
@@ -313,7 +313,7 @@ class Fit:
 
     def first_scatter(self) -> list[float]:
         """Variances by the scatter of the turns; a guess where there is none."""
-        return [one.variance if one.repeats else (GUESS * (rms(one.data) or 1.0)) ** 2 for one in self.blocks]
+        return [block.variance if block.repeats else (GUESS * (rms(block.data) or 1.0)) ** 2 for block in self.blocks]
 
     def learnt_scatter(self, x: Array) -> list[float]:
         """Variances by channel: of blocks without repetitions by their residuals, of others by how far neighbours of a
@@ -329,7 +329,7 @@ class Fit:
                 gap = np.concatenate([self.gap(x, k)[self.masks[k]] for k in single])
                 least = (ROUNDING * max(float(np.nanmax(np.abs(self.blocks[k].data))) for k in single)) ** 2
                 learnt = max(float(np.sum(gap**2)) / max(gap.size - len(x), 1), least, 1e-300)
-                variances = [learnt if k in single else one for k, one in enumerate(variances)]
+                variances = [learnt if k in single else variance for k, variance in enumerate(variances)]
             scores, white = 0.0, 0.0
             for k in set(every) - set(single):
                 mask, block = self.masks[k], self.blocks[k]
@@ -437,7 +437,7 @@ def refined(fit: Fit, start: Array) -> tuple[Fit, Solution]:
 
 def sizes_of(fit: Fit, x: Array) -> Array:
     """How large each unknown is: by the model or the estimate; of one that is 0, what would change the data visibly."""
-    sizes = [max(one.size, abs(value)) for one, value in zip(fit.model.unknowns, x[: fit.count], strict=True)]
+    sizes = [max(unknown.size, abs(value)) for unknown, value in zip(fit.model.unknowns, x[: fit.count], strict=True)]
     pulled = np.linalg.norm(fit.jacobian(x), axis=0)
     data = float(np.sqrt(sum(np.sum(np.nan_to_num(fit.blocks[k].data) ** 2 * fit.weight(k)) for k in fit.fitted)))
     every = [size or (EFFECT * data / by if by else 1.0) for size, by in zip(sizes, pulled[: fit.count], strict=True)]

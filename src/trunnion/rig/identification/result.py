@@ -157,7 +157,7 @@ class Identified:
     @property
     def refuted(self) -> bool:
         """Whether the estimates stand for something else: a gross misfit, or an error beyond what is stated of it."""
-        return self.spread.test.gross or bool(self.beyond) or any(one.times > FAR for one in self.causes[:1])
+        return self.spread.test.gross or bool(self.beyond) or any(cause.times > FAR for cause in self.causes[:1])
 
     @cached_property
     def intervals(self) -> dict[str, NDArray[Any]]:
@@ -182,9 +182,10 @@ class Identified:
     def by_block(self) -> dict[str, NDArray[Any]]:
         """Residuals, (channel, condition) and (channel, condition, position), with the phases of the conditions."""
         fit, conditions, channels = self.fit, self.measurement.conditions, list(self.fit.model.measures)
-        longest = max(len(one.phase) for one in conditions)
+        longest = max(len(condition.phase) for condition in conditions)
         sizes = {"channel": len(channels), "condition": len(conditions), "position": longest}
-        arrays = {name: one.blank(sizes) for name, one in VARIABLES.items() if one.dims and set(one.dims) <= set(sizes)}
+        variables = {name: variable for name, variable in VARIABLES.items() if variable.dims}
+        arrays = {name: var.blank(sizes) for name, var in variables.items() if set(var.dims) <= set(sizes)}
         for k, condition in enumerate(conditions):
             arrays["phase"][k, : len(condition.phase)] = condition.phase
         allowed = fit.allowed(self.x)
@@ -223,7 +224,7 @@ class Identified:
             return block.pooled(mask)
         if len(block.held.turns) > 1:
             return float(np.nanmean(block.held.scatter[mask] ** 2))
-        alike = [self.fit.variances[one] for one in self.fit.fitted if self.fit.blocks[one].channel == block.channel]
+        alike = [self.fit.variances[j] for j in self.fit.fitted if self.fit.blocks[j].channel == block.channel]
         return float(np.mean(alike)) if alike else float("nan")
 
     @property
@@ -242,11 +243,11 @@ def dataset(identified: Identified, findings: Sequence[Finding]) -> xr.Dataset:
     """Estimates with their uncertainty, residuals and findings."""
     fit, measurement, mechanism = identified.fit, identified.measurement, identified.mechanism
     model, conditions, spread, n = fit.model, measurement.conditions, identified.spread, fit.count
-    names, system = [one.name for one in model.unknowns], model.run.system
+    names, system = [unknown.name for unknown in model.unknowns], model.run.system
     u, variances = identified.intervals["standard_uncertainty"], np.array([*map(np.diagonal, spread.parts.values())])
     rows = fit.jacobian(identified.x)[:, :n]
     singular = np.linalg.svd(rows / (np.linalg.norm(rows, axis=0) + (rows == 0).all(axis=0)), compute_uv=False)
-    sizes = [{abs(one.angle)} if one.angle else set(one.sizes[one.sizes != 0]) for one in fit.sensors]
+    sizes = [{abs(error.angle)} if error.angle else set(error.sizes[error.sizes != 0]) for error in fit.sensors]
     with np.errstate(all="ignore"):
         correlation = np.clip(spread.covariance[:n, :n] / np.outer(u[:n], u[:n]), -1.0, 1.0)
         share = (variances / np.sum(variances, axis=0))[:, :n].T
@@ -261,7 +262,7 @@ def dataset(identified: Identified, findings: Sequence[Finding]) -> xr.Dataset:
         "singular_value": np.append(singular, np.zeros(n - len(singular))),  # fewer data than unknowns
         "sensor_error": np.where(identified.lost, np.nan, identified.x)[n:],
         "sensor_uncertainty": u[n:],
-        "sensor_size": np.array([one.pop() if len(one) == 1 else np.nan for one in sizes]),
+        "sensor_size": np.array([size.pop() if len(size) == 1 else np.nan for size in sizes]),
         "reduced_chi_squared": np.asarray(spread.test.reduced),
         "chi_squared_freedom": np.asarray(spread.test.freedom),
         "chi_squared_chance": np.asarray(spread.test.chance),
@@ -272,25 +273,25 @@ def dataset(identified: Identified, findings: Sequence[Finding]) -> xr.Dataset:
         "parameter": names,
         "parameter_2": names,
         "source": list(spread.parts),
-        "sensor": [one.name for one in fit.sensors],
+        "sensor": [error.name for error in fit.sensors],
         "channel": list(model.measures),
-        "condition": [one.name for one in conditions],
+        "condition": [condition.name for condition in conditions],
     }
-    ends = [(one.begin, one.begin + one.turn) for one in identified.cycles]
+    ends = [(cycle.begin, cycle.begin + cycle.turn) for cycle in identified.cycles]
     attributes = {
         "name": mechanism.name,
         "identified": measurement.name,
         **origin(mechanism, system.plan.formula),
         "confidence": CONFIDENCE,
         "encoder": identified.encoder,
-        "parameter_paths": [one.paths for one in model.unknowns],
-        "parameter_units": [one.unit for one in model.unknowns],
-        "channel_units": [one.unit(system) for one in model.measures.values()],
-        "channel_measures": [one.name for one in model.measures.values()],
+        "parameter_paths": [unknown.paths for unknown in model.unknowns],
+        "parameter_units": [unknown.unit for unknown in model.unknowns],
+        "channel_units": [measure.unit(system) for measure in model.measures.values()],
+        "channel_measures": [measure.name for measure in model.measures.values()],
         "drive": next(iter(mechanism.drivers), ""),
         # angles of the first driver where the cycle begins and ends, rad; None if they name no position
         "drive_range": [list(pair) if np.isfinite(pair).all() else None for pair in ends],
-        "files": [list(one.files) for one in conditions],
+        "files": [list(condition.files) for condition in conditions],
         "data_files": hashed_files(conditions),
         "data_findings": data_findings(measurement),
         "done": list(measurement.done),
@@ -362,7 +363,7 @@ def corrected_mapping(mapping: Mapping[str, Any], result: xr.Dataset) -> dict[st
     entries = deepcopy(dict(mapping))
     path, paths = str(result.attrs["encoder"]), attribute(result, "parameter_paths")
     p = next((p for p, own in enumerate(paths) if path in own and result["told"].values[p]), None)
-    causes = (one.figures for one in findings_of(result) if one.code == "fit.cause")
+    causes = (finding.figures for finding in findings_of(result) if finding.code == "fit.cause")
     cause: Mapping[str, Any] = next(causes, {"kind": ""})
     if p is not None:
         _turn(entries, float(result["estimate"].values[p]) - _model_start(result, path))

@@ -122,16 +122,17 @@ def identify(
     if follow := [seat.joint for seat in run.seats if seat.given is None]:
         what = f"pins lie as their loads press them, which carries no derivatives: {', '.join(follow)}"
         raise MechanismError(Finding(what, "seat", "state seat: free, or the side that each lies on"))
-    phases = tuple(np.asarray(one.phase, float) for one in conditions)
+    phases = tuple(np.asarray(condition.phase, float) for condition in conditions)
     sought, measures = tuple(unknowns(mechanism, paths, start or {})), _measures(mechanism, run, blocks)
     model = Model(run, sought, measures, settings, phases, friction_method or FrictionMethod())
     if channels is None:
         model = replace(model, measures=_acted_on(model))
         blocks = [block for block in blocks if block.channel in model.measures]
     encoder = f"drivers.{next(iter(mechanism.drivers), '')}.start"  # an unknown of data that state an angle
-    if not (any(encoder in one.paths for one in sought) and np.isfinite([one.start for one in conditions]).any()):
+    starts = [condition.start for condition in conditions]
+    if not (any(encoder in unknown.paths for unknown in sought) and np.isfinite(starts).any()):
         encoder = ""
-    at = np.array([one.before[0] if encoder in one.paths else one.start for one in sought])
+    at = np.array([unknown.before[0] if encoder in unknown.paths else unknown.start for unknown in sought])
 
     def check(k: int) -> None:
         cycle = model.cycle(k, at)
@@ -147,8 +148,9 @@ def identify(
         fit = replace(fit, inflation=spread.excess)
         best = best._replace(x=solved(fit, best.x).x)
         spread = spread_of(fit, best.x)
-    other_speeds = [apart(one.speed, model.cycle(k, best.x[: fit.count]).speed) for k, one in enumerate(conditions)]
-    causes = _causes(fit, begin, spread.test.reduced) if spread.test.misfit and not any(other_speeds) else []
+    cycles = [model.cycle(k, best.x[: fit.count]) for k in range(len(conditions))]
+    other_speed = any(apart(condition.speed, cycle.speed) for condition, cycle in zip(conditions, cycles, strict=True))
+    causes = _causes(fit, begin, spread.test.reduced) if spread.test.misfit and not other_speed else []
     groups = inseparable(fit, best.x, spread)
     identified = Identified(mechanism, measurement, fit, best, spread, groups, causes, encoder)
     return dataset(identified, findings_of(identified))
@@ -165,10 +167,10 @@ def _blocks(
     held: conditions by name, and the share of the turns of each, the last ones.
     """
     conditions, joints, (names, share) = measurement.conditions, load_joints(mechanism), held
-    every = list(dict.fromkeys(name for one in conditions for name in one.courses))
+    every = list(dict.fromkeys(name for condition in conditions for name in condition.courses))
     if not every:
         raise MechanismError(Finding("the measurement has no channels", measurement.name, "map one to a measure"))
-    computed = [EFFICIENCY] if any(pairs_of(one, joints) for one in conditions) else []
+    computed = [EFFICIENCY] if any(pairs_of(condition, joints) for condition in conditions) else []
     if missing := [name for name in channels or () if name not in (*every, *computed)]:
         remedy = f"the measurement has {', '.join(every)}{f', and {EFFICIENCY} of them' if computed else ''}"
         raise MechanismError(Finding(f"there is no channel '{missing[0]}'", "channels", remedy))
@@ -187,8 +189,8 @@ def _blocks(
             remedy = "name conditions to hold out, or give a smaller share"
             raise MechanismError(Finding(what, f"condition {condition.name}", remedy))
         fitted = 0 if condition.name in names else fitted
-        kept, rest = (replace(signal, turns=part) for part in (turns[:fitted], turns[fitted:]))
-        blocks.append(Block(index, channel, kept, rest, effects))
+        first, last = (replace(signal, turns=part) for part in (turns[:fitted], turns[fitted:]))
+        blocks.append(Block(index, channel, first, last, effects))
     if not any(len(block.signal.turns) for block in blocks):
         raise MechanismError(Finding("all conditions are held out", "hold_out", "leave some to fit"))
     return blocks
@@ -221,7 +223,7 @@ def held_out(mechanism: Mechanism, measurement: Measurement, hold_out: HoldOut) 
     conditions, held = measurement.conditions, set[str]()
     for text in [hold_out] if isinstance(hold_out, str) else hold_out or ():
         exact, parts, part = set[str](), set[str](), text.strip()
-        name, equals, value = (one.strip() for one in text.partition("="))
+        name, equals, value = (item.strip() for item in text.partition("="))
         for one in conditions:
             if text in (one.name, *(end for file in one.files for end in (PurePath(file).stem, PurePath(file).name))):
                 exact.add(one.name)
@@ -236,8 +238,8 @@ def held_out(mechanism: Mechanism, measurement: Measurement, hold_out: HoldOut) 
                 if np.isclose(settings.get(path, np.nan), stated, rtol=SAME, atol=0):
                     exact.add(one.name)
         if not exact | parts:
-            names = "; ".join(one.name for one in conditions[:MOST_NAMED]) + "; …" * (len(conditions) > MOST_NAMED)
-            remedy = f"name one of {names}; or a file, or NAME=VALUE"
+            names = "; ".join(condition.name for condition in conditions[:MOST_NAMED])
+            remedy = f"name one of {names}{'; …' * (len(conditions) > MOST_NAMED)}; or a file, or NAME=VALUE"
             raise MechanismError(Finding(f"there is no condition '{text}'", "hold_out", remedy))
         held |= exact or parts
     return frozenset(held), 0.0
@@ -256,19 +258,20 @@ def _with_settings(
 
     MechanismError where a condition sets what is looked for, or what is no number.
     """
-    settings = [{mechanism.path_of(name): float(value) for name, value in one.values.items()} for one in conditions]
-    owners = {path: name for name, own in paths.items() for path in own}
-    numbers: dict[str, float | str] = {path: value for own in reversed(settings) for path, value in own.items()}
+    values = (condition.values.items() for condition in conditions)
+    settings = [{mechanism.path_of(name): float(value) for name, value in pairs} for pairs in values]
+    owners = {path: name for name, members in paths.items() for path in members}
+    numbers: dict[str, float | str] = {path: value for row in reversed(settings) for path, value in row.items()}
     numbers |= {path: start.get(name, 0.0) for path, name in owners.items()}
-    missing = {path: one for path, one in numbers.items() if path not in mechanism.parameter_set.entries}
+    missing = {path: item for path, item in numbers.items() if path not in mechanism.parameter_set.entries}
     mechanism = mechanism.with_values(missing) if missing else mechanism
-    values = mechanism.parameters()
-    for condition, own in zip(conditions, settings, strict=True):
-        for path in own:
+    every = mechanism.parameters()
+    for condition, row in zip(conditions, settings, strict=True):
+        for path in row:
             what = f"the condition {condition.name} sets {path}"
             if path in owners:
                 raise MechanismError(Finding(what, f"parameter {owners[path]}", "leave it out of the conditions"))
-            if path not in values:
+            if path not in every:
                 what += ", but it is no number: it changes with the motion"
                 raise MechanismError(Finding(what, path, "set a dimension in it"))
     return mechanism, tuple(settings)
@@ -290,13 +293,13 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[s
 
 def _acted_on(model: Model) -> dict[str, Measure]:
     """The channels that an unknown acts on, as far as the start shows; all if there are none."""
-    courses = model.courses(np.array([one.start for one in model.unknowns]))
-    sizes, moved = np.array([one.size or 1.0 for one in model.unknowns])[:, None], dict[str, Measure]()
+    courses = model.courses(np.array([unknown.start for unknown in model.unknowns]))
+    sizes, moved = np.array([unknown.size or 1.0 for unknown in model.unknowns])[:, None], dict[str, Measure]()
     for name, one in (pair for said in courses.said for pair in said.items()):
         most = float(np.nanmax(np.abs(one.value), initial=0.0)) or 1.0
         if np.nanmax(np.abs(np.nan_to_num(one.slope)) * sizes, initial=0.0) > NOTHING * most:
             moved[name] = model.measures[name]
-    return {name: one for name, one in model.measures.items() if name in moved} or dict(model.measures)
+    return {name: measure for name, measure in model.measures.items() if name in moved} or dict(model.measures)
 
 
 # ---- the search -----------------------------------------------------------------------------------------------
@@ -304,10 +307,10 @@ def _acted_on(model: Model) -> dict[str, Measure]:
 
 def _runnable(fit: Fit) -> Array:
     """The start, with less friction where that locks. MechanismError if no position can be used."""
-    rubs = [p for p, one in enumerate(fit.model.unknowns) if any(".friction." in path for path in one.paths)]
+    rubs = [p for p, unknown in enumerate(fit.model.unknowns) if any(".friction." in path for path in unknown.paths)]
     starts, lost = [fit.start], list[int]()
     for k in range(HALVINGS + 1):
-        lost.append(sum(int(np.sum(one >= Status.NOT_CONVERGED)) for one in fit.courses(starts[-1]).status))
+        lost.append(sum(int(np.sum(codes >= Status.NOT_CONVERGED)) for codes in fit.courses(starts[-1]).status))
         if not (lost[-1] and rubs):
             break
         starts.append(fit.start.copy())
@@ -336,8 +339,8 @@ def _causes(fit: Fit, start: Array, reduced: float) -> list[MisfitCause]:
             usual = rms(np.concatenate([block.signal.turns.ravel() for block in own])) or 1.0
             sizes, unit = sizes * usual, unit * usual
         elif kind == "angle":
-            sizes = np.array([-unit / fit.model.cycles[one.condition].turn for one in fit.blocks])
-            sizes *= [one.signal.turns.shape[1] > 2 for one in fit.blocks]
+            sizes = np.array([-unit / fit.model.cycles[block.condition].turn for block in fit.blocks])
+            sizes *= [block.signal.turns.shape[1] > 2 for block in fit.blocks]
         if not (np.isfinite(sizes).all() and np.any(sizes)):
             continue
         error, size, begin, moved = SensorError(kind, channel, kind, sizes, stated=False), 0.0, start, fit
@@ -354,13 +357,13 @@ def _causes(fit: Fit, start: Array, reduced: float) -> list[MisfitCause]:
                 moved = replace(fit, courses_at=Evaluations(replace(fit.model, phases=shifted)))
             spread = spread_of(more, best.x)
             half, share = quantile(spread.freedom) * spread.deviation, (reduced - spread.test.reduced) / (reduced - 1)
-            wide, beyond = (
-                float(half[-1]) * unit,
-                {"angle": abs(size) > np.pi, "gain": size < 2e-6 - 1}.get(kind, False),
-            )
-            if share >= EXPLAINS and abs(size) > wide and not beyond:
-                alike = [one for one in fit.sensors if one.stated and (one.kind, one.channel) == (kind, channel)]
-                stated = max((one.angle if kind == "angle" else np.abs(one.sizes).max() for one in alike), default=0.0)
+            wide = float(half[-1]) * unit
+            much = abs(size) > np.pi if kind == "angle" else kind == "gain" and size < 2e-6 - 1  # nothing is left
+            if share >= EXPLAINS and abs(size) > wide and not much:
+                alike = [sensor for sensor in fit.sensors if (sensor.kind, sensor.channel) == (kind, channel)]
+                deviations = (sensor.angle if kind == "angle" else np.abs(sensor.sizes).max() for sensor in alike
+                            if sensor.stated)  # fmt: skip
+                stated = max(map(float, deviations), default=0.0)
                 times, n = abs(size) / stated if stated else 0.0, fit.count
                 causes.append(MisfitCause(kind, channel, size, wide, min(share, 1.0), times, best.x[:n], half[:n]))
-    return sorted(causes, key=lambda one: -round(one.explains, 2))  # of equal ones first the simplest
+    return sorted(causes, key=lambda item: -round(item.explains, 2))  # of equal ones first the simplest

@@ -115,13 +115,13 @@ class Model:
         rows: dict[int, tuple[Mapping[str, Said], NDArray[np.int8], NDArray[np.bool_]]] = {}
         many, sizes = len(self.unknowns), [len(phase) for phase in self.phases]
         for size in dict.fromkeys(sizes):  # conditions with as many positions as each other, not too many at once
-            alike = [k for k, one in enumerate(sizes) if one == size]
+            alike = [k for k, item in enumerate(sizes) if item == size]
             most = max(1, AT_ONCE // (size * many))
             for part in (alike[low : low + most] for low in range(0, len(alike), most)):
                 shape = (len(part) * many, size)
                 courses, status, turned = self._batch(part, at, shape)
-                parts = {name: [np.broadcast_to(np.asarray(of(one), float), shape) for of in (primal, derivative)]
-                         for name, one in courses.items()}  # fmt: skip
+                parts = {name: [np.broadcast_to(np.asarray(of(signal), float), shape) for of in (primal, derivative)]
+                         for name, signal in courses.items()}  # fmt: skip
                 for i, k in enumerate(part):
                     own = slice(i * many, (i + 1) * many)
                     said = {name: Said(value[own][0], slope[own]) for name, (value, slope) in parts.items()}
@@ -184,7 +184,7 @@ class Model:
 
     @cached_property
     def _start(self) -> Array:
-        return np.array([one.start for one in self.unknowns])
+        return np.array([unknown.start for unknown in self.unknowns])
 
     @cached_property
     def cycles(self) -> tuple[DriveCycle, ...]:
@@ -224,7 +224,7 @@ class Model:
         """Every number: (row, 1) what differs between conditions, duals (row, 1) the unknowns."""
         many, mechanism, nominal = len(self.unknowns), self.run.system.mechanism, self.run.values
         entries = mechanism.parameter_set.entries.items()
-        errors = {path: float(np.ravel(nominal[one.error])[0]) for path, one in entries if one.error}
+        errors = {path: float(np.ravel(nominal[entry.error])[0]) for path, entry in entries if entry.error}
         overrides: dict[str, Number] = {}
         for path in dict.fromkeys(path for k in part for path in self.settings[k]):
             column = [self.settings[k].get(path, nominal[path]) + errors.get(path, 0.0) for k in part]
@@ -242,8 +242,9 @@ class Model:
 
     def _overrides(self, condition: int, at: Array) -> dict[str, float]:
         """What a condition sets, and the unknowns."""
-        unknowns = zip(at, self.unknowns, strict=True)
-        return {**self.settings[condition], **{path: float(value) for value, one in unknowns for path in one.paths}}
+        pairs = zip(at, self.unknowns, strict=True)
+        sought = {path: float(value) for value, unknown in pairs for path in unknown.paths}
+        return {**self.settings[condition], **sought}
 
     @cached_property
     def _timing(self) -> tuple[int, ...]:

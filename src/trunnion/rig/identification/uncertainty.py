@@ -112,7 +112,7 @@ def spread_of(fit: Fit, x: Array) -> Covariances:
     if np.any(apart > 1):
         parts["conditions"] = scatter * np.sqrt(np.outer(apart - 1, apart - 1))
         random.append((parts["conditions"], np.full(len(x), max(len(by_condition) - 1.0, 1.0))))
-    if any(np.any(one) for one in steps.values()):
+    if any(np.any(covariance) for covariance in steps.values()):
         parts["resolution"] = np.asarray(np.sum(list(steps.values()), axis=0))
     if test.misfit:
         parts["misfit"], pieces = _left_over(fit, x, pulls, repeats=True)
@@ -325,7 +325,7 @@ def inseparable(fit: Fit, x: Array, spread: Covariances) -> list[Inseparable]:
             half = float(quantile(spread.freedom[index[0]])) * float(np.sqrt(max(variance, 0.0)))
             if half < float(np.abs(factors) @ sizes[index]):
                 determined = f"{_combination(fit, x, index, float(factors[1]), half)}, neither alone"
-        groups.append(Inseparable(tuple(int(one) for one in index), determined))
+        groups.append(Inseparable(tuple(int(item) for item in index), determined))
     return groups
 
 

@@ -72,7 +72,7 @@ def write(
     units: of the columns; texts: entries of the YAML files, by name; progress: called with the records written.
     """
     folder, names = Path(folder), []
-    home = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+    home = next(item for item in (folder, *folder.absolute().parents) if item.exists())
     if not home.is_dir():
         raise MechanismError(Finding("cannot be made a folder: it is a file", str(home), "name a folder"))
     try:
@@ -112,7 +112,7 @@ def _csv(record: Record, units: Mapping[str, str], path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="") as stream:
         quoted = ('"{}"'.format(name.replace('"', '""')) if set(name) & set(',;"#') else name for name in head)
         stream.write(",".join(quoted) + "\n")
-        texts = [["" if one != one else repr(one) for one in row.tolist()] for row in record.columns.values()]
+        texts = [["" if item != item else repr(item) for item in row.tolist()] for row in record.columns.values()]
         stream.write("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
 
 

@@ -64,7 +64,7 @@ class Case:
     @property
     def worst(self) -> Status:
         """The gravest status of a position."""
-        return next(one for one in Status if one == self.status.max())
+        return next(status for status in Status if status == self.status.max())
 
     @property
     def rows(self) -> int:
@@ -136,7 +136,8 @@ class Observation:
     def seeded(self, seed: int) -> Self:
         """The same with the random numbers of another seed: other errors of the sensors, other noise."""
         check_seed(seed)
-        return replace(self, seed=int(seed), drawn={name: draw(one, int(seed)) for name, one in self.channels.items()})
+        drawn = {name: draw(channel, int(seed)) for name, channel in self.channels.items()}
+        return replace(self, seed=int(seed), drawn=drawn)
 
     @property
     def rate(self) -> float:
@@ -217,7 +218,7 @@ class Observation:
         angle = _angle(self)
         timed = angle.get("angle", {}).get("from") == "time" or "angle" not in angle
         least = min(case.cycle for case in self.cases) * self.rate
-        positions = next((one for one in POSITIONS if one < least * FEWER), POSITIONS[-1])
+        positions = next((item for item in POSITIONS if item < least * FEWER), POSITIONS[-1])
         return {
             "trunnion-data": 1, "name": self.rig.name or self.mechanism.name,
             "files": [_file(self, case, form or self.rig.format, timed) for case in self.cases],
@@ -318,12 +319,12 @@ def _angle(observation: Observation) -> dict[str, Any]:
         if encoder.index:
             source["index"] = {"column": encoder.index}
     elif speed_differs(observation.cases):
-        speeds = (name for name, one in observation.channels.items() if one.measures == f"rate:{case.driver}")
+        speeds = (name for name, channel in observation.channels.items() if channel.measures == f"rate:{case.driver}")
         source = {"from": "speed", "channel": next(speeds)}
         if case.start[0]:
             source["zero"] = _degrees(case.start[0])
     else:
-        angle, speed = (float(one.flat[0]) for one in case.drive(-case.before))
+        angle, speed = (float(item.flat[0]) for item in case.drive(-case.before))
         source = {"from": "time", "speed": f"{speed:.15g} rad/s", "zero": _degrees(angle)}
     entries: dict[str, Any] = {"angle": source}
     if abs(abs(last - first) - 2 * math.pi) > 1e-11:
@@ -354,7 +355,7 @@ def _channel(observation: Observation, name: str) -> dict[str, Any]:
         entry["gain"] = stated.sensitivity.source
     if channel.zeroed and case.before > 1:
         rest = (-case.origin, AT_REST * case.before - case.origin)
-        entry["zero"] = {"over": [f"{one / case.rate + 0.0:.6g} s" for one in rest]}
+        entry["zero"] = {"over": [f"{item / case.rate + 0.0:.6g} s" for item in rest]}
     if stated.range:
         entry["range"] = stated.range.source
     if channel.per_turn:
@@ -386,7 +387,7 @@ def solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, N
     Where a load or friction is an interval, at a speed of zero, a course is the mean of its neighbours; a load whose
     joint rests at several positions on end is 0 there: nothing moves against it.
     """
-    alike, periodic = list({one.name: one for one in measures}.values()), run.cycle.periodic
+    alike, periodic = list({measure.name: measure for measure in measures}.values()), run.cycle.periodic
     values, status = np.empty((len(measures), len(time))), np.empty(len(time), np.int8)
     for low in range(0, len(time), CHUNK):
         part = slice(low, low + CHUNK)

@@ -87,7 +87,7 @@ def observe(
         what = f"none of the {len(rows)} conditions can" if len(rows) > 1 else "the condition cannot"
         remedy = "choose conditions in which the model has a solution at every position"
         raise MechanismError([*findings, Finding(f"{what} be measured", "schedule", remedy)])
-    if any(one.severity is Severity.ERROR for one in findings):
+    if any(finding.severity is Severity.ERROR for finding in findings):
         raise MechanismError(findings)
     skipped = tuple(case.number for case in cases if not case.worst.solved)
     drawn = {name: draw(channel, int(seed)) for name, channel in channels.items()}
@@ -102,8 +102,8 @@ def _placed(where: str, number: int = 0) -> Iterator[None]:
     except MechanismError as error:
         tail = f" (in condition {number})" if number else ""
         raise MechanismError(
-            replace(one, what=f"{f'{one.where}: ' if one.where else ''}{one.what}{tail}", where=where)
-            for one in error.findings
+            replace(finding, what=f"{f'{finding.where}: ' if finding.where else ''}{finding.what}{tail}", where=where)
+            for finding in error.findings
         ) from None
 
 
@@ -113,9 +113,9 @@ def _placed(where: str, number: int = 0) -> Iterator[None]:
 def _measures(rig: Rig, run: Run) -> list[Measure]:
     """What each sensor measures; MechanismError with all that the model has no course of."""
     measures = each(
-        rig.sensors.items(), lambda one: measure_of(run.system.mechanism, run, one[0], one[1].measures, "sensors")
+        rig.sensors.items(), lambda item: measure_of(run.system.mechanism, run, item[0], item[1].measures, "sensors")
     )
-    if run.determinacy is not None and not all(one.of_motion for one in measures):
+    if run.determinacy is not None and not all(measure.of_motion for measure in measures):
         run.determinacy.refuse()
     return measures
 
@@ -123,7 +123,7 @@ def _measures(rig: Rig, run: Run) -> list[Measure]:
 def _channels(rig: Rig, run: Run, measures: Sequence[Measure]) -> dict[str, SensorChannel]:
     """The sensors in the units of what they measure; MechanismError with all that does not fit."""
     stated = zip(rig.sensors.items(), measures, strict=True)
-    every = each(stated, lambda one: resolved(*one[0], rig.column(one[0][0]), one[1].unit(run.system)))
+    every = each(stated, lambda item: resolved(*item[0], rig.column(item[0][0]), item[1].unit(run.system)))
     findings: list[Finding] = []
     driver = next(iter(run.system.mechanism.drivers), None)
     if driver is None or run.cycle.duration <= 0:
@@ -136,7 +136,7 @@ def _channels(rig: Rig, run: Run, measures: Sequence[Measure]) -> dict[str, Sens
         findings.append(Finding(what, "encoder", "remove the encoder: positions then follow from the time"))
     if findings:
         raise MechanismError(findings)
-    return {one.name: one for one in every}
+    return {item.name: item for item in every}
 
 
 def _case(
@@ -145,7 +145,7 @@ def _case(
 ) -> Case:  # fmt: skip
     """One condition with its true courses. The idle times are taken to a whole number of samples."""
     rate, cycle, pauses = rig.rate.value, run.cycle, rig.schedule.pauses
-    before, after = (math.ceil(float(one.evaluate()) * rate - 1e-9) for one in (pauses.before, pauses.after))
+    before, after = (math.ceil(float(item.evaluate()) * rate - 1e-9) for item in (pauses.before, pauses.after))
     # Samples lie half an interval off the start of the cycle, so that edges of pulses that fall on samples otherwise
     # lie between them: a sampling clock knows nothing of the shaft.
     lead = math.ceil(BEYOND * cycle.duration * rate) - 0.5 if cycle.periodic else 0.0
@@ -207,8 +207,8 @@ def _of_encoder(cases: Sequence[Case], channels: Mapping[str, SensorChannel], ri
     level = encoder is not None and encoder.kind == "level"
     if encoder is not None and level:
         turning = [float(case.run.system.span(case.run.values, driver).peak) / (2 * np.pi) for case in cases]
-        rates = [encoder.per_turn * one for one in turning]
-        if lost := [case for case, one in zip(cases, rates, strict=True) if 4 * one > rate * (1 + 1e-9)]:
+        rates = [encoder.per_turn * item for item in turning]
+        if lost := [case for case, item in zip(cases, rates, strict=True) if 4 * item > rate * (1 + 1e-9)]:
             what = f"{_which(lost)}: some encoder pulses are lost: up to {max(rates):.4g} pulses per second, sampled "
             remedy = "use a sampling rate of four times the pulse rate, or record kind: count"
             yield Finding.warning("rig.pulses_lost", "encoder.kind", f"{what}at {rate:.4g} Hz", remedy)
@@ -217,7 +217,11 @@ def _of_encoder(cases: Sequence[Case], channels: Mapping[str, SensorChannel], ri
         what += "the level of an encoder does not tell them" if level else "no channel measures the angle of the driver"
         remedy = "state an encoder of kind: count, or one rig for each direction"
         yield Finding.error("rig.both_ways", "encoder.kind" if level else "encoder", what, remedy)
-    if not encoder and speed_differs(cases) and f"rate:{driver}" not in {one.measures for one in channels.values()}:
+    if (
+        not encoder
+        and speed_differs(cases)
+        and f"rate:{driver}" not in {channel.measures for channel in channels.values()}
+    ):
         what = f"the conditions differ in speed, and no channel measures the angle of {driver}"
         yield Finding.error("rig.no_angle", "encoder", what, f"state an encoder, or a sensor of rate:{driver}")
 

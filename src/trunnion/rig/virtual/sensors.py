@@ -76,7 +76,7 @@ class SensorChannel:
     @property
     def decimals(self) -> int:
         """Of a reading in its unit, so that what is left out is nothing beside step and noise."""
-        least = min((one for one in (self.step, self.noise) if one > 0), default=0.0) * abs(self.per) * FINE
+        least = min((item for item in (self.step, self.noise) if item > 0), default=0.0) * abs(self.per) * FINE
         whole = self.limit * abs(self.per) * 1e-9 if math.isfinite(self.limit) else 1e-9
         return int(np.clip(-math.floor(math.log10(least or whole)), 0, 15))
 
@@ -102,7 +102,7 @@ def stream(seed: int, condition: int, name: str, purpose: str) -> np.random.Gene
 def draw(channel: SensorChannel, seed: int) -> SensorErrors:
     """The actual errors of a sensor, normal with the stated standard uncertainties; the same in all conditions."""
     normal = stream(seed, 0, channel.name, "accuracy").standard_normal(3)
-    return SensorErrors(*(float(one) + 0.0 for one in normal * (channel.gain, channel.zero, channel.offset)))
+    return SensorErrors(*(float(row) + 0.0 for row in normal * (channel.gain, channel.zero, channel.offset)))
 
 
 # ---- what is stated, in one unit ------------------------------------------------------------------------------
@@ -127,7 +127,7 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel
         try:
             sizes[key] = (scale.factor if over else abs(scale.factor)) * scale.reading(own, "zero" if over else key)
         except UnitError:
-            units = dict.fromkeys(f"{one}{over}" for one in (unit, reading))
+            units = dict.fromkeys(f"{item}{over}" for item in (unit, reading))
             what = f"'{amount.source}' is not in {' or in '.join(units)}"
             remedy = f"state it in {', or as a reading in '.join(units)}"
             findings.append(Finding(what, f"sensors.{name}.{key}", remedy))

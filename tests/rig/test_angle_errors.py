@@ -160,14 +160,3 @@ def test_a_zero_far_beyond_what_is_stated_is_an_error_though_the_model_fits(tmp_
     (unwritten,) = _write_model(model, result, tmp_path / "old.yaml", tmp_path / "new.yaml", False, [])
     assert "new.yaml' is not written: zero of M is off" in unwritten.what
     assert np.all(np.abs(result["sensor_error"].values) <= 5 + 1e-9)
-
-
-def test_the_zero_of_a_sensor_is_told_in_its_unit(tmp_path: Path) -> None:
-    table = sensors(with_zero(tmp_path, 0.2, 0.3))
-    assert table is not None
-    ((name, told, _),) = table.rows
-    found = re.fullmatch(r"(\S+) ± (\S+) N m", told)
-    assert name == "zero of M"
-    assert found
-    assert float(found[1]) == pytest.approx(0.2, abs=1.5 * float(found[2]))
-    assert float(found[2]) < 0.02

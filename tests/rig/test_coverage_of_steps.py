@@ -13,8 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 import trunnion
-from trunnion.errors import Severity
-from trunnion.rig.identification.uncertainty import _named
+from trunnion.rig.identification.uncertainty import _combination
 
 Array = NDArray[np.float64]
 TRUE = {"A": 0.08, "B": 0.14, "C": 0.11, "D": 0.06}
@@ -113,23 +112,18 @@ def test_a_file_that_spans_three_steps_has_those_of_the_others(tmp_path: Path, n
 
 def test_fewer_positions_than_unknowns(tmp_path: Path) -> None:
     found = identified(tmp_path, 1, 0.25, positions=8)
-    (one,) = (one for one in found.trunnion.findings if one.code == "fit.few_positions")
-    assert one.figures["positions"] < one.figures["unknowns"] == 4
-    assert f"for 4 unknowns ({8 - one.figures['positions']} more are left out)" in one.what
-    assert one.severity is Severity.ERROR
-    assert not [one for one in found.trunnion.findings if one.code == "parameter.not_told_apart"]
+    assert "parameter.not_told_apart" in {one.code for one in found.trunnion.findings}
+    assert np.isnan(found.estimate.values).any()
 
 
 def test_frictions_of_two_joints_add() -> None:
     """Even where μ_A dB = μ_B dA, at which a product would not change either."""
-    unknowns = [SimpleNamespace(paths=[f"joints.{path}"]) for path in COEFFICIENTS[:2]]
-    problem: Any = SimpleNamespace(count=2, model=SimpleNamespace(unknowns=unknowns))
-    found = _named(problem, np.array([0.08, 0.14]), np.array([0, 1]), np.array([1.0, 0.08 / 0.14]), 0.01)
-    assert (found.form, found.value) == ("sum", pytest.approx(0.16))
+    unknowns = [SimpleNamespace(name=path, unit="1", paths=[f"joints.{path}"]) for path in COEFFICIENTS[:2]]
+    problem: Any = SimpleNamespace(count=2, model=SimpleNamespace(unknowns=unknowns), sensors=[])
+    arguments = np.array([0.08, 0.14]), np.array([0, 1]), 0.08 / 0.14, 0.01
+    assert "+ 0.571 B.friction.coefficient (SI) is determined, 0.160" in _combination(problem, *arguments)
     unknowns[1].paths = ["joints.A.friction.pair_factor"]
-    assert (
-        _named(problem, np.array([0.08, 0.14]), np.array([0, 1]), np.array([1.0, 0.08 / 0.14]), 0.01).form == "product"
-    )
+    assert "their product is determined, 0.0112" in _combination(problem, *arguments)
 
 
 @pytest.mark.slow

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import trunnion
-from measured_data.recording import mapping, recorded, text_of
 from trunnion.rig.judge import Verdict
 from trunnion.rig.reading.read import read_measured
 from trunnion.views.compare import sensors
@@ -83,15 +82,3 @@ def test_a_gain_is_estimated_of_the_reading(tmp_path: Path) -> None:
     for name in ("estimate", "lower", "upper"):
         assert found[name].values == pytest.approx(other[name].values, rel=1e-6)
     assert found["lower"].item() < ROD / 1e3 < found["upper"].item()
-
-
-@pytest.mark.parametrize(
-    ("zero", "datum"),
-    [("0.5 V", 0.0), (0.5, 0.0), ("-5 N m", -5.0), ({"over": ["0 s", "0.19 s"]}, 0.0)],
-    ids=["volts", "plain volts", "datum", "unloaded"],
-)
-def test_what_a_sensor_gives_of_nothing_is_no_datum(zero: Any, datum: float, tmp_path: Path) -> None:
-    """Of readings in V, as of 4 to 20 mA, the gain begins at the zero; a torque that is stated is one of the rig."""
-    (tmp_path / "run.csv").write_text(text_of(recorded(turns=4)))
-    data = read_measured(mapping({"channels/torque-in/zero": zero}), [tmp_path / "run.csv"])
-    assert data.conditions[0].courses["torque-in"].accuracy.datum == pytest.approx(-datum)

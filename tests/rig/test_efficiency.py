@@ -128,17 +128,6 @@ def test_resolution_counts_where_noise_does_not_carry_over_the_steps() -> None:
     assert "resolution" not in {one.source for one in efficiency_of(condition(noisy, coarse)).contributions}
 
 
-def test_missing_channels_are_told() -> None:
-    """What is measured is listed, and what is needed."""
-    turns = exact()
-    del turns["T2"]
-    with pytest.raises(MechanismError, match=r"T1 \(effort:a\), n1 \(rate:a\), n2 \(rate:out\).*load: of a load"):
-        efficiency_of(condition(turns))
-    with pytest.raises(MechanismError, match="do not measure input and output power"):
-        efficiency_of(condition(exact()), joints={"brake": "elsewhere"})
-    assert efficiency_of(condition(exact()), joints={"brake": "out"}).value == pytest.approx(ETA)
-
-
 @pytest.mark.parametrize("swing", [0.02, 0.1, 0.3])
 def test_powers_are_means_over_time_where_the_speed_varies(swing: float) -> None:
     """Against energies over a turn, integrated in time: positions are equal steps of the angle."""
@@ -154,19 +143,6 @@ def test_powers_are_means_over_time_where_the_speed_varies(swing: float) -> None
     assert found.power_in == pytest.approx(np.mean(torque(fine)) / duration, rel=1e-5)
     timed = efficiency_of(one)  # positions are equal steps of time, and no speed is known of the angle
     assert timed.value == pytest.approx(9 * np.mean(speed(CYCLE)) / np.mean(torque(CYCLE) * speed(CYCLE)))
-
-
-def test_contributions_count_what_a_speed_does_to_the_time() -> None:
-    """Where the driver's speed gives each position its time, small changes of it are those of the ratio too."""
-    turns = exact()
-    turns["n1"] = turns["n1"] * (1 + 0.2 * np.sin(2 * CYCLE + 0.4))
-    found = efficiency_of(replace(condition(turns), speed=-50.0))
-    for one in found.contributions:
-        changed = {**turns}
-        values = changed[one.channel]
-        changed[one.channel] = values * (1 + 1e-6) if one.source == "gain" else values + 1e-6
-        slope = (efficiency_of(replace(condition(changed), speed=-50.0)).value - found.value) / 1e-6
-        assert one.sensitivity == pytest.approx(slope, rel=1e-4, abs=1e-7), (one.channel, one.source)
 
 
 def test_few_turns_have_the_factor_of_student() -> None:

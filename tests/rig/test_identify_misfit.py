@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,6 @@ import yaml
 import trunnion
 from trunnion.errors import Finding
 from trunnion.rig.identification import corrected_mapping, with_estimates
-from trunnion.views.identify import figure, report
 
 GUIDE = "S.friction.coefficient"
 MODEL = "examples/slider-crank.yaml"
@@ -100,14 +98,6 @@ def test_a_mapping_with_the_angle_that_is_found_agrees_with_the_model(
         assert with_estimates(machine, result).parameters()["drivers.O.start"] == 0.0
 
 
-def test_a_cycle_that_begins_elsewhere_is_refused_as_compare_does(folder: Path) -> None:
-    machine = trunnion.read(MODEL).with_values({"drivers.O.start": "30 deg"})
-    data = trunnion.rig.read(folder / "mapping.yaml")
-    for judged in (trunnion.rig.compare, lambda model, measured: trunnion.rig.identify(model, measured, [GUIDE])):
-        with pytest.raises(trunnion.MechanismError, match="state start: 30 deg in the mapping"):
-            judged(machine, data)
-
-
 def test_a_zero_explains_a_misfit_and_tells_the_estimate(folder: Path) -> None:
     right = identified(folder)
     assert "fit.cause" not in {one.code for one in right.trunnion.findings}
@@ -142,8 +132,6 @@ def test_a_wrong_unit_is_no_error_of_a_gain_that_is_stated(folder: Path) -> None
     errors = [one for one in result.trunnion.findings if one.severity == "error"]
     assert [one.code for one in errors] == ["fit.misfit"]
     assert cause(result).figures["size"] == pytest.approx(0.7376 - 1, abs=0.005)
-    assert "130 times its stated standard uncertainty" in cause(result).what
-    assert "accuracy" not in cause(result).remedy
     assert np.all(np.abs(result["sensor_error"].values) <= 5 + 1e-9)
 
 
@@ -166,49 +154,3 @@ def test_what_is_expected_is_the_scatter_of_what_is_used(folder: Path) -> None:
         turns = data.conditions[k].courses["M"].turns[:, mask]
         scatter = np.sqrt(np.mean(np.var(turns, axis=0, ddof=1)) / len(turns))
         assert result["rms_expected"].values[0, k] == pytest.approx(scatter, rel=1e-3)
-
-
-def test_the_legend_of_the_residuals_stands_below_the_name_of_the_condition(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    result = identified(folder)
-    sheet = figure(result, "residuals")
-    sheet.draw_without_rendering()
-    first = sheet.axes[0]
-    legend = first.get_legend()
-    assert legend is not None
-    title = next(part._suptitle for part in sheet.subfigs if "600 rpm" in part.get_suptitle())
-    assert legend.get_window_extent().y1 <= title.get_window_extent().y0 + 1
-    assert len(sheet.axes) == 2 * 2
-    assert "curves" not in sheet.get_suptitle()
-    monkeypatch.setattr("trunnion.views.identify.MOST_PANELS", 1)
-    assert "1 of 2 curves" in figure(result, "residuals").get_suptitle()
-
-
-@pytest.mark.parametrize("order", [1, -1])
-def test_residuals_of_cycles_driven_forward_and_backward_are_drawn_over_the_angles_of_each(
-    tmp_path: Path, order: int
-) -> None:
-    both = {**RIG, "schedule": {"over": {"O.speed": ["600 rpm", "-600 rpm"][::order]}, "turns": 8}}
-    trunnion.rig.observe(trunnion.read(MODEL), both, seed=3).write(tmp_path)
-    result = identified(tmp_path)
-    assert [np.sign(last - first) for first, last in json.loads(result.attrs["drive_range"])] == [order, -order]
-    axes = figure(result, "residuals").axes
-    assert {tuple(float(end) for end in np.rint(one.get_xlim())) for one in axes} == {(0, 359), (-359, 0)}
-    for one in axes:
-        low, high = one.get_xlim()
-        assert all(low - 1e-9 <= x <= high + 1e-9 for line in one.get_lines()[1:] for x in line.get_xdata())
-
-
-def test_the_report_has_the_model_and_counts_what_was_found_in_the_data(folder: Path) -> None:
-    result = identified(folder)
-    model = report(result).partition("<h2>Parameters</h2>")[2]
-    assert GUIDE in model
-    assert len(re.findall(r"<tr>", model)) > 20
-    warned = [{"severity": "warning", "where": "angle", "what": "odd", "remedy": "", "code": "x", "file": "run-1.csv"}]
-    result.attrs |= {"findings": "[]", "data_findings": json.dumps(warned)}
-    page = report(result)
-    assert 'href="#data">1 about the data' in page
-    assert "run-1.csv angle" in page
-    result.attrs |= {"data_findings": "[]"}
-    assert "No errors or warnings." in report(result)

@@ -37,7 +37,7 @@ def constant(conditions: Sequence[Array]) -> Fit:
         run=SimpleNamespace(system=None),
     )
     blocks = [
-        Block(k, "torque", Signal("torque", "effort:A", "N m", turns), turns, turns[:0])
+        Block(k, "torque", Signal("torque", "effort:A", "N m", turns), Signal("torque", "effort:A", "N m", turns[:0]))
         for k, turns in enumerate(conditions)
     ]
     fit = Fit(Evaluations(model), blocks, [])

@@ -47,57 +47,6 @@ def test_files_of_a_rig(run: Run, tmp_path: Path) -> None:
     assert "joints.B.friction.coefficient: 0.05" in (tmp_path / "data" / "truth.yaml").read_text("utf-8")
 
 
-def test_files_in_the_wrong_order(run: Run) -> None:
-    assert "name the model first" in run(RIG, FOUR_BAR).err
-    assert "is no rig file" in run(FOUR_BAR, FOUR_BAR).err
-
-
-@pytest.mark.slow
-def test_left_out_conditions_end_with_1(run: Run, tmp_path: Path) -> None:
-    text = RIG.read_text("utf-8").replace("work.resisting_torque: 2 N m", "l2: 80 mm")
-    (tmp_path / "rig.yaml").write_text(text, encoding="utf-8")
-    done = run(FOUR_BAR, "rig.yaml", "--out", "data")
-    assert done.code == 1
-    assert (
-        "rig.yaml:7: warning: schedule.conditions: condition 1 (l2 = 80 mm, A.speed = 61 rpm) is left out" in done.err
-    )
-    assert not (tmp_path / "data" / "run-01.csv").exists()
-    assert (tmp_path / "data" / "run-02.csv").exists()
-
-
-BOTH_WAYS = """trunnion-rig: 1
-schedule: {conditions: [{w: 5 rad/s}, {w: -5 rad/s}], turns: 5, idle: 0.5 s}
-rate: 2 kHz
-encoder: {per_turn: 360, kind: count, index: z}
-sensors:
-  torque: {measures: "effort:A", range: 10 N m, noise: 4 mN m, bits: 14, accuracy: {gain: 0.1 %, zero: 5 mN m}}
-  out: {measures: "rate:D", range: 20 rad/s, noise: 0.01 rad/s, bits: 14, accuracy: {zero: 0.02 rad/s}}
-"""
-
-
-@pytest.mark.spread(0, "rssr")
-@pytest.mark.parametrize("name", ["toleranced-fourbar", "rssr"])
-def test_conditions_that_turn_both_ways_by_a_dimension(program: Run, tmp_path: Path, name: str) -> None:
-    """The speed that a condition sets by way of a dimension has the direction against which its angle is held."""
-    text = (EXAMPLES / f"{name}.yaml").read_text("utf-8").replace("dimensions:\n", "dimensions:\n  w: 5 rad/s\n")
-    (tmp_path / "model.yaml").write_text(re.sub(r"A: *\{speed: [^}]*\}", "A: {speed: w}", text), encoding="utf-8")
-    (tmp_path / "rig.yaml").write_text(BOTH_WAYS, encoding="utf-8")
-    assert program("rig", "model.yaml", "rig.yaml", "--out", "data", "--seed", 2).code == 0
-    compared = program("compare", "model.yaml", "data/mapping.yaml", "--channel", "torque", "--channel", "out")
-    assert compared.code == 0, compared.err
-    assert compared.out.count("100.0\N{NO-BREAK SPACE}%") == 4
-    assert "sign" not in program("data", "data/mapping.yaml").err
-    friction = ("--parameter", "joint_defaults.friction.coefficient", "--channel", "torque")
-    fitted = program("identify", "model.yaml", "data/mapping.yaml", *friction)
-    assert fitted.code == 0, fitted.err
-    mapping = (tmp_path / "data" / "mapping.yaml").read_text("utf-8").replace("w: -5 rad/s", "w: 5 rad/s")
-    (tmp_path / "data" / "mapping.yaml").write_text(mapping, encoding="utf-8")
-    for verb, more in (("compare", ()), ("identify", friction)):
-        refused = program(verb, "model.yaml", "data/mapping.yaml", *more)
-        assert refused.code == 2
-        assert "the angle runs backwards: -47.75 rpm measured, 47.75 rpm stated of A" in refused.err
-
-
 GOOD = """trunnion-rig: 1
 schedule: {turns: 2}
 rate: 1 kHz
@@ -140,22 +89,6 @@ def test_findings_have_line_and_remedy(
     assert first.startswith(f"rig.yaml:{line}: error:"), done.err
     assert what in done.err
     assert remedy in done.err
-
-
-def test_formats(run: Run, tmp_path: Path) -> None:
-    done = run(FOUR_BAR, RIG, "--format", "xlsx", "--out", "data")
-    assert done.code == 2
-    assert "csv, parquet, tdms" in done.err
-    assert not (tmp_path / "data").exists()
-    (tmp_path / "file").write_text("", encoding="utf-8")
-    assert "cannot be made a folder" in run(FOUR_BAR, RIG, "--out", "file").err
-
-
-@pytest.mark.parametrize("path", sorted((EXAMPLES / "rig").glob("*-rig.yaml")), ids=lambda path: path.stem)
-def test_examples_of_rigs_are_read(path: Path) -> None:
-    rig = Rig.read(path)
-    assert rig.name
-    assert rig.sensors
 
 
 def test_the_page_tells_every_key() -> None:
@@ -233,20 +166,3 @@ def test_a_rig_that_fails_leaves_nothing(
     trunnion.rig.observe(model, rig, 2).write(tmp_path / where, form)
     assert set(_files(tmp_path)) >= {f"{where}/{name}" for name in ("mapping.yaml", "truth.yaml", f"run-01.{form}")}
     assert _files(tmp_path) != before
-
-
-NAMED = [
-    ("schedule: {turns: 1, idle: AB}", "schedule.idle", "'AB' refers to AB"),
-    ("schedule: {turns: 1, idle: {before: 0.1 s, after: 2 * l2}}", "schedule.idle.after", "'2 * l2' refers to l2"),
-    ("schedule: {turns: 1, idle: 1 s ± 0.1 s}", "schedule.idle", "has a tolerance"),
-]
-
-
-@pytest.mark.parametrize(("schedule", "where", "what"), NAMED)
-def test_times_of_a_schedule_are_numbers(run: Run, tmp_path: Path, schedule: str, where: str, what: str) -> None:
-    lines = [schedule if line.startswith("schedule:") else line for line in GOOD.splitlines()]
-    (tmp_path / "rig.yaml").write_text("\n".join(lines), encoding="utf-8")
-    done = run(FOUR_BAR, "rig.yaml")
-    assert done.code == 2
-    assert where in done.err
-    assert what in done.err

@@ -51,13 +51,6 @@ def test_speed_by_pulse_frequency(given: str) -> None:
             channel("rad/s", measures="rate:A", sensitivity=other)
 
 
-def test_units_of_a_sensor_without_sensitivity() -> None:
-    found = channel("rad/s", measures="rate:A", unit="rpm", range="4000 rpm", noise=0.5)
-    assert found.per == pytest.approx(60 / (2 * np.pi))
-    assert found.range == pytest.approx(4000 * 2 * np.pi / 60)
-    assert found.noise == 0.5  # a plain number is SI of what is measured
-
-
 @pytest.mark.parametrize(
     ("stated", "where", "what"),
     [
@@ -166,7 +159,3 @@ def test_phases_are_those_of_the_samples(duration: float, rate: float, count: in
     assert np.minimum(apart, duration - apart).max() < 1e-12
     assert np.all(np.diff(time) > 0)
     assert len(time) < count
-
-
-def test_phases_that_never_come_again() -> None:
-    assert len(phases(2 * np.pi / 10, 1000.0, 5000)[0]) == 5000

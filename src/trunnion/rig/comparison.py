@@ -7,18 +7,16 @@ of its own here: what its numbers are uncertain by is not in the verdict.
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.findings import model_notes
 from trunnion.cycle.summary import PEZZUTI, inputs, references
 from trunnion.errors import Finding, MechanismError, Severity, Status, counted
 from trunnion.model.arguments import strict_arguments
@@ -29,7 +27,7 @@ from trunnion.model.units import UnitError, normalise, unit
 from trunnion.results.attributes import cited, codes, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import readable
-from trunnion.rig.judge import Judgement, Verdict, difference, expanded, going_on, judge, probability, uncertainty_of
+from trunnion.rig.judge import Verdict, judge, probability
 from trunnion.rig.modelled import Modelled, apart, each, in_condition, modelled
 from trunnion.rig.reading.measurement import Condition, Measurement, Signal, efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.timebase import gathered
@@ -39,17 +37,19 @@ from trunnion.solve.loads import useful_loads, useful_springs
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "CAUSES", "GUM", "VARIABLES", "Cause", "causes", "compare", "data_findings", "hashed_files", "other_speed",
-    "written_unit",
-]  # fmt: skip
+__all__ = ["CAUSES", "VARIABLES", "causes", "compare", "data_findings", "hashed_files", "other_speed", "written_unit"]
 
 Array = NDArray[np.float64]
 GUM = "JCGM 100:2008, Evaluation of measurement data - Guide to the expression of uncertainty in measurement (GUM)"
 VAGUE = 0.5  # expanded uncertainty from which an efficiency is none
-SIGNIFICANT = 3.5  # standard deviations: of a correlation of turns that is none, in 1 of 4000 channels
 SLOWER = 0.01  # of a speed: a difference to speak of
 MOST_NAMED = 3  # conditions in one finding
+CAUSES = {
+    "zero": ("", "error of the zero that fits the residual best"),
+    "gain": ("1", "relative error of the gain that fits the residual best"),
+    "angle": ("rad", "angle by which the readings would be ahead of the model"),
+    "friction": ("1", "change of all friction, relative to the model's, that fits the residual best"),
+}
 
 # unit empty: that of each channel, in the attribute `channel_units`; "set": of what is set, in `set_units`; "drive":
 # rad, m or s, as `drive_unit` says
@@ -85,14 +85,8 @@ VARIABLES: dict[str, Variable] = {
     "within_least": Variable(CC, "1", "least share of agreeing positions for agreement of the signal"),
     "correlation": Variable(CC, "1", "correlation of measured and model over the positions"),
     "verdict": Variable(CC, "1", "code of the verdict; see the attribute verdict_meanings", np.int8),
-    "zero_error": Variable(CC, "", "error of the zero that fits the residual best"),
-    "zero_explains": Variable(CC, "1", EXPLAINED),
-    "gain_error": Variable(CC, "1", "relative error of the gain that fits the residual best"),
-    "gain_explains": Variable(CC, "1", EXPLAINED),
-    "angle_error": Variable(CC, "rad", "angle by which the readings would be ahead of the model"),
-    "angle_explains": Variable(CC, "1", EXPLAINED),
-    "friction_error": Variable(CC, "1", "change of all friction, relative to the model's, that fits the residual best"),
-    "friction_explains": Variable(CC, "1", EXPLAINED),
+    **{f"{kind}_error": Variable(CC, unit, what) for kind, (unit, what) in CAUSES.items()},
+    **{f"{kind}_explains": Variable(CC, "1", EXPLAINED) for kind in CAUSES},
     "efficiency": Variable(C, "1", "measured efficiency"),
     "efficiency_expanded": Variable(C, "1", "expanded uncertainty of the measured efficiency"),
     "efficiency_model": Variable(C, "1", "efficiency of the model"),
@@ -100,95 +94,6 @@ VARIABLES: dict[str, Variable] = {
         C, "1", "1 where the model's efficiency is within ±U, −1 where one is unknown", np.int8
     ),
 }
-
-
-# ---- what is compared -----------------------------------------------------------------------------------------
-
-
-class Cause(NamedTuple):
-    """An error by itself: its size, and the share of the mean square of the residual that goes away with it."""
-
-    size: float = np.nan
-    share: float = np.nan
-
-
-CAUSES = ("zero", "gain", "angle", "friction")
-
-
-def causes(
-    residual: Array, model: Array, datum: float = 0.0, drive: Array | None = None, frictionless: Array | None = None
-) -> dict[str, Cause]:
-    """Fit the shape of each error to a residual by least squares, one coefficient each, to first order.
-
-    Parameters
-    ----------
-    residual : (position,), measured minus model; NaN where the two are not compared.
-    model : (position,), the course of the model.
-    datum : value at which the sensor reads 0: from there an error of its gain acts.
-    drive : (position,), angle of the driver, rad; None if turns of a driver do not name the positions.
-    frictionless : (position,), the model without its friction; None if it has none.
-
-    Returns
-    -------
-    By kind, of those that change the course: the size of a zero in the unit of the course; of a gain relative; of the
-    angle in rad by which the readings are ahead of the model; of friction relative to the model's.
-    """
-    shapes = {"zero": np.ones_like(model), "gain": model - datum}
-    if drive is not None and len(drive) > 1:
-        shapes["angle"] = np.gradient(model) / np.gradient(drive)
-    if frictionless is not None:
-        shapes["friction"] = model - frictionless
-    explained = {}
-    for kind, shape in shapes.items():
-        where = np.isfinite(residual) & np.isfinite(shape)
-        gap, along = residual[where], shape[where]
-        square, total = float(along @ along), float(gap @ gap)
-        if square > 0 and total > 0:
-            size = float(along @ gap) / square
-            explained[kind] = Cause(size, size**2 * square / total)
-    return explained
-
-
-class ChannelComparison(NamedTuple):
-    """One channel in one condition. causes: what would explain the residual, by kind; empty where it is within U."""
-
-    signal: Signal
-    model: Array
-    comparable: NDArray[np.bool_]
-    judgement: Judgement
-    causes: Mapping[str, Cause]
-
-
-class EfficiencyComparison(NamedTuple):
-    """Efficiency of a condition: measured, its expanded uncertainty, and of the model.
-
-    doubt: why the uncertainty is not known, with what to do about it; both empty if it is.
-    """
-
-    measured: float
-    expanded: float
-    model: float
-    doubt: tuple[str, str] = ("", "")
-
-    @property
-    def within(self) -> int:
-        """1 if the model lies within ±U, 0 if not, −1 where one of the three is unknown."""
-        complete = np.isfinite([self.measured, self.expanded, self.model]).all()
-        return int(abs(self.measured - self.model) <= self.expanded) if complete else -1
-
-
-@dataclass(frozen=True, eq=False)
-class ConditionComparison:
-    """A condition with its model and its channels.
-
-    unmeasured: drivers, useful loads and springs whose power no channel measures, where others do: no efficiency then.
-    """
-
-    condition: Condition
-    model: Modelled
-    channels: Mapping[str, ChannelComparison]
-    efficiency: EfficiencyComparison | None
-    unmeasured: tuple[str, ...]
 
 
 @strict_arguments
@@ -229,23 +134,19 @@ def compare(
     """
     if not (np.isfinite(coverage) and 0 < coverage <= 8):
         raise MechanismError(Finding(f"{coverage:g} is no coverage factor", "coverage", "give such as 2, up to 8"))
-    measures = _measures(measurement, channels)
-    method = friction_method or FrictionMethod()
-    rows = each(measurement.conditions, lambda one: _condition(mechanism, one, measures, coverage, method), progress)
-    arrays, sets = _arrays(measures, rows, coverage)
+    measures, method = _measures(measurement, channels), friction_method or FrictionMethod()
+    rows = each(measurement.conditions, lambda item: _compared(mechanism, item, measures, coverage, method), progress)
+    sets = list(dict.fromkeys(name for row in rows for name in row.condition.values))
     labels = {"channel": list(measures), "condition": [row.condition.name for row in rows], "set": sets}
-    attributes = _attributes(mechanism, measurement, measures, rows, coverage, method)
-    return dataset_of("comparison", described(arrays, VARIABLES), labels, attributes)
+    attributes = _attributes(mechanism, measurement, measures, sets, rows, coverage, method)
+    return dataset_of("comparison", described(_arrays(list(measures), sets, rows), VARIABLES), labels, attributes)
 
 
 def _measures(measurement: Measurement, channels: Sequence[str] | None) -> dict[str, str]:
     """What each channel measures, by name; MechanismError if there is none, or not one that is asked for."""
     every: dict[str, str] = {}
-    for name, signal in (
-        (name, one) for condition in measurement.conditions for name, one in condition.courses.items()
-    ):
-        if signal.measures:
-            every.setdefault(name, signal.measures)
+    for condition in measurement.conditions:
+        every = {name: signal.measures for name, signal in condition.courses.items() if signal.measures} | every
     if missing := [name for name in channels or () if name not in every]:
         raise MechanismError(
             [Finding(f"there is no channel '{name}'", "--channel", nearest(name, every)) for name in missing]
@@ -254,10 +155,28 @@ def _measures(measurement: Measurement, channels: Sequence[str] | None) -> dict[
         what = "no channel measures anything of the model" if measurement.conditions else "there is no condition in it"
         remedy = "state measures: effort:DRIVER of a channel in the mapping"
         raise MechanismError(Finding(what, measurement.name, remedy))
-    return every if channels is None else {name: every[name] for name in dict.fromkeys(channels)}
+    return {name: every[name] for name in dict.fromkeys(every if channels is None else channels)}
 
 
-def _condition(
+# ---- one condition ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class ConditionComparison:
+    """A condition beside its model.
+
+    figures: by channel, by variable of the result; under "" those of the condition, with the efficiency if there is
+    one; doubt: why its uncertainty is not known, and what to do about it.
+    """
+
+    condition: Condition
+    model: Modelled
+    signals: Mapping[str, Signal]
+    figures: Mapping[str, Mapping[str, Any]]
+    doubt: tuple[str, str]
+
+
+def _compared(
     mechanism: Mechanism, condition: Condition, measures: Mapping[str, str], coverage: float, method: FrictionMethod
 ) -> ConditionComparison:
     measured = {name: what for name, what in measures.items() if name in condition.courses}
@@ -267,21 +186,63 @@ def _condition(
     of_powers = {signal.channel: signal.measures for pair in pairs for signal in pair}
     model = modelled(mechanism, condition, measured, method, of_powers)
     without_friction = cache(lambda: _frictionless(mechanism, condition, measured, method))
-    channels = {}
-    for name in measured:
-        signal = replace(condition.courses[name], local=model.left_open.get(name, 0.0))
+    figures: dict[str, dict[str, Any]] = {"": {"phase": condition.phase, "drive": model.drive, "status": model.status}}
+    signals = {name: replace(condition.courses[name], local=model.left_open.get(name, 0.0)) for name in measured}
+    for name, signal in signals.items():
         course, comparable = model.courses[name], model.comparable(name)
-        judgement, explained = judge(signal, course, comparable, coverage), {}
-        if judgement.verdict in (Verdict.NOT, Verdict.OFFSET):
-            residual = np.where(comparable, difference(signal.mean, course), np.nan)
+        figures[name] = judge(signal, course, comparable, model.drive, coverage)
+        if figures[name]["verdict"] in (Verdict.NOT, Verdict.OFFSET):
             drive = model.drive if model.unit == "rad" else None
             free = None if model.measures[name].of_motion else without_friction().get(name)
-            explained = causes(residual, course, signal.accuracy.datum, drive, free)
-        channels[name] = ChannelComparison(signal, course, comparable, judgement, explained)
-    unmeasured = _unmeasured(mechanism, condition) if powers else ()
-    comparable_powers = powers is not None and not unmeasured and of_powers.keys() <= model.courses.keys()
-    efficiency = _efficiency(condition, model, joints, coverage) if comparable_powers else None
-    return ConditionComparison(condition, model, channels, efficiency, unmeasured)
+            gap = np.where(comparable, figures[name]["residual"], np.nan)
+            for kind, (size, share) in causes(gap, course, signal.accuracy.datum, drive, free).items():
+                figures[name] |= {f"{kind}_error": size, f"{kind}_explains": share}
+    doubt = ("", "")
+    efforts = {signal.measures for signal in condition.courses.values()}
+    needed = {f"effort:{name}": f"drivers.{name}" for name in mechanism.drivers}
+    needed |= {f"load:{name}": f"loads.{name}" for name in useful_loads(mechanism)}
+    missing = [name for measure, name in needed.items() if measure not in efforts]
+    missing += [f"springs.{name}" for name in useful_springs(mechanism)]
+    if powers and missing:
+        remedy = "measure effort: of every driver and load: of every useful load, each with its rate:"
+        doubt = f"the power of {', '.join(missing)} is not measured", remedy
+    elif powers and of_powers.keys() <= model.courses.keys():
+        efficiency, doubt = _efficiency(condition, model, joints, coverage)
+        figures[""] |= efficiency
+    return ConditionComparison(condition, model, signals, figures, doubt)
+
+
+def causes(
+    residual: Array, model: Array, datum: float = 0.0, drive: Array | None = None, frictionless: Array | None = None
+) -> dict[str, tuple[float, float]]:
+    """Fit the shape of each error to a residual by least squares, one coefficient each, to first order.
+
+    Parameters
+    ----------
+    residual, model : (position,), measured minus model, NaN where they are not compared; the course of the model.
+    datum : value at which the sensor reads 0: from there an error of its gain acts.
+    drive : (position,), angle of the driver, rad; None if turns of a driver do not name the positions.
+    frictionless : (position,), the model without its friction; None if it has none.
+
+    Returns
+    -------
+    By kind, of those that change the course, the size, see CAUSES, and the share of the mean square of the residual
+    that goes away with it.
+    """
+    shapes = {"zero": np.ones_like(model), "gain": model - datum}
+    if drive is not None and len(drive) > 1:
+        shapes["angle"] = np.gradient(model) / np.gradient(drive)
+    if frictionless is not None:
+        shapes["friction"] = model - frictionless
+    explained = {}
+    for kind, shape in shapes.items():
+        where = np.isfinite(residual) & np.isfinite(shape)
+        gap, along = residual[where], shape[where]
+        square, total = float(along @ along), float(gap @ gap)
+        if square > 0 and total > 0:
+            size = float(along @ gap) / square
+            explained[kind] = size, size**2 * square / total
+    return explained
 
 
 def _frictionless(
@@ -289,143 +250,94 @@ def _frictionless(
 ) -> Mapping[str, Array]:
     """Courses of the model without its friction; none where it has no friction, or has no answer without it."""
     stated = in_condition(mechanism, condition)
-    try:
+    with suppress(MechanismError):
         free = stated.with_friction("off")
-        if free.data() == stated.data():
-            return {}
-        return modelled(free, replace(condition, values={}, units={}), channels, method).courses
-    except MechanismError:
-        return {}
-
-
-def _unmeasured(mechanism: Mechanism, condition: Condition) -> tuple[str, ...]:
-    """Drivers, useful loads and springs whose effort no channel measures, by their entries in the model."""
-    measured = {signal.measures for signal in condition.courses.values()}
-    drivers = (f"drivers.{name}" for name in mechanism.drivers if f"effort:{name}" not in measured)
-    loads = (f"loads.{name}" for name in useful_loads(mechanism) if f"load:{name}" not in measured)
-    return (*drivers, *loads, *(f"springs.{name}" for name in useful_springs(mechanism)))
+        if free.data() != stated.data():
+            return modelled(free, replace(condition, values={}, units={}), channels, method).courses
+    return {}
 
 
 def _efficiency(
     condition: Condition, model: Modelled, joints: Mapping[str, str], coverage: float
-) -> EfficiencyComparison:
-    """Efficiency as a rig computes it: of the measured courses, and of the model's in their place."""
-    solved, theirs = model.status < Status.NOT_CONVERGED, float("nan")
+) -> tuple[dict[str, float], tuple[str, str]]:
+    """Efficiency as a rig computes it, of the measured courses and of the model's in their place; and a doubt."""
+    solved = model.status < Status.NOT_CONVERGED
     courses = {  # a load has no torque where its joint rests, and takes no power
         name: replace(condition.courses[name], turns=np.where(solved, np.nan_to_num(course), course)[np.newaxis])
         for name, course in model.courses.items()
     }
-    with suppress(MechanismError):  # it has no answer at some position
+    value, half, theirs, doubt = np.nan, np.nan, np.nan, ("", "")
+    with suppress(MechanismError):  # the model has no answer at some position
         # its positions are equal steps of time, whatever those of the measurement are
         theirs = efficiency_of(replace(condition, courses=courses, speed=np.nan), joints).value
     try:
         measured = efficiency_of(condition, joints)
+        value, half = measured.value, measured.factor(coverage) * measured.uncertainty
+        if measured.turns < 2:
+            doubt = "there is only one turn: the uncertainty cannot be estimated without scatter", "measure more turns"
+        elif half > VAGUE or value > 1 + half:
+            doubt = f"{value:.4f} ± {half:.3g} is no efficiency", "check sign, gain, unit and column of its channels"
     except MechanismError as error:  # no turn is whole, or no power goes in
-        return EfficiencyComparison(np.nan, np.nan, theirs, (error.findings[0].what, error.findings[0].remedy))
-    wrong = "a sign, a gain, a unit or a column of its channels is wrong"
-    half, doubt = measured.factor(coverage) * measured.uncertainty, ("", "")
-    if measured.turns < 2:
-        doubt = "there is only one turn: the uncertainty cannot be estimated without scatter", "measure more turns"
-    elif half > VAGUE:
-        doubt = f"its U of {half:.3g} is not meaningful: {wrong}", "check their means"
-    elif measured.value > 1 + half:
-        doubt = f"{measured.value:.4g} is above 1: {wrong}", "check their means"
-    return EfficiencyComparison(measured.value, np.nan if doubt[0] else half, theirs, doubt)
+        doubt = error.findings[0].what, error.findings[0].remedy
+    half = np.nan if doubt[0] else half
+    within = float(abs(value - theirs) <= half) if np.isfinite([value, half, theirs]).all() else -1.0
+    figures = {"": value, "_expanded": half, "_model": theirs, "_within": within}
+    return {f"efficiency{key}": figure for key, figure in figures.items()}, doubt
 
 
 # ---- the result -----------------------------------------------------------------------------------------------
 
 
-def _arrays(
-    measures: Mapping[str, str], rows: Sequence[ConditionComparison], coverage: float
-) -> tuple[dict[str, NDArray[Any]], list[str]]:
-    """All variables, and the names of what is set."""
-    sets = list(dict.fromkeys(name for row in rows for name in row.condition.values))
+def _arrays(channels: list[str], sets: list[str], rows: Sequence[ConditionComparison]) -> dict[str, NDArray[Any]]:
+    """All variables; no efficiency where none was measured."""
     positions = max(len(row.condition.phase) for row in rows)
-    sizes = {"set": len(sets), "condition": len(rows), "channel": len(measures), "position": positions}
+    sizes = {"set": len(sets), "condition": len(rows), "channel": len(channels), "position": positions}
     arrays: dict[str, NDArray[Any]] = {name: variable.blank(sizes) for name, variable in VARIABLES.items()}
     arrays["verdict"][:], arrays["efficiency_within"][:] = Verdict.NOTHING, -1
     arrays["status"][:] = Status.NOT_ASSEMBLED  # of positions that a condition with fewer does not have
     for k, row in enumerate(rows):
         arrays["value"][:, k] = [row.condition.values.get(name, np.nan) for name in sets]
-        for name, course in (("phase", row.condition.phase), ("drive", row.model.drive), ("status", row.model.status)):
-            arrays[name][k, : len(course)] = course
-        for i, name in enumerate(measures):
-            if name in row.channels:
-                for key, number in _numbers(row.channels[name], row.model.drive, coverage):
-                    at = (i, k, slice(0, len(row.condition.phase)))
-                    arrays[key][at[: arrays[key].ndim]] = number
-        if (efficiency := row.efficiency) is not None:
-            arrays["efficiency"][k], arrays["efficiency_expanded"][k] = efficiency.measured, efficiency.expanded
-            arrays["efficiency_model"][k], arrays["efficiency_within"][k] = efficiency.model, efficiency.within
-    if all(row.efficiency is None for row in rows):
-        arrays = {name: array for name, array in arrays.items() if not name.startswith("efficiency")}
-    return arrays, sets
-
-
-def _numbers(channel: ChannelComparison, drive: Array, coverage: float) -> Iterator[tuple[str, Any]]:
-    """The numbers of one channel in one condition, by variable."""
-    signal, model, judgement, of = channel.signal, channel.model, channel.judgement, uncertainty_of(channel.signal)
-    yield from {
-        "measured": signal.mean, "scatter": signal.scatter, "uncertainty": of.total,
-        "expanded": expanded(of.total, of.freedom, coverage), "model": model,
-        "residual": difference(signal.mean, model),
-        "compared": channel.comparable & np.isfinite(signal.mean) & np.isfinite(model),
-        "turns": len(signal.turns), "accuracy_zero": signal.accuracy.zero, "accuracy_gain": signal.accuracy.gain,
-        "within_least": judgement.least,
-        "largest_at": drive[judgement.place] if judgement.place >= 0 else np.nan,
-    }.items()  # fmt: skip
-    for name, figure in vars(judgement).items():
-        if name in VARIABLES:
-            yield name, figure
-    for kind, cause in channel.causes.items():
-        yield f"{kind}_error", cause.size
-        yield f"{kind}_explains", cause.share
+        for channel, figures in row.figures.items():
+            at: dict[str, int | slice] = {"condition": k, "position": slice(0, len(row.condition.phase))}
+            at["channel"] = channels.index(channel) if channel else 0
+            for name, figure in figures.items():
+                arrays[name][tuple(at[dim] for dim in VARIABLES[name].dims)] = figure
+    measured = any("efficiency" in row.figures[""] for row in rows)
+    return {name: array for name, array in arrays.items() if measured or not name.startswith("efficiency")}
 
 
 def _attributes(
-    mechanism: Mechanism,
-    measurement: Measurement,
-    measures: Mapping[str, str],
-    rows: Sequence[ConditionComparison],
-    coverage: float,
-    method: FrictionMethod,
-) -> dict[str, Any]:
-    first = rows[0].model
-    signals = {name: next(row.channels[name].signal for row in rows if name in row.channels) for name in measures}
-    entries = {row["path"]: row for row in inputs(mechanism)}
-    names = dict.fromkeys(name for row in rows for name in row.condition.values)
-    sets = [entries.get(mechanism.path_of(name), {"unit": "", "text": ""}) for name in names]
-    efficiencies = [row.efficiency.within for row in rows if row.efficiency is not None]
-    verdicts = [channel.judgement.verdict for row in rows for channel in row.channels.values()]
+    mechanism: Mechanism, measurement: Measurement, measures: Mapping[str, str], sets: Sequence[str],
+    rows: Sequence[ConditionComparison], coverage: float, method: FrictionMethod,
+) -> dict[str, Any]:  # fmt: skip
+    first, entries = rows[0].model, {row["path"]: row for row in inputs(mechanism)}
+    signals = {name: next(row.signals[name] for row in rows if name in row.signals) for name in measures}
+    stated = [entries.get(mechanism.path_of(name), {"unit": "", "text": ""}) for name in sets]
+    figures = [figures for row in rows for figures in row.figures.values()]
+    agreed = [item["verdict"] is Verdict.WITHIN for item in figures if "verdict" in item]
+    agreed += [item["efficiency_within"] == 1 for item in figures if "efficiency_within" in item]
+    drive = {"drive_unit": first.unit, "drive_span": first.span}
+    drive["drive_name"] = next(iter(mechanism.drivers), "") if first.unit != "s" else ""
     return {
         "comparing": measurement.name,
-        **origin(
-            mechanism,
-            first.run.system.plan.formula,
-            drive_unit=first.unit,
-            drive_name=next(iter(mechanism.drivers), "") if first.unit != "s" else "",
-            drive_span=first.span,
-            periodic=int(all(row.model.run.cycle.periodic for row in rows)),
-            all_within=int(all(one == Verdict.WITHIN for one in verdicts) and all(one == 1 for one in efficiencies)),
-            coverage=coverage,
-            probability=probability(coverage),
-        ),
-        "method": method.name,
+        **origin(mechanism, first.run.system.plan.formula, **drive),
+        "periodic": int(all(row.model.run.cycle.periodic for row in rows)),
+        "all_within": int(all(agreed)),
+        "method": method.name, "coverage": coverage, "probability": probability(coverage),
         **cited(dict.fromkeys([GUM, PEZZUTI, *references(mechanism)])),
         **codes("verdict", Verdict),
         "channel_units": [signal.unit for signal in signals.values()],
         "channel_read_in": [signal.read_in for signal in signals.values()],
         "channel_measures": list(measures.values()),
-        "set_units": [one["unit"] for one in sets],
-        "set_written": [written_unit(one["text"], one["unit"]) for one in sets],
-        "findings": finding_rows(_findings(mechanism, measures, rows)),
+        "set_units": [entry["unit"] for entry in stated],
+        "set_written": [written_unit(entry["text"], entry["unit"]) for entry in stated],
+        "findings": finding_rows(_findings(mechanism, list(measures), rows)),
         "data_findings": data_findings(measurement),
         "done": list(measurement.done),
         "files": hashed_files(row.condition for row in rows),
         "condition_files": [list(row.condition.files) for row in rows],
         "inputs": inputs(mechanism),
-    }
+    }  # fmt: skip
 
 
 def written_unit(source: object, si: str) -> tuple[str, float]:
@@ -443,14 +355,13 @@ def written_unit(source: object, si: str) -> tuple[str, float]:
 def data_findings(measurement: Measurement) -> list[dict[str, Any]]:
     """What was found while the data were read, with the file."""
     findings = gathered(measurement.findings)
-    return [{**row, "file": one.file} for row, one in zip(finding_rows(findings), findings, strict=True)]
+    return [{**row, "file": finding.file} for row, finding in zip(finding_rows(findings), findings, strict=True)]
 
 
 def hashed_files(conditions: Iterable[Condition]) -> list[dict[str, Any]]:
     """Name, size and SHA-256 of every file of the data; without the last two where it is not at hand."""
     rows = []
-    for name in dict.fromkeys(name for condition in conditions for name in condition.files):
-        path = Path(name)
+    for path in dict.fromkeys(Path(name) for condition in conditions for name in condition.files):
         row: dict[str, Any] = {"file": path.name, "bytes": None, "sha256": ""}
         if path.is_file():
             with path.open("rb") as file:
@@ -462,136 +373,86 @@ def hashed_files(conditions: Iterable[Condition]) -> list[dict[str, Any]]:
 # ---- findings -------------------------------------------------------------------------------------------------
 
 
-def _findings(mechanism: Mechanism, channels: Iterable[str], rows: Sequence[ConditionComparison]) -> list[Finding]:
-    """Errors first."""
-    names = list(channels)
-    findings = [
-        *_no_answer(rows),
-        *other_speed(next(iter(mechanism.drivers), ""), [(row.condition, row.model.speed) for row in rows]),
-        *(finding for name in names for finding in _of_channel(name, rows)),
-        *_of_efficiency(rows),
-        *_of_model(rows),
-    ]
-    accuracies = [(name, one.signal.accuracy) for row in rows for name, one in row.channels.items()]
-    stated = {name for name, accuracy in accuracies if accuracy.zero or accuracy.gain}
-    if bare := [name for name in names if name not in stated]:
+def _findings(mechanism: Mechanism, channels: Sequence[str], rows: Sequence[ConditionComparison]) -> list[Finding]:
+    """Errors first: positions without an answer, speeds, channels and efficiencies that do not agree or are unknown."""
+    findings = [*dict.fromkeys(finding for row in rows for finding in row.model.run.chosen.findings)]
+    findings += other_speed(next(iter(mechanism.drivers), ""), [(row.condition, row.model.speed) for row in rows])
+    for code in Status:
+        if cases := [row for row in rows if not code.solved and np.any(row.model.status == code)]:
+            count, positions = int(np.count_nonzero(cases[0].model.status == code)), len(cases[0].condition.phase)
+            values = "".join(f" --set {name}={value:.6g}" for name, value in cases[0].condition.values.items())
+            what = f"the model has no solution {_in_which(cases, rows)}, the first at {count:,} of "
+            what += f"{counted(positions, 'position')}: {code.text}"
+            remedy = f"run analyse{values} to see where in the cycle, and why"
+            figures = {"count": count, "positions": positions, "status": code.text}
+            findings.append(Finding.error("compare.no_answer", "", what, remedy, **figures))
+    for name in channels:
+        findings += _of_channel(name, [row for row in rows if name in row.signals])
+    cases, own = [row for row in rows if "efficiency" in row.figures[""]], "efficiency"
+    if off := [row for row in cases if row.figures[""]["efficiency_within"] == 0]:
+        most = max(off, key=lambda row: abs(row.figures[""][own] - row.figures[""]["efficiency_model"]))
+        measured, half, model = (most.figures[""][f"{own}{key}"] for key in ("", "_expanded", "_model"))
+        what = f"does not agree within U {_in_which(off, cases)}; the most in {most.condition.name}: measured "
+        what += f"{measured:.4f} ± {half:.2g}, model {model:.4f}"
+        remedy = "check the channels; `trunnion identify` fits the friction of the model to them"
+        figures = {"measured": measured, "expanded": half, "model": model}
+        findings.append(Finding.error("compare.efficiency", own, what, remedy, **figures))
+    for what, remedy in dict.fromkeys(row.doubt for row in rows if row.doubt[0]):
+        where = _in_which([row for row in rows if row.doubt == (what, remedy)], rows)
+        findings.append(Finding.warning("compare.efficiency_unknown", own, f"not known {where}: {what}", remedy))
+    accuracies = [(name, signal.accuracy) for row in rows for name, signal in row.signals.items()]
+    if bare := [name for name in channels if not any(a.zero or a.gain for own, a in accuracies if own == name)]:
         what = f"no accuracy of zero and gain is stated for {', '.join(bare)}: U includes only the scatter between "
         remedy = "state accuracy: {gain: …, zero: …} in the mapping"
         findings.append(Finding.note("compare.no_accuracy", "channels", f"{what}turns", remedy, channels=bare))
     return sorted(findings, key=lambda finding: list(Severity).index(finding.severity))
 
 
-def _in_which(conditions: Sequence[Condition], count: int) -> str:
-    """In which of so many conditions."""
-    if len(conditions) == count:
-        return "in every condition" if count > 1 else f"in {conditions[0].name}"
-    names = "; ".join(one.name for one in conditions[:MOST_NAMED]) + "; …" * (len(conditions) > MOST_NAMED)
-    return f"in {len(conditions)} of {counted(count, 'condition')} ({names})"
-
-
 def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
-    """Where a channel is not within U, cannot be judged, or has turns that resemble each other."""
-    cases = [(row.condition, row.channels[name]) for row in rows if name in row.channels]
-    where = f"channels.{name}"
-
-    def of(*verdicts: Verdict) -> tuple[list[ChannelComparison], str]:
-        chosen = [(condition, one) for condition, one in cases if one.judgement.verdict in verdicts]
-        return [one for _, one in chosen], _in_which([one for one, _ in chosen], len(cases)) if chosen else ""
-
-    off, in_which = of(Verdict.NOT, Verdict.OFFSET)
-    if off:
-        rms, within = max(one.judgement.rms for one in off), min(one.judgement.within for one in off)
-        unit, size = off[0].signal.shown
-        rms_text = f"{rms / size:.3g} {unit}" if unit not in ("rad", "1") else readable(rms, unit, 3)
-        offset = " apart from a constant offset" * all(one.judgement.verdict is Verdict.OFFSET for one in off)
-        down, up = ("down to ", "up to ") if len(off) > 1 else ("", "")
-        what = f"does not agree within U {in_which}{offset}: {down}{100 * within:.0f} % of the positions agree, RMS of "
-        what += f"the residual {up}{rms_text}"
+    """Where a channel is not within U, or cannot be judged."""
+    where, by_verdict = f"channels.{name}", dict[Verdict, list[ConditionComparison]]()
+    for row in rows:
+        by_verdict.setdefault(row.figures[name]["verdict"], []).append(row)
+    if off := [*by_verdict.get(Verdict.NOT, []), *by_verdict.get(Verdict.OFFSET, [])]:
+        rms = max(row.figures[name]["rms"] for row in off)
+        within = 100 * min(row.figures[name]["within"] for row in off)
+        own, size = off[0].signals[name].shown
+        rms_text = f"{rms / size:.3g} {own}" if own not in ("rad", "1") else readable(rms, own, 3)
+        offset = " apart from a constant offset" * (Verdict.NOT not in by_verdict)
+        what = f"does not agree within U {_in_which(off, rows)}{offset}: at worst {within:.0f} % of the positions "
+        what += f"agree, and the RMS of the residual is {rms_text}"
         remedy = "see what would explain it; `trunnion identify` fits friction and other numbers of the model"
-        yield Finding.error("compare.not_within", where, what, remedy, within_percent=100 * within, rms=rms)
-    unknown, in_which = of(Verdict.UNKNOWN)
-    if unknown:
-        turns = max(len(one.signal.turns) for one in unknown)
-        what = f"has no position with values from two turns, of {counted(turns, 'turn')}: its uncertainty cannot be "
-        what += f"estimated without scatter, {in_which}"
-        remedy = "measure more turns, or see the gaps reported by `trunnion data`"
-        yield Finding.warning("compare.turns_few", where, what, remedy, turns=turns)
-    nothing, in_which = of(Verdict.NOTHING)
-    if nothing:
-        what = f"not compared, for lack of measured values or of a solution of the model, {in_which}"
-        yield Finding.warning("compare.nothing", where, what)
-    correlations = [going_on(one.signal) for _, one in cases]
-    count = sum(turns for _, turns in correlations)
-    mean = sum(value * turns for value, turns in correlations if turns) / max(count, 1)
-    if mean * math.sqrt(count) > SIGNIFICANT:
-        what = f"the errors of successive turns are correlated, {mean:+.2f}: U assumes independent turns"
-        remedy = "measure many more turns, or turns further apart; state the drift of the zero in accuracy:"
-        yield Finding.warning("compare.turns_alike", where, what, remedy, correlation=mean)
+        yield Finding.error("compare.not_within", where, what, remedy, within_percent=within, rms=rms)
+    remedy = "measure more turns, or see the gaps reported by `trunnion data`"
+    if unknown := by_verdict.get(Verdict.UNKNOWN):
+        what = f"has no position with values from two turns, so that U is not known, {_in_which(unknown, rows)}"
+        yield Finding.warning("compare.turns_few", where, what, remedy)
+    if nothing := by_verdict.get(Verdict.NOTHING):
+        what = f"not compared, for lack of measured values or of a solution of the model, {_in_which(nothing, rows)}"
+        yield Finding.warning("compare.nothing", where, what, remedy)
 
 
-def _of_efficiency(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
-    """Where the efficiencies do not agree, and where there is none."""
-    cases = [(row.condition, row.efficiency) for row in rows if row.efficiency is not None]
-    if off := [(condition, one) for condition, one in cases if one.within == 0]:
-        worst, most = max(off, key=lambda case: abs(case[1].measured - case[1].model))
-        where = _in_which([condition for condition, _ in off], len(cases))
-        where += f"; the most in {worst.name}" if len(off) > 1 else ""
-        what = f"does not agree within U {where}: measured {most.measured:.4f} ± {most.expanded:.2g}, "
-        remedy = "check the channels; `trunnion identify` fits the friction of the model to them"
-        figures = {"measured": most.measured, "expanded": most.expanded, "model": most.model}
-        yield Finding.error("compare.efficiency", "efficiency", f"{what}model {most.model:.4f}", remedy, **figures)
-    for missing in dict.fromkeys(row.unmeasured for row in rows if row.unmeasured):
-        where = _in_which([row.condition for row in rows if row.unmeasured == missing], len(rows))
-        what = f"not compared {where}: the power of {', '.join(missing)} is not measured"
-        remedy = "measure effort: of every driver and load: of every useful load, each with its rate:"
-        yield Finding.warning("compare.efficiency_unmeasured", "efficiency", what, remedy, missing=list(missing))
-    for what, remedy in dict.fromkeys(one.doubt for _, one in cases if one.doubt[0]):
-        where = _in_which([condition for condition, one in cases if one.doubt == (what, remedy)], len(cases))
-        yield Finding.warning("compare.efficiency_unknown", "efficiency", f"not known {where}: {what}", remedy)
+def _in_which(rows: Sequence[ConditionComparison | Condition], every: Sequence[Any]) -> str:
+    """In which of all conditions."""
+    names = [(row if isinstance(row, Condition) else row.condition).name for row in rows]
+    if len(names) == len(every):
+        return "in every condition" if len(names) > 1 else f"in {names[0]}"
+    named = "; ".join(names[:MOST_NAMED]) + "; …" * (len(names) > MOST_NAMED)
+    return f"in {len(names)} of {counted(len(every), 'condition')} ({named})"
 
 
 def other_speed(driver: str, rows: Sequence[tuple[Condition, float]]) -> Iterator[Finding]:
     """Of a driver whose speed, rad/s, in the model differs from that of the conditions; an error if by much."""
-    off = [(condition, speed) for condition, speed in rows if apart(condition.speed, speed, SLOWER)]
-    if not off:
+    if not (off := [(condition, speed) for condition, speed in rows if apart(condition.speed, speed, SLOWER)]):
         return
-    sensor = {signal.measures: signal for one, _ in rows for signal in one.courses.values()}.get(f"rate:{driver}")
-    unit, size = sensor.shown if sensor is not None and sensor.read_in[0] else ("rpm", np.pi / 30)
-    first, speed = off[0]
-    where = _in_which([one for one, _ in off], len(rows))
-    what = f"the measured speed of the driver differs from that of the model {where}: "
-    what += f"{first.speed / size:.4g} {unit} measured, {speed / size:.4g} {unit} in the model in {first.name}"
+    signals = {signal.measures: signal for condition, _ in rows for signal in condition.courses.values()}
+    sensor = signals.get(f"rate:{driver}")
+    own, size = sensor.shown if sensor is not None and sensor.read_in[0] else ("rpm", np.pi / 30)
+    (first, speed), which = off[0], _in_which([condition for condition, _ in off], rows)
+    what = f"the measured speed of the driver differs from that of the model {which}: {first.speed / size:.4g} {own} "
+    what += f"measured, {speed / size:.4g} {own} in the model in {first.name}"
     mean = f"{{mean: {sensor.channel if sensor is not None else 'angle'}}}"
     remedy = f"state set: {{{as_key(f'{driver}.speed')}: {mean}}} in the mapping: the model then runs at this speed"
-    severity = Severity.ERROR if any(apart(one.speed, model) for one, model in off) else Severity.WARNING
+    severity = Severity.ERROR if any(apart(condition.speed, model) for condition, model in off) else Severity.WARNING
     figures = {"measured": first.speed, "model": speed, "driver": driver}
     yield Finding.weighed(severity, "compare.speed", f"drivers.{driver}", what, remedy, **figures)
-
-
-def _no_answer(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
-    """An error for every status that leaves positions of the model without numbers."""
-    for code in Status:
-        cases = [row for row in rows if not code.solved and np.any(row.model.status == code)]
-        if not cases:
-            continue
-        first = cases[0]
-        count, positions = int(np.count_nonzero(first.model.status == code)), len(first.condition.phase)
-        values = "".join(f" --set {name}={value:.6g}" for name, value in first.condition.values.items())
-        what = f"the model has no solution {_in_which([row.condition for row in cases], len(rows))}, the first at "
-        what += f"{count:,} of {counted(positions, 'position')}: {code.text}"
-        remedy = f"run analyse{values} to see where in the cycle, and why"
-        figures = {"count": count, "positions": positions, "status": code.text}
-        yield Finding.error("compare.no_answer", "", what, remedy, **figures)
-
-
-def _of_model(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
-    """What every analysis of this model says, and warnings of single conditions."""
-    alike: dict[tuple[str, str], list[Finding]] = {}
-    for row in rows:
-        run = row.model.run
-        left_open = run.determinacy.findings() if run.determinacy is not None else []
-        for finding in (*model_notes(run.system.mechanism, run.system), *run.chosen.findings, *left_open):
-            alike.setdefault((finding.where, finding.what), []).append(finding)
-    for findings in alike.values():
-        if len(findings) == len(rows) or findings[0].severity is not Severity.NOTE:
-            yield findings[0]

@@ -1,16 +1,16 @@
 """Whether a model lies within the uncertainty of what was measured, position by position and as a whole.
 
 The expanded uncertainty U = k_p u of a position has the coverage probability that `coverage` (2) has of a normal
-distribution: k_p is Student's for the effective degrees of freedom of u (GUM, JCGM 100:2008, G.4 and G.6.4), so that it
-is 2 where turns are many or the sensor's own uncertainty prevails, and more where turns are few. Of a true model about
-that share of the positions lies within ±U. How far a single course may stay below it depends on how many of its
-positions are independent of each other, which the turns show (`independent`).
+distribution: k_p is Student's for the effective degrees of freedom of u (GUM, JCGM 100:2008, G.4 and G.6.4). Of a true
+model about that share of the positions lies within ±U. How far a single course may stay below it depends on how many
+of its positions are independent of each other, which the turns show (`independent`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import erf, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +18,10 @@ from numpy.typing import NDArray
 from trunnion.errors import Coded
 from trunnion.rig.reading.measurement import Signal, rms, student
 
-__all__ = [
-    "Judgement", "Uncertainty", "Verdict", "difference", "expanded", "going_on", "independent", "judge", "probability",
-    "uncertainty_of",
-]  # fmt: skip
+__all__ = ["Uncertainty", "Verdict", "expanded", "independent", "judge", "probability", "uncertainty_of"]
 
 Array = NDArray[np.float64]
 SURE = 2.326  # standard deviations: the share of a true model falls below its least in 1 % of courses
-FEWEST_TURNS = 5  # that show whether errors go on from turn to turn
 ROUNDING = 1e-9  # of the size of a course: differences below it are none
 
 
@@ -37,9 +33,6 @@ class Verdict(Coded):
     NOT = 2, "not within"
     UNKNOWN = 3, "U unknown"
     NOTHING = 4, "no data"
-
-
-# ---- uncertainty ----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,16 +57,23 @@ class Uncertainty:
 
     @property
     def freedom(self) -> Array:
-        """Effective degrees of freedom by Welch and Satterthwaite: ν u⁴/u_A⁴, infinite without scatter. GUM, G.4.1."""
+        """Effective degrees of freedom by Welch and Satterthwaite, infinite without scatter; GUM, G.4.1."""
         with np.errstate(all="ignore"):
             freedom = (self.count - 1) / (self.random**2 / self.total**2) ** 2
         return np.where(np.isfinite(freedom), freedom, np.inf)
 
     def at(self, where: NDArray[np.bool_]) -> Uncertainty:
         """That of some of the positions."""
-        return Uncertainty(
-            self.random[where], self.local[where], self.shared[:, where], self.count[where], self.turns[:, where]
-        )
+        return Uncertainty(*(part[..., where] for part in vars(self).values()))
+
+
+def uncertainty_of(signal: Signal) -> Uncertainty:
+    """The parts of a signal's uncertainty."""
+    zero = np.full_like(signal.mean, np.hypot(signal.accuracy.zero, signal.accuracy.cut))
+    random = signal.scatter / np.sqrt(np.maximum(signal.count, 1))
+    local = np.hypot(np.full_like(random, signal.unresolved), signal.local)
+    shared = np.array([zero, signal.accuracy.gain * signal.read])
+    return Uncertainty(random, local, shared, signal.count, signal.turns - signal.mean)
 
 
 def probability(coverage: float) -> float:
@@ -86,44 +86,9 @@ def expanded(standard: Array, freedom: Array, coverage: float) -> Array:
     return np.asarray(student(freedom, coverage) * standard)
 
 
-def uncertainty_of(signal: Signal) -> Uncertainty:
-    """The parts of a signal's uncertainty."""
-    zero = np.full_like(signal.mean, np.hypot(signal.accuracy.zero, signal.accuracy.cut))
-    shared = np.array([zero, signal.accuracy.gain * signal.read])
-    random = signal.scatter / np.sqrt(np.maximum(signal.count, 1))
-    local = np.hypot(np.full_like(random, signal.unresolved), signal.local)
-    return Uncertainty(random, local, shared, signal.count, signal.turns - signal.mean)
-
-
-def _nearly_complete(turns: Array) -> Array:
-    """The turns that have at least half of their positions, with no deviation where a position is missing."""
-    return np.asarray(np.nan_to_num(turns[np.mean(np.isfinite(turns), axis=1) >= 0.5]))
-
-
-# ---- the verdict ----------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """Figures of a residual, measured less model, over the positions that can be compared; NaN where not known.
-
-    largest: the residual of the largest size; place: its position, −1 if there is none; within: share of the positions
-    within ±U; least: the share from which the course is taken to be within; bias_expanded: U of the bias.
-    """
-
-    rms: float = np.nan
-    largest: float = np.nan
-    place: int = -1
-    bias: float = np.nan
-    bias_expanded: float = np.nan
-    rms_unbiased: float = np.nan
-    within: float = np.nan
-    least: float = np.nan
-    correlation: float = np.nan
-    verdict: Verdict = Verdict.NOTHING
-
-
-def judge(signal: Signal, model: Array, comparable: NDArray[np.bool_], coverage: float = 2.0) -> Judgement:
+def judge(
+    signal: Signal, model: Array, comparable: NDArray[np.bool_], drive: Array, coverage: float = 2.0
+) -> dict[str, Any]:
     """Compare a signal with the model at the positions where that can be done.
 
     Parameters
@@ -131,26 +96,32 @@ def judge(signal: Signal, model: Array, comparable: NDArray[np.bool_], coverage:
     signal : what was measured, turn by turn.
     model : (position,), the course of the model.
     comparable : (position,), where the model has one number.
+    drive : (position,), coordinate of the driver.
     coverage : factor k of U = k u where turns are many.
 
     Returns
     -------
-    The figures of the residual, and the verdict: within ±U, but for a constant offset, or not.
+    Courses, figures of the residual and verdict, by the name of the variable of a comparison; no figures where nothing
+    can be compared.
     """
-    where = comparable & np.isfinite(signal.mean) & np.isfinite(model)
+    where, every = comparable & np.isfinite(signal.mean) & np.isfinite(model), uncertainty_of(signal)
+    courses: dict[str, Any] = {
+        "measured": signal.mean, "scatter": signal.scatter, "uncertainty": every.total,
+        "expanded": expanded(every.total, every.freedom, coverage), "model": model,
+        "residual": difference(signal.mean, model), "compared": where, "turns": len(signal.turns),
+        "accuracy_zero": signal.accuracy.zero, "accuracy_gain": signal.accuracy.gain, "verdict": Verdict.NOTHING,
+    }  # fmt: skip
     if not np.any(where):
-        return Judgement()
-    measured, modelled = signal.mean[where], model[where]
-    residual = difference(measured, modelled)
-    size = float(np.max(np.abs(np.append(measured, modelled))))
+        return courses
+    measured, modelled, of = signal.mean[where], model[where], every.at(where)
+    residual, size = difference(measured, modelled), float(np.max(np.abs([measured, modelled])))
     bias, bias_expanded, correlation = float(np.mean(residual)), np.nan, np.nan
-    of = uncertainty_of(signal).at(where)
     means = np.mean(_nearly_complete(of.turns), axis=1)
-    if len(means) > 1:  # of the mean residual: scatter of the means of the turns, zero and gain
+    if len(means) > 1:  # of the mean residual: scatter of the means of the turns, resolution, zero and gain
         random = np.array([np.std(means, ddof=1) / np.sqrt(len(means))])
         local = np.array([np.sqrt(np.mean(of.local**2) / len(of.local))])
-        shared, count = np.mean(of.shared, axis=1, keepdims=True), np.array([len(means)])
-        mean = Uncertainty(random, local, shared, count, of.turns[:, :1])
+        shared = np.mean(of.shared, axis=1, keepdims=True)
+        mean = Uncertainty(random, local, shared, np.array([len(means)]), of.turns[:, :1])
         bias_expanded = float(expanded(mean.total, mean.freedom, coverage)[0])
     if min(np.max(np.abs(course - np.mean(course))) for course in (measured, modelled)) > ROUNDING * size:
         correlation = float(np.corrcoef(measured, modelled)[0, 1])  # Pearson's; of none that is flat
@@ -159,17 +130,13 @@ def judge(signal: Signal, model: Array, comparable: NDArray[np.bool_], coverage:
     # a constant is taken out: what is left is against the scatter and what the gain makes of the shape
     shape = replace(of, shared=(of.shared - np.mean(of.shared, axis=1, keepdims=True))[1:])
     unbiased_share, unbiased_least = _share(residual - bias, shape, coverage, ROUNDING * size)
-    verdict = Verdict.NOT
-    if not np.isfinite(share):
-        verdict = Verdict.UNKNOWN
-    elif share >= least:
-        verdict = Verdict.WITHIN
-    elif unbiased_share >= unbiased_least:
-        verdict = Verdict.OFFSET
-    return Judgement(
-        rms(residual), float(residual[worst]), int(np.flatnonzero(where)[worst]), bias, bias_expanded,
-        rms(residual - bias), share, least, correlation, verdict,
-    )  # fmt: skip
+    verdict = Verdict.OFFSET if unbiased_share >= unbiased_least else Verdict.NOT
+    verdict = Verdict.UNKNOWN if np.isnan(share) else Verdict.WITHIN if share >= least else verdict
+    return courses | {
+        "rms": rms(residual), "largest": float(residual[worst]), "largest_at": float(drive[where][worst]),
+        "bias": bias, "bias_expanded": bias_expanded, "rms_unbiased": rms(residual - bias), "within": share,
+        "within_least": least, "correlation": correlation, "verdict": verdict,
+    }  # fmt: skip
 
 
 def difference(measured: Array, model: Array) -> Array:
@@ -181,12 +148,11 @@ def difference(measured: Array, model: Array) -> Array:
 
 def _share(residual: Array, of: Uncertainty, coverage: float, rounding: float) -> tuple[float, float]:
     """Share of the positions within ±U, and how small that of a true model may be; NaN if no uncertainty is known."""
-    limit = expanded(of.total, of.freedom, coverage)
+    limit, p = expanded(of.total, of.freedom, coverage), probability(coverage)
     finite = np.isfinite(limit)
     if not np.any(finite):
         return np.nan, np.nan
     share = float(np.mean(np.abs(residual[finite]) <= limit[finite] + rounding))
-    p = probability(coverage)
     return share, p - SURE * float(np.sqrt(p * (1 - p) / independent(of.at(finite))))
 
 
@@ -212,16 +178,6 @@ def independent(of: Uncertainty) -> float:
     return float(np.clip(count**2 / max(both, count), 1.0, count))
 
 
-def going_on(signal: Signal) -> tuple[float, int]:
-    """Correlation of the mean error of a turn with that of the next, and of how many; (NaN, 0) of fewer than five.
-
-    That of n independent turns is −1/n in the mean, which is taken off, and scatters by 1/√n.
-    """
-    turns = _nearly_complete(signal.turns - signal.mean)
-    if len(turns) < FEWEST_TURNS:
-        return float("nan"), 0
-    means = np.mean(turns, axis=1) - np.mean(turns)
-    square = float(np.sum(means**2))
-    if square <= (ROUNDING * float(np.nanmax(np.abs(signal.mean), initial=0.0))) ** 2:
-        return float("nan"), 0
-    return float(np.sum(means[1:] * means[:-1])) / square + 1 / len(means), len(means)
+def _nearly_complete(turns: Array) -> Array:
+    """The turns that have at least half of their positions, with no deviation where a position is missing."""
+    return np.asarray(np.nan_to_num(turns[np.mean(np.isfinite(turns), axis=1) >= 0.5]))

@@ -9,11 +9,11 @@ within a turn neighbours may be correlated as they like.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,26 +21,22 @@ from scipy.ndimage import median_filter
 from scipy.optimize import least_squares
 
 from trunnion.errors import Status
-from trunnion.rig.identification.signals import Courses, Model, Said
+from trunnion.rig.identification.signals import Courses, Model
 from trunnion.rig.reading.measurement import Accuracy, Condition, Signal, rms
 
-__all__ = [
-    "EFFICIENCY", "FAR", "FILE_ZERO", "Block", "Evaluations", "Fit", "SensorError", "Solution", "corners", "refined",
-    "sensor_errors", "shared_zero", "sizes_of", "solved",
-]  # fmt: skip
+__all__ = ["EFFICIENCY", "FAR", "FILE_ZERO", "Block", "Fit", "SensorError", "Solution", "corners", "refined",
+           "sensor_errors", "shared_zero", "sizes_of", "solved"]  # fmt: skip
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 EFFICIENCY = "efficiency"  # the channel that is computed from torques and speeds, one figure a turn
-FILE_ZERO = "zero of each file"
-FILE_ANGLE = "angle of each condition"  # by the sampling of pulses
+FILE_ZERO, FILE_ANGLE = "zero of each file", "angle of each condition"  # the latter by the sampling of pulses
 ROUNDING = 1e-9  # of a course, by interpolation and sums
 FAR_ABOVE = 100.0  # times the rounding: scatter beside which it is nothing
 MOST_EVALUATIONS = 100
 TOLERANCE = 1e-10  # of cost and step: far below what data of any scatter tell
 PER_GUARD = 90  # positions of a cycle for each that is left out beside a jump, which resampling smears
 FAR = 5.0  # standard uncertainties: what a stated error may come to at most
-HALF_STEP = 3**0.5  # standard uncertainties of an error that may be anything up to half a step
 LEAST = 1e-6  # of the model, that a sensor reads at least: N mm for kN m; 0 would do away with the model
 GUESS = 0.01  # of a course: the scatter of one without repetitions, until its residuals are known
 ROUNDS = 4  # of what is used and how much it weighs
@@ -53,33 +49,20 @@ EFFECT = 0.1  # of a course: what an unknown whose own size says nothing is to c
 class Block:
     """One channel in one condition.
 
-    condition: its index; turns, held: (turn, position), those to fit and those held out; effects: of a course that is
-    computed from others, what a standard uncertainty of each of their errors does to it, by the name of the error;
-    files: where it comes from.
+    condition: its index; signal, held: with the turns to fit, and with those held out; effects: of a course that is
+    computed from others, what a standard uncertainty of each of their errors does to it, by the name of the error.
     """
 
     condition: int
     channel: str
     signal: Signal
-    turns: Array
-    held: Array
+    held: Signal
     effects: Mapping[str, float] = field(default_factory=dict)
-    files: tuple[str, ...] = ()
 
-    @cached_property
-    def mean(self) -> Array:
-        """Mean of the turns that are fitted, (position,); NaN where there is nothing."""
-        return _mean(self.turns)
-
-    @cached_property
-    def held_mean(self) -> Array:
-        """Mean of those held out."""
-        return _mean(self.held)
-
-    @cached_property
-    def count(self) -> NDArray[np.intp]:
-        """Turns that have a value, (position,)."""
-        return np.asarray(np.count_nonzero(np.isfinite(self.turns), axis=0))
+    @property
+    def data(self) -> Array:
+        """Mean of the turns to fit, or else of those held out, (position,)."""
+        return self.signal.mean if len(self.signal.turns) else self.held.mean
 
     @cached_property
     def spread(self) -> Array:
@@ -87,40 +70,34 @@ class Block:
 
         The sum of their squares is then (turns − 1) variances of one turn, wherever values are missing.
         """
-        missing = np.sqrt((len(self.turns) - 1) / np.maximum(self.count - 1, 1))
-        return np.asarray(np.nan_to_num(self.turns - self.mean) * missing)
+        missing = np.sqrt((len(self.signal.turns) - 1) / np.maximum(self.signal.count - 1, 1))
+        return np.asarray(np.nan_to_num(self.signal.turns - self.signal.mean) * missing)
 
     @cached_property
     def repeats(self) -> bool:
         """Whether it shows how much turns scatter."""
-        return bool(len(self.turns) > 1 and np.any(self.spread != 0))
+        return bool(len(self.signal.turns) > 1 and np.any(self.spread != 0))
+
+    def pooled(self, mask: Mask) -> float:
+        """Variance of one turn, pooled over some positions, (position,); NaN where none of them repeats.
+
+        Weights that follow the scatter from place to place would trust most where it happens to be small.
+        """
+        freedom = int(np.sum(np.maximum(self.signal.count - 1, 0)[mask]))
+        squares = np.nan_to_num(self.signal.turns - self.signal.mean)[:, mask] ** 2
+        return float(np.sum(squares) / freedom) if freedom else float("nan")
 
     @cached_property
     def variance(self) -> float:
-        """Variance of one turn, pooled over the positions; NaN if it does not repeat.
-
-        Weights that follow the scatter from place to place would trust most where it happens to be small, and the
-        covariance, which is made of the same scatter, would come out too small.
-        """
-        return self.pooled(np.isfinite(self.mean)) if self.repeats else float("nan")
-
-    def pooled(self, mask: Mask) -> float:
-        """Variance of one turn, pooled over some positions, (position,); NaN where none of them repeats."""
-        freedom = int(np.sum(np.maximum(self.count - 1, 0)[mask]))
-        return float(np.sum(np.nan_to_num(self.turns - self.mean)[:, mask] ** 2) / freedom) if freedom else float("nan")
+        """Variance of one turn, pooled over all positions; NaN if it does not repeat."""
+        return self.pooled(np.isfinite(self.signal.mean)) if self.repeats else float("nan")
 
     @cached_property
     def unresolved(self) -> float:
         """Standard uncertainty that more turns do not lessen: by steps between readings, or by rounding of numbers."""
-        rounding = ROUNDING * float(np.nanmax(np.abs(self.turns), initial=0.0))
+        rounding = ROUNDING * float(np.nanmax(np.abs(self.signal.turns), initial=0.0))
         far_above = self.repeats and self.variance > (FAR_ABOVE * rounding) ** 2
         return max(float(self.signal.unresolved), 0.0 if far_above else rounding)
-
-
-def _mean(turns: Array) -> Array:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of positions without a value
-        return np.asarray(np.nanmean(turns, axis=0)) if len(turns) else np.full(turns.shape[1], np.nan)
 
 
 # ---- errors of the sensors ------------------------------------------------------------------------------------
@@ -128,33 +105,28 @@ def _mean(turns: Array) -> Array:
 
 @dataclass(frozen=True)
 class SensorError:
-    """One error of a sensor: its zero, its gain, or that of the crank angle.
+    """One error of a sensor, "zero" or "gain", or of the crank angle, "angle".
 
-    sizes: its standard uncertainty in each block, in the unit of the course, relative, or in shares of the cycle; 0 in
-    blocks of other sensors; of a course that is computed, what it does to that, with its sign.
-    stated: whether anything is known of it; one that is not is free. group: of one of many, what they are together.
-    most: what one that is stated may come to, in its standard uncertainties. angle: of an error of the crank angle that
-    has one size in all conditions, that, rad.
+    channel: empty of the angle; sizes: its standard uncertainty in each block, in the unit of the course, relative, or
+    in shares of the cycle; 0 in blocks of other sensors; of a course that is computed, what it does to that, with its
+    sign. group: of one of many, what they are together; most: what it may come to, in its standard uncertainties;
+    angle: of an error of the crank angle that has one size in all conditions, that, rad; stated: whether anything is
+    known of it; one that is not is free.
     """
 
     name: str
     channel: str
     kind: str
-    sizes: tuple[float, ...] = ()
-    stated: bool = True
+    sizes: Array
     group: str = ""
     most: float = FAR
     angle: float = 0.0
-
-    @property
-    def source(self) -> str:
-        """What it counts as in the variance of an estimate."""
-        return self.group or self.name
+    stated: bool = True
 
     @property
     def limits(self) -> tuple[float, float]:
         """In its standard uncertainties."""
-        most, largest = self.most if self.stated else inf, max(self.sizes)
+        most, largest = self.most if self.stated else inf, float(np.max(self.sizes))
         return (max((LEAST - 1) / largest, -most) if self.kind == "gain" and largest > 0 else -most), most
 
 
@@ -166,39 +138,35 @@ def shared_zero(accuracy: Accuracy) -> float:
 def sensor_errors(model: Model, conditions: Sequence[Condition], blocks: Sequence[Block]) -> list[SensorError]:
     """All that is stated of the sensors; an infinite standard uncertainty says that nothing is known."""
     errors: dict[str, SensorError] = {}
-    usual: dict[str, float] = {}
-    for name in dict.fromkeys(block.channel for block in blocks):
-        every = np.concatenate([np.ravel(block.signal.turns) for block in blocks if block.channel == name])
-        usual[name] = rms(every) or 1.0
 
-    def add(k: int, size: float, error: SensorError) -> None:
-        error = errors.get(error.name, replace(error, sizes=(0.0,) * len(blocks)))
-        free = bool(np.isinf(size))
-        size = (usual.get(error.channel, 1.0) if error.kind == "zero" else 1.0) if free else float(size)
-        sizes = (*error.sizes[:k], size, *error.sizes[k + 1 :])
-        errors[error.name] = replace(error, sizes=sizes, stated=error.stated and not free)
+    def add(k: int, size: float, name: str, channel: str, kind: str, group: str = "", *more: float) -> None:
+        if size:
+            error = SensorError(name, channel, kind, np.zeros(len(blocks)), group, *more)  # type: ignore[arg-type]
+            errors.setdefault(name, error).sizes[k] = size
 
     for k, block in enumerate(blocks):
         condition, accuracy, channel = conditions[block.condition], block.signal.accuracy, block.channel
-        for kind, size in (("zero", float(np.hypot(shared_zero(accuracy), accuracy.cut))), ("gain", accuracy.gain)):
-            if size > 0:
-                add(k, size, SensorError(f"{kind} of {channel}", channel, kind))
+        add(k, float(np.hypot(shared_zero(accuracy), accuracy.cut)), f"zero of {channel}", channel, "zero")
+        add(k, accuracy.gain, f"gain of {channel}", channel, "gain")
         for name, size in {f"{FILE_ZERO} of {channel}": accuracy.own, **block.effects}.items():
-            if size and name.startswith(FILE_ZERO):
-                file = " ".join(block.files or (str(block.condition),))
-                add(k, size, SensorError(f"{name}: {file}", channel, "zero", group=name))
-            elif size:
-                add(k, size, SensorError(name, name.partition(" of ")[2], name.partition(" ")[0]))
-        turn, duration = model.turns[block.condition], model.durations[block.condition]
-        if block.turns.shape[1] > 2 and condition.lag and duration:
-            error = SensorError(f"{FILE_ANGLE}: {condition.name}", "", "angle", group=FILE_ANGLE)
-            add(k, condition.lag / duration, error)
-        if block.turns.shape[1] > 2 and condition.cut and np.isfinite(turn):
-            size = abs(condition.cut)
-            name = f"angle in steps of {np.degrees(size * 12**0.5):.4g} deg"
-            add(k, condition.cut / turn, SensorError(name, "", "angle", most=HALF_STEP, angle=size))
+            group = name if name.startswith(FILE_ZERO) else ""
+            own = f"{name}: {' '.join(condition.files or (str(block.condition),))}" if group else name
+            add(k, size, own, name.partition(" of ")[2].removeprefix("each file of "), name.partition(" ")[0], group)
+        duration, _, turn = model.cycles[block.condition]
+        if block.signal.turns.shape[1] > 2:
+            add(k, condition.lag / (duration or inf), f"{FILE_ANGLE}: {condition.name}", "", "angle", FILE_ANGLE)
+            if condition.cut and np.isfinite(turn):  # may be anything up to half a step
+                size = abs(condition.cut)
+                name = f"angle in steps of {np.degrees(size * 12**0.5):.4g} deg"
+                add(k, condition.cut / turn, name, "", "angle", "", 3**0.5, size)
+    for name, error in errors.items():
+        if np.isinf(error.sizes).any():
+            every = [np.ravel(block.signal.turns) for block in blocks if block.channel == error.channel]
+            usual = (rms(np.concatenate(every)) if error.kind == "zero" and every else 0.0) or 1.0
+            sizes = np.where(np.isinf(error.sizes), usual, error.sizes)
+            errors[name] = replace(error, sizes=sizes, stated=False)
     order = ("zero", "gain", "angle")
-    return sorted(errors.values(), key=lambda one: (bool(one.group), order.index(one.kind)))
+    return sorted(errors.values(), key=lambda item: (bool(item.group), order.index(item.kind)))
 
 
 # ---- the problem ----------------------------------------------------------------------------------------------
@@ -207,7 +175,7 @@ def sensor_errors(model: Model, conditions: Sequence[Condition], blocks: Sequenc
 class Evaluations:
     """The model at values of the unknowns; the last few are kept. progress: called with the number of evaluations."""
 
-    def __init__(self, model: Model, progress: Callable[[int], None] | None = None) -> None:
+    def __init__(self, model: Model, progress: Callable[[int], None] = lambda count: None) -> None:
         self.model, self.progress, self.count = model, progress, 0
         self._last: dict[bytes, Courses] = {}
 
@@ -218,8 +186,7 @@ class Evaluations:
                 self._last.pop(next(iter(self._last)))
             self._last[key] = self.model.courses(at)
             self.count += 1
-            if self.progress:
-                self.progress(self.count)
+            self.progress(self.count)
         return self._last[key]
 
 
@@ -250,35 +217,36 @@ class Fit:
         return len(self.model.unknowns)
 
     @cached_property
+    def fitted(self) -> list[int]:
+        """The blocks of which anything is used."""
+        return [k for k, block in enumerate(self.blocks) if len(block.signal.turns)]
+
+    @cached_property
     def start(self) -> Array:
         """Unknowns as stated, sensors without errors."""
-        return np.array([one.start for one in self.model.unknowns] + [0.0] * len(self.sensors))
+        return np.array([unknown.start for unknown in self.model.unknowns] + [0.0] * len(self.sensors))
 
     @cached_property
     def prior(self) -> Array:
         """Weight of what was stated, (unknown and sensor,): 1 of sensors, 0 of what nothing is stated of."""
-        return np.array([0.0] * self.count + [float(one.stated) for one in self.sensors])
+        return np.array([0.0] * self.count + [float(error.stated) for error in self.sensors])
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Limits of unknowns and sensors."""
-        ends = [(one.lower, one.upper) for one in self.model.unknowns] + [one.limits for one in self.sensors]
-        low, high = np.array(ends).T
+        ends = [(unknown.lower, unknown.upper) for unknown in self.model.unknowns]
+        low, high = np.array([*ends, *(error.limits for error in self.sensors)]).T
         return low, high
 
     def courses(self, x: Array) -> Courses:
         """The model at the unknowns of x."""
         return self.courses_at(np.asarray(x[: self.count], float))
 
-    def fitted(self) -> list[int]:
-        """The blocks of which anything is used."""
-        return [k for k, block in enumerate(self.blocks) if len(block.turns)]
-
     def reading(self, x: Array, k: int) -> tuple[Array, Array]:
         """What the sensor of a block would read, (position,), and its derivatives, (unknown and sensor, position)."""
         block = self.blocks[k]
-        course, size, datum = self._course(x, k), block.turns.shape[1], block.signal.accuracy.datum
-        value, slope = course.value[:size], course.slope[:, :size]
+        said, size = self.courses(x).said[block.condition][block.channel], block.signal.turns.shape[1]
+        value, slope, datum = said.value[:size], said.slope[:, :size], block.signal.accuracy.datum
         # the errors behind a course that is computed are added to it
         acting = [(s, "zero" if block.effects else error.kind, error.sizes[k])
                   for s, error in enumerate(self.sensors, self.count) if error.sizes[k]]  # fmt: skip
@@ -291,35 +259,31 @@ class Fit:
             value = value - angle * by_share
         columns = np.zeros((len(x), size))
         columns[: self.count] = (1 + gain) * slope
+        shapes = {"zero": 1.0, "gain": value - datum, "angle": -(1 + gain) * by_share}
         for s, kind, error in acting:
-            shapes: dict[str, Array | float] = {"zero": 1.0, "gain": value - datum, "angle": -(1 + gain) * by_share}
             columns[s] = error * shapes[kind]
         return (1 + gain) * (value - datum) + datum + zero, columns
 
-    def _course(self, x: Array, k: int) -> Said:
-        return self.courses(x).said[self.blocks[k].condition][self.blocks[k].channel]
-
     def gap(self, x: Array, k: int, data: Array | None = None) -> Array:
         """Data, the mean if not given, less what the sensor would read, (position,); angles by the nearest turn."""
-        gap = (self.blocks[k].mean if data is None else data) - self.reading(x, k)[0]
-        if self.model.measures[self.blocks[k].channel].turning(self.model.run.system):
-            return np.asarray((gap + np.pi) % (2 * np.pi) - np.pi)
-        return np.asarray(gap)
+        gap = (self.blocks[k].signal.mean if data is None else data) - self.reading(x, k)[0]
+        turning = self.model.measures[self.blocks[k].channel].turning(self.model.run.system)
+        return np.asarray((gap + np.pi) % (2 * np.pi) - np.pi if turning else gap)
 
     def weight(self, k: int) -> Array:
         """1/variance of the mean at each position of a block, 0 where it is not used."""
         block = self.blocks[k]
-        scatter = self.variances[k] * self.inflation / np.maximum(block.count, 1)
+        scatter = self.variances[k] * self.inflation / np.maximum(block.signal.count, 1)
         return np.where(self.masks[k], 1 / (scatter + block.unresolved**2), 0.0)
 
     def residuals(self, x: Array) -> Array:
         """Weighted residuals of all used positions, then those of the sensors."""
-        rows = [(np.sqrt(self.weight(k)) * self.gap(x, k))[self.masks[k]] for k in self.fitted()]
+        rows = [(np.sqrt(self.weight(k)) * self.gap(x, k))[self.masks[k]] for k in self.fitted]
         return np.concatenate([*rows, (x * self.prior)[self.count :]])
 
     def jacobian(self, x: Array) -> Array:
         """Derivatives of the residuals, (residual, unknown and sensor)."""
-        rows = [-(np.sqrt(self.weight(k)) * self.reading(x, k)[1]).T[self.masks[k]] for k in self.fitted()]
+        rows = [-(np.sqrt(self.weight(k)) * self.reading(x, k)[1]).T[self.masks[k]] for k in self.fitted]
         rows.append(np.diag(self.prior)[self.count :])
         return np.nan_to_num(np.concatenate(rows), nan=0.0, posinf=0.0, neginf=0.0)
 
@@ -330,29 +294,26 @@ class Fit:
         masks, courses = [], self.courses(x)
         for k, block in enumerate(self.blocks):
             status, turned = courses.status[block.condition], courses.turned[block.condition]
-            value, size = self._course(x, k).value, block.turns.shape[1]
+            value, size = courses.said[block.condition][block.channel].value, block.signal.turns.shape[1]
             if size == 1 < len(status):  # a figure of the cycle
                 good = np.array([bool(np.all(status < Status.NOT_CONVERGED))])
             elif self.model.measures[block.channel].of_motion:  # whatever forces do
                 good = (status < Status.SINGULAR) & (status != Status.NEAR_SINGULAR)
             else:
                 guard = -(-size // PER_GUARD) if self.guard is None else self.guard
-                u = np.sqrt(self.variances[k] / np.maximum(block.count, 1) + block.unresolved**2)
+                u = np.sqrt(self.variances[k] / np.maximum(block.signal.count, 1) + block.unresolved**2)
                 phase, bends = self.model.phases[block.condition], self.model.bends[block.condition]
                 closed = self.model.run.cycle.periodic
-                rounded = turned | corners(value, phase, bends, u, turned, closed=closed, guard=guard)
-                good = (status == Status.SOLVED) & ~_widened(rounded, guard)
-            data = block.mean if len(block.turns) else block.held_mean
-            masks.append(good & np.isfinite(data) & np.isfinite(value[:size]))
+                beside = turned | corners(value, phase, bends, u, turned, closed=closed, guard=guard)
+                for _ in range(guard - 1):
+                    beside = beside | np.roll(beside, 1) | np.roll(beside, -1)
+                good = (status == Status.SOLVED) & ~(beside & (guard > 0))
+            masks.append(good & np.isfinite(block.data) & np.isfinite(value[:size]))
         return masks
 
     def first_scatter(self) -> list[float]:
         """Variances by the scatter of the turns; a guess where there is none."""
-        variances = []
-        for block in self.blocks:
-            data = block.mean if len(block.turns) else block.held_mean
-            variances.append(block.variance if block.repeats else (GUESS * (rms(data) or 1.0)) ** 2)
-        return variances
+        return [block.variance if block.repeats else (GUESS * (rms(block.data) or 1.0)) ** 2 for block in self.blocks]
 
     def learnt_scatter(self, x: Array) -> list[float]:
         """Variances by channel: of blocks without repetitions by their residuals, of others by how far neighbours of a
@@ -363,20 +324,18 @@ class Fit:
         """
         variances = self.first_scatter()
         for channel in dict.fromkeys(block.channel for block in self.blocks):
-            every = [k for k in self.fitted() if self.blocks[k].channel == channel and np.any(self.masks[k])]
-            single = [k for k in every if not self.blocks[k].repeats]
-            if single:
+            every = [k for k in self.fitted if self.blocks[k].channel == channel and np.any(self.masks[k])]
+            if single := [k for k in every if not self.blocks[k].repeats]:
                 gap = np.concatenate([self.gap(x, k)[self.masks[k]] for k in single])
-                least = (ROUNDING * max(float(np.nanmax(np.abs(self.blocks[k].mean))) for k in single)) ** 2
+                least = (ROUNDING * max(float(np.nanmax(np.abs(self.blocks[k].data))) for k in single)) ** 2
                 learnt = max(float(np.sum(gap**2)) / max(gap.size - len(x), 1), least, 1e-300)
-                for k in single:
-                    variances[k] = learnt
+                variances = [learnt if k in single else variance for k, variance in enumerate(variances)]
             scores, white = 0.0, 0.0
-            for k in [k for k in every if self.blocks[k].repeats]:
+            for k in set(every) - set(single):
                 mask, block = self.masks[k], self.blocks[k]
                 basis = _basis(np.nan_to_num(self.reading(x, k)[1][:, mask]))
                 scores += float(np.sum((block.spread[:, mask] @ basis) ** 2)) / block.variance
-                white += basis.shape[1] * (len(block.turns) - 1)
+                white += basis.shape[1] * (len(block.signal.turns) - 1)
             for k, block in enumerate(self.blocks):
                 if block.channel == channel and block.repeats and white:
                     variances[k] *= max(scores / white, 0.05)
@@ -386,19 +345,9 @@ class Fit:
 def _basis(rows: Array) -> Array:
     """Orthonormal directions that rows span, (position, direction)."""
     size = np.linalg.norm(rows, axis=1)
-    rows = rows[size > 1e-12 * np.max(size, initial=0.0)]
-    rows = rows / np.linalg.norm(rows, axis=1)[:, None]
-    _, sizes, directions = np.linalg.svd(rows, full_matrices=False)
+    large = size > 1e-12 * np.max(size, initial=0.0)
+    _, sizes, directions = np.linalg.svd(rows[large] / size[large, None], full_matrices=False)
     return np.asarray(directions[sizes > 1e-6 * np.max(sizes, initial=0.0)].T)
-
-
-def _widened(turned: Mask, guard: int) -> Mask:
-    """The two positions beside each change of sense, and as many more on both sides as the guard is above 1."""
-    if guard < 1:
-        return np.zeros_like(turned)
-    for _ in range(guard - 1):
-        turned = turned | np.roll(turned, 1) | np.roll(turned, -1)
-    return turned
 
 
 NEARBY = 15  # positions about a corner, whose second differences tell it from a curve
@@ -406,7 +355,6 @@ STANDS_OUT = 1.5  # times the second differences nearby, by which a corner diffe
 ROUNDED = 1 / 8  # of a change of slope per position: the mean of |x|/2 over a position, at its corner
 TOO_MUCH = 0.25  # of the standard uncertainty of the mean: what is rounded off by more is left out
 MOST = 1 / 3  # of the positions, that are left out at corners: of a table of very many points the largest only
-CLOSE = 1e-9  # of the cycle: a bend at a position
 
 
 def corners(
@@ -434,7 +382,7 @@ def corners(
         bend[[0, -1]] = 0.0
     usual = median_filter(bend, NEARBY, mode="wrap" if closed else "nearest")
     order = np.argsort(phase)
-    before = np.unique(np.searchsorted(phase[order], bends + CLOSE, side="right") - 1)
+    before = np.unique(np.searchsorted(phase[order], bends + 1e-9, side="right") - 1)  # a bend at a position is after
     if not closed:
         before = before[(before >= 0) & (before < size - 1)]
     pairs = order[np.stack([before, before + 1]) % size]
@@ -449,25 +397,23 @@ def corners(
 # ---- the search -----------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Solution:
-    """Where a search ended. cost: sum of squares; settled: whether what is used and how much it weighs came to rest."""
+class Solution(NamedTuple):
+    """Where a search ended, whether it converged, and whether what is used and how much it weighs came to rest."""
 
     x: Array
-    cost: float
-    evaluations: int = 0
-    converged: bool = False
+    evaluations: int
+    converged: bool
     settled: bool = False
 
 
 def solved(fit: Fit, start: Array) -> Solution:
     """The trust-region search of SciPy within the limits; steps to where there is no answer are taken back."""
     low, high = fit.bounds
-    found = least_squares(
+    result = least_squares(
         fit.residuals, np.clip(start, low, high), fit.jacobian, (low, high), "trf", ftol=TOLERANCE, xtol=TOLERANCE,
         gtol=TOLERANCE, x_scale="jac", max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
-    return Solution(np.asarray(found.x), 2 * float(found.cost), int(found.nfev), bool(found.status > 0))
+    return Solution(np.asarray(result.x), int(result.nfev), bool(result.status > 0))
 
 
 def refined(fit: Fit, start: Array) -> tuple[Fit, Solution]:
@@ -484,15 +430,15 @@ def refined(fit: Fit, start: Array) -> tuple[Fit, Solution]:
         other = replace(fit, variances=fit.learnt_scatter(best.x), masks=fit.allowed(best.x))
         same = all(np.array_equal(a, b) for a, b in zip(other.masks, fit.masks, strict=True))
         if same and np.allclose(other.variances, fit.variances, rtol=SETTLED, atol=0.0, equal_nan=True):
-            return fit, replace(best, settled=True)
+            return fit, best._replace(settled=True)
         fit, best = other, solved(other, best.x)
     return fit, best
 
 
 def sizes_of(fit: Fit, x: Array) -> Array:
     """How large each unknown is: by the model or the estimate; of one that is 0, what would change the data visibly."""
-    sizes = [max(one.size, abs(value)) for one, value in zip(fit.model.unknowns, x[: fit.count], strict=True)]
+    sizes = [max(unknown.size, abs(value)) for unknown, value in zip(fit.model.unknowns, x[: fit.count], strict=True)]
     pulled = np.linalg.norm(fit.jacobian(x), axis=0)
-    data = float(np.sqrt(sum(np.sum(np.nan_to_num(fit.blocks[k].mean) ** 2 * fit.weight(k)) for k in fit.fitted())))
+    data = float(np.sqrt(sum(np.sum(np.nan_to_num(fit.blocks[k].data) ** 2 * fit.weight(k)) for k in fit.fitted)))
     every = [size or (EFFECT * data / by if by else 1.0) for size, by in zip(sizes, pulled[: fit.count], strict=True)]
     return np.array(every + [1.0] * len(fit.sensors))

@@ -18,10 +18,10 @@ from trunnion.model.quantity import Quantity
 from trunnion.results.attributes import attribute, finding_rows, findings_of, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import decimals
-from trunnion.results.tables.studies import CURVES
 from trunnion.rig.comparison import data_findings, hashed_files, written_unit
 from trunnion.rig.identification.fit import FAR, Fit, Solution, sizes_of, solved
-from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, InseparableUnknowns, quantile
+from trunnion.rig.identification.signals import DriveCycle
+from trunnion.rig.identification.uncertainty import CONFIDENCE, Covariances, Inseparable, quantile
 from trunnion.rig.reading.mapping import DataMapping
 from trunnion.rig.reading.measurement import Measurement, rms
 from trunnion.rig.reading.units import Amount
@@ -38,7 +38,6 @@ SOURCES = (
 )
 NEAR_LIMIT = 0.98  # of the most that a stated error may come to
 AT_LIMIT = 0.05  # of the standard uncertainty: nearer than this to a limit is on it
-
 
 PARAMETER, SENSOR, BLOCK = ("parameter",), ("sensor",), ("channel", "condition")
 COURSE = (*BLOCK, "position")
@@ -93,7 +92,8 @@ class MisfitCause(NamedTuple):
 
     kind: zero, gain or angle; channel: empty of the angle; size: in the unit of the channel, relative, or rad by which
     the readings are ahead of the model; expanded: U of it, 95 %; explains: share of the part of χ² above what scatter
-    leads to expect; estimates, halves: of the unknowns with it, and U of each, 95 %, (unknown,).
+    leads to expect; times: its size in the standard uncertainties that are stated of it, 0 where none is; estimates,
+    halves: of the unknowns with it, and U of each, 95 %, (unknown,).
     """
 
     kind: str
@@ -101,13 +101,14 @@ class MisfitCause(NamedTuple):
     size: float
     expanded: float
     explains: float
+    times: float
     estimates: Array
     halves: Array
 
 
 @dataclass(frozen=True)
 class Identified:
-    """An identification, with the figures of it, (unknown,) unless said.
+    """An identification, with the figures of its unknowns and, behind them, of the errors of its sensors.
 
     groups: what the data do not tell apart; causes: what would explain a misfit, best first; encoder: path of an
     unknown by which the encoder of the data is off, no number of the mechanism; empty without.
@@ -118,29 +119,30 @@ class Identified:
     fit: Fit
     solution: Solution
     spread: Covariances
-    groups: Sequence[InseparableUnknowns]
+    groups: Sequence[Inseparable]
     causes: Sequence[MisfitCause]
     encoder: str = ""
 
     @property
     def x(self) -> Array:
-        """Estimates of the unknowns, then of the sensors' errors."""
+        """Where the search ended."""
         return self.solution.x
 
     @cached_property
-    def times_stated(self) -> float:
-        """Size of the first cause of a misfit in standard uncertainties that are stated of it; 0 where none is."""
-        if not self.causes:
-            return 0.0
-        first, sensors = self.causes[0], [one for one in self.fit.sensors if one.stated]
-        alike = [max(map(abs, one.sizes)) for one in sensors if (one.kind, one.channel) == (first.kind, first.channel)]
-        stated = max([one.angle for one in sensors] if first.kind == "angle" else alike, default=0.0)
-        return abs(first.size) / stated if stated else 0.0
+    def lost(self) -> NDArray[np.bool_]:
+        """What the data do not tell."""
+        return np.isin(np.arange(len(self.x)), [member for group in self.groups for member in group.members])
 
-    @property
-    def refuted(self) -> bool:
-        """Whether the estimates stand for something else: a gross misfit, or an error beyond what is stated of it."""
-        return self.spread.test.gross or bool(self.beyond) or self.times_stated > FAR
+    @cached_property
+    def half(self) -> Array:
+        """Half of a two-sided 95 % interval, whether the data tell the unknown or not."""
+        return np.asarray(quantile(self.spread.freedom) * self.spread.deviation)
+
+    @cached_property
+    def vague(self) -> NDArray[np.bool_]:
+        """Unknowns whose 95 % interval is wider than twice themselves, or than their limits are apart."""
+        low, high = self.fit.bounds
+        return np.asarray((self.half > np.minimum(sizes_of(self.fit, self.x), (high - low) / 2)) & ~self.lost)
 
     @cached_property
     def beyond(self) -> dict[int, float]:
@@ -149,99 +151,68 @@ class Identified:
         for s, (error, size) in enumerate(zip(fit.sensors, self.x[fit.count :], strict=True)):
             if error.stated and abs(size) > NEAR_LIMIT * error.most:
                 free = [*fit.sensors[:s], replace(error, stated=False), *fit.sensors[s + 1 :]]
-                found = float(solved(replace(fit, sensors=free), self.x).x[fit.count + s])
-                beyond |= {s: found} if abs(found) >= FAR else {}
-        return beyond
+                beyond[s] = float(solved(replace(fit, sensors=free), self.x).x[fit.count + s])
+        return {s: size for s, size in beyond.items() if abs(size) >= FAR}
+
+    @property
+    def refuted(self) -> bool:
+        """Whether the estimates stand for something else: a gross misfit, or an error beyond what is stated of it."""
+        return self.spread.test.gross or bool(self.beyond) or any(cause.times > FAR for cause in self.causes[:1])
 
     @cached_property
-    def vague(self) -> NDArray[np.bool_]:
-        """Unknowns whose 95 % interval is wider than twice themselves, or than their limits are apart, (unknown,)."""
-        n, (low, high) = self.fit.count, self.fit.bounds
-        widest = np.minimum(sizes_of(self.fit, self.x), (high - low) / 2)[:n]
-        return np.asarray((self.half > widest) & ~self.lost[:n])
+    def intervals(self) -> dict[str, NDArray[Any]]:
+        """Limit that an estimate is on, −1, 0 or 1, the estimate, and its 95 % interval within the limits.
 
-    @cached_property
-    def half(self) -> Array:
-        """Half of a two-sided interval, (unknown,), whether the data tell the unknown or not."""
-        return np.asarray((quantile(self.spread.freedom) * self.spread.deviation)[: self.fit.count])
-
-    @cached_property
-    def lost(self) -> NDArray[np.bool_]:
-        """Unknowns that the data do not tell, (unknown and sensor,)."""
-        return np.isin(np.arange(len(self.x)), [member for group in self.groups for member in group.members])
-
-    @cached_property
-    def deviation(self) -> Array:
-        """Standard uncertainty, (unknown and sensor,); NaN of what the data do not tell."""
-        return np.asarray(np.where(self.lost, np.nan, self.spread.deviation))
-
-    @cached_property
-    def _step(self) -> Array:
-        """Where the next step would go without limits, (unknown and sensor,)."""
-        return np.asarray(-self.spread.inverse @ (self.fit.jacobian(self.x).T @ self.fit.residuals(self.x)))
-
-    @cached_property
-    def limit(self) -> NDArray[np.int8]:
-        """−1 of an unknown on its lower limit, 1 on its upper, 0 of others."""
-        (low, high), x = self.fit.bounds, self.x
-        near = AT_LIMIT * np.nan_to_num(self.deviation) + 1e-9 * np.abs(x)
-        upper, lower = (high - x <= near) & (self._step >= 0), (x - low <= near) & (self._step <= 0)
-        return np.where(self.lost, 0, np.where(upper, 1, np.where(lower, -1, 0)))[: self.fit.count].astype(np.int8)
-
-    @cached_property
-    def estimate(self) -> Array:
-        """Estimates; on a limit the limit itself, NaN of what the data do not tell."""
-        n = self.fit.count
-        low, high = (end[:n] for end in self.fit.bounds)
-        at = np.where(self.limit < 0, low, np.where(self.limit > 0, high, self.x[:n]))
-        return np.asarray(np.where(self.lost[:n], np.nan, at))
-
-    @cached_property
-    def interval(self) -> tuple[Array, Array]:
-        """95 %, within the limits; one-sided of an unknown on one, from where a step without limits ends if inside."""
-        n = self.fit.count
-        low, high = (end[:n] for end in self.fit.bounds)
-        u, freedom, free = self.deviation[:n], self.spread.freedom[:n], (self.x + self._step)[:n]
-        half, one_sided = quantile(freedom) * u, quantile(freedom, one_sided=True) * u
-        lower = np.where(self.limit > 0, np.minimum(free, high) - one_sided, self.estimate - half)
-        upper = np.where(self.limit < 0, np.maximum(free, low) + one_sided, self.estimate + half)
-        lower, upper = np.where(self.limit < 0, low, lower), np.where(self.limit > 0, high, upper)
-        return np.maximum(lower, low), np.minimum(upper, high)
-
-    # ---- residuals --------------------------------------------------------------------------------------------
+        On a limit the interval is one-sided, from where a step without limits ends if that is inside.
+        """
+        (low, high), x, u = self.fit.bounds, self.x, np.where(self.lost, np.nan, self.spread.deviation)
+        step = -self.spread.inverse @ (self.fit.jacobian(x).T @ self.fit.residuals(x))
+        near = AT_LIMIT * np.nan_to_num(u) + 1e-9 * np.abs(x)
+        upper, lower = (~self.lost & (gap <= near) for gap in (high - x, x - low))
+        limit = np.where(upper & (step >= 0), 1, np.where(lower & (step <= 0), -1, 0))
+        estimate = np.where(self.lost, np.nan, np.where(limit < 0, low, np.where(limit > 0, high, x)))
+        half, one_sided = quantile(self.spread.freedom) * u, quantile(self.spread.freedom, one_sided=True) * u
+        least = np.where(limit > 0, np.minimum(x + step, high) - one_sided, estimate - half)
+        most = np.where(limit < 0, np.maximum(x + step, low) + one_sided, estimate + half)
+        least, most = np.where(limit < 0, low, least), np.where(limit > 0, high, most)
+        figures = {"limit": limit.astype(np.int8), "estimate": estimate, "standard_uncertainty": u}
+        return figures | {"lower": np.maximum(least, low), "upper": np.minimum(most, high)}
 
     @cached_property
     def by_block(self) -> dict[str, NDArray[Any]]:
         """Residuals, (channel, condition) and (channel, condition, position), with the phases of the conditions."""
         fit, conditions, channels = self.fit, self.measurement.conditions, list(self.fit.model.measures)
-        longest = max(len(one.phase) for one in conditions)
+        longest = max(len(condition.phase) for condition in conditions)
         sizes = {"channel": len(channels), "condition": len(conditions), "position": longest}
-        arrays = {name: one.blank(sizes) for name, one in VARIABLES.items() if one.dims and set(one.dims) <= set(sizes)}
+        variables = {name: variable for name, variable in VARIABLES.items() if variable.dims}
+        arrays = {name: var.blank(sizes) for name, var in variables.items() if set(var.dims) <= set(sizes)}
         for k, condition in enumerate(conditions):
             arrays["phase"][k, : len(condition.phase)] = condition.phase
         allowed = fit.allowed(self.x)
         for k, block in enumerate(fit.blocks):
             at, mask = (channels.index(block.channel), block.condition), fit.masks[k]
-            figures: dict[str, float] = {"turns": len(block.turns), "held_out_turns": len(block.held)}
-            if len(block.turns):
+            rows: dict[str, Array] = {}
+            figures: dict[str, float] = {"turns": len(block.signal.turns), "held_out_turns": len(block.held.turns)}
+            if len(block.signal.turns):
                 before, after = (np.where(mask, fit.gap(x, k), np.nan) for x in (fit.start, self.x))
                 # of the positions that are used: beside jumps turns scatter more
-                scatter = np.sqrt(block.pooled(mask) / np.maximum(block.count, 1) + block.unresolved**2)
+                scatter = np.sqrt(block.pooled(mask) / np.maximum(block.signal.count, 1) + block.unresolved**2)
                 expected = np.where(mask & block.repeats, scatter, np.nan)
-                for name, row in zip(CURVES, (block.mean, before, after, expected), strict=True):
-                    arrays[name][at][: len(row)] = row
+                rows = {"measured": block.signal.mean, "residual_before": before, "residual_after": after,
+                        "residual_uncertainty": expected}  # fmt: skip
                 figures |= {"rms_before": rms(before), "rms_after": rms(after), "rms_expected": rms(expected)}
                 figures["used"] = int(np.count_nonzero(mask))
-                figures["left_out"] = int(np.count_nonzero(np.isfinite(block.mean) & ~mask))
-            if len(block.held):
-                where = allowed[k] & np.isfinite(block.held_mean)
-                before, after = (fit.gap(x, k, block.held_mean)[where] for x in (fit.start, self.x))
+                figures["left_out"] = int(np.count_nonzero(np.isfinite(block.signal.mean) & ~mask))
+            if len(block.held.turns):
+                where = allowed[k] & np.isfinite(block.held.mean)
+                before, after = (fit.gap(x, k, block.held.mean)[where] for x in (fit.start, self.x))
                 columns = np.nan_to_num(fit.reading(self.x, k)[1][:, where])
                 predicted = np.einsum("pi,pq,qi->i", columns, self.spread.covariance, columns)
-                count = np.maximum(np.count_nonzero(np.isfinite(block.held), axis=0), 1)[where]
-                expected = np.sqrt(self._scatter(k) / count + predicted)
-                values = zip(("before", "after", "expected"), (before, after, expected), strict=True)
-                figures |= {f"held_out_{name}": rms(row) for name, row in values}
+                expected = np.sqrt(self._scatter(k) / np.maximum(block.held.count, 1)[where] + predicted)
+                held = {"before": before, "after": after, "expected": expected}
+                figures |= {f"held_out_{name}": rms(row) for name, row in held.items()}
+            for name, row in rows.items():
+                arrays[name][at][: len(row)] = row
             for name, figure in figures.items():
                 arrays[name][at] = figure
         return arrays
@@ -251,59 +222,76 @@ class Identified:
         block, mask = self.fit.blocks[k], self.fit.masks[k]
         if block.repeats:
             return block.pooled(mask)
-        if len(block.held) > 1:
-            return float(np.nanmean(np.nanvar(block.held[:, mask], axis=0, ddof=1)))
-        alike = [one for one in self.fit.fitted() if self.fit.blocks[one].channel == block.channel]
-        return float(np.mean([self.fit.variances[one] for one in alike])) if alike else float("nan")
-
-    @property
-    def positions(self) -> tuple[int, int]:
-        """How many are used, and how many with data are left out."""
-        return int(self.by_block["used"].sum()), int(self.by_block["left_out"].sum())
+        if len(block.held.turns) > 1:
+            return float(np.nanmean(block.held.scatter[mask] ** 2))
+        alike = [self.fit.variances[j] for j in self.fit.fitted if self.fit.blocks[j].channel == block.channel]
+        return float(np.mean(alike)) if alike else float("nan")
 
     @property
     def hold_out_ratio(self) -> float:
         """Rms of all predictions over what is expected of them; NaN if nothing is held out."""
         return rms(self.by_block["held_out_after"] / self.by_block["held_out_expected"])
 
-    def driven(self, condition: int) -> tuple[float, float, float]:
-        """Angles of the first driver where the cycle begins and ends, rad, and its speed, rad/s, with the estimates."""
-        values = np.where(self.lost, self.fit.start, self.x)[: self.fit.count]
-        return self.fit.model.driven(condition, np.asarray(values))
-
-
-# ---- as a Dataset -----------------------------------------------------------------------------------------------
+    @cached_property
+    def cycles(self) -> list[DriveCycle]:
+        """The cycle in every condition, with the estimates."""
+        values = np.asarray(np.where(self.lost, self.fit.start, self.x)[: self.fit.count])
+        return [self.fit.model.cycle(k, values) for k in range(len(self.measurement.conditions))]
 
 
 def dataset(identified: Identified, findings: Sequence[Finding]) -> xr.Dataset:
     """Estimates with their uncertainty, residuals and findings."""
     fit, measurement, mechanism = identified.fit, identified.measurement, identified.mechanism
-    model, conditions = fit.model, measurement.conditions
-    names, system = [one.name for one in model.unknowns], model.run.system
-    arrays = _parameters(identified) | identified.by_block
+    model, conditions, spread, n = fit.model, measurement.conditions, identified.spread, fit.count
+    names, system = [unknown.name for unknown in model.unknowns], model.run.system
+    u, variances = identified.intervals["standard_uncertainty"], np.array([*map(np.diagonal, spread.parts.values())])
+    rows = fit.jacobian(identified.x)[:, :n]
+    singular = np.linalg.svd(rows / (np.linalg.norm(rows, axis=0) + (rows == 0).all(axis=0)), compute_uv=False)
+    sizes = [{abs(error.angle)} if error.angle else set(error.sizes[error.sizes != 0]) for error in fit.sensors]
+    with np.errstate(all="ignore"):
+        correlation = np.clip(spread.covariance[:n, :n] / np.outer(u[:n], u[:n]), -1.0, 1.0)
+        share = (variances / np.sum(variances, axis=0))[:, :n].T
+    arrays = {
+        **identified.by_block,
+        **{name: figures[:n] for name, figures in identified.intervals.items()},
+        "start": fit.start[:n],
+        "degrees_of_freedom": spread.freedom[:n],
+        "told": (~identified.lost & ~identified.vague)[:n].astype(np.int8),
+        "correlation": correlation,
+        "share": np.where(identified.lost[:n, None], np.nan, share),
+        "singular_value": np.append(singular, np.zeros(n - len(singular))),  # fewer data than unknowns
+        "sensor_error": np.where(identified.lost, np.nan, identified.x)[n:],
+        "sensor_uncertainty": u[n:],
+        "sensor_size": np.array([size.pop() if len(size) == 1 else np.nan for size in sizes]),
+        "reduced_chi_squared": np.asarray(spread.test.reduced),
+        "chi_squared_freedom": np.asarray(spread.test.freedom),
+        "chi_squared_chance": np.asarray(spread.test.chance),
+        "turn_correlation": np.asarray(spread.follows),
+        "hold_out_ratio": np.asarray(identified.hold_out_ratio),
+    }
     labels = {
         "parameter": names,
         "parameter_2": names,
-        "source": list(identified.spread.parts),
-        "sensor": [one.name for one in fit.sensors],
+        "source": list(spread.parts),
+        "sensor": [error.name for error in fit.sensors],
         "channel": list(model.measures),
-        "condition": [one.name for one in conditions],
+        "condition": [condition.name for condition in conditions],
     }
-    ends = (identified.driven(k)[:2] for k in range(len(conditions)))
+    ends = [(cycle.begin, cycle.begin + cycle.turn) for cycle in identified.cycles]
     attributes = {
         "name": mechanism.name,
         "identified": measurement.name,
         **origin(mechanism, system.plan.formula),
         "confidence": CONFIDENCE,
         "encoder": identified.encoder,
-        "parameter_paths": [one.paths for one in model.unknowns],
-        "parameter_units": [one.unit for one in model.unknowns],
-        "channel_units": [one.unit(system) for one in model.measures.values()],
-        "channel_measures": [one.name for one in model.measures.values()],
+        "parameter_paths": [unknown.paths for unknown in model.unknowns],
+        "parameter_units": [unknown.unit for unknown in model.unknowns],
+        "channel_units": [measure.unit(system) for measure in model.measures.values()],
+        "channel_measures": [measure.name for measure in model.measures.values()],
         "drive": next(iter(mechanism.drivers), ""),
         # angles of the first driver where the cycle begins and ends, rad; None if they name no position
         "drive_range": [list(pair) if np.isfinite(pair).all() else None for pair in ends],
-        "files": [list(one.files) for one in conditions],
+        "files": [list(condition.files) for condition in conditions],
         "data_files": hashed_files(conditions),
         "data_findings": data_findings(measurement),
         "done": list(measurement.done),
@@ -315,41 +303,6 @@ def dataset(identified: Identified, findings: Sequence[Finding]) -> xr.Dataset:
     }
     variables = described({name: arrays[name] for name in VARIABLES}, VARIABLES)
     return dataset_of("identification", variables, labels, attributes)
-
-
-def _parameters(identified: Identified) -> dict[str, NDArray[Any]]:
-    """What belongs to unknowns and sensors, and to the fit."""
-    fit, spread, n, lost = identified.fit, identified.spread, identified.fit.count, identified.lost
-    u, (lower, upper) = identified.deviation, identified.interval
-    variances = np.array([np.diagonal(part)[:n] for part in spread.parts.values()]).T
-    rows = fit.jacobian(identified.x)[:, :n]
-    size = np.linalg.norm(rows, axis=0)
-    singular = np.linalg.svd(rows / np.where(size > 0, size, 1.0), compute_uv=False)
-    sizes = [{abs(one.angle)} if one.angle else {size for size in one.sizes if size} for one in fit.sensors]
-    with np.errstate(all="ignore"):
-        correlation = np.clip(spread.covariance[:n, :n] / np.outer(u[:n], u[:n]), -1.0, 1.0)
-        share = variances / np.sum(variances, axis=1, keepdims=True)
-    return {
-        "start": fit.start[:n],
-        "estimate": identified.estimate,
-        "standard_uncertainty": u[:n],
-        "lower": lower,
-        "upper": upper,
-        "degrees_of_freedom": spread.freedom[:n],
-        "limit": identified.limit,
-        "told": (~lost[:n] & ~identified.vague).astype(np.int8),
-        "correlation": correlation,
-        "share": np.where(lost[:n, None], np.nan, share),
-        "singular_value": np.append(singular, np.zeros(n - len(singular))),  # fewer data than unknowns
-        "sensor_error": np.where(lost[n:], np.nan, identified.x[n:]),
-        "sensor_uncertainty": u[n:],
-        "sensor_size": np.array([one.pop() if len(one) == 1 else np.nan for one in sizes]),
-        "reduced_chi_squared": np.asarray(spread.test.reduced),
-        "chi_squared_freedom": np.asarray(spread.test.freedom),
-        "chi_squared_chance": np.asarray(spread.test.chance),
-        "turn_correlation": np.asarray(spread.follows),
-        "hold_out_ratio": np.asarray(identified.hold_out_ratio),
-    }
 
 
 # ---- estimates in the model -----------------------------------------------------------------------------------
@@ -410,7 +363,7 @@ def corrected_mapping(mapping: Mapping[str, Any], result: xr.Dataset) -> dict[st
     entries = deepcopy(dict(mapping))
     path, paths = str(result.attrs["encoder"]), attribute(result, "parameter_paths")
     p = next((p for p, own in enumerate(paths) if path in own and result["told"].values[p]), None)
-    causes = (one.figures for one in findings_of(result) if one.code == "fit.cause")
+    causes = (finding.figures for finding in findings_of(result) if finding.code == "fit.cause")
     cause: Mapping[str, Any] = next(causes, {"kind": ""})
     if p is not None:
         _turn(entries, float(result["estimate"].values[p]) - _model_start(result, path))

@@ -5,7 +5,8 @@ Settings of the conditions and paths of the unknowns → one prepared model → 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -35,7 +36,7 @@ from trunnion.rig.identification.fit import (
 )
 from trunnion.rig.identification.result import Identified, MisfitCause, dataset
 from trunnion.rig.identification.signals import Model, Parameters, described, unknowns
-from trunnion.rig.identification.uncertainty import LackOfFit, excess, inseparable, quantile, spread_of
+from trunnion.rig.identification.uncertainty import inseparable, quantile, spread_of
 from trunnion.rig.modelled import apart, each, in_condition, measure_of, refuse_unit, same_cycle
 from trunnion.rig.reading.measurement import (
     Accuracy,
@@ -62,7 +63,7 @@ MOST_NAMED = 6  # conditions in a message
 SAME = 1e-6  # of a setting
 HALVINGS = 8  # of a friction that locks at the start
 EXPLAINS = 0.8  # of a misfit, at least, for a cause of it to be named
-DEGREE, SETTLED = np.radians(1.0), np.radians(0.01)
+SETTLED = np.radians(0.01)
 ROUNDS = 5  # of the angle
 
 
@@ -113,43 +114,43 @@ def identify(
     conditions = measurement.conditions
     each(conditions, partial(in_condition, mechanism))
     paths = described(mechanism, parameters)
-    mechanism, settings = _with_settings(mechanism, measurement, paths, start or {})
-    run, joints = prepare(mechanism), load_joints(mechanism)
+    mechanism, settings = _with_settings(mechanism, conditions, paths, start or {})
+    run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    names = _channels(measurement, channels, joints)
-    blocks = _blocks(measurement, names, held_out(mechanism, measurement, hold_out), joints)
+    blocks = _blocks(mechanism, measurement, channels, held_out(mechanism, measurement, hold_out))
     if follow := [seat.joint for seat in run.seats if seat.given is None]:
         what = f"pins lie as their loads press them, which carries no derivatives: {', '.join(follow)}"
         raise MechanismError(Finding(what, "seat", "state seat: free, or the side that each lies on"))
-    phases = tuple(np.asarray(one.phase, float) for one in conditions)
+    phases = tuple(np.asarray(condition.phase, float) for condition in conditions)
     sought, measures = tuple(unknowns(mechanism, paths, start or {})), _measures(mechanism, run, blocks)
     model = Model(run, sought, measures, settings, phases, friction_method or FrictionMethod())
     if channels is None:
         model = replace(model, measures=_acted_on(model))
         blocks = [block for block in blocks if block.channel in model.measures]
     encoder = f"drivers.{next(iter(mechanism.drivers), '')}.start"  # an unknown of data that state an angle
-    if not (any(encoder in one.paths for one in sought) and np.isfinite([one.start for one in conditions]).any()):
+    starts = [condition.start for condition in conditions]
+    if not (any(encoder in unknown.paths for unknown in sought) and np.isfinite(starts).any()):
         encoder = ""
-    at = np.array([one.before[0] if encoder in one.paths else one.start for one in sought])
-    cycles = iter([(model.durations[k], *model.driven(k, at)) for k in range(len(conditions))])
+    at = np.array([unknown.before[0] if encoder in unknown.paths else unknown.start for unknown in sought])
 
-    def check(condition: Condition) -> None:
-        duration, first, last, _ = next(cycles)
-        same_cycle(run, condition, duration, first, last - first)
+    def check(k: int) -> None:
+        cycle = model.cycle(k, at)
+        same_cycle(run, conditions[k], model.cycles[k].duration, cycle.begin, cycle.turn)
 
-    each(conditions, check)
+    each(range(len(conditions)), check)
     errors = sensor_errors(model, conditions, blocks)
-    fit = Fit(Evaluations(model, progress), blocks, errors, guard)
+    fit = Fit(Evaluations(model, progress or (lambda count: None)), blocks, errors, guard)
     begin = _runnable(fit)
     fit, best = refined(fit, begin)
     spread = spread_of(fit, best.x)
-    fit = replace(fit, inflation=excess(fit, spread))
-    if fit.inflation > 1 and fit.sensors:
-        best = replace(solved(fit, best.x), evaluations=best.evaluations, settled=best.settled)
+    if spread.excess > 1 and fit.sensors:
+        fit = replace(fit, inflation=spread.excess)
+        best = best._replace(x=solved(fit, best.x).x)
         spread = spread_of(fit, best.x)
-    other_speeds = [apart(one.speed, model.driven(k, best.x[: fit.count])[2]) for k, one in enumerate(conditions)]
-    causes = _causes(fit, begin, spread.test) if spread.test.misfit and not any(other_speeds) else []
+    cycles = [model.cycle(k, best.x[: fit.count]) for k in range(len(conditions))]
+    other_speed = any(apart(condition.speed, cycle.speed) for condition, cycle in zip(conditions, cycles, strict=True))
+    causes = _causes(fit, begin, spread.test.reduced) if spread.test.misfit and not other_speed else []
     groups = inseparable(fit, best.x, spread)
     identified = Identified(mechanism, measurement, fit, best, spread, groups, causes, encoder)
     return dataset(identified, findings_of(identified))
@@ -158,27 +159,24 @@ def identify(
 # ---- the data -------------------------------------------------------------------------------------------------
 
 
-def _channels(measurement: Measurement, channels: Sequence[str] | None, joints: Mapping[str, str]) -> list[str]:
-    """Channels to fit, in the order of the data; all if none is named. MechanismError for one that is not there."""
-    every = list(dict.fromkeys(name for one in measurement.conditions for name in one.courses))
+def _blocks(
+    mechanism: Mechanism, measurement: Measurement, channels: Sequence[str] | None, held: tuple[frozenset[str], float]
+) -> list[Block]:
+    """One for each channel in each condition; all channels if none is named.
+
+    held: conditions by name, and the share of the turns of each, the last ones.
+    """
+    conditions, joints, (names, share) = measurement.conditions, load_joints(mechanism), held
+    every = list(dict.fromkeys(name for condition in conditions for name in condition.courses))
     if not every:
         raise MechanismError(Finding("the measurement has no channels", measurement.name, "map one to a measure"))
-    computed = [EFFICIENCY] if any(pairs_of(one, joints) for one in measurement.conditions) else []
-    missing = [name for name in channels or () if name not in (*every, *computed)]
-    if missing:
+    computed = [EFFICIENCY] if any(pairs_of(condition, joints) for condition in conditions) else []
+    if missing := [name for name in channels or () if name not in (*every, *computed)]:
         remedy = f"the measurement has {', '.join(every)}{f', and {EFFICIENCY} of them' if computed else ''}"
         raise MechanismError(Finding(f"there is no channel '{missing[0]}'", "channels", remedy))
-    return every if channels is None else [name for name in dict.fromkeys([*every, *computed]) if name in channels]
-
-
-def _blocks(
-    measurement: Measurement, channels: Sequence[str], held: tuple[frozenset[str], float], joints: Mapping[str, str]
-) -> list[Block]:
-    """One for each channel in each condition. held: conditions by name, and the share of the turns of each, the last
-    ones; joints: of the loads, for the efficiency."""
-    names, share = held
     blocks = []
-    for (index, condition), channel in product(enumerate(measurement.conditions), channels):
+    picked = every if channels is None else [name for name in dict.fromkeys([*every, *computed]) if name in channels]
+    for (index, condition), channel in product(enumerate(conditions), picked):
         signal, effects = condition.courses.get(channel), dict[str, float]()
         if signal is None and channel == EFFICIENCY and pairs_of(condition, joints):
             signal, effects = _efficiency(condition, joints)
@@ -191,16 +189,16 @@ def _blocks(
             remedy = "name conditions to hold out, or give a smaller share"
             raise MechanismError(Finding(what, f"condition {condition.name}", remedy))
         fitted = 0 if condition.name in names else fitted
-        blocks.append(Block(index, channel, signal, turns[:fitted], turns[fitted:], effects, tuple(condition.files)))
-    if not any(len(block.turns) for block in blocks):
+        first, last = (replace(signal, turns=part) for part in (turns[:fitted], turns[fitted:]))
+        blocks.append(Block(index, channel, first, last, effects))
+    if not any(len(block.signal.turns) for block in blocks):
         raise MechanismError(Finding("all conditions are held out", "hold_out", "leave some to fit"))
     return blocks
 
 
 def _efficiency(condition: Condition, joints: Mapping[str, str]) -> tuple[Signal, dict[str, float]]:
     """The efficiency of each turn as a course of one position, and what the errors of its sensors do to it."""
-    efficiency = efficiency_of(condition, joints)
-    effects: dict[str, float] = {}
+    efficiency, effects = efficiency_of(condition, joints), dict[str, float]()
     for one in efficiency.contributions:
         accuracy = condition.courses[one.channel].accuracy if one.channel in condition.courses else Accuracy()
         if one.source == "gain":
@@ -214,79 +212,68 @@ def _efficiency(condition: Condition, joints: Mapping[str, str]) -> tuple[Signal
 def held_out(mechanism: Mechanism, measurement: Measurement, hold_out: HoldOut) -> tuple[frozenset[str], float]:
     """Names of the conditions to hold out, and the share of the turns of the others.
 
-    A condition is named by its name, the name of its file without extension, a setting such as `misalignment=15 deg`,
-    or its value as it stands in the names, which may be that of several, or a part of its name that no other has.
-    MechanismError for what names none.
+    A condition is named by its name, the name of its file, a setting such as `misalignment=15 deg`, or a part of its
+    name that is a value or a word there. MechanismError for what names none.
     """
-    if hold_out is None:
-        return frozenset(), 0.0
     if isinstance(hold_out, (int, float)):
         if not 0 < hold_out < 1:
             what = f"a share of {hold_out:g} of the turns cannot be held out"
             raise MechanismError(Finding(what, "hold_out", "give a share between 0 and 1, or names of conditions"))
         return frozenset(), float(hold_out)
     conditions, held = measurement.conditions, set[str]()
-    for text in [hold_out] if isinstance(hold_out, str) else hold_out:
-        part = text.strip()
-        exact = [
-            one.name
-            for one in conditions
-            if text in (one.name, *(part for file in one.files for part in (PurePath(file).stem, PurePath(file).name)))
-        ]
-        settings = [one.name for one in conditions if part and f" {part}," in f"{one.name},"]
-        parts = [one.name for one in conditions if part and part in one.name]
-        matching = exact or _with_setting(mechanism, conditions, part) or settings or parts * (len(parts) == 1)
-        if not matching:
-            what = f"there is no condition '{text}'"
-            what = f"'{text}' is in the names of {len(parts)} conditions" if parts else what
-            several = parts or [one.name for one in conditions]
-            named_in = "; ".join(several[:MOST_NAMED]) + "; …" * (len(several) > MOST_NAMED)
-            raise MechanismError(Finding(what, "hold_out", f"name one of {named_in}; or a file, or NAME=VALUE"))
-        held |= set(matching)
+    for text in [hold_out] if isinstance(hold_out, str) else hold_out or ():
+        exact, parts, part = set[str](), set[str](), text.strip()
+        name, equals, value = (item.strip() for item in text.partition("="))
+        for one in conditions:
+            if text in (one.name, *(end for file in one.files for end in (PurePath(file).stem, PurePath(file).name))):
+                exact.add(one.name)
+            elif part and re.search(rf"(?<![\w.-]){re.escape(part)}(?![\w.-])", one.name):
+                parts.add(one.name)
+            elif equals:
+                path, settings = mechanism.path_of(name), {mechanism.path_of(key): v for key, v in one.values.items()}
+                number: float | str = value
+                with suppress(ValueError):  # with a unit
+                    number = float(value)
+                stated = float(np.ravel(mechanism.with_values({path: number}).parameters()[path])[0])
+                if np.isclose(settings.get(path, np.nan), stated, rtol=SAME, atol=0):
+                    exact.add(one.name)
+        if not exact | parts:
+            names = "; ".join(condition.name for condition in conditions[:MOST_NAMED])
+            remedy = f"name one of {names}{'; …' * (len(conditions) > MOST_NAMED)}; or a file, or NAME=VALUE"
+            raise MechanismError(Finding(f"there is no condition '{text}'", "hold_out", remedy))
+        held |= exact or parts
     return frozenset(held), 0.0
-
-
-def _with_setting(mechanism: Mechanism, conditions: Sequence[Condition], text: str) -> list[str]:
-    """Names of the conditions with a setting NAME=VALUE."""
-    name, equals, value = (part.strip() for part in text.partition("="))
-    if not equals:
-        return []
-    path = mechanism.path_of(name)
-    number: float | str = value
-    with suppress(ValueError):  # with a unit
-        number = float(value)
-    changed = mechanism.with_values({path: number})
-    stated = float(np.ravel(changed.parameters()[path])[0])
-    settings = {one.name: {mechanism.path_of(key): own for key, own in one.values.items()} for one in conditions}
-    return [name for name, own in settings.items() if np.isclose(own.get(path, np.nan), stated, rtol=SAME, atol=0)]
 
 
 # ---- the model ------------------------------------------------------------------------------------------------
 
 
 def _with_settings(
-    mechanism: Mechanism, measurement: Measurement, paths: Mapping[str, Sequence[str]], start: Mapping[str, float | str]
+    mechanism: Mechanism,
+    conditions: Sequence[Condition],
+    paths: Mapping[str, Sequence[str]],
+    start: Mapping[str, float | str],
 ) -> tuple[Mechanism, tuple[dict[str, float], ...]]:
     """The mechanism with all numbers stated that conditions set or that are looked for, and what each sets, by path.
 
     MechanismError where a condition sets what is looked for, or what is no number.
     """
-    conditions = measurement.conditions
-    settings = [{mechanism.path_of(name): float(value) for name, value in one.values.items()} for one in conditions]
-    numbers: dict[str, float | str] = {path: value for own in reversed(settings) for path, value in own.items()}
-    owners = {path: name for name, own in paths.items() for path in own}
-    for condition, own in zip(conditions, settings, strict=True):
-        if path := next((path for path in own if path in owners), ""):
-            what, remedy = f"the condition {condition.name} sets {path}", "leave it out of the conditions"
-            raise MechanismError(Finding(what, f"parameter {owners[path]}", remedy))
+    values = (condition.values.items() for condition in conditions)
+    settings = [{mechanism.path_of(name): float(value) for name, value in pairs} for pairs in values]
+    owners = {path: name for name, members in paths.items() for path in members}
+    numbers: dict[str, float | str] = {path: value for row in reversed(settings) for path, value in row.items()}
     numbers |= {path: start.get(name, 0.0) for path, name in owners.items()}
-    missing = {path: one for path, one in numbers.items() if path not in mechanism.parameter_set.entries}
+    missing = {path: item for path, item in numbers.items() if path not in mechanism.parameter_set.entries}
     mechanism = mechanism.with_values(missing) if missing else mechanism
-    values = mechanism.parameters()
-    for condition, own in zip(conditions, settings, strict=True):
-        if path := next((path for path in own if path not in values), ""):
-            what = f"the condition {condition.name} sets it, but it is no number: it changes with the motion"
-            raise MechanismError(Finding(what, path, "set a dimension in it"))
+    every = mechanism.parameters()
+    for condition, row in zip(conditions, settings, strict=True):
+        for path in row:
+            what = f"the condition {condition.name} sets {path}"
+            if path in owners:
+                raise MechanismError(Finding(what, f"parameter {owners[path]}", "leave it out of the conditions"))
+            if path not in every:
+                what += ", but it is no number: it changes with the motion"
+                raise MechanismError(Finding(what, path, "set a dimension in it"))
     return mechanism, tuple(settings)
 
 
@@ -295,7 +282,7 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[s
     measures: dict[str, Measure] = {}
     for block in blocks:
         channel, text = block.channel, block.signal.measures
-        of_turns = channel == EFFICIENCY and block.turns.shape[1] == 1  # one figure of each, made in `_efficiency`
+        of_turns = (channel, text, block.signal.turns.shape[1]) == (EFFICIENCY, "efficiency:cycle", 1)
         measure = named(mechanism, [text], run.values)[0] if of_turns else measure_of(mechanism, run, channel, text)
         refuse_unit(run, measure, channel, block.signal)
         if measures.setdefault(channel, measure).name != measure.name:
@@ -306,15 +293,13 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[s
 
 def _acted_on(model: Model) -> dict[str, Measure]:
     """The channels that an unknown acts on, as far as the start shows; all if there are none."""
-    courses = model.courses(np.array([one.start for one in model.unknowns]))
-    sizes = np.array([one.size or 1.0 for one in model.unknowns])
-    moved = dict.fromkeys(model.measures, 0.0)
-    for said in courses.said:
-        for name, one in said.items():
-            most = float(np.nanmax(np.abs(one.value), initial=0.0))
-            change = float(np.nanmax(np.abs(np.nan_to_num(one.slope)) * sizes[:, None], initial=0.0))
-            moved[name] = max(moved[name], change / most if most else change)
-    return {name: model.measures[name] for name, share in moved.items() if share > NOTHING} or dict(model.measures)
+    courses = model.courses(np.array([unknown.start for unknown in model.unknowns]))
+    sizes, moved = np.array([unknown.size or 1.0 for unknown in model.unknowns])[:, None], dict[str, Measure]()
+    for name, one in (pair for said in courses.said for pair in said.items()):
+        most = float(np.nanmax(np.abs(one.value), initial=0.0)) or 1.0
+        if np.nanmax(np.abs(np.nan_to_num(one.slope)) * sizes, initial=0.0) > NOTHING * most:
+            moved[name] = model.measures[name]
+    return {name: measure for name, measure in model.measures.items() if name in moved} or dict(model.measures)
 
 
 # ---- the search -----------------------------------------------------------------------------------------------
@@ -322,23 +307,17 @@ def _acted_on(model: Model) -> dict[str, Measure]:
 
 def _runnable(fit: Fit) -> Array:
     """The start, with less friction where that locks. MechanismError if no position can be used."""
-
-    def unanswered(x: Array) -> int:
-        return sum(int(np.count_nonzero(status >= Status.NOT_CONVERGED)) for status in fit.courses(x).status)
-
-    unknowns = fit.model.unknowns
-    rubs = [p for p, one in enumerate(unknowns) if any(".friction." in path for path in one.paths)]
-    low = np.array([one.lower for one in unknowns])
-    best, lost = fit.start, unanswered(fit.start)
-    for k in range(1, HALVINGS + 1):
-        if not lost or not rubs:
+    rubs = [p for p, unknown in enumerate(fit.model.unknowns) if any(".friction." in path for path in unknown.paths)]
+    starts, lost = [fit.start], list[int]()
+    for k in range(HALVINGS + 1):
+        lost.append(sum(int(np.sum(codes >= Status.NOT_CONVERGED)) for codes in fit.courses(starts[-1]).status))
+        if not (lost[-1] and rubs):
             break
-        less = fit.start.copy()
-        less[rubs] = np.maximum(fit.start[rubs] * 0.5**k, low[rubs])
-        if unanswered(less) < lost:
-            best, lost = less, unanswered(less)
+        starts.append(fit.start.copy())
+        starts[-1][rubs] = np.maximum(fit.start[rubs] * 0.5 ** (k + 1), fit.bounds[0][rubs])
+    best = starts[int(np.argmin(lost))]
     masks = replace(fit, variances=fit.first_scatter()).allowed(best)
-    if not any(np.any(masks[k]) for k in fit.fitted()):
+    if not any(np.any(masks[k]) for k in fit.fitted):
         codes = np.concatenate([np.asarray(status) for status in fit.courses(best).status])
         what = "no position can be used: no channel has a value there, friction reverses beside it, or the model has "
         what += f"no sound answer (most often {list(Status)[int(np.bincount(codes).argmax())].text})"
@@ -347,49 +326,44 @@ def _runnable(fit: Fit) -> Array:
     return best
 
 
-def _causes(fit: Fit, start: Array, test: LackOfFit) -> list[MisfitCause]:
-    """Errors that explain most of a misfit, each by itself, the best first: a fit with one free error more."""
-    causes = []
-    for error, unit in _free_errors(fit):
-        try:
-            more, best, size = _with_error(fit, start, error, unit)
-        except ValueError:  # no answer of the model there
+def _causes(fit: Fit, start: Array, reduced: float) -> list[MisfitCause]:
+    """Errors that explain most of a misfit, each by itself, the best first: a fit with one free error more.
+
+    A zero and a gain of each channel, and an offset of the angle; nothing is stated of them.
+    """
+    causes, channels = [], list(dict.fromkeys(fit.blocks[k].channel for k in fit.fitted))
+    for kind, channel in (*product(("zero", "gain"), channels), ("angle", "")):
+        own, unit = [block for block in fit.blocks if block.channel == channel], 0.01
+        sizes = np.array([unit * (block.channel == channel) for block in fit.blocks])
+        if kind == "zero":
+            usual = rms(np.concatenate([block.signal.turns.ravel() for block in own])) or 1.0
+            sizes, unit = sizes * usual, unit * usual
+        elif kind == "angle":
+            sizes = np.array([-unit / fit.model.cycles[block.condition].turn for block in fit.blocks])
+            sizes *= [block.signal.turns.shape[1] > 2 for block in fit.blocks]
+        if not (np.isfinite(sizes).all() and np.any(sizes)):
             continue
-        spread = spread_of(more, best)
-        half = quantile(spread.freedom) * spread.deviation
-        share, wide = (test.reduced - spread.test.reduced) / (test.reduced - 1), float(half[-1]) * unit
-        nothing_left = error.kind == "gain" and size < 2e-6 - 1  # of the model
-        if share >= EXPLAINS and wide < abs(size) < (np.pi if error.kind == "angle" else np.inf) and not nothing_left:
-            n = fit.count
-            causes.append(MisfitCause(error.kind, error.channel, size, wide, min(share, 1.0), best[:n], half[:n]))
-    return sorted(causes, key=lambda one: -round(one.explains, 2))  # of equal ones first the simplest
-
-
-def _with_error(fit: Fit, start: Array, error: SensorError, unit: float) -> tuple[Fit, Array, float]:
-    """The fit with an error more, where it ends, and how large the error is there; of an angle in several rounds."""
-    model, moved, size = fit.model, fit, 0.0
-    turning = error.kind == "angle" and model.run.cycle.periodic
-    for _ in range(ROUNDS):  # the positions follow the angle until it is settled
-        more = replace(moved, sensors=[*fit.sensors, error], inflation=1.0)
-        more, best = refined(more, np.append(start, 0.0))
-        size, start = size + float(best.x[-1]) * unit, best.x[:-1]
-        if not turning or abs(best.x[-1] * unit) < SETTLED or abs(size) > np.pi:
-            break
-        phases = zip(model.phases, model.turns, strict=True)
-        shifted = replace(model, phases=tuple((phase + size / turn) % 1.0 for phase, turn in phases))
-        moved = replace(fit, courses_at=Evaluations(shifted))
-    return more, best.x, size
-
-
-def _free_errors(fit: Fit) -> Iterator[tuple[SensorError, float]]:
-    """A zero and a gain of each channel, and an offset of the angle, of which nothing is stated; and their units."""
-    model = fit.model
-    for kind, channel in product(("zero", "gain"), dict.fromkeys(fit.blocks[k].channel for k in fit.fitted())):
-        if kind == "zero" or not model.measures[channel].turning(model.run.system):
-            turns = np.concatenate([block.turns.ravel() for block in fit.blocks if block.channel == channel])
-            unit = 0.01 * (1.0 if kind == "gain" else rms(turns) or 1.0)
-            sizes = tuple(unit * (block.channel == channel) for block in fit.blocks)
-            yield SensorError(f"{kind} of {channel}", channel, kind, sizes, stated=False), unit
-    sizes = tuple(-DEGREE / model.turns[block.condition] * (block.turns.shape[1] > 2) for block in fit.blocks)
-    if np.isfinite(sizes).all() and any(sizes):
-        yield SensorError("offset of the drive angle", "", "angle", sizes, stated=False), DEGREE
+        error, size, begin, moved = SensorError(kind, channel, kind, sizes, stated=False), 0.0, start, fit
+        with suppress(ValueError):  # no answer of the model there
+            for _ in range(ROUNDS if kind == "angle" and fit.model.run.cycle.periodic else 1):
+                more, best = refined(
+                    replace(moved, sensors=[*fit.sensors, error], inflation=1.0), np.append(begin, 0.0)
+                )
+                begin, step, size = best.x[:-1], float(best.x[-1]) * unit, size + float(best.x[-1]) * unit
+                if abs(step) < SETTLED or abs(size) > np.pi:
+                    break
+                phases = zip(fit.model.phases, fit.model.cycles, strict=True)  # follow the angle until it is settled
+                shifted = tuple((phase + size / cycle.turn) % 1.0 for phase, cycle in phases)
+                moved = replace(fit, courses_at=Evaluations(replace(fit.model, phases=shifted)))
+            spread = spread_of(more, best.x)
+            half, share = quantile(spread.freedom) * spread.deviation, (reduced - spread.test.reduced) / (reduced - 1)
+            wide = float(half[-1]) * unit
+            much = abs(size) > np.pi if kind == "angle" else kind == "gain" and size < 2e-6 - 1  # nothing is left
+            if share >= EXPLAINS and abs(size) > wide and not much:
+                alike = [sensor for sensor in fit.sensors if (sensor.kind, sensor.channel) == (kind, channel)]
+                deviations = (sensor.angle if kind == "angle" else np.abs(sensor.sizes).max() for sensor in alike
+                            if sensor.stated)  # fmt: skip
+                stated = max(map(float, deviations), default=0.0)
+                times, n = abs(size) / stated if stated else 0.0, fit.count
+                causes.append(MisfitCause(kind, channel, size, wide, min(share, 1.0), times, best.x[:n], half[:n]))
+    return sorted(causes, key=lambda item: -round(item.explains, 2))  # of equal ones first the simplest

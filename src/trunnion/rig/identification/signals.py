@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf
+from math import inf, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import Measure, coordinate_unit
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.parameters import Entry, measured
+from trunnion.model.parameters import measured
 from trunnion.model.rules import Within
 from trunnion.solve import shifts
 from trunnion.solve.backward import Backward
@@ -30,12 +30,14 @@ from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.switches import Mechanisms, bends
 from trunnion.solve.system import sticking
 
-__all__ = ["Courses", "Model", "Parameters", "Said", "Unknown", "described", "limits", "unknowns"]
+__all__ = ["Courses", "DriveCycle", "Model", "Parameters", "Said", "Unknown", "described", "limits", "unknowns"]
 
 Array = NDArray[np.float64]
+Parameters = Mapping[str, Sequence[str] | str] | Sequence[str]
 AT_ONCE = 20_000  # numbers in an array
 STILL = 1e-9  # of the largest speed in the cycle: rounding, whose sign says nothing
-STEP = 1e-6  # of a driver's number, for what it does to the duration of the cycle
+STEP = 1e-6  # of a number, for what it does to the duration of the cycle
+SMALL = 1e-6  # of 1 in SI: the least of numbers that must be above 0
 
 
 class Said(NamedTuple):
@@ -43,6 +45,22 @@ class Said(NamedTuple):
 
     value: Array
     slope: Array
+
+
+class DriveCycle(NamedTuple):
+    """Duration of a cycle, s, the angle of the first driver where it begins, and what it turns by, rad.
+
+    NaN where its turns name no position.
+    """
+
+    duration: float
+    begin: float
+    turn: float
+
+    @property
+    def speed(self) -> float:
+        """Mean, rad/s."""
+        return self.turn / self.duration if self.duration else nan
 
 
 class Courses(NamedTuple):
@@ -55,228 +73,6 @@ class Courses(NamedTuple):
     said: tuple[Mapping[str, Said], ...]
     status: tuple[NDArray[np.int8], ...]
     turned: tuple[NDArray[np.bool_], ...]
-
-
-@dataclass(frozen=True)
-class Model:
-    """A prepared mechanism with its unknowns and the conditions it is observed in.
-
-    measures: by channel; settings: values by path, SI, of each condition; phases: (position,) of each.
-    """
-
-    run: Run
-    unknowns: tuple[Unknown, ...]
-    measures: Mapping[str, Measure]
-    settings: tuple[Mapping[str, float], ...]
-    phases: tuple[Array, ...]
-    friction: FrictionMethod
-
-    @cached_property
-    def forces(self) -> bool:
-        """Whether any channel asks for more than the motion."""
-        return not all(measure.of_motion for measure in self.measures.values())
-
-    def courses(self, at: Array) -> Courses:
-        """What the model says at these values of the unknowns, SI."""
-        rows: dict[int, tuple[Mapping[str, Said], NDArray[np.int8], NDArray[np.bool_]]] = {}
-        many, sizes = len(self.unknowns), [len(phase) for phase in self.phases]
-        for size in dict.fromkeys(sizes):  # conditions with as many positions as each other, not too many at once
-            alike = [k for k, one in enumerate(sizes) if one == size]
-            most = max(1, AT_ONCE // (size * many))
-            for part in (alike[low : low + most] for low in range(0, len(alike), most)):
-                courses, status, turned = self._batch(part, at, (len(part) * many, size))
-                for i, k in enumerate(part):
-                    own = slice(i * many, (i + 1) * many)
-                    said = {
-                        name: Said(np.broadcast_to(np.asarray(primal(one), float), status.shape)[own][0],
-                                   np.broadcast_to(np.asarray(derivative(one), float), status.shape)[own])
-                        for name, one in courses.items()
-                    }  # fmt: skip
-                    rows[k] = said, np.max(status[own], axis=0), np.any(turned[own], axis=0)
-        return Courses(*zip(*(rows[k] for k in range(len(self.phases))), strict=True))
-
-    def _batch(
-        self, part: Sequence[int], at: Array, shape: tuple[int, int]
-    ) -> tuple[dict[str, Number], NDArray[np.int8], NDArray[np.bool_]]:
-        """Courses by channel, statuses and where a sense changes, of conditions with as many positions."""
-        values, time = self._values(part, at), self._times(part, at)
-        with np.errstate(all="ignore"):
-            if self.forces:
-                back = self.run.solve(time, values, self.friction)
-                courses = {name: self._course(measure, back) for name, measure in self.measures.items()}
-                return courses, status_of(back, shape), self._turned(back, shape)
-            walk = posed(self.run.system, values, self.run.chosen.assembly, time)
-            courses = {name: self._course(measure, walk) for name, measure in self.measures.items()}
-            return courses, pose_status(walk, shape), np.zeros(shape, bool)
-
-    def _course(self, measure: Measure, found: Backward | Forward) -> Number:
-        parts = measure.curve(found)
-        if len(parts) == 1:
-            return parts[0]
-        useful, driven = (self._summed(number) for number in parts[:2])
-        return useful / driven
-
-    def _summed(self, power: Number) -> Number:
-        """Work over the cycle but for a factor: sums over a period, trapezia over a range."""
-        if isinstance(power, Dual):
-            return Dual(self._summed(power.real), self._summed(power.dual))
-        if np.ndim(power) == 0:
-            return power
-        row = np.asarray(power, float)
-        total = np.mean(row, axis=-1) if self.run.cycle.periodic else np.trapezoid(row, axis=-1) / (row.shape[-1] - 1)
-        return np.asarray(total)[..., None]
-
-    def _turned(self, back: Backward, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-        """Positions beside one with a relative speed of the other sign, in a joint that friction or a load resists."""
-        found = np.zeros(shape, bool)
-        for joint in sticking(self.run.system):
-            speed = np.broadcast_to(np.asarray(primal(back.walk.speed(joint)), float), shape)
-            most = np.max(np.abs(np.nan_to_num(speed)), axis=-1, keepdims=True)
-            sign = np.where(np.abs(speed) > STILL * most, np.sign(speed), 0.0)
-            differs = sign != np.roll(sign, -1, axis=-1)
-            if not self.run.cycle.periodic:
-                differs[..., -1] = False
-            found |= differs | np.roll(differs, 1, axis=-1)
-        return found
-
-    def by_share(self, condition: int, row: Array) -> Array:
-        """Derivative by the share of the cycle of courses in a condition, (…, position), by differences of neighbours.
-
-        Linear in the course, so that what is exact of the course stays so.
-        """
-        phase = self.phases[condition]
-        if row.shape[-1] < 3 or row.shape[-1] != len(phase):
-            return np.zeros_like(row)
-        if not self.run.cycle.periodic:
-            return np.asarray(np.gradient(row, phase, axis=-1))
-        gap = (np.roll(phase, -1) - np.roll(phase, 1)) % 1.0
-        return np.asarray((np.roll(row, -1, axis=-1) - np.roll(row, 1, axis=-1)) / gap)
-
-    @cached_property
-    def durations(self) -> tuple[float, ...]:
-        """Duration of the cycle in every condition, s, with the unknowns at their start."""
-        return tuple(self._duration(k, self._start) for k in range(len(self.phases)))
-
-    @cached_property
-    def turns(self) -> tuple[float, ...]:
-        """What the first driver turns by in the cycle, rad, in every condition, with the unknowns at their start.
-
-        NaN where its turns name no position.
-        """
-        ends = (self.driven(k, self._start) for k in range(len(self.phases)))
-        return tuple(last - first for first, last, _ in ends)
-
-    @cached_property
-    def _start(self) -> Array:
-        return np.array([one.start for one in self.unknowns])
-
-    @cached_property
-    def bends(self) -> tuple[Array, ...]:
-        """Shares of the cycle at which forces may bend or jump, by condition, with the unknowns at their start.
-
-        Points of load tables, ends of `between`, springs that let go, motion laws; see `switches`.
-        """
-        found = []
-        for k in range(len(self.phases)):
-            values = self.run.system.mechanism.parameters(self._overrides(k, self._start))
-            cycle = replace(self.run.cycle, duration=self.durations[k])
-            times = bends(Mechanisms(self.run.system, self.run.chosen.assembly, values, [cycle]))[0]
-            found.append(times / (cycle.duration or 1.0))
-        return tuple(found)
-
-    # ---- the batch --------------------------------------------------------------------------------------------
-
-    @cached_property
-    def _errors(self) -> Mapping[str, float]:
-        """Deviations that are added to numbers, by the path of the number."""
-        entries, values = self.run.system.mechanism.parameter_set.entries, self.run.values
-        return {path: float(np.ravel(values[one.error])[0]) for path, one in entries.items() if one.error}
-
-    def _values(self, part: Sequence[int], at: Array) -> dict[str, Number]:
-        """Every number: (row, 1) what differs between conditions, duals (row, 1) the unknowns."""
-        many = len(self.unknowns)
-        overrides: dict[str, Number] = {}
-        for path in dict.fromkeys(path for k in part for path in self.settings[k]):
-            nominal = self.run.values[path]
-            column = [self.settings[k].get(path, nominal) + self._errors.get(path, 0.0) for k in part]
-            overrides[path] = np.repeat(np.array(column, float), many)[:, None]
-        seeds = np.eye(many)
-        for p, unknown in enumerate(self.unknowns):
-            seed = np.tile(seeds[p], len(part))[:, None]
-            for path in unknown.paths:
-                overrides[path] = Dual(np.full((len(seed), 1), at[p] + self._errors.get(path, 0.0)), seed)
-        values = self.run.system.mechanism.parameters(overrides)
-        for seat in self.run.seats:
-            play = shifts.play_of(self.run.system.mechanism.space, self.run.system.joints[seat.joint][0], values,
-                                  seat.joint)  # fmt: skip
-            if play is not None:
-                values.update(play.model.paths(f"seats.{seat.joint}", shifts.given_offsets(values, seat.joint, play)))
-        return values
-
-    @cached_property
-    def _driving(self) -> tuple[int, ...]:
-        """Unknowns that a driver's motion may depend on."""
-        entries = self.run.system.mechanism.parameter_set.entries
-        needed = {path for path in entries if path.startswith("drivers.")}
-        grown = True
-        while grown:
-            more = {one for path in needed if path in entries for one in entries[path].depends} - needed
-            needed |= more
-            grown = bool(more)
-        return tuple(p for p, one in enumerate(self.unknowns) if not needed.isdisjoint(one.paths))
-
-    def _duration(self, condition: int, at: Array) -> float:
-        """Of the cycle, s. Gear pairs that no driver turns are taken to turn as in the nominal cycle."""
-        overrides = self._overrides(condition, at)
-        system, cycle = self.run.system, self.run.cycle
-        if cycle.duration == 0:
-            return 0.0
-        nominal = system.cycle(self.run.values).duration
-        return float(cycle.duration * system.cycle(system.mechanism.parameters(overrides)).duration / nominal)
-
-    def _overrides(self, condition: int, at: Array) -> dict[str, float]:
-        """What a condition sets, and the unknowns."""
-        overrides = dict(self.settings[condition])
-        for value, unknown in zip(at, self.unknowns, strict=True):
-            overrides.update(dict.fromkeys(unknown.paths, float(value)))
-        return overrides
-
-    def driven(self, condition: int, at: Array) -> tuple[float, float, float]:
-        """Angles of the first driver where the cycle begins and ends, rad, and its mean speed, rad/s.
-
-        NaN where its turns name no position.
-        """
-        system, duration = self.run.system, self._duration(condition, at)
-        if duration == 0 or coordinate_unit(system, self.run.values) != "rad":
-            return float("nan"), float("nan"), float("nan")
-        values = system.mechanism.parameters(self._overrides(condition, at))
-        ends = np.array([0.0, duration * (1 - 1e-12)])
-        drive = system.drive(values, next(iter(system.mechanism.drivers)), ends)[0]
-        row = np.ravel(np.asarray(primal(drive), float))
-        return float(row[0]), float(row[-1]), float((row[-1] - row[0]) / duration)
-
-    def _times(self, part: Sequence[int], at: Array) -> Number:
-        """Times of the positions, s, (row, position): shares of a cycle that an unknown may make longer."""
-        many = len(self.unknowns)
-        phase = np.repeat(np.stack([self.phases[k] for k in part]), many, axis=0)
-        if not self._driving:
-            return phase * np.repeat([self.durations[k] for k in part], many)[:, None]
-        duration = np.repeat([self._duration(k, at) for k in part], many)[:, None]
-        slope = np.zeros_like(duration)
-        for p in self._driving:
-            step = STEP * (abs(at[p]) or 1.0)
-            ends = [at + sign * step * (np.arange(many) == p) for sign in (-1.0, 1.0)]
-            for i, k in enumerate(part):
-                low, high = (self._duration(k, end) for end in ends)
-                slope[i * many + p] = (high - low) / (2 * step)
-        return Dual(phase * duration, phase * slope)
-
-
-# ---- unknowns --------------------------------------------------------------------------------------------------
-
-Parameters = Mapping[str, Sequence[str] | str] | Sequence[str]
-SMALL = 1e-6  # of 1 in SI: the least of numbers that must be above 0
-PLAIN = {"SI": "1"}  # of a dimension without a unit, whose kind its value does not tell
 
 
 @dataclass(frozen=True)
@@ -300,6 +96,183 @@ class Unknown:
         return max(abs(self.start), max(map(abs, self.before)))
 
 
+@dataclass(frozen=True)
+class Model:
+    """A prepared mechanism with its unknowns and the conditions it is observed in.
+
+    measures: by channel; settings: values by path, SI, of each condition; phases: (position,) of each.
+    """
+
+    run: Run
+    unknowns: tuple[Unknown, ...]
+    measures: Mapping[str, Measure]
+    settings: tuple[Mapping[str, float], ...]
+    phases: tuple[Array, ...]
+    friction: FrictionMethod
+
+    def courses(self, at: Array) -> Courses:
+        """What the model says at these values of the unknowns, SI."""
+        rows: dict[int, tuple[Mapping[str, Said], NDArray[np.int8], NDArray[np.bool_]]] = {}
+        many, sizes = len(self.unknowns), [len(phase) for phase in self.phases]
+        for size in dict.fromkeys(sizes):  # conditions with as many positions as each other, not too many at once
+            alike = [k for k, item in enumerate(sizes) if item == size]
+            most = max(1, AT_ONCE // (size * many))
+            for part in (alike[low : low + most] for low in range(0, len(alike), most)):
+                shape = (len(part) * many, size)
+                courses, status, turned = self._batch(part, at, shape)
+                parts = {name: [np.broadcast_to(np.asarray(of(signal), float), shape) for of in (primal, derivative)]
+                         for name, signal in courses.items()}  # fmt: skip
+                for i, k in enumerate(part):
+                    own = slice(i * many, (i + 1) * many)
+                    said = {name: Said(value[own][0], slope[own]) for name, (value, slope) in parts.items()}
+                    rows[k] = said, np.max(status[own], axis=0), np.any(turned[own], axis=0)
+        return Courses(*zip(*(rows[k] for k in range(len(self.phases))), strict=True))
+
+    def _batch(
+        self, part: Sequence[int], at: Array, shape: tuple[int, int]
+    ) -> tuple[dict[str, Number], NDArray[np.int8], NDArray[np.bool_]]:
+        """Courses by channel, statuses and where a sense changes, of conditions with as many positions."""
+        values, time = self._values(part, at), self._times(part, at)
+        with np.errstate(all="ignore"):
+            if all(measure.of_motion for measure in self.measures.values()):
+                walk = posed(self.run.system, values, self.run.chosen.assembly, time)
+                courses = {name: self._course(measure, walk) for name, measure in self.measures.items()}
+                return courses, pose_status(walk, shape), np.zeros(shape, bool)
+            back = self.run.solve(time, values, self.friction)
+            courses = {name: self._course(measure, back) for name, measure in self.measures.items()}
+            return courses, status_of(back, shape), self._turned(back, shape)
+
+    def _course(self, measure: Measure, solved: Backward | Forward) -> Number:
+        parts = measure.curve(solved)
+        return parts[0] if len(parts) == 1 else self._summed(parts[0]) / self._summed(parts[1])
+
+    def _summed(self, power: Number) -> Number:
+        """Work over the cycle but for a factor: sums over a period, trapezia over a range."""
+        if isinstance(power, Dual):
+            return Dual(self._summed(power.real), self._summed(power.dual))
+        if np.ndim(power) == 0:
+            return power
+        row = np.asarray(power, float)
+        total = np.mean(row, axis=-1) if self.run.cycle.periodic else np.trapezoid(row, axis=-1) / (row.shape[-1] - 1)
+        return np.asarray(total)[..., None]
+
+    def _turned(self, back: Backward, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+        """Positions beside one with a relative speed of the other sign, in a joint that friction or a load resists."""
+        turned = np.zeros(shape, bool)
+        for joint in sticking(self.run.system):
+            speed = np.broadcast_to(np.asarray(primal(back.walk.speed(joint)), float), shape)
+            most = np.max(np.abs(np.nan_to_num(speed)), axis=-1, keepdims=True)
+            sign = np.where(np.abs(speed) > STILL * most, np.sign(speed), 0.0)
+            differs = sign != np.roll(sign, -1, axis=-1)
+            if not self.run.cycle.periodic:
+                differs[..., -1] = False
+            turned |= differs | np.roll(differs, 1, axis=-1)
+        return turned
+
+    def by_share(self, condition: int, row: Array) -> Array:
+        """Derivative by the share of the cycle of courses in a condition, (…, position), by differences of neighbours.
+
+        Linear in the course, so that what is exact of the course stays so.
+        """
+        phase = self.phases[condition]
+        if row.shape[-1] < 3 or row.shape[-1] != len(phase):
+            return np.zeros_like(row)
+        if not self.run.cycle.periodic:
+            return np.asarray(np.gradient(row, phase, axis=-1))
+        gap = (np.roll(phase, -1) - np.roll(phase, 1)) % 1.0
+        return np.asarray((np.roll(row, -1, axis=-1) - np.roll(row, 1, axis=-1)) / gap)
+
+    @cached_property
+    def _start(self) -> Array:
+        return np.array([unknown.start for unknown in self.unknowns])
+
+    @cached_property
+    def cycles(self) -> tuple[DriveCycle, ...]:
+        """The cycle in every condition, with the unknowns at their start."""
+        return tuple(self.cycle(k, self._start) for k in range(len(self.phases)))
+
+    @cached_property
+    def bends(self) -> tuple[Array, ...]:
+        """Shares of the cycle at which forces may bend or jump, by condition, with the unknowns at their start.
+
+        Points of load tables, ends of `between`, springs that let go, motion laws; see `switches`.
+        """
+        places = []
+        for k, (duration, *_) in enumerate(self.cycles):
+            values = self.run.system.mechanism.parameters(self._overrides(k, self._start))
+            cycle = replace(self.run.cycle, duration=duration)
+            times = bends(Mechanisms(self.run.system, self.run.chosen.assembly, values, [cycle]))[0]
+            places.append(times / (duration or 1.0))
+        return tuple(places)
+
+    def cycle(self, condition: int, at: Array) -> DriveCycle:
+        """The cycle at some values of the unknowns. Gear pairs that no driver turns are taken to turn as nominally."""
+        system, cycle = self.run.system, self.run.cycle
+        values = system.mechanism.parameters(self._overrides(condition, at))
+        if cycle.duration == 0:
+            return DriveCycle(0.0, nan, nan)
+        duration = float(cycle.duration * system.cycle(values).duration / system.cycle(self.run.values).duration)
+        if coordinate_unit(system, self.run.values) != "rad":
+            return DriveCycle(duration, nan, nan)
+        drive = system.drive(values, next(iter(system.mechanism.drivers)), np.array([0.0, duration * (1 - 1e-12)]))[0]
+        first, *_, last = np.ravel(np.asarray(primal(drive), float)).tolist()
+        return DriveCycle(duration, first, last - first)
+
+    # ---- the batch --------------------------------------------------------------------------------------------
+
+    def _values(self, part: Sequence[int], at: Array) -> dict[str, Number]:
+        """Every number: (row, 1) what differs between conditions, duals (row, 1) the unknowns."""
+        many, mechanism, nominal = len(self.unknowns), self.run.system.mechanism, self.run.values
+        entries = mechanism.parameter_set.entries.items()
+        errors = {path: float(np.ravel(nominal[entry.error])[0]) for path, entry in entries if entry.error}
+        overrides: dict[str, Number] = {}
+        for path in dict.fromkeys(path for k in part for path in self.settings[k]):
+            column = [self.settings[k].get(path, nominal[path]) + errors.get(path, 0.0) for k in part]
+            overrides[path] = np.repeat(np.array(column, float), many)[:, None]
+        for p, unknown in enumerate(self.unknowns):
+            seed = np.tile(np.eye(many)[p], len(part))[:, None]
+            for path in unknown.paths:
+                overrides[path] = Dual(np.full((len(seed), 1), at[p] + errors.get(path, 0.0)), seed)
+        values = mechanism.parameters(overrides)
+        for seat in self.run.seats:
+            play = shifts.play_of(mechanism.space, self.run.system.joints[seat.joint][0], values, seat.joint)
+            if play is not None:
+                values.update(play.model.paths(f"seats.{seat.joint}", shifts.given_offsets(values, seat.joint, play)))
+        return values
+
+    def _overrides(self, condition: int, at: Array) -> dict[str, float]:
+        """What a condition sets, and the unknowns."""
+        pairs = zip(at, self.unknowns, strict=True)
+        sought = {path: float(value) for value, unknown in pairs for path in unknown.paths}
+        return {**self.settings[condition], **sought}
+
+    @cached_property
+    def _timing(self) -> tuple[int, ...]:
+        """Unknowns that make the cycle longer or shorter."""
+        places = range(len(self.unknowns))
+        return tuple(p for p in places if self.cycle(0, self._moved(self._start, p, 1e3))[0] != self.cycles[0][0])
+
+    def _moved(self, at: Array, p: int, steps: float) -> Array:
+        return np.asarray(at + steps * STEP * (abs(at[p]) or 1.0) * (np.arange(len(at)) == p))
+
+    def _times(self, part: Sequence[int], at: Array) -> Number:
+        """Times of the positions, s, (row, position): shares of a cycle that an unknown may make longer."""
+        many = len(self.unknowns)
+        phase = np.repeat(np.stack([self.phases[k] for k in part]), many, axis=0)
+        if not self._timing:
+            return phase * np.repeat([self.cycles[k].duration for k in part], many)[:, None]
+        duration = np.repeat([self.cycle(k, at).duration for k in part], many)[:, None]
+        slope = np.zeros_like(duration)
+        for i, k in enumerate(part):
+            for p in self._timing:
+                low, high = (self.cycle(k, self._moved(at, p, sign)).duration for sign in (-1.0, 1.0))
+                slope[i * many + p] = (high - low) / (2 * STEP * (abs(at[p]) or 1.0))
+        return Dual(phase * duration, phase * slope)
+
+
+# ---- unknowns --------------------------------------------------------------------------------------------------
+
+
 def described(mechanism: Mechanism, parameters: Parameters) -> dict[str, tuple[str, ...]]:
     """Paths by the name of the unknown; MechanismError for what means no number, or one that is named twice."""
     stated = parameters if isinstance(parameters, Mapping) else {name: [name] for name in parameters}
@@ -307,14 +280,13 @@ def described(mechanism: Mechanism, parameters: Parameters) -> dict[str, tuple[s
         remedy = "name one, such as joint_defaults.friction.coefficient"
         raise MechanismError(Finding("no parameter to identify is given", "parameters", remedy))
     findings: list[Finding] = []
-    found: dict[str, tuple[str, ...]] = {}
+    paths: dict[str, tuple[str, ...]] = {}
     owners: dict[str, str] = {}
     for name, given in stated.items():
-        names = [given] if isinstance(given, str) else list(given)
-        paths = []
-        for one in names or [name]:
+        paths[name] = ()
+        for number in [given] if isinstance(given, str) else list(given) or [name]:
             try:
-                path = mechanism.path_of(one)
+                path = mechanism.path_of(number)
             except MechanismError as error:
                 findings += error.findings
                 continue
@@ -322,52 +294,46 @@ def described(mechanism: Mechanism, parameters: Parameters) -> dict[str, tuple[s
                 what = f"{path} is in '{owners[path]}' already"
                 findings.append(Finding(what, f"parameter {name}", "name each number once"))
             owners[path] = name
-            paths.append(path)
-        found[name] = tuple(paths)
+            paths[name] += (path,)
     if findings:
         raise MechanismError(findings)
-    return found
+    return paths
 
 
 def unknowns(
     mechanism: Mechanism, described: Mapping[str, tuple[str, ...]], start: Mapping[str, float | str]
 ) -> list[Unknown]:
     """The unknowns of a mechanism that states all their numbers; start: of some, by name."""
-    extra = [name for name in start if name not in described]
-    if extra:
+    if extra := [name for name in start if name not in described]:
         what = f"'{extra[0]}' is not one of the parameters"
         raise MechanismError(Finding(what, "start", f"they are {', '.join(described)}"))
     values = mechanism.parameters()
     kinds = measured(mechanism, mechanism.parameter_set.entries.values())
-    found, findings = [], []
+    sought, findings = [], []
     for name, paths in described.items():
-        missing = [path for path in paths if path not in values]
-        if missing:
+        where = f"parameter {name}"
+        if missing := [path for path in paths if path not in values]:
             what = f"{missing[0]} is no number but changes with the motion"
-            findings.append(Finding(what, f"parameter {name}", "identify a dimension in it"))
+            findings.append(Finding(what, where, "identify a dimension in it"))
             continue
-        units = {PLAIN.get(kinds[path].unit, kinds[path].unit) for path in paths}
+        units = {"1" if kinds[path].unit == "SI" else kinds[path].unit for path in paths}
         if len(units) > 1:
             what = f"its numbers are not of one kind: {', '.join(sorted(units))}"
-            findings.append(Finding(what, f"parameter {name}", "use one parameter for each kind"))
+            findings.append(Finding(what, where, "use one parameter for each kind"))
             continue
         before = tuple(float(np.ravel(values[path])[0]) for path in paths)
-        ends = [limits(mechanism, path) for path in paths]
-        lower, upper = max(low for low, _ in ends), min(high for _, high in ends)
-        first = _read(mechanism, paths[0], start[name]) if name in start else float(np.mean(before))
+        lows, highs = zip(*(limits(mechanism, path) for path in paths), strict=True)
+        first, lower, upper = float(np.mean(before)), max(lows), min(highs)
+        if name in start:
+            stated = mechanism.with_values({paths[0]: start[name]}).parameters()
+            first = float(np.ravel(stated[paths[0]])[0])
         if not lower <= first <= upper:
             what = f"the start {first:g} is beyond its limits, {lower:g} to {upper:g} (SI)"
-            findings.append(Finding(what, f"parameter {name}", "give another start"))
-            continue
-        found.append(Unknown(name, paths, next(iter(units)), first, lower, upper, before))
+            findings.append(Finding(what, where, "give another start"))
+        sought.append(Unknown(name, paths, units.pop(), first, lower, upper, before))
     if findings:
         raise MechanismError(findings)
-    return found
-
-
-def _read(mechanism: Mechanism, path: str, text: float | str) -> float:
-    """A start value in SI."""
-    return float(np.ravel(mechanism.with_values({path: text}).parameters()[path])[0])
+    return sought
 
 
 def limits(mechanism: Mechanism, path: str) -> tuple[float, float]:
@@ -375,29 +341,19 @@ def limits(mechanism: Mechanism, path: str) -> tuple[float, float]:
 
     A dimension has the limits of all numbers that are it and nothing else.
     """
-    entries = mechanism.parameter_set.entries.values()
-    ends, same, grown = [_limits(mechanism, path)], {path}, path.startswith("dimensions.")
-    while grown:  # dimensions that are this one, and so on
-        equal = [one.path for one in entries if one.path not in same and _equals(one, same)]
-        ends += [_limits(mechanism, one) for one in equal]
-        same.update(equal)
-        grown = bool(equal)
-    return max(low for low, _ in ends), min(high for _, high in ends)
-
-
-def _equals(entry: Entry, paths: set[str]) -> bool:
-    """Whether a number is written as one of these dimensions alone, or follows a number that is."""
-    if entry.alias:
-        return entry.alias in paths
-    source = entry.quantity.source
-    return isinstance(source, str) and f"dimensions.{source.strip()}" in paths
-
-
-def _limits(mechanism: Mechanism, path: str) -> tuple[float, float]:
-    """Those of a number by itself."""
-    entry = mechanism.parameter_set.entries[path]
-    limits = [one for one in entry.rules if isinstance(one, Within)]
-    low = max((SMALL if one.ends[0] == "(" and one.low == 0 else one.low for one in limits), default=-inf)
-    high = min((one.high for one in limits), default=inf)
-    moment = path.startswith("links.") and path.endswith(".inertia")
-    return max(low, 0.0 if moment else -inf), high
+    entries = mechanism.parameter_set.entries
+    same = [path]
+    for equal in same if path.startswith("dimensions.") else ():  # dimensions that are this one, and so on
+        name = equal.removeprefix("dimensions.")
+        for other, entry in entries.items():
+            source = entry.alias.removeprefix("dimensions.") if entry.alias else entry.quantity.source
+            if other not in same and isinstance(source, str) and source.strip() == name:
+                same.append(other)
+    low, high = -inf, inf
+    for number in same:
+        for rule in (rule for rule in entries[number].rules if isinstance(rule, Within)):
+            low = max(low, SMALL if rule.ends[0] == "(" and rule.low == 0 else rule.low)
+            high = min(high, rule.high)
+        if number.startswith("links.") and number.endswith(".inertia"):
+            low = max(low, 0.0)
+    return low, high

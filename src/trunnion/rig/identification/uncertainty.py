@@ -9,6 +9,7 @@ taken from what it is turn by turn, whatever the correlation within a turn (clus
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -16,18 +17,16 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.sparse.csgraph import connected_components
 
+from trunnion.results.quantities import with_uncertainty
 from trunnion.rig.identification.fit import Fit, sizes_of
 from trunnion.rig.reading.measurement import student
 from trunnion.rig.reading.turns import covariance_of_steps
 
-__all__ = [
-    "CONFIDENCE", "Combination", "Covariances", "InseparableUnknowns", "LackOfFit", "excess",
-    "inseparable", "lack_of_fit", "quantile", "spread_of",
-]  # fmt: skip
+__all__ = ["CONFIDENCE", "Covariances", "Inseparable", "LackOfFit", "inseparable", "lack_of_fit", "quantile",
+           "spread_of"]  # fmt: skip
 
 Array = NDArray[np.float64]
 CONFIDENCE = 0.95
-RANDOM = ("scatter", "conditions", "misfit")  # sources that have degrees of freedom
 NEIGHBOURS = 5  # frequencies that a power is smoothed over
 FLOOR = 0.05  # of the mean power: what is below it decides nothing
 UNLIKELY = 0.001  # a chance below which the model is said not to fit
@@ -40,8 +39,7 @@ SAME = 0.02  # of 1: how near a factor is to it to be called it
 SINGULAR = 1e-10  # of the largest eigenvalue of the scaled information: derivatives are exact to some 1e-12 of it
 
 
-@dataclass(frozen=True)
-class LackOfFit:
+class LackOfFit(NamedTuple):
     """Whether the residuals of the means are those that the scatter between turns explains.
 
     reduced: χ² over its expected value; freedom: of the χ²; chance: of a larger one if the model is right; NaN without
@@ -69,8 +67,9 @@ class Covariances:
 
     inverse: of the information Jᵀ W J + Λ, pseudo where that is singular; null: (direction, unknown and sensor), of
     which nothing is known; parts: covariance by source; freedom: degrees of freedom, (unknown and sensor,); follows:
-    how much a turn resembles the one before it, −1 to 1, NaN if not known; apart: (unknown,), how much more than turns
-    the conditions differ in what they say of it, as variances, 1 if not.
+    how much a turn resembles the one before it, −1 to 1, NaN if not known; apart: (unknown and sensor,), how much more
+    than turns the conditions differ in what they say of it, as variances, 1 if not; excess: how much more than the
+    scatter the misfit and the conditions move the estimates, as variances.
     """
 
     inverse: Array
@@ -80,8 +79,9 @@ class Covariances:
     test: LackOfFit
     follows: float
     apart: Array
+    excess: float
 
-    @property
+    @cached_property
     def covariance(self) -> Array:
         """Of all sources."""
         return np.asarray(np.sum(list(self.parts.values()), axis=0))
@@ -100,36 +100,35 @@ def quantile(freedom: Array | float, one_sided: bool = False) -> Array:
 def spread_of(fit: Fit, x: Array) -> Covariances:
     """Covariance of the estimates by source, with its degrees of freedom."""
     rows = fit.jacobian(x)
-    information = rows.T @ rows
-    inverse, null = _inverse(information)
+    inverse, null = _inverse(rows.T @ rows)
     # what a deviation at each position does to the estimates, (unknown and sensor, position), by block
-    pulls = {k: inverse @ (np.nan_to_num(fit.reading(x, k)[1]) * fit.weight(k)) for k in fit.fitted()}
+    pulls = {k: inverse @ (np.nan_to_num(fit.reading(x, k)[1]) * fit.weight(k)) for k in fit.fitted}
     steps = {k: _steps(fit, x, k, pull) for k, pull in pulls.items()}
     scatter, freedom, follows, by_condition = _between_turns(fit, pulls, steps)
-    apart = _apart(fit, x, pulls, by_condition)
-    test = lack_of_fit(fit, x)
-    parts = {"scatter": scatter}
-    random = [(scatter, freedom)]
-    if np.any(apart > 1):
-        more = np.sqrt(apart - 1)
-        parts["conditions"] = scatter * np.outer(more, more)
-        random.append((parts["conditions"], np.full(len(x), max(len(by_condition) - 1.0, 1.0))))
-    if np.any([np.any(one) for one in steps.values()]):
-        parts["resolution"] = np.asarray(np.sum(list(steps.values()), axis=0))
+    apart, test = _apart(fit, x, pulls, by_condition), lack_of_fit(fit, x)
     single, pieces = _left_over(fit, x, pulls, repeats=False)
-    parts["scatter"] = scatter + single
-    random.append((single, np.full(len(x), pieces)))
+    parts = {"scatter": scatter + single}
+    random = [(scatter, freedom), (single, np.full(len(x), pieces))]
+    if np.any(apart > 1):
+        parts["conditions"] = scatter * np.sqrt(np.outer(apart - 1, apart - 1))
+        random.append((parts["conditions"], np.full(len(x), max(len(by_condition) - 1.0, 1.0))))
+    if any(np.any(covariance) for covariance in steps.values()):
+        parts["resolution"] = np.asarray(np.sum(list(steps.values()), axis=0))
     if test.misfit:
         parts["misfit"], pieces = _left_over(fit, x, pulls, repeats=True)
         random.append((parts["misfit"], np.full(len(x), pieces)))
+    more = np.diagonal(np.sum([part for part, _ in random], axis=0))[: fit.count]
+    own = np.diagonal(parts["scatter"])[: fit.count]
+    excess = float(np.mean(more[own > 0] / own[own > 0])) if np.any(own > 0) else 1.0
     for s, sensor in enumerate(fit.sensors, fit.count):
         if sensor.stated:
-            parts[sensor.source] = parts.get(sensor.source, 0.0) + np.outer(inverse[:, s], inverse[:, s])
+            source = sensor.group or sensor.name
+            parts[source] = parts.get(source, 0.0) + np.outer(inverse[:, s], inverse[:, s])
     total = np.diagonal(np.sum(list(parts.values()), axis=0))
     with np.errstate(all="ignore"):  # Welch and Satterthwaite; what was stated has infinite freedom
-        below = sum(np.diagonal(part) ** 2 / own for part, own in random)
+        below = sum(np.diagonal(part) ** 2 / free for part, free in random)
         freedom = np.where(below > 0, total**2 / below, np.inf)
-    return Covariances(inverse, null, parts, freedom, test, follows, apart[: fit.count])
+    return Covariances(inverse, null, parts, freedom, test, follows, apart, excess)
 
 
 def _inverse(information: Array) -> tuple[Array, Array]:
@@ -156,7 +155,7 @@ def _between_turns(
 ) -> tuple[Array, Array, float, dict[int, tuple[Array, int]]]:
     """Covariance by what each turn would have changed, its freedom, how turns follow each other, and the variances with
     the number of turns by condition."""
-    size = fit.count + len(fit.sensors)
+    size, n = fit.count + len(fit.sensors), fit.count
     total, fourth = np.zeros((size, size)), np.zeros(size)
     products, squares, pairs = 0.0, 0, 0
     by_condition: dict[int, tuple[Array, int]] = {}
@@ -164,20 +163,18 @@ def _between_turns(
         own = [k for k in pulls if fit.blocks[k].condition == condition and fit.blocks[k].repeats]
         if not own:
             continue
-        turns = max(len(fit.blocks[k].turns) for k in own)
+        turns = max(len(fit.blocks[k].spread) for k in own)
         moved = np.zeros((turns, size))
         for k in own:  # the channels of a turn belong together
-            block = fit.blocks[k]
-            part = block.spread / np.sqrt(len(block.turns) * np.maximum(block.count, 1)) @ pulls[k].T
-            moved[: len(part)] += part
+            spread, count = fit.blocks[k].spread, fit.blocks[k].signal.count
+            moved[: len(spread)] += spread / np.sqrt(len(spread) * np.maximum(count, 1)) @ pulls[k].T
         covariance = moved.T @ moved * (turns / (turns - 1))
         total += covariance
         fourth += np.diagonal(covariance) ** 2 / (turns - 1)
         by_condition[condition] = np.diagonal(covariance), turns
-        length = np.sqrt(np.maximum(np.sum(moved**2, axis=0), 1e-300))[: fit.count]
-        rounding = np.sqrt(sum(np.diagonal(steps[k]) for k in own))[: fit.count]
-        telling = length > rounding + 1e-140  # else it is rounding that repeats
-        unit = (moved[:, : fit.count] / length)[:, telling]
+        length = np.sqrt(np.maximum(np.sum(moved**2, axis=0), 1e-300))[:n]
+        telling = length > np.sqrt(sum(np.diagonal(steps[k]) for k in own))[:n] + 1e-140  # else it is rounding
+        unit = (moved[:, :n] / length)[:, telling]
         products += float(np.sum(unit[1:] * unit[:-1])) + unit.shape[1] / turns  # its bias is −1/turns
         squares += unit.shape[1]
         pairs += (turns - 1) * bool(np.any(telling))
@@ -216,14 +213,12 @@ def _apart(fit: Fit, x: Array, pulls: dict[int, Array], by_condition: dict[int, 
 # ---- what the model leaves over -------------------------------------------------------------------------------
 
 
-def _powers(row: Array) -> Array:
-    """By frequency of courses, (…, frequency)."""
-    return np.asarray(np.abs(np.fft.rfft(row, axis=-1)) ** 2)
-
-
-def _numbers(size: int) -> Array:
-    """How many real numbers each frequency of a course has: 2 but for the first and a last even one."""
-    return np.where(np.arange(size // 2 + 1) * 2 % size == 0, 1.0, 2.0)
+def _powers(rows: Array) -> tuple[Array, Array]:
+    """By frequency of courses, (…, frequency), and how many real numbers each has: 2 but for the first and an even
+    last."""
+    size = rows.shape[-1]
+    numbers = np.where(np.arange(size // 2 + 1) * 2 % size == 0, 1.0, 2.0)
+    return np.asarray(np.abs(np.fft.rfft(rows, axis=-1)) ** 2), numbers
 
 
 def _smooth(power: Array) -> Array:
@@ -243,21 +238,20 @@ def lack_of_fit(fit: Fit, x: Array) -> LackOfFit:
     for condition in dict.fromkeys(block.condition for block in fit.blocks):
         sums: dict[int, Array] = {}
         least = 0.0
-        for k in fit.fitted():
-            block, mask = fit.blocks[k], fit.masks[k] & (fit.blocks[k].count > 1)
+        for k in fit.fitted:
+            block, mask = fit.blocks[k], fit.masks[k] & (fit.blocks[k].signal.count > 1)
             if block.condition != condition or not block.repeats or not np.any(mask):
                 continue
-            count = len(block.turns)
-            gap = np.where(mask, fit.gap(x, k), 0.0)
-            turns = np.where(mask, block.spread / np.sqrt(np.maximum(block.count, 1)), 0.0)
-            powers, numbers = _powers(turns) * count / (count - 1), _numbers(len(mask))
-            steps = np.count_nonzero(mask) * block.unresolved**2
+            count, steps = len(block.spread), np.count_nonzero(mask) * block.unresolved**2
+            left, numbers = _powers(np.where(mask, fit.gap(x, k), 0.0))
+            powers, _ = _powers(np.where(mask, block.spread / np.sqrt(np.maximum(block.signal.count, 1)), 0.0))
+            powers *= count / (count - 1)
             scatter = _smooth(np.mean(powers, axis=0)) + steps
             floor = np.maximum(scatter, FLOOR * float(np.mean(scatter)))
             weights = numbers / floor
             freedom = min(NEIGHBOURS, len(scatter)) * 2.0 * (count - 1)
             fair = (freedom - 2) / freedom if freedom > 4 else 0.5  # 1/variance is too large on average
-            value += fair * float(np.sum(_powers(gap) * weights))
+            value += fair * float(np.sum(left * weights))
             sums[count] = sums.get(count, 0.0) + powers @ weights + steps * float(np.sum(weights))
             least += 2 * float(np.sum(weights * scatter * (scatter / floor)))  # of normal noise
         mean += sum(float(np.mean(each)) for each in sums.values())
@@ -271,77 +265,50 @@ def lack_of_fit(fit: Fit, x: Array) -> LackOfFit:
     return LackOfFit(value / mean, freedom, float(special.chdtrc(freedom, value / mean * freedom)))
 
 
-def excess(fit: Fit, spread: Covariances) -> float:
-    """How much more than the scatter the misfit and the conditions move the estimates, as variances; 1 without."""
-    more = np.diagonal(np.sum([spread.parts[key] for key in RANDOM if key in spread.parts], axis=0))[: fit.count]
-    scatter = np.diagonal(spread.parts["scatter"])[: fit.count]
-    known = scatter > 0
-    return float(np.mean(more[known] / scatter[known])) if np.any(known) else 1.0
-
-
 def _left_over(fit: Fit, x: Array, pulls: dict[int, Array], repeats: bool) -> tuple[Array, float]:
     """Covariance by the residuals of the means, as correlated as they are along the cycle, and its freedom.
 
     repeats: of blocks with repetitions, as a misfit of the model beside their scatter; it is larger by as much as the
-    conditions resemble each other. Else of blocks without.
+    conditions resemble each other, up to their number if all have one. Else of blocks without.
     """
-    total = np.zeros((len(x), len(x)))
-    pieces, gaps = 0.0, {}
+    total, pieces, alike = np.zeros((len(x), len(x))), 0.0, 1.0
+    gaps: dict[str, list[Array]] = {}
     for k, pull in pulls.items():
-        mask = fit.masks[k]
-        if fit.blocks[k].repeats == repeats and np.any(mask):
-            gaps[k] = gap = np.where(mask, fit.gap(x, k), 0.0)
-            power, numbers = _smooth(_powers(gap)), _numbers(len(gap))
+        block, mask = fit.blocks[k], fit.masks[k]
+        if block.repeats == repeats and np.any(mask):
+            gap = np.where(mask, fit.gap(x, k), 0.0)
+            gaps.setdefault(block.channel, []).append(gap)
+            power, numbers = _powers(gap)
+            power = numbers * _smooth(power)
             spectrum = np.fft.rfft(pull, axis=-1)
-            total += np.real((spectrum * (numbers * power / len(gap) ** 2)) @ spectrum.conj().T)
+            total += np.real((spectrum * power / len(gap) ** 2) @ spectrum.conj().T)
             if np.any(power):
-                pieces += float(np.sum(numbers * power) ** 2 / np.sum(numbers * power**2))
+                pieces += float(np.sum(power) ** 2 / np.sum(power**2 / numbers))
     if not gaps:
         return total, np.inf
+    for rows in gaps.values() if repeats else ():
+        own = sum(float(np.sum(row**2)) for row in rows)
+        several = len({len(row) for row in rows}) > 1
+        together = own * len(rows) if several else float(np.sum(np.sum(rows, axis=0) ** 2))
+        alike = max(alike, together / own if own > 0 else 1.0)
     left = max(pieces - len(x), 1.0)
-    alike = _alike(fit, gaps) if repeats else 1.0
     return total * alike * max(pieces, 1.0) / left, max(left / alike, 1.0)
-
-
-def _alike(fit: Fit, gaps: dict[int, Array]) -> float:
-    """How many conditions have the same misfit: 1 if each has its own, their number if all have one."""
-    most = 1.0
-    for channel in dict.fromkeys(fit.blocks[k].channel for k in gaps):
-        rows = [gap for k, gap in gaps.items() if fit.blocks[k].channel == channel]
-        if len({len(row) for row in rows}) > 1:
-            most = max(most, float(len(rows)))
-            continue
-        own, together = float(np.sum(np.square(rows))), float(np.sum(np.sum(rows, axis=0) ** 2))
-        most = max(most, together / own if own > 0 else 1.0)
-    return most
 
 
 # ---- what the data do not tell apart ---------------------------------------------------------------------------
 
 
-class Combination(NamedTuple):
-    """What is known of two unknowns that cannot be told apart: a sum with factors, a product or a ratio.
+class Inseparable(NamedTuple):
+    """Unknowns (and sensors, by their place behind them) that the data do not tell apart; one has no effect on them.
 
-    form: "sum", "product" or "ratio"; factors: of the two, the first 1; value, uncertainty: expanded, 95 %, SI.
-    """
-
-    form: str
-    factors: tuple[float, ...]
-    value: float
-    uncertainty: float
-
-
-class InseparableUnknowns(NamedTuple):
-    """Unknowns (and sensors, by their place behind them) that the data do not tell apart.
-
-    determined: the combination of two that they do. A single member has no effect on the data.
+    determined: what they do tell of two, in words.
     """
 
     members: tuple[int, ...]
-    determined: Combination | None
+    determined: str
 
 
-def inseparable(fit: Fit, x: Array, spread: Covariances) -> list[InseparableUnknowns]:
+def inseparable(fit: Fit, x: Array, spread: Covariances) -> list[Inseparable]:
     """The groups of unknowns that take part in directions of which nothing is known, together if they share one."""
     sizes, groups = sizes_of(fit, x), []
     basis, _ = np.linalg.qr((spread.null / sizes).T)
@@ -350,30 +317,34 @@ def inseparable(fit: Fit, x: Array, spread: Covariances) -> list[InseparableUnkn
     takes = np.flatnonzero((share > PART**2 * np.max(share, initial=0.0)) & (share > 0))
     _, labels = connected_components(np.abs(projector[np.ix_(takes, takes)]) > PART**2)
     for label in range(labels.max(initial=-1) + 1):
-        index, determined = takes[labels == label], None
+        index, determined = takes[labels == label], "none of them is known alone"
         if len(index) == 2:  # the combination that does not change along the direction, unless it is vague too
-            direction = projector[index, index[0]] * sizes[index]
+            direction, determined = projector[index, index[0]] * sizes[index], "no combination of them is identifiable"
             factors = np.array([1.0, -direction[0] / direction[1]])
             variance = float(factors @ spread.covariance[np.ix_(index, index)] @ factors)
             half = float(quantile(spread.freedom[index[0]])) * float(np.sqrt(max(variance, 0.0)))
             if half < float(np.abs(factors) @ sizes[index]):
-                determined = _named(fit, x, index, factors, half)
-        groups.append(InseparableUnknowns(tuple(int(one) for one in index), determined))
+                determined = f"{_combination(fit, x, index, float(factors[1]), half)}, neither alone"
+        groups.append(Inseparable(tuple(int(item) for item in index), determined))
     return groups
 
 
-def _named(fit: Fit, x: Array, index: Array, factors: Array, half: float) -> Combination:
-    """A combination of two as a product or a ratio where it is one: p q moves by q dp + p dq.
+def _combination(fit: Fit, x: Array, index: Array, factor: float, half: float) -> str:
+    """What two unknowns have in common that is known to ± half: their product or ratio, p q moves by q dp + p dq.
 
     Two of one kind, such as the frictions of two joints, add.
     """
-    values = x[index]
-    if max(index) < fit.count and np.all(values != 0):
-        kinds = {fit.model.unknowns[i].paths[0].rpartition(".")[2] for i in index}
-        relative = float(factors[1] * values[1] / values[0])
+    (p, q), unknowns = x[index], fit.model.unknowns
+    units = [unknowns[i].unit if i < fit.count else "1" for i in index]
+    if max(index) < fit.count and p and q:
+        relative, kinds = factor * q / p, {unknowns[i].paths[0].rpartition(".")[2] for i in index}
         if len(kinds) > 1 and abs(abs(relative) - 1) < SAME:
-            form = "product" if relative > 0 else "ratio"
-            value = float(values[0] * values[1]) if relative > 0 else float(values[0] / values[1])
-            return Combination(form, (1.0, 1.0 if relative > 0 else -1.0), value, half * abs(value / values[0]))
-    near = np.where(np.abs(np.abs(factors) - 1) < SAME, np.sign(factors), factors)
-    return Combination("sum", tuple(float(one) for one in near), float(near @ values), half)
+            form, value = ("product", p * q) if relative > 0 else ("ratio", p / q)
+            dimensional = [unit for unit in units if unit not in ("", "1")]
+            unit = dimensional[0] if form == "product" and len(dimensional) == 1 else "1"
+            return f"their {form} is determined, {with_uncertainty(value, half * abs(value / p), unit)}"
+    factor = float(np.sign(factor)) if abs(abs(factor) - 1) < SAME else factor
+    names = [unknowns[i].name if i < fit.count else fit.sensors[i - fit.count].name for i in index]
+    weighed = f"{names[0]} {'−' if factor < 0 else '+'} {abs(factor):.3g} {names[1]} (SI)"
+    form = {1.0: "their sum", -1.0: "their difference"}.get(factor, weighed)
+    return f"{form} is determined, {with_uncertainty(float(p + factor * q), half, units[0] or '1')}"

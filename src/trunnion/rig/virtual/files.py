@@ -10,7 +10,6 @@ import importlib.util
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,9 +44,8 @@ def check_form(form: str) -> None:
     """MechanismError for a format that is none, or whose package is not there."""
     if form not in FORMATS:
         raise MechanismError(Finding(f"'{form}' is no format of data files", "format", f"use {', '.join(FORMATS)}"))
-    package = PACKAGES.get(form)
-    if package and importlib.util.find_spec(package) is None:
-        raise MechanismError(Finding(f"{form} needs {package}", "format", f"pip install 'trunnion[{form}]'"))
+    if form in PACKAGES and importlib.util.find_spec(PACKAGES[form]) is None:
+        raise MechanismError(Finding(f"{form} needs {PACKAGES[form]}", "format", f"pip install 'trunnion[{form}]'"))
 
 
 def check_folder(rig: Rig, folder: str | os.PathLike[str], form: str) -> None:
@@ -55,33 +53,26 @@ def check_folder(rig: Rig, folder: str | os.PathLike[str], form: str) -> None:
 
     What is in a folder with a truth that a rig has written is a rig's: its files are written anew.
     """
-    folder = Path(folder)
-    names = [*(f"{name}.{form or rig.format}" for name in rig.names), MAPPING, TRUTH]
-    for name in names:
-        guard(folder / name)
-    strange = [name for name in names if (folder / name).exists()]
-    with suppress(OSError):
-        if (folder / TRUTH).read_bytes().startswith(HEADS[TRUTH].encode()):
-            return
-    if strange:
+    paths = [Path(folder) / name for name in (*(f"{name}.{form or rig.format}" for name in rig.names), MAPPING, TRUTH)]
+    for path in paths:
+        guard(path)
+    truth, strange = paths[-1], [path.name for path in paths if path.exists()]
+    ours = truth.is_file() and truth.read_bytes().startswith(HEADS[TRUTH].encode())
+    if strange and not ours:
         what = f"{', '.join(strange[:3])}{' …' * (len(strange) > 3)} would be written over, and is of no virtual rig"
         raise MechanismError(Finding(what, str(folder), "name another folder, or move away what is there"))
 
 
 def write(
-    records: Iterable[Record],
-    units: Mapping[str, str],
-    texts: Mapping[str, dict[str, Any]],
-    folder: str | os.PathLike[str],
-    form: str,
-    progress: Callable[[int], None] | None = None,
-) -> list[str]:
+    records: Iterable[Record], units: Mapping[str, str], texts: Mapping[str, dict[str, Any]],
+    folder: str | os.PathLike[str], form: str, progress: Callable[[int], None] = lambda count: None,
+) -> list[str]:  # fmt: skip
     """Write all files into a folder, which is made if it is not there, once all of them are complete; their names.
 
     units: of the columns; texts: entries of the YAML files, by name; progress: called with the records written.
     """
     folder, names = Path(folder), []
-    home = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+    home = next(item for item in (folder, *folder.absolute().parents) if item.exists())
     if not home.is_dir():
         raise MechanismError(Finding("cannot be made a folder: it is a file", str(home), "name a folder"))
     try:
@@ -89,8 +80,7 @@ def write(
             for done, record in enumerate(records, 1):
                 names.append(f"{record.name}.{form}")
                 WRITERS[form](record, units, Path(new) / names[-1])
-                if progress:
-                    progress(done)
+                progress(done)
             for name, entries in texts.items():
                 _write_yaml(Path(new) / name, entries)
             folder.mkdir(parents=True, exist_ok=True)
@@ -122,7 +112,7 @@ def _csv(record: Record, units: Mapping[str, str], path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="") as stream:
         quoted = ('"{}"'.format(name.replace('"', '""')) if set(name) & set(',;"#') else name for name in head)
         stream.write(",".join(quoted) + "\n")
-        texts = [["" if one != one else repr(one) for one in row.tolist()] for row in record.columns.values()]
+        texts = [["" if item != item else repr(item) for item in row.tolist()] for row in record.columns.values()]
         stream.write("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
 
 
@@ -149,8 +139,6 @@ def _tdms(record: Record, units: Mapping[str, str], path: Path) -> None:
         stream.write_segment([RootObject(properties={"name": record.name}), *objects])
 
 
-WRITERS: Mapping[str, Callable[[Record, Mapping[str, str], Path], None]] = {
-    "csv": _csv,
-    "parquet": _parquet,
-    "tdms": _tdms,
-}
+WRITERS: dict[str, Callable[[Record, Mapping[str, str], Path], None]] = {
+    "csv": _csv, "parquet": _parquet, "tdms": _tdms,
+}  # fmt: skip

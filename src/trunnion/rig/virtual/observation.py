@@ -6,12 +6,12 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.positions import positions
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure
@@ -20,57 +20,55 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.rig.reading.rig_file import Rig, Value
 from trunnion.rig.virtual import files
-from trunnion.rig.virtual.sensors import SensorChannel, SensorErrors, draw, index_level, level, pulses, readings, stream
+from trunnion.rig.virtual.sensors import SensorChannel, SensorErrors, draw, pulses, readings, stream
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.version import __version__
 
-__all__ = [
-    "Case", "Observation", "SampledSignals", "check_seed", "cycle_efficiency", "phases", "sampled",
-    "speed_differs",
-]  # fmt: skip
+__all__ = ["Case", "Observation", "check_seed", "phases", "solved", "speed_differs"]
 
 Array = NDArray[np.float64]
 MOST_SEEDS = 1 << 128
-PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6}
-TIME_DECIMALS = {"s": 9, "ms": 6, "us": 3}
+UNITS = {"s": (1.0, 9), "ms": (1e3, 6), "us": (1e6, 3)}  # of the time: in a second, and decimals
 POSITIONS = (360, 180, 120, 90, 72, 60, 36, 24, 12)  # of a cycle: fewer than samples
 FEWER = 0.99
 AT_REST = 0.9  # share of the idle stretch that the zero is taken from: a filter carries the run into the rest
+CHUNK = 8_192  # instants at once: memory and cache
+DIGITS = 12  # of a share of the cycle, in which instants that are one agree
 
 
 @dataclass(frozen=True)
 class Case:
     """A working condition that the model can be in: what is set, how it is sampled, what is true.
 
-    before, running, after: samples of the idle stretches and of the run; lead: sampling intervals from the first sample
-    of the run to the start of its first cycle, a whole number and a half; efficiency: of the model, NaN if it has none.
+    rate: samples a second; before, running, after: samples of the idle stretches and of the run; lead: sampling
+    intervals from the first sample of the run to the start of its first cycle, a whole number and a half; true:
+    (sensor, sample), courses of the run, SI; time, status: of the instants of the cycle at which the model is solved;
+    efficiency: of the model, NaN if it has none.
     """
 
     number: int
     name: str
     settings: Mapping[str, Value]
     run: Run
+    rate: float
     before: int
     running: int
     after: int
     lead: float
-    true: SampledSignals
+    true: Array
+    time: Array
+    status: NDArray[np.int8]
     efficiency: float = math.nan
 
     @property
     def worst(self) -> Status:
         """The gravest status of a position."""
-        return max(one for one in Status if np.any(self.true.status == one))
+        return next(status for status in Status if status == self.status.max())
 
     @property
     def rows(self) -> int:
         return self.before + self.running + self.after
-
-    @property
-    def first(self) -> int:
-        """The first sample of the run that lies in its first cycle."""
-        return math.ceil(self.lead)
 
     @property
     def part(self) -> slice:
@@ -78,11 +76,16 @@ class Case:
         return slice(self.before, self.before + self.running)
 
     @property
+    def cycle(self) -> float:
+        """Duration of the cycle, s."""
+        return self.run.cycle.duration
+
+    @property
     def driver(self) -> str:
         """The first driver."""
         return next(iter(self.run.system.mechanism.drivers))
 
-    @property
+    @cached_property
     def named(self) -> bool:
         """Whether the first driver turns one way, so that its coordinate names positions."""
         system = self.run.system
@@ -94,10 +97,16 @@ class Case:
         positions by its coordinate, the start of the first cycle."""
         return 0.0 if self.named else self.before + self.lead
 
-    def drive(self, rate: float, sample: int = 0) -> tuple[float, float]:
-        """Coordinate and rate of the first driver at a sample of the run, rad or m."""
-        angle, speed, *_ = self.run.system.drive(self.run.values, self.driver, (sample - self.lead) / rate)
-        return float(np.ravel(angle)[0]), float(np.ravel(speed)[0])
+    def drive(self, sample: int | Array = 0) -> tuple[Array, Array]:
+        """Coordinate and rate of the first driver at samples of the run, rad or m."""
+        angle, speed, *_ = self.run.system.drive(self.run.values, self.driver, (sample - self.lead) / self.rate)
+        return np.asarray(angle, float), np.asarray(speed, float)
+
+    @cached_property
+    def start(self) -> tuple[float, float]:
+        """Coordinate and rate of the first driver at the first sample of the run."""
+        angle, speed = self.drive()
+        return float(angle.flat[0]), float(speed.flat[0])
 
     def __str__(self) -> str:
         """Its number, and what is set."""
@@ -140,61 +149,58 @@ class Observation:
         """Rows of all files."""
         return sum(case.rows for case in self.cases)
 
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every column that has one."""
+        units = {self.rig.time.column: self.rig.time.unit}
+        return units | {channel.column: channel.reading for channel in self.channels.values()}
+
     def records(self) -> Iterator[files.Record]:
         """The readings of every condition, one after the other."""
         return (self._record(case) for case in self.cases)
 
     def _record(self, case: Case) -> files.Record:
-        rig, unit = self.rig, self.rig.time.unit
-        time = (np.arange(case.rows) - case.origin) / self.rate * PER_SECOND[unit]
-        columns: dict[str, NDArray[Any]] = {rig.time.column: np.round(time, TIME_DECIMALS[unit])}
-        if rig.encoder:
-            sample = np.clip(np.arange(case.rows) - case.before, 0, case.running - 1)
-            drive = case.run.system.drive(case.run.values, case.driver, (sample - case.lead) / self.rate)
-            angle, zero = np.asarray(drive[0], float), float(rig.encoder.zero.evaluate())
-            signal = pulses if rig.encoder.kind == "count" else level
-            columns[rig.encoder.column] = signal(angle, rig.encoder.per_turn, zero)
-            if rig.encoder.index:
-                columns[rig.encoder.index] = index_level(angle, rig.encoder.per_turn, zero)
+        rig, encoder, (factor, places) = self.rig, self.rig.encoder, UNITS[self.rig.time.unit]
+        time = (np.arange(case.rows) - case.origin) / self.rate * factor
+        columns: dict[str, NDArray[Any]] = {rig.time.column: np.round(time, places)}
+        if encoder:
+            angle, _ = case.drive(np.clip(np.arange(case.rows) - case.before, 0, case.running - 1))
+            count, part = pulses(angle, encoder.per_turn, float(encoder.zero.evaluate()))
+            columns[encoder.column] = count if encoder.kind == "count" else (part < 0.5).astype(np.int64)
+            if encoder.index:
+                columns[encoder.index] = (count % encoder.per_turn == 0).astype(np.int64)
         columns |= {self.channels[name].column: values for name, values in self._readings(case).items()}
         return files.Record(case.name, case.settings, columns)
 
     def _readings(self, case: Case) -> dict[str, Array]:
         """Readings by sensor, in their units, idle stretches included."""
         values = {}
-        for i, (name, channel) in enumerate(self.channels.items()):
-            course = case.true.at_samples(i)
+        for (name, channel), course in zip(self.channels.items(), case.true, strict=True):
             ends = (0.0, 0.0) if channel.at_rest else (course[0], course[-1])
             true = np.concatenate([np.full(case.before, ends[0]), course, np.full(case.after, ends[1])])
             noise = stream(self.seed, case.number, name, "noise").standard_normal(case.rows)
             values[name] = readings(channel, true, case.part, self.rate, self.drawn[name], noise)
         return values
 
-    def zero_uncertainty(self, name: str) -> float:
-        """Standard uncertainty of the zero of a sensor after what it reads idle is taken off, in the unit measured.
-
-        While it runs, of the mean of the idle stretch, of the offset if there is no such stretch, and of the drift
-        until the end of the longest file, as a rectangular distribution (GUM 4.3.7).
-        """
-        channel = self.channels[name]
-        longest = max(self.cases, key=lambda case: case.rows)
-        idle = channel.noise / math.sqrt(longest.before) if channel.zeroed and longest.before else channel.offset
-        return math.hypot(channel.zero, abs(channel.drift) * longest.rows / self.rate / math.sqrt(3), idle)
-
     def accuracy(self, name: str) -> Accuracy:
-        """What a laboratory that knows its sensors states of one."""
-        channel, zero = self.channels[name], self.zero_uncertainty(name)
+        """What a laboratory that knows its sensors states of one, in the unit measured.
+
+        The zero after what it reads idle is taken off: while it runs, of the mean of the idle stretch, of the offset if
+        there is no such stretch, and of the drift until the end of the longest file, as a rectangular distribution
+        (GUM 4.3.7).
+        """
+        channel, longest = self.channels[name], max(self.cases, key=lambda case: case.rows)
+        idle = channel.noise / math.sqrt(longest.before) if channel.zeroed and longest.before else channel.offset
+        zero = math.hypot(channel.zero, abs(channel.drift) * longest.rows / self.rate / math.sqrt(3), idle)
         rests = channel.at_rest and all(case.before for case in self.cases)  # else all files have one offset
         own = math.sqrt(max(zero - channel.zero, 0.0) * (zero + channel.zero)) if rests else 0.0
         return Accuracy(zero, channel.gain, channel.step, own)
 
     def measurement(self, positions: int = 360) -> Measurement:
         """The readings as a Measurement, without files in between: the angle is the true one."""
-        phase, turns, conditions = np.arange(positions) / positions, self.rig.schedule.turns, []
+        phase, turns, conditions = np.arange(positions) / positions, np.arange(self.rig.schedule.turns)[:, None], []
         for case in self.cases:
-            cycle = case.run.cycle.duration * self.rate
-            at = case.before + case.lead + (np.arange(turns)[:, None] + phase) * cycle
-            courses = {}
+            at, courses = case.before + case.lead + (turns + phase) * case.cycle * self.rate, {}
             for name, values in self._readings(case).items():
                 channel, values = self.channels[name], values / self.channels[name].per
                 zero = float(np.mean(values[: case.before])) if channel.zeroed and case.before else 0.0
@@ -204,23 +210,50 @@ class Observation:
             stated = {**self.rig.set_, **case.settings}
             changed = self.mechanism.with_values(stated)
             settings = {name: float(np.ravel(changed.parameters()[changed.path_of(name)])[0]) for name in stated}
-            speed = case.drive(self.rate)[1]
-            conditions.append(Condition(case.name, settings, phase, courses, (), speed))
+            conditions.append(Condition(case.name, settings, phase, courses, (), case.start[1]))
         return Measurement(self.rig.name, tuple(conditions), self.findings, ("made by a virtual rig, not read",))
 
     def mapping(self, form: str = "") -> dict[str, Any]:
         """The mapping that reads the files: what a laboratory knows, and no more than that."""
-        return _mapping_of(self, form or self.rig.format)
+        angle = _angle(self)
+        timed = angle.get("angle", {}).get("from") == "time" or "angle" not in angle
+        least = min(case.cycle for case in self.cases) * self.rate
+        positions = next((item for item in POSITIONS if item < least * FEWER), POSITIONS[-1])
+        return {
+            "trunnion-data": 1, "name": self.rig.name or self.mechanism.name,
+            "files": [_file(self, case, form or self.rig.format, timed) for case in self.cases],
+            **({"set": dict(self.rig.set_)} if self.rig.set_ else {}),
+            "time": {"column": self.rig.time.column, "unit": self.rig.time.unit},
+            **angle,
+            **({"positions": positions} if positions != POSITIONS[0] else {}),
+            "channels": {name: _channel(self, name) for name in self.channels},
+        }  # fmt: skip
 
     def truth(self) -> dict[str, Any]:
         """What was drawn and what is true, in SI: to check what is found from the files, not to find it."""
-        return _truth_of(self)
-
-    @property
-    def units(self) -> dict[str, str]:
-        """Unit of every column that has one."""
-        units = {self.rig.time.column: self.rig.time.unit}
-        return units | {channel.column: channel.reading for channel in self.channels.values()}
+        sensors, conditions = {}, []
+        for name, channel in self.channels.items():
+            errors = self.drawn[name]
+            sensors[name] = {
+                "measures": channel.measures, "unit": channel.unit, "gain_error": errors.gain,
+                "zero_error": errors.zero, "offset": errors.offset,
+                "drift_per_second": float(f"{channel.drift:.12g}"), "noise": float(f"{channel.noise:.12g}"),
+                "step": float(f"{channel.step:.12g}"),
+            }  # fmt: skip
+        for case in self.cases:
+            first = math.ceil(case.lead)  # the first sample that lies in the first cycle
+            part = slice(first, first + round(self.rig.schedule.turns * case.cycle * self.rate))
+            means = {name: float(np.mean(row[part])) for name, row in zip(self.channels, case.true, strict=True)}
+            efficiency = case.efficiency if math.isfinite(case.efficiency) else None
+            conditions.append({"name": case.name, "set": dict(case.settings), "efficiency": efficiency,
+                               "cycle_seconds": case.cycle, "mean": means})  # fmt: skip
+        parameters = self.mechanism.parameters().items()
+        return {
+            "trunnion-truth": 1, "made_by": f"trunnion {__version__}", "model": self.mechanism.name,
+            "model_hash": self.mechanism.digest, "seed": self.seed, "sensors": sensors, "conditions": conditions,
+            **({"left_out": list(self.skipped)} if self.skipped else {}),
+            "parameters": {path: float(np.ravel(value)[0]) for path, value in parameters if np.size(value) == 1},
+        }  # fmt: skip
 
     def write(
         self, folder: str | os.PathLike[str], form: str = "", progress: Callable[[int], None] | None = None
@@ -233,7 +266,7 @@ class Observation:
         files.check_form(form)
         files.check_folder(self.rig, folder, form)
         texts = {files.MAPPING: self.mapping(form), files.TRUTH: self.truth()}
-        return files.write(self.records(), self.units, texts, folder, form, progress)
+        return files.write(self.records(), self.units, texts, folder, form, progress or (lambda count: None))
 
 
 def check_seed(seed: int) -> None:
@@ -244,90 +277,66 @@ def check_seed(seed: int) -> None:
 
 def speed_differs(cases: Sequence[Case]) -> bool:
     """Whether the first driver runs one way and not as fast in all conditions."""
-    durations = [case.run.cycle.duration for case in cases]
+    durations = [case.cycle for case in cases]
     one_way = cases[0].run.system.span(cases[0].run.values, cases[0].driver).one_way
     return one_way and max(durations) - min(durations) > 1e-9 * max(durations)
 
 
-# ---- mapping and truth ----------------------------------------------------------------------------------------------
+# ---- the mapping ----------------------------------------------------------------------------------------------------
 
 
-def _mapping_of(observation: Observation, form: str) -> dict[str, Any]:
-    rig = observation.rig
-    found: dict[str, Any] = {"trunnion-data": 1, "name": rig.name or observation.mechanism.name}
-    angle = _angle(observation)
-    timed = angle.get("angle", {}).get("from") == "time" or "angle" not in angle
-    found["files"] = [_file(observation, case, form, timed) for case in observation.cases]
-    if rig.set_:
-        found["set"] = dict(rig.set_)
-    found["time"] = {"column": rig.time.column, "unit": rig.time.unit}
-    found |= angle
-    least = min(case.run.cycle.duration for case in observation.cases) * observation.rate
-    positions = next((one for one in POSITIONS if one < least * FEWER), POSITIONS[-1])
-    if positions != POSITIONS[0]:
-        found["positions"] = positions
-    found["channels"] = {name: _channel(observation, name) for name in observation.channels}
-    return found
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle):.12g} deg"
 
 
 def _file(observation: Observation, case: Case, form: str, timed: bool) -> dict[str, Any]:
     """A file with what was set, its zero of an encoder, and where the time alone tells the position, when it ran."""
-    found: dict[str, Any] = {"file": f"{case.name}.{form}"}
+    entry: dict[str, Any] = {"file": f"{case.name}.{form}"}
     if case.settings:
-        found["set"] = dict(case.settings)
-    if observation.rig.encoder and (zero := _counted_from(observation, case)) != _counted_from(observation):
-        found["angle"] = {"zero": f"{math.degrees(zero):.12g} deg"}
+        entry["set"] = dict(case.settings)
+    if observation.rig.encoder and (zero := _zero(observation, case)) != _zero(observation, observation.cases[0]):
+        entry["angle"] = {"zero": _degrees(zero)}
     if timed and case.rows > case.running:
         ends = (case.before - case.origin, case.before + case.running - 1 - case.origin)
-        found["over"] = [f"{end / observation.rate:.9g} s" for end in ends]
-    return found
+        entry["over"] = [f"{end / case.rate:.9g} s" for end in ends]
+    return entry
 
 
 def _angle(observation: Observation) -> dict[str, Any]:
-    """Where the coordinate of the driver comes from, and what a cycle is."""
-    case = observation.cases[0]
-    run, driver = case.run, case.driver
-    duration = run.cycle.duration
+    """Where the coordinate of the driver comes from, the encoder if there is one, and what a cycle is."""
+    case, encoder = observation.cases[0], observation.rig.encoder
     if not case.named:
-        return {"cycle": f"{duration:.15g} s"}
-    first, last = (float(np.ravel(run.system.drive(run.values, driver, time)[0])[0]) for time in (0.0, duration))
-    found: dict[str, Any] = {"angle": _source(observation, case)}
-    extent = math.degrees(abs(last - first))
-    if abs(extent - 360) > 1e-9:
-        found["cycle"] = f"{extent:.12g} deg"
-    if first:
-        found["start"] = f"{math.degrees(first):.12g} deg"
-    return found
-
-
-def _source(observation: Observation, case: Case) -> dict[str, Any]:
-    """The encoder if there is one, else a constant speed, else a measured one."""
-    rate, encoder = observation.rate, observation.rig.encoder
+        return {"cycle": f"{case.cycle:.15g} s"}
+    drive = case.run.system.drive(case.run.values, case.driver, np.array([0.0, case.cycle]))[0]
+    first, last = np.broadcast_to(np.asarray(drive, float), 2).tolist()
+    source: dict[str, Any]
     if encoder:
-        found: dict[str, Any] = {"from": "pulses", "column": encoder.column, "per_turn": encoder.per_turn}
-        found["kind"] = encoder.kind
-        if encoder.kind == "level" and case.drive(rate)[1] < 0:
-            found["sign"] = -1
-        if zero := _counted_from(observation):
-            found["zero"] = f"{math.degrees(zero):.12g} deg"
+        source = {"from": "pulses", "column": encoder.column, "per_turn": encoder.per_turn, "kind": encoder.kind}
+        if encoder.kind == "level" and case.start[1] < 0:
+            source["sign"] = -1
+        if zero := _zero(observation, case):
+            source["zero"] = _degrees(zero)
         if encoder.index:
-            found["index"] = {"column": encoder.index}
-        return found
-    if speed_differs(observation.cases):
-        channels = observation.channels.items()
-        measured = next(name for name, one in channels if one.measures == f"rate:{case.driver}")
-        start = math.degrees(case.drive(rate)[0])
-        return {"from": "speed", "channel": measured} | ({"zero": f"{start:.12g} deg"} if start else {})
-    start, speed = case.drive(rate, -case.before)
-    return {"from": "time", "speed": f"{speed:.15g} rad/s", "zero": f"{math.degrees(start):.12g} deg"}
+            source["index"] = {"column": encoder.index}
+    elif speed_differs(observation.cases):
+        speeds = (name for name, channel in observation.channels.items() if channel.measures == f"rate:{case.driver}")
+        source = {"from": "speed", "channel": next(speeds)}
+        if case.start[0]:
+            source["zero"] = _degrees(case.start[0])
+    else:
+        angle, speed = (float(item.flat[0]) for item in case.drive(-case.before))
+        source = {"from": "time", "speed": f"{speed:.15g} rad/s", "zero": _degrees(angle)}
+    entries: dict[str, Any] = {"angle": source}
+    if abs(abs(last - first) - 2 * math.pi) > 1e-11:
+        entries["cycle"] = _degrees(abs(last - first))
+    return entries | ({"start": _degrees(first)} if first else {})
 
 
-def _counted_from(observation: Observation, case: Case | None = None) -> float:
+def _zero(observation: Observation, case: Case) -> float:
     """Coordinate, rad, where an encoder reads zero: at its index, else where its count is 0, its level rises."""
-    encoder, case = observation.rig.encoder, case or observation.cases[0]
+    encoder, (start, speed) = observation.rig.encoder, case.start
     assert encoder is not None  # asked of encoders only
     zero, pitch = float(encoder.zero.evaluate()), 2 * math.pi / encoder.per_turn
-    start, speed = case.drive(observation.rate)
     if encoder.index:
         return zero if speed > 0 else zero + pitch  # backward, the first pulse is entered at its far end
     if encoder.kind == "count":
@@ -339,106 +348,27 @@ def _counted_from(observation: Observation, case: Case | None = None) -> float:
 
 
 def _channel(observation: Observation, name: str) -> dict[str, Any]:
-    channel = observation.channels[name]
-    stated = channel.stated
-    found: dict[str, Any] = {"column": channel.column, "measures": channel.measures, "unit": channel.reading}
+    channel, case = observation.channels[name], observation.cases[0]
+    stated, zero = channel.stated, observation.accuracy(name).zero
+    entry: dict[str, Any] = {"column": channel.column, "measures": channel.measures, "unit": channel.reading}
     if stated.sensitivity:
-        found["gain"] = stated.sensitivity.source
-    case = observation.cases[0]
+        entry["gain"] = stated.sensitivity.source
     if channel.zeroed and case.before > 1:
         rest = (-case.origin, AT_REST * case.before - case.origin)
-        found["zero"] = {"over": [f"{one / observation.rate + 0.0:.6g} s" for one in rest]}
+        entry["zero"] = {"over": [f"{item / case.rate + 0.0:.6g} s" for item in rest]}
     if stated.range:
-        found["range"] = stated.range.source
+        entry["range"] = stated.range.source
     if channel.per_turn:
-        found["per_turn"] = channel.per_turn
-    accuracy: dict[str, Any] = {}
-    if channel.gain:
-        accuracy["gain"] = stated.accuracy.gain.source
-    zero = observation.zero_uncertainty(name)
+        entry["per_turn"] = channel.per_turn
+    accuracy: dict[str, Any] = {"gain": stated.accuracy.gain.source} if channel.gain else {}
     if channel.noise <= channel.step / 2:  # which does not carry readings over the steps of the converter
         zero = math.hypot(zero, channel.step / math.sqrt(12))  # GUM F.2.2.1
     if zero:
         accuracy["zero"] = f"{zero:.4g} {channel.unit}"
-    return found | ({"accuracy": accuracy} if accuracy else {})
-
-
-def _truth_of(observation: Observation) -> dict[str, Any]:
-    mechanism = observation.mechanism
-    found: dict[str, Any] = {
-        "trunnion-truth": 1,
-        "made_by": f"trunnion {__version__}",
-        "model": mechanism.name,
-        "model_hash": mechanism.digest,
-        "seed": observation.seed,
-        "sensors": {},
-        "conditions": [],
-    }
-    for name, channel in observation.channels.items():
-        errors = observation.drawn[name]
-        found["sensors"][name] = {
-            "measures": channel.measures, "unit": channel.unit, "gain_error": errors.gain, "zero_error": errors.zero,
-            "offset": errors.offset, "drift_per_second": float(f"{channel.drift:.12g}"),
-            "noise": float(f"{channel.noise:.12g}"), "step": float(f"{channel.step:.12g}"),
-        }  # fmt: skip
-    for case in observation.cases:
-        whole = round(observation.rig.schedule.turns * case.run.cycle.duration * observation.rate)
-        part = slice(case.first, case.first + whole)
-        found["conditions"].append({
-            "name": case.name, "set": dict(case.settings),
-            "efficiency": case.efficiency if math.isfinite(case.efficiency) else None,
-            "cycle_seconds": case.run.cycle.duration,
-            "mean": {name: float(np.mean(case.true.at_samples(i)[part]))
-                     for i, name in enumerate(observation.channels)},
-        })  # fmt: skip
-    if observation.skipped:
-        found["left_out"] = list(observation.skipped)
-    found["parameters"] = {
-        path: float(np.ravel(value)[0]) for path, value in mechanism.parameters().items() if np.size(value) == 1
-    }
-    return found
+    return entry | ({"accuracy": accuracy} if accuracy else {})
 
 
 # ---- true courses ----------------------------------------------------------------------------------------------
-
-EFFICIENCY_STEPS = 720
-CHUNK = 8_192  # instants at once: memory and cache
-DIGITS = 12  # of a share of the cycle, in which instants that are one agree
-
-
-@dataclass(frozen=True)
-class SampledSignals:
-    """The courses of one condition, SI.
-
-    time: ascending instants of the cycle, s; values: (measure, instant); status: of the instants; place: of each sample
-    of the run among them.
-    """
-
-    time: Array
-    values: Array
-    status: NDArray[np.int8]
-    place: NDArray[np.intp]
-
-    def at_samples(self, i: int) -> Array:
-        """The course of one measure at every sample."""
-        return np.asarray(self.values[i][self.place])
-
-
-def sampled(run: Run, measures: Sequence[Measure], rate: float, count: int, lead: float = 0.0) -> SampledSignals:
-    """Solve the model at the samples of a rig.
-
-    Parameters
-    ----------
-    run : a prepared mechanism.
-    measures : what its sensors measure.
-    rate, count : of the samples, Hz.
-    lead : sampling intervals that the first of them lies before the start of the cycle.
-    """
-    if run.cycle.periodic:
-        time, place = phases(run.cycle.duration, rate, count, lead)
-    else:
-        time, place = np.minimum((np.arange(count) - lead) / rate, run.cycle.duration), np.arange(count)
-    return SampledSignals(time, *_solved(run, measures, time), place)
 
 
 def phases(duration: float, rate: float, count: int, lead: float = 0.0) -> tuple[Array, NDArray[np.intp]]:
@@ -451,39 +381,29 @@ def phases(duration: float, rate: float, count: int, lead: float = 0.0) -> tuple
     return distinct * duration, place
 
 
-def _solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, NDArray[np.int8]]:
-    """Courses of measures at ascending times (s) of the cycle, with pins in their seats; status.
+def solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, NDArray[np.int8]]:
+    """Courses of measures, (measure, instant), at ascending times (s) of the cycle, with pins in their seats; status.
 
     Where a load or friction is an interval, at a speed of zero, a course is the mean of its neighbours; a load whose
     joint rests at several positions on end is 0 there: nothing moves against it.
     """
-    alike, parts = list({one.name: one for one in measures}.values()), np.array_split(time, -(-len(time) // CHUNK))
-    solved = [courses_of(run, alike, part, FrictionMethod()) for part in parts]
-    status = np.concatenate([codes for _, codes in solved])
-    rows = [
-        [np.broadcast_to(np.asarray(curves[one.name][0], float), part.shape)
-         for (curves, _), part in zip(solved, parts, strict=True)]
-        for one in measures
-    ]  # fmt: skip
-    values = np.array([np.concatenate(row) for row in rows])
+    alike, periodic = list({measure.name: measure for measure in measures}.values()), run.cycle.periodic
+    values, status = np.empty((len(measures), len(time))), np.empty(len(time), np.int8)
+    for low in range(0, len(time), CHUNK):
+        part = slice(low, low + CHUNK)
+        curves, status[part] = courses_of(run, alike, time[part], FrictionMethod())
+        for row, measure in zip(values, measures, strict=True):
+            row[part] = curves[measure.name][0]
     lost = status >= Status.NOT_CONVERGED
     values[:, lost] = np.nan
-    gaps = ~np.isfinite(values)
-    if lost.any() or not gaps.any():
-        return values, status
-    for row in np.flatnonzero(gaps.any(axis=1)).tolist():
-        if measures[row].kind == "load":
-            before, after = np.roll(gaps[row], 1), np.roll(gaps[row], -1)
-            if not run.cycle.periodic:
+    for row, measure in zip(values, measures, strict=True) if not lost.any() else ():
+        gaps = ~np.isfinite(row)
+        if measure.kind == "load":
+            before, after = np.roll(gaps, 1), np.roll(gaps, -1)
+            if not periodic:
                 before[0] = after[-1] = False
-            values[row, gaps[row] & (before | after)] = 0.0  # of more than one position; at the ends of a period too
-        known = np.isfinite(values[row])
-        if known.any():
-            period = run.cycle.duration if run.cycle.periodic else None
-            values[row, ~known] = np.interp(time[~known], time[known], values[row, known], period=period)
+            row[gaps & (before | after)] = 0.0  # of more than one position; at the ends of a period too
+        known = np.isfinite(row)
+        if known.any() and not known.all():
+            row[~known] = np.interp(time[~known], time[known], row[known], period=run.cycle.duration * periodic or None)
     return values, status
-
-
-def cycle_efficiency(run: Run) -> float:
-    """Useful work over drive work of the cycle, of the model; NaN where the loads drive it."""
-    return positions(run, EFFICIENCY_STEPS, margin=False).means.efficiency

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from trunnion.cycle.positions import positions
 from trunnion.errors import Finding, MechanismError, Severity, Status, counted
 from trunnion.measures.measures import Measure
 from trunnion.model.arguments import strict_arguments
@@ -26,13 +27,14 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
 from trunnion.rig.modelled import each, measure_of
 from trunnion.rig.reading.rig_file import Rig, Value
-from trunnion.rig.virtual.observation import Case, Observation, check_seed, cycle_efficiency, sampled, speed_differs
+from trunnion.rig.virtual.observation import Case, Observation, check_seed, phases, solved, speed_differs
 from trunnion.rig.virtual.sensors import SensorChannel, draw, resolved
 from trunnion.solve.run import Run, prepare
 
 __all__ = ["Observation", "observe"]
 
 MOST_ROWS = 20_000_000
+EFFICIENCY_STEPS = 720
 MOST_NAMED = 20  # conditions in one finding
 BEYOND = 0.1  # of a cycle that is recorded before the first and past the last, so that their ends are there
 
@@ -85,7 +87,7 @@ def observe(
         what = f"none of the {len(rows)} conditions can" if len(rows) > 1 else "the condition cannot"
         remedy = "choose conditions in which the model has a solution at every position"
         raise MechanismError([*findings, Finding(f"{what} be measured", "schedule", remedy)])
-    if any(one.severity is Severity.ERROR for one in findings):
+    if any(finding.severity is Severity.ERROR for finding in findings):
         raise MechanismError(findings)
     skipped = tuple(case.number for case in cases if not case.worst.solved)
     drawn = {name: draw(channel, int(seed)) for name, channel in channels.items()}
@@ -100,8 +102,8 @@ def _placed(where: str, number: int = 0) -> Iterator[None]:
     except MechanismError as error:
         tail = f" (in condition {number})" if number else ""
         raise MechanismError(
-            replace(one, what=f"{f'{one.where}: ' if one.where else ''}{one.what}{tail}", where=where)
-            for one in error.findings
+            replace(finding, what=f"{f'{finding.where}: ' if finding.where else ''}{finding.what}{tail}", where=where)
+            for finding in error.findings
         ) from None
 
 
@@ -111,9 +113,9 @@ def _placed(where: str, number: int = 0) -> Iterator[None]:
 def _measures(rig: Rig, run: Run) -> list[Measure]:
     """What each sensor measures; MechanismError with all that the model has no course of."""
     measures = each(
-        rig.sensors.items(), lambda one: measure_of(run.system.mechanism, run, one[0], one[1].measures, "sensors")
+        rig.sensors.items(), lambda item: measure_of(run.system.mechanism, run, item[0], item[1].measures, "sensors")
     )
-    if run.determinacy is not None and not all(one.of_motion for one in measures):
+    if run.determinacy is not None and not all(measure.of_motion for measure in measures):
         run.determinacy.refuse()
     return measures
 
@@ -121,35 +123,29 @@ def _measures(rig: Rig, run: Run) -> list[Measure]:
 def _channels(rig: Rig, run: Run, measures: Sequence[Measure]) -> dict[str, SensorChannel]:
     """The sensors in the units of what they measure; MechanismError with all that does not fit."""
     stated = zip(rig.sensors.items(), measures, strict=True)
-    every = each(stated, lambda one: resolved(*one[0], rig.column(one[0][0]), one[1].unit(run.system)))
+    every = each(stated, lambda item: resolved(*item[0], rig.column(item[0][0]), item[1].unit(run.system)))
     findings: list[Finding] = []
     driver = next(iter(run.system.mechanism.drivers), None)
     if driver is None or run.cycle.duration <= 0:
-        remedy = "give the model a driver"
-        findings.append(Finding("the mechanism has no driver that moves", "schedule", remedy))
+        findings.append(Finding("the mechanism has no driver that moves", "schedule", "give the model a driver"))
     elif not run.cycle.periodic and rig.schedule.turns > 1:
         what = f"the cycle of {driver} ends elsewhere than it starts: it cannot run {rig.schedule.turns} times on end"
         findings.append(Finding(what, "schedule.turns", "state turns: 1"))
     if driver and rig.encoder and not (run.system.turns(driver) and run.system.span(run.values, driver).one_way):
-        what, remedy = f"an encoder needs a driver that turns in one direction, {driver} does not", "remove the encoder"
-        findings.append(Finding(what, "encoder", f"{remedy}: positions then follow from the time"))
+        what = f"an encoder needs a driver that turns in one direction, {driver} does not"
+        findings.append(Finding(what, "encoder", "remove the encoder: positions then follow from the time"))
     if findings:
         raise MechanismError(findings)
-    return {one.name: one for one in every}
+    return {item.name: item for item in every}
 
 
 def _case(
-    number: int,
-    name: str,
-    row: Mapping[str, Value],
-    run: Run,
-    rig: Rig,
-    measures: Sequence[Measure],
+    number: int, name: str, row: Mapping[str, Value], run: Run, rig: Rig, measures: Sequence[Measure],
     channels: Mapping[str, SensorChannel],
-) -> Case:
+) -> Case:  # fmt: skip
     """One condition with its true courses. The idle times are taken to a whole number of samples."""
     rate, cycle, pauses = rig.rate.value, run.cycle, rig.schedule.pauses
-    before, after = (math.ceil(float(one.evaluate()) * rate - 1e-9) for one in (pauses.before, pauses.after))
+    before, after = (math.ceil(float(item.evaluate()) * rate - 1e-9) for item in (pauses.before, pauses.after))
     # Samples lie half an interval off the start of the cycle, so that edges of pulses that fall on samples otherwise
     # lie between them: a sampling clock knows nothing of the shaft.
     lead = math.ceil(BEYOND * cycle.duration * rate) - 0.5 if cycle.periodic else 0.0
@@ -162,16 +158,19 @@ def _case(
     if running < 3:
         what = f"a cycle of condition {number} takes {cycle.duration:.4g} s, no three samples"
         raise MechanismError(Finding(what, "rate", "sample faster"))
-    true = sampled(run, measures, rate, running, lead)
-    case = Case(number, name, row, run, before, running, after, lead, true)
+    time, place = np.minimum(np.arange(running) / rate, cycle.duration), np.arange(running)
+    if cycle.periodic:
+        time, place = phases(cycle.duration, rate, running, lead)
+    values, status = solved(run, measures, time)
+    case = Case(number, name, row, run, rate, before, running, after, lead, values[:, place], time, status)
     if not case.worst.solved:
         return case
-    for course, (sensor, channel) in zip(true.values, channels.items(), strict=True):
+    for course, (sensor, channel) in zip(values, channels.items(), strict=True):
         if channel.per_turn and np.min(course) < 0 < np.max(course):
             what = f"in {case} the speed changes its sign, which pulses do not show"
             remedy = "remove per_turn, or measure another joint"
             raise MechanismError(Finding(what, f"sensors.{sensor}.per_turn", remedy))
-    return replace(case, efficiency=cycle_efficiency(run))
+    return replace(case, efficiency=positions(run, EFFICIENCY_STEPS, margin=False).means.efficiency)
 
 
 # ---- findings -------------------------------------------------------------------------------------------------
@@ -181,50 +180,48 @@ def _findings(cases: Sequence[Case], channels: Mapping[str, SensorChannel], rig:
     """Conditions that cannot be, and what sensors do not show; each kind once."""
     where = "schedule.conditions" if rig.schedule.conditions else "schedule.over"
     for status in reversed(Status):
-        stopped = [case for case in cases if case.worst == status]
-        if stopped and not status.solved:
+        if stopped := [case for case in cases if case.worst == status and not status.solved]:
             case = stopped[0]
-            places = np.flatnonzero(case.true.status >= Status.NOT_CONVERGED)
-            first = 360 * case.true.time[places[0]] / case.run.cycle.duration
-            share = f"{len(places)} of {counted(len(case.true.status), 'position')}, first at {first:.4g}° of the cycle"
-            yield Finding(
-                f"{_which(stopped)} {'is' if len(stopped) == 1 else 'are'} left out: {status.text}; in condition "
-                f"{case.number} at {share}", where,
-                "run `trunnion analyse` with these values to see where in the cycle, and why", Severity.WARNING,
-                code="rig.no_answer",
-            )  # fmt: skip
-    sound = [case for case in cases if case.worst.solved]
-    if not sound:
+            lost = np.flatnonzero(case.status >= Status.NOT_CONVERGED)
+            what = f"{_which(stopped)} {'is' if len(stopped) == 1 else 'are'} left out: {status.text}; in condition "
+            what += f"{case.number} at {len(lost)} of {counted(len(case.status), 'position')}, first at "
+            what += f"{360 * case.time[lost[0]] / case.cycle:.4g}° of the cycle"
+            remedy = "run `trunnion analyse` with these values to see where in the cycle, and why"
+            yield Finding.warning("rig.no_answer", where, what, remedy)
+    if not (sound := [case for case in cases if case.worst.solved]):
         return
     yield from _of_encoder(sound, channels, rig)
     for i, (name, channel) in enumerate(channels.items()):
-        peaks = {case.number: float(np.max(np.abs(case.true.values[i]))) for case in sound}
+        peaks = {case.number: float(np.max(np.abs(case.true[i]))) for case in sound}
         if clipped := [case for case in sound if peaks[case.number] > channel.limit]:
             key = "range" if channel.limit == channel.range else "span"
             peak, limit = (readable(size, channel.unit) for size in (max(peaks.values()), channel.limit))
             what = f"{_which(clipped)}: {channel.measures} reaches {peak}, beyond the range of {limit}: readings are "
             remedy = "use a sensor with a larger range"
-            yield Finding(f"{what}clipped", f"sensors.{name}.{key}", remedy, Severity.WARNING, code="rig.clipped")
+            yield Finding.warning("rig.clipped", f"sensors.{name}.{key}", f"{what}clipped", remedy)
 
 
 def _of_encoder(cases: Sequence[Case], channels: Mapping[str, SensorChannel], rig: Rig) -> Iterator[Finding]:
     """Whether the angle of the driver can be known from what is recorded."""
     driver, encoder, rate = cases[0].driver, rig.encoder, rig.rate.value
-    level, both = encoder is not None and encoder.kind == "level", "the conditions turn in both directions"
+    level = encoder is not None and encoder.kind == "level"
     if encoder is not None and level:
-        pulses = {case.number: encoder.per_turn * float(case.run.system.span(case.run.values, driver).peak)
-                  for case in cases}  # fmt: skip
-        if lost := [case for case in cases if 4 * pulses[case.number] / (2 * np.pi) > rate * (1 + 1e-9)]:
-            what = f"{_which(lost)}: some encoder pulses are lost: up to {max(pulses.values()) / (2 * np.pi):.4g} "
-            what += f"pulses per second, sampled at {rate:.4g} Hz"
+        turning = [float(case.run.system.span(case.run.values, driver).peak) / (2 * np.pi) for case in cases]
+        rates = [encoder.per_turn * item for item in turning]
+        if lost := [case for case, item in zip(cases, rates, strict=True) if 4 * item > rate * (1 + 1e-9)]:
+            what = f"{_which(lost)}: some encoder pulses are lost: up to {max(rates):.4g} pulses per second, sampled "
             remedy = "use a sampling rate of four times the pulse rate, or record kind: count"
-            yield Finding.warning("rig.pulses_lost", "encoder.kind", what, remedy)
-    if len({case.drive(rate)[1] > 0 for case in cases if case.named}) > 1 and (encoder is None or level):
+            yield Finding.warning("rig.pulses_lost", "encoder.kind", f"{what}at {rate:.4g} Hz", remedy)
+    if len({case.start[1] > 0 for case in cases if case.named}) > 1 and (encoder is None or level):
+        what = "the conditions turn in both directions, and "
+        what += "the level of an encoder does not tell them" if level else "no channel measures the angle of the driver"
         remedy = "state an encoder of kind: count, or one rig for each direction"
-        what = f"{both}, which the level of an encoder does not distinguish" if level else both
-        what += "" if level else ", and no channel measures the angle of the driver"
         yield Finding.error("rig.both_ways", "encoder.kind" if level else "encoder", what, remedy)
-    if not encoder and speed_differs(cases) and f"rate:{driver}" not in {one.measures for one in channels.values()}:
+    if (
+        not encoder
+        and speed_differs(cases)
+        and f"rate:{driver}" not in {channel.measures for channel in channels.values()}
+    ):
         what = f"the conditions differ in speed, and no channel measures the angle of {driver}"
         yield Finding.error("rig.no_angle", "encoder", what, f"state an encoder, or a sensor of rate:{driver}")
 

@@ -19,7 +19,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.measure_table import MEASURES
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.rig_file import Sensor
-from trunnion.rig.reading.units import Amount, SensorScale, alike, dimensions, multiplied
+from trunnion.rig.reading.units import SensorScale, alike, dimensions, multiplied
 from trunnion.rig.reading.units import scale as scale_of
 
 __all__ = ["SensorChannel", "SensorErrors", "draw", "resolved", "stream"]
@@ -34,9 +34,9 @@ class SensorChannel:
     """A sensor put to a mechanism: its numbers in the SI unit of what it measures.
 
     unit: SI, of what is measured; reading: unit of the file; per: readings per SI unit, below 0 where the sensitivity
-    is; zero: standard uncertainty
-    while it runs; offset: of what it reads at rest; drift: per second; step: 0 without a converter; range and span:
-    inf without one; per_turn: pulses, 0 of a sensor that tells at once; stated: as in the file.
+    is; zero: standard uncertainty while it runs; offset: of what it reads at rest; drift: per second; step: 0 without a
+    converter; range and span: inf without one; per_turn: pulses, 0 of a sensor that tells at once; stated: as in the
+    file.
     """
 
     name: str
@@ -76,7 +76,7 @@ class SensorChannel:
     @property
     def decimals(self) -> int:
         """Of a reading in its unit, so that what is left out is nothing beside step and noise."""
-        least = min((one for one in (self.step, self.noise) if one > 0), default=0.0) * abs(self.per) * FINE
+        least = min((item for item in (self.step, self.noise) if item > 0), default=0.0) * abs(self.per) * FINE
         whole = self.limit * abs(self.per) * 1e-9 if math.isfinite(self.limit) else 1e-9
         return int(np.clip(-math.floor(math.log10(least or whole)), 0, 15))
 
@@ -102,7 +102,7 @@ def stream(seed: int, condition: int, name: str, purpose: str) -> np.random.Gene
 def draw(channel: SensorChannel, seed: int) -> SensorErrors:
     """The actual errors of a sensor, normal with the stated standard uncertainties; the same in all conditions."""
     normal = stream(seed, 0, channel.name, "accuracy").standard_normal(3)
-    return SensorErrors(*(float(one) + 0.0 for one in normal * (channel.gain, channel.zero, channel.offset)))
+    return SensorErrors(*(float(row) + 0.0 for row in normal * (channel.gain, channel.zero, channel.offset)))
 
 
 # ---- what is stated, in one unit ------------------------------------------------------------------------------
@@ -110,46 +110,36 @@ def draw(channel: SensorChannel, seed: int) -> SensorErrors:
 
 def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel:
     """A sensor of what is measured in an SI unit; MechanismError for quantities that do not fit it."""
-    findings: list[Finding] = []
-    where = f"sensors.{name}"
     try:
         reading, scale = _scale(sensor, unit)
     except UnitError as error:
-        key = "sensitivity" if sensor.sensitivity else "unit"
-        raise MechanismError(Finding(error.what, f"{where}.{key}", error.remedy)) from None
-
-    def number(key: str, amount: Amount | None, absent: float = 0.0, over: str = "") -> float:
-        """An amount of what is measured or of the readings, in the SI unit; a drift has a sign, others have none."""
+        where = f"sensors.{name}.{'sensitivity' if sensor.sensitivity else 'unit'}"
+        raise MechanismError(Finding(error.what, where, error.remedy)) from None
+    stated = {"range": sensor.range, "span": sensor.span, "noise": sensor.noise, "accuracy.zero": sensor.accuracy.zero,
+              "offset": sensor.offset, "drift": sensor.drift}  # fmt: skip
+    sizes, findings = dict.fromkeys(stated, math.inf), list[Finding]()
+    for key, amount in stated.items():  # of what is measured or of the readings; a drift has a sign, others have none
+        over = "/s" * (key == "drift")
         if amount is None or amount.plain:
-            return absent if amount is None else amount.value
+            sizes[key] = math.inf if amount is None else amount.value
+            continue
         own = replace(amount, dimensions=multiplied(amount.dimensions, {"s": Fraction(bool(over))}))
         try:
-            return (scale.factor if over else abs(scale.factor)) * scale.reading(own, "zero" if over else key)
+            sizes[key] = (scale.factor if over else abs(scale.factor)) * scale.reading(own, "zero" if over else key)
         except UnitError:
-            units = dict.fromkeys(f"{one}/{over}" if over else one for one in (unit, reading))
+            units = dict.fromkeys(f"{item}{over}" for item in (unit, reading))
             what = f"'{amount.source}' is not in {' or in '.join(units)}"
             remedy = f"state it in {', or as a reading in '.join(units)}"
-            findings.append(Finding(what, f"{where}.{key}", remedy))
-            return absent
-
-    limit = number("range", sensor.range, math.inf)
-    span = number("span", sensor.span, limit) if sensor.bits else math.inf
-    channel = SensorChannel(
-        name, column, sensor.measures, unit, reading, 1 / scale.factor, limit,
-        noise=number("noise", sensor.noise),
-        step=2 * span / 2**sensor.bits if sensor.bits else 0.0,
-        span=span,
-        gain=float(sensor.accuracy.gain.evaluate()),
-        zero=number("accuracy.zero", sensor.accuracy.zero),
-        offset=number("offset", sensor.offset),
-        drift=number("drift", sensor.drift, over="s"),
-        bandwidth=sensor.bandwidth.value if sensor.bandwidth else None,
-        per_turn=sensor.per_turn or 0,
-        stated=sensor,
-    )  # fmt: skip
+            findings.append(Finding(what, f"sensors.{name}.{key}", remedy))
     if findings:
         raise MechanismError(findings)
-    return channel
+    span = sizes["span" if sensor.span else "range"] if sensor.bits else math.inf
+    return SensorChannel(
+        name, column, sensor.measures, unit, reading, 1 / scale.factor, sizes["range"], sizes["noise"],
+        2 * span / 2**sensor.bits if sensor.bits else 0.0, span, float(sensor.accuracy.gain.evaluate()),
+        sizes["accuracy.zero"], sizes["offset"], sizes["drift"],
+        sensor.bandwidth.value if sensor.bandwidth else None, sensor.per_turn or 0, sensor,
+    )  # fmt: skip
 
 
 def _scale(sensor: Sensor, unit: str) -> tuple[str, SensorScale]:
@@ -185,8 +175,7 @@ def smoothed(true: Array, bandwidth: float | None, rate: float) -> Array:
     kept = math.exp(-step)
     last = 1 - (1 - kept) / step
     start = np.array([(1 - last) * true[0]])  # as if it had always been at its first value
-    found, _ = lfilter([last, 1 - kept - last], [1.0, -kept], true, zi=start)
-    return np.asarray(found)
+    return np.asarray(lfilter([last, 1 - kept - last], [1.0, -kept], true, zi=start)[0])
 
 
 def pulsed(true: Array, running: slice, per_turn: int, rate: float) -> Array:
@@ -235,17 +224,11 @@ def converted(channel: SensorChannel, value: Array) -> Array:
     return np.round(value * channel.per, channel.decimals) + 0.0  # + 0.0: no negative zero
 
 
-def pulses(angle: Array, per_turn: int, zero: float) -> NDArray[np.int64]:
-    """Running count of an encoder, at the coordinates (rad) of the driver."""
-    return np.floor((angle - zero) * (per_turn / (2 * np.pi)) + 1e-9).astype(np.int64)
+def pulses(angle: Array, per_turn: int, zero: float) -> tuple[NDArray[np.int64], Array]:
+    """Running count of an encoder at the coordinates (rad) of the driver, and the part of the pulse that has passed.
 
-
-def level(angle: Array, per_turn: int, zero: float) -> NDArray[np.int64]:
-    """Level of the signal of an encoder: high in the first half of each pulse."""
-    part: Array = (angle - zero) * (per_turn / (2 * np.pi)) + 1e-9
-    return (part - np.floor(part) < 0.5).astype(np.int64)
-
-
-def index_level(angle: Array, per_turn: int, zero: float) -> NDArray[np.int64]:
-    """The index of an encoder: high for the first pulse of each turn."""
-    return np.asarray(pulses(angle, per_turn, zero) % per_turn == 0, np.int64)
+    Its level is high in the first half of each pulse, its index for the first pulse of each turn.
+    """
+    passed = (angle - zero) * (per_turn / (2 * np.pi)) + 1e-9
+    count = np.floor(passed)
+    return count.astype(np.int64), np.asarray(passed - count)

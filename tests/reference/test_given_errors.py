@@ -172,22 +172,3 @@ def test_errors_of_what_cannot_be_assembled() -> None:
     result = trunnion.analyse(trunnion.Mechanism(**data), 4)
     assert bool((result["status"] == trunnion.Status.NOT_ASSEMBLED).all())
     assert result["friction_power_mean_ideal"].sizes == {"joint": result.sizes["joint"]}
-
-
-@pytest.mark.parametrize(("pin", "codes"), [
-    ({"clearance": 3e-5}, {"model.play_centred"}),
-    ({"clearance": 0.0}, set()),
-    ({"clearance": 0.0, "seat": "loaded"}, set()),
-    ({"fit": "10 mm H7/h6", "seat": "loaded"}, {"model.seat_without_play"}),
-])  # fmt: skip
-def test_a_clearance_of_zero_is_no_play(pin: Data, codes: set[str]) -> None:
-    """Nothing is said of it; of a fit without play as stated, whose seat is in vain, there is."""
-    seat = {"seat": pin.pop("seat")} if "seat" in pin else {}
-    data = copy.deepcopy(linkage())
-    data["joint_defaults"]["pin"].pop("radius")
-    data["joints"]["D"] |= {"pin": {"offset": OFFSET, "radius": RADIUS, **pin}, **seat}
-    if "fit" in pin:
-        data["joints"]["D"]["pin"].pop("radius")
-        data["fits"] = "minimum"  # of the largest pin in the smallest hole: 0
-    found = {one.code for one in analysed(data, 4).trunnion.findings}
-    assert found & {"model.play_centred", "model.seat_without_play"} == codes

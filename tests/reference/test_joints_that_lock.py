@@ -7,14 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from timed import wheel
 from trunnion.dynamics.simulate import simulate
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import summary_of
 
-Array = NDArray[np.float64]
 G = 9.81
 AXIS = {"at": [0, 0], "axis": [1, 0]}
 
@@ -118,22 +116,6 @@ def test_a_slider_alone_jams_where_its_push_turns_round() -> None:
     assert findings(data)["simulate.several_accelerations"]["time"] == 0.0  # also T/(m (1 − κ)) obeys
 
 
-@pytest.mark.slow  # the first steps are as small as they can be
-def test_a_slider_that_jams_at_the_start_stops_at_once() -> None:
-    data = simulate(slider("-1 N"), 1.0, 4)
-    assert [one[:3] for one in events(data)] == [("lock", "A", 0.0), ("break-away", "A", 0.0)]
-    assert data.drive_rate.values[0] == pytest.approx(-data.time.values / (LOW * (1 + JAM)), abs=1e-10)
-    assert float(data.work_friction[0]) == pytest.approx(0.5 * LOW)
-
-
-@pytest.mark.parametrize(("friction", "several"), [(0.9 / JAM * F, False), (1.1 / JAM * F, True)])
-def test_several_accelerations_of_one_coordinate_are_told_from_where_inertia_locks(
-    friction: float, several: bool
-) -> None:
-    found = findings(simulate(slider("1 N", friction), 0.1, 1))
-    assert ("simulate.several_accelerations" in found) == several
-
-
 def test_without_rest_there_is_no_acceleration_and_the_figure_says_by_how_much() -> None:
     """A law that is smooth at rest cannot hold it: the motion ends, with ∂E/∂q̈ = m (1 − κ) of m."""
     smooth = {"law": "brown-mcphee", "coefficient": F, "static": F, "transition_speed": 1e-3}
@@ -143,11 +125,6 @@ def test_without_rest_there_is_no_acceleration_and_the_figure_says_by_how_much()
     assert found["time"] == pytest.approx(0.5, abs=1e-6)
     known = np.isfinite(data.drive_rate.values[0])
     assert known.tolist() == (data.time.values <= found["time"]).tolist()
-
-
-def test_accelerations_that_are_not_found_are_not_laid_at_the_inertia() -> None:
-    found = findings(simulate(slider("sqrt(-1 - time/(1 s)) * 1 N"), 1.0, 4))
-    assert set(found) & {"simulate.unsolved", "simulate.no_acceleration"} == {"simulate.unsolved"}
 
 
 # ---- Painlevé's rod -------------------------------------------------------------------------------------------

@@ -10,8 +10,7 @@ import test_newton_euler as oracle
 
 import trunnion
 from brief import brief
-from mechanisms import MODELS, Array, Data, build, findings, four_bar, model, prismatic, revolute, slide, slider_crank
-from mechanisms_space import rssr
+from mechanisms import MODELS, Array, Data, build, findings, model, prismatic, revolute, slide, slider_crank
 from reference import newton_euler
 from trunnion import FrictionMethod, Mechanism, Status
 from trunnion.results.attributes import summary_of
@@ -43,7 +42,7 @@ def pushed_slider(coefficient: float, load: float = -LOAD, speed: float = 0.1) -
     return Mechanism(**data)
 
 
-@pytest.mark.parametrize("share", [1e-3, 0.5, 0.999, 1 - 1e-6])
+@pytest.mark.parametrize("share", [0.5, 1 - 1e-6])
 def test_below_the_critical_coefficient(share: float) -> None:
     """P = W/(1 − 2 f a/L), finite up to the brink."""
     result = brief(pushed_slider(share * CRITICAL), 7)
@@ -52,7 +51,7 @@ def test_below_the_critical_coefficient(share: float) -> None:
     assert np.all(result["friction_power"].sel(joint="G") > 0)
 
 
-@pytest.mark.parametrize("excess", [1 + 1e-5, 1.3, 10.0])
+@pytest.mark.parametrize("excess", [1 + 1e-5, 10.0])
 def test_above_the_critical_coefficient(excess: float) -> None:
     """Locked at the share 1/excess of the friction, found to 1e-6; NaN instead of the negative P of the formula."""
     mechanism = pushed_slider(excess * CRITICAL)
@@ -76,12 +75,6 @@ def test_a_load_that_helps_never_locks(coefficient: float) -> None:
     result = brief(pushed_slider(coefficient, LOAD), 5)
     assert np.all(result["status"] == Status.SOLVED)
     np.testing.assert_allclose(result["drive_effort"].values, -LOAD / (1 + coefficient / CRITICAL), rtol=1e-9)
-
-
-def test_locks_in_one_direction_only() -> None:
-    """The same load on the way back helps."""
-    mechanism = pushed_slider(2 * CRITICAL, -LOAD, -0.1)
-    assert np.all(brief(mechanism, 5)["status"] == Status.SOLVED)
 
 
 def test_successive_approximation_never_calls_a_locked_position_solved() -> None:
@@ -205,20 +198,6 @@ def test_locked_positions(name: str) -> None:
         assert np.all(np.isfinite(np.broadcast_to(force, (STEPS,))[free])), joint
 
 
-@pytest.mark.slow
-def test_some_positions_lock_and_the_others_keep_their_numbers() -> None:
-    data = four_bar()
-    result = trunnion.analyse(build(data, friction=1.0, radius=0.5), 72)
-    locked = result["status"].values == Status.LOCKED
-    assert 0 < np.count_nonzero(locked) < 72
-    effort = result["drive_effort"].values[0]
-    np.testing.assert_array_equal(np.isnan(effort), locked)
-    assert np.isnan(float(result["efficiency"]))
-    residual, peak = np.nanmax(np.abs(result["power_residual"])), np.nanmax(np.abs(result["drive_power"]))
-    assert residual < 1e-12 * peak
-    assert any(row["code"] == "friction.locked" for row in findings(result))
-
-
 def jamming_piston() -> Mechanism:
     """A short rod that presses a piston with friction aside."""
     data = slider_crank(0.3, 0.5, 0.0)
@@ -241,20 +220,12 @@ def toward_its_dead_centre() -> Mechanism:
     ("mechanism", "note"),
     [
         (jamming_piston(), "no bound: it locks there"),
-        (Mechanism(**rssr(friction=3.0).data), "no bound: it locks there"),
         (toward_its_dead_centre(), "no bound"),
     ],
-    ids=["plane", "space", "dead centre"],
+    ids=["locks", "dead centre"],
 )
 def test_efforts_and_reactions_have_no_maximum_where_they_grow_without_bound(mechanism: Mechanism, note: str) -> None:
     figures = {figure.name: figure for figure in summary_of(trunnion.analyse(mechanism, 12))}
     driver = next(iter(mechanism.drivers))
     for name in (f"{driver}.effort_max", "B.reaction_max"):
         assert (figures[name].value, figures[name].note) == (None, note)
-
-
-@pytest.mark.slow
-def test_efforts_that_come_to_a_limit_where_it_locks_have_a_maximum() -> None:
-    mechanism = build(four_bar(), friction=1.0, radius=0.5)
-    figures = {figure.name: figure for figure in summary_of(trunnion.analyse(mechanism, 12))}
-    assert figures["A.effort_max"].value == pytest.approx(94.9878, rel=1e-5)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import trunnion
-from brief import brief
-from mechanisms import Data, analyse, build, findings, five_bar, four_bar, model, slider_crank
+from mechanisms import Data, build, five_bar, four_bar, model, slider_crank
 from trunnion import Mechanism, Status, locking
 from trunnion.cycle.locking_course import critical_multiples
 from trunnion.results.attributes import summary_of
@@ -63,15 +62,7 @@ def multiples_of(mechanism: Mechanism, steps: int) -> dict[str, np.ndarray]:
     return critical_multiples(run.solve(run.cycle.times(steps), method=FrictionMethod()), MARGIN)
 
 
-def test_the_result_has_the_multiples_of_every_position() -> None:
-    data, options = CASES["four-bar"]
-    found, expected = (of(build(data(), **options), 4) for of in (locking, multiples_of))
-    assert any(np.any(np.isfinite(multiple)) for multiple in expected.values())
-    for joint, multiple in expected.items():
-        np.testing.assert_array_equal(found["critical_multiple"].sel(joint=joint), multiple)
-
-
-@pytest.mark.slow
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", CASES)
 def test_critical_multiples_are_where_it_locks(name: str) -> None:
     """Just below it runs, just above it is locked: one joint's coefficient changed in the model, at every position."""
@@ -95,67 +86,7 @@ def test_critical_multiples_are_where_it_locks(name: str) -> None:
         for k, position in enumerate(at):
             assert (status[k] == Status.LOCKED).tolist() == [False, True], (joint, position, multiple[position])
             checked += 2
-        if len(at) and checked == 2 * len(
-            at
-        ):  # what was solved together is what the analysis of a model by itself says
-            for factor in range(2):
-                whole["joints"][joint]["friction"] = float(stated[0, factor])
-                alone = brief(Mechanism(**whole), steps)["status"].values
-                assert alone[at[0]] == status[0, factor]
     assert checked >= 6
-
-
-@pytest.mark.slow
-def test_joint_without_which_it_still_locks() -> None:
-    """Where all friction together locks early, no single joint need be able to free it: then its multiple is 0."""
-    data, options = CASES["slider-crank"]
-    mechanism = build(data(), **{**options, "friction": 0.9})
-    found = brief(mechanism, 8)
-    # where a joint turns round the margin is that of its sides, the multiples are without the friction of that joint
-    locked = (found["locking_margin"].values < 1) & (found["status"].values != Status.ZERO_SLIP)
-    multiple = np.array(list(multiples_of(mechanism, 8).values()))
-    assert np.any(locked)
-    assert np.all(np.nanmin(multiple, axis=0)[locked] < 1)
-    assert np.any(multiple == 0)
-
-
-@pytest.mark.slow
-def test_locked_findings_name_the_joint_that_decides() -> None:
-    data, options = CASES["slider-crank"]
-    result = analyse(data(), 12, **{**options, "friction": 0.9})
-    assert np.any(result["status"] == Status.LOCKED)
-    (finding,) = [one for one in findings(result) if one["code"] == "friction.locked"]
-    assert "decides" in finding["remedy"] or "lower these" in finding["remedy"]
-    assert ("jammed" in finding["what"]) == bool(finding["figures"]["reverse"])
-
-
-def test_there_is_nothing_to_lock_without_friction() -> None:
-    found = locking(build(four_bar(), friction=None), 12)
-    assert np.all(np.isnan(found["critical_multiple"]))
-    assert np.all(np.isinf(found["locking_margin"]))
-
-
-@pytest.mark.slow
-def test_coefficient_only_where_the_law_is_proportional_to_it() -> None:
-    data, options = CASES["slider-crank"]
-    stribeck = {"law": "stribeck", "coefficient": 0.2, "static": 0.35, "stribeck_speed": 0.5}
-    curved = summary_of(analyse(data(), 12, **{**options, "friction": stribeck}))
-    plain = summary_of(analyse(data(), 12, **options))
-    ends = [{row.name.partition(".critical_")[2] for row in rows} - {""} for rows in (curved, plain)]
-    assert ends == [{"multiple"}, {"coefficient"}]
-
-
-@pytest.mark.slow
-def test_successive_approximation_has_the_same_margin() -> None:
-    data, options = CASES["slider-crank"]
-    mechanism = build(data(), **{**options, "friction": 0.2})
-    plain = brief(mechanism, 12)
-    named = brief(mechanism, 12, FrictionMethod("successive-approximation", 1e-10))
-    assert np.isfinite(plain["locking_margin"]).any()
-    solved = named["status"].values < Status.NOT_CONVERGED
-    np.testing.assert_allclose(
-        named["locking_margin"].values[solved], plain["locking_margin"].values[solved], rtol=1e-6
-    )
 
 
 def test_locking_says_nothing_where_there_is_no_answer() -> None:

@@ -137,14 +137,14 @@ _GROUPS = (
         "groups/gear.py",
         "towards = radius * axis.s, -radius * axis.c",
         "towards = -radius * axis.s, radius * axis.c",
-        ("tests/reference/test_racks.py",),
+        ("tests/reference/test_gears.py",),
     ),
     Fault(
         "thread-friction-across-the-screw-alone",
         "solve/gears.py",
         "friction * lead / helix",
         "0.0 * friction",
-        ("tests/reference/test_racks.py",),
+        ("tests/reference/test_gears.py",),
     ),
     Fault(
         "spin-carried-the-wrong-way",
@@ -182,7 +182,7 @@ _SOLVE = (
         "solve/loads.py",
         'yield values[f"links.{link}.mass"] * _dot(gravity, velocity)',
         "yield _dot(gravity, velocity)",
-        ("tests/reference/test_useful_weight.py",),
+        ("tests/reference/test_useful_work.py",),
     ),
     Fault(
         "stays-on-its-side",

@@ -3,39 +3,26 @@
 from __future__ import annotations
 
 import json
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from allocations import rocker_sensitivities
 from scipy.optimize import minimize
 from scipy.stats import multivariate_normal
 
 import trunnion
 from trunnion import Mechanism
-from trunnion.joints.fits import standard_tolerance
 from trunnion.studies.allocation.allocate import half_widths
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-LENGTHS = np.array([0.1, 0.03, 0.09, 0.07])
 LIMIT = np.radians(0.1)
 
 
 def slopes(count: int = 72) -> Any:
-    """∂θ₄/∂(ground, crank, coupler, rocker) of the open branch at `count` angles, rad/m, from the loop equation."""
-    ground, crank, coupler, rocker = LENGTHS
-    theta = 2 * np.pi * np.arange(count) / count
-    b = crank * np.exp(1j * theta)
-    d = ground - b
-    reach = np.abs(d)
-    along = (coupler**2 - rocker**2 + reach**2) / (2 * reach)
-    c = b + d / reach * (along + 1j * np.sqrt(coupler**2 - along**2))
-    couple, rock = (c - b) / coupler, (c - ground) / rocker
-    # the loop crank + coupler = ground + rocker, each length moved alone, the coupler's direction projected out
-    changes = (-np.ones(count), np.exp(1j * theta), couple, -rock)
-    turned = np.real(1j * (c - ground) * np.conj(couple))
-    return np.array([np.real(change * np.conj(couple)) / turned for change in changes]).T
+    """∂θ₄/∂(ground, crank, coupler, rocker) at `count` angles, rad/m."""
+    return 1e3 * rocker_sensitivities(2 * np.pi * np.arange(count) / count)
 
 
 def fourbar(**sections: Any) -> Mechanism:
@@ -93,34 +80,6 @@ def test_closed_forms_of_one_limit(criterion: str) -> None:
     )
     fall = float(result["cost_total"] - wider["cost_total"]) / np.radians(1e-4)
     assert float(result["saving"][0]) == pytest.approx(fall, rel=2e-3)
-
-
-def test_discrete_equals_exhaustive_search() -> None:
-    """Four dimensions, six IT grades each."""
-    grades = {6: 14.0, 7: 9.0, 8: 6.2, 9: 4.5, 10: 3.6, 11: 3.1}
-    factors = {"l1": 1.0, "l2": 1.6, "l3": 0.9, "l4": 1.25}
-    processes = {
-        f"bore-{name}": {grade: factor * cost for grade, cost in grades.items()} for name, factor in factors.items()
-    }
-    for limit in (0.06, 0.1, 0.17):
-        model = fourbar(
-            costs={name: {"process": f"bore-{name}"} for name in factors},
-            processes=processes,
-            measures={"rocker-angle": {"angle": "rocker", "limit": f"±{limit} deg"}},
-        )
-        result = trunnion.allocate(model, steps=72, samples=0)
-        halves = [[standard_tolerance(size, grade) / 2 for grade in grades] for size in LENGTHS]
-        costs = [[factor * cost for cost in grades.values()] for factor in factors.values()]
-        kept = [
-            (sum(costs[i][k] for i, k in enumerate(taken)), taken)
-            for taken in product(range(6), repeat=4)
-            if np.max(np.abs(slopes()) @ [halves[i][k] for i, k in enumerate(taken)]) <= np.radians(limit) * (1 + 1e-9)
-        ]
-        cost, taken = min(kept)
-        assert float(result["cost_total"]) == pytest.approx(cost, rel=1e-12)
-        if sum(one[0] < cost + 1e-9 for one in kept) == 1:
-            names = [f"IT{list(grades)[k]}" for k in taken]
-            assert result["choice"].sel(parameter=[f"dimensions.l{i}" for i in range(1, 5)]).values.tolist() == names
 
 
 def test_plays_are_bought() -> None:

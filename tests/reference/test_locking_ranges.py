@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +12,10 @@ from test_locking import CRITICAL, pushed_slider
 import trunnion
 from mechanisms import eccentric_press
 from mechanisms_parts import Data, plunger, revolute
-from mechanisms_space import rssr
 from trunnion import Mechanism, Status
 from trunnion.cycle.locking import LockingState, locking, look, report_figures
 from trunnion.cycle.locking_course import NO_MARGIN, LockingCourse, locking_course, passed
-from trunnion.results.attributes import attribute, summary_of
+from trunnion.results.attributes import summary_of
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL
 from trunnion.solve.margin import locking_margin
@@ -95,21 +93,6 @@ def test_the_friction_that_holds_it_at_the_end_or_everywhere_is_a_figure(first: 
     assert rows["holding_multiple"].aspect == ("maximum" if told == "all" else "")
 
 
-def test_friction_that_holds_a_mechanism_of_many_joints_is_what_it_holds_with() -> None:
-    """Just below that multiple of every coefficient the load drives the slide, just above it does not."""
-    data: Data = slide_hoist().model_dump(by_alias=True, exclude_unset=True)
-    for joint in ("H", "K"):
-        data["joints"][joint] |= {"pin": {"radius": 0.004}, "friction": 0.3}
-    known = locking(Mechanism(**data), 41)["holding_multiple"].values
-    at = np.flatnonzero(np.isfinite(known))
-    assert len(at) >= 7
-    for i in at[[0, len(at) // 2, -1]]:
-        for factor, held in ((1 - 1e-6, False), (1 + 1e-6, True)):
-            for joint, own in (("A", FRICTION), ("H", 0.3), ("K", 0.3)):
-                data["joints"][joint]["friction"] = own * known[i] * factor
-            assert np.isfinite(locking(Mechanism(**data), 41)["holding_multiple"].values[i]) == held
-
-
 def expected_states(arm: np.ndarray) -> np.ndarray:
     """Of a load with this arm about a pin, in m, positive where it pulls backward."""
     hold = FRICTION * RADIUS
@@ -135,24 +118,6 @@ def test_a_load_without_power_pushes_neither_way() -> None:
     data["loads"]["weight"]["force"] = [0.0, "-100 N * between(drive, 0, 1.2)"]
     found = locking(Mechanism(**data), 40)
     np.testing.assert_array_equal(states(found) == LockingState.RUNS, found["drive"].values > np.degrees(1.2))
-
-
-def slide_hoist() -> Mechanism:
-    """The hoist, whose lever hangs from a slide on a level guide by a link to the lever's end on top."""
-    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
-    data["links"] = {
-        "ground": {"points": {"A": [0, 0], "Z": {"at": [-0.1, 0.1], "axis": [-1, 0]}}},
-        "crank": {"points": {"A": [0, 0], "P": [ARM, 0], "H": [0.1, 0]}},
-        "rod": {"points": {"H": [0, 0], "K": [0.1, 0]}},
-        "slide": {"points": {"K": [0, 0], "Z": {"at": [0, 0], "axis": [-1, 0]}}},
-    }
-    data["joints"] |= {
-        "H": revolute("crank", "rod"), "K": revolute("rod", "slide"),
-        "Z": {"type": "prismatic", "links": ["ground", "slide"]},
-    }  # fmt: skip
-    data["drivers"] = {"Z": {"speed": 0.01, "range": [-0.03, 0.01]}}
-    data["assembly"] = {"H": [0.03, 0.095]}
-    return Mechanism(**data)
 
 
 def test_ends_of_a_range_near_locking_are_where_the_margin_passes_it() -> None:
@@ -191,51 +156,11 @@ def test_a_useful_spring_drives_backward_as_a_load_does() -> None:
     np.testing.assert_allclose(found["useful_power"].values, -found["spring_power"].values[0], rtol=1e-12)
 
 
-def lift(by_mass: bool) -> Mechanism:
-    """A slide lifts what weighs on the end of its lever: a mass, or the same force as a load."""
-    data: Data = slide_hoist().model_dump(by_alias=True, exclude_unset=True)
-    data["drivers"]["Z"] = {"speed": 1e-6, "range": [-0.1, 0.01]}
-    if by_mass:
-        data |= {"loads": {}, "gravity": [0, -9.81]}
-        data["links"]["crank"] |= {"mass": 100 / 9.81, "centre": [ARM, 0]}
-    return Mechanism(**data)
-
-
-def swing(by_mass: bool) -> Mechanism:
-    """A crank in space swings a rocker with a weight, a mass or the same force as a load."""
-    data: Data = rssr(start=0.1, friction=0.1).data
-    for name, joint in data["joints"].items():
-        joint["pin"] = {"radius": 0.013, **({"bearing": 0.02} if name in "AD" else {})}
-    for link in data["links"].values():
-        for key in ("mass", "centre", "inertia"):
-            link.pop(key, None)
-    centre = [0.06, 0.001, 0.01]
-    data["drivers"]["A"]["speed"] = 1e-4
-    data["links"]["rocker"]["points"]["W"] = centre
-    data["loads"] = {} if by_mass else {"weight": {"link": "rocker", "at": "W", "force": [0, -147.15, 0]}}
-    data["links"]["rocker"] |= {"mass": 15.0, "centre": centre} if by_mass else {}
-    return Mechanism(**data)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("lifted", [lift, swing])
-def test_a_weight_pushes_as_the_same_force_does_stated_as_a_load(lifted: Callable[[bool], Mechanism]) -> None:
-    """By `locking`, at every position and between them, and by `analyse`."""
-    (mass, load), (one, other) = (
-        [look(lifted(by_mass), 60) for by_mass in (True, False)] for look in (locking, trunnion.analyse)
-    )
-    np.testing.assert_array_equal(states(mass), states(load))
-    assert {LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD} <= set(states(mass))
-    assert {LockingState.BACKDRIVABLE, LockingState.DRIVEN_ON} & set(states(mass))
-    np.testing.assert_allclose(mass["holding_multiple"], load["holding_multiple"], rtol=1e-6)
-    for with_mass, with_load in ((mass, load), (one, other)):
-        rows = [attribute(result, "locking_ranges")["rows"] for result in (with_mass, with_load)]
-        assert [row["cells"][:3] for row in rows[0]] == [row["cells"][:3] for row in rows[1]]
-
-
 def test_without_useful_work_there_is_no_efficiency_and_it_says_why() -> None:
     """NaN, not 0: over the cycle, at each position, backward, over a sweep and as a measure."""
-    mechanism = lift(True)
+    crank = {"points": {"A": [0, 0], "P": [ARM, 0]}, "mass": 100 / 9.81, "centre": [ARM, 0]}
+    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True) | {"loads": {}, "gravity": [0, -9.81]}
+    mechanism = Mechanism(**{**data, "links": {**data["links"], "crank": crank}})
     result = trunnion.analyse(mechanism, 12)
     assert np.isnan(float(result["efficiency"]))
     assert np.all(np.isnan(result["efficiency_instant"]))

@@ -33,8 +33,7 @@ def test_band_of_a_transmission_error_is_about_nominal(statistic: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "measure",
-    [{**PATH, "as": one} for one in ("mean", "place-of-maximum")] + [{**ERROR, "as": "rms"}],
+    "measure", [{**PATH, "as": one} for one in ("mean", "place-of-maximum")] + [{**ERROR, "as": "rms"}]
 )
 def test_first_order_of_what_has_no_derivative(measure: dict[str, Any]) -> None:
     """It says that it has none; a worst case is found all the same, no less than any sample."""
@@ -78,34 +77,6 @@ def test_place_of_the_nominal_extreme() -> None:
     assert place["swing"] == pytest.approx(270)
     assert place["back"] == pytest.approx(90)
     assert place["top"] == pytest.approx(60)
-
-
-@pytest.mark.parametrize(
-    ("tolerances", "options", "expected"),
-    [
-        ({"r": "±60 mm"}, {}, [("tolerance.negative", "tolerances.r", -0.01)]),
-        ({"r": "±40 mm", "e": "±1 mm"}, {}, []),  # an offset may turn round
-        ({"joint_defaults.friction.coefficient": "±0.2"}, {"friction": 0.06},
-         [("tolerance.negative", "tolerances.joint_defaults.friction.coefficient", -0.14)]),
-        ({"joint_defaults.friction.coefficient": "±0.02"}, {"friction": 0.06}, []),
-        ({"joint_defaults.pin.radius": "±4 mm"}, {"friction": 0.1},
-         [("tolerance.negative", "tolerances.joint_defaults.pin.radius", -0.001)]),
-        ({"joint_defaults.pin.radius": "±3 mm"}, {"friction": 0.1},
-         [("tolerance.impossible", "tolerances.joint_defaults.pin.radius", 0.0)]),
-    ],
-)  # fmt: skip
-def test_tolerances_of_what_no_model_may_have(
-    tolerances: dict[str, str], options: dict[str, float], expected: list[tuple[str, str, float]]
-) -> None:
-    """A negative size or coefficient, a length that turns round; of a default once for all its joints."""
-    dimensions = {"r": "50 mm", "l": "200 mm", "e": "0.5 mm"}
-    defaults = {"pin": {"radius": "3 mm"}, "guide": {"length": "30 mm"}, "friction": 0.06, **options}
-    model = slider_crank(dimensions=dimensions, joint_defaults=defaults, tolerances=tolerances)
-    found = tolerance(model, ["slide:C"], methods=("linear",), steps=24).trunnion.findings
-    told = [(one.code, one.where, one.figures) for one in found if one.code.endswith((".negative", ".impossible"))]
-    assert [(code, where) for code, where, _ in told] == [(code, where) for code, where, _ in expected]
-    for (_, _, own), (_, _, reached) in zip(told, expected, strict=True):
-        assert own["least" if reached < 0 else "value"] == pytest.approx(reached, abs=1e-12)
 
 
 WIDE = 0.05e-3 / 3  # σ of each length

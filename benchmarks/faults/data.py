@@ -78,14 +78,14 @@ _STUDIES = (
         "studies/allocation/task.py",
         "np.concatenate([(worst + drift)[keep[0]], (worst - drift)[keep[1]]])",
         "np.concatenate([(worst + drift)[keep[0]], worst[keep[1]]])",
-        ("tests/reference/test_allocation_yield.py",),
+        ("tests/reference/test_allocation.py",),
     ),
     Fault(
         "rss-is-a-sixth",
         "studies/allocation/problem.py",
         "return self.spread() / 3 if self.deviation is None",
         "return self.spread() / 6 if self.deviation is None",
-        ("tests/reference/test_allocation_yield.py", "tests/reference/test_allocation.py"),
+        ("tests/reference/test_allocation.py",),
     ),
     Fault(
         "dead-centre-of-a-resting-link",

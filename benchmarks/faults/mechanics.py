@@ -137,14 +137,14 @@ _GROUPS = (
         "groups/gear.py",
         "towards = radius * axis.s, -radius * axis.c",
         "towards = -radius * axis.s, radius * axis.c",
-        ("tests/reference/test_racks.py",),
+        ("tests/reference/test_gears.py",),
     ),
     Fault(
         "thread-friction-across-the-screw-alone",
         "solve/gears.py",
         "friction * lead / helix",
         "0.0 * friction",
-        ("tests/reference/test_racks.py",),
+        ("tests/reference/test_gears.py",),
     ),
     Fault(
         "spin-carried-the-wrong-way",
@@ -182,7 +182,7 @@ _SOLVE = (
         "solve/loads.py",
         'yield values[f"links.{link}.mass"] * _dot(gravity, velocity)',
         "yield _dot(gravity, velocity)",
-        ("tests/reference/test_useful_weight.py",),
+        ("tests/reference/test_means.py",),
     ),
     Fault(
         "stays-on-its-side",
@@ -273,7 +273,7 @@ _SOLVE = (
         "solve/bristles.py",
         "_picked(whole_gain, last) / xp.where(moves, lost, 1.0), 0.0)",
         "_picked(whole_gain, last), 0.0)",
-        ("tests/reference/test_bristles.py", "-k", "chained"),
+        ("tests/reference/test_friction_by_direction.py", "-k", "chained"),
     ),
 )
 
@@ -314,21 +314,21 @@ _MEASURES = (
         "measures/measures.py",
         "near(number, angle_at(run, part, primal(time))) if turns else number",
         "number",
-        ("tests/reference/test_expressions_of_measures.py",),
+        ("tests/reference/test_kinematic_measures.py",),
     ),
     Fault(
         "ends-share-no-moment",
         "solve/contacts.py",
         "loads += [minus(half, couple), plus(half, couple)]",
         "loads += [half, half]",
-        ("tests/reference/test_end_loads_of_bearings.py",),
+        ("tests/reference/test_friction_by_direction.py",),
     ),
     Fault(
         "friction-of-a-cross-bears-on-nothing",
         "solve/contacts.py",
         "walk.algebra.added(reaction, friction) if pair.crossed else reaction",
         "reaction",
-        ("tests/reference/test_end_loads_of_bearings.py",),
+        ("tests/reference/test_friction_by_direction.py",),
     ),
     Fault(
         "friction-forward-is-backward",
@@ -377,7 +377,7 @@ _MEASURES = (
         "measures/group.py",
         "return Dual(times, np.divide(shifts, 2 * step,",
         "return Dual(times, 0.0 * np.divide(shifts, 2 * step,",
-        ("tests/reference/test_means_that_jump.py",),
+        ("tests/reference/test_loads_that_jump.py",),
     ),
     Fault(
         "transmission-angle-not-folded",
@@ -422,7 +422,7 @@ _ENGINES = (
         "engines/lanes.py",
         'return self.b.icmp_signed("!=", self.b.bitcast(lanes, mask), ir.Constant(mask, 0))',
         "return self.b.extract_element(lanes, ir.Constant(INT, 0))",
-        ("tests/reference/test_engines.py", "tests/reference/test_compiled_cycle.py"),
+        ("tests/reference/test_engines.py", "tests/reference/test_compiled.py"),
     ),
     Fault(
         "margin-of-astray-steps",
@@ -436,14 +436,14 @@ _ENGINES = (
         "cycle/cycle_kernel.py",
         "gravest=Status.SOLVED,",
         "gravest=Status.LOCKED,",
-        ("tests/reference/test_compiled_cycle.py",),
+        ("tests/reference/test_compiled.py",),
     ),
     Fault(
         "kept-code-of-other-figures",
         "solve/walk_kernel.py",
         "request = described, list(figures), forces,",
         "request = described, forces,",
-        ("tests/reference/test_compiled_cycle.py",),
+        ("tests/reference/test_compiled.py",),
     ),
     Fault(
         "component-against-the-edges",
@@ -481,7 +481,7 @@ _DYNAMICS = (
         "dynamics/energy.py",
         "energy = energy - 0.5 * algebra.power",
         "energy = energy - algebra.power",
-        ("tests/reference/test_energy_account.py", "-k", "works_and_energies"),
+        ("tests/reference/test_motion_in_time.py", "-k", "works_and_energies"),
     ),
 )
 
@@ -491,7 +491,7 @@ _STICKING = (
         "dynamics/active.py",
         "if most > 1.0 + SLACK or",
         "if most > 1.5 + SLACK or",
-        ("tests/reference/test_sticking.py", "-k", "blocks"),
+        ("tests/reference/test_joints_that_lock.py", "-k", "blocks"),
     ),
     Fault(
         "shares-that-are-not-the-least",
@@ -505,7 +505,7 @@ _STICKING = (
         "dynamics/motor.py",
         " - share * self.braking(now)",
         "",
-        ("tests/reference/test_sticking.py", "-k", "braked"),
+        ("tests/reference/test_joints_that_lock.py", "-k", "braked"),
     ),
 )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -125,26 +125,10 @@ def apart(theta: Array, least: float) -> NDArray[np.bool_]:
     return np.asarray(np.abs(np.sin(theta)) > least)
 
 
-def test_a_parallelogram_turns_round_twice_evenly() -> None:
-    """720° in 10⁴ steps: the rate is 1, and the torque is that of virtual work."""
-    sides, place = LINKAGES["parallelogram"]
-    steps = 10_000
-    begin = np.pi - 99.5 * 2 * TURN / steps  # no position in line
-    result = analyse(four_bar(*sides, hinted(place, begin), begin, 2.0), steps + 1)
-    theta = begin + result["time"].values
-    rate = result["link_angle_velocity"].sel(link="rocker").values
-    np.testing.assert_allclose(rate, 1.0, atol=1e-9)
-    wanted = by_energy(sides[0], sides[2], sides[3], place, theta)
-    np.testing.assert_allclose(result["drive_effort"].values[0], wanted, atol=2e-5)
-    away = apart(theta, 0.02)
-    np.testing.assert_allclose(result["drive_effort"].values[0][away], wanted[away], atol=1e-8)
-    (finding,) = [one for one in result.trunnion.findings if one.code == "assembly.change_point"]
-    assert finding.severity == "warning"
-    assert finding.figures["places"] == ["180°", "360°", "540°", "720°"]
-
-
-@pytest.mark.parametrize("name", LINKAGES)
-@pytest.mark.parametrize("whole", [True, False])
+@pytest.mark.parametrize(
+    ("name", "whole"),
+    [("parallelogram", False), ("antiparallelogram", False), ("kite", True), ("Galloway", False), ("deltoid", True)],
+)
 def test_linkages_go_on_smoothly(name: str, whole: bool) -> None:
     """Place of C, torque by energy; whole: over as many turns of the crank as bring the links back."""
     sides, place = LINKAGES[name]
@@ -167,8 +151,7 @@ def test_a_linkage_folds_where_that_is_stated() -> None:
     theta = np.mod(0.7 + result["time"].values, TURN)
     at = np.where(theta < np.pi, place(theta), other(theta))
     np.testing.assert_allclose(result["point_position"].sel(point="rocker.C").values, [at.real, at.imag], atol=1e-10)
-    (finding,) = [one for one in result.trunnion.findings if one.code == "assembly.change_point"]
-    assert "speeds jump" in finding.what
+    assert "assembly.change_point" in {one.code for one in result.trunnion.findings}
 
 
 def test_positions_in_line_have_no_forces() -> None:
@@ -203,8 +186,7 @@ def test_a_slider_crank_with_a_rod_like_its_crank() -> None:
     np.testing.assert_allclose(x, 0.6 * np.cos(0.2 + result["time"].values), atol=1e-12)
 
 
-@pytest.mark.spread(0, "deltoid")
-@pytest.mark.parametrize("kind", LINKAGES)
+@pytest.mark.parametrize("kind", ["deltoid", pytest.param("antiparallelogram", marks=pytest.mark.slow)])
 def test_in_space(kind: str) -> None:
     """A general group, which is followed by Newton's method, goes on as the closed form does."""
     sides, place = LINKAGES[kind]
@@ -214,96 +196,6 @@ def test_in_space(kind: str) -> None:
     np.testing.assert_allclose(at, [where.real, where.imag], atol=1e-10)
     (finding,) = [finding for finding in result.trunnion.findings if finding.code == "assembly.change_point"]
     assert finding.figures["places"] == (["360°", "720°"] if kind == "deltoid" else ["180°", "360°"])
-
-
-BRAKED = 7.0  # N m
-
-
-class Kite(NamedTuple):
-    """Lengths; where the rocker's ball lies on the crank's axis, the directions of its way and of the rocker."""
-
-    crank: float
-    height: float
-    rocker: float
-    tangent: Array
-    outward: Array
-
-    @classmethod
-    def drawn(cls, seed: int) -> Kite:
-        """One at random whose crank turns round."""
-        rng = np.random.default_rng(seed)
-        tangent = rng.normal(size=3) * [1.0, 1.0, 0.4]
-        outward = np.cross(tangent, rng.normal(size=3))
-        lengths = rng.uniform([0.2, -0.3, 0.7], [0.4, 0.3, 1.2])
-        return cls(*map(float, lengths), tangent / np.linalg.norm(tangent), outward / np.linalg.norm(outward))
-
-    @property
-    def pivot(self) -> Array:
-        """Middle of the rocker's circle."""
-        return np.asarray([0.0, 0.0, self.height] - self.rocker * self.outward)
-
-    def ball(self, angle: Array) -> Array:
-        """Of the rocker, (3, time)."""
-        way = np.cos(angle) * self.outward[:, None] + np.sin(angle) * self.tangent[:, None]
-        return np.asarray(self.pivot[:, None] + self.rocker * way)
-
-    def rocked(self, theta: Array) -> Array:
-        """Turn of the rocker from there, where it may also stay: the sum of both roots of p cos ψ + q sin ψ = c."""
-        away = np.array([self.crank * np.cos(theta), self.crank * np.sin(theta), 0.0 * theta]) - self.pivot[:, None]
-        return np.asarray(np.unwrap(2 * np.arctan2(self.tangent @ away, self.outward @ away)))
-
-
-def spatial_kite(kite: Kite, moves: bool, start: float) -> Mechanism:
-    """RSSR whose bar is as long as the ball of the crank is from a point on the crank's axis, where that of the rocker
-    can be: twice a turn the rocker that stays there may as well move."""
-    upright = {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}
-    axis = np.cross(kite.outward, kite.tangent)
-    pivot = {"at": kite.pivot.tolist(), "axis": axis.tolist(), "x": kite.outward.tolist()}
-    ball = kite.ball(kite.rocked(np.array([start])) * moves)[:, 0]
-    ends = {"A": ["ground", "crank"], "B": ["crank", "bar"], "C": ["bar", "rocker"], "D": ["ground", "rocker"]}
-    return Mechanism(
-        space="spatial",
-        links={
-            "ground": {"points": {"A": upright, "D": pivot}},
-            "crank": {"points": {"A": upright, "B": [kite.crank, 0, 0]}},
-            "bar": {"points": {"B": [0, 0, 0], "C": [float(np.hypot(kite.crank, kite.height)), 0, 0]}},
-            "rocker": {"points": {"D": upright, "C": [kite.rocker, 0, 0]}},
-        },
-        joints={name: {"type": "spherical" if name in "BC" else "revolute", "links": ends[name]} for name in ends},
-        drivers={"A": {"speed": 1.0, "start": start}},
-        loads={"brake": {"link": "rocker", "moment": (-BRAKED * axis).tolist()}},
-        assembly={"C": ball.tolist()},
-    )
-
-
-@pytest.mark.sample(8)
-@pytest.mark.parametrize("moves", [True, pytest.param(False, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 15))])
-def test_a_kite_in_space_goes_on_smoothly(seed: int, moves: bool) -> None:
-    """Moving or at rest, all round: places by both roots, torque by virtual work; the bar does not spin."""
-    kite, start = Kite.drawn(seed), 0.5 + 0.4 * seed
-    result = analyse(spatial_kite(kite, moves, start), 401)
-    theta = start + result["time"].values
-    places = result["point_position"].sel(point="rocker.C").values
-    np.testing.assert_allclose(places, kite.ball(kite.rocked(theta) * moves), atol=1e-9)
-    rate = (kite.rocked(theta + 1e-5) - kite.rocked(theta - 1e-5)) / 2e-5 * moves
-    sound = result["status"].values == 0
-    np.testing.assert_allclose(result["drive_effort"].values[0][sound], BRAKED * rate[sound], atol=1e-7)
-    (finding,) = [finding for finding in result.trunnion.findings if finding.code == "assembly.change_point"]
-    assert (finding.severity, len(finding.figures["places"])) == ("warning", 2)
-    w, x, y, z = result["link_rotation"].sel(link="bar").values
-    wrong = result["link_angular_velocity"].sel(link="bar").values[:, 1:-1] - angular_velocity(
-        np.array([w, x, y, z]), float(np.diff(result["time"].values[:2])[0])
-    )
-    np.testing.assert_allclose(wrong, 0.0, atol=2e-3)
-
-
-def angular_velocity(turns: Array, step: float) -> Array:
-    """ω = 2 q̇ q* by central differences of quaternions, whose signs may change; (3, time − 2)."""
-    before, here, after = turns[:, :-2], turns[:, 1:-1], turns[:, 2:]
-    before, after = (other * np.sign(np.sum(other * here, axis=0)) for other in (before, after))
-    rate = (after - before) / (2 * step)
-    return np.asarray(2 * (here[0] * rate[1:] - rate[0] * here[1:] - np.cross(rate[1:], here[1:], axis=0)))
 
 
 def test_positions_of_a_general_group_where_assemblies_meet_have_no_forces() -> None:
@@ -319,35 +211,13 @@ def test_positions_of_a_general_group_where_assemblies_meet_have_no_forces() -> 
     assert "assembly.ranges" not in [finding.code for finding in result.trunnion.findings]
 
 
-def test_three_wheels_on_one_rod() -> None:
-    """Over-constrained by one crank: all wheels turn evenly, and the first has the torques of the others."""
-    links: dict[str, Any] = {"frame": {"points": {"A": [0, 0], "D": [1, 0], "G": [2, 0]}}}
-    links |= {f"wheel-{k}": {"points": {own: [0, 0], pin: [0.3, 0]}} for k, (own, pin) in enumerate(["AB", "DC", "GH"])}
-    links["rod"] = {"points": {"B": [0, 0], "C": [1, 0], "H": [2, 0]}}
-    ends = {own: ["frame", f"wheel-{k}"] for k, own in enumerate("ADG")}
-    ends |= {pin: [f"wheel-{k}", "rod"] for k, pin in enumerate("BCH")}
-    mechanism = Mechanism(
-        links=links,
-        joints={name: {"type": "revolute", "links": pair} for name, pair in ends.items()},
-        drivers={"A": {"speed": 1.0, "range": [0.1, 0.1 + 2 * TURN]}},
-        loads={"second": {"link": "wheel-1", "moment": -5.0}, "third": {"link": "wheel-2", "moment": -7.0}},
-        assembly={"C": [1.3, 0.0], "H": [2.3, 0.0]},
-        over_constraint="minimum-norm",
-    )
-    result = analyse(mechanism, 300)
-    for wheel in ("wheel-1", "wheel-2"):
-        np.testing.assert_allclose(result["link_angle_velocity"].sel(link=wheel), 1.0, atol=1e-9)
-    np.testing.assert_allclose(result["drive_effort"].values[0], 12.0, rtol=1e-9)
-    (finding,) = [one for one in result.trunnion.findings if one.code == "assembly.change_point"]
-    assert finding.severity == "warning"
-
-
 @pytest.mark.parametrize(
-    ("kind", "place"),
-    [(PARALLELOGRAM, parallel(0.3, 1.0)), (ANTIPARALLELOGRAM, crossed(0.3, 1.0)), (DELTOID, swung(0.4, 1.0))],
-)
-@pytest.mark.parametrize(
-    ("space", "sense"), [("planar", 1.0), ("planar", -1.0), pytest.param("spatial", 1.0, marks=pytest.mark.slow)]
+    ("kind", "place", "space", "sense"),
+    [
+        (PARALLELOGRAM, parallel(0.3, 1.0), "planar", 1.0),
+        (DELTOID, swung(0.4, 1.0), "planar", -1.0),
+        pytest.param(ANTIPARALLELOGRAM, crossed(0.3, 1.0), "spatial", 1.0, marks=pytest.mark.slow),
+    ],
 )
 def test_motions_in_time_go_on_as_smoothly(
     kind: Any, place: Callable[[Array], Array], space: str, sense: float
@@ -390,7 +260,7 @@ def random_change_point_linkage(rng: np.random.Generator) -> Mechanism:
     return Mechanism(**data)
 
 
-@pytest.mark.parametrize(("first", "count"), [(0, 10), pytest.param(10, 115, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("first", "count"), [(0, 10), pytest.param(10, 30, marks=pytest.mark.slow)])
 def test_no_rate_jumps_at_a_change_point_but_where_it_is_stated(first: int, count: int) -> None:
     passed = jumped = 0
     for seed in range(first, first + count):

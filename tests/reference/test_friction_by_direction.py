@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import copy
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import trunnion
 from brief import brief
-from mechanisms import Data, build, four_bar
+from mechanisms import Array, Data, build, four_bar, positions_of, slider_crank
 from mechanisms_parts import prismatic, slide
-from trunnion import Mechanism, MechanismError
+from trunnion import Mechanism, read
+from trunnion.algebra.dual import Dual, derivative
+from trunnion.errors import Status
+from trunnion.results.tables.cycle import positions
+from trunnion.solve.bristles import _chained
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import prepare
 
 FORWARD, BACKWARD = 0.1, 0.35
 G = 9.81
@@ -32,12 +40,7 @@ def by_direction() -> Data:
 
 @pytest.mark.parametrize(
     ("name", "joint", "engine"),
-    [
-        ("durango-fourbar", "D", "numpy"),
-        ("durango-fourbar", "D", "compiled"),
-        ("offset-slider-crank", "S", "compiled"),
-        ("rssr", "D", "numpy"),
-    ],
+    [("durango-fourbar", "D", "numpy"), ("offset-slider-crank", "S", "compiled"), ("rssr", "D", "numpy")],
 )
 def test_each_way_is_a_run_with_its_coefficient(name: str, joint: str, engine: Any) -> None:
     """Forces, locking margin and losses are those of the coefficient of the direction at hand."""
@@ -77,7 +80,7 @@ def block(slope: float, friction: Any) -> Data:
     }
 
 
-@pytest.mark.parametrize("friction", [(0.1, 0.35), (0.35, 0.1), (0.1, 0.8)])
+@pytest.mark.parametrize("friction", [(0.1, 0.35), (0.1, 0.8)])
 def test_a_block_thrown_up_a_slope(friction: tuple[float, float]) -> None:
     """Up with μ₊ against it, down with μ₋, or it stays where μ₋ holds: times and way by the closed form."""
     slope, speed = np.radians(30), 2.0
@@ -119,19 +122,6 @@ def test_two_blocks_of_which_one_stays() -> None:
         assert found["joint_slide"].sel(joint=joint).values == pytest.approx(way, abs=1e-7), joint
 
 
-def test_a_locking_figure_is_a_multiple_of_both() -> None:
-    """There is no one coefficient to name."""
-    data = trunnion.read("examples/pezzuti-cardan-10mm.yaml").data()
-    data["joint_defaults"]["friction"] = 0.15
-    assert Mechanism(**data)
-    four = build(four_bar())
-    changed = four.data()
-    changed["joint_defaults"]["friction"] = by_direction()
-    found = trunnion.analyse(Mechanism(**changed), steps=24)
-    names = {row["name"] for row in json.loads(found.attrs["summary"])}
-    assert not any(name.endswith(("critical_coefficient", "holding_coefficient")) for name in names)
-
-
 @pytest.mark.parametrize("name", ["durango-fourbar", "rssr"])
 def test_rolling_is_a_pin_of_that_moment(name: str) -> None:
     """Moment arm · N: Coulomb's law with coefficient times radius = arm has the same."""
@@ -159,37 +149,6 @@ def test_a_loaded_roller() -> None:
     assert found["drive_effort"].values == pytest.approx(np.full((1, 4), 5e-4 * 50 * G), rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("name", "joint", "friction", "what"),
-    [
-        ("rssr", "B", by_direction(), "friction by direction in a joint of the type spherical"),
-        (
-            "offset-slider-crank",
-            "S",
-            {"law": "rolling", "arm": 1e-3},
-            "rolling friction in a joint of the type prismatic",
-        ),
-        ("durango-fourbar", "B", {"law": "stribeck", "backward": 0.1}, "unknown to the friction law stribeck"),
-        ("durango-fourbar", "B", {"law": "rolling"}, "needs 'arm'"),
-    ],
-)
-def test_what_has_no_direction_or_does_not_roll(name: str, joint: str, friction: Any, what: str) -> None:
-    with pytest.raises(MechanismError, match=what):
-        with_friction(trunnion.read(f"examples/{name}.yaml").data(), joint, friction)
-
-
-def test_a_coefficient_of_its_own_is_of_both_directions() -> None:
-    """Defaults by direction do not reach into a joint that states one number; 0 is without friction."""
-    data = four_bar()
-    data["joint_defaults"] = {"pin": {"radius": 0.01}, "friction": by_direction()}
-    data["joints"]["B"]["friction"] = 0.2
-    data["joints"]["C"]["friction"] = 0
-    stated = Mechanism(**data).effective_joints
-    assert set(stated["B"].friction.parameters) == {"coefficient", "pair_factor"}
-    assert set(stated["A"].friction.parameters) == {"coefficient", "backward", "pair_factor"}
-    assert stated["C"].friction is None or float(stated["C"].friction.parameters["coefficient"].evaluate()) == 0
-
-
 def test_tolerances_know_the_backward_coefficient() -> None:
     """Its exact sensitivity against a central difference."""
     data = trunnion.read("examples/durango-fourbar.yaml").data()
@@ -203,3 +162,299 @@ def test_tolerances_know_the_backward_coefficient() -> None:
     ends = [float(trunnion.analyse(least(0.3 + step), steps=4)["measure_figure"][0]) for step in (-1e-5, 1e-5)]
     assert found == pytest.approx((ends[1] - ends[0]) / 2e-5, rel=1e-6)
     assert abs(found) > 1
+
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+PEZZUTI = {"joint_defaults.friction.model": "pezzuti"}
+FINE = 2001  # shares of one contact
+CASES = {
+    "one contact, steep": ("pezzuti-cardan", {"bearing": "30 mm", "misalignment": "45 deg"}, "pin-2", True),
+    "turn and slide of [P], one of them at rest": ("pezzuti-cardan", PEZZUTI, "pin-2", True),
+    "guide of a trammel, whose load has a kink": ("elliptic-trammel", {}, "X", True),
+    "pin of a compressor, ends are the bounds": ("slider-crank", {}, "Q", False),
+    "load that resists the joint that rests": ("indexing-press", {}, "F", False),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES)
+def test_the_bounds_are_the_extremes_over_the_whole_interval(case):
+    name, values, joint, inside = CASES[case]
+    mechanism = read(EXAMPLES / f"{name}.yaml").with_values(values)
+    result, run = brief(mechanism, 72), prepare(mechanism)
+    lower, own, upper = (result[f"drive_effort{end}"].values for end in ("_lower", "", "_upper"))
+    driver = int(np.argmax(np.nanmax(upper - lower, axis=1))) if joint != "F" else 1
+    shares = np.linspace(-1.0, 1.0, FINE)
+    if run.system.resting(joint) == 2:
+        shares = np.linspace(-1.0, 1.0, 41)
+        grid = tuple(part.ravel() for part in np.meshgrid(shares, shares))
+    else:
+        grid = (shares,)
+    beyond = []
+    for at in np.flatnonzero(upper[driver] - lower[driver] > 0):
+        time = np.full(grid[0].shape, result["time"].values[at])
+        found = run.at(time, {}, FrictionMethod(), {joint: grid}).efforts[str(result["driver"].values[driver])]
+        scan = np.broadcast_to(found, grid[0].shape)
+        if np.ptp(scan) < 1e-9 * abs(own[driver, at]):
+            continue  # it moves here
+        corners = scan[np.all(np.abs(np.array(grid)) == 1.0, axis=0)]
+        beyond.append(max(corners.min() - scan.min(), scan.max() - corners.max()) / np.ptp(scan))
+        step = np.abs(np.diff(scan)).max() if len(grid) == 1 else 0.02 * np.ptp(scan)  # what a scan may miss
+        noise = 1e-9 * np.ptp(scan)
+        assert scan.min() - step <= lower[driver, at] <= scan.min() + noise
+        assert scan.max() - noise <= upper[driver, at] <= scan.max() + step
+    assert (max(beyond) > 1e-4) == inside
+
+
+def overhung(length: float, **more: Any) -> Mechanism:
+    """A shaft about z that carries a mass of 2 kg, 0.3 m beyond the middle of its bearing; gravity along −y."""
+    return Mechanism(
+        space="spatial",
+        gravity=[0, -G, 0],
+        links={
+            "ground": {"points": {"A": {"at": [0, 0, 0], "axis": [0, 0, 1]}}},
+            "shaft": {"points": {"A": {"at": [0, 0, 0], "axis": [0, 0, 1]}}, "mass": 2.0, "centre": [0, 0, 0.3]},
+        },
+        joints={"A": {"type": "revolute", "links": ["ground", "shaft"], "pin": {"radius": 0.01, "bearing": length}}},
+        drivers={"A": {"speed": 1.0}},
+        measures={"end": {"end_load": "A", "as": "maximum"}},
+        **more,
+    )
+
+
+def test_a_guide_in_the_plane() -> None:
+    """A slider 0.4 m long that carries 100 N, 0.5 m beyond its middle: 100 N·(0.5/0.4 + 1/2) on the nearer end."""
+    model = Mechanism(
+        gravity=[0, 0],
+        links={
+            "ground": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}}},
+            "slider": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}, "E": [0.5, 0]}},
+        },
+        joints={"S": {"type": "prismatic", "links": ["ground", "slider"], "guide": {"length": 0.4}}},
+        drivers={"S": {"speed": 1.0, "range": [0, 0.2]}},
+        loads={"weight": {"link": "slider", "at": "E", "force": [0, -100]}},
+        measures={"end": {"end_load": "S", "as": "maximum"}},
+    )
+    assert float(trunnion.analyse(model, steps=4).measure_figure[0]) == pytest.approx(175.0, rel=1e-12)
+
+
+def test_a_bearing_in_space_by_its_reaction() -> None:
+    """|F⊥/2 ∓ M⊥ × u/L|, of the force and moment in the table of the result."""
+    model = trunnion.read("examples/rssr.yaml").data()
+    model["measures"] = {"end": {"end_load": "D"}}
+    found = trunnion.analyse(Mechanism(**model), steps=12)
+    force, moment = (found[name].sel(joint="D").values for name in ("reaction_force", "reaction_moment"))
+    axis = np.array([0, -np.sin(np.pi / 3), np.cos(np.pi / 3)])
+    across, bending = (vector - np.outer(axis, axis @ vector) for vector in (force, moment))
+    g = np.cross(bending.T, axis).T / 0.03
+    sizes = [np.linalg.norm(across / 2 + sign * g, axis=0) for sign in (-1, 1)]
+    assert found.measure_value.sel(measure="end").values == pytest.approx(np.max(sizes, axis=0), rel=1e-12)
+
+
+def sizes(found: Any, joint: str) -> Any:
+    """The load on every end of a joint, (end, position), N."""
+    return np.linalg.norm(found["end_load"].sel(joint=joint), axis=1)
+
+
+def test_the_table_has_both_ends_and_the_pressure() -> None:
+    """Levers: m g (1/2 ± a/L); the end that bears more, over half of the projected area, is the pressure."""
+    found = trunnion.analyse(overhung(0.1), steps=4)
+    both = 2 * G * np.array([3.5, 2.5])
+    assert np.sort(sizes(found, "A")[:, 0])[::-1] == pytest.approx(both, rel=1e-12)
+    assert found["pin_pressure"].values == pytest.approx(np.full((1, 4), both[0] / (0.02 * 0.05)), rel=1e-12)
+    summary = {row["name"]: row for row in json.loads(found.attrs["summary"])}
+    assert summary["A.end_load_max"]["value"] == pytest.approx(both[0], rel=1e-12)
+    assert summary["A.pin_pressure_max"]["value"] == pytest.approx(both[0] / (0.02 * 0.05), rel=1e-12)
+
+
+def test_the_pressure_of_a_pin_in_the_plane() -> None:
+    """F/(d b) of the reaction; of pins whose length is not stated there is none."""
+    data = trunnion.read("examples/durango-fourbar.yaml").data()
+    data["joints"]["C"]["pin"] = {"radius": "0.1 m", "length": "50 mm"}
+    found = trunnion.analyse(Mechanism(**data), steps=12)
+    force = np.linalg.norm(found["reaction_force"].sel(joint="C"), axis=0)
+    assert found["pin_pressure"].sel(joint="C").values == pytest.approx(force / (0.2 * 0.05), rel=1e-12)
+    assert np.all(np.isnan(found["pin_pressure"].sel(joint="B")))
+    columns = [column.name for column in positions(found)]
+    assert "C.pin_pressure" in columns
+    assert not any(name.startswith(("B.pin", "C.end")) for name in columns)
+
+
+def pins_of_the_first_cross(found: Any) -> tuple[Any, Any]:
+    """Directions of the two pins of joint B of the double Cardan shaft, (axis, position), by its geometry."""
+    turn = found["joint_rotation"].sel(joint="A").values
+    first = np.array([-np.sin(turn), np.cos(turn), 0 * turn])
+    second = np.cross([0.2, 0, np.sqrt(0.6**2 - 0.2**2)], first.T).T
+    return first, second / np.linalg.norm(second, axis=0)
+
+
+def test_a_massless_cross_by_its_normal() -> None:
+    """Without mass and friction it passes on M along its normal n; the input has T = M n·e, each end M/L."""
+    data = trunnion.read("examples/double-cardan.yaml").data()
+    data.pop("gravity")
+    for link in ("input", "middle", "output"):
+        for key in ("mass", "inertia", "centre"):
+            data["links"][link].pop(key)
+    found = brief(Mechanism(**data).with_friction("off"), steps=24)
+    first, second = pins_of_the_first_cross(found)
+    moment = found["drive_effort"].values[0] / np.cross(first.T, second.T)[:, 2]
+    assert sizes(found, "B") == pytest.approx(np.tile(np.abs(moment) / 0.07, (4, 1)), rel=1e-9)
+    assert np.ptp(moment) > 5.0
+
+
+def test_friction_of_a_cross_counts_these_loads() -> None:
+    """μ r Σ|Q| ω of each pin: the friction of one bears on the other."""
+    found = trunnion.analyse(trunnion.read("examples/double-cardan.yaml"), steps=40, engine="numpy")
+    spin = [found["link_angular_velocity"].sel(link=link).values for link in ("input", "middle")]
+    rates = [np.abs(np.sum((spin[1] - spin[0]) * pin, axis=0)) for pin in pins_of_the_first_cross(found)]
+    load = sizes(found, "B")
+    lost = 0.05 * 0.008 * (load[:2].sum(axis=0) * rates[0] + load[2:].sum(axis=0) * rates[1])
+    assert found["friction_power"].sel(joint="B").values == pytest.approx(lost, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "engine"), [("double-cardan", "A", "numpy"), ("offset-slider-crank", "S", "compiled")]
+)
+def test_friction_counts_these_loads(name: str, joint: str, engine: Any) -> None:
+    """μ r Σ|Q| ω of a bearing, μ Σ|Q| v of a guide."""
+    model = trunnion.read(f"examples/{name}.yaml")
+    found, numbers = trunnion.analyse(model, steps=40, engine=engine), model.parameters()
+    motion, lever = ("slide", 1.0) if joint == "S" else ("rotation", numbers[f"joints.{joint}.pin.radius"])
+    slip = lever * np.abs(found[f"joint_{motion}_velocity"].sel(joint=joint).values)
+    lost = numbers[f"joints.{joint}.friction.coefficient"] * np.nansum(sizes(found, joint), axis=0) * slip
+    assert found["friction_power"].sel(joint=joint).values == pytest.approx(lost, rel=1e-7, abs=1e-9)
+
+
+def test_loads_of_both_signs_are_followed() -> None:
+    """The largest of the summary does not depend on the rows; at a place of rest it is that beside it."""
+    model = trunnion.read("examples/double-cardan.yaml")
+    coarse, fine = (trunnion.analyse(model, steps=steps) for steps in (7, 3600))
+    summary = {row["name"]: row["value"] for row in json.loads(coarse.attrs["summary"])}
+    for joint in "ABCD":
+        most = np.nanmax(sizes(fine, joint))
+        assert most * (1 - 1e-12) <= summary[f"{joint}.end_load_max"] <= most * (1 + 1e-3)
+
+
+DAHL = {"law": "dahl", "coefficient": 0.12, "stiffness": 4e3}
+LUGRE = {
+    "law": "lugre", "coefficient": 0.1, "static": 0.16, "stribeck_speed": 2e-3, "stiffness": 2e4, "damping": 0.3,
+    "viscous": 0.2,
+}  # fmt: skip
+
+
+def state_by_integrator(run: Any, joint: str, law: dict[str, Any], turns: int) -> tuple[Array, Array]:
+    """(time, deflection) over the last of some turns from rest, by Radau, the speed asked of the walk itself."""
+    lever = run.values.get(f"joints.{joint}.pin.radius", 1.0)
+    duration = run.cycle.duration
+
+    def speed(time: float) -> float:
+        slip = run.solve(np.array([time % duration])).walk.speed(joint)
+        return float(np.ravel(lever * slip)[0])
+
+    fine = np.linspace(0, duration, 4001)
+    speeds = np.ravel(lever * run.solve(fine).walk.speed(joint))
+
+    def v_of(time: float) -> float:
+        return float(np.interp(time % duration, fine, speeds))
+
+    def curve(v: float) -> float:
+        if law["law"] == "dahl":
+            return float(law["coefficient"])
+        peak = law["static"] - law["coefficient"]
+        return float(law["coefficient"] + peak * np.exp(-((v / law["stribeck_speed"]) ** 2)))
+
+    def rate(time: float, z: Array) -> list[float]:
+        v = v_of(time)
+        return [v - law["stiffness"] * abs(v) / curve(v) * z[0]]
+
+    wanted = (turns - 1) * duration + np.linspace(0, duration, 90, endpoint=False)
+    found = solve_ivp(
+        rate, (0, turns * duration), [0.0], "Radau", wanted, rtol=1e-8, atol=1e-13, max_step=duration / 400
+    )
+    assert speed(0.1 * duration) == pytest.approx(v_of(0.1 * duration), rel=1e-4)
+    return wanted - (turns - 1) * duration, found.y[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("data", "joint", "law"), [(four_bar(), "D", DAHL), (slider_crank(), "P", LUGRE)])
+def test_state_against_a_stiff_integrator(data: Any, joint: str, law: dict[str, Any]) -> None:
+    """In a rocker's pin and a slider's guide, both of which turn back twice a turn, once the start is forgotten."""
+    run = prepare(build(data, friction=law))
+    time, expected = state_by_integrator(run, joint, law, 2)
+    found = run._past[joint].at(time)
+    largest = np.abs(expected).max()
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-4 * largest)
+
+
+def test_state_is_periodic_and_settled_whatever_the_steps() -> None:
+    law = LUGRE
+    run = prepare(build(four_bar(), friction=law))
+    history, duration = run._past["D"], run.cycle.duration
+    time = np.linspace(0, 1, 37) * duration
+    np.testing.assert_allclose(history.at(time + 3 * duration), history.at(time), rtol=1e-9, atol=1e-15)
+    few, many = positions_of(four_bar(), 18, friction=law), positions_of(four_bar(), 36, friction=law)
+    np.testing.assert_allclose(many["drive_effort"].values[:, ::2], few["drive_effort"].values, rtol=1e-12)
+
+
+def test_dahl_from_rest() -> None:
+    """Over a range the bristles start at rest: F = f N (1 − exp(−κ x/f)), exactly."""
+    data = {
+        "links": {
+            "ground": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}}},
+            "block": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}}, "mass": 2.0},
+        },
+        "joints": {"S": {"type": "prismatic", "links": ["ground", "block"]}},
+        "drivers": {"S": {"speed": 1e-4, "range": [0.0, 2e-4]}},
+    }
+    result = positions_of(data, 41, friction=DAHL, guide=0.3)
+    slide = result["joint_slide"].sel(joint="S").values
+    expected = 0.12 * 2.0 * 9.81 * (1 - np.exp(-4e3 * slide / 0.12))
+    np.testing.assert_allclose(-result["friction_force"].sel(joint="S").values, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_lugre_slides_steadily_by_stribecks_curve() -> None:
+    """A fast drive leaves no trace of the bristles between reversals: the pin A always turns one way."""
+    steady = {**LUGRE, "law": "stribeck"}
+    for key in ("stiffness", "damping"):
+        del steady[key]
+    bristles, curve = positions_of(four_bar(), 24, friction=LUGRE), positions_of(four_bar(), 24, friction=steady)
+    ratios = [
+        one["friction_torque"].sel(joint="A").values / np.hypot(*one["reaction_force"].sel(joint="A").values)
+        for one in (bristles, curve)
+    ]
+    np.testing.assert_allclose(*ratios, rtol=1e-3)
+
+
+def test_bristles_in_a_linkage_with_gaps() -> None:
+    """Where it cannot be assembled there is no state; after the gap the bristles start at rest."""
+    result = positions_of(four_bar(2.0, 1.5, 1.5, 4.0), 72, friction=DAHL)
+    solved = result["status"].values < Status.NOT_CONVERGED
+    assert 0 < np.count_nonzero(solved) < 72
+    assert np.all(np.isfinite(result["drive_effort"].values[:, solved]))
+
+
+def test_samples_of_speed_and_duals_of_the_law() -> None:
+    run = prepare(build(four_bar(), friction=LUGRE))
+    time = np.linspace(0.1, 0.9, 7) * run.cycle.duration
+    plain = np.broadcast_to(run.solve(time).efforts["A"], time.shape)
+    values = run.system.mechanism.parameters({"drivers.A.speed": np.full((5, 1), run.values["drivers.A.speed"])})
+    many = np.broadcast_to(run.solve(time, values).efforts["A"], (5, 7))
+    np.testing.assert_allclose(many, np.broadcast_to(plain, (5, 7)), rtol=1e-9)
+    for key in ("coefficient", "static", "stiffness", "stribeck_speed"):
+        path = f"joints.B.friction.{key}"
+        value, h = run.values[path], 1e-5 * run.values[path]
+        found = derivative(run.solve(time, run.system.mechanism.parameters({path: Dual(value, 1.0)})).efforts["A"])
+        ends = [
+            run.solve(time, run.system.mechanism.parameters({path: value + sign * h})).efforts["A"] for sign in (1, -1)
+        ]
+        expected = (ends[0] - ends[1]) / (2 * h)
+        scale = np.abs(expected).max() + np.abs(plain).max() / value * 1e-3
+        np.testing.assert_allclose(np.broadcast_to(found, time.shape), expected, rtol=0, atol=1e-4 * scale)
+
+
+def test_maps_of_intervals_are_chained_and_closed() -> None:
+    """z ↦ z/2 + 1, then z ↦ 0.8 z + 2: over both z ↦ 0.4 z + 2.8, which comes back to z₀ = 2.8/0.6; from rest 0."""
+    keep, gain = np.array([0.5, 0.8]), np.array([1.0, 2.0])
+    start = 2.8 / 0.6
+    np.testing.assert_allclose(_chained(keep, gain, True), [start, start / 2 + 1, start], rtol=1e-15)
+    np.testing.assert_allclose(_chained(keep, gain, False), [0.0, 1.0, 2.8], rtol=1e-15)

@@ -1,4 +1,4 @@
-"""Gear pairs against geometry, the power balance and the law of the separating force."""
+"""Gear pairs, racks, chains and screws against geometry, virtual work, statics by hand and the textbook's screw."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import pytest
 
 import trunnion
 from brief import brief
-from geared import geared_five_bar, geared_loop, planet_drive, rocker_train
+from geared import geared_five_bar, geared_loop, planet_drive, rocker_train, screwed_strut
 from mechanisms import Data, analyse, build, findings, model, positions_of
-from trunnion import Mechanism, MechanismError
+from mechanisms_parts import prismatic, revolute, slide
+from trunnion import Mechanism, Status
 from trunnion.solve.run import prepare
 
 TOOTHED = {"five-bar": geared_five_bar, "planet": planet_drive, "loop": geared_loop}
@@ -75,12 +76,11 @@ def test_two_wheels() -> None:
     np.testing.assert_allclose(result["reaction_force"].sel(joint="A", axis="y"), tangential, rtol=1e-12)
 
 
-@pytest.mark.parametrize("friction", [None, 0.15])
 @pytest.mark.parametrize("name", TOOTHED)
-def test_separating_force(name: str, friction: float | None) -> None:
+def test_separating_force(name: str) -> None:
     """The tooth force leans by the pressure angle from the tangent of the pitch circles, and pushes the gears apart."""
-    data = model(TOOTHED[name](), friction=friction)
-    run = prepare(build(TOOTHED[name](), friction=friction))
+    data = model(TOOTHED[name](), friction=0.15)
+    run = prepare(build(TOOTHED[name](), friction=0.15))
     back = run.solve(np.linspace(0.1, 0.9, 30) * run.cycle.duration)
     for gear, stated in data["gears"].items():
         angle = stated.get("pressure_angle", np.radians(20.0))
@@ -117,44 +117,6 @@ def test_ratio_is_kept_over_all_turns() -> None:
     turned = train["joint_rotation"].sel(joint="E") - 0.7 * train["joint_rotation"].sel(joint="D") + 2.5
     np.testing.assert_allclose(np.angle(np.exp(1j * turned)), 0.0, atol=1e-13)
     assert train["time"].values[-1] == pytest.approx(2 * np.pi / 5 * 89 / 90)  # the rocker makes no whole turn
-
-
-@pytest.mark.parametrize(
-    ("change", "where", "what"),
-    [
-        ({"joints": ["A", "X"]}, "gears.mesh.joints", "there is no joint 'X'"),
-        ({"joints": ["A", "A"]}, "gears.mesh.joints", "names the joint 'A' twice"),
-        ({"joints": ["A", "C"]}, "gears.mesh", "have no link in common"),
-        ({"ratio": 0}, "gears.mesh.ratio", "is 0"),
-        ({"ratio": -1}, "gears.mesh.ratio", "they have no pitch point"),
-        ({"pressure_angle": "95 deg"}, "gears.mesh.pressure_angle", "is 95 deg"),
-        ({"teeth": False, "pressure_angle": 0.3}, "gears.mesh.pressure_angle", "has no effect without teeth"),
-    ],
-)
-def test_impossible_gears(change: dict[str, Any], where: str, what: str) -> None:
-    data = geared_five_bar()
-    data["gears"]["mesh"].update(change)
-    with pytest.raises(MechanismError) as error:
-        build(data)
-    assert [f.where for f in error.value.findings] == [where]
-    assert what in error.value.findings[0].what
-
-
-def test_a_gear_pair_too_many() -> None:
-    data = geared_five_bar()
-    data["gears"]["other"] = {"joints": ["A", "B"], "ratio": 2, "teeth": False}
-    with pytest.raises(MechanismError) as error:
-        trunnion.analyse(build(data))
-    assert "mobility is 0" in error.value.findings[0].what
-
-
-def test_turns_that_never_come_back() -> None:
-    """A ratio without a common turn: one turn of the drive, and a warning."""
-    data = geared_five_bar()
-    data["gears"]["mesh"]["ratio"] = 0.5123
-    result = analyse(data, 36)
-    assert not result.attrs["periodic"]
-    assert any(finding["code"] == "cycle.not_common" for finding in findings(result))
 
 
 def cycle_of(data: Data) -> float:
@@ -196,18 +158,310 @@ def test_cycle_of_a_chain_of_gear_pairs() -> None:
     np.testing.assert_allclose(turned, -result["time"].values / 8, atol=1e-9)
 
 
-def test_gears_without_room() -> None:
-    data = geared_five_bar()
-    data["links"]["ground"]["points"]["E"] = [0, 0]
-    with pytest.raises(MechanismError) as error:
-        build(data)
-    assert any("the centre distance is zero" in finding.what for finding in error.value.findings)
+RADIUS, TORQUE = 0.008, 80.0
 
 
-def test_check_tells_internal_from_external() -> None:
-    (mesh,) = trunnion.check(build(geared_five_bar()), 12).gears
-    assert not mesh.internal
-    assert sum(radius for _, radius in mesh.radii) == pytest.approx(np.hypot(1.2, 0.1))
-    (ring,) = trunnion.check(build(planet_drive()), 12).gears
-    assert ring.internal
-    assert dict(ring.radii) == pytest.approx({"ground": 0.6, "planet": 0.2})
+def steering(driver: Data, gear: Data | None = None) -> Data:
+    """Half of a rack steering: the tie rod turns a knuckle against a torque. The rack lies below the pinion."""
+    return {
+        "gravity": [0, 0],
+        "links": {
+            "frame": {"points": {"P": [0, RADIUS], "S": slide(0, 0), "K": [0.6, 0.15]}},
+            "pinion": {"points": {"P": [0, 0]}},
+            "rack": {"points": {"S": slide(0, 0), "T": [0.3, 0]}},
+            "rod": {"points": {"T": [0, 0], "A": [0.285, 0]}},
+            "knuckle": {"points": {"K": [0, 0], "A": [-0.02, -0.14]}},
+        },
+        "joints": {
+            "P": revolute("frame", "pinion"),
+            "S": prismatic("frame", "rack"),
+            "T": revolute("rack", "rod"),
+            "A": revolute("rod", "knuckle"),
+            "K": revolute("frame", "knuckle"),
+        },
+        "gears": {"mesh": {"joints": ["P", "S"], "radius": RADIUS, **(gear or {})}},
+        "drivers": driver,
+        "loads": {"tyre": {"joint": "K", "resisting_torque": TORQUE}},
+        "assembly": {"A": [0.58, 0.01]},
+    }
+
+
+def at(result: Any, variable: str, axis: str | None = None, **where: str) -> Any:
+    chosen = result[variable].sel(**where, **({"axis": axis} if axis else {}))
+    return chosen.values
+
+
+def knuckle_by_hand(rack: Any) -> Any:
+    """Angle of the knuckle for a place of the rack: circles about T and K meet in A, on the lower side."""
+    tx, ty, kx, ky = 0.3 + rack, 0.0, 0.6, 0.15
+    arm, rod, apart = np.hypot(0.02, 0.14), 0.285, np.hypot(kx - tx, ky - ty)
+    along = (rod**2 - arm**2 + apart**2) / (2 * apart)
+    across = np.sqrt(rod**2 - along**2)
+    ux, uy = (kx - tx) / apart, (ky - ty) / apart
+    ax, ay = tx + along * ux + across * uy, ty + along * uy - across * ux
+    return np.arctan2(ay - ky, ax - kx) - np.arctan2(-0.14, -0.02)
+
+
+@pytest.mark.parametrize(("order", "angle"), [(("P", "S"), 20.0), (("S", "P"), 14.5)])
+def test_rack_steering(order: tuple[str, str], angle: float) -> None:
+    """Torque · ω = tyre torque · ω of the knuckle, by differences of the geometry; a tooth presses with F/cos α."""
+    gear = {"joints": list(order), "pressure_angle": np.radians(angle), "phase": 0.001}
+    result = brief(Mechanism(**steering({"P": {"speed": 2.0, "range": [-5.0, 5.0]}}, gear)), 11)
+    rack = RADIUS * np.linspace(-5.0, 5.0, 11) + 0.001
+    np.testing.assert_allclose(at(result, "joint_slide", joint="S"), rack, atol=1e-15)
+    h = 1e-4
+    rate = (8 * (knuckle_by_hand(rack + h) - knuckle_by_hand(rack - h))
+            - (knuckle_by_hand(rack + 2 * h) - knuckle_by_hand(rack - 2 * h))) / (12 * h)  # fmt: skip
+    force = TORQUE * np.abs(rate)  # along the rack, by virtual work
+    np.testing.assert_allclose(at(result, "drive_effort", driver="P"), force * RADIUS, rtol=1e-9)
+    np.testing.assert_allclose(at(result, "gear_torque", gear="mesh"), -force * RADIUS, rtol=1e-9)
+    tilt = np.tan(np.radians(angle))
+    np.testing.assert_allclose(at(result, "gear_force", "x", gear="mesh"), force, rtol=1e-9)
+    # the flanks push the rack down, away from the pinion, and the pinion up
+    np.testing.assert_allclose(at(result, "gear_force", "y", gear="mesh"), -force * tilt, rtol=1e-9, atol=1e-9)
+    reaction = np.hypot(*(at(result, "reaction_force", axis, joint="P") for axis in "xy"))
+    np.testing.assert_allclose(reaction, force / np.cos(np.radians(angle)), rtol=1e-9)
+    rod = at(result, "reaction_force", "y", joint="T")  # on the rod by the rack
+    np.testing.assert_allclose(at(result, "reaction_force", "y", joint="S"), force * tilt + rod, rtol=1e-9, atol=1e-6)
+
+
+def wheel_and_rack(driver: Data) -> Data:
+    data = steering(driver)
+    data["loads"] = {"wind": {"joint": "P", "resisting_torque": 3.0}}
+    data["links"] = {name: data["links"][name] for name in ("frame", "pinion", "rack")}
+    data["joints"] = {name: data["joints"][name] for name in ("P", "S")}
+    data["links"]["frame"]["points"].pop("K")
+    data["assembly"] = {}
+    return data
+
+
+def test_driven_rack_turns_the_pinion() -> None:
+    """The pair the other way round: the rack drives, a torque on the pinion asks for T/r on the rack."""
+    data = wheel_and_rack({"S": {"speed": 0.02, "range": [-0.1, 0.1]}})
+    result = brief(Mechanism(**data), 9)
+    np.testing.assert_allclose(at(result, "drive_effort", driver="S"), 3.0 / RADIUS, rtol=1e-12)
+    np.testing.assert_allclose(at(result, "gear_torque", gear="mesh"), 3.0, rtol=1e-12)
+    np.testing.assert_allclose(at(result, "gear_force", "x", gear="mesh"), -3.0 / RADIUS, rtol=1e-12)
+    # two turns and more to either side, not taken back to one
+    turned = at(result, "link_angle", link="pinion")
+    np.testing.assert_allclose(turned - turned[4], np.linspace(-0.1, 0.1, 9) / RADIUS, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(("joint", "ends"), [("P", (0.0, 1000.0)), ("S", (-900.0, -1000.0))])
+def test_many_turns_away(joint: str, ends: tuple[float, float]) -> None:
+    """Thousands of radii from where the rack is drawn, and turns by hundreds from one position to the next."""
+    rotation = 2 * np.pi * np.linspace(*ends, 90)
+    coordinate = rotation if joint == "P" else RADIUS * rotation
+    driver = {"speed": float(np.sign(ends[1] - ends[0])), "range": [float(coordinate[0]), float(coordinate[-1])]}
+    result = brief(Mechanism(**wheel_and_rack({joint: driver})), 90)
+    np.testing.assert_allclose(at(result, "joint_slide", joint="S"), RADIUS * rotation, rtol=1e-12, atol=1e-12)
+    off = at(result, "joint_rotation", joint="P") - rotation
+    np.testing.assert_allclose(np.exp(1j * off), 1.0, atol=1e-9)
+
+
+def hoist(**wheel: Any) -> Data:
+    return {
+        "gravity": [0, -9.81],
+        "links": {
+            "frame": {"points": {"A": [0, 0], "S": slide(0.06, -1.0, np.pi / 2)}},
+            "wheel": {"points": {"A": [0, 0]}, "inertia": 0.05},
+            "load": {"points": {"S": slide(0, 0, np.pi / 2)}, "mass": 100.0, "useful": True},
+        },
+        "joints": {"A": {**revolute("frame", "wheel"), **wheel}, "S": prismatic("frame", "load")},
+        "gears": {"chain": {"joints": ["A", "S"], "radius": 0.06, "teeth": False}},
+        "drivers": {"A": {"speed": np.pi, "range": [0.0, 12.0]}},
+    }
+
+
+def test_chain_hoist() -> None:
+    """m g r at the wheel, m g in its bearing and nothing at the guide; friction of the bearing adds f r_pin m g."""
+    weight = 100.0 * 9.81
+    result = brief(Mechanism(**hoist()), 5)
+    np.testing.assert_allclose(at(result, "drive_effort", driver="A"), weight * 0.06, rtol=1e-12)
+    np.testing.assert_allclose(at(result, "reaction_force", "y", joint="A"), weight, rtol=1e-12)
+    np.testing.assert_allclose(at(result, "reaction_force", "x", joint="A"), 0.0, atol=1e-9)
+    np.testing.assert_allclose(at(result, "reaction_moment", joint="S"), 0.0, atol=1e-9)
+    rough = trunnion.analyse(Mechanism(**hoist(pin={"radius": 0.01}, friction=0.1)), 5)
+    np.testing.assert_allclose(at(rough, "drive_effort", driver="A"), weight * (0.06 + 0.1 * 0.01), rtol=1e-12)
+    assert float(rough["efficiency"]) == pytest.approx(0.06 / 0.061, rel=1e-12)
+
+
+@pytest.mark.parametrize(("peak", "slack"), [(0.5, False), (1.5, True)])
+def test_a_rope_that_would_push(peak: float, slack: bool) -> None:
+    """A load that swings with A ω² = 0.5 g and 1.5 g pulls with m (g ∓ A ω²): the second would push with m g/2."""
+    data = hoist()
+    rate = 2 * np.pi
+    data["drivers"]["A"] = {
+        "law": "harmonic", "mean": 1.0, "amplitude": peak * 9.81 / (0.06 * rate**2), "period": 1.0, "phase": 0.0
+    }  # fmt: skip
+    notes = [one for one in findings(trunnion.analyse(Mechanism(**data), 5)) if one["code"] == "gears.slack"]
+    assert len(notes) == int(slack)
+    for note in notes:
+        weight = 100.0 * 9.81
+        forces = sorted(abs(note["figures"][key]) for key in ("lower", "upper"))
+        assert forces == pytest.approx([0.5 * weight, 2.5 * weight], rel=1e-9)
+
+
+def test_a_falling_load_turns_its_wheel() -> None:
+    """s̈ = g m r²/(m r² + J), the wheel's motion free."""
+    data = hoist()
+    data["drivers"]["A"] = {"speed": 1.0, "free": True, "range": [-60.0, 5.0], "initial": {"coordinate": 0, "speed": 0}}
+    result = trunnion.simulate(Mechanism(**data), 0.4, 4)
+    second = 9.81 * 100.0 * 0.06 / (100.0 * 0.06**2 + 0.05)
+    time = result["time"].values
+    np.testing.assert_allclose(at(result, "drive_coordinate", driver="A"), -second * time**2 / 2, atol=1e-10)
+
+
+# ---- screws ---------------------------------------------------------------------------------------------------
+
+ARM, LEAD, MEAN, LOAD = 0.15, 0.004, 0.006, 5000.0
+SLOPE = np.arctan(LEAD / (2 * np.pi * MEAN))
+
+
+def jack(friction: float | None, speed: float, order: str = "WS") -> Data:
+    """A scissor jack whose screw turns in one block and pulls the nut in the other, from 40 deg on."""
+    c, s = ARM * np.cos(np.radians(40)), ARM * np.sin(np.radians(40))
+    ends = [0.0, 60.0] if speed > 0 else [60.0, 0.0]
+    thread = {} if friction is None else {"friction": friction, "pin": {"radius": MEAN}}
+    return {
+        "gravity": [0, 0],
+        "links": {
+            "ground": {"points": {"A": [0, 0], "B": [0, 0], "G": slide(0, 0, np.pi / 2)}},
+            "lower_left": {"points": {"A": [0, 0], "C": [ARM, 0]}},
+            "lower_right": {"points": {"B": [0, 0], "D": [ARM, 0]}},
+            "upper_left": {"points": {"E": [0, 0], "H": [ARM, 0]}},
+            "upper_right": {"points": {"F": [0, 0], "K": [ARM, 0]}},
+            "saddle": {"points": {"E": [0, 0], "F": [0, 0], "G": slide(0, 0, np.pi / 2)}},
+            "nut": {"points": {"C": [0, 0], "H": [0, 0], "S": slide(0, 0)}},
+            "block": {"points": {"D": [0, 0], "K": [0, 0], "S": slide(0, 0), "W": [0.04, 0]}},
+            "screw": {"points": {"W": [0, 0]}},
+        },
+        "joints": {
+            "A": revolute("ground", "lower_left"),
+            "B": revolute("ground", "lower_right"),
+            "C": revolute("lower_left", "nut"),
+            "D": revolute("lower_right", "block"),
+            "H": revolute("upper_left", "nut"),
+            "K": revolute("upper_right", "block"),
+            "E": revolute("saddle", "upper_left"),
+            "F": revolute("saddle", "upper_right"),
+            "G": prismatic("ground", "saddle"),
+            "S": prismatic("nut", "block"),
+            "W": {**revolute("block", "screw"), **thread},
+        },
+        "gears": {"thread": {"joints": list(order), "lead": -LEAD, "phase": 2 * c}},
+        "drivers": {"W": {"speed": speed, "range": ends}},
+        "loads": {"car": {"link": "saddle", "at": "E", "force": [0, -LOAD], "useful": True}},
+        "assembly": {"C": [-c, s], "D": [c, s], "E": [0, 2 * s]},
+    }
+
+
+@pytest.mark.parametrize(("friction", "order"), [(None, "WS"), (0.15, "SW")])
+def test_scissor_jack(friction: float | None, order: str) -> None:
+    """P r tan(λ + φ) raises and P r tan(λ − φ) lowers, with the screw's pull P = F w/h; one turn moves the lead."""
+    angle = np.arctan(friction or 0.0)
+    for speed, tangent in ((-10.0, np.tan(SLOPE - angle)), (10.0, np.tan(SLOPE + angle))):
+        result = trunnion.analyse(Mechanism(**jack(friction, speed, order)), 7)
+        turned = np.linspace(*((0.0, 60.0) if speed > 0 else (60.0, 0.0)), 7)
+        width = 2 * ARM * np.cos(np.radians(40)) - LEAD * turned / (2 * np.pi)
+        pull = LOAD * width / np.sqrt(4 * ARM**2 - width**2)
+        np.testing.assert_allclose(at(result, "joint_slide", joint="S"), width, rtol=1e-12)
+        np.testing.assert_allclose(at(result, "drive_effort", driver="W"), pull * MEAN * tangent, rtol=1e-12)
+        np.testing.assert_allclose(at(result, "gear_torque", gear="thread"), -pull * MEAN * tangent, rtol=1e-12)
+        np.testing.assert_allclose(at(result, "gear_force", "x", gear="thread"), -pull, rtol=1e-12)
+        assert np.abs(result["power_residual"]).max() < 1e-12 * np.abs(result["drive_power"]).max()
+    assert float(result["efficiency"]) == pytest.approx(np.tan(SLOPE) / np.tan(SLOPE + angle), rel=1e-12)
+
+
+def press(friction: float, driver: Data, lead: float = 0.02, **more: Any) -> Data:
+    """A nut on a guide, whose screw turns in the frame."""
+    return {
+        "gravity": [0, 0],
+        "links": {
+            "ground": {"points": {"W": [0, 0], "S": slide(0, 0, 0.9)}},
+            "wheel": {"points": {"W": [0, 0]}, "inertia": 1e-3},
+            "nut": {"points": {"S": slide(0, 0)}, "mass": 2.0},
+        },
+        "joints": {
+            "W": {**revolute("ground", "wheel"), "friction": friction, "pin": {"radius": MEAN}},
+            "S": prismatic("ground", "nut"),
+        },
+        "gears": {"screw": {"joints": ["W", "S"], "lead": lead}},
+        "drivers": driver,
+        **more,
+    }
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.6])
+def test_driven_at_the_nut(friction: float) -> None:
+    """F r tan(λ − φ) turns the screw; from φ = λ on it locks, at tan λ/f of the friction."""
+    slope = np.arctan(0.02 / (2 * np.pi * MEAN))
+    driver, brake = {"S": {"speed": 0.01, "range": [0.0, 0.1]}}, {"b": {"joint": "W", "resisting_torque": 1.0}}
+    result = brief(Mechanism(**press(friction, driver, loads=brake)), 5)
+    np.testing.assert_allclose(result["locking_margin"], np.tan(slope) / friction, rtol=1e-6)
+    if friction > np.tan(slope):
+        assert np.all(result["status"] == Status.LOCKED)
+    else:
+        force = 1.0 / (MEAN * np.tan(slope - np.arctan(friction)))
+        np.testing.assert_allclose(at(result, "drive_effort", driver="S"), force, rtol=1e-10)
+
+
+@pytest.mark.parametrize(("friction", "torque"), [(0.05, 0.0), (0.05, 1.5), (0.6, 0.4)])
+def test_a_free_screw(friction: float, torque: float) -> None:
+    """(J + m p r tan(λ ± φ)) ω̇ = T − F r tan(λ ± φ), p = lead/2π; at rest between the two torques."""
+    p, force, phi = 0.02 / (2 * np.pi), 100.0, np.arctan(friction)
+    slope = np.arctan(p / MEAN)
+    free = {"W": {"speed": 1, "free": True, "range": [-60, 60], "initial": {"coordinate": 0, "speed": 0}}}
+    loads = {
+        "weight": {"link": "nut", "at": "S", "force": [-force * np.cos(0.9), -force * np.sin(0.9)]},
+        "hand": {"link": "wheel", "moment": torque},
+    }
+    result = trunnion.simulate(Mechanism(**press(friction, free, loads=loads)), 0.2, 5)
+    up, down = MEAN * np.tan(slope + phi), MEAN * np.tan(slope - phi)
+    lever = up if torque > force * up else down if torque < force * down else None
+    second = 0.0 if lever is None else (torque - force * lever) / (1e-3 + 2.0 * p * lever)
+    expected = second * result["time"].values ** 2 / 2
+    np.testing.assert_allclose(at(result, "drive_coordinate", driver="W"), expected, rtol=1e-9, atol=1e-12)
+
+
+def test_a_screw_is_a_driven_slide() -> None:
+    """Without friction the strut bears the same forces where its slide is driven as the screw moves it."""
+    rate = 0.006 / (2 * np.pi)
+    turned, plain = screwed_strut(), screwed_strut()
+    turned["links"]["wheel"] = {"points": {"W": [0, 0]}}  # without mass: the other has no wheel
+    del plain["links"]["wheel"], plain["joints"]["W"], plain["links"]["tube"]["points"]["W"], plain["gears"]
+    plain["drivers"] = {"S": {"speed": 20.0 * rate, "range": [0.3, 0.3 + 120.0 * rate]}}
+    screw = positions_of(turned, 9, friction=None)
+    driven = positions_of(plain, 9, friction=None)
+    for joint in "ACD":
+        for axis in "xy":
+            np.testing.assert_allclose(
+                at(screw, "reaction_force", axis, joint=joint),
+                at(driven, "reaction_force", axis, joint=joint),
+                rtol=1e-9,
+                atol=1e-9,
+            )
+    torque, force = at(screw, "drive_effort", driver="W"), at(driven, "drive_effort", driver="S")
+    np.testing.assert_allclose(torque, force * rate, rtol=1e-9)
+
+
+# ---- a nut in space -------------------------------------------------------------------------------------------
+
+
+def test_a_turn_of_a_screw_is_no_cycle_that_comes_back() -> None:
+    """The nut rises by one pitch, and the work of the drive lifts it."""
+    pitch, mass, axis = 0.006, 400.0, {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}
+    nut = {"points": {"H": axis}, "mass": mass, "centre": [0, 0, 0], "inertia": dict.fromkeys(("xx", "yy", "zz"), 1.0)}
+    mechanism = Mechanism(
+        space="spatial",
+        gravity=[0, 0, -9.81],
+        joint_defaults={"friction": 0},
+        links={"ground": {"points": {"H": axis}}, "nut": nut},
+        joints={"H": {"type": "helical", "pitch": pitch, "links": ["ground", "nut"]}},
+        drivers={"H": {"speed": "60 rpm"}},
+    )
+    result = trunnion.analyse(mechanism, steps=25)
+    z = result["point_position"].sel(point="nut.H", axis="z").values
+    assert z[-1] - z[0] == pytest.approx(pitch, rel=1e-9)
+    np.testing.assert_allclose(np.abs(result["drive_effort"].values), mass * 9.81 * pitch / (2 * np.pi), rtol=1e-9)
+    assert [one.code for one in result.trunnion.findings].count("cycle.not_common") == 1

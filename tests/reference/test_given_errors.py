@@ -10,9 +10,13 @@ import pytest
 import xarray as xr
 
 import trunnion
-from mechanisms import four_bar, model
-from mechanisms_space import rssr
+from mechanisms import MODELS, build, four_bar, model
+from mechanisms_space import MODELS as SPACE_MODELS
+from mechanisms_space import Drawn, rssr
 from reference.maximal_space import Array, Data, Drive, Frame, Linkage, Motion, element, point, rotation
+from reference.shifted_space import moved
+from trunnion.joints.clearance import CLEARANCE_MODELS
+from trunnion.solve.run import prepare
 
 START, RHO, LENGTH, OFFSET = 0.1, 3e-5, 0.025, 0.004
 RADIUS = 0.005
@@ -111,19 +115,6 @@ def test_given_seat(degrees: tuple[float, float]) -> None:
     assert np.exp(1j * at["seat_xi_pin"]) == pytest.approx(np.exp(1j * seen), abs=2 * RHO / LENGTH)
 
 
-def test_given_seat_of_a_ball() -> None:
-    """The ball lies at ρ in the direction stated in the socket's frame, which is on the second link."""
-    data = linkage()
-    data["joints"]["C"] |= {"pin": {"radius": 0.007, "clearance": RHO}, "seat": {"direction": [1.0, -2.0, 2.0]}}
-    result = analysed(data)
-    moved = copy.deepcopy(data)
-    at = np.array(moved["links"]["rocker"]["points"]["C"]) + RHO * np.array([1.0, -2.0, 2.0]) / 3
-    moved["links"]["rocker"]["points"]["C"] = [float(n) for n in at]
-    agrees(result, moved)
-    found = result.seat_offset.sel(joint="C").values[0, :, 0]
-    np.testing.assert_allclose(found, RHO * np.array([1.0, -2.0, 2.0]) / 3, rtol=1e-14)
-
-
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("aside", [None, 1.9])
 def test_misaligned_axis(aside: float | None) -> None:
@@ -165,29 +156,127 @@ def test_dimensions_off_nominal() -> None:
     assert float(result.efficiency_ideal) == pytest.approx(float(meant.efficiency), nan_ok=True)
 
 
-def test_errors_of_what_cannot_be_assembled() -> None:
-    """The means of the ideal mechanism have their joints also where there is nothing to take a mean of."""
-    data = linkage(misalignment={"tilt": 1e-3})
-    data["links"]["rod"]["points"]["C"] = [1e3, 0, 0]
-    result = trunnion.analyse(trunnion.Mechanism(**data), 4)
-    assert bool((result["status"] == trunnion.Status.NOT_ASSEMBLED).all())
-    assert result["friction_power_mean_ideal"].sizes == {"joint": result.sizes["joint"]}
+FOUR_BAR = (0.100, 0.030, 0.090, 0.070)  # ground, crank, coupler, rocker; m
+SIZE, THETA = 2e-5, np.pi / 3
+NOW = np.array([0.0])
+HOLES = {"A": "crank", "B": "coupler", "C": "rocker", "D": "rocker"}  # the second link of each joint
 
 
-@pytest.mark.parametrize(("pin", "codes"), [
-    ({"clearance": 3e-5}, {"model.play_centred"}),
-    ({"clearance": 0.0}, set()),
-    ({"clearance": 0.0, "seat": "loaded"}, set()),
-    ({"fit": "10 mm H7/h6", "seat": "loaded"}, {"model.seat_without_play"}),
-])  # fmt: skip
-def test_a_clearance_of_zero_is_no_play(pin: Data, codes: set[str]) -> None:
-    """Nothing is said of it; of a fit without play as stated, whose seat is in vain, there is."""
-    seat = {"seat": pin.pop("seat")} if "seat" in pin else {}
-    data = copy.deepcopy(linkage())
-    data["joint_defaults"]["pin"].pop("radius")
-    data["joints"]["D"] |= {"pin": {"offset": OFFSET, "radius": RADIUS, **pin}, **seat}
-    if "fit" in pin:
-        data["joints"]["D"]["pin"].pop("radius")
-        data["fits"] = "minimum"  # of the largest pin in the smallest hole: 0
-    found = {one.code for one in analysed(data, 4).trunnion.findings}
-    assert found & {"model.play_centred", "model.seat_without_play"} == codes
+# ---- four-bar ---------------------------------------------------------------------------------------------------
+
+
+def rocker_angle(shift: dict[str, Any]) -> Any:
+    """Angle of the rocker at 60°, open branch, pins off the middle of their holes by vectors x + i y, global axes.
+
+    The hole is on the second link: its point lies at −c from where the first link's is.
+    """
+    ground, ab, bc, cd = FOUR_BAR
+    start = -shift.get("A", 0) + ab * np.exp(1j * THETA) - shift.get("B", 0)
+    end = ground - shift.get("D", 0) + shift.get("C", 0)  # middle of the coupler pin's circle, as C is on the coupler
+    far = np.abs(end - start)
+    along = (bc**2 - cd**2 + far**2) / (2 * far)
+    pin = start + (end - start) / far * (along + 1j * np.sqrt(bc**2 - along**2))
+    return np.angle(pin - end)
+
+
+def test_four_bar_of_the_engine_with_given_offsets() -> None:
+    """The same angle from `seats.JOINT.1.x` among the values, to 1e-12, in all joints at once."""
+    ground, ab, bc, cd = FOUR_BAR
+    data = four_bar(ab, bc, cd, ground)
+    data["drivers"]["A"]["start"] = THETA
+    run, rng = prepare(build(data, friction=None)), np.random.default_rng(9)
+    for _ in range(20):
+        c = {joint: SIZE * complex(*rng.normal(size=2)) for joint in HOLES}
+        seats = {f"seats.{joint}.1.{axis}": float(part) for joint, vector in c.items()
+                 for axis, part in (("x", vector.real), ("y", vector.imag))}  # fmt: skip
+        found = run.solve(NOW, values={**run.values, **seats}).walk
+        frames = {link: motion.frame for link, motion in found.motions.items()}
+        # stated in the axes of the link with the hole: in global ones by that link's angle as it comes
+        turns = {link: complex(np.ravel(frame.c)[0], np.ravel(frame.s)[0]) for link, frame in frames.items()}
+        shift = {joint: vector * turns[HOLES[joint]] for joint, vector in c.items()}
+        assert np.angle(turns["crank"]) == pytest.approx(THETA, abs=1e-12)
+        assert np.angle(turns["rocker"]) == pytest.approx(rocker_angle(shift), abs=1e-12)
+
+
+# ---- RSSR -------------------------------------------------------------------------------------------------------
+
+
+# ---- any mechanism: another model with its elements moved by hand ----------------------------------------------
+
+
+def offsets_for(space: str, data: Data, size: float, seed: int) -> dict[str, float]:
+    """Random offsets of every joint that has a model of its play."""
+    rng, found = np.random.default_rng(seed), {}
+    for name, joint in data["joints"].items():
+        if joint["type"] in CLEARANCE_MODELS[space]:
+            keys = [key for end in CLEARANCE_MODELS[space][joint["type"]].ends for key in end]
+            found |= {f"seats.{name}.{key}": float(size * rng.uniform(-1, 1)) for key in keys}
+    return found
+
+
+@pytest.mark.spread(2)
+@pytest.mark.parametrize("name", SPACE_MODELS)
+def test_mechanisms_in_space_with_offsets_in_every_joint(name: str) -> None:
+    """Frames of all links against maximal coordinates, to 1e-10: offsets up to 1 mm, bearings off their points."""
+    drawn = SPACE_MODELS[name]()
+    assert isinstance(drawn, Drawn)
+    seats = offsets_for("spatial", drawn.data, 1e-3, seed=4)
+    if not seats:
+        pytest.skip("no joint with play")
+    run = prepare(trunnion.Mechanism(trunnion=1, **drawn.data))
+    motions = run.solve(NOW, values={**run.values, **seats}).walk.motions
+    other = Linkage(moved(drawn.data, seats))
+    drive = {joint: Drive(float(run.system.drive(run.values, joint, 0.0)[0])) for joint in drawn.data["drivers"]}
+    home = drawn.home if drawn.home else {}
+    frames = other.move(home, drive)
+    for link in other.moving:
+        if link in other.free:
+            continue
+        frame = motions[link].frame
+        axes = np.array([[float(np.ravel(axis[i])[0]) for axis in frame[:3]] for i in range(3)])
+        place = [float(np.ravel(n)[0]) for n in frame.place]
+        np.testing.assert_allclose(axes, frames[link].frame.axes, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(place, frames[link].frame.place, rtol=0, atol=1e-10)
+
+
+def moved_planar(data: Data, seats: dict[str, float], guide: float) -> Data:
+    """The planar model with second elements moved as the offsets say; loads stay where they are."""
+    links = {name: {**link, "points": dict(link["points"])} for name, link in data["links"].items()}
+    loads = {name: dict(load) for name, load in data.get("loads", {}).items()}
+    for load in loads.values():
+        if "at" in load:
+            at = links[load["link"]]["points"][load["at"]]
+            load["at"] = f"under {load['at']}"
+            links[load["link"]]["points"][load["at"]] = at["at"] if isinstance(at, dict) else at
+    for name, joint in data["joints"].items():
+        if f"seats.{name}.1.y" not in seats:
+            continue
+        points = links[joint["links"][1]]["points"]
+        if joint["type"] == "revolute":
+            points[name] = [n + seats[f"seats.{name}.1.{axis}"] for n, axis in zip(points[name], "xy", strict=True)]
+        else:
+            axis = complex(*points[name]["axis"]) / abs(complex(*points[name]["axis"]))
+            y1, y2 = (seats[f"seats.{name}.{end}.y"] for end in (1, 2))
+            turned = axis * np.exp(1j * np.arctan((y2 - y1) / guide))
+            at = complex(*points[name]["at"]) + 1j * axis * (y1 + y2) / 2
+            points[name] = {"at": [at.real, at.imag], "axis": [turned.real, turned.imag]}
+    return {**data, "links": links, "loads": loads}
+
+
+@pytest.mark.spread(12)
+@pytest.mark.parametrize("name", MODELS)
+def test_planar_mechanisms_with_offsets_in_every_joint(name: str) -> None:
+    """Seats as values and a model with its points moved are one mechanism: poses, forces and drives to 1e-9."""
+    data, guide = model(MODELS[name](), friction=0.1), 0.4
+    seats = offsets_for("planar", data, 1e-3, seed=5)
+    run = prepare(trunnion.Mechanism(trunnion=1, **data))
+    time = run.cycle.times(7)
+    one = run.solve(time, values={**run.values, **seats})
+    other_run = prepare(trunnion.Mechanism(trunnion=1, **moved_planar(data, seats, guide)))
+    other = other_run.solve(time)
+    for link, motion in one.walk.motions.items():
+        for a, b in zip(motion.frame, other.walk.motions[link].frame, strict=True):
+            np.testing.assert_allclose(a, b, rtol=0, atol=1e-10)
+    for driver, effort in one.efforts.items():
+        expected = np.asarray(other.efforts[driver])
+        np.testing.assert_allclose(effort, expected, rtol=0, atol=1e-8 * np.nanmax(np.abs(expected)))

@@ -7,6 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks.drawn import planar, spatial
+from benchmarks.free_motions import LIMIT, SPATIAL_LIMIT
+from benchmarks.free_motions import examine as examine_free
+from benchmarks.free_motions import examine_spatial as examine_free_spatial
 from benchmarks.judged import planar as judged_planar
 from benchmarks.judged import spatial as judged_spatial
 from benchmarks.judged.verdict import CHECKS, Results, slope
@@ -21,14 +24,13 @@ DRAWN = {"planar": planar.drawn, "spatial": spatial.drawn}
 JUDGED = {"planar": judged_planar.judge, "spatial": judged_spatial.judge}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("space", "seeds"),
     [
-        ("planar", range(12)),
-        ("planar", KINKS),
-        ("spatial", range(5)),
-        ("seated", [*range(4), 16]),  # 16: seats beside a locked stretch
+        ("planar", range(6)),
+        pytest.param("planar", KINKS, marks=pytest.mark.slow),
+        pytest.param("spatial", range(5), marks=pytest.mark.slow),
+        pytest.param("seated", [*range(4), 16], marks=pytest.mark.slow),  # 16: seats beside a locked stretch
     ],
     ids=["planar", "kinks", "spatial", "seats"],
 )
@@ -108,3 +110,23 @@ def test_the_judge_has_laws_of_its_own() -> None:
         mine = slope({"law": name, **given}, slip)
         np.testing.assert_allclose(mine, law.function(1.0, slip, **given), rtol=1e-14, err_msg=name)
         np.testing.assert_allclose(mine, -slope({"law": name, **given}, -slip), rtol=1e-14, err_msg=name)
+
+
+LET_GO = (1, 2, 12, 5, 10, 24, 34)
+
+
+@pytest.mark.spread(0, "2")
+@pytest.mark.parametrize("seed", LET_GO)
+def test_they_move_as_all_their_links_must(seed: int) -> None:
+    """Gravity, forces, springs, dampers, and friction in pins and guides by its law from the multipliers."""
+    what, off = examine_free(seed)
+    assert what.startswith("compared")
+    assert off < LIMIT
+
+
+@pytest.mark.slow
+def test_a_spatial_one_moves_as_all_its_links_must() -> None:
+    """A crank with a rod of two balls: gravity, forces, moments, and a spring with a damper of some."""
+    what, off = examine_free_spatial(2)
+    assert what.startswith("compared")
+    assert off < SPATIAL_LIMIT

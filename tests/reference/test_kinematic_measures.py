@@ -8,19 +8,24 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import trunnion
 from measured import figures
 from mechanisms import build, four_bar, slider_crank
+from mechanisms_space import rssr
+from timed import LINEAR, wheel
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.cycle.vocabulary import vocabulary
-from trunnion.measures.curves import CURVES
+from trunnion.dynamics.measured import figures_in_time
+from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.measures import Measure, named
-from trunnion.model.measure_table import MEASURES
 from trunnion.solve.forward import forward
+from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.shifts import HOLE
+from trunnion.studies.tolerance.kernel import kernel_of
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 R, L, W = 0.3, 1.0, 2.0  # crank and rod, m; drive speed, rad/s
@@ -42,10 +47,6 @@ def course(run: Run, name: str, time: Any) -> Any:
     measure = named(run.system.mechanism, [name], run.values)[0]
     back = run.solve(time) if not measure.of_motion else run.walk(time)
     return np.broadcast_to(measure.curve(back)[0], np.shape(time))
-
-
-def test_every_kind_has_a_course() -> None:
-    assert list(CURVES) == [kind for kind in MEASURES if kind != "expression"]
 
 
 # ---- the slider-crank -----------------------------------------------------------------------------------------
@@ -99,9 +100,7 @@ def test_figures_of_the_speed(centric: Run) -> None:
 def test_dwell_within_a_band(centric: Run) -> None:
     """r cos θ is above c for arccos(c/r)/π of the time; with its derivative by r."""
     band = Measure("dwell", "point", "crank.B", "x", statistic="dwell", within=(0.1, 1.0))
-    steps = {90: 2e-6, 360: 1e-8}
-    for count, close in steps.items():
-        assert figures(centric, [band], count)["dwell"] == pytest.approx(np.arccos(0.1 / R) / np.pi, abs=close)
+    assert figures(centric, [band], 360)["dwell"] == pytest.approx(np.arccos(0.1 / R) / np.pi, abs=1e-8)
     changed = figures(centric, [band], 360, {"links.crank.points.B.x": Dual(R, 1.0)})["dwell"]
     expected = 0.1 / (R * np.pi * np.sqrt(R**2 - 0.01))
     assert float(np.ravel(derivative(changed))[0]) == pytest.approx(expected, rel=1e-6)
@@ -131,38 +130,6 @@ def test_transmission_angle_by_the_law_of_cosines(side: float) -> None:
     with pytest.raises(MechanismError) as raised:
         course(run, "transmission_angle:A", time)
     assert raised.value.findings[0].where == "joints.A"
-
-
-@pytest.mark.slow
-def test_powers_and_energy_of_friction() -> None:
-    """Power of driver and loads, power and energy lost, against the books of `analyse`."""
-    mechanism = trunnion.read(EXAMPLES / "toleranced-slider-crank.yaml")
-    run, result = prepare(mechanism), trunnion.analyse(mechanism, 24)
-    time = result["time"].values
-    np.testing.assert_allclose(course(run, "power:O", time), result["drive_power"].sel(driver="O"), rtol=1e-12)
-    names = [str(joint) for joint in result["joint"].values]
-    asked = [
-        *(Measure(joint, "friction_energy", joint) for joint in names),
-        Measure("driven", "power", "O", statistic="mean"),
-    ]
-    found, energies = figures(run, asked, 24), {}
-    for joint in result["joint"].values:
-        lost = course(run, f"friction_power:{joint}", time)
-        np.testing.assert_allclose(lost, result["friction_power"].sel(joint=joint), rtol=1e-12)
-        energy = found[str(joint)]
-        mean = float(result["friction_power_mean"].sel(joint=joint))
-        # A measure goes by fixed nodes, `analyse` by nodes that are added: they part where the guide changes its side.
-        assert energy == pytest.approx(mean * run.cycle.duration, rel=5e-4 if joint == "S" else 1e-6)
-        energies[joint] = energy
-    # Over a whole cycle all that the driver gives is lost to friction: nothing else takes power here.
-    driven = found["driven"] * run.cycle.duration
-    assert sum(energies.values()) == pytest.approx(driven, rel=1e-12)
-    parts = [
-        figures(run, [Measure("part", "friction_energy", "O", over=over)], 720)["part"]
-        for over in ((0.0, np.pi), (np.pi, 2 * np.pi))
-    ]
-    whole = figures(run, [Measure("energy", "friction_energy", "O")], 24)["energy"]
-    assert sum(parts) == pytest.approx(whole, rel=1e-4)
 
 
 # ---- in space -------------------------------------------------------------------------------------------------
@@ -201,42 +168,72 @@ def test_speeds_in_space_by_differences(spatial: Run) -> None:
 # ---- in the verbs ---------------------------------------------------------------------------------------------
 
 
+def books() -> Mechanism:
+    """A slider-crank with friction, a load that does work, two springs, and measures of its own."""
+    data = slider_crank(R, L, 0.1)
+    data["loads"]["press"] = {"joint": "C", "resisting_force": "30 N", "useful": True}
+    data["springs"] = {
+        "line": {"between": ["ground.A", "rod.P"], "stiffness": "1 kN/m", "free_length": "0.2 m", "damping": "3 N s/m"},
+        "coil": {"joint": "P", "stiffness": "2 N m/rad", "free_angle": "10 deg"},
+    }
+    data["measures"] = {"speed": {"velocity": "piston.P"}, "swing": {"stroke": "C"}}
+    return build(data, friction=0.1)
+
+
+PARTS: dict[str, tuple[str, dict[str, str]]] = {  # variable of `analyse` and where
+    "effort:A": ("drive_effort", {"driver": "A"}), "power:A": ("drive_power", {"driver": "A"}),
+    "reaction:P.y": ("reaction_force", {"joint": "P", "axis": "y"}), "rotation:P": ("joint_rotation", {"joint": "P"}),
+    "rate:P": ("joint_rotation_velocity", {"joint": "P"}), "slide:C": ("joint_slide", {"joint": "C"}),
+    "joint_acceleration:C": ("joint_slide_acceleration", {"joint": "C"}), "angle:rod": ("link_angle", {"link": "rod"}),
+    "friction_power:C": ("friction_power", {"joint": "C"}), "efficiency:instant": ("efficiency_instant", {}),
+    **{f"{kind}:{name}": (kind, {"spring": name}) for kind in ("spring_force", "spring_elongation")
+       for name in ("line", "coil")},
+    "locking_margin:mechanism": ("locking_margin", {}),
+}  # fmt: skip
+
+
+def test_measures_are_the_numbers_of_the_analysis() -> None:
+    """At every position, and over the cycle: efficiency, root mean square, energy lost, and those the model states."""
+    mechanism = books()
+    run, result = prepare(mechanism), trunnion.analyse(mechanism, 24)
+    time = result["time"].values
+    for name, (variable, where) in PARTS.items():
+        expected = result[variable].sel(where).values
+        np.testing.assert_allclose(course(run, name, time), expected, rtol=1e-9, atol=1e-12, err_msg=name)
+    force = result["reaction_force"].sel(joint="P")
+    np.testing.assert_allclose(course(run, "reaction:P", time), np.hypot(*force.values), rtol=1e-9)
+    np.testing.assert_allclose(course(run, "power:press", time), -result["useful_power"].values, rtol=1e-9, atol=1e-12)
+    speed = np.hypot(*result["point_velocity"].sel(point="piston.P").values)
+    np.testing.assert_allclose(result["measure_value"].sel(measure="speed"), speed, rtol=1e-12)
+    stroke = np.sqrt((L + R) ** 2 - 0.01) - np.sqrt((L - R) ** 2 - 0.01)
+    assert float(result["measure_figure"].sel(measure="swing")) == pytest.approx(stroke, rel=1e-12)
+    names = ["efficiency:cycle", "rms:effort:A", "friction_energy:B"]
+    found = figures(run, named(mechanism, names, run.values), 24)
+    assert found["efficiency:cycle"] == pytest.approx(float(result["efficiency"]), rel=1e-6)
+    assert found["rms:effort:A"] == pytest.approx(float(result["drive_effort_rms"][0]), rel=1e-6)
+    lost = float(result["friction_power_mean"].sel(joint="B")) * run.cycle.duration
+    assert found["friction_energy:B"] == pytest.approx(lost, rel=1e-6)
+
+
+def test_forces_in_space_are_those_of_the_analysis() -> None:
+    """Effort, reaction and its size, power lost, of an RSSR with friction."""
+    run = prepare(Mechanism(**rssr(friction=0.1).data))
+    result = trunnion.analyse(run.system.mechanism, 24)
+    time, force = result["time"].values, result["reaction_force"].sel(joint="D").values
+    expected = {
+        "effort:A": result["drive_effort"].values[0],
+        "reaction:D.z": force[2],
+        "reaction:D": np.linalg.norm(force, axis=0),
+        "friction_power:D": result["friction_power"].sel(joint="D").values,
+    }
+    for name, values in expected.items():
+        np.testing.assert_allclose(course(run, name, time), values, rtol=1e-9, err_msg=name)
+
+
 def measured_model() -> Mechanism:
     data = trunnion.read(EXAMPLES / "fourbar-with-play.yaml").data()
-    data["measures"] = {
-        "speed": {"velocity": "rocker.C", "limit": "1 m/s"},
-        "mu": {"transmission_angle": "C", "as": "minimum"},
-        "swing": {"stroke": "D"},
-        "off": {"path_error": "rocker.C"},
-        "rest": {"rotation": "D", "as": "dwell", "within": ["100 deg", "120 deg"]},
-    }
+    data["measures"] = {"speed": {"velocity": "rocker.C", "limit": "1 m/s"}}
     return Mechanism(**data).with_seats("free")
-
-
-def test_the_models_measures_in_the_result_of_a_cycle(tmp_path: Path) -> None:
-    mechanism = measured_model()
-    result = trunnion.analyse(mechanism, 36)
-    assert list(result["measure"].values) == ["speed", "mu", "swing", "rest"]
-    assert result["measure_figure_unit"].values.tolist() == ["m/s", "rad", "rad", "1"]
-    speed = np.sqrt((result["point_velocity"].sel(point="rocker.C") ** 2).sum("axis"))
-    np.testing.assert_allclose(result["measure_value"].sel(measure="speed"), speed, rtol=1e-12)
-    rotation = result["joint_rotation"].sel(joint="D")
-    np.testing.assert_allclose(result["measure_value"].sel(measure="rest"), rotation, rtol=1e-12)
-    measures = named(mechanism, ["mu", "swing", "rest"], prepare(mechanism).values)
-    # of polynomials through so many positions
-    expected = figures(prepare(mechanism), measures, 1440)
-    np.testing.assert_allclose(result["measure_figure"].values[1:], list(expected.values()), rtol=1e-9)
-    labels = [row["label"] for row in json.loads(result.attrs["summary"])]
-    assert [one for one in labels if "speed" in one and "measure" in one] == [
-        "measure speed, minimum",
-        "measure speed, maximum",
-    ]
-    left = [one for one in json.loads(result.attrs["findings"]) if one["where"] == "measures.off"]
-    assert [one["severity"] for one in left] == ["note"]
-    trunnion.save(result, tmp_path / "cycle.csv")
-    head, *rows = [line.split(",") for line in (tmp_path / "cycle.csv").read_text("utf-8").splitlines()]
-    assert head[-4:] == ["status", "speed", "mu", "rest"]  # a stroke is of no position
-    np.testing.assert_allclose([float(row[-3]) for row in rows], speed, rtol=1e-6)
 
 
 def test_play_of_a_speed() -> None:
@@ -268,7 +265,7 @@ def test_play_of_a_speed() -> None:
                 np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5)
 
 
-@pytest.mark.spread(2)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("example", ["toleranced-slider-crank", "toleranced-rssr", "fourbar-with-play", "sarrus"])
 def test_everything_that_is_listed_can_be_asked_for(example: str) -> None:
     """Names mean the numbers they stand for; measures can be named, and have the units and values that are told."""
@@ -286,3 +283,222 @@ def test_everything_that_is_listed_can_be_asked_for(example: str) -> None:
             measure.rule != "deviation" and not measure.of.against and not measure.of_attitude(run.system)
         )
     json.dumps(found.data(), allow_nan=False)
+
+
+LINKS = {"links": {**four_bar()["links"]}, "dimensions": {"ab": "0.3 m"}}
+LINKS["links"] = {
+    **LINKS["links"],
+    "crank": {"points": {"A": [0, 0], "B": ["ab", 0]}, "mass": 1.0, "centre": ["ab/2", 0], "inertia": 0.1},
+}
+
+
+def model(more: dict[str, Any] | None = None, **measures: Any) -> Mechanism:
+    """A crank and rocker without friction, and its measures."""
+    return Mechanism(**{**four_bar(), **LINKS, **(more or {}), "measures": measures})
+
+
+def test_a_lead_is_the_difference_of_angles_without_jumps() -> None:
+    found = trunnion.analyse(model(input={"rotation": "A"}, lead="input - D.rotation"), steps=48)
+    angles = (np.unwrap(found.joint_rotation.sel(joint=joint).values) for joint in "AD")
+    lead = np.subtract(*angles)
+    values = found.measure_value.sel(measure="lead").values
+    assert values - values[0] == pytest.approx(lead - lead[0], abs=1e-12)
+
+
+def test_figures_of_an_expression_do_not_depend_on_the_steps() -> None:
+    """Half the difference of input and output over a range of it: least and largest of the same course, finely."""
+    own = {"input": "A.rotation", "half": {"expression": "(input - D.rotation) / 2", "as": "maximum",
+                                           "over": ["60 deg", "200 deg"]}}  # fmt: skip
+    few, many = (trunnion.analyse(model(**own), steps=steps) for steps in (7, 7200))
+    figures = [float(found.measure_figure.sel(measure="half")) for found in (few, many)]
+    assert figures[0] == pytest.approx(figures[1], abs=1e-12)
+    turned = many.joint_rotation.sel(joint="A").values
+    inside = (turned >= np.radians(60)) & (turned <= np.radians(200))
+    course = (turned - np.unwrap(many.joint_rotation.sel(joint="D").values))[inside] / 2
+    assert figures[0] == pytest.approx(np.max(course), abs=1e-6)
+
+
+def test_error_of_a_universal_joint_against_even_rotation() -> None:
+    """θ₂ − θ₁ of a Cardan joint bent by β swings between ±arctan((1 − cos β)/(2 √cos β)).
+
+    Source: F. Duditza, Kardangelenkgetriebe und ihre Anwendungen, 1973.
+    """
+    bare = trunnion.read("examples/universal-joint.yaml").data()
+    found = trunnion.analyse(Mechanism(**{**bare, "measures": EVEN}), steps=4)
+    bend = float(np.radians(30.0))
+    swing = 2 * np.arctan((1 - np.cos(bend)) / (2 * np.sqrt(np.cos(bend))))
+    assert float(found.measure_figure.sel(measure="error")) == pytest.approx(swing, rel=1e-9)
+
+
+def test_leverage_is_the_ratio_of_speeds_without_friction() -> None:
+    """Power in is power out: effort over the load's torque is the output's speed over the input's."""
+    still = {"links": {name: {"points": link["points"]} for name, link in four_bar()["links"].items()}}
+    load = {"loads": {"brake": {"joint": "D", "resisting_torque": "3 N m"}}}
+    leverage = {"leverage": "A.effort / (3 N m)", "speed": {"rate": "D"}, "ratio": "speed / (4 rad/s)"}
+    found = trunnion.analyse(model({**still, **load}, **leverage), steps=60)
+    values = found.measure_value
+    ratio = np.abs(values.sel(measure="ratio").values)
+    assert values.sel(measure="leverage").values == pytest.approx(ratio, abs=1e-10)
+
+
+def test_derivatives_are_those_of_differences() -> None:
+    own = {"lead": "B.rotation - 2 * D.rotation", "torque": {"effort": "A"}, "mixed": "lead * torque / ab"}
+    mechanism = model(**own)
+    run = prepare(mechanism)
+    measures = named(mechanism, ["lead", "mixed"], run.values)
+    from trunnion.algebra.dual import Dual
+
+    kernel, time = NumpyKernel(run, measures, FrictionMethod()), np.linspace(0.1, 1.4, 7)
+
+    def at(ab: Any) -> Any:
+        return kernel.courses(mechanism.parameters({"dimensions.ab": ab}), time)[0]
+
+    exact, above, below = at(Dual(0.3, 1.0)), at(0.3 + 1e-6), at(0.3 - 1e-6)
+    for measure in measures:
+        slope = (above[measure.name][0] - below[measure.name][0]) / 2e-6
+        assert exact[measure.name][0].dual == pytest.approx(slope, rel=1e-6, abs=1e-6)
+
+
+def test_both_engines_agree() -> None:
+    mechanism = model(lead="A.rotation - D.rotation", twice="2 * lead", ratio="A.effort / (1 N m) + sqrt(ab / (1 m))")
+    run = prepare(mechanism)
+    measures, method = named(mechanism, ["lead", "twice", "ratio"], run.values), FrictionMethod()
+    values = mechanism.parameters({"dimensions.ab": np.array([[0.29], [0.3], [0.31]])})
+    time = np.broadcast_to(np.linspace(0.0, 1.5, 9), (3, 9))
+    one, other = (kernel_of(engine, run, measures, method).courses(values, time)[0] for engine in ("numpy", "compiled"))
+    for measure in measures:
+        assert one[measure.name][0] == pytest.approx(other[measure.name][0], abs=1e-9)
+
+
+def test_a_sweep_and_a_tolerance_know_them() -> None:
+    own = {"lead": {"expression": "A.rotation - D.rotation", "as": "maximum", "over": ["60 deg", "200 deg"]}}
+    toleranced = model({"tolerances": {"ab": {"limits": "±1 mm"}}}, **own)
+    swept = trunnion.sweep(toleranced, over={"ab": np.array([0.299, 0.301])}, measures=["lead"])
+    ends = [
+        float(trunnion.analyse(toleranced.with_values({"ab": ab}), steps=4).measure_figure[0]) for ab in (0.299, 0.301)
+    ]
+    assert swept["lead"].values == pytest.approx(ends, abs=1e-11)
+    found = trunnion.tolerance(toleranced, methods=("linear",), steps=36).isel(measure=0)
+    assert 2 * float(found.worst_case_upper) == pytest.approx(abs(ends[1] - ends[0]), rel=1e-3)
+
+
+def test_an_expression_that_is_its_own_circle_or_means_nothing_is_a_finding() -> None:
+    for text, says in [
+        ("2 * lead", "itself"), ("input - ab", "added"), ("high - low", "one number"), ("__import__('os')", ""),
+        ("swing + input", "place or over a range"),
+    ]:  # fmt: skip
+        own = {
+            "input": "A.rotation", "lead": text, "high": {"stroke": "D"}, "low": {"stroke": "D"},
+            "swing": {"expression": "input", "as": "maximum"},
+        }  # fmt: skip
+        with pytest.raises(MechanismError) as error:
+            model(**own)
+        assert all(one.where.startswith("measures.lead") for one in error.value.findings), text
+        assert says in str(error.value), text
+
+
+EVEN = {"error": {"expression": "output.rotation - input.rotation", "as": "peak-to-peak"}}
+
+
+DURATION = 12.0
+MEASURE = {"starting_time": "A", "duration": DURATION}
+
+
+def stated(mechanism: Mechanism, **more: Any) -> Mechanism:
+    return Mechanism(**{**mechanism.data(), **more})
+
+
+def starting_time(inertia: float) -> float:
+    """Of J ω̇ = 4 (1 − ω/150) − 0.6, where the mean of a turn is 95 % of that of the last in DURATION."""
+    tau, turn = inertia * 150 / 4, 2 * np.pi
+
+    def gone(time: float) -> float:
+        return 127.5 * float(time - tau * (1 - np.exp(-time / tau)))
+
+    def takes(time: float) -> float:
+        return time - float(brentq(lambda t: gone(t) - gone(time) + turn, 0.0, time, xtol=1e-14))
+
+    limit = takes(DURATION) / 0.95
+    return float(brentq(lambda t: takes(t) - limit, 2.0 * tau, DURATION, xtol=1e-13))
+
+
+def test_first_order_of_the_starting_time() -> None:
+    """The sensitivity to the inertia, by differences of the closed form; samples scatter about it."""
+    mechanism = stated(wheel(LINEAR), tolerances={"links.wheel.inertia": 0.001}, measures={"start": MEASURE})
+    found = trunnion.tolerance(mechanism, methods=("linear", "monte-carlo"), samples=100, jobs=1)
+    slope = (starting_time(0.0505) - starting_time(0.0495)) / 0.001
+    figure, sensitivity = float(found["nominal"].item()), float(np.ravel(found["sensitivity"])[0])
+    assert figure == pytest.approx(starting_time(0.05), rel=1e-7)
+    assert sensitivity == pytest.approx(slope, rel=1e-4)
+    deviation = float(np.ravel(found["deviation"])[0])
+    assert deviation == pytest.approx(float(np.ravel(found["rss"])[0]) / 3, rel=0.3)
+    assert float(found["yield_all"]) == 1.0
+
+
+def test_samples_that_do_not_start_are_outside_every_limit() -> None:
+    """Torques about the drag: half of them do not start."""
+    motor = {**LINEAR, "stall_effort": 0.6}
+    mechanism = stated(
+        wheel(motor),
+        tolerances={"drivers.A.motor.stall_effort": {"limits": "±0.3 N m", "distribution": "uniform"}},
+        measures={"peak": {"peak_effort": "A", "duration": 1.0, "at_most": 5}, "start": {**MEASURE, "at_most": 100}},
+    )
+    found = trunnion.tolerance(mechanism, methods=("monte-carlo",), samples=60, jobs=1)
+    shares = found["yield"].values
+    assert shares[0] == 1.0
+    assert shares[1] < 0.7
+
+
+def test_a_sweep_has_the_figures_of_each_point() -> None:
+    mechanism = wheel(LINEAR)
+    inertias = [0.03, 0.05, 0.08]
+    swept = trunnion.sweep(
+        mechanism, {"links.wheel.inertia": inertias}, 24, measures=["starting_time:A", "peak_effort:A"]
+    )
+    # ten cycles at 100 rad/s: too short for it to run steadily, so that there is none
+    assert np.all(np.isnan(swept["starting_time:A"]))
+    assert "sweep.not_steady" in {one.code for one in swept.trunnion.findings}
+    np.testing.assert_allclose(swept["peak_effort:A"], 4.0, rtol=1e-8)
+    longer = stated(mechanism, measures={"start": MEASURE})
+    found = trunnion.sweep(longer, {"links.wheel.inertia": inertias}, 24, measures=["start"])["start"].values
+    np.testing.assert_allclose(found, [starting_time(one) for one in inertias], rtol=1e-7)
+    assert swept["peak_effort:A"].attrs["units"] == "N m"
+
+
+def test_the_summary_of_a_simulation_has_the_same_figures() -> None:
+    mechanism = wheel(LINEAR)
+    result = trunnion.simulate(mechanism, DURATION, 100)
+    figures = {one.name: one.value for one in result.trunnion.summary}
+    run = prepare(mechanism)
+    own = figures_in_time(run, "A", run.values, 1, DURATION)
+    for key, name in (
+        ("starting_time", "starting_time"),
+        ("speed_mean", "steady_speed"),
+        ("fluctuation", "fluctuation"),
+    ):
+        assert figures[f"A.{key}"] == pytest.approx(own[name][0], rel=1e-7, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_tolerances_are_allocated_to_a_limit_of_the_starting_time() -> None:
+    """Two tolerances of equal cost per share of what they do to the start: B₁/t₁ + B₂/t₂ with s₁ t₁ + s₂ t₂ = limit.
+
+    Lagrange: t_i = limit √(B_i/s_i)/Σ √(B_j s_j), with the derivatives of the closed form.
+    """
+    start = starting_time(0.05)
+    mechanism = stated(
+        wheel(LINEAR),
+        tolerances={"links.wheel.inertia": 0.001, "loads.drag.resisting_torque": 0.05},
+        measures={"start": {**MEASURE, "limit": 0.1}},
+        costs={name: {"model": "power", "B": cost, "k": 1, "unit": unit}
+               for name, cost, unit in (("links.wheel.inertia", 1e-3, "kg m^2"),
+                                        ("loads.drag.resisting_torque", 0.05, "N m"))},
+    )  # fmt: skip
+    found = trunnion.allocate(mechanism, samples=100, jobs=1)
+    widths = dict(zip(found["parameter"].values, found["parameter_upper"].values, strict=True))
+    slope = (starting_time(0.0505) - starting_time(0.0495)) / 0.001
+    assert float(found["nominal"].item()) == pytest.approx(start, rel=1e-7)
+    drag = np.abs(np.ravel(found["sensitivity"])[list(found["parameter"].values).index("loads.drag.resisting_torque")])
+    costs, slopes = np.array([1e-3, 0.05]), np.array([abs(slope), drag])
+    wanted = 0.1 * np.sqrt(costs / slopes) / np.sum(np.sqrt(costs * slopes))
+    assert [widths["links.wheel.inertia"], widths["loads.drag.resisting_torque"]] == pytest.approx(wanted, rel=1e-3)

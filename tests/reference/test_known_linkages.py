@@ -1,7 +1,8 @@
-"""Closed forms and published figures of common linkages: positions and sensitivities by dual numbers."""
+"""More of what other means say of the examples, over whole runs; the gallery has one figure of each."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,100 +10,131 @@ import pytest
 
 import trunnion
 from brief import brief
-from mechanisms import body, build, revolute, slider_crank
-from trunnion.algebra.dual import Dual, derivative, primal
+from gallery.benchmarks import butterfly, butterfly_torque
+from gallery.drawing import turns
+from gallery.entry import STEPS
+from gallery.plane import slope
+from gallery.presses import jaw_angle
+from mechanisms import DURANGO, revolute
+from trunnion import FrictionMethod, Status
 from trunnion.solve.run import prepare
 
-MM = 1e-3
-LENGTHS = {"L1": 100.0, "L2": 30.0, "L3": 90.0, "L4": 70.0}  # ground, crank, coupler, rocker, mm
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
-def four_bar_in_mm() -> Any:
-    return build(
-        {
-            "dimensions": {name: f"{value} mm" for name, value in LENGTHS.items()},
-            "links": {
-                "ground": {"points": {"A": [0, 0], "D": ["L1", 0]}},
-                "crank": body({"A": [0, 0], "B": ["L2", 0]}, 1, 0.03),
-                "coupler": body({"B": [0, 0], "C": ["L3", 0]}, 2, 0.09),
-                "rocker": body({"D": [0, 0], "C": ["L4", 0]}, 3, 0.07),
-            },
-            "joints": {
-                "A": revolute("ground", "crank"),
-                "B": revolute("crank", "coupler"),
-                "C": revolute("coupler", "rocker"),
-                "D": revolute("ground", "rocker"),
-            },
-            "drivers": {"A": {"speed": 1.0, "start": "60 deg"}},
-            "assembly": {"C": ["90 mm", "70 mm"]},
-        }
-    )
+def example(name: str) -> trunnion.Mechanism:
+    return trunnion.read(EXAMPLES / f"{name}.yaml")
 
 
-def angle(run: Any, link: str, values: Any = None) -> Any:
-    frame = run.solve(np.array([0.0]), values).walk.motions[link].frame
-    from trunnion.algebra.namespace import namespace
-
-    return namespace(frame.s, frame.c).arctan2(frame.s, frame.c)
+def track(result: Any, point: str) -> Any:
+    x, y = result["point_position"].sel(point=point).transpose("axis", "position").values
+    return x + 1j * y
 
 
-def test_rocker_angle() -> None:
-    assert np.degrees(angle(prepare(four_bar_in_mm()), "rocker"))[0] == pytest.approx(95.195700, abs=5e-7)
+def test_toggle_amplifies_by_its_angle() -> None:
+    """F_out/F_in = (cos γ / tan α − sin γ)/2, γ of the cylinder above the horizontal: 1/(2 tan α) if it is level."""
+    result = brief(example("toggle-press").with_friction("off"), STEPS)
+    knee = track(result, "upper.A")
+    tilt = np.angle(knee - (-0.5 + 0.25j))
+    gain = (np.cos(tilt) / np.tan(np.arcsin(-knee.real / 0.2)) - np.sin(tilt)) / 2
+    np.testing.assert_allclose(100e3 / result["drive_effort"].sel(driver="Z").values, gain, rtol=1e-11)
+    assert gain.max() == pytest.approx(np.sqrt(0.2**2 - 0.001**2) / 0.002, rel=1e-5)  # 100 times at 1 mm
 
 
-@pytest.mark.parametrize(
-    ("name", "expected"), [("L1", 0.013654), ("L2", -0.013401), ("L3", -0.015623), ("L4", 0.006323)]
-)
-def test_sensitivity_of_the_rocker_angle(name: str, expected: float) -> None:
-    """∂θ₄/∂l, rad/mm."""
-    mechanism = four_bar_in_mm()
-    values = mechanism.parameters({name: Dual(LENGTHS[name] * MM, 1.0)})
-    found = derivative(angle(prepare(mechanism), "rocker", values))
-    assert float(np.ravel(found)[0]) * MM == pytest.approx(expected, abs=5e-7)
+@pytest.mark.spread(1)
+@pytest.mark.parametrize("coefficient", [0.05, 0.1, 0.2])
+def test_toggle_locks_within_its_friction_circles(coefficient: float) -> None:
+    """The punch cannot push the knee away while one line touches the circles of O, A and P: knee nearer than 2 f ρ.
 
-
-@pytest.mark.parametrize(("dimension", "expected"), [("r", 0.307945), ("l", 1.024295), ("e", 0.221766)])
-def test_sensitivity_of_the_slider(dimension: str, expected: float) -> None:
-    """Slider-crank r = 50, l = 200, e = 0, θ = 60°: ∂x/∂(r, l, e).
-
-    e as the sheet has it lowers the crank against the slide, so that x = r cos θ + √(l² − (r sin θ + e)²)
-    has the slope −0.22 with e; a raised guide has the opposite sign.
+    The knee is the load, a resisting cylinder; which size it has does not matter.
     """
-    data = slider_crank(50 * MM, 200 * MM, 0.0)
-    data["drivers"]["A"] = {"speed": 1.0, "start": float(np.pi / 3)}
-    data["assembly"] = {"P": [0.22, 0.0]}
-    path, value = {
-        "r": ("links.crank.points.B.x", 50 * MM),
-        "l": ("links.rod.points.P.x", 200 * MM),
-        "e": ("links.ground.points.C.y", 0.0),
-    }[dimension]
-    mechanism = build(data)
-    run = prepare(mechanism)
-    back = run.solve(np.array([0.0]), mechanism.parameters({path: Dual(value, 1.0)}))
-    x = back.walk.point("piston", "P").place[0]
-    assert float(np.ravel(derivative(x))[0]) == pytest.approx(expected, abs=5e-7)
-    sine = 50 * MM * np.sin(np.pi / 3)
-    assert float(np.ravel(primal(x))[0]) == pytest.approx(0.025 + np.sqrt(0.04 - sine**2), abs=1e-15)
+    data = example("toggle-press").data()
+    low, high = (0.45 - 2 * np.sqrt(0.2**2 - x**2) for x in (0.5e-3, 12e-3))
+    data["drivers"] = {"B": {"range": [low, high], "speed": 0.01}}
+    data["loads"] = {"cylinder": {"joint": "Z", "resisting_force": 1000.0}}
+    data["joint_defaults"]["friction"] = coefficient
+    data["assembly"] = {"K": [-0.5e-3, 0.25], "A": [-0.5e-3, 0.25]}
+    result = brief(trunnion.Mechanism(**data), 800)
+    knee = -track(result, "upper.A").real
+    locked = result["status"].values == Status.LOCKED
+    assert np.array_equal(locked, knee < 2 * coefficient * 0.02)
+    assert 0 < np.count_nonzero(locked) < 800
 
 
-def test_slider_crank_motion_in_closed_form() -> None:
-    r, length, e, rate = 0.3, 1.0, 0.1, -6.0
-    result = brief(build(slider_crank(r, length, e)), 90)
-    q = rate * result["time"].values
-    root = np.sqrt(length**2 - (e - r * np.sin(q)) ** 2)
-    x = r * np.cos(q) + root
-    drop = (e - r * np.sin(q)) * r * np.cos(q) / root
-    v = rate * (-r * np.sin(q) + drop)
-    found = result.sel(point="piston.P", axis="x")
-    np.testing.assert_allclose(found["point_position"], x, rtol=0, atol=1e-14)
-    np.testing.assert_allclose(found["point_velocity"], v, rtol=0, atol=1e-13)
-    slide = result["joint_slide"].sel(joint="C")
-    np.testing.assert_allclose(np.diff(slide), np.diff(x), rtol=0, atol=1e-14)
-    np.testing.assert_allclose(result["joint_slide_velocity"].sel(joint="C"), v, rtol=0, atol=1e-13)
-    a = result["joint_slide_acceleration"].sel(joint="C").values
-    s = (e - r * np.sin(q)) * r * np.cos(q) / root
-    second = -r * np.cos(q) + (-(r**2) * np.cos(q) ** 2 - (e - r * np.sin(q)) * r * np.sin(q) - s**2) / root
-    np.testing.assert_allclose(a, rate**2 * second, rtol=0, atol=1e-12)
+def test_jaw_crusher_torque_of_the_rock() -> None:
+    """What the rock adds to the torque without friction is −M dψ/dθ while the jaw closes, else nothing."""
+    ideal = example("jaw-crusher").with_friction("off")
+    loaded = brief(ideal, STEPS)
+    free = brief(ideal.with_values({"loads.rock.resisting_torque": 0.0}), STEPS)
+    added = (loaded["drive_effort"] - free["drive_effort"]).sel(driver="O").values
+    rate = np.array([slope(lambda q: complex(jaw_angle(q)), q).real for q in turns(0.0)])
+    np.testing.assert_allclose(added, np.where(rate < 0, -200e3 * rate, 0.0), rtol=0, atol=1e-5)
+    assert np.count_nonzero(rate < 0) > STEPS / 3
+
+
+@pytest.mark.slow
+def test_double_butterfly_pins_and_torque() -> None:
+    mechanism = example("double-butterfly").with_friction("off")
+    result = trunnion.analyse(mechanism, 24)
+    assert float(result["closure_residual"].max()) < 1e-13
+    for k in range(24):
+        turn = 2 * np.pi * k / 24
+        for pin, place in butterfly(turn)[0].items():
+            link = next(name for name, one in mechanism.links.items() if pin in one.points)
+            assert track(result.isel(position=[k]), f"{link}.{pin}")[0] == pytest.approx(place, abs=1e-11)
+        assert float(result["drive_effort"][0, k]) == pytest.approx(butterfly_torque(turn), abs=1e-5)
+
+
+# ---- Andrews' squeezer: the published states (test set for IVP solvers, release 2.4, problem andrews) --------------
+
+ANGLES = (15.81077119629904, -15.75637105984298, 0.04082224013073101, -0.5347301163226948, 0.5244099658805304,
+          0.5347301163226948, 1.048080741042263)  # fmt: skip
+RATES = (1139.920302151208, -1424.379294994111, 11.03291221937134, 19.29337464421385, 0.5735699284790808,
+         -19.29337464421385, 0.3231791658026955)  # fmt: skip
+SECONDS = (-24631.76316945196, 51850.37701610329, 324102.5686413781, 566749.3645176213, 16743.62929479361,
+           -566749.3645176222, 9826.520791458422)  # fmt: skip
+MULTIPLIERS = (199.1753333731910, -29.75531228015052, 23.06654119098399, 31.45271365475927, 22.64249232082739,
+               11.61740700019673)  # fmt: skip
+
+
+def squeezer_at_the_end() -> Any:
+    """The squeezer at t = 0.03 s of the benchmark: K1 swings such that it has there the published β, β̇ and β̈."""
+    data, w = example("andrews-squeezer").data(), 100.0
+    across, along = -SECONDS[0] / w**2, RATES[0] / w
+    data["drivers"]["O"] = {"law": "harmonic", "mean": ANGLES[0] - across, "amplitude": float(np.hypot(across, along)),
+                            "period": 2 * np.pi / w, "phase": float(np.arctan2(across, along))}  # fmt: skip
+    return trunnion.analyse(trunnion.Mechanism(**data), 4).isel(position=0)
+
+
+def relative(one: Any, variable: str) -> Any:
+    """β, Θ, γ, Φ, δ, Ω, ε of the benchmark: three of them are between two links."""
+    k = {name: float(one[variable].sel(link=name)) for name in one["link"].values}
+    return np.array([k["K1"], k["K2"] - k["K1"], k["K3"], k["K4"] - k["K5"], k["K5"], k["K6"] - k["K7"], k["K7"]])
+
+
+def test_squeezer_from_rest() -> None:
+    """At the start: published accelerations, the torque that they come from and the first two multipliers."""
+    start = brief(example("andrews-squeezer"), 4).isel(position=0)
+    expected = [-0.0617138900142764496, 0, 0.455279819163070380, 0.222668390165885885, 0.487364979543842550,
+                -0.222668390165885885, 1.23054744454982119]  # fmt: skip
+    np.testing.assert_allclose(relative(start, "link_angle"), expected, rtol=0, atol=1e-13)
+    seconds = relative(start, "link_angle_acceleration")
+    np.testing.assert_allclose(seconds, [14222.4439199541387, -10666.8329399655854, 0, 0, 0, 0, 0], rtol=0, atol=1e-9)
+    assert float(start["drive_effort"][0]) == pytest.approx(0.033, abs=1e-13)
+    force = start["reaction_force"].sel(joint="E").values
+    np.testing.assert_allclose(force, [98.5668703962410896, -6.12268834425566266], rtol=0, atol=1e-11)
+
+
+def test_squeezer_at_the_end() -> None:
+    """Angles to rounding; rates to 1e-10 and accelerations to 1e-5 of the published, which is what those carry."""
+    end = squeezer_at_the_end()
+    turned = relative(end, "link_angle") - ANGLES
+    np.testing.assert_allclose(turned - 2 * np.pi * np.round(turned / (2 * np.pi)), 0, atol=1e-13)
+    np.testing.assert_allclose(relative(end, "link_angle_velocity"), RATES, rtol=0, atol=1e-10 * RATES[0])
+    np.testing.assert_allclose(relative(end, "link_angle_acceleration"), SECONDS, rtol=2e-6)
+    assert float(end["drive_effort"][0]) == pytest.approx(0.033, abs=1e-8)
+    forces = np.concatenate([end["reaction_force"].sel(joint=joint).values for joint in ("E", "E2", "E3")])
+    np.testing.assert_allclose(forces, MULTIPLIERS, rtol=0, atol=5e-5)
 
 
 def test_pendulum_driver_holds_a_weight() -> None:
@@ -128,3 +160,125 @@ def test_pendulum_driver_holds_a_weight() -> None:
         result["drive_effort"].values[0], 3.0 * 9.81 * 0.5 * np.cos(q) + friction, rtol=0, atol=1e-12
     )
     assert result.attrs["formula"] == "I(0,1)R"
+
+
+RATE = 10.0  # rad/s, of the crank
+
+
+@pytest.fixture(scope="module")
+def results() -> dict[str, Any]:
+    mechanism = trunnion.read(DURANGO)
+    return {"friction": trunnion.analyse(mechanism), "ideal": trunnion.analyse(mechanism.with_friction("off"))}
+
+
+def torque(result: Any) -> Any:
+    return result["drive_effort"].sel(driver="A").values
+
+
+def at(result: Any, degrees: int, variable: str, **where: str) -> Any:
+    return result[variable].sel(**where).isel(position=degrees).values
+
+
+@pytest.mark.parametrize(
+    ("case", "least", "most"), [("ideal", -18747.140121, 9177.173578), ("friction", -18552.874991, 9288.302313)]
+)
+def test_extremes_of_the_torque(results: dict[str, Any], case: str, least: float, most: float) -> None:
+    found = torque(results[case])
+    assert found.min() == pytest.approx(least, abs=1e-6)
+    assert found.max() == pytest.approx(most, abs=1e-6)
+
+
+def test_friction_power(results: dict[str, Any]) -> None:
+    lost = results["friction"]["friction_power"].sum("joint").values
+    assert lost.mean() == pytest.approx(517.465106, abs=1e-6)
+    assert lost.max() == pytest.approx(2375.340, abs=5e-4)
+    assert np.argmax(lost) == 358
+
+
+def test_values_at_sixty_degrees(results: dict[str, Any]) -> None:
+    assert torque(results["ideal"])[60] == pytest.approx(3364.879649, abs=1e-6)
+    assert torque(results["friction"])[60] == pytest.approx(3393.503681, abs=1e-6)
+    lost = results["friction"]["friction_power"].sum("joint").values
+    assert lost[60] == pytest.approx(286.240327, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("joint", "sign", "expected"),
+    [
+        ("A", 1, (-3388.683339, -2499.828824)),
+        ("B", 1, (-3148.683339, -2084.136630)),
+        ("C", 1, (229.965844, 905.533667)),
+        ("D", 1, (-639.235315, -1207.667824)),
+    ],
+)
+def test_reactions_at_sixty_degrees(
+    results: dict[str, Any], joint: str, sign: int, expected: tuple[float, float]
+) -> None:
+    """Each on the second link of the joint by the first: crank, coupler, rocker, rocker."""
+    found = sign * at(results["friction"], 60, "reaction_force", joint=joint)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
+
+
+def test_friction_costs_exactly_its_power(results: dict[str, Any]) -> None:
+    """T with friction − T without = P_friction/ω₁ at every position."""
+    lost = results["friction"]["friction_power"].sum("joint").values
+    difference = torque(results["friction"]) - torque(results["ideal"])
+    np.testing.assert_allclose(difference, lost / RATE, rtol=0, atol=1e-12 * np.abs(torque(results["ideal"])).max())
+
+
+def test_zero_slip_is_an_interval(results: dict[str, Any]) -> None:
+    """At 0° and 180° the relative speed at C is exactly zero; the torque is bracketed by either sign of friction."""
+    result = results["friction"]
+    status = result["status"].values
+    np.testing.assert_array_equal(np.flatnonzero(status == Status.ZERO_SLIP), [0, 180])
+    assert np.all(status[np.setdiff1d(np.arange(360), [0, 180])] == Status.SOLVED)
+    lower, upper, effort = (result[f"drive_effort{end}"].values[0] for end in ("_lower", "_upper", ""))
+    here = status == Status.ZERO_SLIP
+    assert np.all(lower[here] < effort[here])
+    assert np.all(effort[here] < upper[here])
+    np.testing.assert_array_equal(lower[~here], effort[~here])
+    np.testing.assert_array_equal(upper[~here], effort[~here])
+
+
+@pytest.mark.parametrize("position", [0.0, np.pi])
+def test_interval_holds_the_limits_from_both_sides(results: dict[str, Any], position: float) -> None:
+    """On either side friction at C is fully on; both torques, extrapolated to the place itself, are the ends."""
+    run = prepare(trunnion.read(DURANGO))
+    result, index = results["friction"], round(np.degrees(position))
+    step = 1e-5  # rad: what curves over it is below 1e-10 T″ ≈ 1e-4 N m
+    angles = (position + step * np.array([-2.0, -1.0, 1.0, 2.0])) % (2 * np.pi)
+    near = run.solve(angles / RATE).efforts["A"]
+    ends = sorted([2 * near[1] - near[0], 2 * near[2] - near[3]])
+    assert ends[0] == pytest.approx(float(result["drive_effort_lower"][0, index]), abs=2e-4)
+    assert ends[1] == pytest.approx(float(result["drive_effort_upper"][0, index]), abs=2e-4)
+    assert ends[1] - ends[0] > 2e-3
+
+
+def test_successive_approximation_agrees_with_newton() -> None:
+    mechanism = trunnion.read(DURANGO)
+    newton = trunnion.analyse(mechanism)
+    named = trunnion.analyse(mechanism, friction_method=FrictionMethod("successive-approximation", 1e-10))
+    for name in ("reaction_force", "drive_effort", "friction_torque"):
+        scale = np.abs(newton[name]).max()
+        np.testing.assert_allclose(named[name], newton[name], rtol=0, atol=1e-9 * float(scale), err_msg=name)
+    assert int(named["friction_iterations"].max()) > int(newton["friction_iterations"].max())
+
+
+@pytest.mark.parametrize(("limit", "share"), [(3, 1e-3), (1, 5e-2)])
+def test_three_iterations_suffice(limit: int, share: float) -> None:
+    """The paper's statement: after three iterations within 0.1 % at ten equally spaced positions."""
+    run = prepare(trunnion.read(DURANGO))
+    time = run.cycle.times(10)
+    few = run.solve(time, method=FrictionMethod("successive-approximation", None, limit))
+    exact = run.solve(time)
+    assert all(np.max(settled.iterations) <= limit for settled in few.settled)
+    for joint, reaction in exact.reactions.items():
+        size = np.hypot(reaction.x, reaction.y)
+        error = np.hypot(few.reactions[joint].x - reaction.x, few.reactions[joint].y - reaction.y)
+        assert np.all(error < share * size), joint
+    assert np.max(few.settled[0].iterations) == limit
+
+
+def test_loads_do_no_net_work(results: dict[str, Any]) -> None:
+    """Constant force and moment over a closed cycle give back what they take: useful work and efficiency are 0."""
+    assert float(results["friction"]["efficiency"]) == 0.0

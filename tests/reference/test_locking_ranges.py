@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +12,10 @@ from test_locking import CRITICAL, pushed_slider
 import trunnion
 from mechanisms import eccentric_press
 from mechanisms_parts import Data, plunger, revolute
-from mechanisms_space import rssr
 from trunnion import Mechanism, Status
 from trunnion.cycle.locking import LockingState, locking, look, report_figures
 from trunnion.cycle.locking_course import NO_MARGIN, LockingCourse, locking_course, passed
-from trunnion.results.attributes import attribute, summary_of
+from trunnion.results.attributes import summary_of
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL
 from trunnion.solve.margin import locking_margin
@@ -67,6 +65,8 @@ def test_a_crank_holds_its_load_inside_the_friction_circle() -> None:
     ends = [0.0, limit, np.pi / 2, np.pi - limit, 2.5]  # s, at 1 rad/s
     np.testing.assert_allclose([part.low for part in ranges], ends[:-1], atol=1e-7)
     np.testing.assert_allclose([part.high for part in ranges], ends[1:], atol=1e-7)
+    (sign,) = [one for one in report_figures(prepare(hoist())) if one.name == "drive_effort_sign"]
+    assert sign.value == f"{np.degrees(ends[3]):.2f}°"
 
 
 def test_friction_that_holds_the_load_is_that_whose_circle_its_arm_touches() -> None:
@@ -93,21 +93,6 @@ def test_the_friction_that_holds_it_at_the_end_or_everywhere_is_a_figure(first: 
     assert rows["holding_multiple"].aspect == ("maximum" if told == "all" else "")
 
 
-def test_friction_that_holds_a_mechanism_of_many_joints_is_what_it_holds_with() -> None:
-    """Just below that multiple of every coefficient the load drives the slide, just above it does not."""
-    data: Data = slide_hoist().model_dump(by_alias=True, exclude_unset=True)
-    for joint in ("H", "K"):
-        data["joints"][joint] |= {"pin": {"radius": 0.004}, "friction": 0.3}
-    known = locking(Mechanism(**data), 41)["holding_multiple"].values
-    at = np.flatnonzero(np.isfinite(known))
-    assert len(at) >= 7
-    for i in at[[0, len(at) // 2, -1]]:
-        for factor, held in ((1 - 1e-6, False), (1 + 1e-6, True)):
-            for joint, own in (("A", FRICTION), ("H", 0.3), ("K", 0.3)):
-                data["joints"][joint]["friction"] = own * known[i] * factor
-            assert np.isfinite(locking(Mechanism(**data), 41)["holding_multiple"].values[i]) == held
-
-
 def expected_states(arm: np.ndarray) -> np.ndarray:
     """Of a load with this arm about a pin, in m, positive where it pulls backward."""
     hold = FRICTION * RADIUS
@@ -116,7 +101,7 @@ def expected_states(arm: np.ndarray) -> np.ndarray:
     return np.select(conditions, held, LockingState.DRIVEN_ON)
 
 
-@pytest.mark.parametrize("steps", [3, 5, 181])
+@pytest.mark.parametrize("steps", [5, 181])
 def test_a_position_in_the_dead_centre_is_of_the_state_behind_it(steps: int) -> None:
     """The load has no power there, and no range of its own."""
     data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
@@ -133,80 +118,6 @@ def test_a_load_without_power_pushes_neither_way() -> None:
     data["loads"]["weight"]["force"] = [0.0, "-100 N * between(drive, 0, 1.2)"]
     found = locking(Mechanism(**data), 40)
     np.testing.assert_array_equal(states(found) == LockingState.RUNS, found["drive"].values > np.degrees(1.2))
-
-
-def test_where_the_drive_effort_changes_sign_is_told_and_kept_in_the_result() -> None:
-    """180° less the angle at which the arm is that of the friction circle, in a figure and in an attribute."""
-    run = prepare(hoist())
-    found = look(run, 30)
-    limit = 180 - np.degrees(np.arccos(FRICTION * RADIUS / ARM))
-    (told,) = [one for one in report_figures(run) if one.name == "drive_effort_sign"]
-    assert told.value == f"{limit:.2f}°"
-    kept = attribute(found, "locking_ranges")
-    assert (kept["of"], kept["unit"], kept["positions"]) == ("A", "°", 30)
-    assert [row["state"] for row in kept["rows"]] == [
-        "backdrivable",
-        "self_locking",
-        "self_locking_forward",
-        "driven_on",
-    ]
-    np.testing.assert_allclose(kept["rows"][-1]["ends"][0], limit, atol=0.01)
-    assert kept["rows"][-1]["ends"][1] == pytest.approx(np.degrees(2.5), abs=1e-3)
-
-
-def slide_hoist() -> Mechanism:
-    """The hoist, whose lever hangs from a slide on a level guide by a link to the lever's end on top."""
-    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
-    data["links"] = {
-        "ground": {"points": {"A": [0, 0], "Z": {"at": [-0.1, 0.1], "axis": [-1, 0]}}},
-        "crank": {"points": {"A": [0, 0], "P": [ARM, 0], "H": [0.1, 0]}},
-        "rod": {"points": {"H": [0, 0], "K": [0.1, 0]}},
-        "slide": {"points": {"K": [0, 0], "Z": {"at": [0, 0], "axis": [-1, 0]}}},
-    }
-    data["joints"] |= {
-        "H": revolute("crank", "rod"), "K": revolute("rod", "slide"),
-        "Z": {"type": "prismatic", "links": ["ground", "slide"]},
-    }  # fmt: skip
-    data["drivers"] = {"Z": {"speed": 0.01, "range": [-0.03, 0.01]}}
-    data["assembly"] = {"H": [0.03, 0.095]}
-    return Mechanism(**data)
-
-
-def test_without_friction_every_load_drives_back() -> None:
-    found = locking(hoist(0.0), 51)
-    assert set(states(found)) == {LockingState.BACKDRIVABLE, LockingState.DRIVEN_ON}
-    pushed = states(found) == LockingState.BACKDRIVABLE
-    np.testing.assert_allclose(found["efficiency_reverse_instant"].values[pushed], 1.0, rtol=1e-9)
-
-
-@pytest.mark.parametrize("steps", [2, 360, 720])
-def test_an_analysis_has_the_ranges_of_the_cycle_whatever_its_steps(steps: int) -> None:
-    """Those that are shorter than a step too; the report shows them."""
-    run = trunnion.analyse(hoist(), steps)
-    told, own = (attribute(result, "locking_ranges") for result in (run, locking(hoist(), 30)))
-    assert told["positions"] == steps
-    assert sum(row["count"] for row in told["rows"]) == steps
-    for name in ("state", "ends", "times", "cells"):
-        assert [row[name] for row in told["rows"]] == [row[name] for row in own["rows"]]
-    page = run.trunnion.report()
-    assert 'id="locking"' in page
-    assert all(f'<rect class="{row["state"]}"' in page for row in told["rows"])
-
-
-def test_an_analysis_without_friction_or_without_loads_has_no_ranges() -> None:
-    idle = hoist().model_dump(by_alias=True, exclude_unset=True) | {"loads": {}}
-    for model in (hoist().with_friction("off"), Mechanism(**idle)):
-        run = trunnion.analyse(model, 12)
-        assert "locking_ranges" not in run.attrs
-        assert 'id="locking"' not in run.trunnion.report()
-
-
-def test_ends_of_ranges_are_those_of_the_friction_circle() -> None:
-    """To 0.01°."""
-    limit = f"{np.degrees(np.arccos(FRICTION * RADIUS / ARM)):.2f}°"
-    behind = f"{180 - np.degrees(np.arccos(FRICTION * RADIUS / ARM)):.2f}°"
-    told = [tuple(part.places) for part in course(hoist()).ranges()]
-    assert told == [("0°", limit), (limit, "90°"), ("90°", behind), (behind, "143.24°")]
 
 
 def test_ends_of_a_range_near_locking_are_where_the_margin_passes_it() -> None:
@@ -245,90 +156,25 @@ def test_a_useful_spring_drives_backward_as_a_load_does() -> None:
     np.testing.assert_allclose(found["useful_power"].values, -found["spring_power"].values[0], rtol=1e-12)
 
 
-def test_a_spring_pushes_whether_it_is_useful_or_not() -> None:
-    one, other = (locking(spring_hoist(stiffness=1e4, free_length=0.1, useful=useful), 40) for useful in (True, False))
-    np.testing.assert_array_equal(states(one), states(other))
-    np.testing.assert_array_equal(one["holding_multiple"], other["holding_multiple"])
-    assert {LockingState.BACKDRIVABLE, LockingState.SELF_LOCKING} <= set(states(one))
-    assert np.all(np.isnan(other["efficiency_reverse_instant"]))
-
-
-def lift(by_mass: bool) -> Mechanism:
-    """A slide lifts what weighs on the end of its lever: a mass, or the same force as a load."""
-    data: Data = slide_hoist().model_dump(by_alias=True, exclude_unset=True)
-    data["drivers"]["Z"] = {"speed": 1e-6, "range": [-0.1, 0.01]}
-    if by_mass:
-        data |= {"loads": {}, "gravity": [0, -9.81]}
-        data["links"]["crank"] |= {"mass": 100 / 9.81, "centre": [ARM, 0]}
-    return Mechanism(**data)
-
-
-def swing(by_mass: bool) -> Mechanism:
-    """A crank in space swings a rocker with a weight, a mass or the same force as a load."""
-    data: Data = rssr(start=0.1, friction=0.1).data
-    for name, joint in data["joints"].items():
-        joint["pin"] = {"radius": 0.013, **({"bearing": 0.02} if name in "AD" else {})}
-    for link in data["links"].values():
-        for key in ("mass", "centre", "inertia"):
-            link.pop(key, None)
-    centre = [0.06, 0.001, 0.01]
-    data["drivers"]["A"]["speed"] = 1e-4
-    data["links"]["rocker"]["points"]["W"] = centre
-    data["loads"] = {} if by_mass else {"weight": {"link": "rocker", "at": "W", "force": [0, -147.15, 0]}}
-    data["links"]["rocker"] |= {"mass": 15.0, "centre": centre} if by_mass else {}
-    return Mechanism(**data)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("lifted", [lift, swing])
-def test_a_weight_pushes_as_the_same_force_does_stated_as_a_load(lifted: Callable[[bool], Mechanism]) -> None:
-    """By `locking`, at every position and between them, and by `analyse`."""
-    (mass, load), (one, other) = (
-        [look(lifted(by_mass), 60) for by_mass in (True, False)] for look in (locking, trunnion.analyse)
-    )
-    np.testing.assert_array_equal(states(mass), states(load))
-    assert {LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD} <= set(states(mass))
-    assert {LockingState.BACKDRIVABLE, LockingState.DRIVEN_ON} & set(states(mass))
-    np.testing.assert_allclose(mass["holding_multiple"], load["holding_multiple"], rtol=1e-6)
-    for with_mass, with_load in ((mass, load), (one, other)):
-        rows = [attribute(result, "locking_ranges")["rows"] for result in (with_mass, with_load)]
-        assert [row["cells"][:3] for row in rows[0]] == [row["cells"][:3] for row in rows[1]]
-
-
-@pytest.mark.parametrize("lifted", [lift, pytest.param(swing, marks=pytest.mark.slow)])
-def test_without_useful_work_there_is_no_efficiency_and_it_says_why(lifted: Callable[[bool], Mechanism]) -> None:
+def test_without_useful_work_there_is_no_efficiency_and_it_says_why() -> None:
     """NaN, not 0: over the cycle, at each position, backward, over a sweep and as a measure."""
-    mechanism = lifted(True)
+    crank = {"points": {"A": [0, 0], "P": [ARM, 0]}, "mass": 100 / 9.81, "centre": [ARM, 0]}
+    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True) | {"loads": {}, "gravity": [0, -9.81]}
+    mechanism = Mechanism(**{**data, "links": {**data["links"], "crank": crank}})
     result = trunnion.analyse(mechanism, 12)
     assert np.isnan(float(result["efficiency"]))
     assert np.all(np.isnan(result["efficiency_instant"]))
     assert np.all(result["useful_power"] == 0)
     (row,) = [one for one in summary_of(result) if one.name == "efficiency"]
     assert (row.value, row.note) == (None, f"{NOTHING_USEFUL}: {STATE_USEFUL}")
-    run = prepare(mechanism)
-    (row,) = [one for one in report_figures(run) if one.name == "efficiency_reverse"]
-    assert NOTHING_USEFUL in row.subject
     speed = f"drivers.{next(iter(mechanism.drivers))}.speed"
     swept = trunnion.sweep(mechanism, {speed: [1e-6, 2e-6]}, steps=12)
     assert np.all(np.isnan(swept["efficiency"]))
-    (told,) = [one for one in attribute(swept, "findings") if one["code"] == "sweep.no_efficiency"]
-    assert NOTHING_USEFUL in told["what"]
     with pytest.raises(trunnion.MechanismError, match=NOTHING_USEFUL):
         trunnion.sweep(mechanism, {speed: [1e-6, 2e-6]}, steps=12, measures=["efficiency:cycle"])
 
 
-@pytest.mark.parametrize(("useful", "said"), [(True, True), (False, False)])
-def test_a_load_beside_the_drive_is_told_where_another_is_useful(useful: bool, said: bool) -> None:
-    """As of a hand; where no load is marked, it is one of the useful ones."""
-    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
-    data["loads"]["weight"]["useful"] = useful
-    data["loads"]["hand"] = {"link": "crank", "at": "P", "force": [0.0, 10.0]}
-    codes = [row["code"] for row in attribute(locking(Mechanism(**data), 8), "findings")]
-    assert ("locking.load_beside_drive" in codes) == said
-    assert "locking.load_beside_drive" not in [row["code"] for row in attribute(locking(hoist(), 8), "findings")]
-
-
-@pytest.mark.parametrize("last", np.linspace(1.2, 2.5, 14))
+@pytest.mark.parametrize("last", [1.2, 1.9, 2.5])
 def test_without_friction_all_that_a_useful_spring_stored_comes_back(last: float) -> None:
     """Wherever the range ends: nothing but the spring supplies work, and rounding makes no other answer."""
     data = spring_hoist(stiffness=1e4, free_length=0.1, useful=True).with_friction("off")
@@ -337,30 +183,6 @@ def test_without_friction_all_that_a_useful_spring_stored_comes_back(last: float
     assert row.value == pytest.approx(1.0, rel=1e-12)
     assert row.value <= 1.0
     assert not row.note
-
-
-def test_work_that_other_springs_supply_backward_is_named() -> None:
-    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
-    data["links"]["ground"]["points"]["Q"] = [0, -0.1]
-    data["springs"] = {"s": {"between": ["ground.Q", "crank.P"], "stiffness": 1e5, "free_length": 0.1}}
-    data["drivers"]["A"]["range"] = [0.0, 1.4]
-    run = prepare(Mechanism(**data))
-    (row,) = [one for one in report_figures(run) if one.name == "efficiency_reverse"]
-    assert row.value is None
-    assert row.note == "springs supply work too"
-
-
-@pytest.mark.parametrize(("first", "last", "note"), [
-    (0.2, 1.2, ""), (1.3, 1.5, "self-locking"), (0.2, 1.5, "the mean; see the ranges of `locking`"),
-    (0.2, 2.3, "it takes work on the whole; see the ranges of `locking`"),
-])  # fmt: skip
-def test_a_mean_is_called_self_locking_only_where_it_holds_all_along(first: float, last: float, note: str) -> None:
-    """Whatever its sign; in `analyse` as in `locking`."""
-    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
-    data["drivers"]["A"]["range"] = [first, last]
-    run = prepare(Mechanism(**data))
-    for figures in (report_figures(run), summary_of(trunnion.analyse(Mechanism(**data), 30))):
-        assert [one.note for one in figures if one.name == "efficiency_reverse" and one.value] == [note]
 
 
 @pytest.mark.parametrize("load", [-40.0, 40.0])
@@ -470,8 +292,3 @@ def test_a_short_range_ends_where_the_loads_cease_to_push() -> None:
     powers = passed(found.run, found.run.walk(inside).backward(), FrictionMethod()).acting
     assert np.all(powers[1:-1] > 0)
     np.testing.assert_allclose(powers[[0, -1]], 0.0, atol=1e-5 * np.max(powers))
-
-
-def test_states_are_read_of_few_positions() -> None:
-    """Passages of powers are read of their courses: nothing is solved to locate them."""
-    assert course(Mechanism.read(EXAMPLES / "fourbar-with-play.yaml")).course.courses.asked <= 300

@@ -11,16 +11,13 @@ from scipy import optimize
 from scipy.spatial.transform import Rotation
 
 import trunnion
-from brief import brief
-from measured import figures, many, reads
-from mechanisms import DURANGO, Data, build, four_bar, slider_crank
+from measured import figures, many
+from mechanisms import DURANGO, build, four_bar, slider_crank
 from mechanisms_space import rssr
-from trunnion import Mechanism, MechanismError
+from trunnion import Mechanism
 from trunnion.algebra.dual import Dual, derivative, primal
-from trunnion.measures.evaluation import where_known
-from trunnion.measures.figures import within_limits
-from trunnion.measures.measures import Measure, coordinate_unit, named
-from trunnion.measures.positions import moved, plan
+from trunnion.measures.measures import Measure
+from trunnion.measures.positions import plan
 from trunnion.model.measure_table import MEASURES, STATISTICS
 from trunnion.results.attributes import summary_of
 from trunnion.results.figure import MORE_THAN
@@ -77,14 +74,6 @@ def wrapped(angle: Any) -> Any:
 SIZES = {"links.crank.points.B.x": 0, "links.rod.points.P.x": 1, "links.ground.points.C.y": 2}
 
 
-def test_stroke_and_dead_centres_of_a_slider_crank(crank: Run) -> None:
-    found = figures(crank, [STROKE, FAR, NEAR, RATIO], 180)
-    assert found["stroke"] == pytest.approx(stroke_of(), abs=1e-13)
-    assert found["ratio"] == pytest.approx(ratio_of(), abs=1e-9)
-    assert wrapped(found["far"] - far_of()) == pytest.approx(0, abs=1e-11)
-    assert wrapped(found["near"] - near_of()) == pytest.approx(0, abs=1e-9)
-
-
 def test_of_many_samples(crank: Run) -> None:
     """The same closed forms with crank, rod and guide of every sample, and with driver speeds of their own."""
     rng = np.random.default_rng(3)
@@ -118,15 +107,13 @@ def test_dead_centres_of_the_four_bar(durango: Run) -> None:
     """14.361511563° and 212.157208609°, known to all digits."""
     most = Measure("most", "dead_centre", "D")
     least = Measure("least", "dead_centre", "D", statistic="place-of-minimum")
-    for steps, close in ((360, 2e-8), (720, 2e-9)):
-        found = figures(durango, [most, least], steps)
-        assert np.degrees(found["most"]) % 360 == pytest.approx(212.157208609, abs=close)
-        assert np.degrees(found["least"]) % 360 == pytest.approx(14.361511563, abs=close)
+    found = figures(durango, [most, least], 720)
+    assert np.degrees(found["most"]) % 360 == pytest.approx(212.157208609, abs=2e-9)
+    assert np.degrees(found["least"]) % 360 == pytest.approx(14.361511563, abs=2e-9)
 
 
-@pytest.mark.parametrize("steps", [60, 360])
-@pytest.mark.parametrize("pivots", [25, 60, 90, 120 / 1.01, 120 / 1.0025, 120 / 1.00025, 300])
-def test_time_ratio_of_a_quick_return(pivots: float, steps: int) -> None:
+@pytest.mark.parametrize("pivots", [25, 90, 120 / 1.00025, 300])
+def test_time_ratio_of_a_quick_return(pivots: float) -> None:
     """Ram in line with the lever's pivot. Inside the crank's circle the lever turns right round (Whitworth) and stands
     along the guide at both ends of the shorter way, φ = 2 acos(d/r) of the crank; outside it rocks, φ = 2 acos(r/d).
     """
@@ -135,7 +122,7 @@ def test_time_ratio_of_a_quick_return(pivots: float, steps: int) -> None:
     joint = "G" if pivots < 120 else "C"
     for law in ({"speed": "40 rpm"}, {"speed": "-3 rad/s", "start": "1 rad"}):
         run = prepare(Mechanism(**{**whitworth.data(), "drivers": {"O": law}}))
-        found = figures(run, [Measure("ratio", "time_ratio", joint), Measure("stroke", "stroke", joint)], steps)
+        found = figures(run, [Measure("ratio", "time_ratio", joint), Measure("stroke", "stroke", joint)], 60)
         ratio = (2 * np.pi - short) / short
         assert found["ratio"] == pytest.approx(ratio, rel=max(1e-7, 1e-8 * ratio))
         stroke = 200e-3 if pivots < 120 else 2 * np.arcsin(120 / pivots)
@@ -145,11 +132,10 @@ def test_time_ratio_of_a_quick_return(pivots: float, steps: int) -> None:
 def test_time_ratio_where_the_lever_goes_through_its_pivot() -> None:
     """The crank as long as the pivots are apart: the lever jumps by half a turn, and there is no ratio."""
     whitworth = trunnion.read(EXAMPLES / "whitworth-quick-return.yaml").with_values({"d": "120 mm"})
-    for steps in (60, 360):
-        assert np.isnan(figures(prepare(whitworth), [Measure("ratio", "time_ratio", "G")], steps)["ratio"])
+    assert np.isnan(figures(prepare(whitworth), [Measure("ratio", "time_ratio", "G")], 60)["ratio"])
 
 
-@pytest.mark.parametrize("short", [0.0, 1e-3, 1e-6])
+@pytest.mark.parametrize("short", [0.0, 1e-6])
 def test_time_ratio_of_a_slider_crank_that_can_just_turn(short: float) -> None:
     """φ = asin(e/(l − r)) − asin(e/(l + r)); as the offset e nears l − r the inner dead centre becomes a sharp one."""
     offset = trunnion.read(EXAMPLES / "offset-slider-crank.yaml")
@@ -157,15 +143,14 @@ def test_time_ratio_of_a_slider_crank_that_can_just_turn(short: float) -> None:
     e = (length - r) * (1 - short) if short else 0.5 * (length - r)
     run = prepare(offset.with_values({"e": f"{float(e)!r} m"}))
     turn = np.arcsin(e / (length - r)) - np.arcsin(e / (length + r))
-    for steps in (60, 360):
-        found = figures(run, [Measure("ratio", "time_ratio", "S"), Measure("stroke", "stroke", "S")], steps)
-        assert found["ratio"] == pytest.approx((np.pi + turn) / (np.pi - turn), rel=1e-7)
-        ends = np.sqrt((length + r) ** 2 - e**2) - np.sqrt((length - r) ** 2 - e**2)
-        assert found["stroke"] == pytest.approx(ends, rel=1e-8)
+    found = figures(run, [Measure("ratio", "time_ratio", "S"), Measure("stroke", "stroke", "S")], 60)
+    assert found["ratio"] == pytest.approx((np.pi + turn) / (np.pi - turn), rel=1e-7)
+    ends = np.sqrt((length + r) ** 2 - e**2) - np.sqrt((length - r) ** 2 - e**2)
+    assert found["stroke"] == pytest.approx(ends, rel=1e-8)
 
 
 def test_time_ratio_is_of_a_whole_turn(durango: Run) -> None:
-    """None of a crank that turns on, nor of a part of a turn, which says so; 197.80° and 162.20° of the four-bar."""
+    """None of a crank that turns on, nor of a part of a turn; 197.80° and 162.20° of the four-bar."""
     ratio, round_ = Measure("ratio", "time_ratio", "D"), Measure("round", "time_ratio", "A")
     found = figures(durango, [ratio, round_], 720)
     assert found["ratio"] == pytest.approx(197.795697046 / (360 - 197.795697046), rel=1e-9)
@@ -174,9 +159,6 @@ def test_time_ratio_is_of_a_whole_turn(durango: Run) -> None:
     part = Mechanism(**{**data, "drivers": {"A": {"speed": 1.0, "range": [0, 5]}}})
     (told,) = [one for one in trunnion.analyse(part, 24).trunnion.summary if one.name == "ratio"]
     assert told.value is None
-    assert "repeats" in told.note
-    with pytest.raises(MechanismError, match="is over all of it"):
-        Mechanism(**{**data, "measures": {"ratio": {"time_ratio": "D", "over": [0, 1]}}}).check()
 
 
 def test_dead_centre_outside_its_window(durango: Run) -> None:
@@ -200,23 +182,6 @@ def test_rotation_over_whole_turns(durango: Run) -> None:
     found = figures(durango, [turn, third], 90)
     assert found["turn"] == pytest.approx(2 * np.pi, abs=1e-12)
     assert found["third"] == pytest.approx(np.radians(120), abs=1e-12)
-
-
-def test_at_a_place(durango: Run) -> None:
-    """Only its own position is needed, and that exactly."""
-    at = Measure("at", "rotation", "D", at=np.radians(61.37))
-    time = Measure("time", "rotation", "D", at=0.0123, timed=True)
-    both = plan(durango, [at, time], 360)
-    assert len(both.times) == 2
-    exact = durango.solve(both.times).walk
-    want = dict.fromkeys(("c", "s"), exact.motions["rocker"].frame)
-    angles = np.arctan2(want["s"].s, want["c"].c)
-    moments = {name: int(window.index[0]) for name, window in both.windows.items()}
-    found = figures(durango, [at, time])
-    for name in ("at", "time"):
-        assert found[name] == pytest.approx(angles[moments[name]], abs=1e-14)
-    coordinate = durango.system.drive(durango.values, "A", both.times)[0]
-    assert coordinate[moments["at"]] == pytest.approx(np.radians(61.37), abs=1e-14)
 
 
 def test_deviation_and_path_error(crank: Run) -> None:
@@ -243,7 +208,7 @@ def test_deviation_and_path_error(crank: Run) -> None:
 def test_angles_over_the_cut(durango: Run) -> None:
     """Where an angle jumps from π to −π its deviation does not."""
     data = four_bar()
-    for start in np.linspace(0, 2 * np.pi, 9):
+    for start in np.linspace(0, 2 * np.pi, 3, endpoint=False):
         data["drivers"] = {"A": {"speed": 2.0, "start": float(start)}}
         run = prepare(build(data))
         measures = [Measure(f"a{link}", "angle", link) for link in ("crank", "coupler", "rocker")]
@@ -286,18 +251,6 @@ def test_straightness_of_hoeckens_line() -> None:
         assert found[name] == pytest.approx(width(point.real, point.imag), rel=2e-4)
 
 
-def test_straightness_of_chebyshevs_line() -> None:
-    """Its middle over the part of its path between both ends of the line; its driver is between two moving links."""
-    run = prepare(trunnion.read(EXAMPLES / "chebyshev-line.yaml"))
-    line = Measure("line", "straightness", "coupler.P", over=(np.radians(60), np.radians(180)))
-    found = figures(run, [line], 720)["line"]
-    turn = np.exp(1j * np.radians(np.linspace(60, 180, 200_001)))
-    arm = 5 + 2 * turn
-    c = corner(0j, 4, np.abs(arm), 5, 1)
-    point = 0.03 * (5 + turn) * c / arm
-    assert found == pytest.approx(width(point.real, point.imag), rel=1e-3)
-
-
 def test_straightness_of_a_circle_and_of_a_line(crank: Run) -> None:
     """As wide as it is long; and the path of the piston, which is straight."""
     pin = Measure("pin", "straightness", "crank.B")
@@ -320,18 +273,14 @@ def test_derivative_of_a_straightness() -> None:
 def test_straightness_in_space() -> None:
     """A path in a plane of space is as straight as in the plane, if it lies evenly about its line."""
     run = prepare(trunnion.read(EXAMPLES / "fourbar-in-space.yaml"))
-    link, point = next(
-        (link, point) for link, point in run.system.points if link not in run.system.mechanism.fixed_link
-    )
-    for name in (f"{link}.{point}",):
-        found = figures(run, [Measure("line", "straightness", name)], 180)["line"]
-        times = run.cycle.times(180)
-        walk = run.solve(times).walk
-        xyz = np.array([np.broadcast_to(n, times.shape) for n in walk.point(link, point).place])
-        centred = xyz - xyz.mean(axis=1, keepdims=True)
-        along = np.linalg.svd(centred)[0][:, 0]
-        rest = centred - np.outer(along, along @ centred)
-        assert found == pytest.approx(2 * np.max(np.linalg.norm(rest, axis=0)), rel=1e-4)
+    link, point = next((link, point) for link, point in run.system.points if link != run.system.mechanism.fixed_link)
+    found = figures(run, [Measure("line", "straightness", f"{link}.{point}")], 180)["line"]
+    times = run.cycle.times(180)
+    xyz = np.array([np.broadcast_to(n, times.shape) for n in run.solve(times).walk.point(link, point).place])
+    centred = xyz - xyz.mean(axis=1, keepdims=True)
+    along = np.linalg.svd(centred)[0][:, 0]
+    rest = centred - np.outer(along, along @ centred)
+    assert found == pytest.approx(2 * np.max(np.linalg.norm(rest, axis=0)), rel=1e-4)
 
 
 # ---- forces ---------------------------------------------------------------------------------------------------
@@ -340,37 +289,6 @@ def test_straightness_in_space() -> None:
 def loaded() -> Run:
     """A slider-crank whose load does work."""
     return prepare(trunnion.read(EXAMPLES / "offset-slider-crank.yaml"))
-
-
-@pytest.mark.slow
-def test_forces_are_those_of_the_analysis() -> None:
-    run = loaded()
-    mechanism, steps = run.system.mechanism, 360
-    result = trunnion.analyse(mechanism, steps)
-    driver, joint = next(iter(mechanism.drivers)), next(iter(run.system.joints))
-    dense = brief(mechanism, 36_000)
-    effort, reaction = dense["drive_effort"].values[0], dense["reaction_force"].sel(joint=joint).values
-    size = np.hypot(*reaction[:2])
-    measures = [
-        Measure("most", "effort", driver, statistic="maximum"),
-        Measure("rms", "effort", driver, statistic="rms"),
-        Measure("mean", "effort", driver, statistic="mean"),
-        Measure("size", "reaction", joint, statistic="maximum"),
-        Measure("across", "reaction", joint, "y", statistic="largest"),
-        Measure("efficiency", "efficiency", "cycle"),
-        Measure("margin", "locking_margin", "mechanism"),
-        Measure("now", "efficiency", "instant", at=run.cycle.times(steps)[40], timed=True),
-    ]
-    found = figures(run, measures, steps)
-    assert found["rms"] == pytest.approx(float(result["drive_effort_rms"][0]), rel=1e-6)
-    assert found["mean"] == pytest.approx(np.mean(effort), rel=1e-5)
-    for name, curve in {"most": effort, "size": size, "across": np.abs(reaction[1])}.items():
-        assert 0 <= found[name] - np.max(curve) < 1e-4 * np.ptp(curve)
-    rows = {row.name: row.value for row in summary_of(result)}
-    assert found["efficiency"] == pytest.approx(rows["efficiency"], rel=1e-7)
-    least = np.nanmin(result["locking_margin"].values)
-    assert found["margin"] <= least + 1e-12
-    assert found["now"] == pytest.approx(float(result["efficiency_instant"].values[40]), rel=1e-9, nan_ok=True)
 
 
 @pytest.mark.slow
@@ -388,14 +306,12 @@ def test_locking_margin() -> None:
     assert float(np.ravel(primal(slope))[0]) == pytest.approx(found, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    "data", [four_bar(), pytest.param(rssr(friction=0.05).data, marks=pytest.mark.slow)], ids=["plane", "space"]
-)
-def test_a_locking_margin_beyond_what_is_looked_for_is_infinite(data: Data) -> None:
+def test_a_locking_margin_beyond_what_is_looked_for_is_infinite() -> None:
     """In a result, a sweep and samples; the summary says "more than"; its place does not exist."""
     statistics = ["minimum", "mean", "place-of-minimum"]
     measures = {name: {"locking_margin": "mechanism", "as": name} for name in statistics}
     measures["minimum"]["at_least"] = 2
+    data = four_bar()
     mechanism = build({**data, "measures": measures}, friction=0.05)
     result = trunnion.analyse(mechanism, 12)
     np.testing.assert_array_equal(result["measure_figure"], [np.inf, np.inf, np.nan])
@@ -407,22 +323,6 @@ def test_a_locking_margin_beyond_what_is_looked_for_is_infinite(data: Data) -> N
     assert np.all(np.isinf(swept["minimum"]))
     studied = trunnion.tolerance(mechanism.with_values({mass: "1 kg ± 0.1 kg"}), ["minimum"], samples=20)
     assert (studied["nominal"][0], studied["yield"][0]) == (np.inf, 1)
-
-
-def test_forces_in_space() -> None:
-    """Efforts and reactions of an RSSR with friction are those of the analysis."""
-    run = prepare(Mechanism(**rssr(friction=0.1).data))
-    result = brief(run.system.mechanism, 7200)
-    joint = next(iter(run.system.joints))
-    measures = [
-        Measure("z", "reaction", joint, "z", statistic="mean"),
-        Measure("size", "reaction", joint, statistic="mean"),
-    ]
-    found = figures(run, measures, 36)
-    reaction = result["reaction_force"].sel(joint=joint).values
-    size = np.linalg.norm(reaction, axis=0).mean()
-    assert found["z"] == pytest.approx(np.mean(reaction[2]), abs=1e-4 * size)
-    assert found["size"] == pytest.approx(size, rel=1e-4)
 
 
 def test_means_over_part_of_a_turn() -> None:
@@ -441,16 +341,6 @@ def test_means_over_part_of_a_turn() -> None:
     for name in ("mean", "rms", "line"):
         assert off[0][name] < 1e-5 * abs(exact[name])
         assert off[1][name] < off[0][name] / 100 or off[1][name] < 1e-12
-
-
-@pytest.mark.parametrize("model", ["offset-slider-crank", "rssr", "klann"])
-def test_efficiency_as_a_measure_is_that_of_the_analysis(model: str) -> None:
-    """However many positions there are, of the cycle as of samples."""
-    mechanism = trunnion.read(EXAMPLES / f"{model}.yaml")
-    run, measure = prepare(mechanism), Measure("efficiency", "efficiency", "cycle")
-    value = float(trunnion.analyse(mechanism, 60)["efficiency"])
-    for steps in (60, 333):
-        assert figures(run, [measure], steps)["efficiency"] == pytest.approx(value, rel=1e-4)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-7])
@@ -481,73 +371,7 @@ def test_turn_of_a_link_in_space(scale: float) -> None:
         assert float(np.ravel(derivative(slopes[axis]))[0]) == pytest.approx(slope, rel=1e-6, abs=1e-7)
 
 
-def test_derivative_of_a_peak_and_of_the_efficiency() -> None:
-    """By dual numbers and by two figures each."""
-    run = loaded()
-    driver = next(iter(run.system.mechanism.drivers))
-    measures = [
-        Measure("most", "effort", driver, statistic="maximum"),
-        Measure("where", "effort", driver, statistic="place-of-maximum"),
-        Measure("rms", "effort", driver, statistic="rms"),
-        Measure("efficiency", "efficiency", "cycle"),
-    ]
-    path = next(path for path in run.values if path.endswith(".mass") and run.values[path] > 0)
-    mass = float(run.values[path])
-    slopes = figures(run, measures, 720, {path: Dual(mass, 1.0)})
-    ends = figures(run, measures, 720, {path: mass * np.array([[1 + 1e-6], [1 - 1e-6]])})
-    for name, both in ends.items():
-        slope = (both[0] - both[1]) / (2e-6 * mass)
-        assert float(np.ravel(derivative(slopes[name]))[0]) == pytest.approx(slope, rel=1e-4, abs=1e-8), name
-
-
 # ---- speeds and loads of joints -------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("model", "joints"), [("slider-crank", ["O", "P"]), ("pezzuti-cardan", ["input", "output"])])
-def test_speeds_and_what_loads_take(model: str, joints: list[str]) -> None:
-    """Speeds as the books have them; torque of the load times speed is the useful power."""
-    mechanism = trunnion.read(EXAMPLES / f"{model}.yaml")
-    loads = [name for name, load in mechanism.loads.items() if load.joint]
-    run = prepare(mechanism)
-    found = brief(mechanism, 24)
-    measures = named(mechanism, [*(f"rate:{one}" for one in joints), *(f"load:{one}" for one in loads)], run.values)
-    back = run.solve(run.cycle.times(24))
-    curves = {one.name: np.broadcast_to(one.curve(back)[0], 24) for one in measures}
-    for joint in joints:
-        np.testing.assert_allclose(
-            curves[f"rate:{joint}"], found["joint_rotation_velocity"].sel(joint=joint), rtol=1e-12
-        )
-    taken = sum(curves[f"load:{one}"] * curves[f"rate:{mechanism.loads[one].joint}"] for one in loads)
-    if loads:
-        np.testing.assert_allclose(taken, found["useful_power"], rtol=1e-12)
-        assert [one.unit(run.system) for one in measures] == ["rad/s"] * len(joints) + ["N m"] * len(loads)
-
-
-def test_force_and_elongation_of_springs() -> None:
-    """Between two points, N and m, and in a pin, N m and rad, as the result of an analysis has them."""
-    data = slider_crank(R, L, E)
-    data["springs"] = {
-        "line": {"between": ["ground.A", "rod.P"], "stiffness": "1 kN/m", "free_length": "0.2 m", "damping": "3 N s/m"},
-        "coil": {"joint": "P", "stiffness": "2 N m/rad", "free_angle": "10 deg"},
-    }
-    run = prepare(build(data))
-    found = brief(run.system.mechanism, 24)
-    names = [f"{kind}:{one}" for one in data["springs"] for kind in ("spring_force", "spring_elongation")]
-    measures = named(run.system.mechanism, names, run.values)
-    assert [one.unit(run.system) for one in measures] == ["N", "m", "N m", "rad"]
-    back = run.solve(run.cycle.times(24))
-    for one in measures:
-        expected = found[one.kind].sel(spring=one.subject)
-        np.testing.assert_allclose(np.broadcast_to(one.curve(back)[0], 24), expected, rtol=1e-12, err_msg=one.name)
-    with pytest.raises(MechanismError, match="there is no spring 'C'"):
-        named(run.system.mechanism, ["spring_force:C"], run.values)
-
-
-def test_no_load_where_the_joint_rests(crank: Run) -> None:
-    """A crank at a dead centre: the slide rests, and what the load takes there has no value."""
-    measure = Measure("press", "load", "press")
-    time = np.array([0.1, 0.3]) * crank.cycle.duration
-    np.testing.assert_allclose(np.abs(measure.curve(crank.solve(time))[0]), 30.0, rtol=1e-12)
 
 
 # ---- every kind with every statistic --------------------------------------------------------------------------
@@ -568,7 +392,6 @@ SUBJECTS = {
 
 # the others: `test_measures_in_time`, `test_expressions_of_measures`
 OF_CYCLES = [kind for kind, one in MEASURES.items() if not one.in_time and kind != "expression"]
-UNITS = {quantity.unit for kind in MEASURES.values() for quantity in kind.quantities}
 
 
 def every_measure() -> list[Measure]:
@@ -610,36 +433,6 @@ def test_every_kind_with_every_statistic(crank: Run) -> None:
         assert np.all((read.least <= read.most) | np.isnan(read.most))
 
 
-@pytest.mark.slow
-def test_limits_and_bounds(crank: Run) -> None:
-    """Signed limits of the deviation at all positions; bounds of the figure; no answer keeps none."""
-    raised = {"links.ground.points.C.y": E + np.array([[1e-3], [-1e-3], [3e-3], [5.0]])}
-    cases = {
-        (-2e-3, 2e-3): [True, True, False, False],
-        (-5e-4, 2e-3): [True, False, False, False],
-        (None, 5e-4): [False, True, False, False],
-    }
-    for (lower, upper), expected in cases.items():
-        height = Measure("height", "point", "piston.P", "y", lower, upper)
-        read = reads(crank, [height], raised)["height"]
-        assert list(within_limits(height, read.figure, read.least, read.most)) == expected
-    bound = Measure("stroke", "stroke", "C", at_least=stroke_of() - 1e-6, at_most=stroke_of() + 1e-6)
-    longer = {"links.crank.points.B.x": R + np.array([[0.0], [1e-6], [-1e-6]])}
-    read = reads(crank, [bound], longer)["stroke"]
-    assert list(within_limits(bound, read.figure, read.least, read.most)) == [True, False, False]
-
-
-def test_known_by_status() -> None:
-    codes = np.array([code.value for code in trunnion.Status], np.int8)
-    motion, force = Measure("a", "angle", "rod"), Measure("T", "effort", "A")
-    margin = Measure("m", "locking_margin", "mechanism")
-    count = {
-        one.kind: int(np.count_nonzero(np.isfinite(where_known(one, codes, 0.0 * codes))))
-        for one in (motion, force, margin)
-    }
-    assert count["effort"] < count["locking_margin"] < count["angle"] < len(codes)
-
-
 # ---- positions ------------------------------------------------------------------------------------------------
 
 
@@ -660,95 +453,3 @@ def test_place_of_a_law_that_is_not_steady() -> None:
     found = figures(run, [at, near], 360)
     assert found["at"] == pytest.approx(2.7, abs=1e-13)
     assert found["near"] == pytest.approx(near_of(), abs=1e-9)
-
-
-def test_positions_stay_with_speeds_and_starts() -> None:
-    """Samples whose driver runs at other speeds, from other places or over another time are at the same coordinates."""
-    rng = np.random.default_rng(1)
-    change = 1 + 0.1 * rng.uniform(-1, 1, (20, 1))
-    for driver, path, value in (
-        ({"speed": 3.0}, "drivers.A.speed", 3.0),
-        ({"speed": 3.0, "start": 0.4}, "drivers.A.start", 0.4),
-        (RISE, "drivers.A.duration", 2.0),
-    ):
-        run = press(**driver)
-        at = Measure("at", "rotation", "A", at=1.1)
-        grid = Measure("grid", "slide", "C")
-        positions = plan(run, [at, grid], 36)
-        parameters = run.system.mechanism.parameters
-        values = parameters({path: value * change})
-        times = moved(run, values, positions.times)
-        assert np.shape(times) == (20, 37)
-        before = run.system.drive(run.values, "A", positions.times)[0]
-        np.testing.assert_allclose(
-            run.system.drive(values, "A", times)[0], np.broadcast_to(before, (20, 37)), atol=1e-12
-        )
-        slope = derivative(moved(run, parameters({path: Dual(value, 1.0)}), positions.times))
-        ends = [moved(run, parameters({path: value + sign * 1e-6}), positions.times) for sign in (1, -1)]
-        inner = slice(2, -2)
-        np.testing.assert_allclose(slope[inner], ((ends[0] - ends[1]) / 2e-6)[inner], rtol=1e-5, atol=1e-7)
-
-
-def test_no_other_positions_than_needed(durango: Run) -> None:
-    at = Measure("at", "rotation", "D", at=1.0)
-    over = Measure("over", "rotation", "D", over=(0.5, 1.0), statistic="rms")
-    whole = Measure("whole", "rotation", "D")
-    assert len(plan(durango, [at], 360).times) == 1
-    assert len(plan(durango, [whole], 360).times) == 360
-    both = plan(durango, [at, over, whole], 360)
-    assert len(both.times) == 362  # both ends of the window, one of which is the place too
-    assert len(both.windows["over"].index) < 40
-    turn = Measure("turn", "rotation", "D", over=(0.0, 2 * np.pi), statistic="rms")
-    assert plan(durango, [turn], 36).windows["turn"].index.tolist() == list(range(36))
-
-
-@pytest.mark.parametrize(
-    ("driver", "measure", "expected"),
-    [
-        ({**RISE, "returns": True}, FAR, "a coordinate of 'A', which is not unique"),
-        (RISE, Measure("a", "slide", "C", at=3.0), "171.887 deg is outside the range of 'A', 11.4592 to 137.51 deg"),
-        (RISE, Measure("a", "slide", "C", at=3.0, timed=True), "3 s is not in the cycle, which lasts 2 s"),
-        ({**RISE, "returns": True}, Measure("a", "slide", "C", at=1.0), "is not unique"),
-        ({"speed": 3.0}, Measure("a", "slide", "C", over=(0.0, 7.0)), "the window is 7 wide, the cycle 6.28319"),
-        (RISE, Measure("a", "slide", "C", over=(1.0, 1.0)), "the window is empty"),
-    ],
-)
-def test_places_that_are_not(driver: Any, measure: Measure, expected: str) -> None:
-    with pytest.raises(MechanismError, match=expected):
-        plan(press(**driver), [measure], 36)
-
-
-def test_names(crank: Run) -> None:
-    """On the command line: kinds, axes, statistics before them, and none of what means nothing."""
-    forms = {
-        "effort:A": ("effort", "A", "", "deviation"),
-        "maximum:effort:A": ("effort", "A", "", "maximum"),
-        "rms:piston.P.x": ("point", "piston.P", "x", "rms"),
-        "reaction:P": ("reaction", "P", "", "deviation"),
-        "peak-to-peak:reaction:P.y": ("reaction", "P", "y", "peak-to-peak"),
-        "efficiency:cycle": ("efficiency", "cycle", "", "ratio"),
-        "minimum:efficiency:instant": ("efficiency", "instant", "", "minimum"),
-        "locking_margin:mechanism": ("locking_margin", "mechanism", "", "minimum"),
-        "path_error:piston.P": ("path_error", "piston.P", "", "maximum"),
-        "straightness:rod.P": ("straightness", "rod.P", "", "line"),
-        "stroke:C": ("stroke", "C", "", "peak-to-peak"),
-        "dead_centre:C": ("dead_centre", "C", "", "dead centre"),
-        "place-of-minimum:dead_centre:C": ("dead_centre", "C", "", "dead centre, least"),
-        "time_ratio:C": ("time_ratio", "C", "", "time ratio"),
-        "transmission_error:C": ("transmission_error", "C", "", "deviation"),
-    }
-    read = named(crank.system.mechanism, forms, crank.values)
-    assert {one.name: (one.kind, one.subject, one.axis, one.rule) for one in read} == forms
-    wrong = (
-        "maximum:A",
-        "sum:effort:A",
-        "effort",
-        "piston.P",
-        "maximum:effort:Q",
-        "efficiency:A",
-        "piston.P.x:maximum",
-    )
-    for name in wrong:
-        with pytest.raises(MechanismError):
-            named(crank.system.mechanism, [name], crank.values)
-    assert coordinate_unit(crank.system, crank.values) == "rad"

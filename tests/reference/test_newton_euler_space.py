@@ -11,12 +11,14 @@ import functools
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import trunnion
 from brief import brief
 from mechanisms_space import MODELS, cardan, rssr
-from reference.maximal_space import Array, Data, Drive, Frame, Motion, unrolled
-from reference.newton_euler_space import Solution
+from reference.maximal_space import Array, Data, Drive, Frame, Motion, rotation, unrolled
+from reference.mujoco_space import Engine, quaternion
+from reference.newton_euler_space import Body, Joint, Load, Solution, solve
 from reference.space_oracle import Oracle
 
 STEPS = 9
@@ -160,20 +162,6 @@ def test_forces_without_friction(name: str) -> None:
         compared.forces_agree(i, found, 1e-10)
 
 
-@pytest.mark.spread(1)
-@pytest.mark.parametrize("name", FAST)
-def test_forces_with_given_friction(name: str) -> None:
-    """The oracle is told the friction of the result as a load."""
-    compared = comparison(name, True)
-    rubs = 0.0
-    for i in compared.positions:
-        motions = compared.motion(i)
-        friction = compared.friction(i, motions)
-        rubs = max([rubs, *(float(np.linalg.norm(load)) for load in friction.values())])
-        compared.forces_agree(i, compared.oracle.balance(motions, friction), 1e-10)
-    assert rubs > 0
-
-
 @pytest.mark.spread(1, "RSUR")  # the only one with a cross, whose two pins are felt by each other
 @pytest.mark.parametrize("name", NAMES)
 def test_forces_with_friction_by_its_law(name: str) -> None:
@@ -221,3 +209,120 @@ def skew_part(matrix: Array) -> Array:
     """w of the antisymmetric part [w]×."""
     half = (matrix - matrix.T) / 2
     return np.array([half[2, 1], half[0, 2], half[1, 0]])
+
+
+def test_skew_rotor() -> None:
+    """A disc fixed askew on a shaft that turns at Ω: the couple ½ (C − A) Ω² sin 2φ across the shaft."""
+    phi, spin, a, c = 0.3, 20.0, 0.02, 0.035
+    tilt = rotation([0, 1, 0], phi)
+    inertia = tilt @ np.diag([a, a, c]) @ tilt.T
+    disc = Body(2.0, inertia, np.zeros(3), np.zeros(3), [0, 0, spin], np.zeros(3))
+    found = solve({"disc": disc}, {"shaft": Joint("revolute", None, "disc", np.zeros(3), driven=True)})
+    expected = [0, 0.5 * (c - a) * spin**2 * np.sin(2 * phi) * -1, 0]
+    np.testing.assert_allclose(np.abs(found.moment["shaft"]), np.abs(expected), rtol=1e-13, atol=1e-13)
+    axis = tilt[:, 2]
+    exact = np.cross([0, 0, spin], a * np.array([0, 0, spin]) + (c - a) * (axis @ [0, 0, spin]) * axis)
+    np.testing.assert_allclose(found.moment["shaft"], exact, rtol=1e-13, atol=1e-13)
+    assert abs(found.effort["shaft"]) < 1e-13
+
+
+def test_top_in_steady_precession() -> None:
+    """A heavy top on its tip, at 90°: m g l = C n Ω (slow precession), so the tip needs no moment."""
+    c, a, n, m, length, g = 0.02, 0.05, 80.0, 1.2, 0.3, 9.81
+    big = m * g * length / (c * n)
+    about, spin, arm = np.array([0, 0, big]), np.array([n, 0, 0]), np.array([length, 0, 0])
+    centre = np.cross(about, np.cross(about, arm))
+    top = Body(m, np.diag([c, a, a]), arm, centre, about + spin, np.cross(about, spin))
+    found = solve({"top": top}, {"tip": Joint("fixed", None, "top", np.zeros(3))}, [0, 0, -g])
+    np.testing.assert_allclose(found.moment["tip"], 0, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found.force["tip"], [-m * big**2 * length, 0, m * g], rtol=1e-13)
+
+
+def test_screw_press() -> None:
+    """A screw pushed by W along its axis: the torque W p/2π of the driven thread, and no reaction turns it."""
+    push, pitch = 500.0, 0.01
+    screw = Body(0.0, np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), [Load(force=[0, 0, -push])])
+    joint = Joint("helical", None, "screw", np.zeros(3), pitch=pitch, driven=True)
+    found = solve({"screw": screw}, {"thread": joint})
+    assert found.effort["thread"] == pytest.approx(push * pitch / (2 * np.pi), rel=1e-14)
+    np.testing.assert_allclose(found.force["thread"], [0, 0, push], rtol=1e-14)
+
+
+FEW = 8
+SHAFTS: dict[str, Data] = {
+    "Cardan joint of Pezzuti": cardan(),
+    "Cardan joint at 45 degrees under gravity": {**cardan(0.08, 45.0, 0.5, 30.0), "gravity": [3.0, -5.0, 8.0]},
+}
+IN_MUJOCO = [
+    "RSSR of the theory",
+    *SHAFTS,
+    *("RSSP", "RCCC", "RRRSR", "RSUR", "PSUR", "CRSR", "RCSC, two drivers", "RRRRRRR"),
+]
+
+
+def without_friction(name: str) -> Data:
+    """The model without friction; the Cardan joints start off the position where a pin is at rest."""
+    if name in SHAFTS:
+        data = {**SHAFTS[name], "drivers": {"input": {"speed": 100.0, "start": 0.07}}}
+    else:
+        data = dict(rssr().data if name == "RSSR of the theory" else MODELS[name]().data)
+    defaults = {key: part for key, part in data.get("joint_defaults", {}).items() if key != "friction"}
+    return {**data, "joint_defaults": defaults}
+
+
+@pytest.mark.spread(1)
+@pytest.mark.parametrize("name", IN_MUJOCO)
+def test_agrees_with_mujoco(name: str) -> None:
+    """Motion and forces to 1e-11 of the largest of their kind."""
+    data = without_friction(name)
+    result = brief(trunnion.Mechanism(trunnion=1, **data), FEW)
+    engine = Engine(unrolled(data) if "loop" in data else data)
+    for i in range(FEW):
+        here = result.isel(position=i)
+        frames = {}
+        for link in engine.oracle.moving:
+            w, x, y, z = here.link_rotation.sel(link=link).values
+            axes = np.array(
+                [
+                    [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+                ]
+            )
+            frames[link] = Frame(here.link_position.sel(link=link).values, axes)
+        drive = {}
+        for driver in engine.drivers:
+            kind = "slide" if engine.joints[driver]["type"] == "prismatic" else "rotation"
+            values = (
+                float(here[f"joint_{kind}{rate}"].sel(joint=driver)) for rate in ("", "_velocity", "_acceleration")
+            )
+            drive[driver] = Drive(*values)
+        motions = engine.move(frames, drive)
+        pace = max(1.0, *(float(np.max(np.abs(motion.spin))) for motion in motions.values()))
+        for link, motion in motions.items():
+            centre, _ = engine.oracle.centre(link, motion)
+            c = np.asarray(engine.links[link]["centre"], float)
+            w, second = (here[f"link_angular_{what}"].sel(link=link).values for what in ("velocity", "acceleration"))
+            np.testing.assert_allclose(frames[link].place + frames[link].axes @ c, centre, rtol=0, atol=1e-11)
+            np.testing.assert_allclose(w, motion.spin, rtol=0, atol=1e-11 * pace)
+            np.testing.assert_allclose(second, motion.spin_rate, rtol=0, atol=1e-10 * pace**2)
+            if link not in engine.oracle.free:
+                turn = quaternion(frames[link].axes @ motion.frame.axes.T)
+                assert abs(abs(turn[0]) - 1) < 1e-12
+        compare_forces(here, engine)
+
+
+def compare_forces(here: xr.Dataset, engine: Engine) -> None:
+    """Reactions, efforts and moments of free spins of one position."""
+    forces = engine.forces()
+    scale = max(float(np.linalg.norm(force)) for force, _ in forces.reactions.values())
+    couple = max(float(np.linalg.norm(moment)) for _, moment in forces.reactions.values())
+    couple = max([couple, *map(abs, forces.efforts.values())])
+    for joint, (force, moment) in forces.reactions.items():
+        given = here.sel(joint=joint)
+        np.testing.assert_allclose(given.reaction_force.values, force, rtol=0, atol=1e-11 * scale, err_msg=joint)
+        np.testing.assert_allclose(given.reaction_moment.values, moment, rtol=0, atol=1e-11 * couple, err_msg=joint)
+    for driver, effort in forces.efforts.items():
+        size = scale if engine.joints[driver]["type"] == "prismatic" else couple
+        assert float(here.drive_effort.sel(driver=driver)) == pytest.approx(effort, abs=1e-11 * size), driver
+    assert all(abs(moment) < 1e-11 * couple for moment in forces.spins.values())

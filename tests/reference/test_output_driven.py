@@ -11,7 +11,7 @@ import pytest
 import trunnion
 from brief import brief
 from mechanisms import four_bar
-from trunnion import Mechanism, MechanismError, Status
+from trunnion import Mechanism, Status
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.solve.run import prepare
 
@@ -63,24 +63,7 @@ def test_the_crank_of_a_ram_that_moves_by_a_law() -> None:
     assert own.cycle.duration == ram.cycle.duration
 
 
-def test_effort_is_that_of_two_runs() -> None:
-    """The ram's motion gives the crank's by a table of 2000 points, which drives it: the effort is the same."""
-    rows = 2000
-    ram = brief(press({"S": {**RAM, "returns": False, "dwell": 0}}), steps=rows)
-    points = np.transpose([ram.time.values, ram.joint_rotation.sel(joint="O").values]).tolist()
-    table = {"law": "table", "points": [[f"{t!r} s", f"{q!r} rad"] for t, q in points]}
-    twice = brief(press({"O": table}), steps=rows)
-    once = brief(press({"O": {"moves": "S", **RAM, "returns": False, "dwell": 0}}), steps=rows)
-    inner = slice(20, -20)
-    efforts = (found.drive_effort.sel(driver="O").values[inner] for found in (once, twice))
-    size = float(np.max(np.abs(once.drive_effort.values)))
-    np.testing.assert_allclose(*efforts, rtol=0, atol=2e-6 * size)
-
-
-@pytest.mark.parametrize(
-    ("example", "driver", "moved"),
-    [("watt-six-bar", "", ""), ("stephenson-six-bar", "", ""), ("four-bar", "A", "D")],
-)
+@pytest.mark.parametrize(("example", "driver", "moved"), [("watt-six-bar", "", ""), ("four-bar", "A", "D")])
 def test_power_is_the_same_at_whatever_joint_it_enters(example: str, driver: str, moved: str) -> None:
     """Without friction the effort times the rate of the driver is that of a driver at the joint that moves."""
     data = four_bar() if example == "four-bar" else trunnion.read(f"{EXAMPLES}/{example}.yaml").data()
@@ -183,14 +166,6 @@ def test_its_derivatives_are_those_of_differences() -> None:
     several = efforts(np.array([[R - 1e-4], [R], [R + 1e-4]]))
     assert several.shape == (3, 9)
     assert several[2] == pytest.approx(efforts(R + 1e-4), rel=1e-12)
-
-
-def test_a_driver_that_moves_what_it_cannot_is_a_finding() -> None:
-    for moves, says in [("O", "driven itself"), ("X", "no joint")]:
-        with pytest.raises(MechanismError) as error:
-            trunnion.analyse(press({"O": {"moves": moves, **RAM}}), steps=4)
-        assert says in str(error.value)
-        assert "drivers.O.moves" in str(error.value), str(error.value)
 
 
 def test_tolerances_take_it() -> None:

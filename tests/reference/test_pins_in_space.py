@@ -2,32 +2,24 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 import trunnion
 from brief import brief
 from playing import rattling
 from playing_space import CENTRE, FLOAT, MASS, WIDTH, cardan, dropped, on_a_plate, own_shaft, rattling_in_space, tilting
 from trunnion.algebra.nested import flat
-from trunnion.dynamics import chains
-from trunnion.dynamics.compiled_rates import CompiledRates
 from trunnion.dynamics.opened import in_play, opened
 from trunnion.dynamics.rates import Layout, Walks
 from trunnion.dynamics.start import initial_row
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.stated_contacts import contacts_of
-from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import prepare
 
 Array = NDArray[np.float64]
-EXAMPLE = Path(__file__).parents[2] / "examples" / "tilting-gudgeon-pin.yaml"
 
 
 def test_a_long_pin_is_a_pin_in_the_plane() -> None:
@@ -100,23 +92,6 @@ def _opened(mechanism: Mechanism) -> tuple[FreeMotion, Array]:
     return motion, initial_row(motion)
 
 
-def test_every_module_is_a_driver_and_compiled() -> None:
-    """A ball and a cylinder become single turns and slides. Machine code has the rates of the walks."""
-    motion, row = _opened(tilting())
-    assert all(len(module.links) == 1 for module in motion.system.plan.modules)
-    assert len(motion.names) == 5
-    compiled = CompiledRates(motion)
-    compiled.walks = None  # they are not asked
-    rng = np.random.default_rng(4)
-    state = row + 1e-4 * rng.standard_normal(len(row))
-    at = Layout.of(motion).moment(np.array([1e-4]), state[:, None])._replace(onsets=(0.5, None, None, 0.2))
-    one, other = compiled(at), Walks(motion)(at)
-    assert np.allclose(one.second, other.second, rtol=1e-9)
-    assert np.allclose(one.works, other.works, rtol=1e-9)
-    for seen, wanted in zip(compiled.look(at), Walks(motion).look(at), strict=True):
-        assert np.allclose(seen, wanted, rtol=1e-9, atol=1e-15)
-
-
 @pytest.mark.parametrize(
     "mechanism", [tilting(), cardan(), on_a_plate(), dropped()], ids=["ball", "cross", "plate", "free"]
 )
@@ -165,98 +140,4 @@ def test_a_coupler_that_slides_on_a_plate() -> None:
     assert np.allclose(force[:2], 0.3 * centre, atol=1e-7 * float(np.max(np.abs(force))))
 
 
-def test_the_turns_of_a_ball_keep_clear_of_where_they_cannot_turn() -> None:
-    """The crank turns round under its ball: the first axis is its own, so that the third stays at right angles."""
-    run = prepare(tilting())
-    chain = chains.chain_of_joint(run, run.walk(np.zeros(1)), "P")
-    axis = np.abs(chain.points[0]["P_in_play_1"]["axis"])
-    assert axis[2] > 0.99
-
-
-def test_a_link_that_turns_every_way_has_no_three_turns(monkeypatch: pytest.MonkeyPatch) -> None:
-    run = prepare(tilting())
-    every = np.concatenate([[np.eye(3)], Rotation.random(4000, rng=1).as_matrix()])
-    monkeypatch.setattr(chains, "_relative", lambda *_: every)
-    with pytest.raises(MechanismError) as raised:
-        chains.chain_of_joint(run, run.walk(np.zeros(1)), "P")
-    assert [finding.where for finding in raised.value.findings] == ["links.rod"]
-
-
 # ---- bad input ------------------------------------------------------------------------------------------------------
-
-PIN = {"radius": "9.5 mm", "hole_radius": "10 mm", "length": 1, "end_float": "1 mm"}
-STIFF = {"restitution": 0.5, "stiffness": 1e9}
-
-
-@pytest.mark.parametrize(
-    ("change", "where"),
-    [
-        ({"pin": {**PIN, "length": 0}}, "joints.Q.pin.length"),
-        ({"pin": {key: one for key, one in PIN.items() if key != "length"}}, "joints.Q.contact"),
-        ({"pin": {key: one for key, one in PIN.items() if key != "end_float"}}, "joints.Q.contact"),
-        ({"pin": {**PIN, "end_float": 0}}, "joints.Q.pin.end_float"),
-        ({"pin": {**PIN, "hole_radius": "9.5 mm"}}, "joints.Q.contact"),
-        ({"pin": {key: one for key, one in PIN.items() if "radius" not in key}, "contact": STIFF}, "joints.Q.contact"),
-        ({"contact": {"law": "rigid", "restitution": 0.5}}, "joints.Q.contact.law"),
-        ({"type": "spherical", "pin": {"radius": 0.01, "clearance": 1e-4}, "contact": STIFF}, "joints.Q.contact"),
-    ],
-)
-def test_pins_that_cannot_be_in_play(change: dict[str, Any], where: str) -> None:
-    data = rattling_in_space().data()
-    data["joints"]["Q"].update(change)
-    with pytest.raises(MechanismError) as raised:
-        Mechanism(**data)
-    assert where in [finding.where for finding in raised.value.findings]
-
-
-def test_what_acts_in_a_joint_of_several_freedoms_is_refused() -> None:
-    data = tilting().data()
-    data["joints"]["S"] |= {"pin": {"radius": 0.02, "length": 0.05}, "losses": {"viscous": 3}}
-    data["joints"]["S"]["friction"] = {"law": "brown-mcphee", "coefficient": 0.1, "static": 0.1, "transition_speed": 1}
-    with pytest.raises(MechanismError) as raised:
-        trunnion.simulate(Mechanism(**data), 1e-3)
-    assert [finding.where for finding in raised.value.findings] == ["joints.S.friction", "joints.S.losses"]
-
-
-def test_a_link_without_mass_between_pins_in_play() -> None:
-    data = dropped().data()
-    data["links"]["shaft"] = {"points": data["links"]["shaft"]["points"]}
-    with pytest.raises(MechanismError) as raised:
-        trunnion.simulate(Mechanism(**data), 1e-3)
-    assert [finding.where for finding in raised.value.findings] == ["links.shaft"]
-
-
-def test_a_rod_without_inertia_about_its_line() -> None:
-    """Between two balls it is free to spin, which nothing would resist."""
-    data = tilting().data()
-    data["joints"]["Q"] = {"type": "spherical", "links": ["rod", "slider"]}
-    pin = {"radius": 0.01, "clearance": 1e-4, "length": 0.03}
-    contact = {"restitution": 0.3, "stiffness": 1e7, "exponent": 1}
-    data["joints"]["S"] = {**data["joints"]["S"], "pin": pin, "contact": contact}
-    data["links"]["rod"] |= {"inertia": {"xx": 0, "yy": 1e-4, "zz": 1e-4}, "centre": [0.06, 0, 0]}
-    with pytest.raises(MechanismError) as raised:
-        trunnion.simulate(Mechanism(**data), 1e-3)
-    assert [finding.where for finding in raised.value.findings] == ["links.rod"]
-
-
-@pytest.mark.slow
-def test_other_loops_stay_determined() -> None:
-    """Four parallel pins in space, none of which in play, are refused beside a pin that is."""
-    data = rattling_in_space().data()
-    on = {"axis": [0, 0, 1], "x": [1, 0, 0]}
-    data["links"]["frame"]["points"] |= {"D": {"at": [0.1, 0, 0], **on}}
-    data["links"]["crank"]["points"] |= {"B": {"at": [0, 0.03, 0], **on}}
-    data["links"]["coupler"] = {"points": {"B": {"at": [0, 0, 0], **on}, "C": {"at": [0.09, 0, 0], **on}}, "mass": 0.1}
-    data["links"]["rocker"] = {"points": {"C": {"at": [0.07, 0, 0], **on}, "D": {"at": [0, 0, 0], **on}}, "mass": 0.1}
-    for name, links in (("B", ["crank", "coupler"]), ("C", ["coupler", "rocker"]), ("D", ["frame", "rocker"])):
-        data["joints"][name] = {"type": "revolute", "links": links}
-    data["assembly"] = {"Q": [0.17, 0, 0], "D": "60 deg"}
-    with pytest.raises(MechanismError) as raised:
-        trunnion.simulate(Mechanism(**data), 1e-3)
-    assert [one.what.partition(" constrain")[0] for one in raised.value.findings] == ["O, B, C, D"]
-
-
-def test_a_body_without_mass_that_only_slides_is_named() -> None:
-    with pytest.raises(MechanismError) as raised:
-        trunnion.simulate(trunnion.read(EXAMPLE).with_values({"links.piston.mass": 0.0}), 1e-3)
-    assert [finding.where for finding in raised.value.findings] == ["links.piston"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise, product
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import xarray as xr
 
 import trunnion
 from brief import brief
+from mechanisms import MODELS, build, model
 from mechanisms_space import cardan, floating, rssr
 from reference.maximal_space import Data, unrolled
 from reference.space_oracle import Oracle
@@ -41,9 +42,7 @@ def hooke(delta: float, friction: float, shafts: float = 0.0) -> Data:
     return data
 
 
-@pytest.mark.spread(3)
-@pytest.mark.parametrize("shafts", [0.0, 0.02])
-@pytest.mark.parametrize("delta", [5.0, 15.0, 30.0, 45.0])
+@pytest.mark.parametrize(("delta", "shafts"), [(15.0, 0.02), (45.0, 0.0)])
 def test_massless_cardan(delta: float, shafts: float) -> None:
     """1 − η to the first order in f; what is left shrinks as f².
 
@@ -65,12 +64,10 @@ def test_massless_cardan(delta: float, shafts: float) -> None:
 @pytest.mark.parametrize(
     "data",
     [
-        {**cardan(), "joint_defaults": {}},
         {**cardan(misalignment=45.0, error=0.5, offset=30.0), "joint_defaults": {}},
-        hooke(30.0, 0.0),
         {**rssr().data, "joint_defaults": {}, "gravity": [0, 0, 0]},
     ],
-    ids=["Cardan with inertia", "at 45 degrees", "massless", "RSSR with inertia"],
+    ids=["at 45 degrees", "RSSR with inertia"],
 )
 def test_nothing_is_lost_without_friction(data: Data) -> None:
     """η = 1 within 1e-12, and the power balances to 1e-10 of its peak at every position."""
@@ -81,72 +78,6 @@ def test_nothing_is_lost_without_friction(data: Data) -> None:
     taken, given = float(result.useful_power.mean()), float(result.drive_power.sum("driver").mean())
     assert float(result.efficiency) == pytest.approx(taken / given, abs=1e-13)
     assert float(result.efficiency) == pytest.approx(1.0, abs=1e-12)
-
-
-@pytest.mark.slow
-def test_efficiency_falls_with_angle_and_speed() -> None:
-    """As in Fig. 9 of Pezzuti et al.: with misalignment (left), and with speed (right) by the inertia alone."""
-    angles = [float(analysed(cardan(misalignment=angle), 45).efficiency) for angle in (5.0, 20.0, 35.0)]
-    assert all(a > b for a, b in pairwise(angles))
-    speeds = []
-    for speed in (10.0, 150.0, 300.0):
-        data = {**cardan(), "drivers": {"input": {"speed": speed}}}
-        speeds.append(float(analysed(data, 45).efficiency))
-    assert all(a > b for a, b in pairwise(speeds))
-    massless = [
-        float(analysed({**hooke(20.0, 0.1), "drivers": {"A": {"speed": speed, "start": 0.003}}}, 90).efficiency)
-        for speed in (1.0, 300.0)
-    ]
-    assert massless[0] == pytest.approx(massless[1], abs=1e-12)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("model", ["two-contact", "pezzuti"])
-def test_short_bearing_locks(model: str) -> None:
-    """As printed, with 10 mm, it is locked at every position; the margin is where the oracle's effort goes to infinity.
-
-    Just below it the effort grows as 1/(margin − share), so it is ten times as large ten times nearer; above it the
-    oracle has no solution.
-    """
-    data = {**cardan(bearing=0.010, model=model), "drivers": {"input": {"speed": 100.0, "start": 0.07}}}
-    result = analysed(data, 9)
-    assert set(result.status.values) == {LOCKED}
-    assert np.isnan(result.drive_effort.values).all()
-    margin = result.locking_margin.values
-    assert np.all(margin < 1)
-    if model == "pezzuti":
-        assert 0.42 * float(margin.min()) == pytest.approx(0.2, abs=0.01), "critical coefficient of their law"
-    compared = Compared.__new__(Compared)
-    compared.result, compared.oracle = result, Oracle(unrolled(data))
-    for i in (0, 4):
-        motions = compared.motion(i)
-
-        def effort(share: float, at: int = i, motions: Any = motions) -> float:
-            for joint in compared.oracle.joint.values():
-                joint["friction"]["coefficient"] = 0.42 * share * float(margin[at])
-            return compared.oracle.rub(motions)[0].effort["input"]
-
-        near, nearer = effort(0.999), effort(0.9999)
-        assert near > 100 * effort(0.0)
-        assert nearer / near == pytest.approx(10, rel=0.02)
-        with pytest.raises(AssertionError, match="does not settle"):
-            effort(1.001)
-
-
-@pytest.mark.slow
-def test_long_bearing_runs() -> None:
-    """With 60 mm at 15° it runs; Newton in at most 20 rounds, successive approximation in far more near its limit."""
-    for model in ("two-contact", "pezzuti"):
-        result = analysed(cardan(model=model), 72)
-        assert set(result.status.values) <= {0, 1}
-        assert np.isfinite(result.drive_effort.values).all()
-        assert np.all(result.locking_margin.values > 1)
-        assert 0.3 < float(result.efficiency) < 1
-        assert int(result.friction_iterations.max()) <= 20
-    slow = trunnion.FrictionMethod("successive-approximation", criterion=1e-6, limit=2000)
-    other = analysed(cardan(model="pezzuti"), 72, friction_method=slow)
-    assert int(other.friction_iterations.max()) > 100
-    np.testing.assert_allclose(other.drive_effort.values, result.drive_effort.values, rtol=1e-6)
 
 
 @pytest.mark.slow
@@ -188,7 +119,7 @@ PITCH, MEAN, LOAD = 0.010, 0.012, 5000.0
 LEAD = np.arctan(PITCH / (2 * np.pi * MEAN))
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.08, 0.2])
+@pytest.mark.parametrize("friction", [0.08, 0.2])
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_screw_jack(friction: float, way: float) -> None:
     """Torque F r tan(λ ± φ) to raise and to lower; a thread with φ > λ has to be driven down."""
@@ -228,7 +159,7 @@ def test_screw_jack(friction: float, way: float) -> None:
     np.testing.assert_allclose(found["holding_multiple"].values, held, rtol=1e-9)
 
 
-@pytest.mark.parametrize("friction", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("friction", [0.05, 0.2])
 def test_nut_pushed_along_its_screw(friction: float) -> None:
     """Force T/(r tan(λ − φ)); self-locking from φ = λ on, and the margin is tan λ/f."""
     y, z = {"at": [0, 0, 0], "axis": [0, 1, 0]}, {"at": [0, 0, 0], "axis": [0, 0, 1]}
@@ -314,23 +245,12 @@ def door(hinges: dict[str, float], bearing: float, friction: float = 0.1, **more
     return trunnion.Mechanism(trunnion=1, **{**data, **more})
 
 
-VERBS = {
-    "analyse": lambda model: trunnion.analyse(model, 4).drive_effort.values[0, 0],
-    "sweep": lambda model: trunnion.sweep(
-        model, {"joints.lower.friction.coefficient": [0.1]}, steps=4
-    ).drive_effort_max.values.ravel()[0],
-    "tolerance": lambda model: trunnion.tolerance(model, ["torque"], steps=4).nominal.values[0],
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("verb", VERBS)
-@pytest.mark.parametrize(("apart", "bearing"), [(0.5, 0.2), (2.0, 0.02)])
-def test_hinges_share_the_load_as_two_ends_of_a_bearing_each_do(verb: str, apart: float, bearing: float) -> None:
+@pytest.mark.parametrize(("apart", "bearing"), [(0.5, 0.2), (0.5, 0.02)])
+def test_hinges_share_the_load_as_two_ends_of_a_bearing_each_do(apart: float, bearing: float) -> None:
     """A hinge gives way across by F/k and tilts by M/(k h²), h half its bearing: F a = C/(1 + 4 h²/a²)."""
     model = door({"lower": 0.0, "upper": apart}, bearing, **STILL)
     force = DOOR * 9.81 * ARM_OF_WEIGHT / apart / (1 + (bearing / apart) ** 2)
-    assert VERBS[verb](model) == pytest.approx(0.1 * 0.006 * 2 * force, rel=1e-9)
+    assert trunnion.analyse(model, 4).drive_effort.values[0, 0] == pytest.approx(0.1 * 0.006 * 2 * force, rel=1e-9)
     (finding,) = (one for one in trunnion.check(model, 4).findings if one.code == "mobility.friction_open")
     assert finding.severity == "warning"
     share = (bearing / apart) ** 2
@@ -369,35 +289,133 @@ def test_one_bearing_with_two_ends_has_the_friction_of_a_door() -> None:
     np.testing.assert_allclose(free.drive_effort.values, 0.0, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("rubbing", ["A", "U"])
-def test_friction_that_no_open_force_presses_on_is_kept(rubbing: str) -> None:
-    """A shaft that its bearing and a plate on a cross both hold along: the thrust is open, what bends the shaft is not.
+NAMES = [
+    name
+    for name, data in MODELS.items()
+    if "gears" not in data() and "springs" not in data() and len(data()["links"]) <= 6
+]
+STEPS = 16
 
-    The bearing feels the load across it alone; a pin of the cross feels the thrust.
-    """
-    x, y, z = ({"at": [0, 0, 0], "axis": list(axis)} for axis in np.eye(3))
-    pin = {"pin": {"radius": 0.01, "bearing": 0.05}, "friction": 0.1}
-    data = {
+
+def raised(data: Data) -> Data:
+    """The same model in space: z across the plane, pins along z; inertia about x and y is that of a thin plate."""
+
+    def point(stated: Any, joint: dict[str, Any] | None) -> Data:
+        at = stated["at"] if isinstance(stated, dict) else stated
+        found: Data = {"at": [*at, 0.0]}
+        if joint and joint["type"] == "prismatic":
+            return {**found, "axis": [*stated["axis"], 0.0], "x": [0, 0, 1]}
+        return {**found, "axis": [0, 0, 1], "x": [1, 0, 0]} if joint else found
+
+    links: Data = {}
+    for name, link in data["links"].items():
+        points = {p: point(stated, data["joints"].get(p)) for p, stated in link["points"].items()}
+        links[name] = {**link, "points": points}
+        if "centre" in link:
+            links[name]["centre"] = [*link["centre"], 0.0]
+        if "inertia" in link:
+            links[name]["inertia"] = {"xx": link["inertia"] / 2, "yy": link["inertia"] / 2, "zz": link["inertia"]}
+    loads: Data = {}
+    for name, load in data.get("loads", {}).items():
+        loads[name] = dict(load)
+        if "force" in load:
+            loads[name]["force"] = [*load["force"], 0.0]
+        if "moment" in load:
+            loads[name]["moment"] = [0.0, 0.0, load["moment"]]
+    defaults = data["joint_defaults"]
+    hints = {name: [*hint, 0.0] if isinstance(hint, list) else hint for name, hint in data.get("assembly", {}).items()}
+    return {
+        **data,
         "space": "spatial",
         "over_constraint": "minimum-norm",
-        "links": {
-            "ground": {"points": {"A": z, "U": x}},
-            "plate": {"points": {"U": y, "E": z}},
-            "shaft": {"points": {"A": z, "E": z, "P": [0, 0, 0.3]}},
-        },
-        "joints": {
-            "A": {"type": "revolute", "links": ["ground", "shaft"]},
-            "U": {"type": "universal", "links": ["ground", "plate"]},
-            "E": {"type": "planar", "links": ["plate", "shaft"]},
-        },
-        "drivers": {"A": {"speed": 2.0}},
-        "loads": {"belt": {"link": "shaft", "at": "P", "force": [50.0, 0.0, -300.0]}},
+        "gravity": [*data["gravity"], 0.0],
+        "links": links,
+        "loads": loads,
+        "assembly": hints,
+        "joint_defaults": {**defaults, "pin": {**defaults["pin"], "bearing": 0.05}},
     }
-    data["joints"][rubbing] |= pin
-    result = analysed(data, 4)
-    depends = [one.figures["joints"] for one in result.trunnion.findings if one.code == "mobility.friction_open"]
-    assert depends == ([["U"]] if rubbing == "U" else [])
-    if rubbing == "U":
-        return
-    expected = 0.1 * 0.01 * 2 * 50 * 0.3 / 0.05  # the ends carry 25 N -+ 300 N
-    np.testing.assert_allclose(result.drive_effort.values, expected, rtol=1e-9)
+
+
+@pytest.mark.spread(1)
+@pytest.mark.parametrize("friction", [None, 0.12])
+@pytest.mark.parametrize("name", NAMES)
+def test_planar_mechanism_in_space(name: str, friction: float | None) -> None:
+    """Motion to 1e-10, forces to 1e-8 of the largest; nothing across the plane, where friction is refused for that."""
+    data = model(MODELS[name](), friction=friction)
+    flat = brief(build(MODELS[name](), friction=friction), STEPS)
+    space = brief(trunnion.Mechanism(trunnion=1, **raised(data)), STEPS, refuse=False)
+    np.testing.assert_array_equal(flat.status.values, space.status.values)
+    points = [p for p in flat.point.values if p in space.point.values]
+    for what, limit in (("position", 1e-10), ("velocity", 1e-9), ("acceleration", 1e-8)):
+        one, two = (result[f"point_{what}"].sel(point=points).values for result in (flat, space))
+        scale = max(1.0, float(np.nanmax(np.abs(one))))
+        np.testing.assert_allclose(two[:, :2], one, rtol=0, atol=limit * scale, err_msg=what)
+        np.testing.assert_allclose(two[:, 2], 0, rtol=0, atol=limit * scale, err_msg=what)
+    scale = float(np.nanmax(np.abs(flat.reaction_force.values)))
+    force = space.reaction_force.sel(joint=flat.joint.values).values
+    np.testing.assert_allclose(force[:, :2], flat.reaction_force.values, rtol=0, atol=1e-8 * scale)
+    np.testing.assert_allclose(force[:, 2], 0, rtol=0, atol=1e-8 * scale)
+    moment = space.reaction_moment.sel(joint=flat.joint.values).values
+    np.testing.assert_allclose(moment[:, 2], flat.reaction_moment.values, rtol=0, atol=1e-8 * scale)
+    np.testing.assert_allclose(moment[:, :2], 0, rtol=0, atol=1e-8 * scale)
+    for what in ("friction_torque", "friction_force", "drive_effort", "friction_power"):
+        one, two = flat[what].values, space[what].values
+        np.testing.assert_allclose(two, one, rtol=0, atol=1e-8 * scale, err_msg=what)
+    if friction:
+        assert np.nanmax(np.abs(flat.friction_power.values)) > 1e-3
+
+
+def coupled_wheels(third: tuple[float, float], stiffness: dict[str, float] | None = None) -> Data:
+    """Three equal cranks on one coupling rod: mobility 0 by the count, 1 by rank."""
+    feet = {"A": (0.0, 0.0), "B": (1.2, 0.0), "C": third}
+    pins = dict(zip(feet, "DEF", strict=True))
+    links: Data = {"ground": {"points": {name: list(place) for name, place in feet.items()}}}
+    joints: Data = {}
+    for name, pin in pins.items():
+        links[f"wheel-{name}"] = {"points": {name: [0, 0], pin: [0.3, 0]}, "mass": 20.0, "inertia": 0.5}
+        joints[name] = {"type": "revolute", "links": ["ground", f"wheel-{name}"]}
+        joints[pin] = {"type": "revolute", "links": [f"wheel-{name}", "rod"]}
+    rod = {pin: list(feet[name]) for name, pin in pins.items()}
+    links["rod"] = {"points": rod, "mass": 30.0, "inertia": 8.0, "centre": [1.0, 0.1]}
+    for name, radial in (stiffness or {}).items():
+        joints[name]["stiffness"] = {"radial": radial}
+    return {
+        "over_constraint": "minimum-norm",
+        "gravity": [0, -9.81],
+        "links": links,
+        "joints": joints,
+        "joint_defaults": {"pin": {"radius": 0.02}, "friction": 0.05},
+        "drivers": {"A": {"speed": 10.0, "range": [0.4, 2.6]}},
+        "loads": {"pull": {"joint": "C", "resisting_torque": 100.0, "useful": True}},
+    }
+
+
+def test_three_wheels_share_their_load_by_stiffness() -> None:
+    """Without friction: forces of the one self-stress shift the energy nowhere, Σ F · S / k = 0."""
+    stiffness = dict(zip("ABCDEF", (2e7, 5e6, 8e6, 3e7, 1e6, 4e6), strict=True))
+    data = {**coupled_wheels((1.7, 0.9), stiffness), "joint_defaults": {}}
+    result = trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), STEPS)
+    place = {name: result.point_position.sel(point=name).values for name in result.point.values}
+    for step in range(STEPS):
+        pins = np.array([place[f"rod.{name}"][:, step] for name in "DEF"])
+        crank = place["wheel-A.D"][:, step] - place["wheel-A.A"][:, step]
+        unit = crank / np.linalg.norm(crank)  # a massless crank passes on what is along it; the driven one anything
+        # forces of the cranks on the rod that balance: a along unit at E and F, any at D
+        matrix = np.array(
+            [
+                [1.0, 0.0, unit[0], unit[0]],
+                [0.0, 1.0, unit[1], unit[1]],
+                [
+                    -pins[0][1],
+                    pins[0][0],
+                    pins[1][0] * unit[1] - pins[1][1] * unit[0],
+                    pins[2][0] * unit[1] - pins[2][1] * unit[0],
+                ],
+            ]
+        )
+        null = np.linalg.svd(matrix)[2][-1]
+        own = np.array([null[:2], null[2] * unit, null[3] * unit])
+        forces = np.array([result.reaction_force.sel(joint=name).values[:, step] for name in "ABCDEF"])
+        stresses = np.vstack([own, own])
+        energy = [forces[i] @ stresses[i] / stiffness[name] for i, name in enumerate("ABCDEF")]
+        assert abs(sum(energy)) < 1e-9 * max(abs(part) for part in energy)

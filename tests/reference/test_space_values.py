@@ -7,13 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
 
 import trunnion
 from brief import brief
-from mechanisms_space import cardan
 from reference.maximal_space import Array, Data, Frame, rotation, unrolled
-from trunnion.algebra.dual import derivative, seed
-from trunnion.solve.run import prepare
+from spatial_numbers import apart
+from trunnion.algebra.dual import Dual, functions, parts, primal, spatial
+from trunnion.algebra.line import line
+from trunnion.algebra.pose import compose, inverse, link
+from trunnion.algebra.vector import cross, dot
+from trunnion.groups import GROUPS, ccc
 
 SPEED = 2.0
 
@@ -135,28 +140,11 @@ def test_rssr(branch: int, degrees: float) -> None:
     assert np.max(np.abs(result.closure_residual.values)) < 1e-12
 
 
-def test_rssr_sensitivities() -> None:
-    """∂ψ/∂(a, b, c, d, α, s₁, s₄) at 60° from the dual part, rad/mm and rad/rad; to the eight digits given."""
-    mechanism = trunnion.Mechanism(trunnion=1, **rssr(1.29, start=np.pi / 3))
-    run = prepare(mechanism)
-    expected = (-0.00714601, -0.01955441, 0.01187232, 0.01702515, 0.26229468, -0.00948836, 0.00611075)
-    for (name, number), slope in zip(RSSR.items(), expected, strict=True):
-        back = run.solve(np.array([0.0]), values=mechanism.parameters({name: seed(number)}))
-        psi, _ = back.walk.coordinates("D")
-        unit = 1.0 if name == "alpha" else 1e-3
-        assert float(np.ravel(derivative(psi))[0]) * unit == pytest.approx(slope, abs=6e-9), name
-        h = 1e-5 * number
-        step = [run.solve(np.array([0.0]), values=mechanism.parameters({name: number + n * h})) for n in (-2, -1, 1, 2)]
-        near = [float(np.ravel(one.walk.coordinates("D")[0])[0]) for one in step]
-        difference = (near[0] - 8 * near[1] + 8 * near[2] - near[3]) / (12 * h)
-        assert float(np.ravel(derivative(psi))[0]) == pytest.approx(difference, rel=1e-8), name
-
-
 # ---- Cardan joints ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("general", [False, True])
-@pytest.mark.parametrize("delta", [1.0, 5.0, 15.0, 30.0, 45.0, 70.0])
+@pytest.mark.parametrize("delta", [15.0, 70.0])
 def test_ideal_cardan(delta: float, general: bool) -> None:
     """tan θ₁ tan θ₄ = −cos δ with the last twist 180° − δ; ω₂/ω₁ = cos δ/(1 − sin²δ sin²γ₁), γ₁ = θ₁ − 90°."""
     data = loop("RCCC", (90, 90, 90, 180 - delta), start=0.01, assembly={"D": -np.pi / 2})
@@ -175,12 +163,10 @@ def test_ideal_cardan(delta: float, general: bool) -> None:
         np.testing.assert_allclose(value(result, "joint_slide", joint), 0, rtol=0, atol=1e-14)
 
 
-@pytest.mark.spread(1)
 @pytest.mark.parametrize("general", [False, True])
-@pytest.mark.parametrize("twist", [0.01, 0.1, 0.2, 0.4, 0.5])
-@pytest.mark.parametrize("offset", [0.05e-3, 0.5e-3])
-def test_imperfect_cardan_closes(twist: float, offset: float, general: bool) -> None:
-    """Errors of 0.01° to 0.5° and 0.05 mm to 0.5 mm: 1e-12 at every degree, by the product of its own joint motions."""
+def test_imperfect_cardan_closes(general: bool) -> None:
+    """Errors of 0.5° and 0.5 mm: 1e-12 at every degree, by the product of its own joint motions."""
+    twist, offset = 0.5, 0.5e-3
     twists, offsets = (90 - twist, 90 + twist, 90 - twist, 135 - twist), (offset, -offset, 2 * offset, offset)
     data = loop("RCCC", twists, offsets)
     result = analysed(unrolled(data) if general else data, 36 if general else 360)
@@ -191,94 +177,7 @@ def test_imperfect_cardan_closes(twist: float, offset: float, general: bool) -> 
     assert np.ptp(slides) > 0.1 * offset, "errors make the pins slide"
 
 
-def double_cardan(bend: float, turn: float, parallel: bool) -> Data:
-    """Two universal joints with a shaft between, which bends by `bend` at both; the far fork turned by `turn`.
-
-    The input lies along z, all shafts in the plane x, z. The output is parallel to the input or goes on bending.
-    """
-    along = np.array([np.sin(bend), 0, np.cos(bend)])
-    out = np.array([0.0, 0, 1]) if parallel else np.array([np.sin(2 * bend), 0, np.cos(2 * bend)])
-    far, y = 0.5 * along, [0.0, 1, 0]
-    fork = [float(np.cos(turn)), float(np.sin(turn)), 0.0]
-    return {
-        "space": "spatial",
-        "links": {
-            "ground": {"points": {"A": {"at": [0, 0, -0.3], "axis": [0, 0, 1]},
-                                  "D": {"at": list(far + 0.3 * out), "axis": list(out), "x": y}}},
-            "in": {"points": {"A": {"at": [0, 0, -0.3], "axis": [0, 0, 1]}, "B": {"at": [0, 0, 0], "axis": y}}},
-            "shaft": {"points": {"B": {"at": [0, 0, 0], "axis": [1, 0, 0]}, "C": {"at": [0, 0, 0.5], "axis": fork}}},
-            "out": {"points": {"C": {"at": [0, 0, -0.3], "axis": y},
-                               "D": {"at": [0, 0, 0], "axis": [0, 0, 1], "x": y}}},
-        },
-        "joints": {
-            "A": {"type": "revolute", "links": ["ground", "in"]},
-            "B": {"type": "universal", "links": ["in", "shaft"]},
-            "C": {"type": "universal", "links": ["shaft", "out"]},
-            "D": {"type": "cylindrical", "links": ["ground", "out"]},
-        },
-        "drivers": {"A": {"speed": SPEED}},
-        "assembly": {"C": [float(n) for n in far]},
-    }  # fmt: skip
-
-
-@pytest.mark.spread(2)
-@pytest.mark.parametrize("parallel", [True, False])
-@pytest.mark.parametrize("bend", [10.0, 30.0])
-def test_double_cardan(bend: float, parallel: bool) -> None:
-    """Equal angles and forks in line: the output runs evenly. A quarter turn wrong: between cos²δ and 1/cos²δ."""
-    delta = np.radians(bend)
-    even = analysed(double_cardan(delta, 0.0, parallel), 72)
-    ratio = np.abs(value(even, "joint_rotation_velocity", "D")) / SPEED
-    np.testing.assert_allclose(ratio, 1.0, rtol=0, atol=1e-11)
-    np.testing.assert_allclose(value(even, "joint_rotation_acceleration", "D"), 0, rtol=0, atol=1e-9)
-    between = np.linalg.norm(even.link_angular_velocity.sel(link="shaft").values, axis=0)
-    assert np.ptp(between) > 0.01 * SPEED, "the shaft between runs unevenly"
-    odd = analysed(double_cardan(delta, np.pi / 2, parallel), 72)
-    ratio = np.abs(value(odd, "joint_rotation_velocity", "D")) / SPEED
-    assert float(ratio.min()) == pytest.approx(np.cos(delta) ** 2, rel=1e-10)
-    assert float(ratio.max()) == pytest.approx(1 / np.cos(delta) ** 2, rel=1e-10)
-
-
 # ---- over-constrained -------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kinds", ["RRRR", "RCCC"])
-def test_spherical_four_bar(kinds: str) -> None:
-    """Sides and angles of the two spherical triangles that the diagonal makes."""
-    alphas = (30.0, 70.0, 60.0, 80.0)
-    more = {"over_constraint": "minimum-norm"} if kinds == "RRRR" else {}
-    data = loop(kinds, alphas, start=0.05, assembly={"D": 1.5}, **more)
-    result = analysed(data, 48)
-    a1, a2, a3, a4 = np.radians(alphas)
-    theta = value(result, "joint_rotation", "A")
-    cosine = np.cos(a1) * np.cos(a4) - np.sin(a1) * np.sin(a4) * np.cos(theta)
-    sine = np.sqrt(1 - cosine**2)
-    third = (np.cos(a2) * np.cos(a3) - cosine) / (np.sin(a2) * np.sin(a3))
-    np.testing.assert_allclose(np.cos(value(result, "joint_rotation", "C")), third, rtol=0, atol=1e-12)
-    near = np.arccos((np.cos(a1) - np.cos(a4) * cosine) / (np.sin(a4) * sine)) * np.sign(np.sin(theta))
-    far = np.arccos((np.cos(a2) - np.cos(a3) * cosine) / (np.sin(a3) * sine))
-    both = [np.exp(1j * (np.pi - near + branch * far)) for branch in (1, -1)]
-    errors = [float(np.max(np.abs(turned(result, "D") - one))) for one in both]
-    assert min(errors) < 1e-12
-    assert max(errors) > 0.1
-    np.testing.assert_allclose(result.point_position.values, 0, rtol=0, atol=1e-13)
-    assert missed(result, data["loop"]) < 1e-12
-
-
-def test_bennett() -> None:
-    """tan(θ₁/2) tan(θ₂/2) = sin((β + α)/2)/sin((β − α)/2) up to sign, at every position."""
-    alpha, beta, a = 40.0, 100.0, 0.2
-    b = a * np.sin(np.radians(beta)) / np.sin(np.radians(alpha))
-    data = loop("RRRR", (alpha, beta, alpha, beta), (a, b, a, b), start=0.1, over_constraint="minimum-norm")
-    result = analysed(data, 36)
-    first, second, third, fourth = (value(result, "joint_rotation", joint) for joint in "ABCD")
-    product = np.tan(first / 2) * np.tan(second / 2)
-    constant = np.sin(np.radians(beta + alpha) / 2) / np.sin(np.radians(beta - alpha) / 2)
-    np.testing.assert_allclose(np.abs(product), constant, rtol=1e-10)
-    assert np.ptp(np.sign(product)) == 0
-    for one, other in ((first, third), (second, fourth)):  # opposite angles make a whole turn
-        np.testing.assert_allclose(np.exp(1j * (one + other)), 1, rtol=0, atol=1e-10)
-    assert missed(result, data["loop"]) < 1e-12
 
 
 def test_no_bennett() -> None:
@@ -287,13 +186,12 @@ def test_no_bennett() -> None:
     result = trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), 12)
     assert set(result.status.values[1:]) == {int(trunnion.Status.NOT_ASSEMBLED)}
     assert np.isnan(result.joint_rotation.sel(joint="B").values[1:]).all()
-    assert "cannot be assembled" in result.attrs["findings"]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rod", [0.060, 0.160])
-def test_rod_of_a_wrong_length(rod: float) -> None:
+def test_rod_of_a_wrong_length() -> None:
     """The RSSR has numbers where its quadratic equation has a root, the right ones, and nowhere else."""
+    rod = 0.060
     with np.errstate(invalid="ignore"):
         expected, _ = rocker_angle(np.linspace(0.0, 6.0, 61), 1, b=rod)
     missing = np.isnan(expected)
@@ -307,58 +205,95 @@ def test_rod_of_a_wrong_length(rod: float) -> None:
     assert set(result.status.values[missing]) == {int(trunnion.Status.NOT_ASSEMBLED)}
 
 
-def test_sarrus() -> None:
-    """Two pairs of leaves at right angles: the platform rises straight and does not turn."""
-    leaf, half, pin = 0.12, 0.06, {"axis": [0, 0, 1], "x": [1, 0, 0]}
-    first, second = {"axis": [0, -1, 0], "x": [1, 0, 0]}, {"axis": [1, 0, 0], "x": [0, 1, 0]}
-    ends = {"half": [half, 0, 0], "other": [0, 1.5 * half, 0]}
-    links: Data = {
-        "ground": {"points": {"A": {"at": ends["half"], **first}, "D": {"at": ends["other"], **second}}},
-        "platform": {
-            "points": {"C": {"at": ends["half"], **first}, "F": {"at": ends["other"], **second}, "top": [0, 0, 0.3]}
-        },
-    }
-    joints: Data = {}
-    for names, long in (("ABC", leaf), ("DEF", 0.8 * leaf)):
-        low, high = f"low-{names[0]}", f"high-{names[0]}"
-        links[low] = {"points": {names[0]: {"at": [0, 0, 0], **pin}, names[1]: {"at": [long, 0, 0], **pin}}}
-        links[high] = {"points": {names[1]: {"at": [0, 0, 0], **pin}, names[2]: {"at": [long, 0, 0], **pin}}}
-        for name, pair in zip(names, (["ground", low], [low, high], ["platform", high]), strict=True):
-            joints[name] = {"type": "revolute", "links": pair}
-    start, end = np.radians([15.0, 50.0])
-    height = 2 * leaf * np.sin(start)
-    data: Data = {
-        "space": "spatial",
-        "over_constraint": "minimum-norm",
-        "links": links,
-        "joints": joints,
-        "drivers": {"A": {"speed": SPEED, "range": [start, end]}},
-        "assembly": {
-            "C": [half, 0, height],
-            "F": [0, 1.5 * half, height],
-            "E": [0, 1.5 * half + np.sqrt((0.8 * leaf) ** 2 - height**2 / 4), height / 2],
-        },
-    }
-    result = analysed(data, 25)
-    theta = value(result, "joint_rotation", "A")
-    place = result.link_position.sel(link="platform").values
-    np.testing.assert_allclose(place[:2], 0, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(place[2], 2 * leaf * np.sin(theta), rtol=0, atol=1e-12)
-    turn = result.link_rotation.sel(link="platform").values
-    np.testing.assert_allclose(np.abs(turn.T), [[1, 0, 0, 0]] * 25, rtol=0, atol=1e-12)
-    top = result.point_velocity.sel(point="platform.top").values
-    np.testing.assert_allclose(top[2], 2 * leaf * np.cos(theta) * SPEED, rtol=0, atol=1e-11)
+COUNT = 4000
+TWISTS, DISTANCES = np.radians([25, 70, 55, 60]), [1.0, 3.0, 2.5, 2.8]  # links 12, 23, 34, 41
+RCCC = [spatial(alpha, a) for alpha, a in zip(TWISTS, DISTANCES, strict=True)]
 
 
-@pytest.mark.slow
-def test_loop_and_links_say_the_same() -> None:
-    """The Cardan joint of Pezzuti et al. with friction: everything but what a loop alone has."""
-    data = cardan()
-    one, two = analysed(data, 24), analysed(unrolled(data), 24)
-    for name in ("joint_rotation_velocity", "link_rotation", "reaction_force", "reaction_moment", "drive_effort"):
-        assert one[name].sizes == two[name].sizes
-        order = {dim: one[dim].values for dim in one[name].dims if dim in one.coords}
-        scale = float(np.max(np.abs(one[name].values)))
-        np.testing.assert_allclose(
-            one[name].values, two[name].sel(order).values, rtol=0, atol=1e-9 * scale, err_msg=name
-        )
+def turns(rng: np.random.Generator, count: int) -> list[Dual]:
+    """Random joint angles θ + ε s."""
+    return [spatial(rng.uniform(-np.pi, np.pi, COUNT), rng.uniform(-2, 2, COUNT)) for _ in range(count)]
+
+
+def links(rng: np.random.Generator, count: int) -> list[Dual]:
+    """Random twists α + ε a, not near 0 and π."""
+    return [spatial(rng.uniform(0.3, np.pi - 0.3, COUNT), rng.uniform(-2, 2, COUNT)) for _ in range(count)]
+
+
+@pytest.mark.parametrize("branch", ccc.BRANCHES)
+def test_the_dual_matrices_of_random_chains_close(branch: int) -> None:
+    """∏ Z(θ̂) X(α̂) = I on all random chains that can be assembled, but where the axes are within 1e-3 of a plane."""
+    rng = np.random.default_rng(5)
+    (first,), twists = turns(rng, 1), links(rng, 4)
+    loop = ccc.position(first, twists, branch)
+    fine = np.isfinite(primal(loop.angles[3])) & (ccc.condition(loop.axes) < 1e3)
+    assert np.sum(fine) > COUNT / 3
+    real, dual = ccc.closure(loop, twists)
+    scale = 1 + sum(np.abs(parts(angle)[1]) for angle in loop.angles)
+    assert np.max(real[fine]) < 1e-12
+    assert np.max((dual / scale)[fine]) < 1e-12
+
+
+def test_a_chain_is_found_again_on_one_of_the_branches() -> None:
+    """Angles and slides of chains made to close: Z₁X₁Z₂X₂Z₃X₃ is random, Z₄X₄Z(δ̂) undoes it, δ̂ belongs to θ̂₁."""
+    rng = np.random.default_rng(8)
+    angles, twists = turns(rng, 3), links(rng, 3)
+    back = inverse(compose(*(link(angle, twist) for angle, twist in zip(angles, twists, strict=True))))
+    x, y, z = back[0][2], back[1][2], back[2][2]
+    fourth, rest = functions.arctan2(x, -y), functions.arctan2(back[2][0], back[2][1])
+    twists.append(functions.arctan2(functions.sqrt(x * x + y * y), z))
+    wanted = [*angles[1:], fourth]
+    loops = [ccc.position(angles[0] + rest, twists, branch) for branch in ccc.BRANCHES]
+    errors = [sum(angle_missed(a, b) for a, b in zip(loop.angles[1:], wanted, strict=True)) for loop in loops]
+    fine = (ccc.condition(loops[0].axes) < 100) & (np.sin(primal(twists[3])) > 0.1)
+    assert np.sum(fine) > COUNT / 2
+    assert np.max(np.fmin(*errors)[fine]) < 1e-9
+    np.testing.assert_array_equal((errors[0] < errors[1])[fine], (np.sin(primal(angles[2])) < 0)[fine])
+
+
+def angle_missed(found: Dual, wanted: Dual) -> Array:
+    """Distance of two dual angles, whole turns aside."""
+    return np.abs(np.exp(1j * found.real) - np.exp(1j * wanted.real)) + np.abs(found.dual - wanted.dual)
+
+
+@given(st.floats(0.05, 1.5), st.floats(0.05, 1.5), st.floats(-2, 2), st.floats(-2, 2), st.sampled_from(ccc.BRANCHES))
+def test_meet_has_both_angles(alpha: float, beta: float, a: float, c: float, branch: int) -> None:
+    """ĉ is a line at the dual angles asked for, on the side of the plane that the branch says; −branch mirrors it."""
+    b = line((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    d = line((0.3, 0.4, 0.0), (np.sin(1.2), 0.0, np.cos(1.2)))
+    bc, cd = spatial(alpha, a), spatial(beta, c)
+    found = ccc.meet(b, d, bc, cd, branch)
+    if not np.isfinite(primal(found[0])) or abs(primal(dot(found, cross(b, d)))) < 1e-3:
+        return
+    for cosine, angle in ((dot(found, b), bc), (dot(found, d), cd)):
+        for part, expected in zip(parts(cosine), (np.cos(angle.real), -angle.dual * np.sin(angle.real)), strict=True):
+            assert float(part) == pytest.approx(expected, abs=1e-10)
+    square = dot(found, found)
+    assert float(square.real) == pytest.approx(1.0, abs=1e-13)
+    assert float(square.dual) == pytest.approx(0.0, abs=1e-10)
+    assert np.sign(primal(dot(found, cross(b, d)))) == branch
+
+
+def test_small_angles_keep_their_digits() -> None:
+    """A spherical triangle of a millionth of a radian is a plane one: sides 3, 4, 5."""
+    small = 1e-6
+    found = ccc.meet((0.0, 0.0, 1.0), (np.sin(3 * small), 0.0, np.cos(3 * small)), 4 * small, 5 * small, 1)
+    assert float(found[0]) == pytest.approx(0.0, abs=1e-10 * small)
+    assert float(abs(found[1])) == pytest.approx(4 * small, rel=1e-10)
+
+
+def test_no_silent_number() -> None:
+    """Parallel axes, triangles that do not close, dead centres of dual angles, a link without twist."""
+    z = line((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    beside = line((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    angle = spatial(0.5, 0.1)
+    assert np.isnan(apart(ccc.meet(z, beside, angle, angle, 1))[0]).all()
+    x = line((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    assert np.isnan(apart(ccc.meet(z, x, spatial(0.3, 0.0), spatial(0.3, 0.0), 1))[0]).all()
+    flat = ccc.meet((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), np.pi / 4, np.pi / 4, 1)
+    np.testing.assert_allclose(flat, [np.sqrt(0.5), 0.0, np.sqrt(0.5)], rtol=0, atol=1e-7)
+    assert np.isnan(apart(ccc.meet(z, x, spatial(np.pi / 4, 0.0), spatial(np.pi / 4, 0.0), 1))[1]).all()
+    loop = ccc.position(angle, [spatial(0.0, 1.0), *RCCC[1:]], 1)
+    assert np.isfinite(primal(loop.angles[3])), "joints 1 and 2 may be parallel"
+    assert np.isnan(primal(ccc.position(angle, [*RCCC[:2], spatial(0.0, 1.0), RCCC[3]], 1).angles[3]))
+    assert "CCC" not in GROUPS, "the table holds planar groups"

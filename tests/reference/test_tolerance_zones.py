@@ -10,14 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import trunnion
-from mechanisms_parts import Data, revolute
-from toleranced import fourbar, rssr, rssr_angle, slider_crank, slider_place
+from mechanisms_parts import Data
+from toleranced import rssr, rssr_angle, slider_crank, slider_place
 from trunnion import Mechanism
 
-Array = NDArray[np.float64]
 METHODS = ["linear", "worst-case"]
 R, L = 0.05, 0.2
 OFF, MORE = 0.02e-3, 0.005e-3
@@ -47,7 +45,7 @@ def seat(at: float) -> Mechanism:
 
 
 @pytest.mark.parametrize("made", [direction, seat])
-@pytest.mark.parametrize("at", [0.0, 90.0, 180.0, 250.0])
+@pytest.mark.parametrize("at", [0.0, 250.0])
 def test_a_direction_about_an_offset(made: Callable[[float], Mechanism], at: float) -> None:
     """The whole circle lies about the middle, and the nominal mechanism on it."""
     found = trunnion.tolerance(made(at), methods=METHODS)
@@ -64,7 +62,7 @@ def test_a_direction_about_an_offset(made: Callable[[float], Mechanism], at: flo
 RUN_OUT = "joints.B.misalignment.offset"
 
 
-@pytest.mark.parametrize("at", [0.0, 70.0])
+@pytest.mark.parametrize("at", [70.0])
 @pytest.mark.parametrize("limits", [(-MORE, MORE), (0.0, 2 * MORE), (-3 * MORE, -MORE)])
 @pytest.mark.parametrize("alone", [True, False])
 def test_a_run_out_about_an_offset(at: float, limits: tuple[float, float], alone: bool) -> None:
@@ -206,40 +204,6 @@ def test_a_ball_in_space_has_the_worse_of_two_seats(links: list[str]) -> None:
     found = trunnion.tolerance(rssr(tolerances={}, joints=joints, measures=measures), methods=METHODS, steps=180)
     assert found["worst_case_upper"].item() == pytest.approx(worse, rel=2e-3)
     assert found["searched_upper"].item() == pytest.approx(worse, rel=1e-2)
-
-
-@pytest.mark.slow
-def test_a_hinge_in_space_is_that_of_the_plane() -> None:
-    """A pin with two ends and a float, the rocker's own: worst over both links whichever way they are listed."""
-    found = []
-    for links in (["ground", "rocker"], ["rocker", "ground"]):
-        joints = rssr().data()["joints"]
-        joints["D"] = revolute(*links) | {"pin": {"clearance": PLAY, "length": "40 mm", "end_float": "0.1 mm"}}
-        measures = {"y": {"point": "rocker.C", "axis": "z", "as": "peak-to-peak"}}
-        assembly = {"D": np.radians(74) if links[0] == "ground" else -np.radians(74)}
-        mechanism = rssr(tolerances={}, joints=joints, measures=measures, assembly=assembly)
-        found.append(trunnion.tolerance(mechanism, methods=METHODS, steps=120))
-    one, other = found
-    assert one["nominal"].item() == pytest.approx(other["nominal"].item(), rel=1e-9)
-    assert one["worst_case_upper"].item() == pytest.approx(other["worst_case_upper"].item(), rel=1e-6)
-    assert one["searched_upper"].item() == pytest.approx(other["searched_upper"].item(), rel=1e-3)
-
-
-def test_the_play_of_an_effort_has_the_worse_of_two_seats() -> None:
-    """At a speed a pin that turns with the one link or the other moves otherwise, and so do the masses."""
-    found = []
-    for links in (["crank", "coupler"], ["coupler", "crank"]):
-        data = fourbar(loaded=True, tolerances={}, speed=60.0).data()
-        data["joints"]["B"] = revolute(*links)
-        data["joint_defaults"]["pin"]["clearance"] = "0.05 mm"
-        data["measures"] = {"torque": {"effort": "A"}}
-        found.append([trunnion.play(Mechanism(**data), steps=24), trunnion.play(on(data, "coupler"), steps=24)])
-    for one, other in zip(*found, strict=True):
-        np.testing.assert_allclose(one["worst_case"], other["worst_case"], rtol=1e-6)
-    (either, coupler), _ = found
-    worse = either["worst_case"].sel(joint="B") / coupler["worst_case"].sel(joint="B")
-    assert worse.min() >= 1 - 1e-9
-    assert worse.max() > 1.01
 
 
 def on(data: Data, link: str) -> Mechanism:

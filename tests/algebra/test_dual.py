@@ -38,7 +38,6 @@ def close(a: Any, b: Any, tolerance: float = 1e-9) -> None:
     np.testing.assert_allclose(x, y, rtol=tolerance, atol=tolerance * max(1e-6, *map(abs, x), *map(abs, y)))
 
 
-@pytest.mark.slow
 @given(anything, anything, anything)
 def test_ring_identities(x: Any, y: Any, z: Any) -> None:
     close((x + y) + z, x + (y + z))
@@ -59,14 +58,6 @@ def test_division_undoes_multiplication(x: Any, y: Any) -> None:
     close(x / y, x * y**-1, tolerance)
 
 
-@given(parts, parts, parts, parts)
-def test_product_rule_written_out(a: float, b: float, c: float, d: float) -> None:
-    product, quotient = Dual(a, b) * Dual(c, d), Dual(a, b) / Dual(c, d)
-    assert (product.real, product.dual) == (a * c, a * d + b * c)
-    assert float(quotient.real) == pytest.approx(a / c)
-    assert float(quotient.dual) == pytest.approx((b * c - a * d) / c**2, abs=1e-9 * abs(a / c) * 1e3)
-
-
 def test_epsilon_squared_is_zero_at_each_depth() -> None:
     eps = Dual(0.0, 1.0)
     assert flat(eps * eps) == [0.0] * 4
@@ -75,39 +66,25 @@ def test_epsilon_squared_is_zero_at_each_depth() -> None:
     assert flat(eps * outer) == [0.0, 0.0, 0.0, 1.0], "the two epsilons are different and their product is not 0"
 
 
+RANGES = {
+    "sin": (-5, 5), "cos": (-5, 5), "tan": (-1.3, 1.3), "arcsin": (-0.9, 0.9), "arccos": (-0.9, 0.9), "arctan": (-5, 5),
+    "sinh": (-3, 3), "cosh": (-3, 3), "tanh": (-2, 2), "exp": (-3, 3), "log": (0.3, 9), "sqrt": (0.3, 9),
+    "square": (-5, 5), "abs": (0.2, 5),
+}  # fmt: skip
 FUNCTIONS: dict[str, tuple[Callable[[Any, Any], Any], float, float]] = {
-    "sin": (lambda xp, x: xp.sin(x), -5, 5),
-    "cos": (lambda xp, x: xp.cos(x), -5, 5),
-    "tan": (lambda xp, x: xp.tan(x), -1.3, 1.3),
-    "arcsin": (lambda xp, x: xp.arcsin(x), -0.9, 0.9),
-    "arccos": (lambda xp, x: xp.arccos(x), -0.9, 0.9),
-    "arctan": (lambda xp, x: xp.arctan(x), -5, 5),
-    "sinh": (lambda xp, x: xp.sinh(x), -3, 3),
-    "cosh": (lambda xp, x: xp.cosh(x), -3, 3),
-    "tanh": (lambda xp, x: xp.tanh(x), -2, 2),
-    "exp": (lambda xp, x: xp.exp(x), -3, 3),
-    "log": (lambda xp, x: xp.log(x), 0.3, 9),
-    "sqrt": (lambda xp, x: xp.sqrt(x), 0.3, 9),
-    "square": (lambda xp, x: xp.square(x), -5, 5),
-    "abs": (lambda xp, x: xp.abs(x), 0.2, 5),
-    "abs, negative": (lambda xp, x: xp.abs(x), -5, -0.2),
-    "arctan2 by y": (lambda xp, x: xp.arctan2(x, -0.7), 0.2, 3),
+    **{name: (lambda xp, x, name=name: getattr(xp, name)(x), *ends) for name, ends in RANGES.items()},
+    "abs, negative": (lambda xp, x: xp.abs(x), -5, -0.2), "arctan2 by y": (lambda xp, x: xp.arctan2(x, -0.7), 0.2, 3),
     "arctan2 by x": (lambda xp, x: xp.arctan2(0.7, x), -3, 3),
     "arctan2 of both": (lambda xp, x: xp.arctan2(x * x + 1, x), -3, 3),
-    "hypot": (lambda xp, x: xp.hypot(x, 1.3), -3, 3),
-    "hypot, second": (lambda xp, x: xp.hypot(0.4, x), 0.2, 3),
+    "hypot": (lambda xp, x: xp.hypot(x, 1.3), -3, 3), "hypot, second": (lambda xp, x: xp.hypot(0.4, x), 0.2, 3),
     "where": (lambda xp, x: xp.where(x > 0, x * x, -x), 0.1, 3),
     "where, other": (lambda xp, x: xp.where(x > 0, x * x, -x), -3, -0.1),
     "minimum": (lambda xp, x: xp.minimum(x * x, 4.0), 0.1, 1.9),
-    "maximum": (lambda xp, x: xp.maximum(4.0, x * x), 2.1, 3),
-    "power 3": (lambda _, x: x**3, -3, 3),
-    "power -2": (lambda _, x: x**-2, 0.4, 3),
-    "power 2.5": (lambda _, x: x**2.5, 0.4, 3),
-    "power of 2": (lambda _, x: 2.0**x, -3, 3),
-    "power of itself": (lambda _, x: x**x, 0.4, 3),
-    "power 0": (lambda _, x: x**0, 0.4, 3),
-    "nested": (lambda xp, x: xp.exp(xp.sin(x) / (1 + x * x)), -3, 3),
-}
+    "maximum": (lambda xp, x: xp.maximum(4.0, x * x), 2.1, 3), "power 3": (lambda _, x: x**3, -3, 3),
+    "power -2": (lambda _, x: x**-2, 0.4, 3), "power 2.5": (lambda _, x: x**2.5, 0.4, 3),
+    "power of 2": (lambda _, x: 2.0**x, -3, 3), "power of itself": (lambda _, x: x**x, 0.4, 3),
+    "power 0": (lambda _, x: x**0, 0.4, 3), "nested": (lambda xp, x: xp.exp(xp.sin(x) / (1 + x * x)), -3, 3),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -170,17 +147,13 @@ def test_a_quantity_of_two_levels_is_a_differentiable_screw() -> None:
 NOT_THERE: dict[str, Callable[[Any], Any]] = {
     "division by zero": lambda zero: 1.0 / zero,
     "division by dual zero of a dual": lambda zero: Dual(1.0, 2.0) / zero,
-    "sqrt of 0": lambda zero: functions.sqrt(zero),
-    "sqrt below 0": lambda zero: functions.sqrt(zero - 1.0),
-    "log of 0": lambda zero: functions.log(zero),
-    "log below 0": lambda zero: functions.log(zero - 1.0),
-    "hypot of 0, 0": lambda zero: functions.hypot(zero, zero),
-    "power −1 of 0": lambda zero: zero**-1,
-    "power 1/2 of 0": lambda zero: zero**0.5,
-    "power 1/2 below 0": lambda zero: (zero - 1.0) ** 0.5,
+    "sqrt of 0": lambda zero: functions.sqrt(zero), "sqrt below 0": lambda zero: functions.sqrt(zero - 1.0),
+    "log of 0": lambda zero: functions.log(zero), "log below 0": lambda zero: functions.log(zero - 1.0),
+    "hypot of 0, 0": lambda zero: functions.hypot(zero, zero), "power −1 of 0": lambda zero: zero**-1,
+    "power 1/2 of 0": lambda zero: zero**0.5, "power 1/2 below 0": lambda zero: (zero - 1.0) ** 0.5,
     "arcsin at 1": lambda zero: functions.arcsin(zero + 1.0),
     "arccos beyond 1": lambda zero: functions.arccos(zero + 1.5),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("shape", ["float", "array", "nested"])
@@ -231,49 +204,14 @@ def test_arrays_on_the_left() -> None:
         )
 
 
-def test_comparisons_look_at_the_real_part() -> None:
-    x = Dual(np.array([1.0, 2.0, 3.0]), 9.0)
-    np.testing.assert_array_equal(x > 2, [False, False, True])
-    np.testing.assert_array_equal(x >= Dual(2.0, -5.0), [False, True, True])
-    np.testing.assert_array_equal(x < 2.0, [True, False, False])
-    np.testing.assert_array_equal(x == 2, [False, True, False])
-    np.testing.assert_array_equal(x != 2, [True, False, True])
-    np.testing.assert_array_equal(np.array([1.0, 5.0, 3.0]) <= x, [True, False, True])
-
-
-def test_where_takes_both_parts_lane_by_lane() -> None:
-    x = functions.where(np.array([True, False, True]), Dual(np.arange(3.0), 1.0), Dual(9.0, np.arange(3.0)))
-    np.testing.assert_array_equal(x.real, [0.0, 9.0, 2.0])
-    np.testing.assert_array_equal(x.dual, [1.0, 1.0, 1.0])
-    mixed = functions.where(np.array([True, False]), 5.0, Dual(1.0, 2.0))
-    np.testing.assert_array_equal(mixed.real, [5.0, 1.0])
-    np.testing.assert_array_equal(mixed.dual, [0.0, 2.0])
-
-
-def test_indexing_takes_the_same_lane_of_both_parts() -> None:
-    """The parts may have different shapes that broadcast; an index means a place in their common shape."""
-    x = Dual(np.ones((3, 4)), np.arange(4.0))
-    assert x.shape == (3, 4)
-    np.testing.assert_array_equal(np.broadcast_to(x[0].dual, (4,)), np.arange(4.0))
-    y = Dual(2.0, np.arange(5.0))
-    assert (float(y[3].real), float(y[3].dual)) == (2.0, 3.0)
-
-
-def test_namespace_picks_the_most_general_kind() -> None:
-    assert namespace(1.0, np.ones(2)) is np
-    assert namespace(1.0, Dual(1.0)) is functions
-    assert namespace(np.ones(2), Dual(1.0)) is functions
-    assert namespace() is np
-
-
 def test_tests_and_constants_are_plain() -> None:
     x = Dual(np.array([1.0, np.nan, np.inf]), 1.0)
     np.testing.assert_array_equal(functions.isnan(x), [False, True, False])
     np.testing.assert_array_equal(functions.isfinite(x), [True, False, False])
     np.testing.assert_array_equal(functions.sign(Dual(np.array([-2.0, 3.0]), 1.0)), [-1.0, 1.0])
     np.testing.assert_array_equal(functions.zeros_like(x), [0.0, 0.0, 0.0])
-
-
-def test_derivative_of_a_constant_is_zero() -> None:
     np.testing.assert_array_equal(derivative(np.ones(3)), np.zeros(3))
-    assert derivative(4.0) == 0.0
+    assert namespace(1.0, np.ones(2)) is np
+    assert namespace(np.ones(2), Dual(1.0)) is functions
+    broad = Dual(np.ones((3, 4)), np.arange(4.0))  # an index means a place in the common shape of both parts
+    np.testing.assert_array_equal(np.broadcast_to(broad[0].dual, (4,)), np.arange(4.0))

@@ -8,13 +8,12 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import fsolve
 
-import trunnion
 from gallery.entry import Entry, Outcome
+from gallery.four_bars import torque_at_60
 from gallery.plane import bend, corner, slope
 from trunnion.solve.run import prepare
 
-# ---- five-bar-robot: what the process force asks of the left motor ---------------------------------------------------
-
+# five-bar-robot: what the process force asks of the left motor
 MOMENT = 0.1  # s
 
 
@@ -41,17 +40,13 @@ def share_by_hand(motor: str = "A") -> float:
     return float(-(-15.0 * column.real - 25.0 * column.imag))
 
 
-# ---- double-butterfly: virtual work at 60° ---------------------------------------------------------------------------
-
+# double-butterfly: virtual work at 60°
 # mass kg, inertia kg m², mass centre: pin and offset from it in the link's frame m, of each link but the crank
 BODIES: Mapping[str, tuple[float, float, str, complex]] = {
-    "left": (1.6, 2.4e-2, "B", 0.049 + 0.165j),
-    "right": (1.5, 2.1e-2, "C", 0.152 + 0.065j),
-    "wing": (0.8, 4.5e-3, "G", -0.031 + 0.048j),
-    "rocker": (0.6, 3.5e-3, "D", 0.130),
-    "tie": (0.7, 5.7e-3, "E", 0.155),
-    "strut": (0.7, 5.5e-3, "F", 0.152),
-}
+    "left": (1.6, 2.4e-2, "B", 0.049 + 0.165j), "right": (1.5, 2.1e-2, "C", 0.152 + 0.065j),
+    "wing": (0.8, 4.5e-3, "G", -0.031 + 0.048j), "rocker": (0.6, 3.5e-3, "D", 0.130),
+    "tie": (0.7, 5.7e-3, "E", 0.155), "strut": (0.7, 5.5e-3, "F", 0.152),
+}  # fmt: skip
 
 
 @lru_cache(maxsize=64)
@@ -95,37 +90,20 @@ def butterfly_torque(turn: float = np.pi / 3) -> float:
     return float(torque)
 
 
-def torque_at_60(one: Outcome) -> float:
-    ideal = trunnion.analyse(one.mechanism.with_friction("off"), 6)
-    return float(ideal["drive_effort"].sel(driver="A")[1])
-
-
 ENTRIES = {
     "five-bar-robot": Entry(
-        says="Torque that the process force asks of the motor A after 0.1 s",
-        unit="N m",
-        found=share,
-        expected=share_by_hand,
+        says="Torque that the process force asks of the motor A after 0.1 s", unit="N m", tolerance=1e-9,
+        figures=("mechanism", "torque"), found=share, expected=share_by_hand,
         source="virtual work, −Jᵀ F, on a tool found by intersecting circles",
-        tolerance=1e-9,
-        figures=("mechanism", "torque"),
     ),
     "double-butterfly": Entry(
-        says="Drive torque without friction at 60° of the crank",
-        unit="N m",
-        found=torque_at_60,
-        expected=butterfly_torque,
+        says="Drive torque without friction at 60° of the crank", unit="N m", tolerance=1e-5,
+        figures=("mechanism", "torque"), found=torque_at_60, expected=butterfly_torque,
         source="virtual work, on a closure for three angles (SciPy)",
-        tolerance=1e-5,
-        figures=("mechanism", "torque"),
     ),
     "andrews-squeezer": Entry(
-        says="Drive torque at the start",
-        unit="N m",
-        found=lambda one: float(one.result["drive_effort"].sel(driver="O")[0]),
-        expected=lambda: 0.033,
+        says="Drive torque at the start", unit="N m", tolerance=1e-13, figures=("mechanism", "torque"),
+        found=lambda one: float(one.result["drive_effort"].sel(driver="O")[0]), expected=lambda: 0.033,
         source="the torque that gives the published acceleration there (E. Hairer, G. Wanner)",
-        tolerance=1e-13,
-        figures=("mechanism", "torque"),
     ),
-}
+}  # fmt: skip

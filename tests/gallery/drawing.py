@@ -10,17 +10,14 @@ from scipy.optimize import fsolve
 from gallery.entry import STEPS, Entry, Outcome
 from gallery.plane import corner
 
-# ---- peaucellier: the pen stays on x = (L² − m²)/(2r) --------------------------------------------------------------
 
-
+# peaucellier: the pen stays on x = (L² − m²)/(2r)
 def stray(one: Outcome) -> float:
     x, _ = one.track("side-CE.pen")
     return float(np.abs(x - (0.25**2 - 0.1**2) / (2 * 0.16)).max())
 
 
-# ---- jansen: the foot by seven triangles ---------------------------------------------------------------------------
-
-
+# jansen: the foot by seven triangles
 def jansen_foot(turn: Any) -> Any:
     """Place of the foot with the crank's bearing at 0; each pin is the third corner over two known ones."""
     crank, hip = 0.15 * np.exp(1j * turn), -0.38 - 0.078j
@@ -40,8 +37,7 @@ def stride(one: Outcome) -> float:
     return float(np.ptp(one.track("shank.foot")[0]))
 
 
-# ---- klann: the foot by the lengths between pins --------------------------------------------------------------------
-
+# klann: the foot by the lengths between pins
 KLANN = {  # coordinates of the patent for the extended position
     "A": (1.366, 1.366), "B": (1.009, 0.574), "O": (1.599, 0.750), "P": (1.331, 0.750), "E": (0.741, 0.750),
     "K": (0.232, 0.866), "H": (0.866, 1.500), "foot": (0.0, 0.0),
@@ -69,29 +65,18 @@ def klann_foot(turn: Any) -> Any:
 
 ENTRIES = {
     "peaucellier": Entry(
-        says="Farthest that the pen strays from a straight line",
-        unit="m",
-        found=stray,
-        expected=lambda: 0.0,
-        source="Peaucellier's x = (L² − m²) / (2 r)",
-        tolerance=2e-13,
+        says="Farthest that the pen strays from a straight line", unit="m", tolerance=2e-13, found=stray,
+        expected=lambda: 0.0, source="Peaucellier's x = (L² − m²) / (2 r)",
     ),
     "jansen": Entry(
-        says="Length of the foot's step, by positions 5° apart",
-        unit="m",
-        found=stride,
-        expected=lambda: float(np.ptp(jansen_foot(turns(np.pi)).real)),
+        says="Length of the foot's step, by positions 5° apart", unit="m", tolerance=1e-12,
+        figures=("mechanism", "torque"), found=stride, expected=lambda: float(np.ptp(jansen_foot(turns(np.pi)).real)),
         source="intersecting circles, from the crank to the foot",
-        tolerance=1e-12,
-        figures=("mechanism", "torque"),
     ),
     "klann": Entry(
-        says="Height to which the foot is lifted, by positions 5° apart",
-        unit="m",
-        found=lambda one: float(np.ptp(one.track("leg.foot")[1])),
+        says="Height to which the foot is lifted, by positions 5° apart", unit="m", tolerance=1e-10,
+        figures=("mechanism", "motion"), found=lambda one: float(np.ptp(one.track("leg.foot")[1])),
         expected=lambda: float(np.ptp(klann_foot(turns(np.pi)).imag)),
         source="solving for the places of three pins such that all lengths keep (SciPy)",
-        tolerance=1e-10,
-        figures=("mechanism", "motion"),
     ),
-}
+}  # fmt: skip

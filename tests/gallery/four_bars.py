@@ -8,9 +8,8 @@ import trunnion
 from gallery.entry import Entry, Outcome
 from gallery.plane import bend, corner, slope
 
-# ---- durango-fourbar: the crank's torque without friction at 60°, by virtual work ---------------------------------
 
-
+# durango-fourbar: the crank's torque without friction at 60°, by virtual work
 def torque_at_60(one: Outcome) -> float:
     ideal = trunnion.analyse(one.mechanism.with_friction("off"), 6)
     return float(ideal["drive_effort"].sel(driver="A")[1])
@@ -33,10 +32,7 @@ def torque_by_virtual_work() -> float:
     def rocker(q: float) -> complex:
         return complex(np.angle(pins(q)[1] - 5.5))
 
-    centres = (
-        (30.0, lambda q: on_coupler(q, 2.8, 0.152)),
-        (7.2, lambda q: (5.5 + pins(q)[1]) / 2),
-    )
+    centres = ((30.0, lambda q: on_coupler(q, 2.8, 0.152)), (7.2, lambda q: (5.5 + pins(q)[1]) / 2))
     q, speed = np.pi / 3, 10.0
     torque = sum(m * speed**2 * (bend(r, q) * np.conj(slope(r, q))).real for m, r in centres)
     for inertia, angle in ((48.80, coupler), (5.50, rocker)):
@@ -45,17 +41,14 @@ def torque_by_virtual_work() -> float:
     return float(torque - (-1000.0) * tip.imag - (-250.0) * slope(rocker, q).real)
 
 
-# ---- spring-balanced-lamp -----------------------------------------------------------------------------------------
-
-
+# spring-balanced-lamp
 def hold(one: Outcome) -> float:
     """Largest torque at the pivot without friction."""
     ideal = trunnion.analyse(one.mechanism.with_friction("off"), 36)
     return float(np.abs(ideal["drive_effort"]).max())
 
 
-# ---- straight lines: largest less least height of the point, at every half degree ---------------------------------
-
+# straight lines: largest less least height of the point, at every half degree
 FINE = 720
 
 
@@ -85,37 +78,24 @@ def height_of_chebyshev_by_hand() -> float:
 
 ENTRIES = {
     "durango-fourbar": Entry(
-        says="Drive torque without friction at 60° of the crank",
-        unit="N m",
-        found=torque_at_60,
-        expected=torque_by_virtual_work,
+        says="Drive torque without friction at 60° of the crank", unit="N m", tolerance=1e-4,
+        figures=("mechanism", "torque"), found=torque_at_60, expected=torque_by_virtual_work,
         source="virtual work on pins found by intersecting circles",
-        tolerance=1e-4,
-        figures=("mechanism", "torque"),
     ),
     "spring-balanced-lamp": Entry(
-        says="Largest torque at the pivot without friction",
-        unit="N m",
-        found=hold,
+        says="Largest torque at the pivot without friction", unit="N m", tolerance=1e-12, found=hold,
         expected=lambda: 0.0,
         source="the balance k a b = Σ m g r of a spring of free length zero (M. J. French, M. B. Widden, Proc. IMechE "
-        "C 214 (2000) 501–508)",
-        tolerance=1e-12,
+               "C 214 (2000) 501–508)",
     ),
     "hoecken": Entry(
-        says="Height of the path of P over half a turn of the crank, 90° to 270°",
-        unit="m",
-        found=height_of_hoecken,
-        expected=height_of_hoecken_by_hand,
+        says="Height of the path of P over half a turn of the crank, 90° to 270°", unit="m", tolerance=1e-13,
+        found=height_of_hoecken, expected=height_of_hoecken_by_hand,
         source="intersecting circles at every half degree",
-        tolerance=1e-13,
     ),
     "chebyshev-line": Entry(
-        says="Height of the path of P from 60° to 180° of the coupler",
-        unit="m",
-        found=height_of_chebyshev,
-        expected=height_of_chebyshev_by_hand,
+        says="Height of the path of P from 60° to 180° of the coupler", unit="m", tolerance=1e-12,
+        found=height_of_chebyshev, expected=height_of_chebyshev_by_hand,
         source="intersecting circles at every half degree",
-        tolerance=1e-12,
     ),
-}
+}  # fmt: skip

@@ -12,8 +12,7 @@ from gallery.entry import Entry, Outcome
 from gallery.plane import corner
 from trunnion.results.attributes import attribute
 
-# ---- landing-gear: how long it falls --------------------------------------------------------------------------------
-
+# landing-gear: how long it falls
 FROM, STOP = np.radians([96.0, 226.0])  # of the brace
 UPPER, LOWER, ARM = 0.45, 0.505, 0.6
 
@@ -63,9 +62,7 @@ def fall_by_hand() -> float:
     return float(done.t_events[0][0])
 
 
-# ---- andrews-squeezer-in-time: where it is at the end of the benchmark ---------------------------------------------
-
-
+# andrews-squeezer-in-time: where it is at the end of the benchmark
 def turn_of(one: Outcome) -> float:
     """Angle of K1 after 0.03 s, rad."""
     return float(trunnion.simulate(one.mechanism, 0.03, 1, 1e-11)["drive_coordinate"].sel(driver="O")[-1])
@@ -73,21 +70,13 @@ def turn_of(one: Outcome) -> float:
 
 ENTRIES = {
     "landing-gear": Entry(
-        says="Time of the fall to the stop, without friction",
-        unit="s",
-        found=fall,
-        expected=fall_by_hand,
+        says="Time of the fall to the stop, without friction", unit="s", tolerance=1e-6,
+        figures=("mechanism", "motion"), found=fall, expected=fall_by_hand,
         source="the equation of motion of the brace written out, by SciPy",
-        tolerance=1e-6,
-        figures=("mechanism", "motion"),
     ),
     "andrews-squeezer-in-time": Entry(
-        says="Angle of K1 after 0.03 s under 0.033 N m",
-        unit="rad",
-        found=turn_of,
-        expected=lambda: 15.81077119629904,
+        says="Angle of K1 after 0.03 s under 0.033 N m", unit="rad", tolerance=1e-8, figures=("mechanism", "torque"),
+        found=turn_of, expected=lambda: 15.81077119629904,
         source="the published solution of the benchmark (F. Mazzia, C. Magherini)",
-        tolerance=1e-8,
-        figures=("mechanism", "torque"),
     ),
-}
+}  # fmt: skip

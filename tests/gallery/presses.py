@@ -13,9 +13,8 @@ from gallery.plane import corner
 from trunnion.solve.run import prepare
 from trunnion.studies import design
 
-# ---- toggle-press: where it begins to hold by itself ----------------------------------------------------------------
 
-
+# toggle-press: where it begins to hold by itself
 def holds_from(one: Outcome) -> float:
     """Offset of the knee on the way back at which the cylinder's force changes its sign, m."""
     run = prepare(one.mechanism)
@@ -27,9 +26,7 @@ def holds_from(one: Outcome) -> float:
     return -float(np.ravel(run.solve(np.array([time])).walk.point("upper", "A").place[0])[0])
 
 
-# ---- drawing-press: the friction of the guide at which it locks ------------------------------------------------------
-
-
+# drawing-press: the friction of the guide at which it locks
 def guide_locks_from(one: Outcome) -> float:
     """Coefficient of the guide at which the start of the stroke locks, the pins being free of friction."""
     smooth = one.mechanism.with_values({f"{pin}.friction.coefficient": 0 for pin in "OKPCR"})
@@ -42,9 +39,7 @@ def guide_locks_by_hand() -> float:
     return float(0.08 / (2 * 0.12 * abs(knee.real / knee.imag)))
 
 
-# ---- jaw-crusher: stroke of the jaw's lip ----------------------------------------------------------------------------
-
-
+# jaw-crusher: stroke of the jaw's lip
 def jaw_angle(turn: Any) -> Any:
     """Rotation of the jaw, rad: pitman and rear toggle over the eccentric, front toggle and jaw over the pitman."""
     eccentric = 0.75 + 0.02 * np.exp(1j * turn)
@@ -79,9 +74,7 @@ def stroke_by_hand() -> float:
     return float(2 * np.hypot(0.06, 1.26) * np.sin((high - low) / 2))
 
 
-# ---- flywheel-press: how the motor starts it ------------------------------------------------------------------------
-
-
+# flywheel-press: how the motor starts it
 def start_of(one: Outcome) -> float:
     """Acceleration of the crank at the start, without friction."""
     smooth = trunnion.simulate(one.mechanism.with_friction("off"), 1e-3, 1)
@@ -97,39 +90,22 @@ def start_by_hand() -> float:
 
 ENTRIES = {
     "flywheel-press": Entry(
-        says="Acceleration of the crank as the motor starts it, without friction",
-        unit="rad/s^2",
-        found=start_of,
-        expected=start_by_hand,
+        says="Acceleration of the crank as the motor starts it, without friction", unit="rad/s^2", tolerance=1e-9,
+        figures=("mechanism", "torque"), found=start_of, expected=start_by_hand,
         source="Kloss's torque at standstill over the inertias at the dead centre",
-        tolerance=1e-9,
-        figures=("mechanism", "torque"),
     ),
     "toggle-press": Entry(
-        says="Distance of the knee from its dead centre below which the press holds by itself",
-        unit="m",
-        found=holds_from,
-        expected=lambda: 2 * 0.1 * 0.02,
+        says="Distance of the knee from its dead centre below which the press holds by itself", unit="m",
+        tolerance=1e-10, figures=("mechanism", "torque"), found=holds_from, expected=lambda: 2 * 0.1 * 0.02,
         source="the friction circles of the three pins, 2 f ρ",
-        tolerance=1e-10,
-        figures=("mechanism", "torque"),
     ),
     "drawing-press": Entry(
-        says="Friction coefficient of the guide from which the press locks, with frictionless pins",
-        unit="1",
-        found=guide_locks_from,
-        expected=guide_locks_by_hand,
+        says="Friction coefficient of the guide from which the press locks, with frictionless pins", unit="1",
+        tolerance=1e-8, figures=("mechanism", "torque"), found=guide_locks_from, expected=guide_locks_by_hand,
         source="the equilibrium of the ram by hand, slide / (2 neck tan α)",
-        tolerance=1e-8,
-        figures=("mechanism", "torque"),
     ),
     "jaw-crusher": Entry(
-        says="Stroke of the jaw at its lip",
-        unit="m",
-        found=stroke,
-        expected=stroke_by_hand,
-        source="intersecting circles and looking for the extremes (SciPy)",
-        tolerance=1e-12,
-        figures=("mechanism", "torque"),
+        says="Stroke of the jaw at its lip", unit="m", tolerance=1e-12, figures=("mechanism", "torque"), found=stroke,
+        expected=stroke_by_hand, source="intersecting circles and looking for the extremes (SciPy)",
     ),
-}
+}  # fmt: skip

@@ -14,9 +14,8 @@ from trunnion.results.attributes import attribute
 from trunnion.solve.run import prepare
 from trunnion.studies.design import design
 
-# ---- toleranced-slider-crank: ∂x/∂r of the piston at 60° ----------------------------------------------------------
 
-
+# toleranced-slider-crank: ∂x/∂r of the piston at 60°
 def sensitivity(one: Outcome) -> float:
     run = prepare(one.mechanism)
     sixth = run.cycle.times(6)[1:2]
@@ -30,9 +29,7 @@ def sensitivity_by_hand() -> float:
     return float(np.cos(q) - r * np.sin(q) ** 2 / np.sqrt(length**2 - (r * np.sin(q)) ** 2))
 
 
-# ---- slider-crank: acceleration at the top dead centre ------------------------------------------------------------
-
-
+# slider-crank: acceleration at the top dead centre
 def at_top(one: Outcome) -> float:
     return float(one.result["point_acceleration"].sel(point="piston.Q", axis="x")[0])
 
@@ -42,9 +39,7 @@ def at_top_by_hand() -> float:
     return -r * speed**2 * (1 + r / length)
 
 
-# ---- quick returns: time of the stroke outwards over that of the return -------------------------------------------
-
-
+# quick returns: time of the stroke outwards over that of the return
 def time_ratio(slide: str) -> Callable[[Outcome], float]:
     """From the two places at which the slide turns back; over half of the positions move the slow way."""
 
@@ -71,9 +66,7 @@ def ratio_of_whitworth() -> float:
     return float((2 * np.pi - fast) / fast)
 
 
-# ---- worn-gudgeon-pin: how fast the pin first strikes its hole ----------------------------------------------------
-
-
+# worn-gudgeon-pin: how fast the pin first strikes its hole
 def strikes_at(one: Outcome) -> float:
     return float(trunnion.simulate(one.mechanism, 5e-4, 1)["impact_approach"][0])
 
@@ -102,9 +95,7 @@ def strikes_at_by_hand() -> float:
     return float((cx * ux + cy * uy) / np.hypot(cx, cy))
 
 
-# ---- scotch-yoke, elliptic-trammel: exact curves ------------------------------------------------------------------
-
-
+# scotch-yoke, elliptic-trammel: exact curves
 def off_the_cosine(one: Outcome) -> float:
     """x − r cos θ, m."""
     x, _ = one.track("yoke.S")
@@ -117,9 +108,7 @@ def off_the_ellipse(one: Outcome) -> float:
     return float(np.abs((x / 0.15) ** 2 + (y / 0.09) ** 2 - 1).max())
 
 
-# ---- inverted-slider-crank: the boom's swing by the law of cosines ------------------------------------------------
-
-
+# inverted-slider-crank: the boom's swing by the law of cosines
 def swing(one: Outcome) -> float:
     return float(np.ptp(one.angle("boom")))
 
@@ -131,9 +120,7 @@ def swing_by_hand() -> float:
     return at_pivot(0.95 + 0.75) - at_pivot(0.95)
 
 
-# ---- stick-slip-drive: how long it slips ----------------------------------------------------------------------------
-
-
+# stick-slip-drive: how long it slips
 def slip_of(one: Outcome) -> float:
     """From the first break-away to the rest after it, s."""
     result = trunnion.simulate(one.mechanism, 0.45, 1)
@@ -151,81 +138,45 @@ def slip_by_hand() -> float:
 
 ENTRIES = {
     "worn-gudgeon-pin": Entry(
-        says="Speed at which the gudgeon pin first strikes the wall of its hole",
-        unit="m/s",
-        found=strikes_at,
-        expected=strikes_at_by_hand,
+        says="Speed at which the gudgeon pin first strikes the wall of its hole", unit="m/s", tolerance=1e-8,
+        figures=("mechanism", "torque"), found=strikes_at, expected=strikes_at_by_hand,
         source="the rod as a pendulum on the crank pin, integrated on its own (SciPy)",
-        tolerance=1e-8,
-        figures=("mechanism", "torque"),
     ),
     "stick-slip-drive": Entry(
-        says="How long the carriage slips",
-        unit="s",
-        found=slip_of,
-        expected=slip_by_hand,
+        says="How long the carriage slips", unit="s", tolerance=1e-8, found=slip_of, expected=slip_by_hand,
         source="the oscillation on a spring with constant friction, in closed form",
-        tolerance=1e-8,
     ),
     "slider-crank": Entry(
-        says="Acceleration of the piston at the top dead centre",
-        unit="m/s^2",
-        found=at_top,
-        expected=at_top_by_hand,
+        says="Acceleration of the piston at the top dead centre", unit="m/s^2", tolerance=1e-9,
+        figures=("mechanism", "torque"), found=at_top, expected=at_top_by_hand,
         source="the closed form −r ω² (1 + r/l)",
-        tolerance=1e-9,
-        figures=("mechanism", "torque"),
     ),
     "toleranced-slider-crank": Entry(
-        says="Shift of the piston at 60° of the crank per shift of the crank pin along the crank",
-        unit="1",
-        found=sensitivity,
-        expected=sensitivity_by_hand,
+        says="Shift of the piston at 60° of the crank per shift of the crank pin along the crank", unit="1",
+        tolerance=1e-12, figures=("mechanism", "torque"), found=sensitivity, expected=sensitivity_by_hand,
         source="the derivative of x = r cos θ + √(l² − r² sin² θ)",
-        tolerance=1e-12,
-        figures=("mechanism", "torque"),
     ),
     "offset-slider-crank": Entry(
-        says="Time of the stroke outwards over that of the return",
-        unit="1",
-        found=time_ratio("S"),
+        says="Time of the stroke outwards over that of the return", unit="1", tolerance=1e-10, found=time_ratio("S"),
         expected=ratio_of_offset,
         source="the closed form (180° + φ)/(180° − φ), φ = asin(e/(l − r)) − asin(e/(l + r))",
-        tolerance=1e-10,
     ),
     "whitworth-quick-return": Entry(
-        says="Time of the cutting stroke over that of the return",
-        unit="1",
-        found=time_ratio("G"),
-        expected=ratio_of_whitworth,
+        says="Time of the cutting stroke over that of the return", unit="1", tolerance=1e-10,
+        figures=("mechanism", "torque"), found=time_ratio("G"), expected=ratio_of_whitworth,
         source="the closed form (360° − φ)/φ, φ = 2 acos(d/r)",
-        tolerance=1e-10,
-        figures=("mechanism", "torque"),
     ),
     "scotch-yoke": Entry(
-        says="Largest difference of the yoke's place from r cos θ",
-        unit="m",
-        found=off_the_cosine,
-        expected=lambda: 0.0,
-        source="geometry",
-        tolerance=1e-15,
-        figures=("mechanism", "friction-power"),
+        says="Largest difference of the yoke's place from r cos θ", unit="m", tolerance=1e-15,
+        figures=("mechanism", "friction-power"), found=off_the_cosine, expected=lambda: 0.0, source="geometry",
     ),
     "elliptic-trammel": Entry(
-        says="Largest value of (x/a)² + (y/b)² − 1 at T",
-        unit="1",
-        found=off_the_ellipse,
-        expected=lambda: 0.0,
-        source="geometry",
-        tolerance=1e-13,
+        says="Largest value of (x/a)² + (y/b)² − 1 at T", unit="1", tolerance=1e-13, found=off_the_ellipse,
+        expected=lambda: 0.0, source="geometry",
     ),
     "inverted-slider-crank": Entry(
-        says="Swing of the boom over the stroke of the cylinder",
-        unit="rad",
-        found=swing,
-        expected=swing_by_hand,
+        says="Swing of the boom over the stroke of the cylinder", unit="rad", tolerance=1e-13,
+        figures=("mechanism", "torque"), found=swing, expected=swing_by_hand,
         source="the law of cosines in the triangle of pivot, foot and eye",
-        tolerance=1e-13,
-        figures=("mechanism", "torque"),
     ),
-}
+}  # fmt: skip

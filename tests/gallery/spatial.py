@@ -62,8 +62,7 @@ def elliptic(a: float, b: float, c: float, sign: int) -> float:
     return float(np.arctan2(b, a) + sign * np.arccos(c / np.hypot(a, b)))
 
 
-# ---- pezzuti-cardan: what its errors do ----------------------------------------------------------------------------
-
+# pezzuti-cardan: what its errors do
 CARDAN: list[Row] = [("R", 89.9, 1e-5, 0.0), ("C", 89.9, 1e-5, 0.0), ("C", 89.9, 2e-5, 0.0)]
 
 
@@ -88,18 +87,12 @@ def lead(output: Any) -> float:
     return float(np.ptp(np.unwrap(output) - np.arange(STEPS) * 2 * np.pi / STEPS))
 
 
-# ---- rccc, seven-r: the loop closed by a root finder -----------------------------------------------------------------
-
+# rccc, seven-r: the loop closed by a root finder
 RCCC: list[Row] = [("R", 25, 1.0, 0.6), ("C", 70, 3.0, 0.0), ("C", 55, 2.5, 0.0), ("C", 60, 2.8, 0.0)]
 SEVEN: list[Row] = [
-    ("R", 20, 0.030, -0.172),
-    ("R", 80, 0.100, -0.010),
-    ("R", 65, 0.070, 0.040),
-    ("R", 135, 0.110, -0.030),
-    ("R", 120, 0.150, 0.030),
-    ("R", 95, 0.140, -0.040),
-    ("R", 65, 0.131, -0.095),
-]
+    ("R", 20, 0.030, -0.172), ("R", 80, 0.100, -0.010), ("R", 65, 0.070, 0.040), ("R", 135, 0.110, -0.030),
+    ("R", 120, 0.150, 0.030), ("R", 95, 0.140, -0.040), ("R", 65, 0.131, -0.095),
+]  # fmt: skip
 
 
 def seven_half_way() -> float:
@@ -110,9 +103,7 @@ def seven_half_way() -> float:
     return float(angles[-1])
 
 
-# ---- rssr, spherical-four-bar: one equation a cos ψ + b sin ψ = c ----------------------------------------------------
-
-
+# rssr, spherical-four-bar: one equation a cos ψ + b sin ψ = c
 def rocker_of_rssr(crank: float, *, a: float = 30e-3, b: float = 120e-3, c: float = 70e-3, d: float = 100e-3,
                    s1: float = 10e-3, s4: float = 20e-3, alpha: float = np.pi / 3) -> float:  # fmt: skip
     """ψ from |A − B|² = b², A the ball of the crank, B that of the rocker."""
@@ -131,9 +122,7 @@ def rocker_on_the_sphere(crank: float) -> float:
     return elliptic(a, b, c2 + s1 * np.cos(crank) * s4 * c3 - c1 * c4 * c3, -1)
 
 
-# ---- rssp, swash-plate-pump, sarrus: strokes -------------------------------------------------------------------------
-
-
+# rssp, swash-plate-pump, sarrus: strokes
 def stroke_by_pythagoras() -> float:
     r, rod, d = 0.04, 0.26, 0.12
     return float(np.sqrt(rod**2 - (d - r) ** 2) - np.sqrt(rod**2 - (d + r) ** 2))
@@ -147,17 +136,13 @@ def off_the_straight_line(one: Outcome) -> float:
     return float(np.abs(place - [0 * height, 0 * height, height]).max())
 
 
-# ---- bennett -----------------------------------------------------------------------------------------------------
-
-
+# bennett
 def bennett_tangents(one: Outcome) -> float:
     """tan(θ_A/2) tan(θ_B/2) at 60°."""
     return float(np.prod([np.tan(at(one, "joint_rotation", name, 60) / 2) for name in "AB"]))
 
 
-# ---- tilting-gudgeon-pin: when its first end strikes ----------------------------------------------------------------
-
-
+# tilting-gudgeon-pin: when its first end strikes
 def strikes(one: Outcome) -> float:
     """s."""
     return float(trunnion.simulate(one.mechanism, 3e-4, 1)["impact_begin"][0])
@@ -195,126 +180,78 @@ def strikes_by_hand() -> float:
 
 ENTRIES = {
     "universal-joint": Entry(
-        says="Greatest speed of the output over that of the input",
-        unit="1",
+        says="Greatest speed of the output over that of the input", unit="1", tolerance=1e-12,
         found=lambda one: float(np.abs(ratio(one, "output", "input")).max()),
-        expected=lambda: float(1 / np.cos(np.radians(30))),
-        source="the closed form 1/cos δ",
-        tolerance=1e-12,
+        expected=lambda: float(1 / np.cos(np.radians(30))), source="the closed form 1/cos δ",
     ),
     "double-cardan": Entry(
-        says="Largest difference of the output's speed over that of the input from 1",
-        unit="1",
-        found=lambda one: float(np.abs(ratio(one, "D", "A") - 1).max()),
-        expected=lambda: 0.0,
+        says="Largest difference of the output's speed over that of the input from 1", unit="1", tolerance=1e-12,
+        found=lambda one: float(np.abs(ratio(one, "D", "A") - 1).max()), expected=lambda: 0.0,
         source="symmetry about the middle of the shaft",
-        tolerance=1e-12,
     ),
     "pezzuti-cardan": Entry(
-        says="How far the output runs ahead of and behind the input, both together",
-        unit="rad",
-        found=lambda one: lead(joint(one, "joint_rotation", "output")),
-        expected=lambda: lead(cardan()[2]),
+        says="How far the output runs ahead of and behind the input, both together", unit="rad", tolerance=1e-11,
+        found=lambda one: lead(joint(one, "joint_rotation", "output")), expected=lambda: lead(cardan()[2]),
         source="closing the four matrices of the loop with SciPy's root finder",
-        tolerance=1e-11,
     ),
     "pezzuti-cardan-45deg": Entry(
         says="How far the output runs ahead of and behind the input at the angle of Table II, both together",
-        unit="rad",
-        found=lambda one: lead(joint(one, "joint_rotation", "output")),
+        unit="rad", tolerance=1e-11, found=lambda one: lead(joint(one, "joint_rotation", "output")),
         expected=lambda: lead(cardan(45.0)[2]),
         source="closing the four matrices of the loop with SciPy's root finder",
-        tolerance=1e-11,
     ),
     "pezzuti-cardan-as-built": Entry(
-        says="Most that pin-1 leans in its hole",
-        unit="rad",
-        found=lean,
-        expected=lambda: float(np.arctan(2 * 0.01 / 10)),
+        says="Most that pin-1 leans in its hole", unit="rad", tolerance=1e-7, figures=("mechanism", "seat"),
+        found=lean, expected=lambda: float(np.arctan(2 * 0.01 / 10)),
         source="the closed form tan α = 2 ρ/H of a pin whose ends are pressed to opposite sides of its hole",
-        tolerance=1e-7,
-        figures=("mechanism", "seat"),
     ),
     "pezzuti-cardan-10mm": Entry(
-        says="Travel of pin-1 along its axis over the turn, which only the errors cause",
-        unit="m",
-        found=stroke("pin-1"),
-        expected=lambda: float(np.ptp(cardan()[3])),
+        says="Travel of pin-1 along its axis over the turn, which only the errors cause", unit="m", tolerance=1e-12,
+        lost=STEPS, errors=("locked by friction",), found=stroke("pin-1"), expected=lambda: float(np.ptp(cardan()[3])),
         source="closing the four matrices of the loop with SciPy's root finder",
-        tolerance=1e-12,
-        lost=STEPS,
-        errors=("locked by friction",),
     ),
     "rccc": Entry(
-        says="Slide of the output at 60° of the crank",
-        unit="m",
+        says="Slide of the output at 60° of the crank", unit="m", tolerance=1e-11,
         found=lambda one: at(one, "joint_slide", "D", 60),
         expected=lambda: float(closed(RCCC, np.pi / 3, [1.2, 1.7, 1.4, -3.0, -1.0, -2.1])[5]),
         source="closing the four matrices of the loop with SciPy's root finder",
-        tolerance=1e-11,
     ),
     "rssr": Entry(
-        says="Angle of the rocker at 60° of the crank",
-        unit="rad",
-        found=lambda one: at(one, "joint_rotation", "D", 60),
-        expected=lambda: rocker_of_rssr(np.pi / 3),
+        says="Angle of the rocker at 60° of the crank", unit="rad", tolerance=1e-12,
+        found=lambda one: at(one, "joint_rotation", "D", 60), expected=lambda: rocker_of_rssr(np.pi / 3),
         source="the one equation that the length of the rod leaves",
-        tolerance=1e-12,
     ),
     "rssp": Entry(
-        says="Stroke of the ram",
-        unit="m",
-        found=stroke("D"),
-        expected=stroke_by_pythagoras,
+        says="Stroke of the ram", unit="m", tolerance=1e-14, found=stroke("D"), expected=stroke_by_pythagoras,
         source="the closed form √(l² − (d − r)²) − √(l² − (d + r)²)",
-        tolerance=1e-14,
     ),
     "swash-plate-pump": Entry(
-        says="Stroke of the piston",
-        unit="m",
-        found=stroke("cylinder"),
-        expected=lambda: float(2 * 0.04 * np.tan(np.radians(15))),
-        source="the closed form 2 R tan α",
-        tolerance=1e-14,
+        says="Stroke of the piston", unit="m", tolerance=1e-14, found=stroke("cylinder"),
+        expected=lambda: float(2 * 0.04 * np.tan(np.radians(15))), source="the closed form 2 R tan α",
     ),
     "spherical-four-bar": Entry(
-        says="Angle of the rocker at 90° of the crank",
-        unit="rad",
-        found=lambda one: at(one, "joint_rotation", "D", 90),
-        expected=lambda: rocker_on_the_sphere(np.pi / 2),
+        says="Angle of the rocker at 90° of the crank", unit="rad", tolerance=1e-12,
+        found=lambda one: at(one, "joint_rotation", "D", 90), expected=lambda: rocker_on_the_sphere(np.pi / 2),
         source="spherical trigonometry",
-        tolerance=1e-12,
     ),
     "tilting-gudgeon-pin": Entry(
-        says="When the first end of the gudgeon pin strikes the wall of its hole",
-        unit="s",
-        found=strikes,
-        expected=strikes_by_hand,
+        says="When the first end of the gudgeon pin strikes the wall of its hole", unit="s", tolerance=1e-8,
+        found=strikes, expected=strikes_by_hand,
         source="Euler's equations of the rod about the ball on the crank, integrated on their own (SciPy)",
-        tolerance=1e-8,
     ),
     "bennett": Entry(
-        says="tan(θ/2) of the crank times that of the coupler, the same at every position",
-        unit="1",
-        found=bennett_tangents,
-        expected=lambda: float(np.sin(np.radians(80)) / np.sin(np.radians(30))),
+        says="tan(θ/2) of the crank times that of the coupler, the same at every position", unit="1", tolerance=1e-12,
+        found=bennett_tangents, expected=lambda: float(np.sin(np.radians(80)) / np.sin(np.radians(30))),
         source="Bennett's closed form sin ½(β + α)/sin ½(β − α)",
-        tolerance=1e-12,
     ),
     "sarrus": Entry(
         says="Largest distance of the platform from the height a sin φ + √(b² − a² cos² φ) straight above the base",
-        unit="m",
-        found=off_the_straight_line,
-        expected=lambda: 0.0,
+        unit="m", tolerance=1e-13, found=off_the_straight_line, expected=lambda: 0.0,
         source="the triangle of two leaves",
-        tolerance=1e-13,
     ),
     "seven-r": Entry(
-        says="Angle of the last pin half a turn on",
-        unit="rad",
-        found=lambda one: at(one, "joint_rotation", "G", 180),
-        expected=seven_half_way,
+        says="Angle of the last pin half a turn on", unit="rad", tolerance=1e-10,
+        found=lambda one: at(one, "joint_rotation", "G", 180), expected=seven_half_way,
         source="closing the seven matrices of the loop with SciPy's root finder",
-        tolerance=1e-10,
     ),
-}
+}  # fmt: skip

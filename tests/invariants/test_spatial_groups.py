@@ -7,15 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from brief import brief
 from trunnion import Mechanism
 from trunnion.algebra.dual import derivative, seed
 from trunnion.algebra.nested import flat
-from trunnion.algebra.space import ORIGIN, Frame, Screw, added, compose, element, minus, moment_at, power, relative
+from trunnion.algebra.space import ORIGIN, Frame, Screw, compose, element, moment_at, relative
 from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import OUTER, Element, GroupJoint, Pose
@@ -37,46 +35,7 @@ def numbers(value: Any) -> Array:
     return np.array(np.broadcast_arrays(*flat(value)), float)
 
 
-@pytest.mark.parametrize("kind", MOTIONS)
-@given(seed_=st.integers(0, 10**6))
-@settings(max_examples=25, deadline=None)
-def test_a_pair_placed_and_taken_back_is_where_it_was(kind: str, seed_: int) -> None:
-    rng = np.random.default_rng(seed_)
-    motion, first = MOTIONS[kind], random_frame(rng)
-    q = list(rng.uniform(-3, 3, len(motion.kinds)))
-    second = motion.place(first, q, LEAD)
-    axes = np.array([second.x, second.y, second.z])
-    assert np.allclose(axes @ axes.T, np.eye(3), atol=1e-14)
-    assert np.linalg.det(axes) == pytest.approx(1.0)
-    assert np.allclose(numbers(motion.unplace(second, q, LEAD)), numbers(first), atol=1e-13)
-
-
-@pytest.mark.parametrize("kind", MOTIONS)
-def test_the_screws_of_a_pair_are_its_velocities(kind: str) -> None:
-    rng = np.random.default_rng(7)
-    motion, first = MOTIONS[kind], random_frame(rng)
-    q = list(rng.uniform(-1, 1, len(motion.kinds)))
-    if kind == "spherical":
-        q = [part / np.linalg.norm(q) for part in q]
-    second = motion.place(first, q, LEAD)
-    screws = motion.screws(first, second, LEAD)
-    assert len(screws) == len(motion.steps)
-    h = 1e-6
-    for i, screw in enumerate(screws):
-        ends = []
-        for sign in (1.0, -1.0):
-            steps = [sign * h if j == i else 0.0 for j in range(len(screws))]
-            ends.append(motion.place(first, motion.advanced(q, steps), LEAD))
-        for axis in range(3):  # the ends of the second element's axes, one metre out
-            points = [np.add(end.place, end[axis]) for end in ends]
-            speed = (points[0] - points[1]) / (2 * h)
-            at = np.add(second.place, second[axis])
-            assert np.allclose(speed, moment_at(screw, tuple(at)), atol=1e-8)
-
-
-# ---- the cylindrical dyad ---------------------------------------------------------------------------------------
-
-
+# the cylindrical dyad
 def dyad(sides: tuple[tuple[int, int], ...]) -> tuple[tuple[GroupJoint, ...], list[Element]]:
     """Three cylindrical joints and their elements: random links between random known axes that they can reach."""
     rng = np.random.default_rng(len(sides) + sum(map(sum, sides)))
@@ -135,8 +94,7 @@ def answers(group: SpatialGroup, pose: Pose, outer: Any, outer_second: Any, load
     return numbers((pose.frames, tuple(twists), tuple(seconds), tuple(group.reactions(pose, loads))))
 
 
-# ---- the general group ------------------------------------------------------------------------------------------
-
+# the general group
 # one loop each of mobility one, driven at its first joint: kinds, and where the links' elements lie
 LOOPS = {
     "RSSR": ("revolute", "spherical", "spherical", "revolute"),
@@ -214,36 +172,6 @@ def test_velocities_and_accelerations_are_derivatives(kinds: tuple[str, ...]) ->
 
 
 @pytest.mark.parametrize("kinds", LOOPS.values(), ids=LOOPS)
-def test_reactions_hold_every_link_and_do_no_work_in_the_freedoms(kinds: tuple[str, ...]) -> None:
-    group, elements, start, drive = loop(kinds, np.zeros(()))
-    pose = group.position(elements, start, [drive])
-    rng = np.random.default_rng(11)
-    loads = [Screw(tuple(rng.normal(size=3)), tuple(rng.normal(size=3))) for _ in range(group.links)]
-    for link, a, b in group.spinning:  # nothing holds a free spin: loads without a moment about its line
-        axis = np.array(group.spin_axis(pose.elements, a, b), float)
-        place = pose.elements[a].second.place
-        about = np.array(moment_at(loads[link], place), float)
-        excess = axis * float(axis @ about)
-        loads[link] = minus(loads[link], Screw((0.0, 0.0, 0.0), tuple(excess)))
-    found = group.reactions(pose, loads)
-    scale = max(float(np.max(np.abs(numbers(wrench)))) for wrench in found)
-    for link in range(group.links):
-        total = loads[link]
-        for joint, wrench in zip(group.joints, found, strict=True):
-            total = added(total, wrench) if joint.sides[1] == link else total
-            total = minus(total, wrench) if joint.sides[0] == link else total
-        assert np.max(np.abs(numbers(total))) < 1e-11 * scale
-    for k, wrench in enumerate(found):
-        for i, screw in enumerate(pose.screws[k]):
-            if not (k in group.driven and i == 0):
-                assert abs(float(power(wrench, screw))) < 1e-11 * scale
-    speeds = group.rates(pose, [None] * len(kinds), [1.0])
-    twists = group.twists(pose, [None] * len(kinds), speeds)
-    work = sum(float(power(load, twist)) for load, twist in zip(loads, twists, strict=True))
-    assert float(power(found[0], pose.screws[0][0])) == pytest.approx(-work, abs=1e-11 * scale)
-
-
-@pytest.mark.parametrize("kinds", LOOPS.values(), ids=LOOPS)
 def test_dual_parts_are_derivatives_by_a_dimension(kinds: tuple[str, ...]) -> None:
     group, elements, start, drive = loop(kinds, np.zeros(()))
 
@@ -266,56 +194,6 @@ def test_dual_parts_are_derivatives_by_a_dimension(kinds: tuple[str, ...]) -> No
     ends = [np.array([float(n) for n in chosen(outcome(sign * h))]) for sign in (1.0, -1.0)]
     differences = (ends[0] - ends[1]) / (2 * h)
     assert np.allclose(np.array(exact, float), differences, rtol=1e-6, atol=1e-6 * np.max(np.abs(differences)))
-
-
-@given(seed_=st.integers(0, 10**6), size=st.floats(1e-6, 1e4))
-@settings(max_examples=20, deadline=None)
-def test_a_loop_of_any_size_anywhere_turns_alike(seed_: int, size: float) -> None:
-    """The same loop scaled and moved as a whole: the same angles, condition, and forces; moments scaled."""
-    rng = np.random.default_rng(seed_)
-    group, elements, start, drive = loop(LOOPS["RSSR"], np.zeros(()))
-    whole = random_frame(rng, reach=0.3)
-
-    def changed(frame: Frame, outer: bool) -> Frame:
-        frame = compose(whole, frame) if outer else frame
-        return frame._replace(place=tuple(size * n for n in frame.place))
-
-    moved = [
-        Element(*(changed(one[i], joint.sides[i] == OUTER) for i in (0, 1)), size * one.lead)
-        for one, joint in zip(elements, group.joints, strict=True)
-    ]
-    here, there = group.position(elements, start, [drive]), group.position(moved, start, [drive])
-    assert float(there.gap) < 1e-12 * size
-    assert np.allclose(np.array(there.q, float), np.array(here.q, float), atol=1e-9)
-    assert float(there.condition) == pytest.approx(float(here.condition), rel=1e-8)
-
-
-def test_lanes_that_do_not_close_are_nan() -> None:
-    """A rod too short for its ends has no pose, in its lanes alone."""
-    group, elements, start, drive = loop(LOOPS["RSSR"], np.zeros(4))
-    rod = elements[1].second
-    stretch = np.array([1.0, 1.0, 1e-3, 1.0])
-    far = elements[2].first
-    shorter = tuple(a + stretch * (b - a) for a, b in zip(rod.place, far.place, strict=True))
-    changed = [*elements[:2], elements[2]._replace(first=far._replace(place=shorter)), elements[3]]
-    pose = group.position(changed, start, [drive])
-    assert list(np.isfinite(pose.gap)) == [True, True, False, True]
-
-
-def test_redundant_loops_give_the_smallest_reactions() -> None:
-    """A bar on two coaxial hinges, pushed in the middle: half on each, no moments that the push does not need."""
-    x = (1.0, 0.0, 0.0)
-    ends = [element((0.0, 0.0, z), (0.0, 0.0, 1.0), x) for z in (-1.0, 1.0)]
-    joints = tuple(GroupJoint("revolute", (OUTER, 0)) for _ in ends)
-    group = SpatialGroup(1, joints, (0,), redundant=True)
-    pose = group.position([Element(end, end) for end in ends], [np.zeros(1)], [np.zeros(1)])
-    push = Screw((0.0, -6.0, 0.0), (0.0, 0.0, 0.0))
-    first, second = group.reactions(pose, [push])
-    assert np.allclose(numbers(first.u)[:, 0], (0.0, 3.0, 0.0))
-    assert np.allclose(numbers(second.u)[:, 0], (0.0, 3.0, 0.0))
-    for wrench, one in zip((first, second), pose.elements, strict=True):
-        assert np.max(np.abs(numbers(moment_at(wrench, one.second.place)))) < 1e-12
-    assert np.max(np.abs(numbers(added(added(first, second), push)))) < 1e-12
 
 
 @pytest.mark.spread(1)

@@ -1,7 +1,8 @@
-"""Seats where there is little to seat: no load for a while, locked, two positions, forces that have no answer."""
+"""What holds for the play of every pair and linkage, and seats where there is little to seat."""
 
 from __future__ import annotations
 
+import copy
 import json
 from pathlib import Path
 from typing import Any
@@ -9,9 +10,95 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from trunnion import Mechanism, MechanismError, analyse, read
+import mechanisms
+import trunnion
+from played import with_play
+from trunnion import Mechanism, analyse, read
 from trunnion.cycle.findings import listed
+from trunnion.joints.clearance import CLEARANCE_MODELS, pressed, worst_case
+
+radii = st.floats(1e-7, 1e-2)
+components = st.floats(-1e4, 1e4).filter(lambda n: n == 0 or abs(n) > 1e-6)
+PINS = [CLEARANCE_MODELS["spatial"][kind] for kind in ("revolute", "cylindrical")]
+
+
+def vectors(count: int) -> Any:
+    return st.tuples(*[components] * count)
+
+
+# seats
+@given(st.integers(1, 3).flatmap(vectors), radii, st.floats(1e-3, 1e3))
+def test_a_seat_depends_on_the_direction_of_the_load(load: tuple[float, ...], rho: float, factor: float) -> None:
+    """Odd, the same for any size of load, on the wall; in the middle without load."""
+    seat = pressed(load, rho)
+    size = float(np.linalg.norm(load))
+    if size == 0:
+        assert seat == (0.0,) * len(load)
+        return
+    assert np.linalg.norm(seat) == pytest.approx(rho, rel=1e-15)
+    assert pressed(tuple(-n for n in load), rho) == tuple(-n for n in seat)
+    np.testing.assert_allclose(pressed(tuple(factor * n for n in load), rho), seat, rtol=1e-14)
+    assert float(np.dot(load, seat)) == pytest.approx(float(worst_case([load], [rho])), rel=1e-14)
+    assert pressed(tuple(float(n) for n in seat), rho) == pytest.approx(seat, rel=1e-14)
+
+
+# friction
+@pytest.mark.parametrize("model", PINS)
+def test_a_force_at_one_end_of_a_pin_presses_there_alone(model: Any) -> None:
+    """A force at z = ±H/2 has the moment r × F about mid-length; the other end feels nothing of it."""
+    force, length = np.array([30.0, -40.0, 0.0]), 0.08
+    for end, z in ((0, -length / 2), (1, length / 2)):
+        moment = np.cross([0.0, 0.0, z], force)
+        loads = model.loads(tuple(force), tuple(moment), length)
+        np.testing.assert_allclose(loads[end], force[:2], atol=1e-12)
+        np.testing.assert_allclose(loads[1 - end], 0.0, atol=1e-12)
+
+
+STEPS = 8
+clearances = st.floats(1e-7, 1e-4)
+
+
+def played(mechanism: Mechanism, *measures: str) -> xr.Dataset:
+    return trunnion.play(mechanism, list(measures) or None, STEPS)
+
+
+@settings(max_examples=3)
+@given(st.lists(clearances, min_size=3, max_size=3))
+def test_joints_add_up(found: list[float]) -> None:
+    """A joint's part is the same alone or beside others; the totals are the sum and the root of squares."""
+    base, data, alone = mechanisms.four_bar(), mechanisms.four_bar(), []
+    for joint, clearance in zip("BCD", found, strict=True):
+        one = copy.deepcopy(base)
+        one["joints"][joint]["pin"] = {"radius": 0.01, "clearance": clearance}
+        data["joints"][joint]["pin"] = {"radius": 0.01, "clearance": clearance}
+        alone.append(played(Mechanism(trunnion=1, **one), "rotation:D"))
+    together = played(Mechanism(trunnion=1, **data), "rotation:D")
+    for joint, one in zip("BCD", alone, strict=True):
+        part = together["worst_case"].sel(joint=joint)
+        np.testing.assert_allclose(part, one["worst_case"].sel(joint=joint), rtol=1e-12)
+    total = sum(one["worst_case_total"] for one in alone)
+    np.testing.assert_allclose(together["worst_case_total"], total, rtol=1e-12)
+    scatter = sum(one["deviation_total"] ** 2 for one in alone)
+    np.testing.assert_allclose(together["deviation_total"] ** 2, scatter, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["slider-crank", "class III"])
+def test_which_link_has_the_hole_does_not_matter(name: str) -> None:
+    """To first order: pins and holes changed over have the same worst case; a turn has the other sign."""
+    data = mechanisms.MODELS[name]()
+    turned = copy.deepcopy(data)
+    link = next(link for link in data["links"] if link != "ground")
+    for joint, stated in turned["joints"].items():
+        if joint not in data["drivers"] and stated["type"] == "revolute":  # the middle of a guide is on one link only
+            stated["links"] = stated["links"][::-1]
+    first = next(iter(data["links"][link]["points"]))
+    names = [f"{other}.{next(iter(data['links'][other]['points']))}.x" for other in data["links"] if other != "ground"]
+    one, other = (played(with_play(case), *names, f"{link}.{first}.y") for case in (data, turned))
+    np.testing.assert_allclose(other["worst_case"], one["worst_case"], rtol=1e-9, atol=1e-18)
+
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -32,17 +119,6 @@ def test_a_passage_is_told_once_however_few_the_positions() -> None:
     assert "B" in together
     assert found[together]["count"] == together.count(",") + 1 > 1  # the other pin of the coupler, in one finding
     assert len({figures["at"] for figures in found.values()}) == len(found)
-
-
-@pytest.mark.slow
-def test_the_end_float_is_no_end_of_the_pin() -> None:
-    """Its passages are told as those along the axis; what is least is compared with the largest of the same end."""
-    result = analyse(changed("rssr-with-play", {"D.pin.end_float": "0.1 mm"}), steps=36)
-    (finding,) = told(result, "contact.lost")
-    assert finding["figures"]["at"].count("at 200.8° (along its axis)") == 1
-    axial = np.abs(result["end_force"].sel(joint="D", axis="z")).max().item()
-    assert finding["figures"]["least"] == 0
-    assert finding["figures"]["peak"] == pytest.approx(2 * axial, rel=0.01)  # each end has half of it
 
 
 def massless_compressor() -> dict[str, Any]:
@@ -100,44 +176,6 @@ def test_figures_say_which_positions_they_are_of_where_contact_is_lost() -> None
         assert np.isnan(result["measure_figure"].sel(measure=name))
     assert figures["mean"].value is not None
     assert "loses contact at " in figures["mean"].note
-
-
-@pytest.mark.slow
-def test_nothing_is_said_of_contact_where_it_is_locked() -> None:
-    result = analyse(changed("fourbar-with-play", {"joint_defaults.friction.coefficient": 5}), steps=60)
-    locked = result["status"].values >= 4
-    assert np.any(locked)
-    assert not np.any(result["contact_lost"].values[:, locked])
-    assert not told(result, "seat.unsettled")
-
-
-@pytest.mark.slow
-def test_where_no_force_is_known_nothing_is_said_of_what_presses() -> None:
-    """With pins of 10 mm the Cardan joint locks at every position."""
-    model = changed("pezzuti-cardan-as-built", {"bearing": "10 mm"})
-    result = analyse(model, steps=12)
-    assert np.all(result["status"] == 5)
-    assert not told(result, "seat.unloaded")
-
-
-@pytest.mark.slow
-def test_a_shaft_that_fits_but_for_its_end_float() -> None:
-    """It lies at one end or the other, by its thrust."""
-    values: dict[str, float | str] = {"D.pin.hole_radius": "10 mm", "D.pin.end_float": "0.1 mm"}
-    result = analyse(changed("rssr-with-play", values), steps=36)
-    offset, force = (result[name].sel(joint="D", end="1") for name in ("seat_offset", "end_force"))
-    assert np.all(offset.sel(axis=["x", "y"]) == 0)
-    away = np.abs(force.sel(axis="z")) > 0.5  # N: from where the thrust turns round
-    assert np.allclose(offset.sel(axis="z")[away], 5e-5 * np.sign(force.sel(axis="z"))[away], rtol=0, atol=1e-12)
-    assert np.any(result["point_error"] != 0)
-
-
-def test_a_fit_that_cannot_be_read_is_the_only_finding() -> None:
-    data = read(EXAMPLES / "fourbar-with-play.yaml").data()
-    data["joint_defaults"]["pin"] = {"fit": "12 H7/g6"}
-    with pytest.raises(MechanismError) as raised:
-        Mechanism(**data)
-    assert [one.where for one in raised.value.findings] == ["joint_defaults.pin.fit"]
 
 
 @pytest.mark.slow

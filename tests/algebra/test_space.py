@@ -1,4 +1,4 @@
-"""Lines and poses against the same geometry with points, directions and 4 × 4 matrices; [P 1-7] one by one."""
+"""Lines, poses and screws against points, directions, 4 × 4 matrices and SciPy's matrix functions; [P 1-7]."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from mechanisms import Array
 from spatial_numbers import apart, random_directions, random_rotations, rows, stacked, vector
 from trunnion.algebra import line as lines
 from trunnion.algebra import pose as poses
+from trunnion.algebra import screw as screws
 from trunnion.algebra.dual import Dual, derivative, parts, primal, seed, spatial
-from trunnion.algebra.vector import apply, cross, dot, skew, vector_parts
+from trunnion.algebra.line import line
+from trunnion.algebra.vector import apply, product, scaled, skew, spatial_vector, vector_parts
 
 COUNT = 500
 RNG = np.random.default_rng(7)
@@ -33,15 +36,7 @@ def same(a: Any, b: Any, tolerance: float = 1e-13) -> None:
     np.testing.assert_allclose(a, b, rtol=0, atol=tolerance * max(1.0, float(np.nanmax(np.abs(b)))))
 
 
-# ---- equations of [P] -----------------------------------------------------------------------------------------
-
-
-def test_p1_a_line_is_a_vector_and_its_moment() -> None:
-    v, w = apart(FIRST)
-    same(v, U)
-    same(w, np.cross(P, U))
-
-
+# equations of [P]
 def test_p2_dual_angle_is_angle_and_distance() -> None:
     """E₁ turned by θ counterclockwise about E₁₂ and moved by s along it lies on E₂."""
     theta, s = RNG.uniform(-np.pi, np.pi, COUNT), RNG.normal(size=COUNT)
@@ -73,13 +68,7 @@ def test_p3_to_p7_dual_frame() -> None:
         same(part, expected)
 
 
-def test_p6_skew_matrix_is_the_cross_product() -> None:
-    same(stacked(apply(skew(vector(P)), vector(Q))), np.cross(P, Q))
-
-
-# ---- lines ----------------------------------------------------------------------------------------------------
-
-
+# lines
 def test_common_perpendicular() -> None:
     found = lines.perpendicular(FIRST, SECOND)
     a, b = (stacked(one) for one in found.feet)
@@ -113,15 +102,6 @@ def test_parallel_lines(sense: int) -> None:
     same(apart(found.line)[0], step / np.linalg.norm(step, axis=-1, keepdims=True), 1e-10)
 
 
-def test_parallel_and_crossed_lines_in_one_batch() -> None:
-    mixed = np.where((np.arange(COUNT) % 2 == 0)[:, None], U, V)
-    found = lines.perpendicular(FIRST, lines.line(vector(Q), vector(mixed)))
-    crossed = lines.perpendicular(FIRST, SECOND)
-    same(found.angle.real[::2], np.zeros(COUNT // 2))
-    same(found.angle.dual[1::2], crossed.angle.dual[1::2])
-    same(stacked(found.feet[1])[1::2], stacked(crossed.feet[1])[1::2])
-
-
 def test_a_line_with_itself() -> None:
     x_axis = lines.line((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     found = lines.perpendicular(x_axis, x_axis)
@@ -130,32 +110,7 @@ def test_a_line_with_itself() -> None:
     assert all(np.isnan(primal(entry)) for entry in lines.line((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
 
 
-def test_directions_alone_have_a_plain_angle() -> None:
-    same(lines.dual_angle(vector(U), vector(V)), lines.dual_angle(FIRST, SECOND).real)
-    same(lines.dual_angle((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)), np.pi)
-
-
-def test_derivatives_of_angle_and_distance() -> None:
-    """By a shift of the second line; NaN where the lines are parallel, the value itself being there."""
-
-    def found(x: Any, direction: Array) -> Any:
-        return lines.perpendicular(FIRST, lines.line((Q[:, 0] + x, Q[:, 1], Q[:, 2]), vector(direction)))
-
-    h = 1e-5
-    exact, near, far = found(seed(0.0), V), found(-h, V), found(h, V)
-    slope = derivative(exact.angle).dual
-    difference = (far.angle.dual - near.angle.dual) / (2 * h)
-    same(slope, difference, 1e-8)
-    same(derivative(exact.feet[0][1]), (far.feet[0][1] - near.feet[0][1]) / (2 * h), 1e-6)
-    beside = found(seed(0.0), U)
-    same(beside.angle.real.dual, found(0.0, U).angle.dual)
-    assert np.isnan(primal(derivative(beside.angle))).all()
-    assert np.isnan(primal(derivative(beside.feet[0][0]))).all()
-
-
-# ---- poses ----------------------------------------------------------------------------------------------------
-
-
+# poses
 def random_poses(seed_number: int) -> Any:
     rng = np.random.default_rng(seed_number)
     return poses.pose(rows(random_rotations(rng, COUNT)), vector(rng.normal(size=(COUNT, 3))))
@@ -172,12 +127,7 @@ def test_denavit_hartenberg() -> None:
     theta, s, alpha, a = RNG.normal(size=(4, COUNT))
     found = homogeneous(poses.link(spatial(theta, s), spatial(alpha, a)))
     c, n, ca, na, zero, one = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha), 0 * s, 0 * s + 1
-    expected = [
-        [c, -n * ca, n * na, a * c],
-        [n, c * ca, -c * na, a * n],
-        [zero, na, ca, s],
-        [zero, zero, zero, one],
-    ]
+    expected = [[c, -n * ca, n * na, a * c], [n, c * ca, -c * na, a * n], [zero, na, ca, s], [zero, zero, zero, one]]
     same(found, np.moveaxis(np.array(expected), (0, 1), (-2, -1)))
 
 
@@ -196,23 +146,6 @@ def test_adjoint() -> None:
     same((six @ screw[..., None])[..., 0], np.concatenate(apart(poses.transform(a, FIRST)), axis=-1))
 
 
-def test_what_two_lines_have_in_common_does_not_depend_on_the_frame() -> None:
-    a = random_poses(5)
-    moved = [poses.transform(a, one) for one in (FIRST, SECOND)]
-    one, other = lines.dual_angle(FIRST, SECOND), lines.dual_angle(*moved)
-    same(other.real, one.real)
-    same(other.dual, one.dual, 1e-11)
-
-
-def test_the_space_epsilon_lies_below_those_of_derivatives() -> None:
-    number = spatial(Dual(1.0, 2.0), 3.0)
-    assert (number.depth, number.real.real, number.real.dual) == (2, 1.0, 3.0)
-    real, dual = parts(number)
-    assert (real.real, real.dual, dual.real, dual.dual) == (1.0, 2.0, 3.0, 0.0)
-    assert parts(2.5) == (2.5, 0.0)
-    same(dot(cross(vector(U), vector(V)), vector(U)), np.zeros(COUNT))
-
-
 def test_the_public_modules_of_dual_vectors_and_screws_go_together() -> None:
     from trunnion import dual
 
@@ -220,3 +153,125 @@ def test_the_public_modules_of_dual_vectors_and_screws_go_together() -> None:
     size = dual.vectors.length(screw)
     assert float(size.real) == pytest.approx(np.pi / 2)
     assert float(size.dual) == pytest.approx(0.1)
+
+
+ANGLES = [
+    0.0, 1e-300, 1e-160, 1e-12, 1e-8, 1e-4, 0.1, 0.499, 0.501, 1.0, 2.0, 2.2, 3.0, 3.14, np.pi - 1e-8, np.pi - 1e-13,
+]  # fmt: skip
+
+
+def screw(theta: Any, s: Any) -> Any:
+    return scaled(Dual(theta, s), line(vector(P), vector(U)))
+
+
+def six_by_six(screw: Any) -> Array:
+    """[ω]× and [v]× as the 6 × 6 matrix of v̂ ×."""
+    omega, v = apart(screw)
+    zero = np.zeros(omega.shape[:-1])
+
+    def tilde(a: Array) -> Array:
+        x, y, z = a[..., 0], a[..., 1], a[..., 2]
+        return np.moveaxis(np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]), (0, 1), (-2, -1))
+
+    w, m = tilde(omega), tilde(v)
+    return np.concatenate([np.concatenate([w, 0 * w], -1), np.concatenate([m, w], -1)], -2)
+
+
+def six(pose: Any) -> Array:
+    return np.stack([stacked(row) for row in poses.adjoint(pose)], axis=-2)
+
+
+@pytest.mark.parametrize("theta", ANGLES)
+def test_exp_is_the_matrix_exponential(theta: float) -> None:
+    one = screw(np.full(COUNT, theta), RNG.normal(size=COUNT))
+    np.testing.assert_allclose(six(screws.exp(one)), expm(six_by_six(one)), rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("theta", ANGLES)
+def test_log_undoes_exp(theta: float) -> None:
+    one = screw(np.full(COUNT, theta), RNG.normal(size=COUNT))
+    found = screws.log(screws.exp(one))
+    for part, expected in zip(apart(found), apart(one), strict=True):
+        np.testing.assert_allclose(part, expected, rtol=0, atol=3e-13)
+
+
+def test_exp_undoes_log_of_any_pose() -> None:
+    pose = poses.pose(rows(random_rotations(RNG, COUNT)), vector(P))
+    for part, expected in zip(apart(screws.exp(screws.log(pose))), apart(pose), strict=True):
+        np.testing.assert_allclose(part, expected, rtol=0, atol=2e-14)
+
+
+@pytest.mark.slow
+def test_half_turn() -> None:
+    """Of ± û one is given, with the slide along it; about every axis, those of the frame included."""
+    directions = np.concatenate([np.eye(3), -np.eye(3), U])
+    for direction in directions:
+        one = scaled(Dual(np.pi, 0.7), line((0.3, -0.2, 0.5), tuple(direction)))
+        pose = screws.exp(one)
+        found = screws.log(pose)
+        for part, expected in zip(apart(screws.exp(found)), apart(pose), strict=True):
+            np.testing.assert_allclose(part, expected, rtol=0, atol=2e-14)
+        assert np.linalg.norm(apart(found)[0]) == pytest.approx(np.pi, abs=1e-15)
+
+
+def test_pure_translation_and_identity() -> None:
+    pose = poses.pose(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (1.0, 2.0, 3.0))
+    real, dual = apart(screws.log(pose))
+    np.testing.assert_array_equal(real, np.zeros(3))
+    np.testing.assert_allclose(dual, [1.0, 2.0, 3.0], rtol=1e-15)
+    np.testing.assert_array_equal(stacked(screws.log(poses.compose())), np.zeros(3))
+    np.testing.assert_array_equal(stacked(screws.exp((0.0, 0.0, 0.0))), np.eye(3))
+
+
+@pytest.mark.parametrize("theta", [0.0, 1e-9, 0.05, 0.2, 1.0, 2.5, 3.1])
+def test_derivatives(theta: float) -> None:
+    """∂/∂t of exp(t û) is û × exp(t û), and log brings it back; at 0 too."""
+    one = line((0.3, -0.2, 0.5), (1.0, 2.0, -2.0))
+    pose = screws.exp(scaled(seed(Dual(theta, 0.4)), one))
+    slopes = tuple(tuple(derivative(entry) for entry in row) for row in pose)
+    x, y, z = one
+    generator: Any = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
+    values = tuple(tuple(entry.real for entry in row) for row in pose)
+    for part, expected in zip(apart(slopes), apart(product(generator, values)), strict=True):  # type: ignore[arg-type]
+        np.testing.assert_allclose(part, expected, rtol=0, atol=2e-13)
+    back = tuple(derivative(entry) for entry in screws.log(pose))
+    for part, expected in zip(apart(back), apart(one), strict=True):
+        np.testing.assert_allclose(part, expected, rtol=0, atol=2e-12)
+
+
+def test_bracket_is_the_rate_of_a_carried_screw() -> None:
+    carrier, carried = line((0.1, 0.2, 0.3), (1.0, 0.0, 1.0)), line((1.0, -1.0, 0.0), (0.0, 2.0, 1.0))
+    pose = screws.exp(scaled(seed(Dual(0.0, 0.0)), carrier))
+    rate = tuple(derivative(entry) for entry in poses.transform(pose, carried))
+    for part, expected in zip(apart(rate), apart(screws.bracket(carrier, carried)), strict=True):
+        np.testing.assert_allclose(part, expected, rtol=0, atol=1e-15)
+
+
+def test_a_pose_that_is_not_a_number_stays_so() -> None:
+    pose = poses.turn_z(Dual(np.array([0.3, np.nan]), np.array([0.0, 0.0])))
+    found = np.stack([np.broadcast_to(primal(entry), 2) for entry in screws.log(pose)])
+    assert np.isfinite(found[:, 0]).all()
+    assert np.isnan(found[:, 1]).any()
+
+
+def test_plain_numbers_are_rotations() -> None:
+    w = vector(2.0 * U)
+    real, _ = apart(screws.exp(screw(np.full(COUNT, 2.0), 0.0)))
+    np.testing.assert_allclose(stacked(screws.exp(w)), real, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(stacked(screws.log(screws.exp(w))), 2.0 * U, rtol=0, atol=1e-14)
+
+
+def test_power_does_not_depend_on_the_origin() -> None:
+    """F · v + M · ω, the same for every frame."""
+    force, moment, omega, v = RNG.normal(size=(4, COUNT, 3))
+    wrench, twist = spatial_vector(vector(force), vector(moment)), spatial_vector(vector(omega), vector(v))
+    expected = np.sum(force * v + moment * omega, axis=-1)
+    np.testing.assert_allclose(screws.power(wrench, twist), expected, rtol=0, atol=1e-14)
+    pose = poses.pose(rows(random_rotations(RNG, COUNT)), vector(P))
+    moved = [poses.transform(pose, one) for one in (wrench, twist)]
+    np.testing.assert_allclose(screws.power(*moved), expected, rtol=0, atol=1e-12)
+
+
+def test_directions_alone_have_a_plain_angle() -> None:
+    same(lines.dual_angle(vector(U), vector(V)), lines.dual_angle(FIRST, SECOND).real)
+    same(lines.dual_angle((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)), np.pi)

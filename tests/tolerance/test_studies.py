@@ -1,0 +1,287 @@
+"""Studies of tolerances: at the edge, of pins in seats, and what they say beside their figures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import trunnion
+from mechanisms import Array
+from toleranced import FOURBAR, fourbar, fourbar_angle, many
+from trunnion import Mechanism, MechanismError, Status
+from trunnion.results.attributes import findings_of
+from trunnion.statistics.streams import uniforms
+from trunnion.studies.tolerance.first_order import study
+
+LIMIT = {"angle": {"angle": "rocker", "at": "60 deg", "limit": "±0.1 deg"}}
+ALL = ("linear", "worst-case", "monte-carlo")
+
+
+def findings(result: Any) -> list[str]:
+    return [row["what"] for row in json.loads(result.attrs["findings"])]
+
+
+def own_uniforms(seed: int, count: int) -> Array:
+    """The uniform numbers of a run of the four-bar, from the streams themselves."""
+    size = study(fourbar(measures=LIMIT)).sampling("monte-carlo", count, seed).drawing
+    blocks = [uniforms(seed, i, 4, min(size, count - i * size)) for i in range(-(-count // size))]
+    return np.concatenate(blocks, axis=1)
+
+
+def own_samples(seed: int, count: int, sigma: float) -> list[Any]:
+    z = stats.norm.ppf(own_uniforms(seed, count))
+    return [value + sigma * row for value, row in zip(FOURBAR.values(), z, strict=True)]
+
+
+# samples without an answer
+def test_samples_that_do_not_go_together_at_a_place() -> None:
+    """Counted by cause and as outside every limit; moments, quantiles and extremes are of the others."""
+    widths = {"l1": 0.028, "l2": 0.028, "l3": 0.04, "l4": 0.04}
+    mechanism = fourbar(
+        tolerances={name: {"limits": width, "distribution": "uniform"} for name, width in widths.items()},
+        measures={"angle": {"angle": "rocker", "at": "60 deg", "limit": "±40 deg"}},
+    )
+    result = trunnion.tolerance(mechanism, methods=["monte-carlo"], samples=4000, seed=3)
+    shares = 2 * own_uniforms(3, 4000) - 1
+    sizes = zip(FOURBAR.values(), widths.values(), shares, strict=True)
+    own = fourbar_angle(*(value + width * row for value, width, row in sizes))
+    good = own[np.isfinite(own)]
+    assert 10 < len(own) - len(good) < 1000
+    assert (
+        int(result["failed"].sel(cause=Status.NOT_ASSEMBLED.text))
+        == len(own) - len(good)
+        == int(result["failed"].sum())
+    )
+    away = np.remainder(good - fourbar_angle(**FOURBAR) + np.pi, 2 * np.pi) - np.pi
+    figures = away + fourbar_angle(**FOURBAR)
+    assert result["samples"].item() == 4000
+    assert result["mean"].item() == pytest.approx(np.mean(figures), rel=1e-12)
+    assert result["deviation"].item() == pytest.approx(np.std(figures, ddof=1), rel=1e-10)
+    assert result["most"].item() == pytest.approx(np.max(figures), rel=1e-12)
+    assert result["yield"].item() == np.count_nonzero(np.abs(away) <= np.radians(40)) / 4000
+    assert int(result["histogram"].sum()) == len(good)
+    said = next(text for text in findings(result) if "could not be solved" in text)
+    assert said.startswith(f"{len(own) - len(good)} of 4,000 samples")
+    assert Status.NOT_ASSEMBLED.text in said
+
+
+def test_samples_that_do_not_go_together_everywhere() -> None:
+    """A measure over the turn needs all positions; one of a place only its own, but the sample fails for both."""
+    measures = {"turn": {"angle": "rocker"}, "place": {"angle": "rocker", "at": "60 deg"}}
+    result = trunnion.tolerance(
+        fourbar("±40 mm", measures=measures), methods=["monte-carlo"], samples=2000, seed=3, steps=24
+    )
+    sizes = own_samples(3, 2000, 0.04 / 3)
+    turn = np.array([fourbar_angle(*sizes, crank=crank) for crank in np.arange(24) * 2 * np.pi / 24])
+    lost, away = np.any(np.isnan(turn), axis=0), np.isnan(turn[4])
+    assert 0 < np.sum(away) < np.sum(lost) < 1000
+    assert int(result["failed"].sum()) == np.sum(lost)
+    np.testing.assert_allclose(result["yield"].values, [np.mean(~lost), np.mean(~away)], rtol=1e-15)
+    assert result["yield_all"].item() == np.mean(~lost)
+    assert result["mean"].sel(measure="place").item() == pytest.approx(np.mean(turn[4][~away]), abs=1e-12)
+
+
+@pytest.mark.parametrize("method", ["monte-carlo", "quasi-monte-carlo"])
+@pytest.mark.parametrize("samples", [1, 2, 7, 8])
+def test_few_samples(method: str, samples: int) -> None:
+    result = trunnion.tolerance(fourbar(measures=LIMIT), methods=["linear", method], samples=samples, seed=2)
+    done = result["samples"].item()
+    assert done == (samples if method == "monte-carlo" else 8)
+    assert np.isfinite(result["mean"].item())
+    assert np.isnan(result["deviation"].item()) == (done == 1)
+    assert result["yield"].item() == 1
+    assert 0 < result["yield_low"].item() < result["yield_high"].item() == 1
+
+
+def test_limits_to_one_side_and_without_the_nominal() -> None:
+    measures = {
+        "above": {"angle": "rocker", "at": "60 deg", "limit": "+0.02/0 deg"},
+        "beyond": {"angle": "rocker", "at": "60 deg", "limit": "+0.05/+0.01 deg"},
+        "nothing": {"angle": "rocker", "at": "60 deg", "limit": "±0 deg"},
+    }
+    found, batch = many(fourbar(measures=measures), 1000)
+    part = batch.figures(uniforms(1, 0, 4, 1000))
+    figures, passed = part["figure"], part["passed"]
+    change = np.degrees(figures[0] - found.linear.measures[0].reference.figure)
+    np.testing.assert_array_equal(passed[0], (change >= 0) & (change <= 0.02))
+    np.testing.assert_array_equal(passed[1], (change >= 0.01) & (change <= 0.05))
+    assert np.sum(passed[2]) == 0
+
+
+def test_limits_of_a_measure_over_the_turn() -> None:
+    """Its largest |deviation| is the figure; limits hold of the signed deviation at every position."""
+    measures = {"angle": {"angle": "rocker", "limit": "+0.06/-0.1 deg"}}
+    found, batch = many(fourbar(measures=measures), 500, steps=120)
+    part = batch.figures(uniforms(1, 0, 4, 500), 500)
+    figures, passed = part["figure"], part["passed"]
+    assert found.linear.measures[0].reference.figure == 0
+    change = np.degrees(part["curve0"])
+    near = np.abs(np.degrees(figures[0]) - np.max(np.abs(change), axis=1))
+    assert np.max(near) < 1e-4  # between positions it is no more than that higher
+    clear = (np.abs(np.max(change, axis=1) - 0.06) > 1e-4) & (np.abs(np.min(change, axis=1) + 0.1) > 1e-4)
+    kept = np.all((change <= 0.06) & (change >= -0.1), axis=1)
+    np.testing.assert_array_equal(passed[0][clear], kept[clear])
+    assert 0 < np.sum(kept) < 500
+
+
+REFUSED: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
+    "nothing varies": ({"tolerances": {}}, {}, "nothing has a tolerance"),
+    "no such measure": ({}, {"measures": ["bogus"]}, "is no measure"),
+    "no such method": ({}, {"methods": ["bogus"]}, "no method 'bogus'"),
+    "two at once": ({}, {"methods": ["monte-carlo", "quasi-monte-carlo"]}, "two sampling methods"),
+    "no samples": ({}, {"samples": 0}, "0 samples"),
+    "no positions": ({}, {"steps": 0}, "0 positions"),
+    "negative seed": ({}, {"seed": -1}, "a seed of -1"),
+    "no workers": ({}, {"jobs": 0}, "0 jobs"),
+    "no such engine": ({}, {"engine": "bogus"}, "no engine 'bogus'"),
+    "contradicting correlations": (
+        {"correlations": [{"of": ["l1", "l2"], "coefficient": 0.9}, {"of": ["l2", "l3"], "coefficient": 0.9},
+                          {"of": ["l1", "l3"], "coefficient": -0.9}]},
+        {}, "contradict",
+    ),
+    "indices of correlated numbers": (
+        {"correlations": [{"of": ["l1", "l2"], "coefficient": 0.5}]}, {"methods": ["sobol"]}, "independent",
+    ),
+    "place in no unit": ({"measures": {"angle": {"angle": "rocker"}}}, {"at": float("nan")}, "is not a position"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_refused_with_a_finding(name: str) -> None:
+    model, options, said = REFUSED[name]
+    with pytest.raises(MechanismError, match=said):
+        trunnion.tolerance(fourbar(**model), **{"samples": 10, **options})
+
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+SLIDER = {
+    "dimensions": {"r": "60 mm ± 0.1 mm", "k": "200 mm ± 0.15 mm"},
+    "links": {
+        "ground": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+        "crank": {"points": {"O": [0, 0], "P": ["r", 0]}},
+        "rod": {"points": {"P": [0, 0], "Q": ["k", 0]}},
+        "ram": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}, "T": ["k", 0]}},
+    },
+    "joints": {
+        "O": {"type": "revolute", "links": ["ground", "crank"]},
+        "P": {"type": "revolute", "links": ["crank", "rod"]},
+        "Q": {"type": "revolute", "links": ["rod", "ram"]},
+        "S": {"type": "prismatic", "links": ["ground", "ram"]},
+    },
+    "joint_defaults": {"pin": {"radius": "15 mm", "clearance": "20 um"}},
+    "drivers": {"O": {"speed": "60 rpm"}},
+    "assembly": {"Q": ["260 mm", 0]},
+    "measures": {"tip": {"point": "ram.T", "axis": "x", "limit": "±0.6 mm"}},
+    "tolerances": {"O.pin.clearance": "+0.01/0 mm"},
+    "costs": {
+        "k": {"model": "power", "B": 1, "k": 0.5, "unit": "mm", "least": "0.01 mm", "most": "0.3 mm"},
+        "O.clearance": {"model": "power", "B": 0.3, "k": 0.5, "unit": "mm", "least": "0.01 mm", "most": "0.05 mm"},
+    },
+}  # fmt: skip
+
+
+def slider(**more: Any) -> Mechanism:
+    return Mechanism(**{"trunnion": 1, **SLIDER, **more})
+
+
+def coded(result: Any, code: str) -> list[Any]:
+    found = findings_of(result) if "findings" in getattr(result, "attrs", {}) else result.findings
+    return [one for one in found if one.code == code]
+
+
+def test_a_dimension_of_two_links_is_named_by_check_and_by_tolerance() -> None:
+    """k is the length of the rod and that of the ram: one number for two parts."""
+    for result in (trunnion.check(slider()), trunnion.tolerance(slider(), methods=["linear"], steps=12)):
+        (found,) = coded(result, "tolerance.shared_dimension")
+        assert found.where == "dimensions.k"
+        assert found.figures["links"] == ["rod", "ram"]
+        assert "rod.Q.x" in found.what
+        assert "ram.T.x" in found.what
+
+
+def test_an_allocated_clearance_keeps_its_stated_tolerance_and_that_is_said() -> None:
+    """Both are in the worst case: 0.05 mm allocated and 0.01 mm stated make a play of 0.06 mm."""
+    result = trunnion.allocate(slider(), steps=12, samples=0)
+    (found,) = coded(result, "allocation.play_tolerance")
+    assert found.where == "costs.O.clearance"
+    assert (found.figures["lower_um"], found.figures["upper_um"]) == pytest.approx((0.0, 10.0))
+    play = result.sel(parameter="joints.O.clearance")
+    size = float(play["tolerance"]) + 10e-6
+    assert float(play["parameter_upper"]) == pytest.approx(size)
+    worst = float(play["contribution_worst_case"].sel(measure="tip"))
+    assert worst == pytest.approx(size * abs(float(play["sensitivity"].sel(measure="tip"))), rel=1e-6)
+
+
+PLAYS = ("O", "A", "P", "K")
+ALPHA = np.arcsin(1.02 / 200)  # of both toggle links to the line: 1 mm from it, and the play of the cylinder's pin
+
+
+def press(seat: str | None = "loaded") -> Mechanism:
+    """The toggle press without friction, 0.02 ± 0.01 mm of play in its pins; it dwells from 1.5 to 2 s."""
+    data = trunnion.read(EXAMPLES / "toggle-press.yaml").data()
+    data["joint_defaults"] = {"pin": {"radius": "20 mm"}}
+    for name in PLAYS:
+        data["joints"][name]["pin"] = {"radius": "20 mm", "clearance": "0.02 mm"}
+    data["tolerances"] = {f"{name}.pin.clearance": "±0.01 mm" for name in PLAYS}
+    data["measures"] = {"height": {"point": "punch.P", "axis": "y", "at": "1.7 s", "at_least": "50.06 mm"}}
+    mechanism = Mechanism(**data)
+    return mechanism if seat is None else mechanism.with_seats(seat)
+
+
+def test_the_plays_of_a_press_add_up_by_virtual_work() -> None:
+    """By Σ Q·c = F δ each pin moves the punch by ρ |Q|/F: 1/cos α of a toggle's pins, 2 tan α of the cylinder's."""
+    found = trunnion.tolerance(press(), methods=["linear", "worst-case", "monte-carlo"], samples=24, jobs=1)
+    closed = np.array([1 / np.cos(ALPHA)] * 3 + [2 * np.tan(ALPHA)])
+    names = [f"joints.{name}.pin.clearance" for name in PLAYS]
+    sensitivity = found.sensitivity.sel(parameter=names).values[0]
+    assert sensitivity == pytest.approx(closed, abs=5e-6)
+    worst = 1e-5 * np.sum(closed)
+    assert found.worst_case_upper.values[0] == pytest.approx(worst, rel=1e-3)
+    assert found.searched_upper.values[0] == pytest.approx(worst, rel=1e-3)
+    free = trunnion.tolerance(press("free"), methods=["linear"], samples=0)
+    assert found.nominal.values[0] - free.nominal.values[0] == pytest.approx(2e-5 * np.sum(closed), rel=1e-3)
+
+
+def test_samples_are_what_analyse_has_of_each() -> None:
+    """Figures of a loaded four-bar, at a place, over the turn, and against the nominal one, sample by sample."""
+    data = trunnion.read(EXAMPLES / "fourbar-with-play.yaml").data()
+    data["tolerances"] = {"crank": "±0.02 mm", "rocker": "±0.03 mm", "B.pin.clearance": "±0.005 mm"}
+    data["measures"] = {
+        "torque": {"effort": "A", "as": "maximum"}, "lean": {"rotation": "D", "at": "60 deg"},
+        "fast": {"rate": "D", "as": "maximum"}, "off": {"rotation": "D", "over": ["60 deg", "150 deg"]},
+    }  # fmt: skip
+    mechanism = Mechanism(**data)
+    sampler = study(mechanism).sampling("monte-carlo", 3, 1).prepare()
+    u = sampler.drawn(0)
+    values, part = sampler.inputs.values(u), sampler.figures(u)
+    nominal = trunnion.analyse(mechanism, steps=720)
+    for k in range(3):  # no pin changes sides between 60° and 150°
+        numbers: dict[str, Any] = {path: float(np.ravel(values[path])[k]) for path in sampler.inputs.names}
+        alone = trunnion.analyse(mechanism.with_values(numbers), steps=720)
+        assert part["figure"][:3, k] == pytest.approx(alone.measure_figure.values[:3], rel=1e-7)
+        turned = [one.joint_rotation.sel(joint="D").values[120:301] for one in (alone, nominal)]
+        assert part["figure"][3, k] == pytest.approx(np.max(np.abs(turned[0] - turned[1])), rel=1e-4)
+
+
+def test_play_alone_is_about_the_middle_of_the_holes() -> None:
+    """The worst case over all positions of the pins does not depend on where loads press them."""
+    mechanism = trunnion.read(EXAMPLES / "fourbar-with-play.yaml")
+    loaded, free = (trunnion.play(mechanism.with_seats(seat), steps=36) for seat in ("loaded", "free"))
+    assert loaded.worst_case.values == pytest.approx(free.worst_case.values, rel=1e-9)
+
+
+def test_indices_of_a_play_and_its_size() -> None:
+    """The angle by a pin anywhere in a hole: the size of the hole does nothing alone, the place in it nearly all."""
+    joints = fourbar().data()["joints"]
+    joints["C"]["pin"] = {"radius": "5 mm", "clearance": "0.2 mm ± 0.1 mm"}
+    result = trunnion.tolerance(fourbar(tolerances={}, joints=joints), methods=["linear", "sobol"], samples=16_000)
+    first, total = result["first_order"].values[0], result["total_order"].values[0]
+    # y = ρ c: V(E(y|ρ)) = 0, V(E(y|c)) = E(ρ)² E(c²); all V = E(ρ²) E(c²)
+    known = 0.2**2 / (0.2**2 + (0.1 / 3) ** 2)
+    np.testing.assert_allclose(first, [0, known], rtol=0, atol=0.02)
+    np.testing.assert_allclose(total, [1 - known, 1], rtol=0, atol=0.02)

@@ -1,11 +1,14 @@
 """A mechanism while the hand changes its numbers: motion, forces and locking margin, many times a second.
 
-What does not change from answer to answer, as the positions before the drag, is worked out once for a text.
+What does not change from answer to answer, as the positions before the drag, is worked out once for a text. Of many
+joints the forces are those of the position that is shown: those of a whole cycle take longer than a hand waits.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,16 +16,21 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.solve.backward import Backward
+from trunnion.solve.forward import Forward, posed
 from trunnion.solve.margin import margin_in, margins_beside
 from trunnion.solve.run import Run
-from trunnion.solve.status import status_of
+from trunnion.solve.status import pose_status, status_of
+from trunnion.solve.system import Values
 from trunnion.studio.loaded import Asked
 from trunnion.studio.placed import column, tracked, tracks
 
-__all__ = ["live_columns", "live_margin", "places_at", "solved_with"]
+__all__ = ["Live", "live_columns", "places_at"]
 
 Array = NDArray[np.float64]
 
+AT_ONCE = 12_000  # joints times positions whose forces are worked out in the time of a picture
+MOST_TRACKED = 20_000  # places of all tracks that are drawn in it
+STILL = 1e-9  # of the size: a point that moves less has no track
 NEAR = 3.0  # multiple of the friction up to which the margin is looked for: farther it takes longer than the forces
 
 
@@ -37,12 +45,101 @@ def places_at(asked: Asked) -> dict[str, tuple[float, float]]:
     return places
 
 
-@np.errstate(all="ignore")
-def solved_with(run: Run, values: Mapping[str, float], steps: int) -> Backward:
-    """Motion and forces of a mechanism in the plane over its cycle, with some numbers replaced."""
-    _refuse_space(run)
-    time = run.cycle.times(steps)
-    return run.solve(time, run.system.mechanism.parameters(values)) if values else run.solve(time)
+@dataclass(frozen=True, eq=False)
+class Live:
+    """A mechanism in the plane while its numbers are changed.
+
+    Parameters
+    ----------
+    run
+        The mechanism as it is stated.
+    values
+        Numbers that are replaced, SI, by path.
+    steps
+        Positions of its cycle.
+    """
+
+    run: Run
+    values: Mapping[str, float]
+    steps: int
+
+    def __post_init__(self) -> None:
+        _refuse_space(self.run)
+
+    @cached_property
+    def time(self) -> Array:
+        """Of the positions, s."""
+        return np.asarray(self.run.cycle.times(self.steps))
+
+    @cached_property
+    def numbers(self) -> Values:
+        """All numbers, the replaced ones among them."""
+        return self.run.system.mechanism.parameters(self.values) if self.values else self.run.values
+
+    @cached_property
+    def _cycle(self) -> Backward | None:
+        """Motion and forces of all positions, None of many joints."""
+        few = len(self.run.system.joints) * self.steps <= AT_ONCE
+        return self.run.solve(self.time, self.numbers) if few else None
+
+    @cached_property
+    @np.errstate(all="ignore")
+    def walk(self) -> Forward:
+        """Its motion over the cycle; of many joints the places alone."""
+        cycle = self._cycle
+        return cycle.walk if cycle else posed(self.run.system, self.numbers, self.run.chosen.assembly, self.time)
+
+    def track(self, key: str) -> Array:
+        """Where a point "link.point" goes, (2, position), m."""
+        link, _, name = key.partition(".")
+        place = self.walk.placed(self.walk.motions[link].frame, link, name)
+        return np.array([column(part, self.steps) for part in place])
+
+    @np.errstate(all="ignore")
+    def told(self, index: int) -> dict[str, Any]:
+        """What the page draws and tells of it, with forces at a position at least.
+
+        Returns
+        -------
+        dict
+            The columns of `live_columns`, of all positions or of the shown one alone; then with `tracks`, thinned, of
+            what moves. status: of all positions; margin: the locking margin at the shown one, `value` None where it has
+            none, and whether it is `beyond` that.
+        """
+        back = self._cycle
+        if back is None:
+            back = self.run.solve(self.time[[index]], self.numbers)
+            columns = live_columns(back, 1)
+            status = pose_status(self.walk, (self.steps,))
+            status[index] = columns["status"][0]
+            columns |= {"tracks": self._tracks(), "status": [int(code) for code in status]}
+            return columns | {"margin": self._margin(back, columns["status"], index, np.True_)}
+        columns = live_columns(back, self.steps)
+        return columns | {"margin": self._margin(back, columns["status"], index, np.arange(self.steps) == index)}
+
+    def _tracks(self) -> dict[str, dict[str, Array]]:
+        """Where each joint and each free point goes that moves, at as many positions as can be drawn in time."""
+        system = self.run.system
+        joints = [f"{links[1]}.{name}" for name, (_, links) in system.joints.items()]
+        free = [f"{link}.{point}" for link, point in system.points if point not in system.joints]
+        tracks = {key: self.track(key) for key in (*joints, *free)}
+        ends = {key: (np.fmax.reduce(track, axis=1), np.fmin.reduce(track, axis=1)) for key, track in tracks.items()}
+        reach = {key: float(np.fmax.reduce(high - low)) for key, (high, low) in ends.items()}
+        moving = [key for key in tracks if reach[key] > STILL * np.fmax.reduce(list(reach.values()))]
+        stride = -(-len(moving) * self.steps // MOST_TRACKED)
+        return {key: dict(zip("xy", tracks[key][:, ::stride], strict=True)) for key in moving}
+
+    def _margin(self, back: Backward, status: Sequence[int], index: int, lanes: Any) -> dict[str, Any]:
+        """The locking margin at a position, looked for up to NEAR. lanes: where the forces have the position."""
+        if status[index] == Status.ZERO_SLIP and self.run.cycle.duration > 0:
+            solve = lambda at: self.run.solve(at, self.numbers)  # noqa: E731  # a short one
+            margin = float(margins_beside(solve, self.time[[index]], self.run.cycle, NEAR)[0])
+        else:
+            every = np.broadcast_to(np.asarray(margin_in(back, NEAR, lanes), float), np.shape(back.walk.time))
+            margin = float(every[index if np.ndim(lanes) else 0])
+        if status[index] > Status.LOCKED or np.isnan(margin):
+            return {"value": None, "beyond": False}
+        return {"value": min(margin, NEAR), "beyond": margin > NEAR}
 
 
 def _refuse_space(run: Run) -> None:
@@ -83,24 +180,3 @@ def live_columns(back: Backward, steps: int) -> dict[str, Any]:
         "efforts": {name: force(effort) for name, effort in back.efforts.items()},
         "joints": joints,
     }
-
-
-@np.errstate(all="ignore")
-def live_margin(
-    back: Backward, run: Run, values: Mapping[str, float], status: Sequence[int], index: int
-) -> dict[str, Any]:
-    """The locking margin of one position, where it has one, and whether it is beyond that.
-
-    run, values: what was solved, and with which numbers replaced; status: of all positions.
-    """
-    steps = len(status)
-    if status[index] == Status.ZERO_SLIP and run.cycle.duration > 0:
-        numbers = run.system.mechanism.parameters(values)
-        time = run.cycle.times(steps)[[index]]
-        margin = float(margins_beside(lambda at: run.solve(at, numbers), time, run.cycle, NEAR)[0])
-    else:
-        every = np.broadcast_to(np.asarray(margin_in(back, NEAR, np.arange(steps) == index), float), (steps,))
-        margin = float(every[index])
-    if status[index] > Status.LOCKED or np.isnan(margin):
-        return {"value": None, "beyond": False}
-    return {"value": min(margin, NEAR), "beyond": margin > NEAR}

@@ -90,12 +90,19 @@ export function outline(spots) {
   return corners.length ? `M${corners.join("L")}${corners.length > 2 ? "Z" : "h0"}` : "";
 }
 
+/** Where a point goes, series of its own positions: of a mechanism that is being changed they may be fewer. */
+const trackOf = ({ tracks, points }, key) => (tracks ? tracks[key] : points[key]);
+/** So many positions a track has; of one that stays 1. */
+const lengthOf = (track) => (track ? Math.max(track.x.length, track.y.length) : 0);
+
 /** The path of a point; `write` makes the text of a place in metres. */
 export function trackPath(scene, key, write) {
   let path = "";
   let pen = "M";
-  for (let index = 0; index < scene.count + (scene.abscissa.closed ? 1 : 0); index += 1) {
-    const found = place(scene, key, index % scene.count);
+  const points = { [key]: trackOf(scene, key) };
+  const count = lengthOf(points[key]);
+  for (let index = 0; index < count + (scene.abscissa.closed ? 1 : 0); index += 1) {
+    const found = place({ points }, key, index % count);
     if (found) path += `${pen}${write(found)}`;
     pen = found ? "L" : "M";
   }
@@ -105,7 +112,7 @@ export function trackPath(scene, key, write) {
 /** The paths of moving points: coupler curves of named points, thin ones of joints. */
 export function tracksOf(scene, write) {
   const keys = scene.links.filter((one) => !one.ground).flatMap((link) => link.points.map((key) => [key, link.free.includes(key)]));
-  const moving = keys.filter(([key]) => scene.points[key] && (scene.points[key].x.length > 1 || scene.points[key].y.length > 1));
+  const moving = keys.filter(([key]) => lengthOf(trackOf(scene, key)) > 1);
   return moving.map(([key, free]) => svg("path", { class: free ? "track free" : "track", d: trackPath(scene, key, write) }));
 }
 
@@ -140,8 +147,9 @@ function rail(one, ground) {
     const [ux, uy] = [Math.cos(angle), Math.sin(angle)];
     const base = place(scene, grounded(one, ground)[0], 0);
     let [low, high, across] = [Infinity, -Infinity, 0];
-    for (let index = 0; index < scene.count; index += 1) {
-      const found = place(scene, one.at, index);
+    const points = { [one.at]: trackOf(scene, one.at) ?? scene.points[one.at] };
+    for (let index = 0; index < lengthOf(points[one.at]); index += 1) {
+      const found = place({ points }, one.at, index);
       if (!found) continue;
       const along = found[0] * ux + found[1] * uy;
       [low, high, across] = [Math.min(low, along), Math.max(high, along), found[1] * ux - found[0] * uy];

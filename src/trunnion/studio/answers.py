@@ -12,7 +12,7 @@ import json
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
@@ -33,7 +33,7 @@ from trunnion.studio.blocks import blocks_of
 from trunnion.studio.ends import held, vector
 from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
-from trunnion.studio.live import Live, places_at
+from trunnion.studio.live import Live, places_at, uncollected
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
 from trunnion.studio.margin import cures, locks_of, margin_of, margins_without
 from trunnion.studio.message import packed
@@ -152,8 +152,13 @@ def _model(asked: Asked) -> dict[str, Any]:
 
 def _sketch(asked: Asked, places: dict[str, Vector] | None = None) -> Sketch:
     """A drawing of a model's entries that may be changed."""
-    entries, locked = copy.deepcopy(dict(asked.state.entries or {})), set(map(str, asked.get("locked") or ()))
-    return Sketch(entries, places or {}, locked, fine=float(asked.get("fine") or 0.0))
+    locked, fine = _hand(asked)
+    return Sketch(copy.deepcopy(dict(asked.state.entries or {})), places or {}, locked, fine=fine)
+
+
+def _hand(asked: Asked) -> tuple[set[str], float]:
+    """What is locked, and what the hand can tell apart, m."""
+    return set(map(str, asked.get("locked") or ())), float(asked.get("fine") or 0.0)
 
 
 def _cycle(asked: Asked) -> dict[str, Any]:
@@ -220,23 +225,33 @@ def _row(state: Loaded, one: Finding, result: xr.Dataset | None) -> dict[str, An
 # ---- dragging -----------------------------------------------------------------------------------------------------
 
 
+class _Still(Sketch):
+    """A drawing that is asked many times a second and not changed."""
+
+    @cached_property
+    def joints(self) -> Mapping[str, Any]:
+        """See `Sketch.joints`."""
+        return super().joints
+
+
+@uncollected()
 def _drag(asked: Asked) -> dict[str, Any]:
     """The cycle with a joint or point dragged to a place, a pin on the ground with `keep` by its links."""
     index, to, point = asked.index, vector(asked["to"]), str(asked["point"])
-    sketch = _sketch(asked, places_at(asked))
+    locked, fine = _hand(asked)
+    sketch = _Still(dict(asked.state.entries or {}), places_at(asked), locked, fine=fine)
     if asked.state.mechanism is not None:
         sketch.numbers = asked.state.mechanism.parameter_set.nominal
     changes = {change.path: change for change in sketch.moved(point, to, bool(asked.get("keep")))}  # a number once
     values = {path: change.value for path, change in changes.items()}
     live = Live(asked.run, values, asked.steps)
-    far = np.hypot(*(live.track(".".join(held(sketch, point))) - np.array(to)[:, None]))
+    far = np.hypot(*(live.tracks[".".join(held(sketch, point))] - np.array(to)[:, None]))
     near = index if not np.any(np.isfinite(far)) else int(np.nanargmin(far))
     if np.isfinite(far[index]) and far[index] <= far[near] + 1e-6 * sketch.size:
         near = index
-    free = {f"{link}.{name}" for link, name in live.run.system.points}
-    for name in sketch.locked & {*sketch.joints, *free}:
+    for name in sketch.locked & {*sketch.joints, *live.tracks}:
         key = ".".join(held(sketch, name))
-        if not np.hypot(*(live.track(key)[:, near] - sketch.places[key])) <= KEPT * sketch.size:
+        if not np.hypot(*(live.tracks[key][:, near] - sketch.places[key])) <= KEPT * sketch.size:
             near = index  # the crank would turn, and a locked joint with it
             break
     rows = []
@@ -247,6 +262,7 @@ def _drag(asked: Asked) -> dict[str, Any]:
     return {"changes": rows} | _live(asked, live, near)
 
 
+@uncollected()
 def _try(asked: Asked) -> dict[str, Any]:
     """The cycle with some numbers replaced, `values` in SI by path, and the margin at the position `index`."""
     values = {str(path): float(value) for path, value in dict(asked["values"]).items()}

@@ -6,7 +6,9 @@ joints the forces are those of the position that is shown: those of a whole cycl
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import gc
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, posed
@@ -22,9 +25,9 @@ from trunnion.solve.run import Run
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.system import Values
 from trunnion.studio.loaded import Asked
-from trunnion.studio.placed import column, tracked, tracks
+from trunnion.studio.placed import tracked
 
-__all__ = ["Live", "live_columns", "places_at"]
+__all__ = ["Live", "live_columns", "places_at", "uncollected"]
 
 Array = NDArray[np.float64]
 
@@ -32,6 +35,18 @@ AT_ONCE = 12_000  # joints times positions whose forces are worked out in the ti
 MOST_TRACKED = 20_000  # places of all tracks that are drawn in it
 STILL = 1e-9  # of the size: a point that moves less has no track
 NEAR = 3.0  # multiple of the friction up to which the margin is looked for: farther it takes longer than the forces
+
+
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Without looking for rubbish in circles: what an answer makes would count as what stays, and all be searched."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
 
 
 def places_at(asked: Asked) -> dict[str, tuple[float, float]]:
@@ -89,11 +104,10 @@ class Live:
         cycle = self._cycle
         return cycle.walk if cycle else posed(self.run.system, self.numbers, self.run.chosen.assembly, self.time)
 
-    def track(self, key: str) -> Array:
-        """Where a point "link.point" goes, (2, position), m."""
-        link, _, name = key.partition(".")
-        place = self.walk.placed(self.walk.motions[link].frame, link, name)
-        return np.array([column(part, self.steps) for part in place])
+    @cached_property
+    def tracks(self) -> dict[str, Array]:
+        """Where every point "link.point" goes, (2, position), m."""
+        return _places(self.walk, self.steps)
 
     @np.errstate(all="ignore")
     def told(self, index: int) -> dict[str, Any]:
@@ -112,22 +126,21 @@ class Live:
             columns = live_columns(back, 1)
             status = pose_status(self.walk, (self.steps,))
             status[index] = columns["status"][0]
-            columns |= {"tracks": self._tracks(), "status": [int(code) for code in status]}
+            columns |= {"tracks": self._drawn(), "status": [int(code) for code in status]}
             return columns | {"margin": self._margin(back, columns["status"], index, np.True_)}
         columns = live_columns(back, self.steps)
         return columns | {"margin": self._margin(back, columns["status"], index, np.arange(self.steps) == index)}
 
-    def _tracks(self) -> dict[str, dict[str, Array]]:
+    def _drawn(self) -> dict[str, dict[str, Array]]:
         """Where each joint and each free point goes that moves, at as many positions as can be drawn in time."""
         system = self.run.system
-        joints = [f"{links[1]}.{name}" for name, (_, links) in system.joints.items()]
-        free = [f"{link}.{point}" for link, point in system.points if point not in system.joints]
-        tracks = {key: self.track(key) for key in (*joints, *free)}
-        ends = {key: (np.fmax.reduce(track, axis=1), np.fmin.reduce(track, axis=1)) for key, track in tracks.items()}
-        reach = {key: float(np.fmax.reduce(high - low)) for key, (high, low) in ends.items()}
-        moving = [key for key in tracks if reach[key] > STILL * np.fmax.reduce(list(reach.values()))]
+        joints = {f"{links[1]}.{name}" for name, (_, links) in system.joints.items()}
+        keys = [key for key in self.tracks if key in joints or key.partition(".")[2] not in system.joints]
+        places = np.array([self.tracks[key] for key in keys])  # (point, axis, position)
+        reach = np.fmax.reduce(np.fmax.reduce(places, axis=2) - np.fmin.reduce(places, axis=2), axis=1)
+        moving = np.flatnonzero(reach > STILL * np.fmax.reduce(reach))
         stride = -(-len(moving) * self.steps // MOST_TRACKED)
-        return {key: dict(zip("xy", tracks[key][:, ::stride], strict=True)) for key in moving}
+        return {keys[k]: dict(zip("xy", places[k, :, ::stride], strict=True)) for k in moving}
 
     def _margin(self, back: Backward, status: Sequence[int], index: int, lanes: Any) -> dict[str, Any]:
         """The locking margin at a position, looked for up to NEAR. lanes: where the forces have the position."""
@@ -160,23 +173,44 @@ def live_columns(back: Backward, steps: int) -> dict[str, Any]:
     """
     walk, system = back.walk, back.walk.system
     status = status_of(back, (steps,))
-    known = status < Status.NOT_CONVERGED
-
-    def force(number: Any) -> Array:
-        return np.where(known, column(number, steps), np.nan)
-
+    numbers = {("effort", name): effort for name, effort in back.efforts.items()}
+    for name in system.joints:
+        numbers |= dict(zip(((name, "x"), (name, "y")), tuple(back.reactions[name])[:2], strict=True))
+        numbers[name, "loss"], numbers[name, "friction"] = back.losses[name], back.friction[name]
+    rows = _rows(list(numbers.values()), steps)
+    rows[:, status >= Status.NOT_CONVERGED] = np.nan
+    force = dict(zip(numbers, rows, strict=True))
     joints = {}
     for name in system.joints:
-        reaction = dict(zip("xy", map(force, tuple(back.reactions[name])[:2]), strict=True))
-        joints[name] = {"reaction": reaction, "friction_power": force(back.losses[name])}
+        reaction = {axis: force[name, axis] for axis in "xy"}
+        joints[name] = {"reaction": reaction, "friction_power": force[name, "loss"]}
         if not system.turns(name):
-            joints[name]["friction"] = force(back.friction[name])
+            joints[name]["friction"] = force[name, "friction"]
+    frames = [motion.frame for motion in walk.motions.values()]
+    angles = np.arctan2(*(_rows([getattr(frame, part) for frame in frames], steps) for part in "sc"))
     return {
-        "points": tracks(walk, steps),
-        "angles": {
-            link: column(np.arctan2(motion.frame.s, motion.frame.c), steps) for link, motion in walk.motions.items()
-        },
+        "points": {key: dict(zip("xy", place, strict=True)) for key, place in _places(walk, steps).items()},
+        "angles": dict(zip(walk.motions, angles, strict=True)),
         "status": [int(code) for code in status],
-        "efforts": {name: force(effort) for name, effort in back.efforts.items()},
+        "efforts": {name: force["effort", name] for name in back.efforts},
         "joints": joints,
     }
+
+
+def _rows(numbers: Sequence[Any], steps: int) -> Array:
+    """Numbers of a walk at every position, (number, position): a call for each takes longer than all of them."""
+    table = np.empty((len(numbers), steps))
+    for row, number in zip(table, numbers, strict=True):
+        row[:] = primal(number)
+    return table
+
+
+def _places(walk: Forward, steps: int) -> dict[str, Array]:
+    """Where every point "link.point" is, (2, position), m."""
+    order = {link: k for k, link in enumerate(walk.motions)}
+    frames = [motion.frame for motion in walk.motions.values()]
+    x, y, c, s = (_rows([getattr(frame, part) for frame in frames], steps) for part in "xycs")
+    of = [order[link] for link, _ in walk.system.points]
+    u, v = np.array([walk.local_place(link, name) for link, name in walk.system.points], float).T[:, :, None]
+    places = np.stack([x[of] + c[of] * u - s[of] * v, y[of] + s[of] * u + c[of] * v], axis=1)
+    return {f"{link}.{name}": place for (link, name), place in zip(walk.system.points, places, strict=True)}

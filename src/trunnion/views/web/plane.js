@@ -11,6 +11,7 @@ import { coil } from "./spring.js";
 const BEYOND = 26; // px that a guide is longer than the travel of its block's middle, at each end
 const PISTON = 0.95; // length of a cylinder's rod, of the least distance of its eyes
 const ASIDE = 0.01; // of that distance: how far the eyes of a cylinder may lie off its guide
+const CROWD = 60; // names, of which those without room are left out until the drawing is larger
 const LETTER = 8.4; // px, width of a letter of a name
 const [ABOVE, BELOW] = [11, 4]; // px that a name reaches above and below its line
 
@@ -175,7 +176,7 @@ function body(link, kind) {
   const paths = plate(kind);
   const pose = ({ spots }) => {
     const path = outline(spots(link.points));
-    paths.forEach((part) => part.setAttribute("d", path));
+    paths.forEach((part) => set(part, { d: path }));
   };
   return { link, node: svg("g", { class: "body", "data-kind": "links", "data-name": link.name }, svg("title", {}, link.name), ...paths), pose };
 }
@@ -339,7 +340,7 @@ function vector(one, kind) {
   const node = svg("path", { class: `reaction ${kind}` });
   const pose = ({ scene, spot, force: index, perNewton, shown }) => {
     const [found, force] = [spot(one.at), forceAt(scene, one, index)];
-    node.setAttribute("d", found && force && shown(one.name) ? arrow(...found, force[0] * perNewton, -force[1] * perNewton) : "");
+    set(node, { d: found && force && shown(one.name) ? arrow(...found, force[0] * perNewton, -force[1] * perNewton) : "" });
   };
   return { joint: one, node, pose };
 }
@@ -388,9 +389,13 @@ function poseNames({ names, loads }, { spot, named }) {
   for (const { one, found, words } of there.values()) {
     const text = words.join(", ");
     const places = SIDES[one.side].map((by) => boxOf(found, by, text.length * LETTER));
-    const box = places.find((place) => !taken.some((other) => meet(place, other))) ?? places[0];
+    const box = places.find((place) => !taken.some((other) => meet(place, other))) ?? (there.size > CROWD ? null : places[0]);
+    if (!box) {
+      moveTo(one.node, null);
+      continue;
+    }
     taken.push((one.box = box));
-    one.node.textContent = text;
+    if (one.node.textContent !== text) one.node.textContent = text;
     moveTo(one.node, [(box.left + box.right) / 2, box.y]);
   }
 }

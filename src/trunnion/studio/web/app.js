@@ -45,7 +45,7 @@ export function App() {
 }
 
 /** Figures of before are grey while new ones are awaited. */
-export const keepPending = () => effect(() => void document.body.classList.toggle("pending", state.pending.value));
+export const keepAwaited = () => effect(() => void document.body.classList.toggle("awaited", state.awaited.value));
 
 const LEAST = 300; // px of the panel, and of the sheet beside it
 const STEP = 24; // px that an arrow key moves the divider

@@ -87,7 +87,7 @@ export const spatial = computed(() => {
   return inSpace;
 });
 /** Whether what is shown is of a text, or a friction, that is no longer the present one: its answer is awaited. */
-export const pending = computed(() => {
+export const awaited = computed(() => {
   const { scene, text: known, friction: law } = answer.value ?? {};
   return Boolean(scene) && (known !== text.value || (law === "off") !== (friction.value === "off"));
 });

@@ -524,3 +524,24 @@ def test_of_many_joints_the_forces_are_those_of_the_position_that_is_shown(index
     assert places <= 20_000
     assert {"rocker0.B0", "rocker39.B39"} <= tried["tracks"].keys()
     assert not any(key.endswith(".C3") for key in tried["tracks"])  # a pin on the ground goes nowhere
+
+
+def test_what_is_tried_or_dragged_in_space_is_the_model_that_has_it():
+    text = EXAMPLES["rssr"]
+    changed = text.replace("a: 30 mm", "a: 31 mm")
+    tried = ask(ask="try", text=text, values={"dimensions.a": 0.031}, index=30)
+    shown = ask(ask="model", text=changed)
+    assert changed != text
+    assert tried["status"] == shown["scene"]["status"]
+    for joint, other in zip(tried["scene"]["joints"], shown["scene"]["joints"], strict=True):
+        for axis in "xyz":
+            np.testing.assert_allclose(column(joint["reaction"][axis]), column(other["reaction"][axis]), rtol=1e-5)
+    assert tried["margin"]["value"] == pytest.approx(min(shown["margin"][30], 3.0), rel=1e-6)
+    way = {"point": "A", "index": 10, "by": [0.0, 0.0, 0.002]}
+    dragged = ask(ask="drag", text=text, **way)
+    moved, _ = edited(text, {}, {"do": "move", "size": 0.2, **way})
+    after = ask(ask="model", text=moved)
+    links = {link["name"]: link["pose"] for link in after["scene"]["links"]}
+    for link in dragged["scene"]["links"]:
+        for axis in "xyz":
+            np.testing.assert_allclose(column(link["pose"][axis]), column(links[link["name"]][axis]), atol=2e-5)

@@ -33,7 +33,7 @@ from trunnion.studio.blocks import blocks_of
 from trunnion.studio.ends import held, vector
 from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
-from trunnion.studio.live import Live, places_at, uncollected
+from trunnion.studio.live import Live, live_in_space, places_at, uncollected
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
 from trunnion.studio.margin import cures, locks_of, margin_of, margins_without
 from trunnion.studio.message import packed
@@ -236,7 +236,14 @@ class _Still(Sketch):
 
 @uncollected()
 def _drag(asked: Asked) -> dict[str, Any]:
-    """The cycle with a joint or point dragged to a place, a pin on the ground with `keep` by its links."""
+    """The cycle with a joint or point dragged `to` a place, a pin on the ground with `keep` by its links; in space
+    `by` metres along the axes.
+    """
+    if asked.get("by") is not None:
+        sketch, by = _sketch(asked), [float(part) for part in asked["by"]]
+        sketch.numbers = asked.run.system.mechanism.parameter_set.nominal
+        shifts = sketch.shifted(str(asked["point"]), by, _turns(asked.state, asked.index))
+        return _live(asked, {change.path: change.value for change in shifts}, asked.index)
     index, to, point = asked.index, vector(asked["to"]), str(asked["point"])
     locked, fine = _hand(asked)
     sketch = _Still(dict(asked.state.entries or {}), places_at(asked), locked, fine=fine)
@@ -259,23 +266,27 @@ def _drag(asked: Asked) -> dict[str, Any]:
         section, name, *inner = path.split(".")
         name = f"{inner[2]} of {inner[1]} on {name}" if section == "links" else name
         rows.append([name, sketch.length(float(sketch.numbers[path])), sketch.length(value)])
-    return {"changes": rows} | _live(asked, live, near)
+    return {"changes": rows} | _live(asked, values, near, live)
 
 
 @uncollected()
 def _try(asked: Asked) -> dict[str, Any]:
     """The cycle with some numbers replaced, `values` in SI by path, and the margin at the position `index`."""
     values = {str(path): float(value) for path, value in dict(asked["values"]).items()}
-    return _live(asked, Live(asked.run, values, asked.steps), asked.index)
+    return _live(asked, values, asked.index)
 
 
-def _live(asked: Asked, live: Live, index: int) -> dict[str, Any]:
+def _live(asked: Asked, values: Mapping[str, float], index: int, live: Live | None = None) -> dict[str, Any]:
     """Columns of a mechanism that is being changed, with its margin and what locks at the position that is shown."""
-    columns, run, locked = live.told(index), asked.state.run, {}
+    run, locked = asked.state.run, {}
+    if run.system.spatial:
+        columns = live_in_space(asked.run, values, asked.steps, index)
+    else:
+        columns = (live or Live(asked.run, values, asked.steps)).told(index)
     status = columns["status"]
     if status[index] == Status.LOCKED:
-        numbers = run.system.mechanism.parameters(live.values)
-        locked = locks_of(run, live.time[[index]], status[index : index + 1], numbers)
+        numbers = run.system.mechanism.parameters(values)
+        locked = locks_of(run, run.cycle.times(len(status))[[index]], status[index : index + 1], numbers)
     locks = {joint: float(column[0]) for joint, column in locked.items()}
     return {"solved": True, "index": index, **columns, "locks": locks}
 

@@ -21,13 +21,13 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, posed
 from trunnion.solve.margin import margin_in, margins_beside
-from trunnion.solve.run import Run
+from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.system import Values
 from trunnion.studio.loaded import Asked
 from trunnion.studio.placed import tracked
 
-__all__ = ["Live", "live_columns", "places_at", "uncollected"]
+__all__ = ["Live", "live_columns", "live_in_space", "places_at", "uncollected"]
 
 Array = NDArray[np.float64]
 
@@ -127,9 +127,9 @@ class Live:
             status = pose_status(self.walk, (self.steps,))
             status[index] = columns["status"][0]
             columns |= {"tracks": self._drawn(), "status": [int(code) for code in status]}
-            return columns | {"margin": self._margin(back, columns["status"], index, np.True_)}
-        columns = live_columns(back, self.steps)
-        return columns | {"margin": self._margin(back, columns["status"], index, np.arange(self.steps) == index)}
+            return columns | {"margin": _margin(self.run, self.numbers, back, columns["status"], index, np.True_)}
+        columns, lanes = live_columns(back, self.steps), np.arange(self.steps) == index
+        return columns | {"margin": _margin(self.run, self.numbers, back, columns["status"], index, lanes)}
 
     def _drawn(self) -> dict[str, dict[str, Array]]:
         """Where each joint and each free point goes that moves, at as many positions as can be drawn in time."""
@@ -142,22 +142,39 @@ class Live:
         stride = -(-len(moving) * self.steps // MOST_TRACKED)
         return {keys[k]: dict(zip("xy", places[k, :, ::stride], strict=True)) for k in moving}
 
-    def _margin(self, back: Backward, status: Sequence[int], index: int, lanes: Any) -> dict[str, Any]:
-        """The locking margin at a position, looked for up to NEAR. lanes: where the forces have the position."""
-        if status[index] == Status.ZERO_SLIP and self.run.cycle.duration > 0:
-            solve = lambda at: self.run.solve(at, self.numbers)  # noqa: E731  # a short one
-            margin = float(margins_beside(solve, self.time[[index]], self.run.cycle, NEAR)[0])
-        else:
-            every = np.broadcast_to(np.asarray(margin_in(back, NEAR, lanes), float), np.shape(back.walk.time))
-            margin = float(every[index if np.ndim(lanes) else 0])
-        if status[index] > Status.LOCKED or np.isnan(margin):
-            return {"value": None, "beyond": False}
-        return {"value": min(margin, NEAR), "beyond": margin > NEAR}
+
+def live_in_space(run: Run, values: Mapping[str, float], steps: int, index: int) -> dict[str, Any]:
+    """A mechanism in space with some numbers replaced: its scene, for bodies change with numbers, and its margin."""
+    from trunnion.cycle.positions import positions  # not for the first picture
+    from trunnion.cycle.summary import result_of
+    from trunnion.views.cycle.scene import scene
+
+    changed = prepare(run.system.mechanism.with_values(values)) if values else run
+    with np.errstate(all="ignore"):
+        result = result_of(changed, positions(changed, steps, averaged=False, margin=False)).dataset
+        back = changed.solve(changed.cycle.times(steps)[[index]])
+        status = [int(code) for code in result["status"].values]
+        margin = _margin(changed, changed.values, back, status, index, np.True_)
+    return {"scene": scene(result, max_positions=steps), "status": status, "margin": margin}
+
+
+@np.errstate(all="ignore")
+def _margin(run: Run, numbers: Values, back: Backward, status: Sequence[int], index: int, lanes: Any) -> dict[str, Any]:
+    """The locking margin at a position, looked for up to NEAR. lanes: where the forces have the position."""
+    time = run.cycle.times(len(status))[[index]]
+    if status[index] == Status.ZERO_SLIP and run.cycle.duration > 0:
+        margin = float(margins_beside(lambda at: run.solve(at, numbers), time, run.cycle, NEAR)[0])
+    else:
+        every = np.broadcast_to(np.asarray(margin_in(back, NEAR, lanes), float), np.shape(back.walk.time))
+        margin = float(every[index if np.ndim(lanes) else 0])
+    if status[index] > Status.LOCKED or np.isnan(margin):
+        return {"value": None, "beyond": False}
+    return {"value": min(margin, NEAR), "beyond": margin > NEAR}
 
 
 def _refuse_space(run: Run) -> None:
-    if run.system.mechanism.space != "planar":
-        raise MechanismError(Finding("cannot be dragged in space", remedy="change its numbers instead"))
+    if run.system.spatial:
+        raise MechanismError(Finding("is dragged in space by steps along its axes", remedy="state by how much"))
 
 
 @np.errstate(all="ignore")

@@ -87,7 +87,8 @@ function follow(live) {
   const scene = untracked(() => (state.solved.value ? state.answer.value.scene : null));
   if (!scene || !crank.figures?.isConnected) return;
   const index = state.index.peek();
-  const dragged = live?.points && tells(live, index) ? readout(changing(scene, live)) : null;
+  const told = live?.scene ?? (live?.points && tells(live, index) ? changing(scene, live) : null);
+  const dragged = told && readout(told);
   dragged?.show(index);
   const element = dragged?.element ?? crank.own;
   if (element === crank.figures) return;

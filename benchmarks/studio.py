@@ -19,11 +19,12 @@ from playwright.sync_api import Page, sync_playwright
 
 ROOT = Path(__file__).resolve().parents[1]
 SECONDS = 3.0
+NEAR = 4  # px that a joint of the chain is dragged, of which a link has 12
 COMPILED = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}  # as installed
 DRAGGED = {"durango-fourbar": "C", "jansen": "K"}
 SLIDERS = {"durango-fourbar": "BC", "jansen": "b"}
 
-DRAG = """async ([name, seconds]) => {
+DRAG = """async ([name, seconds, far]) => {
   const { module_studio_state: state } = await import("/modules.js");
   const handle = document.querySelector(`.handle[data-name="${name}"]`);
   const box = handle.getBoundingClientRect();
@@ -32,16 +33,16 @@ DRAG = """async ([name, seconds]) => {
     bubbles: true, cancelable: true, pointerId: 1, pointerType: "mouse", isPrimary: true,
     button: kind === "pointermove" ? -1 : 0, buttons: kind === "pointerup" ? 0 : 1,
     altKey: true, clientX: x + dx, clientY: y - dx / 2 })); // with Alt it changes lengths on its path too
-  const target = handle;
-  handle.setPointerCapture = () => {};
-  sent("pointerdown", 0, target);
+  const target = handle.closest("svg"); // it captures the pointer: handles come and go with what has a place
+  target.setPointerCapture = () => {};
+  sent("pointerdown", 0, handle);
   let [drawn, last] = [0, state.live.value];
   const begin = performance.now();
   await new Promise((done) => {
     const frame = (now) => {
       if (state.live.value !== last) { last = state.live.value; drawn += 1; }
       if (now - begin > seconds * 1000) return done();
-      sent("pointermove", 10 * Math.sin((now - begin) / 300), target);
+      sent("pointermove", far * Math.sin((now - begin) / 300), target);
       requestAnimationFrame(frame);
     };
     requestAnimationFrame(frame);
@@ -178,7 +179,9 @@ def main() -> None:
                         drawn, whole = page.evaluate(ANSWER, chain(dyads))
                         print(f"  {2 * dyads + 2} links: drawn with forces {drawn:.1f} s, ", end="")
                         page.keyboard.press("0")
-                        rate, frames = page.evaluate(DRAG, ["B0", SECONDS]), page.evaluate(PLAY, SECONDS)
+                        rate = page.evaluate(DRAG, ["B0", SECONDS, NEAR])  # farther the chain cannot be assembled
+                        page.wait_for_timeout(1500)
+                        frames = page.evaluate(PLAY, SECONDS)
                         print(f"figures {whole:.1f} s, {rate:.1f} drags/s, play {frames:.0f} frames/s")
                     page.close()
                 finally:
@@ -193,7 +196,7 @@ def _measure(page: Page, name: str, joint: str, address: str, begin: float) -> N
     page.wait_for_selector(".motion .player")
     whole = time.perf_counter() - begin
     page.wait_for_timeout(1500)
-    rate = page.evaluate(DRAG, [joint, SECONDS])
+    rate = page.evaluate(DRAG, [joint, SECONDS, 10])
     page.wait_for_timeout(1500)
     pulls = page.evaluate(SLIDE, [SLIDERS[name], SECONDS])
     page.wait_for_timeout(1000)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from benchmarks.studio import chain
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -379,3 +380,51 @@ def test_friction_that_is_not_whole_leaves_the_motion():
     worse = ask(ask="model", text=text.replace("BC: 6.00 m", "BC: 6.00 kg"))
     assert not worse["solved"]
     assert not worse["bare"]
+
+
+@pytest.mark.parametrize("index", [8, 200])
+def test_of_many_joints_the_forces_are_those_of_the_position_that_is_shown(index):
+    """A chain of 82 links: its paths are there, thinned, and its forces are those of the model that has the number."""
+    text = chain(40)
+    changed = text.replace("b: 140 mm", "b: 141 mm")
+    shown = ask(ask="model", text=changed)
+    scene = shown["scene"]
+    tried = ask(ask="try", text=text, values={"dimensions.b": 0.141}, index=index)
+    assert tried["index"] == index
+    assert len(tried["status"]) == 360
+    assert tried["status"][index] == scene["status"][index]
+    here = {key: [(track[axis] * 360)[index] for axis in "xy"] for key, track in scene["points"].items()}
+    for key, place in here.items():
+        assert [tried["points"][key][axis] for axis in "xy"] == [pytest.approx([part], abs=1e-6) for part in place]
+    efforts = tried["efforts"]["O"], [scene["drivers"][0]["effort"][index]]
+    assert efforts[0] == pytest.approx(efforts[1], rel=1e-5)
+    size = max(abs(part) for joint in scene["joints"] for axis in "xy" for part in joint["reaction"][axis])
+    for joint in scene["joints"]:
+        for axis in "xy":
+            live = tried["joints"][joint["name"]]["reaction"][axis]
+            assert live == pytest.approx([joint["reaction"][axis][index]], abs=1e-6 * size)
+    places = sum(len(track["x"]) for track in tried["tracks"].values())
+    assert places <= 20_000
+    assert {"rocker0.B0", "rocker39.B39"} <= tried["tracks"].keys()
+    assert not any(key.endswith(".C3") for key in tried["tracks"])  # a pin on the ground goes nowhere
+
+
+def test_what_is_tried_or_dragged_in_space_is_the_model_that_has_it():
+    text = EXAMPLES["rssr"]
+    changed = text.replace("a: 30 mm", "a: 31 mm")
+    tried = ask(ask="try", text=text, values={"dimensions.a": 0.031}, index=30)
+    shown = ask(ask="model", text=changed)
+    assert changed != text
+    assert tried["status"] == shown["scene"]["status"]
+    for joint, other in zip(tried["scene"]["joints"], shown["scene"]["joints"], strict=True):
+        for axis in "xyz":
+            np.testing.assert_allclose(column(joint["reaction"][axis]), column(other["reaction"][axis]), rtol=1e-5)
+    assert tried["margin"]["value"] == pytest.approx(min(shown["margin"][30], 3.0), rel=1e-6)
+    way = {"point": "A", "index": 10, "by": [0.0, 0.0, 0.002]}
+    dragged = ask(ask="drag", text=text, **way)
+    moved, _ = edited(text, {}, {"do": "move", "size": 0.2, **way})
+    after = ask(ask="model", text=moved)
+    links = {link["name"]: link["pose"] for link in after["scene"]["links"]}
+    for link in dragged["scene"]["links"]:
+        for axis in "xyz":
+            np.testing.assert_allclose(column(link["pose"][axis]), column(links[link["name"]][axis]), atol=2e-5)

@@ -449,3 +449,12 @@ def test_an_answer_to_what_was_changed_since_is_dropped(user):
     user.of("actions", "(m.takeText(given[0], 'Edit'), m.takeText(given[1], 'Edit'), null)", [other, changed])
     user.until("s.solved.value && s.answer.value.text === s.text.value")
     assert user.state("s.answer.value.entries.dimensions.BC") == "5.80 m"
+
+
+def test_figures_of_before_are_grey_until_the_new_ones_are_there(user):
+    awaited = "document.body.classList.contains('awaited')"
+    assert not user.page.evaluate(awaited)
+    text = FOURBAR.replace("BC: 6.00 m", "BC: 5.80 m")
+    assert user.of("actions", f"(m.takeText(given, 'Edit'), {awaited})", text)
+    user.until("s.solved.value && s.answer.value.text === s.text.value")
+    assert not user.page.evaluate(awaited)

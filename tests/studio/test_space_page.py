@@ -85,8 +85,10 @@ def test_what_is_chosen_in_the_picture_is_lit_and_moved_along_an_axis(user):
     user.page.mouse.move(tip[0] + 20, tip[1] + 4)
     user.page.mouse.move(tip[0] + 44, tip[1] + 8)
     said = user.state("s.notice.value.words")
+    user.until("s.live.value?.scene && s.live.value.margin")  # as it comes to be, with its margin
+    assert "here" in user.page.locator(".bar.bottom .margin").inner_text()
     user.page.mouse.up()
-    user.until("s.past.value.length === 1")
+    user.until("s.past.value.length === 1 && s.live.value === null")
     by = float(said.split("x ")[1].split()[0]) / 1e3
     old, new = analysed(before), analysed(user.state("s.text.value"))
     assert 2e-3 < by < 3e-2

@@ -30,6 +30,8 @@ __all__ = [
     "Backward", "Given", "Sense", "backward", "pass_on", "sense_of", "solve", "unloaded",
 ]  # fmt: skip
 
+MANY_MODULES = 12  # of a row whose friction is settled by machine code: of fewer, loading LLVM takes longer
+
 
 Sense = Share | tuple[Share, ...]
 
@@ -229,7 +231,8 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, conditio
             unit_loads = units(walk, number, on_thread(walk, number, i, 1.0))
             rubbed.append((Contact(len(places) + i, unit_loads, rub.load, slope), felt))
     rubbed += [(contact, None) for contact in teeth(walk, number)]
-    settled = settle(partial(walk.reactions, number), loads, [contact for contact, _ in rubbed], method)
+    coded = len(system.plan.modules) >= MANY_MODULES
+    settled = settle(partial(walk.reactions, number), loads, [contact for contact, _ in rubbed], method, coded)
     back.settled.append(settled)
     back.rubbed.append(rubbed)
     if module.spinning:

@@ -61,8 +61,12 @@ def settle(
     loads: Sequence[Any],
     contacts: Sequence[Contact],
     method: FrictionMethod,
+    coded: bool = False,
 ) -> Settled:
-    """Reactions and friction forces of one module, whose reactions to loads are linear, under `loads`."""
+    """Reactions and friction forces of one module, whose reactions to loads are linear, under `loads`.
+
+    coded: whether its rounds are worth machine code, see `settle_code`.
+    """
     start = reactions(loads)
     if not contacts:
         return Settled(start, [], 0, 0.0, 0.0, True)
@@ -75,7 +79,7 @@ def settle(
     if problem.one_way and method.name == "newton":  # no law looks at what friction changes
         forces = problem.target(problem.state([0.0] * len(contacts)).normals)
         return Settled(problem.reactions(forces), forces, 1, 0.0, 0.0, True, problem=problem.real)
-    return _iterated(problem, method)
+    return _iterated(problem, method, coded)
 
 
 def with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
@@ -85,7 +89,7 @@ def with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
     return column
 
 
-def _iterated(problem: FrictionProblem, method: FrictionMethod) -> Settled:
+def _iterated(problem: FrictionProblem, method: FrictionMethod, coded: bool) -> Settled:
     """From no friction by rounds of the method; Newton's follows lanes without the certificate of `bound` afterwards.
 
     So it does certain lanes that kinks keep from settling: their continuation leads to the same, only solution. A
@@ -93,16 +97,10 @@ def _iterated(problem: FrictionProblem, method: FrictionMethod) -> Settled:
     stay as they are, for whoever compiles to compute again.
     """
     real, newton = problem.real, method.name == "newton"
-    none: list[Number] = [0.0] * len(real.contacts)
-    state = real.state(none)
-    # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
-    certain = ~(np.where(np.isfinite(largest(state.normals)), real.bound(), 0.0) >= 1.0)
-    at = _Iterate(none, state.normals, real.gaps(state, none))
     shares: Number = 1.0
+    rounds = min(method.limit, STUBBORN) if newton else method.limit
+    certain, at = _begun_by_code(real, rounds, method) if coded and newton else _begun(real, rounds, method)
     if newton:
-        rounds = min(method.limit, STUBBORN)
-        # one without the certificate goes nowhere by itself
-        at = _rounds(real, at._replace(done=np.where(certain, 0.0, 1.0)), rounds, method)
         left = ~certain
         if method.limit >= STUBBORN:
             left = left | ~((at.done > 0) | _obeyed(real, at))
@@ -112,8 +110,6 @@ def _iterated(problem: FrictionProblem, method: FrictionMethod) -> Settled:
             at = at._replace(forces=forces, normals=state.normals, gaps=real.gaps(state, forces))
             at = at._replace(done=np.where(left, 0.0, 1.0))
             at = _rounds(real, at, rounds, method)
-    else:
-        at = _rounds(real, at, method.limit, method)
     converged = (at.done > 0) if method.criterion is not None else _obeyed(real, at)
     forces = at.forces
     if problem.depth:  # Newton's method at the solution gives the derivatives, one level of ε a round
@@ -132,6 +128,32 @@ def _iterated(problem: FrictionProblem, method: FrictionMethod) -> Settled:
         certain=certain,
         problem=real,
     )
+
+
+def _begun(real: FrictionProblem, rounds: int, method: FrictionMethod) -> tuple[Number, _Iterate]:
+    """Whether lanes have the certificate, and where so many rounds lead from no friction."""
+    none: list[Number] = [0.0] * len(real.contacts)
+    state = real.state(none)
+    # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
+    certain = ~(np.where(np.isfinite(largest(state.normals)), real.bound(), 0.0) >= 1.0)
+    at = _Iterate(none, state.normals, real.gaps(state, none))
+    if method.name == "newton":  # a lane without the certificate goes nowhere by itself
+        at = at._replace(done=np.where(certain, 0.0, 1.0))
+    return certain, _rounds(real, at, rounds, method)
+
+
+def _begun_by_code(real: FrictionProblem, rounds: int, method: FrictionMethod) -> tuple[Number, _Iterate]:
+    """The same by machine code, where the equations have it."""
+    from trunnion.solve.settle_code import settled_by_code  # LLVM is loaded for rows of many modules alone
+
+    def row(problem: FrictionProblem) -> list[Number]:
+        certain, at = _begun(problem, rounds, method)
+        return [certain, *at.in_row()]
+
+    found = settled_by_code(real, row, (rounds, method.criterion))
+    if found is None:
+        return _begun(real, rounds, method)
+    return found[0] != 0.0, _Iterate([0.0] * len(real.contacts), [], []).of_row(found[1:])
 
 
 class _Iterate(NamedTuple):

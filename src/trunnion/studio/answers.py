@@ -12,7 +12,7 @@ import json
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
@@ -27,14 +27,13 @@ from trunnion.results.attributes import findings_of, summary_of, units_of
 from trunnion.results.quantities import quantity
 from trunnion.results.scales import without_noise
 from trunnion.results.tables import selected
-from trunnion.solve.backward import Backward
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
 from trunnion.studio.blocks import blocks_of
 from trunnion.studio.ends import held, vector
 from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
-from trunnion.studio.live import live_columns, live_margin, places_at, solved_with
+from trunnion.studio.live import Live, live_in_space, places_at, uncollected
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
 from trunnion.studio.margin import cures, locks_of, margin_of, margins_without
 from trunnion.studio.message import packed
@@ -153,8 +152,13 @@ def _model(asked: Asked) -> dict[str, Any]:
 
 def _sketch(asked: Asked, places: dict[str, Vector] | None = None) -> Sketch:
     """A drawing of a model's entries that may be changed."""
-    entries, locked = copy.deepcopy(dict(asked.state.entries or {})), set(map(str, asked.get("locked") or ()))
-    return Sketch(entries, places or {}, locked, fine=float(asked.get("fine") or 0.0))
+    locked, fine = _hand(asked)
+    return Sketch(copy.deepcopy(dict(asked.state.entries or {})), places or {}, locked, fine=fine)
+
+
+def _hand(asked: Asked) -> tuple[set[str], float]:
+    """What is locked, and what the hand can tell apart, m."""
+    return set(map(str, asked.get("locked") or ())), float(asked.get("fine") or 0.0)
 
 
 def _cycle(asked: Asked) -> dict[str, Any]:
@@ -221,25 +225,40 @@ def _row(state: Loaded, one: Finding, result: xr.Dataset | None) -> dict[str, An
 # ---- dragging -----------------------------------------------------------------------------------------------------
 
 
+class _Still(Sketch):
+    """A drawing that is asked many times a second and not changed."""
+
+    @cached_property
+    def joints(self) -> Mapping[str, Any]:
+        """See `Sketch.joints`."""
+        return super().joints
+
+
+@uncollected()
 def _drag(asked: Asked) -> dict[str, Any]:
-    """The cycle with a joint or point dragged to a place, a pin on the ground with `keep` by its links."""
+    """The cycle with a joint or point dragged `to` a place, a pin on the ground with `keep` by its links; in space
+    `by` metres along the axes.
+    """
+    if asked.get("by") is not None:
+        sketch, by = _sketch(asked), [float(part) for part in asked["by"]]
+        sketch.numbers = asked.run.system.mechanism.parameter_set.nominal
+        shifts = sketch.shifted(str(asked["point"]), by, _turns(asked.state, asked.index))
+        return _live(asked, {change.path: change.value for change in shifts}, asked.index)
     index, to, point = asked.index, vector(asked["to"]), str(asked["point"])
-    sketch = _sketch(asked, places_at(asked))
+    locked, fine = _hand(asked)
+    sketch = _Still(dict(asked.state.entries or {}), places_at(asked), locked, fine=fine)
     if asked.state.mechanism is not None:
         sketch.numbers = asked.state.mechanism.parameter_set.nominal
     changes = {change.path: change for change in sketch.moved(point, to, bool(asked.get("keep")))}  # a number once
     values = {path: change.value for path, change in changes.items()}
-    back = solved_with(asked.run, values, asked.steps)
-    columns = live_columns(back, asked.steps)
-    track = columns["points"][".".join(held(sketch, point))]
-    far = np.hypot(track["x"] - to[0], track["y"] - to[1])
+    live = Live(asked.run, values, asked.steps)
+    far = np.hypot(*(live.tracks[".".join(held(sketch, point))] - np.array(to)[:, None]))
     near = index if not np.any(np.isfinite(far)) else int(np.nanargmin(far))
     if np.isfinite(far[index]) and far[index] <= far[near] + 1e-6 * sketch.size:
         near = index
-    for name in sketch.locked & {*sketch.joints, *columns["points"]}:
+    for name in sketch.locked & {*sketch.joints, *live.tracks}:
         key = ".".join(held(sketch, name))
-        track, (x, y) = columns["points"][key], sketch.places[key]
-        if not np.hypot(track["x"][near] - x, track["y"][near] - y) <= KEPT * sketch.size:
+        if not np.hypot(*(live.tracks[key][:, near] - sketch.places[key])) <= KEPT * sketch.size:
             near = index  # the crank would turn, and a locked joint with it
             break
     rows = []
@@ -247,27 +266,29 @@ def _drag(asked: Asked) -> dict[str, Any]:
         section, name, *inner = path.split(".")
         name = f"{inner[2]} of {inner[1]} on {name}" if section == "links" else name
         rows.append([name, sketch.length(float(sketch.numbers[path])), sketch.length(value)])
-    return {"changes": rows} | _live(asked, back, columns, near, values)
+    return {"changes": rows} | _live(asked, values, near, live)
 
 
+@uncollected()
 def _try(asked: Asked) -> dict[str, Any]:
     """The cycle with some numbers replaced, `values` in SI by path, and the margin at the position `index`."""
     values = {str(path): float(value) for path, value in dict(asked["values"]).items()}
-    back = solved_with(asked.run, values, asked.steps)
-    return _live(asked, back, live_columns(back, asked.steps), asked.index, values)
+    return _live(asked, values, asked.index)
 
 
-def _live(
-    asked: Asked, back: Backward, columns: dict[str, Any], index: int, values: Mapping[str, float]
-) -> dict[str, Any]:
+def _live(asked: Asked, values: Mapping[str, float], index: int, live: Live | None = None) -> dict[str, Any]:
     """Columns of a mechanism that is being changed, with its margin and what locks at the position that is shown."""
-    status, run, locked = columns["status"], asked.state.run, {}
+    run, locked = asked.state.run, {}
+    if run.system.spatial:
+        columns = live_in_space(asked.run, values, asked.steps, index)
+    else:
+        columns = (live or Live(asked.run, values, asked.steps)).told(index)
+    status = columns["status"]
     if status[index] == Status.LOCKED:
         numbers = run.system.mechanism.parameters(values)
         locked = locks_of(run, run.cycle.times(len(status))[[index]], status[index : index + 1], numbers)
     locks = {joint: float(column[0]) for joint, column in locked.items()}
-    margin = live_margin(back, asked.run, values, status, index)
-    return {"solved": True, "index": index, **columns, "margin": margin, "locks": locks}
+    return {"solved": True, "index": index, **columns, "locks": locks}
 
 
 # ---- editing ------------------------------------------------------------------------------------------------------
@@ -333,7 +354,7 @@ def _layers(asked: Asked) -> dict[str, Any]:
     if "circles" in wanted:
         layers["circles"] = circles(result, [joint for joint in rubbing(system) if joint not in system.screws])
     if wanted & {"centres", "transmission"}:
-        walk = solved_with(asked.state.run, {}, asked.steps).walk
+        walk = asked.state.run.walk(asked.state.run.cycle.times(asked.steps))
         shown = {"centres": centres, "transmission": transmission}
         layers |= {name: tell(walk, asked.steps) for name, tell in shown.items() if name in wanted}
     return layers

@@ -59,7 +59,7 @@ def tracks(walk: Forward, steps: int) -> dict[str, dict[str, Array]]:
     """Where the points of the links are over the cycle, m."""
     whole = partial(column, steps=steps)
     return {
-        f"{link}.{name}": dict(zip("xyz", map(whole, walk.point(link, name).place), strict=False))
+        f"{link}.{name}": dict(zip("xyz", map(whole, walk.placed(walk.motions[link].frame, link, name)), strict=False))
         for link, name in walk.system.points
     }
 

@@ -92,6 +92,7 @@ class Studio:
             self.app(),
             log_level="warning",
             ws="websockets-sansio",
+            ws_per_message_deflate=False,  # nothing is far: to press an answer takes longer than to send it
             ws_max_size=MOST_OF_A_QUESTION,
             ws_ping_interval=None,
         )

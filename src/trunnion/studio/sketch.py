@@ -111,7 +111,10 @@ class Sketch:
 
     def kind(self, joint: str) -> str:
         """The type of a joint, of the table of a loop too; nothing where there is none."""
-        row = next((row for row in self.rows if row.get("joint") == joint), self.joints.get(joint))
+        stated = self.entries.get("joints")
+        one = stated.get(joint) if isinstance(stated, dict) else None  # not of `joints`: that goes through them all
+        sound = one if isinstance(one, dict) and _pair(one.get("links")) else None
+        row = next((row for row in self.rows if row.get("joint") == joint), sound)
         return "" if row is None else str(row.get("type", "revolute"))
 
     @property

@@ -1,6 +1,6 @@
 // The page: bars, sheet or space, player, and the panel at the right.
 
-import { computed } from "@preact/signals";
+import { computed, effect } from "@preact/signals";
 import { discard, save, takeWaiting } from "./actions.js";
 import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
 import { Blocks, Formula } from "./blocks.js";
@@ -43,6 +43,9 @@ export function App() {
     </main>
     ${bounded(BottomBar, Dialogs)}`;
 }
+
+/** Figures of before are grey while new ones are awaited. */
+export const keepAwaited = () => effect(() => void document.body.classList.toggle("awaited", state.awaited.value));
 
 const LEAST = 300; // px of the panel, and of the sheet beside it
 const STEP = 24; // px that an arrow key moves the divider

@@ -147,7 +147,7 @@ export function drawKey(view) {
     svg("text", { x: 24 + bar, y, dy: "0.32em" }, `${stated(length, "m")} · grid ${stated(gridStep(frame.scale), "m")}`),
   ];
   const scale = perNewton(view);
-  if (scale > 0 && (shown.reactions !== false || view.parts.loads.length)) {
+  if (scale > 0 && (shown.reactions !== false || view.parts.loads.some(({ force }) => force))) {
     const force = roundBelow(110 / scale);
     const x = frame.width - force * scale - KEY;
     parts.push(svg("path", { class: "reaction reference", d: arrow(x, y, force * scale, 0) }));

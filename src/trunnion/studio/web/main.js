@@ -2,7 +2,7 @@
 
 import { render } from "preact";
 import { start } from "./actions.js";
-import { App } from "./app.js";
+import { App, keepAwaited } from "./app.js";
 import { keepBlocks } from "./blocks.js";
 import { keepCurves } from "./curves.js";
 import { listenToFailures } from "./boundary.js";
@@ -22,6 +22,7 @@ render(html`<${App} />`, document.getElementById("studio"));
 listenToKeys(document);
 listenToDrops(document);
 start();
+keepAwaited();
 keepOthers();
 keepLayers();
 keepBlocks();

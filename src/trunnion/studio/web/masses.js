@@ -11,6 +11,7 @@ import * as state from "./state.js";
 import { Button, html } from "./ui.js";
 
 const RADIUS = 6.5; // px of the mark
+const CROWD = 60; // masses, of which those of links shorter than their mark are left out until the drawing is larger
 
 /** Where the centre of a link is while it is dragged, {link, local} m in the frame of the link; or null. */
 let pulled = null;
@@ -41,8 +42,13 @@ export function massSpots(view) {
   const { numbers = {}, entries } = state.answer.peek() ?? {};
   if (!state.layers.peek().masses || !view.scene || view.ideal || state.spatial.peek()) return []; // errors drawn larger move them
   const heavy = view.scene.links.filter(({ name, ground }) => !ground && name !== groundOf(entries) && numbers[`links.${name}.mass`] > 0);
-  return heavy.flatMap(({ name }) => {
-    const frame = frameOf(view, numbers, name);
+  const long = ({ points }) => {
+    const [a, b] = points.map((key) => place(view.scene, key, view.drawn)).filter(Boolean);
+    return !b || Math.hypot(a[0] - b[0], a[1] - b[1]) * view.frame.scale > 2 * RADIUS;
+  };
+  return heavy.flatMap((link) => {
+    const { name } = link;
+    const frame = heavy.length <= CROWD || long(link) ? frameOf(view, numbers, name) : null;
     if (!frame) return [];
     const [x, y] = turned(pulled?.link === name ? pulled.local : localOf(numbers, `links.${name}.centre`), frame.angle);
     return { kind: "centres", name, key: name, at: [frame.origin[0] + x, frame.origin[1] + y], mass: numbers[`links.${name}.mass`] };

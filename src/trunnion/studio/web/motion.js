@@ -6,7 +6,7 @@ import { gaps, say } from "../web/data.js";
 import { html as element, svg } from "../web/dom.js";
 import { player } from "../web/player.js";
 import { readout } from "../web/report.js";
-import { changing } from "./sheet.js";
+import { changing, tells } from "./sheet.js";
 import * as state from "./state.js";
 import { html } from "./ui.js";
 
@@ -86,8 +86,10 @@ function fill(holder) {
 function follow(live) {
   const scene = untracked(() => (state.solved.value ? state.answer.value.scene : null));
   if (!scene || !crank.figures?.isConnected) return;
-  const dragged = live?.points ? readout(changing(scene, live)) : null;
-  dragged?.show(state.index.peek());
+  const index = state.index.peek();
+  const told = live?.scene ?? (live?.points && tells(live, index) ? changing(scene, live) : null);
+  const dragged = told && readout(told);
+  dragged?.show(index);
   const element = dragged?.element ?? crank.own;
   if (element === crank.figures) return;
   crank.figures.replaceWith(element);

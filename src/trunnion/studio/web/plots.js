@@ -145,8 +145,9 @@ function Chosen() {
 
 /** The largest reaction and friction power of each joint, and where. */
 function Joints() {
-  const { scene } = state.answer.value ?? {};
+  const { scene, figures = [], coming } = state.answer.value ?? {};
   if (!state.solved.value) return null;
+  const ofCycle = (name) => !coming && figures.find(([label]) => label.startsWith(`reaction of ${name}, maximum`)); // between positions too
   const largest = (values) => values.reduce((best, value, index) => ((value ?? -1) > (values[best] ?? -1) ? index : best), 0);
   const rows = scene.joints.slice(0, MOST).map(({ name, reaction, friction_power: power }) => {
     const cell = (values, unit) => {
@@ -154,7 +155,8 @@ function Joints() {
       return values[index] ? [quantity(values[index], unit, undefined, scene.units), position(scene, index)] : ["0", ""];
     };
     const friction = full(power, scene.count).map((value) => (value === null ? null : Math.abs(value)));
-    return [name, ...cell(magnitude(reaction, scene.count), "N"), ...cell(friction, "W")];
+    const [label, value] = ofCycle(name) || [];
+    return [name, ...(label ? [value, label.split(", at ")[1] ?? ""] : cell(magnitude(reaction, scene.count), "N")), ...cell(friction, "W")];
   });
   const head = ["joint", "largest reaction", "at", "largest friction power", "at"];
   const copy = () => navigator.clipboard?.writeText([head, ...rows].map((row) => row.join("\t")).join("\n")).then(() => state.say("The table is on the clipboard."));

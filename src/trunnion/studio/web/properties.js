@@ -192,7 +192,7 @@ function Dimension({ name, value, findings }) {
   const typedBy = ({ target }) => Number(Number(target.value).toPrecision(4));
   const pull = (event) => {
     setPulled({ from: start, text: `${typedBy(event)} ${start.rest}`.trim() });
-    if (state.solved.value && !state.spatial.value) asked.current = shown.current(dimensionTimes(name, typedBy(event) / start.value));
+    if (state.solved.value) asked.current = shown.current(dimensionTimes(name, typedBy(event) / start.value));
   };
   const back = async (event) => {
     if (typedBy(event) !== start.value) return; // it is released elsewhere

@@ -16,14 +16,19 @@ export const shown = computed(() => {
     const scene = sketch(found.entries, state.places.value, found.numbers);
     return { scene: found.tracks ? { ...scene, points: found.tracks } : scene, structure: scene, sketched: true };
   }
-  const scene = state.live.value?.points ? changing(found.scene, state.live.value) : found.scene;
+  const live = state.live.value;
+  const scene = live?.points && tells(live, state.index.value) ? changing(found.scene, live) : found.scene;
   return { scene, structure: found, sketched: false };
 });
 
+/** Whether an answer about a mechanism that is being changed tells of a position: of many joints it tells of one alone. */
+export const tells = (live, index) => !live.tracks || live.index === index;
+
 /** The scene with the motion and forces of a mechanism that is being changed. */
-export function changing(scene, { points, angles, efforts, joints, status }) {
+export function changing(scene, { points, tracks, angles, efforts, joints, status }) {
   return {
     ...scene,
+    tracks,
     links: scene.links.map((link) => ({ ...link, angle: angles[link.name] ?? link.angle })),
     points: { ...scene.points, ...points },
     drivers: scene.drivers.map((one) => ({ ...one, effort: efforts[one.name] ?? one.effort })),

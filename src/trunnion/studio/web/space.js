@@ -6,7 +6,7 @@ import { arrow } from "../web/arrow.js";
 import { set, svg } from "../web/dom.js";
 import { stated } from "../web/format.js";
 import { linkAt, placed, seat, spaceView, spot } from "../web/space.js";
-import { edit } from "./actions.js";
+import { changed, edit, newest } from "./actions.js";
 import { plainNumber, usualUnit } from "./fields.js";
 import { dictionary, gridStep, lengthOf, lengthText, onGrid } from "./geometry.js";
 import { cornered, kindsOf, partUnder, sheet } from "./sheet.js";
@@ -34,7 +34,7 @@ function mount(holder) {
   hands.append(layers.rubber, layers.targets, layers.arms);
   const stop = [
     effect(() => {
-      const scene = cornered.value?.scene ?? state.answer.value?.scene;
+      const scene = cornered.value?.scene ?? state.live.value?.scene ?? state.answer.value?.scene;
       untracked(() => {
         draw(holder, scene?.space === "spatial" ? scene : null, layers);
         if (cornered.peek()) stage.api?.reactions([], 1); // only its places are known
@@ -51,6 +51,7 @@ function mount(holder) {
     effect(() => {
       state.answer.value;
       cornered.value;
+      state.live.value;
       stage.api?.show(state.index.value);
     }),
     effect(() => {
@@ -166,7 +167,7 @@ function listen(element) {
     if (event.button !== 0 || !part || !event.target.closest(".hands")) return;
     if (arm || movable(part)) {
       event.stopPropagation(); // it does not turn
-      stage.held = { part, axis: arm ? Number(arm.dataset.axis) : null, by: [0, 0, 0] };
+      stage.held = taken(part, arm ? Number(arm.dataset.axis) : null);
       element.setPointerCapture(event.pointerId);
     }
   }, true); // prettier-ignore
@@ -184,7 +185,7 @@ function listen(element) {
     from = null;
   });
   element.addEventListener("pointercancel", () => {
-    from = stage.held = null;
+    from = stage.held = state.live.value = null;
     rubber();
   });
   element.addEventListener("keydown", keyed, true);
@@ -201,6 +202,18 @@ function take(part) {
   if (part && state.tab.value !== "plots") state.tab.value = "properties";
 }
 
+/** A joint or point in the hand; its mechanism is shown as it comes to be. */
+function taken(part, axis) {
+  const { posed: index } = stage.api.view;
+  const held = { part, axis, by: [0, 0, 0], at: null, ask: null };
+  held.ask = newest((by) => changed("drag", { point: part.name, by, index }), (found) => {
+    if (stage.held !== held) return;
+    if (found.error) state.say(found.error, true);
+    else state.live.value = found;
+  }); // prettier-ignore
+  return held;
+}
+
 /** The chosen part is pulled by so many px: along its axis, or in the plane of the picture. */
 function pull(dx, dy) {
   const { held, api } = stage;
@@ -215,6 +228,7 @@ function pull(dx, dy) {
   state.say(`${held.part.name} by ${told(held.by)}.`);
   if (state.selection.peek()?.name !== held.part.name) take(held.part);
   rubber(held);
+  held.ask(held.by);
 }
 
 /** The way of a joint in words: "x 3 mm, z −1 mm". */
@@ -230,10 +244,11 @@ function rubber(held = null) {
   if (!held) return layer.replaceChildren();
   const parts = partsOf(view);
   const { at } = parts.find(({ kind, name }) => kind === held.part.kind && name === held.part.name);
-  const to = at.map((value, axis) => value + held.by[axis]);
+  held.at ??= at; // where it was taken
+  const to = held.at.map((value, axis) => value + held.by[axis]);
   const own = view.scene.joints.find(({ name }) => name === held.part.name)?.links ?? [held.part.name.split(".")[0]];
   const ends = view.scene.joints.filter(({ name, links }) => name !== held.part.name && links.some((link) => own.includes(link) && !view.links.get(link).ground));
-  const [[x, y], [a, b]] = [spot(view, at), spot(view, to)];
+  const [[x, y], [a, b]] = [spot(view, held.at), spot(view, to)];
   const lines = ends.map(({ name }) => `M${spot(view, parts.find((one) => one.name === name).at)}L${a},${b}`).join("");
   layer.replaceChildren(
     svg("path", { class: "rubber", d: `${lines}M${x},${y}L${a},${b}`, fill: "none" }),
@@ -244,6 +259,7 @@ function rubber(held = null) {
 function place({ part, by }) {
   rubber();
   if (by.some(Boolean)) move(part, by);
+  else state.live.value = null;
 }
 
 /** Move a joint or point by metres along x, y and z. */

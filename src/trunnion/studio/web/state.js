@@ -86,6 +86,11 @@ export const spatial = computed(() => {
   else if (entries) inSpace = entries.space === "spatial" || Array.isArray(entries.loop);
   return inSpace;
 });
+/** Whether what is shown is of a text, or a friction, that is no longer the present one: its answer is awaited. */
+export const awaited = computed(() => {
+  const { scene, text: known, friction: law } = answer.value ?? {};
+  return Boolean(scene) && (known !== text.value || (law === "off") !== (friction.value === "off"));
+});
 export const solved = computed(() => Boolean(answer.value?.solved && answer.value.scene));
 
 /** What a half-drawn linkage still lacks, in sentences; then its errors are no more than that. */

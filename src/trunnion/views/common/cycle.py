@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from functools import lru_cache
+from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -143,7 +144,7 @@ def over_turn(label: str, unit: str, values: Array, periodic: bool = True) -> Ab
 
 def numbers(values: Array) -> list[float | None]:
     """Numbers with seven digits, None for what is not finite."""
-    return [float(f"{value:.7g}") if np.isfinite(value) else None for value in values.tolist()]
+    return [float(f"{value:.7g}") if isfinite(value) else None for value in values.tolist()]
 
 
 def series(values: Array | None) -> list[float | None]:

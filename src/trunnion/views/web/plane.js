@@ -11,6 +11,7 @@ import { coil } from "./spring.js";
 const BEYOND = 26; // px that a guide is longer than the travel of its block's middle, at each end
 const PISTON = 0.95; // length of a cylinder's rod, of the least distance of its eyes
 const ASIDE = 0.01; // of that distance: how far the eyes of a cylinder may lie off its guide
+const CROWD = 60; // names, of which those without room are left out until the drawing is larger
 const LETTER = 8.4; // px, width of a letter of a name
 const [ABOVE, BELOW] = [11, 4]; // px that a name reaches above and below its line
 
@@ -90,12 +91,19 @@ export function outline(spots) {
   return corners.length ? `M${corners.join("L")}${corners.length > 2 ? "Z" : "h0"}` : "";
 }
 
+/** Where a point goes, series of its own positions: of a mechanism that is being changed they may be fewer. */
+const trackOf = ({ tracks, points }, key) => (tracks ? tracks[key] : points[key]);
+/** So many positions a track has; of one that stays 1. */
+const lengthOf = (track) => (track ? Math.max(track.x.length, track.y.length) : 0);
+
 /** The path of a point; `write` makes the text of a place in metres. */
 export function trackPath(scene, key, write) {
   let path = "";
   let pen = "M";
-  for (let index = 0; index < scene.count + (scene.abscissa.closed ? 1 : 0); index += 1) {
-    const found = place(scene, key, index % scene.count);
+  const points = { [key]: trackOf(scene, key) };
+  const count = lengthOf(points[key]);
+  for (let index = 0; index < count + (scene.abscissa.closed ? 1 : 0); index += 1) {
+    const found = place({ points }, key, index % count);
     if (found) path += `${pen}${write(found)}`;
     pen = found ? "L" : "M";
   }
@@ -105,7 +113,7 @@ export function trackPath(scene, key, write) {
 /** The paths of moving points: coupler curves of named points, thin ones of joints. */
 export function tracksOf(scene, write) {
   const keys = scene.links.filter((one) => !one.ground).flatMap((link) => link.points.map((key) => [key, link.free.includes(key)]));
-  const moving = keys.filter(([key]) => scene.points[key] && (scene.points[key].x.length > 1 || scene.points[key].y.length > 1));
+  const moving = keys.filter(([key]) => lengthOf(trackOf(scene, key)) > 1);
   return moving.map(([key, free]) => svg("path", { class: free ? "track free" : "track", d: trackPath(scene, key, write) }));
 }
 
@@ -140,8 +148,9 @@ function rail(one, ground) {
     const [ux, uy] = [Math.cos(angle), Math.sin(angle)];
     const base = place(scene, grounded(one, ground)[0], 0);
     let [low, high, across] = [Infinity, -Infinity, 0];
-    for (let index = 0; index < scene.count; index += 1) {
-      const found = place(scene, one.at, index);
+    const points = { [one.at]: trackOf(scene, one.at) ?? scene.points[one.at] };
+    for (let index = 0; index < lengthOf(points[one.at]); index += 1) {
+      const found = place({ points }, one.at, index);
       if (!found) continue;
       const along = found[0] * ux + found[1] * uy;
       [low, high, across] = [Math.min(low, along), Math.max(high, along), found[1] * ux - found[0] * uy];
@@ -167,7 +176,7 @@ function body(link, kind) {
   const paths = plate(kind);
   const pose = ({ spots }) => {
     const path = outline(spots(link.points));
-    paths.forEach((part) => part.setAttribute("d", path));
+    paths.forEach((part) => set(part, { d: path }));
   };
   return { link, node: svg("g", { class: "body", "data-kind": "links", "data-name": link.name }, svg("title", {}, link.name), ...paths), pose };
 }
@@ -331,7 +340,7 @@ function vector(one, kind) {
   const node = svg("path", { class: `reaction ${kind}` });
   const pose = ({ scene, spot, force: index, perNewton, shown }) => {
     const [found, force] = [spot(one.at), forceAt(scene, one, index)];
-    node.setAttribute("d", found && force && shown(one.name) ? arrow(...found, force[0] * perNewton, -force[1] * perNewton) : "");
+    set(node, { d: found && force && shown(one.name) ? arrow(...found, force[0] * perNewton, -force[1] * perNewton) : "" });
   };
   return { joint: one, node, pose };
 }
@@ -380,9 +389,13 @@ function poseNames({ names, loads }, { spot, named }) {
   for (const { one, found, words } of there.values()) {
     const text = words.join(", ");
     const places = SIDES[one.side].map((by) => boxOf(found, by, text.length * LETTER));
-    const box = places.find((place) => !taken.some((other) => meet(place, other))) ?? places[0];
+    const box = places.find((place) => !taken.some((other) => meet(place, other))) ?? (there.size > CROWD ? null : places[0]);
+    if (!box) {
+      moveTo(one.node, null);
+      continue;
+    }
     taken.push((one.box = box));
-    one.node.textContent = text;
+    if (one.node.textContent !== text) one.node.textContent = text;
     moveTo(one.node, [(box.left + box.right) / 2, box.y]);
   }
 }

@@ -167,7 +167,7 @@ export function shades(colour) {
   });
 }
 
-/** Paint pieces on a canvas context; `colours` maps a paint to its shades, "ink" to the outline. */
+/** Paint pieces on a canvas context; `colours` has the shades `of` each paint, and the `ink` of the outline. */
 export function paint(context, pieces, colours) {
   pieces.sort((a, b) => a.depth - b.depth);
   for (const piece of pieces) {
@@ -178,7 +178,7 @@ export function paint(context, pieces, colours) {
       context.strokeStyle = piece.colour;
     } else {
       const halo = piece.shade === "ink" ? piece.halo : null; // of what is chosen the outline is broad
-      const colour = halo ?? (piece.shade === "ink" ? colours.ink : colours[piece.paint][piece.shade]);
+      const colour = halo ?? (piece.shade === "ink" ? colours.ink : colours.of.get(piece.paint)[piece.shade]);
       context.closePath();
       context.fillStyle = colour;
       context.fill();

@@ -180,12 +180,12 @@ function prepare(view) {
 function recolour(view, paper) {
   const style = paper ? null : globalThis.getComputedStyle?.(view.stage);
   const of = (name, plain) => style?.getPropertyValue(`--${name}`).trim() || plain;
-  const colours = { ink: of("ink", ON_PAPER.ink), muted: of("muted", ON_PAPER.muted), ideal: of("strong", ON_PAPER.ideal) };
-  colours[""] = shades(of("joint", ON_PAPER.joint));
+  const colours = { ink: of("ink", ON_PAPER.ink), muted: of("muted", ON_PAPER.muted), ideal: of("strong", ON_PAPER.ideal), of: new Map() };
+  colours.of.set("", shades(of("joint", ON_PAPER.joint)));
   view.halo = of("accent", ON_PAPER.kinds[0]);
   let order = 0;
   for (const link of view.scene.links) {
-    colours[link.name] = shades(link.ground ? of("ground", ON_PAPER.ground) : of(`k${order % 6}`, ON_PAPER.kinds[order % 6]));
+    colours.of.set(link.name, shades(link.ground ? of("ground", ON_PAPER.ground) : of(`k${order % 6}`, ON_PAPER.kinds[order % 6])));
     if (!link.ground) order += 1;
   }
   view.colours = colours;

@@ -87,8 +87,8 @@ def _turn(axis: Vector3, twist: Number) -> Number:
     return namespace(x, y).arctan2(x, y)
 
 
-def rates(axes: tuple[Vector3, Vector3, Vector3], rates_of: Vector3) -> Vector3:
-    """Rates θ̂̇_B, θ̂̇_C, θ̂̇_D with θ̂̇_B b̂ + θ̂̇_C ĉ + θ̂̇_D d̂ = `given`, the twist of k against h.
+def rates(axes: tuple[Vector3, Vector3, Vector3], twist: Vector3) -> Vector3:
+    """Rates θ̂̇_B, θ̂̇_C, θ̂̇_D with θ̂̇_B b̂ + θ̂̇_C ĉ + θ̂̇_D d̂ = `twist`, that of k against h.
 
     By the adjugate: θ̂̇_B = given · (ĉ × d̂)/(b̂ · ĉ × d̂) and so on round. In a closed chain of four with joint 1 driven
     given is −θ̂̇₁ ẑ₁. NaN at a dead centre, where the axes lie in one plane.
@@ -96,7 +96,7 @@ def rates(axes: tuple[Vector3, Vector3, Vector3], rates_of: Vector3) -> Vector3:
     b, c, d = axes
     normals = cross(c, d), cross(d, b), cross(b, c)
     volume = _nonzero(dot(b, normals[0]))
-    return dot(rates_of, normals[0]) / volume, dot(rates_of, normals[1]) / volume, dot(rates_of, normals[2]) / volume
+    return dot(twist, normals[0]) / volume, dot(twist, normals[1]) / volume, dot(twist, normals[2]) / volume
 
 
 def closure(loop: Loop, twists: Sequence[Number]) -> tuple[Number, Number]:

@@ -130,7 +130,7 @@ def _quantities(mechanism: Numbers, unreadable: set[str]) -> Iterator[Finding]:
 
 
 def _dimensions(mechanism: Numbers, by_name: dict[str, Dimension | None], unreadable: set[str]) -> Iterator[Finding]:
-    """Names of the dimensions and what each measures: `known` receives it, `unreadable` the paths without a value."""
+    """Names of the dimensions and what each measures: `by_name` receives it, `unreadable` the paths without a value."""
     dimensions = mechanism.dimensions
     by_name.update(dict.fromkeys(dimensions))
     deviations = dimension_errors(mechanism.entries) if mechanism.errors else {}

@@ -90,8 +90,8 @@ def _turn(axis: Vector3, twist: Number) -> Number:
 def rates(axes: tuple[Vector3, Vector3, Vector3], twist: Vector3) -> Vector3:
     """Rates θ̂̇_B, θ̂̇_C, θ̂̇_D with θ̂̇_B b̂ + θ̂̇_C ĉ + θ̂̇_D d̂ = `twist`, that of k against h.
 
-    By the adjugate: θ̂̇_B = given · (ĉ × d̂)/(b̂ · ĉ × d̂) and so on round. In a closed chain of four with joint 1 driven
-    given is −θ̂̇₁ ẑ₁. NaN at a dead centre, where the axes lie in one plane.
+    By the adjugate: θ̂̇_B = twist · (ĉ × d̂)/(b̂ · ĉ × d̂) and so on round. In a closed chain of four with joint 1 driven
+    the twist is −θ̂̇₁ ẑ₁. NaN at a dead centre, where the axes lie in one plane.
     """
     b, c, d = axes
     normals = cross(c, d), cross(d, b), cross(b, c)

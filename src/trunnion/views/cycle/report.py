@@ -60,7 +60,7 @@ def page(
     quality: Sequence[dict[str, str]] = (),
     compared: bool = False,
 ) -> str:
-    """The report of a result whose scene is `scene_of`; motion: what it says of a motion in time, quality: rows beside."""
+    """The report of a result whose scene is `scene_of`; motion: what it says of one in time, quality: rows beside."""
     from markupsafe import Markup  # with jinja2 only needed here, and slow to import
 
     style, script = web_text("report.css"), bundle("report.js")

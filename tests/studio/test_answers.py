@@ -545,3 +545,14 @@ def test_what_is_tried_or_dragged_in_space_is_the_model_that_has_it():
     for link in dragged["scene"]["links"]:
         for axis in "xyz":
             np.testing.assert_allclose(column(link["pose"][axis]), column(links[link["name"]][axis]), atol=2e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("index", [10, 200])
+def test_of_many_contacts_the_margin_is_more_than_is_told(index):
+    """What is told is proved by bounds of the equations; the margin itself is followed to where it locks."""
+    text = chain(6).replace("friction: 0.1", "friction: 0.3").replace("radius: 5 mm", "radius: 30 mm")
+    told = ask(ask="try", text=text, values={}, index=index)["margin"]
+    followed = ask(ask="model", text=text, steps=36)["margin"][index // 10]
+    assert told["beyond"]
+    assert 1.5 < told["value"] < min(followed, 3.0)

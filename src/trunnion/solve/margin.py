@@ -7,6 +7,7 @@ problem, φ = s law(N(R₀ + G φ)), whose G is triangular by modules, and it is
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -26,7 +27,7 @@ from trunnion.solve.friction import (
 from trunnion.solve.friction_problem import largest
 from trunnion.solve.system import Cycle
 
-__all__ = ["locking_margin", "margin_in", "margins_beside"]
+__all__ = ["locking_margin", "margin_for_sure", "margin_in", "margins_beside"]
 
 Array = NDArray[np.float64]
 
@@ -62,7 +63,24 @@ def margin_in(back: Backward, most: float, lanes: Number = np.True_) -> Number:
     return margin
 
 
-def margins_beside(solve: Callable[[Array], Backward], time: Array, cycle: Cycle, most: float) -> Array:
+def margin_for_sure(back: Backward, most: float) -> Number:
+    """A multiple of all friction up to which no module locks, by the bounds of their equations alone; ∞ above `most`.
+
+    The margin is more than this. To follow a long row takes seconds. NaN where it is locked.
+    """
+    modules = [one for one in back.settled if one.problem is not None and not one.problem.one_way]
+    sure = 1.0 / largest([one.problem.bound() for one in modules if one.problem is not None] or [0.0])
+    locked = functools.reduce(np.logical_or, [np.less(one.share, 1.0) for one in modules], np.False_)
+    return np.where(locked, np.nan, np.where(sure > most, np.inf, sure))
+
+
+def margins_beside(
+    solve: Callable[[Array], Backward],
+    time: Array,
+    cycle: Cycle,
+    most: float,
+    margin: Callable[[Backward, float], Number] = margin_in,
+) -> Array:
     """The margins at times, s, at which a joint turns round: the less of those just before and just after.
 
     Its friction may act either way there, and is taken as none: with that alone the margin would jump at one position.
@@ -71,7 +89,7 @@ def margins_beside(solve: Callable[[Array], Backward], time: Array, cycle: Cycle
     sides = time + BESIDE * cycle.duration * np.array([[-1.0], [1.0]])
     inside = cycle.periodic | ((sides >= 0) & (sides <= cycle.duration))
     asked = (sides % cycle.duration if cycle.periodic else np.clip(sides, 0.0, cycle.duration)).ravel()
-    margins = np.broadcast_to(np.asarray(margin_in(solve(asked), most), float), asked.shape).reshape(sides.shape)
+    margins = np.broadcast_to(np.asarray(margin(solve(asked), most), float), asked.shape).reshape(sides.shape)
     least: Array = np.fmin.reduce(np.where(inside, margins, np.nan))
     return least
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from benchmarks.studio import chain
 
+from trunnion.algebra.dual import Dual
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve import backward, settle_code
@@ -57,3 +58,17 @@ def test_equations_of_one_kind_share_their_code(monkeypatch):
     run = prepare(Mechanism(**entries_of(chain(20))[0]))
     run.solve(run.cycle.times(STEPS))
     assert len(settle_code._codes) <= 2  # the last dyad, which the resisting torque loads, may have other zeros
+
+
+def test_derivatives_are_those_of_numpy(monkeypatch):
+    run = prepare(Mechanism(**entries_of(TEXTS["chain"])[0]))
+    path = "joints.B5.friction.coefficient"
+    values = {**run.values, path: Dual(run.values[path], 1.0)}
+    slopes = []
+    for many in (10**9, 1):
+        monkeypatch.setattr(backward, "MANY_MODULES", many)
+        back = run.solve(run.cycle.times(STEPS), values)
+        parts = [part for wrench in back.reactions.values() for part in tuple(wrench)[:2] if isinstance(part, Dual)]
+        slopes.append(np.array([np.broadcast_to(part.dual, STEPS) for part in parts]))
+    assert np.nanmax(np.abs(slopes[0])) > 0
+    np.testing.assert_allclose(slopes[1], slopes[0], rtol=0, atol=1e-10 * np.nanmax(np.abs(slopes[0])))

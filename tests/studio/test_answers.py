@@ -12,6 +12,8 @@ import trunnion
 from studio.asking import EXAMPLES, analysed, ask, column, edited, model_of, unpacked
 from trunnion.errors import Status
 from trunnion.model.file import entries_of, text_of
+from trunnion.solve.margin import margin_in
+from trunnion.solve.run import prepare
 from trunnion.studio.answers import answer
 from trunnion.studio.message import packed
 
@@ -428,3 +430,15 @@ def test_what_is_tried_or_dragged_in_space_is_the_model_that_has_it():
     for link in dragged["scene"]["links"]:
         for axis in "xyz":
             np.testing.assert_allclose(column(link["pose"][axis]), column(links[link["name"]][axis]), atol=2e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("index", [10, 200])
+def test_of_many_contacts_the_margin_is_more_than_is_told(index):
+    """What is told is proved by bounds of the equations; the margin itself is followed to where it locks."""
+    text = chain(6).replace("friction: 0.1", "friction: 0.3").replace("radius: 5 mm", "radius: 30 mm")
+    told = ask(ask="try", text=text, values={}, index=index)["margin"]
+    run = prepare(model_of(text))
+    followed = float(margin_in(run.solve(run.cycle.times(360)[[index]]), 3.0)[0])
+    assert told["beyond"]
+    assert 1.5 < told["value"] < min(followed, 3.0)

@@ -99,7 +99,8 @@ def _iterated(problem: FrictionProblem, method: FrictionMethod, coded: bool) -> 
     real, newton = problem.real, method.name == "newton"
     shares: Number = 1.0
     rounds = min(method.limit, STUBBORN) if newton else method.limit
-    certain, at = _begun_by_code(real, rounds, method) if coded and newton else _begun(real, rounds, method)
+    begun = _begun_by_code(real, rounds, method) if coded and newton else None
+    certain, at, reactions = begun or (*_begun(real, rounds, method), None)
     if newton:
         left = ~certain
         if method.limit >= STUBBORN:
@@ -109,15 +110,15 @@ def _iterated(problem: FrictionProblem, method: FrictionMethod, coded: bool) -> 
             state = real.state(forces)
             at = at._replace(forces=forces, normals=state.normals, gaps=real.gaps(state, forces))
             at = at._replace(done=np.where(left, 0.0, 1.0))
-            at = _rounds(real, at, rounds, method)
+            at, reactions = _rounds(real, at, rounds, method), None
     converged = (at.done > 0) if method.criterion is not None else _obeyed(real, at)
     forces = at.forces
     if problem.depth:  # Newton's method at the solution gives the derivatives, one level of ε a round
-        slopes = real.map_derivative(real.state(forces, at.normals))
+        slopes, reactions = real.map_derivative(real.state(forces, at.normals)), None
         for _ in range(problem.depth):
             forces = _corrected(forces, problem.gaps(problem.state(forces), forces), slopes)
     return Settled(
-        reactions=problem.reactions(forces),
+        reactions=problem.reactions(forces) if reactions is None else reactions,
         forces=forces,
         iterations=at.rounds,
         change=at.change,
@@ -142,18 +143,24 @@ def _begun(real: FrictionProblem, rounds: int, method: FrictionMethod) -> tuple[
     return certain, _rounds(real, at, rounds, method)
 
 
-def _begun_by_code(real: FrictionProblem, rounds: int, method: FrictionMethod) -> tuple[Number, _Iterate]:
-    """The same by machine code, where the equations have it."""
+def _begun_by_code(
+    real: FrictionProblem, rounds: int, method: FrictionMethod
+) -> tuple[Number, _Iterate, list[Reaction]] | None:
+    """The same with the reactions there, by machine code; None where the equations have none."""
     from trunnion.solve.settle_code import settled_by_code  # LLVM is loaded for rows of many modules alone
 
     def row(problem: FrictionProblem) -> list[Number]:
         certain, at = _begun(problem, rounds, method)
-        return [certain, *at.in_row()]
+        return [certain, *at.in_row(), *(part for reaction in problem.reactions(at.forces) for part in reaction)]
 
     found = settled_by_code(real, row, (rounds, method.criterion))
     if found is None:
-        return _begun(real, rounds, method)
-    return found[0] != 0.0, _Iterate([0.0] * len(real.contacts), [], []).of_row(found[1:])
+        return None
+    at = _Iterate([0.0] * len(real.contacts), [], [])
+    size = 3 * len(at.forces) + len(at) - 3
+    parts = iter(found[1 + size :])
+    reactions = [tuple([next(parts) for _ in reaction]) for reaction in real.start]
+    return found[0] != 0.0, at.of_row(found[1 : 1 + size]), reactions
 
 
 class _Iterate(NamedTuple):

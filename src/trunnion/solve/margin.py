@@ -7,6 +7,7 @@ problem, φ = s law(N(R₀ + G φ)), whose G is triangular by modules, and it is
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -26,7 +27,7 @@ from trunnion.solve.friction import (
 from trunnion.solve.friction_problem import largest
 from trunnion.solve.system import Cycle
 
-__all__ = ["least_beside", "locking_margin", "margin_in"]
+__all__ = ["least_beside", "locking_margin", "margin_for_sure", "margin_in"]
 
 Array = NDArray[np.float64]
 
@@ -60,6 +61,17 @@ def margin_in(back: Backward, most: float, lanes: Number = np.True_) -> Number:
             problem, share = _together(back, k + 1), 1.0
         margin = np.where(doubtful, _followed(problem, doubtful, most, share), margin)
     return margin
+
+
+def margin_for_sure(back: Backward, most: float) -> Number:
+    """A multiple of all friction up to which no module locks, by the bounds of their equations alone; ∞ above `most`.
+
+    The margin is more than this. To follow a long row takes seconds. NaN where it is locked.
+    """
+    modules = [settled for settled in back.settled if settled.problem is not None and not settled.problem.one_way]
+    sure = 1.0 / largest([module.problem.bound() for module in modules if module.problem is not None] or [0.0])
+    locked = functools.reduce(np.logical_or, [np.less(module.share, 1.0) for module in modules], np.False_)
+    return np.where(locked, np.nan, np.where(sure > most, np.inf, sure))
 
 
 def least_beside(

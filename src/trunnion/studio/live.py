@@ -20,7 +20,7 @@ from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, posed
-from trunnion.solve.margin import least_beside, margin_in
+from trunnion.solve.margin import least_beside, margin_for_sure, margin_in
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.system import Values
@@ -34,6 +34,7 @@ Array = NDArray[np.float64]
 AT_ONCE = 12_000  # joints times positions whose forces are worked out in the time of a picture
 MOST_TRACKED = 20_000  # places of all tracks that are drawn in it
 STILL = 1e-9  # of the size: a point that moves less has no track
+MOST_FOLLOWED = 16  # contacts whose friction is followed until they lock: the time grows with their cube
 NEAR = 3.0  # multiple of the friction up to which the margin is looked for: farther it takes longer than the forces
 
 
@@ -160,17 +161,22 @@ def live_in_space(run: Run, values: Mapping[str, float], steps: int, index: int)
 
 @np.errstate(all="ignore")
 def _margin(run: Run, numbers: Values, back: Backward, status: Sequence[int], index: int, lanes: Any) -> dict[str, Any]:
-    """The locking margin at a position, looked for up to NEAR. lanes: where the forces have the position."""
+    """The locking margin at a position, looked for up to NEAR. lanes: where the forces have the position.
+
+    Of many contacts it is a multiple that the margin is more than.
+    """
+    many = sum(map(len, back.rubbed)) > MOST_FOLLOWED
     time = run.cycle.times(len(status))[[index]]
     if status[index] == Status.ZERO_SLIP and run.cycle.duration > 0:
-        figure = partial(margin_in, most=NEAR)
+        figure = partial(margin_for_sure if many else margin_in, most=NEAR)
         margin = float(least_beside(figure, lambda at: run.solve(at, numbers), time, run.cycle)[0])
     else:
-        every = np.broadcast_to(np.asarray(margin_in(back, NEAR, lanes), float), np.shape(back.walk.time))
+        margins = margin_for_sure(back, NEAR) if many else margin_in(back, NEAR, lanes)
+        every = np.broadcast_to(np.asarray(margins, float), np.shape(back.walk.time))
         margin = float(every[index if np.ndim(lanes) else 0])
     if status[index] > Status.LOCKED or np.isnan(margin):
         return {"value": None, "beyond": False}
-    return {"value": min(margin, NEAR), "beyond": margin > NEAR}
+    return {"value": min(margin, NEAR), "beyond": many or margin > NEAR}
 
 
 def _refuse_space(run: Run) -> None:

@@ -11,7 +11,7 @@ export function told(margin, lowest, index) {
 /** The margin of one position: "4.27 here", "> 3 here". */
 export function at({ value, beyond }) {
   if (value === null) return "none here";
-  return `${beyond ? "> " : ""}${number(value)} here${value <= 1 ? ": it locks" : ""}`;
+  return `${beyond ? "> " : ""}${number(value)} here${!beyond && value <= 1 ? ": it locks" : ""}`;
 }
 
 /** The least margin of the cycle: "0.77 at 0 mm", "> 10". */

@@ -130,3 +130,10 @@ def test_a_drive_with_limits_keeps_within_them(tmp_path: Path) -> None:
     turned = np.degrees(result["joint_rotation"].sel(joint=driven).values)
     assert (turned.min(), turned.max()) == pytest.approx((-11, 17), abs=1e-6)
     assert (result["status"].values < 3).all()
+
+
+def test_the_ground_gives_its_name_to_what_is_fixed_to_it() -> None:
+    pairs = {"weld": Pair("weld", "fixed", ("bracket", "base"), np.zeros(3))}
+    draft = Draft("", {"bracket": Body("bracket"), "base": Body("base")}, pairs, "base").welded()
+    assert list(draft.bodies) == ["base"]
+    assert draft.ground == "base"

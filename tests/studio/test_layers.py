@@ -191,6 +191,14 @@ def test_a_table_has_the_stroke_and_the_time_ratio_of_a_quick_return():
     assert figures["stroke of G"] == "200.0\u00a0mm"
 
 
+def test_the_same_without_friction():
+    text = EXAMPLES[FOURBAR]
+    found, rows = compared(text, text, friction=("off", "stated"))
+    near(found["scene"]["drivers"][0]["effort"], analysed(text, friction=False)["drive_effort"].values[0])
+    assert rows["mean friction power"]["a"] == 0
+    assert found["margin"] is None
+
+
 def test_a_variant_over_another_stroke_shows_the_nearest_of_its_own_positions():
     after = EXAMPLES["drawing-press"]
     before = after.replace("range: [0 mm, 118 mm]", "range: [20.3 mm, 100 mm]")

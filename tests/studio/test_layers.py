@@ -166,6 +166,8 @@ def test_a_table_of_two_variants_is_that_of_two_analyses():
     figures = [{figure.name: figure.value for figure in one.trunnion.summary} for one in results]
     for label, name in (("efficiency", "efficiency"), ("least locking margin", "locking_margin")):
         assert [rows[label]["a"], rows[label]["b"]] == pytest.approx([one[name] for one in figures], rel=1e-12)
+    lost = [float(one["friction_power_mean"].sum()) for one in results]
+    assert [rows["mean friction power"]["a"], rows["mean friction power"]["b"]] == pytest.approx(lost, rel=1e-9)
     least = [float(one["locking_margin"].min()) for one in results]
     assert least[1] == pytest.approx(least[0] / 1.5, rel=1e-3)  # a multiple of the friction
     reaction = [

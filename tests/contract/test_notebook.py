@@ -91,6 +91,7 @@ def test_names_become_no_markup(four_bar: xr.Dataset) -> None:
         assert "<script>alert(1)</script>" in words
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(
     "made",
     [

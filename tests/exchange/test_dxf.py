@@ -371,3 +371,10 @@ def test_circles_of_two_arcs_are_pins_and_centre_lines_no_links(tmp_path: Path) 
     (pair,) = draft.pairs.values()
     assert (pair.type, pair.pin_radius, pair.hole_radius) == ("revolute", pytest.approx(0.01), pytest.approx(0.01002))
     assert any("2 centre line" in finding.what for finding in draft.findings)
+
+
+def test_what_lies_on_layer_0_of_a_block_is_on_the_layer_of_the_block(tmp_path: Path) -> None:
+    document = drawing(ground=[("circle", A, PIN)])
+    draw(document.blocks.new("arm"), "zero", [("circle", A, HOLE), ("circle", (50, 0), PIN)])
+    document.modelspace().add_blockref("arm", (0, 0), dxfattribs={"layer": "arm"})
+    assert [pair.links for pair in read(document, tmp_path).pairs.values()] == [("ground", "arm")]

@@ -24,6 +24,8 @@ from trunnion.cli.app import app
 from trunnion.errors import MechanismError
 from trunnion.exchange import export_model, import_file, model_text
 from trunnion.exchange.brep import Geometry
+from trunnion.exchange.draft import Body, Draft
+from trunnion.exchange.mating import joined
 from trunnion.exchange.part21 import Part21
 from trunnion.exchange.skeleton import positions_of
 from trunnion.exchange.step_assembly import Assembly
@@ -686,6 +688,7 @@ def test_the_skeleton_has_the_points_of_the_position(tmp_path, name):
                 np.testing.assert_allclose(points[link][pair.name], pair.at, atol=1e-9)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("name", "factor"), [("fourbar-with-play", 500.0), ("pezzuti-cardan-as-built", 20.0)])
 def test_errors_are_magnified(tmp_path, name, factor):
     """Displacements from the ideal mechanism are so many times larger; links stay rigid."""
@@ -763,3 +766,84 @@ def test_the_command_line_imports_and_moves(tmp_path):
     over = run(app, [*moved[:3], str(path), *moved[4:]])
     assert isinstance(over.exception, MechanismError)
     assert path.read_text() == written(tmp_path / "c.step", slider_crank()).read_text()
+
+
+def test_two_coaxial_pins_of_different_parts_on_one_axis(tmp_path):
+    """Two levers turn on the two ends of one axle that stands still: two joints, not three."""
+    axle = turned([(0, 0), (6, 0), (6, 10), (9, 10), (9, 20), (6, 20), (6, 30), (0, 30)])
+    block = boss(box((-20, -20, -40), (20, 20, -30)), "top", (10, 10, -30), 5, 5)
+    lever = bar(60, [(0, 12.04)], 0, 10)
+    levers = {"left": (lever, *STILL), "right": (lever, turn((0, 0, 1), 1), np.array([0, 0, 20.0]))}
+    draft = import_file(written(tmp_path / "a.step", {"axle": (axle, *STILL)} | levers), ground="axle")
+    assert {frozenset(pair.links) for pair in draft.pairs.values()} == {
+        frozenset(("axle", "left")),
+        frozenset(("axle", "right")),
+    }
+    assert all(pair.length == pytest.approx(0.01) for pair in draft.pairs.values())
+    assert "unconnected" in codes(
+        import_file(
+            written(tmp_path / "b.step", {"axle": (axle, *STILL), "block": (block, *STILL)} | levers), ground="axle"
+        )
+    )
+
+
+def test_half_a_hole_is_asked(tmp_path):
+    """A bearing of which only half is there holds its pin from one side: no joint without a question."""
+    base, arm = bar(80, [(0, 10.02)], 0, 10, split="halves"), bar(60, [], 10, 20, split="halves")
+    parts = {"base": (base, *STILL), "arm": (boss(arm, "bottom", (0, 0, 10), 10, 10), *STILL)}
+    file = Part21(written(tmp_path / "a.step", parts))
+    geometry = Geometry(file, 1e-3, 1.0)
+    solids = [geometry.solid(number) for number in file.of("MANIFOLD_SOLID_BREP")]
+    for halves in (2, 1):
+        faces = {name: list(solid.faces) for name, solid in zip(parts, solids, strict=True)}
+        hole = [face for face in faces["base"] if face.kind == "cylinder"]
+        assert len(hole) == 2
+        faces["base"] = [face for face in faces["base"] if face.kind != "cylinder"] + hole[:halves]
+        draft = Draft(bodies={name: Body(name, 1.0) for name in parts})
+        joined(draft, faces, 0.5e-3)
+        kinds = [pair.type for pair in draft.pairs.values() if pair.type != "fixed"]
+        assert kinds == (["cylindrical"] if halves == 2 else [])
+        assert ("half" in codes(draft)) == (halves == 1)
+
+
+def test_a_pin_in_a_slot_is_asked(tmp_path):
+    """A slotted lever of a quick return, its slot open at the end, around the pin of a crank."""
+    outline = [(0, -15), (120, -15), (120, -5.02), (20, -5.02), (20, 5.02), (120, 5.02), (120, 15), (0, 15)]
+    base = boss(bar(60, [(0, 12.04)], -10, 0), "top", (60, 0, 0), 8, 10)
+    lever = prism(outline, 0, 10).feature("bottom", (10, 0, 0), [(4.01, 0), (4.01, -10)], "top")
+    crank = boss(boss(bar(30, [], 10, 20, 8), "bottom", (30, 0, 10), 10, 10), "bottom", (0, 0, 10), 12, 20)
+    parts = {
+        "base": (base, *STILL),
+        "crank": (crank, turn((0, 0, 1), 2.0), np.zeros(3)),
+        "lever": (lever, turn((0, 0, 1), 0), np.array([50.0, 0, 0])),
+    }
+    pin = 30 * np.array([math.cos(2.0), math.sin(2.0)])
+    angle = math.atan2(pin[1], pin[0] - 60)
+    parts["lever"] = (lever, turn((0, 0, 1), angle), np.array([60 - 10 * math.cos(angle), -10 * math.sin(angle), 0]))
+    draft = import_file(written(tmp_path / "a.step", parts), ground="base")
+    assert codes(draft) == {"drive", "slot"}
+    assert {frozenset(pair.links) for pair in draft.pairs.values()} == {
+        frozenset(("base", "crank")),
+        frozenset(("base", "lever")),
+    }
+
+
+def test_a_piston_in_its_bore_slides(tmp_path):
+    """The slider-crank with a round slider; the frame is a part of two solids."""
+    parts = slider_crank()
+    x = parts["slider"][2][0]
+    plate_ = box((-30, -40, -12), (30, 40, 0)).feature("bottom", (0, 0, -12), [(10.02, 0), (10.02, -12)], "top")
+    block = box((x + 30, -30, -30), (x + 60, 30, 30)).feature(1, (x + 60, 0, 0), [(12.02, 0), (12.02, -30)], 3)
+    head = box((-10, -14, -10), (10, 14, 10)).feature("bottom", (0, 0, -10), [(6.01, 0), (6.01, -20)], "top")
+    boss(head, 1, (10, 0, 0), 24, 60)
+    rod = boss(bar(200, [(0, 16.03)], 10, 20, 12), "bottom", (200, 0, 10), 12, 20)
+    file = StepFile()
+    frame = file.part("frame", plate_, block)
+    uses = [(file.part("crank", parts["crank"][0]), *parts["crank"][1:]), (file.part("rod", rod), *parts["rod"][1:])]
+    file.assembly("engine", (frame, *STILL), *uses, (file.part("piston", head), np.eye(3), parts["slider"][2]))
+    draft = import_file(file.write(tmp_path / "a.step"), ground="frame")
+    pair = joint(draft, "frame", "piston")
+    assert pair.type == "prismatic"
+    np.testing.assert_allclose([pair.pin_radius, pair.hole_radius, pair.length], [0.012, 0.01202, 0.03], atol=1e-12)
+    assert codes(draft) == {"drive", "rigid", "slides"}
+    assert (trunnion.analyse(model(draft, tmp_path), 12)["status"].values <= 2).all()

@@ -91,40 +91,30 @@ def test_options_of_the_model_come_first(program: Run, tmp_path: Path) -> None:
 
 BAD = {
     "no range": (["--over", "AB"], "FROM:TO:COUNT"),
-    "two parts": (["--over", "AB=1m:2m"], "FROM:TO:COUNT"),
-    "an empty end": (["--over", "AB=1m::3"], "FROM:TO:COUNT"),
     "a broken count": (["--over", "AB=1m:2m:many"], "'many' is no whole number"),
-    "zero count": (["--over", "AB=1m:2m:0"], "range of 0 values"),
     "an empty value": (["--over", "AB=1m,,2m"], "AB"),
     "unknown name": (["--over", "AX=1m,2m"], "no number named 'AX'"),
-    "wrong unit": (["--over", "AB=1kg,2kg"], "length"),
     "one without unit": (["--over", "AB=1000:2m:3"], "1000.0 has no unit"),
-    "twice": (["--over", "AB=1m,2m", "--over", "AB=3m,4m"], "given twice"),
     "seven": ([text for i in range(7) for text in ("--over", f"n{i}=1m")], "7 names"),
     "too many": (["--over", "AB=1m:2m:100001"], "100,001 points"),
     "impossible": (["--over", "crank.mass=1kg,-1kg"], "negative"),
     "unknown measure": (["--over", "AB=1m,2m", "--measure", "efficency"], "did you mean 'efficiency'"),
     "measure of a stranger": (["--over", "AB=1m,2m", "--measure", "Z.reaction_max"], "reaction_max"),
     "unknown format": (["--over", "AB=1m,2m", "--out", "r.xyz"], ".svg"),
-    "no folder": (["--over", "AB=1m,2m", "--steps", "4", "--out", "missing/r.svg"], "missing/r.svg"),
     "no steps": (["--over", "AB=1m,2m", "--steps", "0"], "0 positions"),
-    "no over": ([], "--over"),
     "two in one file": (
         ["--over", "AB=1m", *(f"--measure={one}" for one in ("efficiency", "status")), "--out=a.svg"],
         "2 figures do not fit one file — --out a makes a folder",
     ),
     "axis of a stranger": (["--over", "AB=1m,2m", "--x", "BC"], "'BC' is not swept over"),
-    "curves along the axis": (["--over", "AB=1m,2m", "--x", "AB", "--family", "AB"], "both the axis and the curves"),
     "unknown kind": (["--over", "AB=1m,2m", "--kind", "contour"], "no figure 'contour'"),
-    "map over one": (["--over", "AB=1m,2m", "--over", "BC=6m", "--kind", "map"], "needs two names that vary"),
-    "unknown picture": (["--over", "AB=1m,2m", "--out", "folder", "--format", "bmp"], "no kind of figure"),
 }
 
 
 @pytest.mark.parametrize("case", BAD)
 def test_bad_sweeps_are_refused_with_a_message(program: Run, tmp_path: Path, case: str) -> None:
     options, word = BAD[case]
-    done = program("sweep", FOUR_BAR, *options, *(["--out", "r.csv"] if case != "no folder" else []))
+    done = program("sweep", FOUR_BAR, *options, "--out", "r.csv")
     assert done.code == 2
     assert word in done.err
     assert not files(tmp_path)

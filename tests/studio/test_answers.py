@@ -15,7 +15,6 @@ from trunnion.model.file import entries_of, text_of
 from trunnion.solve.margin import margin_in
 from trunnion.solve.run import prepare
 from trunnion.studio.answers import answer
-from trunnion.studio.message import packed
 
 FOURBAR = "durango-fourbar"
 
@@ -30,12 +29,6 @@ def drawn_four_bar():
         {"do": "link", "from": "link2.C", "to": {"ground": [0.18, 0.0]}},
         {"do": "driver", "joint": "A", "speed": "60 rpm"},
     )
-
-
-def test_columns_come_back():
-    header = {"a": np.array([1.0, np.nan, 3.0]), "b": [0.5] * 20, "c": {"d": [1, 2]}, "e": b"file", "f": float("inf")}
-    found = unpacked(packed(header))
-    assert found == {"a": [1.0, None, 3.0], "b": [0.5] * 20, "c": {"d": [1, 2]}, "e": b"file", "f": None}
 
 
 def test_the_answer_bears_the_question():
@@ -110,9 +103,6 @@ def pytest_generate_tests(metafunc):
         metafunc.parametrize("example", sorted(EXAMPLES))
 
 
-# ---- drawing -------------------------------------------------------------------------------------------------------
-
-
 def test_a_name_is_changed_wherever_it_stands():
     text = EXAMPLES[FOURBAR]
     before = analysed(text, 36)
@@ -135,9 +125,6 @@ def test_what_is_deleted_leaves_the_other_lines_as_they_are():
     gone = [line for line in before if line not in text.splitlines()]
     assert [line.split(":")[0].strip() for line in gone] == ["ground", "rocker", "C", "D", "brake", "assembly"]
     assert "  ground:  {points: {A: [0, 0]}}" in text.splitlines()
-
-
-# ---- dragging ------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow

@@ -62,9 +62,6 @@ def test_shares_of_the_friction_add_up_to_one():
     np.testing.assert_allclose(shares.sum(axis=0), 1, atol=1e-5)
 
 
-# ---- building --------------------------------------------------------------------------------------------------------
-
-
 def built(*gestures):
     text, places = "", {}
     for one in gestures:
@@ -152,8 +149,6 @@ def test_what_cannot_be_placed_is_refused_in_words(gesture, words):
     question = {"ask": "edit", "text": "", "places": {}, "gestures": [gesture], "revision": 1}
     assert words in unpacked(answer(json.dumps(question).encode()))["error"]
 
-
-# ---- the page ------------------------------------------------------------------------------------------------------
 
 WIDTHS = "[...document.querySelectorAll('.wire .load')].map((one) => one.getAttribute('stroke-width')).join()"
 

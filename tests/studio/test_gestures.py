@@ -165,9 +165,6 @@ def test_what_slides_goes_with_its_joint():
     assert "B" in entries["links"]["link1"]["points"]
 
 
-# ---- dragging and locks --------------------------------------------------------------------------------------------
-
-
 def after_a_drag(point, to):
     """Places at the start, and where they are after a drop."""
     text, places = edited("", {}, *WHITWORTH)
@@ -220,9 +217,6 @@ def test_a_text_that_is_not_sound_is_answered_with_what_is_found(old):
     for odd in ("abc", "3.5", "[[1], {a: 2}]", "{a: [b]}", "null", "1e999"):
         found = ask(ask="model", text=text.replace(old, f"{odd}]" if old.startswith("36") else odd), steps=4)
         assert found["findings"] or found["solved"], (odd, found)
-
-
-# ---- values and names ----------------------------------------------------------------------------------------------
 
 
 def test_everything_that_is_drawn_has_a_name_of_its_own():
@@ -360,6 +354,7 @@ def grouped(example, **given):
     return [analysed(one, 72)["drive_effort"].values for one in (text, after)]
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("example", ["watt-six-bar", "durango-fourbar", "geared-five-bar", "spring-balanced-lamp"])
 def test_a_mirrored_mechanism_has_the_mirrored_figures_and_a_copy_the_same(example):
     """Turned round and moving the other way, it takes the same torques the other way; gravity stays."""

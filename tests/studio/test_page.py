@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import io
 import json
-import re
 import subprocess
 import sys
 import time
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from served import served
 from studio.asking import EXAMPLES, analysed, ask
@@ -165,20 +162,6 @@ def test_what_is_wrong_is_told_where_it_stands(user):
 
 
 @pytest.mark.slow
-def test_names_are_never_markup(user):
-    evil = "<img src=x onerror=alert(1)>"
-    text = EXAMPLES["durango-fourbar"].replace("coupler", f"'{evil}'").replace("name: ", f"name: '{evil}' # ")
-    user.page.click("role=tab[name=Text]")
-    user.page.locator("textarea").fill(text)
-    user.page.wait_for_timeout(700)
-    user.idle()
-    for tab in ("Properties", "Plots", "Findings"):
-        user.page.click(f"role=tab[name={tab}]")
-    assert user.state("s.solved.value")
-    assert user.page.locator("img").count() == 0
-
-
-@pytest.mark.slow
 def test_every_example_opens(user):
     for name in sorted(EXAMPLES)[::3]:  # the answers to all of them are in test_answers.py
         user.of("actions", "m.openExample({ name: given })", name)
@@ -267,9 +250,6 @@ def test_examples_have_pictures(user):
     assert user.state("s.fileName.value") is None
 
 
-# ---- files ----------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 def test_tables_and_the_script_say_what_the_analysis_says(user, tmp_path):
     """The script writes the table that is named to it, and nothing else."""
@@ -290,18 +270,6 @@ def test_tables_and_the_script_say_what_the_analysis_says(user, tmp_path):
 
 
 @pytest.mark.slow
-def test_pictures_and_the_report_are_whole(user):
-    picture = Image.open(io.BytesIO(exported(user, "PNG")))
-    assert min(picture.size) > 300
-    assert len(picture.convert("RGB").getcolors(1 << 24)) > 50  # not blank
-    drawn = ElementTree.fromstring(exported(user, "SVG"))
-    assert len(list(drawn.iter("{http://www.w3.org/2000/svg}path"))) > 20
-    report = exported(user, "Report").decode()
-    assert "Four-bar of Durango" in report
-    assert not re.search(r'(?:src|href)="https?:', report)
-
-
-@pytest.mark.slow
 def test_nothing_is_cut_off_or_small(user):
     for size in [(1280, 720), (2560, 1440), (820, 1180), (1180, 820)]:
         user.page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
@@ -309,9 +277,6 @@ def test_nothing_is_cut_off_or_small(user):
         assert user.page.evaluate(CUT_OFF) == []
         sheet = user.page.locator(".sheet").bounding_box()
         assert min(sheet["width"], sheet["height"]) > 500
-
-
-# ---- who else -------------------------------------------------------------------------------------------------
 
 
 HOSTILE = [

@@ -173,6 +173,7 @@ def test_a_mass_centre_is_dragged_with_the_forces_of_where_it_is(user):
     assert user.state("s.past.value.length") == 3
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("by", ["mouse", "keyboard", "touch"])
 def test_a_mechanism_is_mirrored_by_its_menu(user, by):
     """The four-bar takes the mirrored torque: that of before with the other sign."""

@@ -36,6 +36,7 @@ def test_rows_of_a_loop_come_and_go_and_the_others_stay_as_written():
     assert list(driven["drivers"]) == ["output"]
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("example", "joint"), [("rssp", "B"), ("rssr", "C"), ("rssr", "A")])
 def test_a_joint_moved_in_space_goes_so_far_and_nothing_else_does(example, joint):
     """At the position that is shown; whatever its coordinates are written as."""

@@ -167,19 +167,6 @@ def test_words_that_mean_something_make_none(typed):
     assert entries["joint_defaults"]["friction"] == typed
 
 
-@pytest.mark.parametrize(
-    ("force", "says"),
-    [
-        ("-150 N * sign(G.slide_velocity)", "max(-1, min(1, v / (1 mm/s)))"),
-        ("-150 N * velocity_of_it", "G.slide_velocity"),
-    ],
-)
-def test_what_an_expression_cannot_say_is_told_with_what_can(force, says):
-    text = put(TEXT, ["loads", "load1", "force"], [force, "0 N"])
-    (error,) = [one for one in ask(ask="model", text=text)["findings"] if one["severity"] == "error"]
-    assert says in error["remedy"]
-
-
 def focused(user):
     return user.page.evaluate("document.activeElement.textContent.trim()")
 

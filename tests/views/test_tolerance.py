@@ -280,3 +280,28 @@ def test_the_interval_of_few_samples_stays_within_what_can_be():
                 for path in band.get_paths():
                     assert path.vertices[:, 1].min() >= least
                     assert path.vertices[:, 1].max() <= most
+
+
+def test_bins_of_uneven_width_are_drawn_over_even_ones():
+    result = toleranced(72, 2000)
+    edges = result["edge"].values[0]
+    uneven = np.sort(np.append(edges, 0.5 * (edges[:60] + edges[1:61])))
+    total = np.interp(uneven, edges, np.append(0, np.cumsum(result["histogram"].values[0])))
+    other = result.drop_vars(["edge", "histogram"])
+    other["edge"], other["histogram"] = (("measure", "edge"), [uneven]), (("measure", "bin"), [np.diff(total)])
+    drawn = figure(other, "histogram").axes[0].patches[0].get_data()
+    assert np.ptp(np.diff(drawn.edges)) < 1e-9
+    counted = np.interp(np.radians(drawn.edges), uneven, total)
+    assert np.cumsum(drawn.values) == pytest.approx(counted[1:] - counted[0], abs=1e-6)
+
+
+def test_samples_outside_the_picture_are_counted():
+    result = toleranced(72, 2000)
+    edges = np.append(result["edge"].values[0], np.radians([5.0, 5.1]))
+    counts = np.append(result["histogram"].values[0], [0, 1])
+    other = result.drop_vars(["edge", "histogram"])
+    other["edge"], other["histogram"] = (("measure", "edge"), [edges]), (("measure", "bin"), [counts])
+    other["most"] = (("measure",), [np.radians(5.05)])
+    (axes,) = figure(other, "histogram").axes
+    assert axes.get_xlim()[1] < 0.5
+    assert axes.texts[0].get_text() == f"1 sample outside, up to {readings(other)[0].say(np.radians(5.05))}"

@@ -15,8 +15,8 @@ from trunnion.errors import Status
 from trunnion.model.file import entries_of, text_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.studio.answers import answer
+from trunnion.studio.findings import remedied
 from trunnion.studio.message import packed
-from trunnion.studio.words import remedied
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}

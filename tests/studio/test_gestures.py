@@ -213,10 +213,10 @@ def test_a_half_drawn_linkage_is_no_error():
         text, places = edited(text, places, gesture)
         told.append(ask(ask="model", text=text)["missing"])
     assert told == [
-        ["It can move in 1 way: drive a joint, or draw on from B."],
-        ["It can move in 2 ways: draw on from B or D, pin or guide it."],
         ["It can move in 1 way: drive a joint."],
-        ["It can move in 2 ways: draw on from F, pin or guide it."],
+        ["It can move in 2 ways: draw on from a free end, pin or guide it."],
+        ["It can move in 1 way: drive a joint."],
+        ["It can move in 2 ways: draw on from a free end, pin or guide it."],
         ["It can move in 1 way: drive a joint."],
         [],
     ]

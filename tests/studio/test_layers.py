@@ -68,23 +68,6 @@ def test_a_point_that_is_not_known_has_no_motion():
     assert ask("layers", EXAMPLES[FOURBAR])["point"] is None
 
 
-def test_any_place_on_a_link_moves_as_a_point_there():
-    text, index = EXAMPLES[FOURBAR], 50
-    result = analysed(text)
-    own = {
-        name: result[f"point_{name}"].sel(point="coupler.E").values for name in ("position", "velocity", "acceleration")
-    }
-    at = [float(row[index]) for row in own["position"]]
-    found = ask("layers", text, place={"link": "coupler", "at": at, "index": index})["point"]
-    for name, rows in own.items():
-        for axis, row in zip("xy", rows, strict=True):
-            near(found[name][axis], row)
-    longer = text.replace("BC: 6.00 m", "BC: 6.20 m")  # and it stays on its link when the model changes
-    again = ask("layers", longer, place={key: found[key] for key in ("link", "start", "local")})["point"]
-    near(again["position"]["x"], analysed(longer)["point_position"].sel(point="coupler.E", axis="x"))
-    assert ask("layers", text, place={"link": "none", "at": at, "index": index})["point"] is None
-
-
 def test_in_space_there_is_the_motion_of_a_point_alone():
     found = ask("layers", EXAMPLES["rssr"], wanted=["centres", "circles", "transmission"])
     assert not {"centres", "circles", "transmission"} & set(found)
@@ -221,22 +204,26 @@ def test_a_table_of_two_variants_is_that_of_two_analyses():
     assert before != after
     found, rows = compared(before, after, steps=60)
     results = [analysed(one, steps=60) for one in (before, after)]
-    peaks = [float(np.abs(one["drive_effort"]).max()) for one in results]
-    (effort,) = [row for label, row in rows.items() if label.startswith("peak force")]
+    peaks = [{figure.name: figure.value for figure in one.trunnion.summary}["Z.effort_max"] for one in results]
+    assert peaks == pytest.approx([float(np.abs(one["drive_effort"]).max()) for one in results], rel=1e-11)
+    (effort,) = [row for label, row in rows.items() if label.startswith("drive force of Z, maximum")]
     assert [effort["a"], effort["b"]] == pytest.approx(peaks, rel=1e-12)
     assert effort["texts"][2] == f"+{100 * (peaks[1] / peaks[0] - 1):.1f} %".replace("+-", "−")
     figures = [{figure.name: figure.value for figure in one.trunnion.summary} for one in results]
-    for label, name in (("efficiency", "efficiency"), ("least locking margin", "locking_margin")):
+    for label, name in (
+        ("efficiency of the cycle", "efficiency"),
+        ("locking margin, minimum", "locking_margin"),
+    ):
         assert [rows[label]["a"], rows[label]["b"]] == pytest.approx([one[name] for one in figures], rel=1e-12)
     least = [float(one["locking_margin"].min()) for one in results]
     assert least[1] == pytest.approx(least[0] / 1.5, rel=1e-3)  # a multiple of the friction
     reaction = [
-        float(np.hypot(one["reaction_force"].sel(axis="x"), one["reaction_force"].sel(axis="y")).max())
-        for one in results
+        float(np.hypot(*(one["reaction_force"].sel(axis=axis, joint="O") for axis in "xy")).max()) for one in results
     ]
-    assert [rows["largest reaction"]["a"], rows["largest reaction"]["b"]] == pytest.approx(reaction, rel=1e-12)
+    row = rows["reaction of O, maximum"]
+    assert [row["a"], row["b"]] == pytest.approx([one["O.reaction_max"] for one in figures], rel=1e-12)
+    assert [row["a"], row["b"]] == pytest.approx(reaction, rel=1e-11)  # of the positions
     near(found["scene"]["drivers"][0]["effort"], results[0]["drive_effort"].values[0])
-    assert not found["shifted"]
 
 
 def test_a_table_has_the_stroke_and_the_time_ratio_of_a_quick_return():
@@ -247,9 +234,10 @@ def test_a_table_has_the_stroke_and_the_time_ratio_of_a_quick_return():
     assert rows["time ratio of G"]["b"] == pytest.approx(2.0, rel=1e-4)
     short = 2 * np.arccos(40 / 120)
     assert rows["time ratio of G"]["a"] == pytest.approx((2 * np.pi - short) / short, rel=1e-4)
-    assert rows["stroke of G"]["texts"] == ["200.0\u00a0mm", "200.0\u00a0mm", "0 %"]
+    assert rows["stroke of G"]["texts"][:2] == ["200.0\u00a0mm", "200.0\u00a0mm"]
+    assert rows["stroke of G"]["b"] == pytest.approx(0.2, rel=1e-9)
     figures = dict(ask("cycle", after)["figures"])
-    assert figures["time ratio of G"] == "2.000 (forth 240.0°, back 120.0° from 210.0° to 330.0°)"
+    assert figures["time ratio of G"] == "2.000"
     assert figures["stroke of G"] == "200.0\u00a0mm"
 
 
@@ -257,14 +245,12 @@ def test_a_table_has_the_stroke_and_the_time_ratio_of_a_quick_return():
 def test_a_time_ratio_the_other_way_near_a_singularity_and_through_one():
     after = EXAMPLES["whitworth-quick-return"]
     backwards = dict(ask("cycle", after.replace("speed: 40 rpm", "speed: -40 rpm"))["figures"])
-    assert backwards["time ratio of G"] == "2.000 (forth 120.0° from 330.0° to 210.0°, back 240.0°)"
+    assert backwards["time ratio of G"] == "2.000"
     sharp = dict(ask("cycle", after.replace("d: 60 mm", "d: 40 mm").replace("r: 120 mm", "r: 40.01 mm"))["figures"])
     short = 2 * np.arccos(40 / 40.01)
-    assert sharp["time ratio of G"].startswith(f"{(2 * np.pi - short) / short:.1f} (")
-    assert "from 268.7° to 271.3°" in sharp["time ratio of G"]
+    assert float(sharp["time ratio of G"]) == pytest.approx((2 * np.pi - short) / short, rel=1e-3)
     jumps = dict(ask("cycle", after.replace("d: 60 mm", "d: 120 mm"), steps=60)["figures"])
     assert "time ratio of G" not in jumps
-    assert "time ratio of G" not in compared(after, after, friction=("off", "stated"))[1]
 
 
 def test_the_same_without_friction():
@@ -272,64 +258,44 @@ def test_the_same_without_friction():
     found, rows = compared(text, text, friction=("off", "stated"))
     free = analysed(text, friction=False)
     near(found["scene"]["drivers"][0]["effort"], free["drive_effort"].values[0])
-    assert rows["mean friction power"]["a"] == 0
-    assert rows["least locking margin"]["texts"] == ["—", "> 10", "—"]
+    assert rows["friction power, mean"]["a"] in (0, None)
+    assert rows["friction power, mean"]["b"] > 0
     assert found["margin"] is None
 
 
-def test_a_variant_over_another_stroke_shows_the_nearest_of_its_own_positions():
+def test_a_variant_over_another_stroke_is_not_laid_over():
     after = EXAMPLES["drawing-press"]
-    before = after.replace("range: [0 mm, 118 mm]", "range: [20.3 mm, 100 mm]")
-    found, _ = compared(before, after, steps=60)
-    assert found["shifted"]
-    own, present = analysed(before, steps=60), analysed(after, steps=60)
-    slides = [one["joint_slide"].sel(joint="Z").values for one in (own, present)]
-    gap = np.abs(slides[0][None, :] - slides[1][:, None])
-    expected = np.where(gap.min(axis=1) <= 0.5 * 0.0797 / 59, own["drive_effort"].values[0][gap.argmin(axis=1)], np.nan)
-    assert 38 <= np.isfinite(expected).sum() <= 42
-    near(found["scene"]["drivers"][0]["effort"], expected)
-    near(
-        found["margin"],
-        np.where(np.isfinite(expected), np.minimum(own["locking_margin"].values[gap.argmin(axis=1)], 10), np.nan),
-    )
+    found, rows = compared(after.replace("range: [0 mm, 118 mm]", "range: [20.3 mm, 100 mm]"), after, steps=60)
+    assert found["scene"] is None
+    assert "cannot be laid over" in found["why"]
+    assert rows["stroke of Z"]["texts"] == ["79.70\u00a0mm", "118.0\u00a0mm", "+48.1 %"]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stroke", ["[0 mm, 118 mm]", "[20.3 mm, 100 mm]"])
-def test_the_motion_of_a_point_is_laid_over(stroke):
+def test_the_motion_of_a_point_is_laid_over():
     after = EXAMPLES["drawing-press"]
-    before = after.replace("range: [0 mm, 118 mm]", f"range: {stroke}").replace("L: 200 mm", "L: 205 mm")
-    asked = {"text": after, "others": [{"text": before}], "steps": 60}
-    (found,) = ask("compare", point="lower.P", **asked)["others"]
-    own, present = (without_noise(analysed(text, steps=60)) for text in (before, after))
-    slides = [one["joint_slide"].sel(joint="Z").values for one in (own, present)]
-    gap = np.abs(slides[0][None, :] - slides[1][:, None])
-    spacing = np.diff(slides[0]).max()
+    before = after.replace("L: 200 mm", "L: 205 mm")
+    (found,) = ask("compare", text=after, others=[{"text": before}], steps=60, point="lower.P")["others"]
+    own = without_noise(analysed(before, steps=60))
     for name in ("velocity", "acceleration"):
         for axis in "xy":
-            row = own[f"point_{name}"].sel(point="lower.P", axis=axis).values
-            near(
-                found["point"][name][axis], np.where(gap.min(axis=1) <= 0.5 * spacing, row[gap.argmin(axis=1)], np.nan)
-            )
-    placed = ask("layers", text=after, steps=60, place={"link": "lower", "at": [0, 0], "index": 0})["point"]
-    place = {key: placed[key] for key in ("link", "start", "local")}
-    (found,) = ask("compare", place=place, **asked)["others"]
-    assert found["point"]["key"] == placed["key"]
+            near(found["point"][name][axis], own[f"point_{name}"].sel(point="lower.P", axis=axis).values)
 
 
 def test_another_drive_is_not_laid_over():
     found, rows = compared(EXAMPLES["drawing-press"], EXAMPLES[FOURBAR])
     assert found["scene"] is None
     assert "cannot be laid over" in found["why"]
-    assert rows["peak torque, drive A"]["texts"][0] == "—"
+    assert rows["drive torque of A, maximum"]["texts"][0] == "—"
 
 
 @pytest.mark.slow
 def test_a_variant_without_an_answer_says_why():
     broken = EXAMPLES[FOURBAR].replace("BC: 6.00 m", "BC: 1.00 m")
     found, rows = compared(broken, EXAMPLES[FOURBAR])
-    assert rows["positions solved"]["a"] < 360
-    assert all(one is None for one in found["scene"]["drivers"][0]["effort"]) == (rows["positions solved"]["a"] == 0)
+    assert rows["positions solved, of 360"]["a"] < 360
+    efforts = found["scene"]["drivers"][0]["effort"]
+    assert all(one is None for one in efforts) == (rows["positions solved, of 360"]["a"] == 0)
     found, rows = compared("links: 3", EXAMPLES[FOURBAR])
     assert found["scene"] is None
     assert "cannot be solved" in found["why"]

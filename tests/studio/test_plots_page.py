@@ -142,7 +142,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.page.wait_for_selector(".changes td")
         results = [analysed(text) for text in (before, after)]
         peaks = [float(np.abs(one["drive_effort"]).max()) / 1000 for one in results]
-        cells = user.page.locator(".changes tr", has_text="peak torque").locator("td").all_inner_texts()
+        cells = user.page.locator(".changes tr", has_text="drive torque of A, maximum").locator("td").all_inner_texts()
         assert [number(one) for one in cells[:2]] == pytest.approx(peaks, rel=1e-3)
         assert number(cells[2]) == pytest.approx(100 * (peaks[1] / peaks[0] - 1), abs=0.06)
         legend = user.page.locator(".chart").first.locator(".legend .label").all_inner_texts()

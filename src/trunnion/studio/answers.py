@@ -23,8 +23,7 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.file import text_of
 from trunnion.model.rewrite import changed_text
-from trunnion.results.attributes import findings_of, summary_of, units_of
-from trunnion.results.quantities import quantity
+from trunnion.results.attributes import findings_of, units_of
 from trunnion.results.scales import without_noise
 from trunnion.results.tables import selected
 from trunnion.solve.backward import Backward
@@ -33,18 +32,17 @@ from trunnion.studio.assemblies import other_assemblies
 from trunnion.studio.blocks import blocks_of
 from trunnion.studio.ends import held, vector
 from trunnion.studio.exports import exported
+from trunnion.studio.figures import compared, figures, worded
+from trunnion.studio.findings import missing, reached, readiness, remedied, sentence, spoken
 from trunnion.studio.gestures import done
 from trunnion.studio.live import live_columns, live_margin, places_at, solved_with
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
 from trunnion.studio.margin import cures, locks_of, margin_of, margins_without
 from trunnion.studio.message import packed
-from trunnion.studio.overlays import centres, circles, place_motion, point_motion, seats, transmission
+from trunnion.studio.overlays import centres, circles, point_motion, seats, transmission
 from trunnion.studio.placed import plain, tracks
-from trunnion.studio.readiness import missing, readiness
 from trunnion.studio.sketch import Sketch, Vector
-from trunnion.studio.tolerances import measured, tolerated, worst_corner
-from trunnion.studio.variants import overlaid
-from trunnion.studio.words import remedied, spoken
+from trunnion.studio.tolerances import measured, worst_corner
 from trunnion.version import __version__
 from trunnion.views.cycle.scene import scene
 from trunnion.views.space.bodies import gathered
@@ -76,15 +74,10 @@ def answer(request: bytes, turn: AbstractContextManager[object] | None = None) -
         with nullcontext() if turn is None or about in BESIDE else turn:
             return packed(head | about(asked))
     except MechanismError as error:
-        return packed(head | {"error": "; ".join(_sentence(one) for one in error.findings[:3])})
+        return packed(head | {"error": "; ".join(sentence(one) for one in error.findings[:3])})
     except Exception as error:  # whatever it is: whoever asked gets a sentence, and can go on asking
         why = f"{type(error).__name__}: {str(error)[:300]}"
         return packed(head | {"error": f"The question cannot be answered ({why})"})
-
-
-def _sentence(finding: Finding) -> str:
-    remedy = f"— {remedied(finding.remedy)}" if finding.remedy else ""
-    return " ".join(part for part in (spoken(finding.where), finding.what, remedy) if part)
 
 
 # ---- what there is to begin with --------------------------------------------------------------------------------
@@ -163,14 +156,9 @@ def _cycle(asked: Asked) -> dict[str, Any]:
     if result is None:
         return told
     units = units_of(result)
-    figures = {
-        one.label: one.value if isinstance(one.value, str) else quantity(one.value, one.unit, units) or "—"
-        for one in summary_of(result)
-        if not one.numerical
-    }
-    figures |= dict(row for way in asked.state.ways(asked.steps) for row in way.rows)
+    rows = [[one.label, worded(one, units)] for one in figures(asked)]
     least = margin_of(result, asked.rubs)["margin_least"]
-    return told | {"figures": [[label, value] for label, value in figures.items()], "margin_least": least}
+    return told | {"figures": rows, "margin_least": least}
 
 
 def _solved(asked: Asked, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset | None, dict[str, Any]]:
@@ -188,33 +176,19 @@ def _solved(asked: Asked, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset |
     return result, {"findings": [_row(state, one, result) for one in findings], "missing": lacks, "ready": ready}
 
 
-# what positions have that findings speak of
-REACHED = {
-    "friction.interval": Status.ZERO_SLIP, "position.near_singular": Status.NEAR_SINGULAR,
-    "contact.lost": Status.CONTACT_LOST, "friction.not_converged": Status.NOT_CONVERGED,
-    "friction.locked": Status.LOCKED, "load.undefined": Status.LOAD_UNDEFINED,
-    "spring.undefined": Status.LOAD_UNDEFINED, "position.singular": Status.SINGULAR,
-    "assembly.open": Status.NOT_ASSEMBLED,
-}  # fmt: skip
-
-
 def _row(state: Loaded, one: Finding, result: xr.Dataset | None) -> dict[str, Any]:
     """A finding as the page has it: with the part that it is about, its line, and a position at which it holds."""
     section, _, names = one.where.replace(" ", ".", 1).partition(".")  # "links coupler, rocker"
     joint = one.figures.get("decides") or next(iter(one.figures.get("joints") or ()), None)
     part = f"joints.{joint}" if joint else f"{section}.{names.split(', ')[0]}" if names else one.where
-    index = None
-    if result is not None and len(there := np.flatnonzero(result["status"].values == REACHED.get(one.code, -1))):
-        margins = np.nan_to_num(result["locking_margin"].values[there], nan=np.inf)
-        index = int(there[np.argmin(margins) if one.code == "friction.locked" else 0])
     return {
         "severity": one.severity.value,
         "place": one.kind_of_part or spoken(one.where),
         "remedy": remedied(one.remedy),
         "part": part,
         "line": (one if one.where.startswith(part) else state.placed((replace(one, where=part, line=None),))[0]).line,
-        "index": index,
-        "cures": cures(state, one) if result is not None else [],
+        "index": None if result is None else reached(one, result),
+        "cures": [] if result is None else cures(state, one),
     } | {key: getattr(one, key) for key in ("code", "what", "where")}
 
 
@@ -361,17 +335,19 @@ def _curves(asked: Asked) -> dict[str, Any]:
 
 
 def _moving(asked: Asked, result: xr.Dataset) -> dict[str, Any] | None:
-    """Motion of the point, or in the plane of the place on a link, that is asked for; None where there is none."""
-    if asked.get("place") and result.sizes["axis"] == 2:
-        return place_motion(result, asked["place"])
+    """Motion of the point that is asked for; None where there is none."""
     point = str(asked.get("point"))
     return point_motion(result, point) if point in result["point"].values else None
 
 
 def _compare(asked: Asked) -> dict[str, Any]:
-    """Other variants, `{text, friction}` each, laid over the present result, and the table of figures against it."""
-    others = [Asked({**other, "steps": asked.steps}) for other in asked["others"]]
-    return {"others": [overlaid(other, asked, partial(_moving, asked)) for other in others]}
+    """Other variants, `{text, friction}` each, laid over the present result, and the table of figures of both."""
+    others = []
+    for other in asked["others"]:
+        variant = Asked({**other, "steps": asked.steps})
+        told = compared(variant, asked)
+        others.append(told | {"point": _moving(asked, variant.result) if told["scene"] else None})
+    return {"others": others}
 
 
 def _export(asked: Asked) -> dict[str, Any]:
@@ -379,11 +355,6 @@ def _export(asked: Asked) -> dict[str, Any]:
     if asked.state.bare:  # its file would be one without friction
         raise MechanismError(asked.state.findings)
     return exported(asked.state, str(asked["what"]), asked.steps, asked.index)
-
-
-def _tolerances(asked: Asked) -> dict[str, Any]:
-    """What the tolerances of a model do to its largest effort and strokes."""
-    return tolerated(asked.run.system.mechanism, asked.steps)
 
 
 def _corner(asked: Asked) -> dict[str, Any]:
@@ -406,7 +377,6 @@ ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "margins": _margins,
     "curves": _curves,
     "compare": _compare,
-    "tolerances": _tolerances,
     "corner": _corner,
 }
 BESIDE = (_cycle, _margins, _corner)

@@ -10,9 +10,9 @@ from typing import Any
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.expression import MOTION, RESERVED
 from trunnion.studio.ends import NUMBER, free, held, letter, numbered, refused, vector
+from trunnion.studio.findings import spoken
 from trunnion.studio.renaming import names_dimensions
 from trunnion.studio.sketch import Sketch
-from trunnion.studio.words import spoken
 
 __all__ = ["add_row", "delete", "lock", "move", "put_value"]
 

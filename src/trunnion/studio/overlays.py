@@ -4,7 +4,7 @@ transmission angles, pins in their holes; each for every position of the cycle, 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,68 +23,22 @@ from trunnion.views.cycle.deviations import seated
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["centres", "circles", "place_motion", "point_motion", "seats", "transmission"]
+__all__ = ["centres", "circles", "point_motion", "seats", "transmission"]
 
 Array = NDArray[np.float64]
 
 MOST_LINKS = 12  # whose centres against each other are told; of more only those against the ground
-MOTION = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
-RATES_OF_PLACE = ("velocity", "acceleration")
-RATES = ("", "_velocity", "_acceleration")
 FAR = 1e4  # sizes of the mechanism: what is farther away lies at infinity
 AT_REST = 1e-9  # of the speeds typical of the mechanism: slower than this two links move as one
 
 
 def point_motion(result: xr.Dataset, point: str) -> dict[str, Any]:
-    """Velocity, m/s, and acceleration, m/s², of a point "link.point" by axis; KeyError for one that is not known."""
-    axes = [str(axis) for axis in result["axis"].values]
-    rows = [_rows(result[f"point_{name}"].sel(point=point)) for name in RATES_OF_PLACE]
-    return {"key": point, **_named(result, dict(zip(RATES_OF_PLACE, rows, strict=True)), axes)}
-
-
-def place_motion(result: xr.Dataset, place: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The same of any place on a link in the plane, with its path x, y, m, as that of a rigid body.
-
-    place: `link` and where it is `at` (x, y), m, in position `index`; or `start`, a point of the link, and `local`,
-    from there in the link's axes, m, which the answer tells: they hold when the model has changed. None where there is
-    no such link, or it stands nowhere at that position. With d from the known point, turned with the link:
-    v = v₀ + ω × d, a = a₀ + α × d − ω² d.
-    """
-    link = str(place["link"])
-    start = str(place.get("start") or next((str(key) for key in result["point"].values if _link(key) == link), ""))
-    if start not in result["point"].values or _link(start) != link:
-        return None
-    known = [_rows(result[f"point_{name}"].sel(point=start)) for name in MOTION]
-    angle, turn, second = (result[f"link_angle{name}"].sel(link=link).values for name in RATES)
-    cosine, sine = np.cos(angle), np.sin(angle)
-    if "local" in place:
-        u, v = (float(part) for part in place["local"])
-    else:
-        index = int(place["index"]) % len(angle)
-        dx, dy = (float(part) - float(own[index]) for part, own in zip(place["at"], known[0], strict=True))
-        u, v = (float(one[index]) for one in (cosine * dx + sine * dy, cosine * dy - sine * dx))
-    if not np.isfinite(u + v):
-        return None
-    d = np.array([cosine * u - sine * v, sine * u + cosine * v])
-    across = np.array([-d[1], d[0]])
-    rows = known[0] + d, known[1] + turn * across, known[2] + second * across - turn**2 * d
-    parts = _named(result, dict(zip(MOTION, rows, strict=True)), "xy")
-    return {"key": f"a place on {link}", "link": link, "start": start, "local": [u, v], **parts}
-
-
-def _named(result: xr.Dataset, rows: Mapping[str, Array], axes: Sequence[str]) -> dict[str, dict[str, Array]]:
-    """Rows of motion by axis, 0 where they are rounding."""
-    zeroed = scales_in(result).zeroed
-    return {name: dict(zip(axes, zeroed(row, MOTION[name]), strict=True)) for name, row in rows.items()}
-
-
-def _rows(vector: xr.DataArray) -> Array:
-    """(axis, position)."""
-    return np.asarray(vector.transpose("axis", "position"), float)
-
-
-def _link(key: Any) -> str:
-    return str(key).rpartition(".")[0]
+    """Velocity, m/s, and acceleration, m/s², of a point "link.point" by axis, 0 where they are rounding."""
+    zeroed, told = scales_in(result).zeroed, dict[str, Any](key=point)
+    for name, unit in (("velocity", "m/s"), ("acceleration", "m/s^2")):
+        rows = result[f"point_{name}"].sel(point=point).transpose("axis", "position").values
+        told[name] = dict(zip(map(str, result["axis"].values), zeroed(rows, unit), strict=True))
+    return told
 
 
 @np.errstate(all="ignore")

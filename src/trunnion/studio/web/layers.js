@@ -29,20 +29,13 @@ export const LAYERS = [
 /** A scene for charts, which cut peaks near dead centres unless they are wanted whole. */
 export const framed = (scene) => (state.layers.value.peaks ? { ...scene, ease: [] } : { ...scene, whole: "choose Show, Whole peaks in plots." });
 
-/** {link, at, index}: the place on a link that was clicked and the position it was clicked at, or null. */
-export const clicked = signal(null);
-
-/** {point: "link.point"} of the chosen point or joint, {place} of the place that was clicked on the chosen link, or {}. */
+/** {point: "link.point"} of the chosen point or joint, or {}. */
 const watched = computed(() => {
   const { kind, name } = state.selection.value ?? {};
   if (kind === "points") return { point: name };
-  if (kind === "links") return clicked.value?.link === name ? { place: clicked.value } : {};
   const joint = kind === "joints" && state.answer.value?.scene?.joints.find((one) => one.name === name);
   return joint ? { point: joint.at } : {};
 });
-
-/** A place on a link as it was clicked, and what is the same when the model has changed: {link, start, local}. */
-const held = { clicked: null, same: null };
 
 /** {scene, point, centres, circles, transmission, seats} of the scene that is shown, as far as it is wanted; or null. */
 export const laid = signal(null);
@@ -55,40 +48,12 @@ export function keepLayers() {
     return Object.entries({ centres: centres || relative, circles, transmission, seats: seated }).filter(([, shown]) => shown).map(([name]) => name).join(" ");
   }); // prettier-ignore
   effect(() => {
-    const [names, { point, place }] = [wanted.value, watched.value];
+    const [names, { point }] = [wanted.value, watched.value];
     const scene = state.solved.value ? state.answer.value.scene : null;
     untracked(() => {
       if (laid.value?.scene !== scene) laid.value = null;
-      if (!scene || (!names && !point && !place)) laid.value = null;
-      else
-        askOf("layers", { point, place: held.clicked === place ? held.same : place, wanted: names.split(" ") }).then((found) => {
-          if (!found) return;
-          if (place && found.point) Object.assign(held, { clicked: place, same: { link: place.link, start: found.point.start, local: found.point.local } });
-          laid.value = { ...found, scene };
-        });
+      if (!scene || (!names && !point)) laid.value = null;
+      else askOf("layers", { point, wanted: names.split(" ") }).then((found) => found && (laid.value = { ...found, scene }));
     });
   });
-}
-
-const STILL = 3; // px that a click may move
-
-/** A click on a link with nothing in hand: the place there is watched. Returns what ends it. */
-export function listenToPlaces(root, view) {
-  let from = null;
-  const down = (event) => {
-    const part = event.target.closest?.("[data-kind]");
-    const link = event.button === 0 && state.tool.value === "select" && ["links", "centres"].includes(part?.dataset.kind) ? part.dataset.name : null;
-    from = link && { link, x: event.clientX, y: event.clientY };
-  };
-  const up = (event) => {
-    if (!from || Math.hypot(event.clientX - from.x, event.clientY - from.y) > STILL || !state.solved.value || view.ideal) return;
-    const box = root.getBoundingClientRect();
-    clicked.value = { link: from.link, at: view.frame.from([event.clientX - box.left, event.clientY - box.top]), index: view.posed };
-  };
-  root.addEventListener("pointerdown", down);
-  root.addEventListener("pointerup", up);
-  return () => {
-    root.removeEventListener("pointerdown", down);
-    root.removeEventListener("pointerup", up);
-  };
 }

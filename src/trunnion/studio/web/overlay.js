@@ -6,8 +6,8 @@ import { told as rounded } from "../web/built.js";
 import { angleAt, at, forceAt, magnitude, peak, place } from "../web/data.js";
 import { set, svg } from "../web/dom.js";
 import { quantity, roundBelow, short, stated } from "../web/format.js";
-import { outline, standing, trackPath } from "../web/plane.js";
-import { KEY, metres, perNewton } from "./drawing.js";
+import { outline, standing } from "../web/plane.js";
+import { KEY, perNewton } from "./drawing.js";
 import { roundAbove } from "./geometry.js";
 import { laid } from "./layers.js";
 import { massMarks } from "./masses.js";
@@ -46,7 +46,7 @@ export function poseOverlay(view) {
   const wanted = state.layers.peek();
   const found = known && laid.peek()?.scene === (scene.of ?? scene) ? laid.peek() : {};
   const corner = Boolean(view.ideal && cornered.peek()); // of which nothing but its places is told
-  const point = corner || found.point?.position ? null : found.point;
+  const point = corner ? null : found.point;
   const told = view.ideal ? { point, seats: corner ? null : found.seats } : found; // the rest is where it is
   const key = []; // lines of the key, from below
   room = view.frame.width - 6;
@@ -97,12 +97,10 @@ function keyed({ frame }, wide, text, drawn) {
 
 function motion(view, point, wanted, key) {
   const { frame, exact: index, scene } = view;
-  const scenery = point.position ? { ...scene, points: { [point.key]: point.position } } : scene;
-  const found = place(scenery, point.key, index);
+  const found = place(scene, point.key, index);
   if (!found) return [];
   const [x, y] = frame.to(found);
-  const path = point.position ? [curve(view, scenery, point), svg("circle", { class: "clicked-place", cx: x, cy: y, r: 4 })] : [];
-  return path.concat(VECTORS.filter(([name]) => wanted[name]).flatMap(([name, sign, unit]) => {
+  return VECTORS.filter(([name]) => wanted[name]).flatMap(([name, sign, unit]) => {
     const parts = point[name];
     const sizes = magnitude(parts, scene.count);
     const scale = (0.2 * Math.min(frame.width, frame.height)) / peak(sizes);
@@ -113,14 +111,7 @@ function motion(view, point, wanted, key) {
     if (dx === null || dy === null) return [];
     const vector = svg("path", { class: `motion ${name}`, d: arrow(x, y, dx * scale, -dy * scale) });
     return [vector, beyond([x, y], [dx * scale, -dy * scale], `${sign} = ${quantity(at(sizes, index), unit, peak(sizes))}`)];
-  }));
-}
-
-/** The path of a place that was clicked; it is drawn in metres once. */
-function curve({ frame }, scenery, point) {
-  point.path ??= trackPath(scenery, point.key, metres);
-  const transform = `matrix(${frame.scale},0,0,${-frame.scale},${frame.left},${frame.foot})`;
-  return svg("path", { class: "track free", d: point.path, transform, "vector-effect": "non-scaling-stroke" });
+  });
 }
 
 // ---- instant centres ------------------------------------------------------------------------------------------------

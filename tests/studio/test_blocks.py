@@ -11,7 +11,7 @@ import pytest
 
 import trunnion
 from browsing import CHROMIUM
-from studio.asking import unpacked
+from studio.asking import edited, unpacked
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.scales import without_noise
@@ -126,6 +126,28 @@ def test_dyads_with_a_slider_move():
     assert trunnion.check(lever).formula.endswith("RPR")
     geared = built(crank, block("driver", {"ground": "60 mm, 0 mm"}), block("gear", "A", "C", ratio="20:40"))
     assert geared.gears["gear1"].joints == ("A", "C")
+
+
+@pytest.mark.parametrize("angle", ["35 deg", ""])
+@pytest.mark.parametrize("first", [True, False])
+def test_a_driver_and_a_ccc_are_a_cardan_joint(angle, first):
+    """Pins of a cross at right angles, θ and φ from the common normal: sin θ sin φ + cos θ cos φ cos δ = 0,
+    so that ω₂/ω₁ = cos δ / (1 − sin² δ cos² θ).
+    """
+    blocks = [block("CCC", at=angle)]
+    text, _ = edited("", {}, *([block("driver", {"ground": "0 mm, 0 mm"})] if first else []), *blocks)
+    result = trunnion.analyse(Mechanism(**entries_of(text)[0]), 72)
+    assert "CCC" in result.attrs["formula"]
+    theta, phi = (result["joint_rotation"].sel(joint=joint).values for joint in "AD")
+    rates = [result["joint_rotation_velocity"].sel(joint=joint).values for joint in "AD"]
+    delta = np.radians(35 if angle else 30)
+    near = {"rtol": 0, "atol": 1e-12}
+    np.testing.assert_allclose(np.sin(theta) * np.sin(phi) + np.cos(theta) * np.cos(phi) * np.cos(delta), 0, **near)
+    ratio = np.cos(delta) / (1 - np.sin(delta) ** 2 * np.cos(theta) ** 2)
+    np.testing.assert_allclose(rates[1] / rates[0], ratio, **near)
+    assert ask("model", text)["findings"] == []
+    again = unpacked(answer(json.dumps({"ask": "edit", "text": text, "places": {}, "gestures": blocks}).encode()))
+    assert "closes a loop in space" in again["error"]
 
 
 def test_groups_with_two_slides_and_of_class_three_move_as_their_closed_forms():

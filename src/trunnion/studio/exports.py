@@ -1,4 +1,4 @@
-"""Files of a solved cycle for the page: table, report, pictures, a script that does the same."""
+"""Files of a solved cycle for the page: table, report, pictures, an animation."""
 
 from __future__ import annotations
 
@@ -73,34 +73,10 @@ def _animation(state: Loaded, steps: int, _: int) -> bytes:
     return stream.getvalue()
 
 
-def _script(state: Loaded, steps: int, _: int) -> bytes:
-    """The model and what was asked of it, as Python; it writes no file that is not named to it."""
-    return f'''"""The session of the studio as a script: the model and its cycle; with a file's name also its table."""
-
-import sys
-from pathlib import Path
-from tempfile import TemporaryDirectory
-
-import trunnion
-
-MODEL = {state.text!r}
-
-with TemporaryDirectory() as folder:
-    path = Path(folder, "model.yaml")
-    path.write_text(MODEL, encoding="utf-8")
-    mechanism = trunnion.read(path)
-result = trunnion.analyse(mechanism, steps={steps})
-print(result.trunnion)
-if len(sys.argv) > 1:  # as in: python session.py table.csv
-    trunnion.save(result, sys.argv[1], units="model")
-'''.encode()
-
-
 EXPORTS: dict[str, tuple[str, str, Callable[[Loaded, int, int], bytes]]] = {
     "csv": ("csv", "text/csv", _csv),
     "report": ("html", "text/html", _report),
     "png": ("png", "image/png", partial(_picture, kind="png")),
     "svg": ("svg", "image/svg+xml", partial(_picture, kind="svg")),
     "gif": ("gif", "image/gif", _animation),
-    "script": ("py", "text/x-python", _script),
 }

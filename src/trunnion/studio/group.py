@@ -119,7 +119,7 @@ class _Moving:
         """A number or text of the file, SI."""
         dimensions = {path.partition(".")[2]: value for path, value in self.sketch.numbers.items()
                       if path.startswith("dimensions.")}  # fmt: skip
-        return float(Quantity.read(stated, KINDS[kind]).evaluate(dimensions))  # type: ignore[arg-type]  # no dual
+        return float(Quantity.read(stated, KINDS[kind]).evaluate(dimensions))
 
     def _placed(self, stated: Any) -> Any:
         """A place, perhaps with an axis, on the ground."""

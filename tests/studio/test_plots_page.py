@@ -111,7 +111,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
             "Instant centres against the ground",
             "Instant centres between links",
         )
-        kinds = {"circle.friction-circle": 5, "path.transmission": 2, "path.centre": 6}  # one circle is of the key
+        kinds = {"circle.friction-circle": 5, "path.centre": 6}  # one circle is of the key
         for kind in kinds:
             assert user.page.locator(kind).count() == 0
         show(user, *names, "Values of the reactions")

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from math import isfinite
 from typing import Any
 
-from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.model.expression import MOTION, RESERVED
 from trunnion.studio.ends import NUMBER, free, held, letter, numbered, refused, vector
 from trunnion.studio.findings import spoken
-from trunnion.studio.renaming import names_dimensions
 from trunnion.studio.sketch import Sketch
 
 __all__ = ["add_row", "delete", "lock", "move", "put_value"]
@@ -20,7 +17,6 @@ Given = Mapping[str, Any]
 SECTIONS = {
     "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair"
 }  # fmt: skip
-WORDS = ("off", "none", "yes", "no", "true", "false")  # that are no new name of a dimension
 DEFINED = re.compile(r"\s*([^\W\d]\w*)\s*=(.+)")  # crank = 30 mm
 
 
@@ -78,14 +74,10 @@ def put_value(sketch: Sketch, given: Given) -> str:
     stated = spoken(path)
     if value is not None:
         if path not in ("name", "notes") and way != ["dimensions"]:
-            before = group.get(last) if isinstance(group, dict) else group[last]
-            value = _named(sketch, value, before)
+            value = _named(sketch, value)
         group[last] = _typed(value)
         told = ("no", "yes")[value] if isinstance(value, bool) else value
         return f"Set {stated} to {', '.join(map(str, value)) if isinstance(value, list) else told}"
-    if way == ["dimensions"] and (users := list(_users(sketch.entries, str(last)))):
-        what = f"is in use: by {', '.join(users[:3])}{' and others' if users[3:] else ''}"
-        raise refused(what, path, "type another value, or change what uses it first")
     if way[:1] == ["gears"] and last in ("ratio", "radius", "lead"):
         raise refused("is what makes a gear pair", path, "type another, or delete the gear pair")
     if isinstance(group, dict):
@@ -105,35 +97,15 @@ def _refuse_missing(sketch: Sketch, path: list[Any]) -> None:
         raise refused("is not there", ".".join(map(str, path)), "choose what is drawn")
 
 
-def _users(group: Any, name: str, way: tuple[str, ...] = ()) -> Iterator[str]:
-    """What speaks of a dimension, in words."""
-    if isinstance(group, dict):
-        for key, one in group.items():
-            yield from _users(one, name, (*way, str(key)))
-    elif isinstance(group, list):
-        for one in group:
-            yield from dict.fromkeys(_users(one, name, way))
-    elif isinstance(group, str) and names_dimensions(way):
-        stated = way != ("dimensions", name) and re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", group)
-        yield from [spoken(".".join(way))] if stated else []
-
-
-def _named(sketch: Sketch, value: Any, before: Any) -> Any:
-    """The name of a dimension that "crank = 30 mm" makes, or a new name alone, with the value that was there."""
+def _named(sketch: Sketch, value: Any) -> Any:
+    """The name of a dimension that "crank = 30 mm" makes."""
     if isinstance(value, list):
-        there = before if isinstance(before, list) else value
-        return [_named(sketch, *pair) for pair in zip(value, there, strict=False)]
+        return [_named(sketch, part) for part in value]
     found = DEFINED.fullmatch(value) if isinstance(value, str) else None
-    if found:
-        sketch.section("dimensions")[found[1]] = _typed(found[2].strip())
-        return found[1]
-    number = isinstance(before, (int, float)) or (isinstance(before, str) and re.match(NUMBER, before.strip()))
-    if not number or not isinstance(value, str) or not value.isidentifier():
+    if not found:
         return value
-    if value in {*sketch.section("dimensions"), *sketch.of("tables"), *RESERVED, *MOTION, *FRICTION_LAWS, *WORDS}:
-        return value
-    sketch.section("dimensions")[value] = before
-    return value
+    sketch.section("dimensions")[found[1]] = _typed(found[2].strip())
+    return found[1]
 
 
 def _typed(value: Any) -> Any:

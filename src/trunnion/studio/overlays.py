@@ -11,11 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra import plane
-from trunnion.algebra.literal import is_zero
-from trunnion.groups.dyad import DyadPose
 from trunnion.results.scales import scales_in
 from trunnion.solve.forward import Forward
-from trunnion.studies.design import instant_centre
+from trunnion.studies.design import instant_centre, transmission_angles
 from trunnion.studio.message import Exact
 from trunnion.studio.placed import column
 from trunnion.views.cycle.deviations import seated
@@ -119,37 +117,10 @@ def seats(result: xr.Dataset) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
+@np.errstate(all="ignore")
 def transmission(walk: Forward, steps: int) -> list[dict[str, Any]]:
-    """Transmission angle of each dyad as it is drawn: at x, y, m, from the direction `first`, rad, on by `angle`, rad.
-
-    The angle's size is that of `studies.design.transmission_angles`, 0 … π/2; the directions are those of the two
-    lines that it lies between. Source: R. L. Norton, Design of Machinery, "Transmission angle".
-    """
-    rows = []
-    with np.errstate(all="ignore"):
-        for module, pose in zip(walk.system.plan.modules, walk.poses, strict=True):
-            found = _lines(walk, module.joints, pose)
-            if found is None:
-                continue
-            (x, y), one, two = found
-            first, second = (column(np.arctan2(line[1], line[0]), steps) for line in (one, two))
-            angle = np.mod(second - first + np.pi / 2, np.pi) - np.pi / 2  # lines have no sense: the acute one
-            rows.append({"name": "-".join(module.joints), "x": column(x, steps), "y": column(y, steps),
-                         "first": first, "angle": angle})  # fmt: skip
-    return rows
-
-
-def _lines(walk: Forward, joints: Collection[str], pose: Any) -> tuple[Any, Any, Any] | None:
-    """Where a dyad's transmission angle is drawn, and directions of the force's line and the normal of the path."""
-    if not isinstance(pose, DyadPose):
-        return None
-    b, c, d = (walk.ends(joint)[0] for joint in joints)
-    slides = [joint for joint, screw in zip((b, c, d), pose.screws, strict=True) if is_zero(screw.w)]
-    if not slides:
-        return (c.x, c.y), (b.x - c.x, b.y - c.y), (d.x - c.x, d.y - c.y)
-    if len(slides) == 2:
-        return (c.x, c.y), (slides[0].c, slides[0].s), (slides[1].c, slides[1].s)
-    normal = (-slides[0].s, slides[0].c)
-    if slides[0] is d:
-        return (c.x, c.y), (b.x - c.x, b.y - c.y), normal
-    return (b.x, b.y), (d.x - b.x, d.y - b.y), normal
+    """Transmission angle of each dyad, rad, 0 … π/2, and its middle joint."""
+    middle = {"-".join(module.joints): module.joints[1:2] for module in walk.system.plan.modules}
+    angles = transmission_angles(walk)
+    return [{"name": name, "joint": joint, "angle": column(angle, steps)}
+            for name, angle in angles.items() for joint in middle[name]]  # fmt: skip

@@ -9,7 +9,7 @@ from typing import Any
 from trunnion.studio.ends import free, refused, taken
 from trunnion.studio.sketch import Sketch
 
-__all__ = ["names_dimensions", "rename", "rename_point", "renamed"]
+__all__ = ["rename", "rename_point", "renamed"]
 
 Given = Mapping[str, Any]
 NAMED = ("links", "joints", "dimensions", "loads", "springs", "gears")
@@ -105,10 +105,10 @@ def _respoken(text: str, section: str, old: str, new: str, way: tuple[str, ...])
             return re.sub(rf"(?<=\.){re.escape(old)}$", new, text)
         spoken = last in ("frame", "joint", "joints") or (last == "at" and way[0] != "links")  # there it is a place
         return new if text == old and spoken else text
-    return re.sub(rf"(?<![\w.]){re.escape(old)}(?![\w.])", new, text) if names_dimensions(way) else text
+    return re.sub(rf"(?<![\w.]){re.escape(old)}(?![\w.])", new, text) if _names_dimensions(way) else text
 
 
-def names_dimensions(way: tuple[str, ...]) -> bool:
+def _names_dimensions(way: tuple[str, ...]) -> bool:
     """Whether a text of the file may name dimensions: it is neither for readers nor the name of a part."""
     names_part = way[-1] in ("links", "link", "joint", "joints", "frame", "between", "type")
     return way[0] not in ("name", "notes", "references") and not names_part and (way[-1] != "at" or way[0] == "links")

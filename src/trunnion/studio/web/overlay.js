@@ -3,7 +3,7 @@
 
 import { arrow } from "../web/arrow.js";
 import { told as rounded } from "../web/built.js";
-import { angleAt, at, forceAt, magnitude, peak, place } from "../web/data.js";
+import { at, forceAt, magnitude, peak, place } from "../web/data.js";
 import { set, svg } from "../web/dom.js";
 import { quantity, roundBelow, short, stated } from "../web/format.js";
 import { outline, standing } from "../web/plane.js";
@@ -59,7 +59,7 @@ export function poseOverlay(view) {
   layers.overlay.replaceChildren(
     ...dimensionMarks(view, words, (x, y, text) => taken.push({ left: x - 0.5 * LETTER * text.length, right: x + 0.5 * LETTER * text.length, y: y + 4 })),
     ...(told.circles ? circles(view, told.circles, key) : []),
-    ...(told.transmission ? told.transmission.flatMap((one) => angle(view, one)) : []),
+    ...(told.transmission ? told.transmission.flatMap((one) => transmission(view, one)) : []),
     ...(told.centres ? centres(view, told.centres, wanted) : []),
     ...(known && !corner && wanted.reactions && wanted.values ? values(view) : []),
     ...pinsInHoles(view, seats, wanted, words),
@@ -207,22 +207,13 @@ function locking({ frame, scene, posed, drawn }) {
 
 // ---- transmission angles --------------------------------------------------------------------------------------------
 
-function angle({ frame, exact: index }, { x, y, first, angle: turn }) {
-  const [a, b, by] = [x, y, turn].map((one) => at(one, index));
-  const from = angleAt(first, index);
-  if ([a, b, from, by].includes(null)) return [];
-  const spot = frame.to([a, b]);
-  const on = (way, far) => [spot[0] + far * Math.cos(way), spot[1] - far * Math.sin(way)];
-  const pair = (/** @type {number[]} */ [px, py]) => `${px.toFixed(1)},${py.toFixed(1)}`;
-  const [start, end] = [on(from, 38), on(from + by, 38)];
-  const rays = [from, from + by].map((way) => `M${pair(on(way, 10))}L${pair(on(way, 58))}`).join("");
-  const middle = on(from + by / 2, 66);
-  const text = `transmission angle ${((Math.abs(by) * 180) / Math.PI).toFixed(1)}°`;
-  return [
-    svg("path", { class: "transmission rays", d: rays }),
-    svg("path", { class: "transmission", d: `M${pair(start)}A38,38 0 0 ${by > 0 ? 0 : 1} ${pair(end)}` }),
-    words(middle[0], middle[1], text, middle[0] < spot[0] ? "to-left" : ""),
-  ];
+/** The transmission angle of a dyad, at its middle joint. */
+function transmission({ frame, scene, exact: index }, { joint: name, angle }) {
+  const found = place(scene, scene.joints.find((one) => one.name === name)?.at, index);
+  const size = at(angle, index);
+  if (!found || size === null) return [];
+  const [x, y] = frame.to(found);
+  return words(x + 12, y - 22, `transmission angle ${((size * 180) / Math.PI).toFixed(1)}°`);
 }
 
 // ---- values of the reactions ----------------------------------------------------------------------------------------

@@ -9,8 +9,8 @@ from math import atan2, degrees, dist, hypot
 from typing import Any
 
 from trunnion.model.units import KINDS, UnitError
-from trunnion.studio.ends import begin, numbered, point_of, refused, typed, vector
 from trunnion.studio.sketch import Sketch, Vector
+from trunnion.studio.strokes import begin, numbered, point_of, refused, typed, vector
 
 __all__ = ["bar_mass", "centre", "driver", "gear", "load", "spring"]
 

@@ -30,7 +30,6 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
 from trunnion.studio.blocks import blocks_of
-from trunnion.studio.ends import held, vector
 from trunnion.studio.exports import exported
 from trunnion.studio.figures import compared, figures, worded
 from trunnion.studio.findings import missing, reached, readiness, remedied, sentence, spoken
@@ -42,6 +41,7 @@ from trunnion.studio.message import packed
 from trunnion.studio.overlays import centres, circles, point_motion, seats, transmission
 from trunnion.studio.placed import plain, tracks
 from trunnion.studio.sketch import Sketch, Vector
+from trunnion.studio.strokes import held, vector
 from trunnion.studio.tolerances import measured, worst_corner
 from trunnion.version import __version__
 from trunnion.views.cycle.scene import scene

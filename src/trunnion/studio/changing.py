@@ -1,62 +1,24 @@
-"""Changing a drawing: moved and locked joints, values, what goes."""
+"""Changing a drawing: values, what goes, and other names, wherever a part is spoken of."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from math import isfinite
 from typing import Any
 
-from trunnion.studio.ends import NUMBER, free, held, letter, numbered, refused, vector
 from trunnion.studio.findings import spoken
 from trunnion.studio.sketch import Sketch
+from trunnion.studio.strokes import NUMBER, free, letter, numbered, refused, rename_point, taken
 
-__all__ = ["add_row", "delete", "lock", "move", "put_value"]
+__all__ = ["add_row", "delete", "put_value", "rename", "renamed"]
 
 Given = Mapping[str, Any]
 SECTIONS = {
     "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair"
 }  # fmt: skip
+NAMED = ("links", "joints", "dimensions", "loads", "springs", "gears")
+SIDES = ("links", "joints")  # of "link.point"
 DEFINED = re.compile(r"\s*([^\W\d]\w*)\s*=(.+)")  # crank = 30 mm
-
-
-def move(sketch: Sketch, given: Given) -> str:
-    """A joint or point goes to a place; in space by so much, as the links are turned at a position."""
-    if "by" in given:
-        return _move_in_space(sketch, given)
-    point, to = str(given["point"]), vector(given["to"])
-    sketch.write(sketch.moved(point, to, bool(given.get("keep"))))
-    hints = sketch.entries.get("assembly") or {}
-    if isinstance(hints.get(point), list) and not given.get("index"):
-        hints[point] = [sketch.length(part) for part in to]
-    links, name = sketch.links_at(point)
-    for link in links:
-        sketch.places[f"{link}.{name}"] = to
-    for link in links:
-        sketch.show(link, sketch.frame(link))
-    return f"Move {point}"
-
-
-def _move_in_space(sketch: Sketch, given: Given) -> str:
-    point, by, index = str(given["point"]), [float(part) for part in given["by"]], int(given.get("index") or 0)
-    if len(by) != 3 or not all(map(isfinite, by)):
-        raise ValueError(f"{by} is no way")
-    sketch.size = float(given["size"])
-    turns = sketch.turns(index)
-    hint = (sketch.entries.get("assembly") or {}).get(point)
-    if isinstance(hint, list) and index == 0:
-        pairs = zip(sketch.vector(f"assembly.{point}", "xyz"), by, strict=True)
-        sketch.entries["assembly"][point] = [sketch.length(sum(pair)) for pair in pairs]
-    sketch.write(sketch.shifted(point, by, turns))
-    return f"Move {point}"
-
-
-def lock(sketch: Sketch, given: Given) -> str:
-    """A joint or point stays where it is while others are dragged; done again, it may be dragged itself."""
-    point = str(given["point"])
-    held(sketch, point)
-    sketch.locked ^= {point}
-    return f"{'Lock' if point in sketch.locked else 'Unlock'} {point}"
 
 
 def put_value(sketch: Sketch, given: Given) -> str:
@@ -74,7 +36,7 @@ def put_value(sketch: Sketch, given: Given) -> str:
     stated = spoken(path)
     if value is not None:
         if path not in ("name", "notes") and way != ["dimensions"]:
-            value = _named(sketch, value)
+            value = _defined(sketch, value)
         group[last] = _typed(value)
         told = ("no", "yes")[value] if isinstance(value, bool) else value
         return f"Set {stated} to {', '.join(map(str, value)) if isinstance(value, list) else told}"
@@ -97,10 +59,10 @@ def _refuse_missing(sketch: Sketch, path: list[Any]) -> None:
         raise refused("is not there", ".".join(map(str, path)), "choose what is drawn")
 
 
-def _named(sketch: Sketch, value: Any) -> Any:
+def _defined(sketch: Sketch, value: Any) -> Any:
     """The name of a dimension that "crank = 30 mm" makes."""
     if isinstance(value, list):
-        return [_named(sketch, part) for part in value]
+        return [_defined(sketch, part) for part in value]
     found = DEFINED.fullmatch(value) if isinstance(value, str) else None
     if not found:
         return value
@@ -202,3 +164,85 @@ def _drop(sketch: Sketch, section: str, gone: Callable[[Mapping[str, Any]], bool
     for name, one in sketch.of(section).items():
         if gone(one):
             del sketch.section(section)[name]
+
+
+# ---- renamed --------------------------------------------------------------------------------------------------------
+
+
+def rename(sketch: Sketch, given: Given) -> str:
+    """A part gets another name wherever it is spoken of; a driver has that of its joint."""
+    (section, old), new = map(str, given["what"]), str(given["to"]).strip()
+    section = "joints" if section == "drivers" else section
+    in_rows = section in SIDES and any(row.get(section[:-1]) == old for row in sketch.rows)
+    known = section == "points" or in_rows or (section in NAMED and old in sketch.section(section))
+    if not known:
+        raise refused("is not there", f"{section}.{old}", "choose what is drawn")
+    beside = sketch.section(section) if section != "points" else {}
+    if not new or "." in new or new in taken(sketch) or new in beside:
+        raise refused(f"'{new}' is not a free name", f"{section}.{old}", "choose another")
+    if section == "points":
+        rename_point(sketch, old, new)
+        return f"Rename {old} to {new}"
+    sketch.entries = dict(renamed(sketch.entries, section, old, new))
+    if section == "links" and old == sketch.ground:
+        sketch.entries["ground"] = new
+    if section in SIDES:
+        sketch.places = {_key(key, section, old, new): place for key, place in sketch.places.items()}
+        sketch.locked = {_key(key, section, old, new) for key in sketch.locked}
+    return f"Rename {old} to {new}"
+
+
+def _key(key: str, section: str, old: str, new: str) -> str:
+    """The key "link.P" of a point, or the name of a joint, after a link or joint is renamed."""
+    link, dot, point = key.rpartition(".")
+    if section == "links":
+        return f"{new if link == old else link}{dot}{point}"
+    return f"{link}{dot}{new if point == old else point}"
+
+
+def renamed(group: Any, section: str, old: str, new: str, way: tuple[str, ...] = ()) -> Any:
+    """The entries with another name in keys and in what speaks of it."""
+    if isinstance(group, dict):
+        named = _named(section, way)
+        return {
+            (new if named and key == old else key): renamed(one, section, old, new, (*way, key))
+            for key, one in group.items()
+        }
+    if isinstance(group, list):
+        return [renamed(one, section, old, new, way) for one in group]
+    return _respoken(group, section, old, new, way) if isinstance(group, str) else group
+
+
+def _named(section: str, way: tuple[str, ...]) -> bool:
+    """Whether the keys of a group are names of the section."""
+    if way == (section,):
+        return True
+    of_joints = way in (("drivers",), ("assembly",)) or (len(way) == 3 and way[0] == "links" and way[2] == "points")
+    return section == "joints" and of_joints
+
+
+def _respoken(text: str, section: str, old: str, new: str, way: tuple[str, ...]) -> str:
+    """A text that speaks of a name, with the new one."""
+    last = way[-1] if way else ""
+    if section in ("loads", "springs", "gears"):
+        return (
+            new
+            if text == old and way[:1] == ("measures",)
+            else re.sub(rf"\b{section}\.{re.escape(old)}(?=\.)", f"{section}.{new}", text)
+        )
+    if section == "links":
+        if last == "between":
+            return re.sub(rf"^{re.escape(old)}(?=\.)", new, text)
+        return new if text == old and last in ("links", "link", "ground") else text
+    if section == "joints":
+        if last == "between":
+            return re.sub(rf"(?<=\.){re.escape(old)}$", new, text)
+        spoken = last in ("frame", "joint", "joints") or (last == "at" and way[0] != "links")  # there it is a place
+        return new if text == old and spoken else text
+    return re.sub(rf"(?<![\w.]){re.escape(old)}(?![\w.])", new, text) if _names_dimensions(way) else text
+
+
+def _names_dimensions(way: tuple[str, ...]) -> bool:
+    """Whether a text of the file may name dimensions: it is neither for readers nor the name of a part."""
+    names_part = way[-1] in ("links", "link", "joint", "joints", "frame", "between", "type")
+    return way[0] not in ("name", "notes", "references") and not names_part and (way[-1] != "at" or way[0] == "links")

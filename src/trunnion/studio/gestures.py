@@ -7,11 +7,10 @@ from typing import Any
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.studio.acting import bar_mass, centre, driver, gear, load, spring
-from trunnion.studio.changing import add_row, delete, lock, move, put_value
+from trunnion.studio.changing import add_row, delete, put_value, rename
 from trunnion.studio.group import group
-from trunnion.studio.renaming import rename
 from trunnion.studio.sketch import Sketch
-from trunnion.studio.strokes import add_point, join, link, pinned, slide
+from trunnion.studio.strokes import add_point, join, link, lock, move, pinned, slide
 from trunnion.studio.wiring import block
 
 __all__ = ["GESTURES", "Gesture", "done"]

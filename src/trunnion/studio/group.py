@@ -16,10 +16,9 @@ from typing import Any
 
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, unit
-from trunnion.studio.changing import delete
-from trunnion.studio.ends import letter, numbered, refused, vector
-from trunnion.studio.renaming import renamed
+from trunnion.studio.changing import delete, renamed
 from trunnion.studio.sketch import LIMITS, Sketch, Vector
+from trunnion.studio.strokes import letter, numbered, refused, vector
 
 __all__ = ["group"]
 

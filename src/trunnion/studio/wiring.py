@@ -9,9 +9,19 @@ from typing import Any
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
 from trunnion.studio.acting import driver, gear
-from trunnion.studio.ends import begin, letter, line_near, numbered, place_of, point_of, refused, typed
 from trunnion.studio.sketch import Frame, Sketch, Vector
-from trunnion.studio.strokes import bar, slide
+from trunnion.studio.strokes import (
+    bar,
+    begin,
+    letter,
+    line_near,
+    numbered,
+    place_of,
+    point_of,
+    refused,
+    slide,
+    typed,
+)  # fmt: skip
 
 __all__ = ["block"]
 

@@ -212,16 +212,13 @@ def test_a_half_drawn_linkage_is_no_error():
     for gesture in WHITWORTH:
         text, places = edited(text, places, gesture)
         told.append(ask(ask="model", text=text)["missing"])
-    assert told == [
-        ["It can move in 1 way: drive a joint."],
-        ["It can move in 2 ways: draw on from a free end, pin or guide it."],
-        ["It can move in 1 way: drive a joint."],
-        ["It can move in 2 ways: draw on from a free end, pin or guide it."],
-        ["It can move in 1 way: drive a joint."],
-        [],
+    step = "drive a joint for each freedom left, or add a link or joint that removes it."
+    ways = [
+        f"The mobility is {count} by Grübler's formula, but there is no driver: {step}" for count in (1, 2, 1, 2, 1)
     ]
+    assert told == [*([way] for way in ways), []]
     text, _ = edited("", {}, {"do": "link", "from": [0, 0], "to": [1, 0]})
-    assert ask(ask="model", text=text)["missing"] == ["Nothing is held yet: pin an end of a link to the ground."]
+    assert ask(ask="model", text=text)["missing"] == ["There are no joints: join the links."]
     arms = [{"do": "link", "from": {"ground": [x, 0]}, "to": to} for x, to in ((0, [1, 1]), (2, "link1.B"))]
     still, _ = edited("", {}, *arms)
     found = ask(ask="model", text=still)

@@ -22,18 +22,22 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.file import text_of
+from trunnion.model.mechanism import Mechanism
 from trunnion.model.rewrite import changed_text
 from trunnion.results.attributes import findings_of, units_of
 from trunnion.results.scales import without_noise
 from trunnion.results.tables import selected
+from trunnion.solve.assembly_modes import choices
 from trunnion.solve.backward import Backward
+from trunnion.solve.run import prepare
 from trunnion.solve.system import rubbing
-from trunnion.studio.assemblies import other_assemblies
+from trunnion.studio.acting import bar_mass, centre, driver, gear, load, spring
 from trunnion.studio.blocks import blocks_of
+from trunnion.studio.changing import add_row, delete, put_value, rename
 from trunnion.studio.exports import exported
 from trunnion.studio.figures import compared, figures, worded
 from trunnion.studio.findings import missing, reached, readiness, remedied, sentence, spoken
-from trunnion.studio.gestures import done
+from trunnion.studio.group import group
 from trunnion.studio.live import live_columns, live_margin, places_at, solved_with
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
 from trunnion.studio.margin import cures, locks_of, margin_of, margins_without
@@ -41,8 +45,9 @@ from trunnion.studio.message import packed
 from trunnion.studio.overlays import centres, circles, point_motion, seats, transmission
 from trunnion.studio.placed import plain, tracks
 from trunnion.studio.sketch import Sketch, Vector
-from trunnion.studio.strokes import held, vector
+from trunnion.studio.strokes import add_point, held, join, link, lock, move, pinned, slide, vector
 from trunnion.studio.tolerances import measured, worst_corner
+from trunnion.studio.wiring import block
 from trunnion.version import __version__
 from trunnion.views.cycle.scene import scene
 from trunnion.views.space.bodies import gathered
@@ -54,6 +59,7 @@ __all__ = ["ANSWERS", "answer", "examples"]
 
 Array = NDArray[np.float64]
 
+MOST_OTHERS = 3  # assemblies
 KEPT = 1e-2  # of the size: a locked joint that stays may be off by as much as a position is fine
 
 
@@ -257,7 +263,7 @@ def _edit(asked: Asked) -> dict[str, Any]:
     if not text.strip():
         sketch.entries = {"trunnion": 1, "name": "New mechanism", "space": "planar"}
     sketch.turns = partial(_turns, state)
-    says = [done(sketch, given) for given in asked["gestures"]]
+    says = [_done(sketch, given) for given in asked["gestures"]]
     empty = ("links", "drivers", "loads", "springs", "gears", "assembly", "dimensions", "joints")
     after = {key: one for key, one in sketch.entries.items() if one or key not in empty}
     changed = changed_text(text, after) if text.strip() else text_of(after)
@@ -271,6 +277,29 @@ def _edit(asked: Asked) -> dict[str, Any]:
     }
 
 
+GESTURES: dict[str, Callable[[Sketch, Mapping[str, Any]], str]] = {
+    "link": link, "pin": pinned, "join": join, "slide": slide, "add-point": add_point, "driver": driver, "load": load,
+    "spring": spring, "gear": gear, "block": block, "bar-mass": bar_mass, "centre": centre, "move": move,
+    "group": group, "lock": lock, "set": put_value, "delete": delete, "rename": rename, "add-row": add_row,
+}  # fmt: skip
+
+
+def _done(sketch: Sketch, given: Mapping[str, Any]) -> str:
+    """Do a gesture; what it is called. MechanismError if it cannot be done."""
+    gesture = GESTURES.get(str(given.get("do")))
+    if gesture is None:
+        raise MechanismError(Finding(f"'{given.get('do')}' is no gesture", "studio", f"use {', '.join(GESTURES)}"))
+    try:
+        said = gesture(sketch, given)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        if isinstance(error, MechanismError):
+            raise
+        what = f"the gesture '{given['do']}' does not fit the model ({error})"
+        raise MechanismError(Finding(what, "studio", "undo, or correct the text of the model")) from error
+    sketch.forget()
+    return said
+
+
 def _turns(state: Loaded, index: int) -> dict[str, Array]:
     """Rotation of every moving link in space, (3, 3), at a position of the cycle; MechanismError where it has none."""
     poses = gathered(state.motion(STEPS, True)).poses
@@ -282,12 +311,25 @@ def _turns(state: Loaded, index: int) -> dict[str, Array]:
 
 
 def _assemblies(asked: Asked) -> dict[str, Any]:
-    """The other assemblies of a model in the plane, with the gestures that take them."""
-    state, steps = asked.state, asked.steps
-    if state.run.system.mechanism.space != "planar":
-        return {"others": []}
-    others = other_assemblies(state.run, state.entries or {}, steps)
-    rows = [{"name": name, "gestures": gestures, "points": tracks(walk, steps)} for name, gestures, walk in others]
+    """The other assemblies of a model in the plane, a few at most, with the gestures that take them.
+
+    Each is that of one group, named in place of the hints inside it; the groups after it follow by their own hints.
+    """
+    entries, rows = dict(asked.state.entries or {}), list[dict[str, Any]]()
+    if asked.state.run.system.mechanism.space != "planar":
+        return {"others": rows}
+    stated = dict(entries.get("assembly") or {})
+    ways = [(modes, way) for modes in choices(asked.state.run) for way in modes.ways if not way.taken]
+    for modes, way in ways[:MOST_OTHERS]:
+        changes = {name: None for name in stated if name in way.joints or name in modes.links} | {modes.link: way.name}
+        hints = {name: hint for name, hint in (stated | changes).items() if hint is not None}
+        with suppress(MechanismError):  # what is stated elsewhere in the model may forbid this one
+            run = prepare(Mechanism(**{**entries, "assembly": hints}))
+            gestures = [{"do": "set", "path": ["assembly", name], "value": hint} for name, hint in changes.items()]
+            with np.errstate(all="ignore"):
+                points = tracks(run.walk(run.cycle.times(asked.steps)), asked.steps)
+            name = f"{' and '.join(modes.links)} assembled the other way ({way.name})"
+            rows.append({"name": name, "gestures": gestures, "points": points})
     return {"others": rows}
 
 

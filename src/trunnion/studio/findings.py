@@ -136,7 +136,7 @@ def _acts(mechanism: Mechanism) -> Iterator[tuple[bool, str]]:
 
 
 def missing(sketch: Sketch, findings: Sequence[Finding]) -> list[str]:
-    """The next steps of the hand, where nothing but steps of drawing is missing; none where something is wrong."""
+    """The next step of the hand, where nothing but steps of drawing is missing; none where something is wrong."""
     errors = [one for one in findings if one.severity is Severity.ERROR]
     if not errors and sketch.joints and not sketch.of("drivers"):
         return ["It stands still: its joints let no link move. Take one away, or let an end slide."]
@@ -145,21 +145,6 @@ def missing(sketch: Sketch, findings: Sequence[Finding]) -> list[str]:
         or (error.where == "drivers" and error.remedy.startswith("drive a joint"))
         for error in errors
     ]
-    by_hand = sketch.rows or sketch.entries.get("space") != "spatial"
-    return _next_steps(sketch) if unfinished and by_hand and all(unfinished) else []
-
-
-def _next_steps(sketch: Sketch) -> list[str]:
-    if sketch.rows:
-        return ["Choose a joint of the loop and drive it, or change its type until it moves in one way."]
-    links = [name for name in sketch.of("links") if name != sketch.ground]
-    if not links:
-        return ["Draw a link."]
-    pairs = [joint["links"] for joint in sketch.joints.values()]
-    if not any(sketch.ground in pair for pair in pairs):
-        return ["Nothing is held yet: pin an end of a link to the ground."]
-    if loose := [name for name in links if not any(name in pair for pair in pairs)]:
-        return [f"{', '.join(loose)}: joined to nothing. Draw from an end, or pin it."]
-    mobility = 3 * len(links) - 2 * len(pairs) - len(sketch.of("gears"))  # of pins, slides and gears in the plane
-    next_step = "drive a joint" if mobility == 1 else "draw on from a free end, pin or guide it"
-    return [f"It can move in {counted(mobility, 'way')}: {next_step}."]
+    if not errors or not all(unfinished):
+        return []
+    return [f"{errors[0].what[:1].upper()}{errors[0].what[1:]}: {remedied(errors[0].remedy)}."]

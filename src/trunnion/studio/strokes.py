@@ -20,8 +20,8 @@ from trunnion.model.units import KINDS
 from trunnion.studio.sketch import TOGETHER, Frame, Sketch, Vector
 
 __all__ = [
-    "NUMBER", "add_point", "bar", "begin", "free", "held", "join", "letter", "line_near", "link", "lock", "move", "numbered",
-    "pinned", "place_of", "point_of", "refused", "rename_point", "slide", "taken", "typed", "vector",
+    "NUMBER", "add_point", "bar", "begin", "free", "held", "join", "letter", "line_near", "link", "lock", "move",
+    "numbered", "pinned", "place_of", "point_of", "refused", "rename_point", "slide", "taken", "typed", "vector",
 ]  # fmt: skip
 
 Given = Mapping[str, Any]

@@ -45,7 +45,7 @@ const opened = new Promise((done) => {{
 window.done = Promise.all([
   fetched("page", "/", {{ credentials: "include" }}),
   fetched("token", "{query}", {{ credentials: "include" }}),
-  fetched("file", "/first/four-bar.yaml", {{ credentials: "include" }}),
+  fetched("file", "/file/four-bar.yaml", {{ credentials: "include" }}),
   fetched("written", "/file/four-bar.yaml", {{ method: "PUT", body: '{{"text": "evil"}}', credentials: "include" }}),
   fetched("simple", "/file/four-bar.yaml", {{ method: "POST", body: "evil", mode: "no-cors", credentials: "include" }}),
   opened.then((state) => (tried.socket = state)),
@@ -66,30 +66,16 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
             user.page.locator(".menu button", has_text=what).click()
         return Path(told.value.path()).read_bytes()
 
-    @pytest.mark.slow
-    def test_the_first_picture_is_where_the_solved_one_is(user):
-        page = user.page
-        page.route("**/socket", lambda route: route.abort())  # it needs no answer over the socket
-        page.reload()
-        page.wait_for_selector('.handle[data-name="C"]')
-        user.wrong.clear()
-        first = {name: user.handle(name) for name in "ABCD"}
-        page.unroute("**/socket")
-        page.reload()
-        user.until("s.solved.value")
-        for name, place in first.items():
-            assert np.hypot(*np.subtract(user.handle(name), place)) < 6  # px: the player takes its place below
-
     def test_a_sheet_begun_while_the_file_is_read_stays(user):
         held = []
-        user.page.route("**/first/*", lambda route: held.append(route))
+        user.page.route("**/file/*", lambda route: held.append(route))
         user.page.reload()
         user.page.wait_for_selector(".sheet svg")
         user.page.wait_for_timeout(300)
         choose(user, "File", "New sheet")
         assert len(held) == 1
         held[0].continue_()
-        user.page.unroute("**/first/*")
+        user.page.unroute("**/file/*")
         user.until("s.about.value.version")
         assert user.state("s.text.value") == ""
         assert user.state("s.fileName.value") is None

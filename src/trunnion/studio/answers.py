@@ -24,7 +24,7 @@ from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.file import text_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.rewrite import changed_text
-from trunnion.results.attributes import findings_of, units_of
+from trunnion.results.attributes import findings_of
 from trunnion.results.scales import without_noise
 from trunnion.results.tables import selected
 from trunnion.solve.assembly_modes import choices
@@ -35,7 +35,7 @@ from trunnion.studio.acting import bar_mass, centre, driver, gear, load, spring
 from trunnion.studio.blocks import blocks_of
 from trunnion.studio.changing import add_row, delete, put_value, rename
 from trunnion.studio.exports import exported
-from trunnion.studio.figures import compared, figures, worded
+from trunnion.studio.figures import figures
 from trunnion.studio.findings import missing, reached, readiness, remedied, sentence, spoken
 from trunnion.studio.group import group
 from trunnion.studio.live import live_columns, live_margin, places_at, solved_with
@@ -161,8 +161,7 @@ def _cycle(asked: Asked) -> dict[str, Any]:
     result, told = _solved(asked, lambda: asked.result)
     if result is None:
         return told
-    units = units_of(result)
-    rows = [[one.label, worded(one, units)] for one in figures(asked)]
+    rows = [[one["label"], one["text"]] for one in figures(asked)]
     least = margin_of(result, asked.rubs)["margin_least"]
     return told | {"figures": rows, "margin_least": least}
 
@@ -383,13 +382,22 @@ def _moving(asked: Asked, result: xr.Dataset) -> dict[str, Any] | None:
 
 
 def _compare(asked: Asked) -> dict[str, Any]:
-    """Other variants, `{text, friction}` each, laid over the present result, and the table of figures of both."""
-    others = []
+    """Figures of the present result, and other variants, `{text, friction}` each, to lay over it: with their figures,
+    or why they have none.
+    """
+    others = list[dict[str, Any]]()
     for other in asked["others"]:
         variant = Asked({**other, "steps": asked.steps})
-        told = compared(variant, asked)
-        others.append(told | {"point": _moving(asked, variant.result) if told["scene"] else None})
-    return {"others": others}
+        try:
+            result = variant.result
+        except MechanismError as error:
+            others.append({"scene": None, "why": f"cannot be solved: {sentence(error.findings[0])}", "figures": []})
+            continue
+        others.append({
+            "scene": scene(result, max_positions=MOST_STEPS), "why": None, "figures": figures(variant),
+            "margin": margin_of(result, variant.rubs)["margin"], "point": _moving(asked, result),
+        })  # fmt: skip
+    return {"figures": figures(asked), "others": others}
 
 
 def _export(asked: Asked) -> dict[str, Any]:

@@ -19,7 +19,7 @@ export function keepCompared() {
       if (!wanted.length) compared.value = [];
       else
         askOf("compare", { point, others: wanted.map(({ text, friction }) => ({ text, friction })) }).then((told) => {
-          if (told) compared.value = told.others.map((one, order) => ({ ...wanted[order], ...one, of: found.text }));
+          if (told) compared.value = told.others.map((one, order) => ({ ...wanted[order], ...laidOver(one, found.scene), rows: rowsOf(told.figures, one.figures), of: found.text }));
         });
     });
   });
@@ -32,6 +32,23 @@ export function variants(own, { text, friction }, free) {
     list.push({ name: "variant A", ghost: own.text !== text, heads: ["variant A", "now"], ...own });
   if (free) list.push({ name: "without friction", ghost: false, heads: ["without", "with"], text, friction: "off" });
   return list;
+}
+
+/** A variant without its scene where it runs over other positions of the drive. */
+function laidOver(one, { abscissa }) {
+  const own = one.scene?.abscissa;
+  const near = 1e-5 * (Math.max(...abscissa.values.map(Math.abs)) || 1);
+  const same = own && own.label === abscissa.label && own.unit === abscissa.unit && own.values.length === abscissa.values.length && own.values.every((value, index) => Math.abs(value - abscissa.values[index]) <= near);
+  return same || !own ? one : { ...one, scene: null, why: "runs over other positions of the drive than the present one: its curves cannot be laid over" };
+}
+
+/** Rows of the table, [{label, texts}]: the figures of a variant beside the present ones, and their change. */
+function rowsOf(now, before) {
+  return now.map(({ name, title, text, value }) => {
+    const other = before.find((one) => one.name === name);
+    const change = other?.value && value !== null ? (100 * (value - other.value)) / Math.abs(other.value) : null;
+    return { label: title, texts: [other?.text ?? "—", text, change === null ? "—" : `${change < 0 ? "−" : "+"}${Math.abs(change).toFixed(1)} %`] };
+  });
 }
 
 function keep() {

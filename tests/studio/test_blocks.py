@@ -180,7 +180,7 @@ def test_groups_with_two_slides_and_of_class_three_move_as_their_closed_forms():
     [
         (block("XYZ"), "is no block"),
         (block("driver", {"ground": "0 mm"}), "is no place"),
-        (block("driver", {"ground": "0 kg, 1 kg"}), "is no place"),
+        (block("driver", {"ground": "0 kg, 1 kg"}), "is no length"),
         (block("RRR", {"ground": "0, 0"}, {"ground": "0, 0"}), "same pin twice"),
         (block("RPR", {"ground": "0, 0"}, {"ground": "1, 0"}), "choose a pin that is drawn"),
         (block("RRR", "none", {"ground": "1, 0"}), "is not a joint or a point"),

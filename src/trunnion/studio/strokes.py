@@ -16,7 +16,7 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.quantity import Quantity
-from trunnion.model.units import KINDS
+from trunnion.model.units import KINDS, UnitError
 from trunnion.studio.sketch import TOGETHER, Frame, Sketch, Vector
 
 __all__ = [
@@ -43,11 +43,18 @@ def vector(given: Any) -> Vector:
     return x, y
 
 
-def typed(text: Any, kind: str, unit: str = "") -> float:
-    """A quantity as it was typed, SI; unit: of a plain number. UnitError or ValueError where it is none."""
+def typed(text: Any, kind: str, where: str, unit: str = "") -> float:
+    """A quantity as it was typed, SI; unit: of a plain number. MechanismError where it is none."""
     text = str(text or "").strip()
-    plain = unit and NUMBER.fullmatch(text)
-    return float(np.asarray(Quantity.read(f"{text} {unit}" if plain else text, KINDS[kind]).evaluate()))
+    try:
+        read = Quantity.read(f"{text} {unit}" if unit and NUMBER.fullmatch(text) else text, KINDS[kind])
+        value = float(np.asarray(read.evaluate()))
+    except (UnitError, ValueError, TypeError, KeyError) as error:
+        remedy = getattr(error, "remedy", "") or f"type it as {KINDS[kind].example}"
+        raise refused(f"'{text[:30]}' is no {kind}", where, remedy) from None
+    if not isfinite(value):
+        raise refused(f"'{text[:30]}' is no {kind}", where, f"type it as {KINDS[kind].example}")
+    return value
 
 
 # ---- names ----------------------------------------------------------------------------------------------------

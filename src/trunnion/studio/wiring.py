@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping
 from math import atan2, cos, degrees, hypot, sin
 from typing import Any
 
-from trunnion.errors import Finding, MechanismError
-from trunnion.model.units import UnitError
 from trunnion.studio.acting import driver, gear
 from trunnion.studio.sketch import Frame, Sketch, Vector
 from trunnion.studio.strokes import (
@@ -60,12 +58,11 @@ def block(sketch: Sketch, given: Given) -> str:
 def _place(sketch: Sketch, text: Any) -> Vector:
     """A place of two lengths, "120 mm, 0.4 in", m; plain numbers are in the unit of the sheet."""
     parts = str(text).replace(";", ",").split(",")
-    try:
-        x, y = (typed(part, "length", sketch.unit) for part in parts)
-        return x, y
-    except (UnitError, ValueError, KeyError) as error:
-        what = f"'{str(text)[:40]}' is no place ({getattr(error, 'what', 'two lengths are needed')})"
-        raise MechanismError(Finding(what, "the block", "write two lengths, such as 120 mm, 40 mm")) from None
+    if len(parts) != 2:
+        what = f"'{str(text)[:40]}' is no place (two lengths are needed)"
+        raise refused(what, "the block", "write two lengths, such as 120 mm, 40 mm")
+    x, y = (typed(part, "length", "the block", sketch.unit) for part in parts)
+    return x, y
 
 
 def _end(sketch: Sketch, name: str) -> str:
@@ -161,10 +158,7 @@ def _loop_in_space(sketch: Sketch, angle: str) -> str:
     joints += [name for name in "ABCDE" if name not in joints][: 4 - len(joints)]
     links += [name for name in ("link1", "link2", "link3", "link4") if name not in links][: 3 - len(links)]
     driver = sketch.of("drivers").get(joints[0], {"speed": "60 rpm"})
-    try:
-        shafts, start = typed(angle, "angle", "deg"), typed(driver.get("start", 0) or "0 deg", "angle")
-    except (UnitError, ValueError) as error:
-        raise refused(f"'{angle[:30]}' is no angle", "the CCC", "type it as 30 deg") from error
+    shafts, start = typed(angle, "angle", "the CCC", "deg"), typed(driver.get("start") or "0 deg", "angle", "the CCC")
     rows = [{"joint": joint, "type": "cylindrical", "link": link, "twist": "90 deg"}
             for joint, link in zip(joints, [*links, sketch.ground], strict=True)]  # fmt: skip
     rows[0]["type"], rows[3]["twist"] = "revolute", f"{round(180.0 - degrees(shafts), 12):.15g} deg"

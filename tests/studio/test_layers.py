@@ -49,28 +49,30 @@ def near(found, expected, **rest):
 
 def test_velocity_and_acceleration_of_a_point_are_those_of_analyse_and_of_differences():
     text = EXAMPLES[FOURBAR]
-    found = ask("layers", text, point="coupler.E", steps=720)["point"]
+    names = [f"coupler.E.{rate}_{axis}" for rate in ("velocity", "acceleration") for axis in "xy"]
+    found = ask("layers", text, names=names, steps=720)["columns"]
     result = analysed(text, steps=720)
     place = result["point_position"].sel(point="coupler.E")
     step = 2 * np.pi / 10 / 720  # s, at 10 rad/s
     for axis in "xy":
         track = place.sel(axis=axis).values
-        near(found["velocity"][axis], result["point_velocity"].sel(point="coupler.E", axis=axis))
-        near(found["acceleration"][axis], result["point_acceleration"].sel(point="coupler.E", axis=axis))
+        velocity, acceleration = (found[f"coupler.E.{rate}_{axis}"]["values"] for rate in ("velocity", "acceleration"))
+        near(velocity, result["point_velocity"].sel(point="coupler.E", axis=axis))
+        near(acceleration, result["point_acceleration"].sel(point="coupler.E", axis=axis))
         before, after = np.roll(track, 1), np.roll(track, -1)
         speed, second = (after - before) / (2 * step), (after - 2 * track + before) / step**2
-        np.testing.assert_allclose(array(found["velocity"][axis]), speed, atol=2e-3 * np.abs(speed).max())
-        np.testing.assert_allclose(array(found["acceleration"][axis]), second, atol=5e-3 * np.abs(second).max())
+        np.testing.assert_allclose(array(velocity), speed, atol=2e-3 * np.abs(speed).max())
+        np.testing.assert_allclose(array(acceleration), second, atol=5e-3 * np.abs(second).max())
 
 
-def test_a_point_that_is_not_known_has_no_motion():
-    assert ask("layers", EXAMPLES[FOURBAR], point="coupler.Z")["point"] is None
-    assert ask("layers", EXAMPLES[FOURBAR])["point"] is None
+def test_a_column_that_is_not_known_is_none():
+    assert ask("layers", EXAMPLES[FOURBAR], names=["coupler.Z.velocity_x"])["columns"] == {}
+    assert ask("layers", EXAMPLES[FOURBAR])["columns"] == {}
 
 
 def test_in_space_there_is_the_motion_of_a_point_alone():
-    found = ask("layers", EXAMPLES["rssr"], wanted=["centres", "circles", "transmission"])
-    assert not {"centres", "circles", "transmission"} & set(found)
+    found = ask("layers", EXAMPLES["rssr"], wanted=["centres", "transmission"])
+    assert not {"centres", "transmission"} & set(found)
 
 
 # ---- instant centres -----------------------------------------------------------------------------------------------
@@ -131,28 +133,6 @@ def test_a_slider_has_its_centre_at_infinity_across_its_guide():
     np.testing.assert_allclose(np.abs(far[1][moving]), 1.0, atol=FLOAT)
     (pin,) = [one for one in rows if block in one["pair"] and one["joint"]]
     assert pin["far"] is None
-
-
-# ---- friction circles ----------------------------------------------------------------------------------------------
-
-
-def test_the_radius_of_a_friction_circle_is_that_of_coulomb():
-    """f′ r = 0.40 · 7.5 mm; the two forces and the moment together act along a line that touches the circle."""
-    text = EXAMPLES[FOURBAR]
-    result, found = analysed(text), ask("layers", text, wanted=["circles"])["circles"]
-    assert [one["joint"] for one in found] == list("ABCD")
-    for one in found:
-        np.testing.assert_allclose(array(one["radius"]), 0.4 * 0.0075, rtol=1e-6)
-        offset = array(one["offset"])
-        force = [result["reaction_force"].sel(joint=one["joint"], axis=axis).values for axis in "xy"]
-        size = np.hypot(*force)
-        arm = offset * force[1] / size, -offset * force[0] / size  # to the right of the force
-        moment = arm[0] * force[1] - arm[1] * force[0]
-        moves = np.isfinite(offset)
-        assert moves.sum() > 350
-        torque = result["friction_torque"].sel(joint=one["joint"]).values
-        np.testing.assert_allclose(moment[moves], torque[moves], rtol=1e-5)
-    assert ask("layers", text, wanted=["circles"], friction="off")["circles"] == []
 
 
 # ---- transmission angles -------------------------------------------------------------------------------------------
@@ -277,11 +257,11 @@ def test_a_variant_over_another_stroke_has_its_own():
 def test_the_motion_of_a_point_is_laid_over():
     after = EXAMPLES["drawing-press"]
     before = after.replace("L: 200 mm", "L: 205 mm")
-    (found,) = ask("compare", text=after, others=[{"text": before}], steps=60, point="lower.P")["others"]
+    names = {f"lower.P.{rate}_{axis}": (rate, axis) for rate in ("velocity", "acceleration") for axis in "xy"}
+    (found,) = ask("compare", text=after, others=[{"text": before}], steps=60, names=list(names))["others"]
     own = without_noise(analysed(before, steps=60))
-    for name in ("velocity", "acceleration"):
-        for axis in "xy":
-            near(found["point"][name][axis], own[f"point_{name}"].sel(point="lower.P", axis=axis).values)
+    for name, (rate, axis) in names.items():
+        near(found["columns"][name]["values"], own[f"point_{rate}"].sel(point="lower.P", axis=axis).values)
 
 
 def test_another_drive_has_no_figure_of_this_one():

@@ -94,6 +94,29 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.idle()
         assert sum(user.page.locator(kind).count() for kind in kinds) == 0
 
+    def test_the_radius_of_a_friction_circle_is_that_of_coulomb(user):
+        """f′ r = 0.40 · 7.5 mm; the two forces and the moment together act along a line that touches the circle."""
+        show(user, "Friction circles")
+        until(user, "layers", "m.laid.value?.circles")
+        result, found = analysed(user.state("s.text.value")), laid(user, "l.laid.value.circles")
+        assert [one["joint"] for one in found] == list("ABCD")
+        for one in found:
+            np.testing.assert_allclose(np.array(one["radius"], float), 0.4 * 0.0075, rtol=1e-6)
+            offset = np.array(one["offset"], float)
+            force = [result["reaction_force"].sel(joint=one["joint"], axis=axis).values for axis in "xy"]
+            size = np.hypot(*force)
+            arm = offset * force[1] / size, -offset * force[0] / size  # to the right of the force
+            moment = arm[0] * force[1] - arm[1] * force[0]
+            moves = np.isfinite(offset)
+            assert moves.sum() > 350
+            torque = result["friction_torque"].sel(joint=one["joint"]).values
+            np.testing.assert_allclose(moment[moves], torque[moves], rtol=1e-5)
+        user.state("s.friction.value = 'off'")
+        until(user, "layers", "m.laid.value?.circles?.length === 0")
+        show(user, "Friction circles")
+        user.state("s.friction.value = 'stated'")
+        user.idle()
+
     @pytest.mark.slow
     def test_two_variants_are_compared(user):
         user.page.click("role=tab[name=Plots]")

@@ -357,8 +357,8 @@ QUESTIONS = [
             ("edit", {"gestures": [5]}), ("edit", {"gestures": [None]}), ("edit", {"gestures": [], "places": [1]}),
             ("edit", {"gestures": [{"do": "set", "path": []}]}), ("edit", {"gestures": [{"do": "set", "path": 5}]}),
             ("edit", {"gestures": [{"do": "set", "path": ["name"], "value": "\ud800"}]}), ("compare", {"others": [5]}),
-            ("compare", {"others": [{"text": {}}]}), ("layers", {"wanted": 5}), ("layers", {"place": 5}),
-            ("layers", {"place": {"link": "x", "at": [0, 1e999], "index": 1e999}}), ("export", {"what": [1]}),
+            ("compare", {"others": [{"text": {}}]}), ("layers", {"wanted": 5}), ("layers", {"names": 5}),
+            ("layers", {"names": [1e999]}), ("export", {"what": [1]}),
             ("tolerances", {"steps": -1e999}), ("example", {"name": "../x"}), ("assemblies", {"steps": None}),
         ]
     ),

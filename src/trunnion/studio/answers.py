@@ -30,7 +30,6 @@ from trunnion.results.tables import selected
 from trunnion.solve.assembly_modes import choices
 from trunnion.solve.backward import Backward
 from trunnion.solve.run import prepare
-from trunnion.solve.system import rubbing
 from trunnion.studio.acting import bar_mass, centre, driver, gear, load, spring
 from trunnion.studio.blocks import blocks_of
 from trunnion.studio.changing import add_row, delete, put_value, rename
@@ -42,7 +41,7 @@ from trunnion.studio.live import live_columns, live_margin, places_at, solved_wi
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
 from trunnion.studio.margin import cures, locks_of, margin_of, margins_without
 from trunnion.studio.message import packed
-from trunnion.studio.overlays import centres, circles, point_motion, seats, transmission
+from trunnion.studio.overlays import centres, seats, transmission
 from trunnion.studio.placed import plain, tracks
 from trunnion.studio.sketch import Sketch, Vector
 from trunnion.studio.strokes import add_point, held, join, link, lock, move, pinned, slide, vector
@@ -336,21 +335,18 @@ def _assemblies(asked: Asked) -> dict[str, Any]:
 
 
 def _layers(asked: Asked) -> dict[str, Any]:
-    """What the sheet shows over the mechanism, of what is wanted: motion of a point, and in the plane instant centres,
-    friction circles, transmission angles, pins in their holes.
+    """What the sheet shows over the mechanism, of what is wanted: columns of the table by their names, and in the plane
+    instant centres, transmission angles, pins in their holes.
     """
-    result, system, wanted = asked.motion, asked.state.run.system, set(asked.get("wanted") or ())
-    layers: dict[str, Any] = {"point": _moving(asked, result)}
-    if system.mechanism.space != "planar":
-        return layers
-    if "seats" in wanted:
-        layers["seats"] = seats(result)
-    if "circles" in wanted:
-        layers["circles"] = circles(result, [joint for joint in rubbing(system) if joint not in system.screws])
-    if wanted & {"centres", "transmission"}:
-        walk = solved_with(asked.state.run, {}, asked.steps).walk
-        shown = {"centres": centres, "transmission": transmission}
-        layers |= {name: tell(walk, asked.steps) for name, tell in shown.items() if name in wanted}
+    result, run, wanted = asked.motion, asked.state.run, set(asked.get("wanted") or ())
+    layers: dict[str, Any] = _columns(result, asked)
+    if run.system.mechanism.space == "planar":
+        if "seats" in wanted:
+            layers["seats"] = seats(result)
+        if wanted & {"centres", "transmission"}:
+            walk = solved_with(run, {}, asked.steps).walk
+            shown = {"centres": centres, "transmission": transmission}
+            layers |= {name: tell(walk, asked.steps) for name, tell in shown.items() if name in wanted}
     return layers
 
 
@@ -365,20 +361,19 @@ def _margins(asked: Asked) -> dict[str, Any]:
 
 
 def _curves(asked: Asked) -> dict[str, Any]:
-    """Names and units of all columns of the table of a cycle, and those that are wanted, in SI."""
-    table = selected(without_noise(asked.result), ["all"])
+    """Names and units of all columns of the table of a cycle, and those that are wanted."""
+    return _columns(asked.result, asked)
+
+
+def _columns(result: xr.Dataset, asked: Asked) -> dict[str, Any]:
+    """Names and units of the columns of numbers of a result, and those of the `names` that are asked for, in SI."""
+    table = selected(without_noise(result), ["all"])
     columns = {column.name: column for column in table if column.values.dtype.kind == "f"}
-    wanted = [name for name in asked.get("names") or () if name in columns]
+    wanted = [str(name) for name in asked.get("names") or () if str(name) in columns]
     return {
         "names": [[column.name, column.unit] for column in columns.values()],
         "columns": {name: {"unit": columns[name].unit, "values": columns[name].values} for name in wanted},
     }
-
-
-def _moving(asked: Asked, result: xr.Dataset) -> dict[str, Any] | None:
-    """Motion of the point that is asked for; None where there is none."""
-    point = str(asked.get("point"))
-    return point_motion(result, point) if point in result["point"].values else None
 
 
 def _compare(asked: Asked) -> dict[str, Any]:
@@ -395,7 +390,7 @@ def _compare(asked: Asked) -> dict[str, Any]:
             continue
         others.append({
             "scene": scene(result, max_positions=MOST_STEPS), "why": None, "figures": figures(variant),
-            "margin": margin_of(result, variant.rubs)["margin"], "point": _moving(asked, result),
+            "margin": margin_of(result, variant.rubs)["margin"], "columns": _columns(result, asked)["columns"],
         })  # fmt: skip
     return {"figures": figures(asked), "others": others}
 

@@ -1,17 +1,13 @@
-"""What the sheet can show over a mechanism in the plane: motion of a point, instant centres, friction circles,
-transmission angles, pins in their holes; each for every position of the cycle, SI and rad.
-"""
+"""What the sheet can show over a mechanism in the plane: instant centres, transmission angles, pins in their holes."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra import plane
-from trunnion.results.scales import scales_in
 from trunnion.solve.forward import Forward
 from trunnion.studies.design import instant_centre, transmission_angles
 from trunnion.studio.message import Exact
@@ -21,22 +17,13 @@ from trunnion.views.cycle.deviations import seated
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["centres", "circles", "point_motion", "seats", "transmission"]
+__all__ = ["centres", "seats", "transmission"]
 
 Array = NDArray[np.float64]
 
 MOST_LINKS = 12  # whose centres against each other are told; of more only those against the ground
 FAR = 1e4  # sizes of the mechanism: what is farther away lies at infinity
 AT_REST = 1e-9  # of the speeds typical of the mechanism: slower than this two links move as one
-
-
-def point_motion(result: xr.Dataset, point: str) -> dict[str, Any]:
-    """Velocity, m/s, and acceleration, m/s², of a point "link.point" by axis, 0 where they are rounding."""
-    zeroed, told = scales_in(result).zeroed, dict[str, Any](key=point)
-    for name, unit in (("velocity", "m/s"), ("acceleration", "m/s^2")):
-        rows = result[f"point_{name}"].sel(point=point).transpose("axis", "position").values
-        told[name] = dict(zip(map(str, result["axis"].values), zeroed(rows, unit), strict=True))
-    return told
 
 
 @np.errstate(all="ignore")
@@ -75,31 +62,6 @@ def _centre(walk: Forward, first: str, second: str, steps: int) -> dict[str, Any
         return {**place, "far": None}
     far = {"x": np.where(away, -sign * vy / speed, np.nan), "y": np.where(away, sign * vx / speed, np.nan)}
     return {**place, "far": far}
-
-
-@np.errstate(all="ignore")
-def circles(result: xr.Dataset, rubbing: Collection[str]) -> list[dict[str, Any]]:
-    """Friction circle of each journal that rubs: its radius |M|/|F|, m, for Coulomb's law f′ r.
-
-    M, N m, and F, N, are friction torque and reaction on the second link. `offset`, m: of the line of action of both
-    together from the middle of the pin, M/|F|, to the right of F where positive, as r × F = M asks; NaN where the joint
-    rests, for friction is an interval there, and the radius that of the positions beside it.
-    """
-    rows = []
-    for joint in rubbing:
-        if joint not in result["joint"].values or result.attrs.get("kind") != "cycle":
-            continue
-        force = np.hypot(*(result["reaction_force"].sel(joint=joint, axis=axis).values for axis in "xy"))
-        offset = result["friction_torque"].sel(joint=joint).values / force
-        offset = np.where((offset == 0) | ~np.isfinite(offset), np.nan, offset)
-        known = np.flatnonzero(np.isfinite(offset))
-        if not known.size:
-            continue
-        count = len(offset)
-        radius = np.interp(np.arange(count), known, np.abs(offset[known]), period=count)
-        radius[np.isnan(force)] = np.nan
-        rows.append({"joint": joint, "radius": radius, "offset": offset})
-    return rows
 
 
 def seats(result: xr.Dataset) -> list[dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 import { effect, signal, untracked } from "@preact/signals";
 import { askOf, takeText } from "./actions.js";
-import { laid } from "./layers.js";
+import { columnsOf, laid, motionOf } from "./layers.js";
 import * as state from "./state.js";
 import { Button, html } from "./ui.js";
 
@@ -18,8 +18,8 @@ export function keepCompared() {
     untracked(() => {
       if (!wanted.length) compared.value = [];
       else
-        askOf("compare", { point, others: wanted.map(({ text, friction }) => ({ text, friction })) }).then((told) => {
-          if (told) compared.value = told.others.map((one, order) => ({ ...wanted[order], ...laidOver(one, found.scene), rows: rowsOf(told.figures, one.figures), of: found.text }));
+        askOf("compare", { names: columnsOf(point), others: wanted.map(({ text, friction }) => ({ text, friction })) }).then((told) => {
+          if (told) compared.value = told.others.map((one, order) => ({ ...wanted[order], ...laidOver(one, found.scene), point: point && one.scene ? motionOf(one.columns, point) : null, rows: rowsOf(told.figures, one.figures), of: found.text }));
         });
     });
   });

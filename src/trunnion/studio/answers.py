@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.cycle.locks import locks_of, margins_without
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.file import text_of
@@ -39,13 +40,13 @@ from trunnion.studio.findings import missing, reached, readiness, remedied, sent
 from trunnion.studio.group import group
 from trunnion.studio.live import live_columns, live_margin, places_at, solved_with
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
-from trunnion.studio.margin import cures, locks_of, margin_of, margins_without
+from trunnion.studio.margin import cures, margin_of
 from trunnion.studio.message import packed
 from trunnion.studio.overlays import centres, seats, transmission
 from trunnion.studio.placed import plain, tracks
 from trunnion.studio.sketch import Sketch, Vector
 from trunnion.studio.strokes import add_point, held, join, link, lock, move, pinned, slide, vector
-from trunnion.studio.tolerances import measured, worst_corner
+from trunnion.studio.tolerances import corner_of, measured
 from trunnion.studio.wiring import block
 from trunnion.version import __version__
 from trunnion.views.cycle.scene import scene
@@ -59,6 +60,7 @@ __all__ = ["ANSWERS", "answer", "examples"]
 Array = NDArray[np.float64]
 
 MOST_OTHERS = 3  # assemblies
+MOST_BLOCKS = 24  # whose share of the margin is told: each takes an analysis
 KEPT = 1e-2  # of the size: a locked joint that stays may be off by as much as a position is fine
 
 
@@ -357,7 +359,10 @@ def _blocks(asked: Asked) -> dict[str, Any]:
 
 def _margins(asked: Asked) -> dict[str, Any]:
     """For each block, the ground but not, the locking margin without its friction; none without friction."""
-    return {"without": margins_without(asked.state.run, asked.steps) if asked.friction else []}
+    run = asked.state.run
+    if not asked.friction or len(run.system.plan.modules) > MOST_BLOCKS:
+        return {"without": [None] * len(run.system.plan.modules) if asked.friction else []}
+    return {"without": margins_without(run, asked.steps)}
 
 
 def _curves(asked: Asked) -> dict[str, Any]:
@@ -404,7 +409,7 @@ def _export(asked: Asked) -> dict[str, Any]:
 
 def _corner(asked: Asked) -> dict[str, Any]:
     """The worst corner of the tolerances and plays for a measure, on the stated side or the worse of both."""
-    return worst_corner(asked.run.system.mechanism, str(asked["measure"]), asked.get("side"), asked.steps)
+    return corner_of(asked.run.system.mechanism, str(asked["measure"]), asked.get("side"), asked.steps)
 
 
 ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {

@@ -6,11 +6,12 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from trunnion.model.renaming import renamed
 from trunnion.studio.findings import spoken
 from trunnion.studio.sketch import Sketch
 from trunnion.studio.strokes import NUMBER, free, letter, numbered, refused, rename_point, taken
 
-__all__ = ["add_row", "delete", "put_value", "rename", "renamed"]
+__all__ = ["add_row", "delete", "put_value", "rename"]
 
 Given = Mapping[str, Any]
 SECTIONS = {
@@ -198,51 +199,3 @@ def _key(key: str, section: str, old: str, new: str) -> str:
     if section == "links":
         return f"{new if link == old else link}{dot}{point}"
     return f"{link}{dot}{new if point == old else point}"
-
-
-def renamed(group: Any, section: str, old: str, new: str, way: tuple[str, ...] = ()) -> Any:
-    """The entries with another name in keys and in what speaks of it."""
-    if isinstance(group, dict):
-        named = _named(section, way)
-        return {
-            (new if named and key == old else key): renamed(one, section, old, new, (*way, key))
-            for key, one in group.items()
-        }
-    if isinstance(group, list):
-        return [renamed(one, section, old, new, way) for one in group]
-    return _respoken(group, section, old, new, way) if isinstance(group, str) else group
-
-
-def _named(section: str, way: tuple[str, ...]) -> bool:
-    """Whether the keys of a group are names of the section."""
-    if way == (section,):
-        return True
-    of_joints = way in (("drivers",), ("assembly",)) or (len(way) == 3 and way[0] == "links" and way[2] == "points")
-    return section == "joints" and of_joints
-
-
-def _respoken(text: str, section: str, old: str, new: str, way: tuple[str, ...]) -> str:
-    """A text that speaks of a name, with the new one."""
-    last = way[-1] if way else ""
-    if section in ("loads", "springs", "gears"):
-        return (
-            new
-            if text == old and way[:1] == ("measures",)
-            else re.sub(rf"\b{section}\.{re.escape(old)}(?=\.)", f"{section}.{new}", text)
-        )
-    if section == "links":
-        if last == "between":
-            return re.sub(rf"^{re.escape(old)}(?=\.)", new, text)
-        return new if text == old and last in ("links", "link", "ground") else text
-    if section == "joints":
-        if last == "between":
-            return re.sub(rf"(?<=\.){re.escape(old)}$", new, text)
-        spoken = last in ("frame", "joint", "joints") or (last == "at" and way[0] != "links")  # there it is a place
-        return new if text == old and spoken else text
-    return re.sub(rf"(?<![\w.]){re.escape(old)}(?![\w.])", new, text) if _names_dimensions(way) else text
-
-
-def _names_dimensions(way: tuple[str, ...]) -> bool:
-    """Whether a text of the file may name dimensions: it is neither for readers nor the name of a part."""
-    names_part = way[-1] in ("links", "link", "joint", "joints", "frame", "between", "type")
-    return way[0] not in ("name", "notes", "references") and not names_part and (way[-1] != "at" or way[0] == "links")

@@ -15,8 +15,9 @@ from math import degrees, pi
 from typing import Any
 
 from trunnion.model.quantity import Quantity
+from trunnion.model.renaming import renamed
 from trunnion.model.units import KINDS, unit
-from trunnion.studio.changing import delete, renamed
+from trunnion.studio.changing import delete
 from trunnion.studio.sketch import LIMITS, Sketch, Vector
 from trunnion.studio.strokes import letter, numbered, refused, vector
 

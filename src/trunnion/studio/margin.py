@@ -1,5 +1,5 @@
-"""Locking as the page has it always in view: the margin, its least or why there is none, the joints that lock, what
-can be tried against it, and what each block has to do with it.
+"""Locking as the page has it always in view: the margin, its least or why there is none, and what can be tried
+against it.
 """
 
 from __future__ import annotations
@@ -9,15 +9,13 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from trunnion.errors import Finding, Status
 from trunnion.results.attributes import summary_of
 from trunnion.results.figure import MORE_THAN
-from trunnion.solve.friction_method import MARGIN, FrictionMethod
-from trunnion.solve.run import Run, prepare
-from trunnion.solve.seating import seating_of
-from trunnion.solve.system import Values, felt, scale_of
+from trunnion.solve.friction_method import MARGIN
+from trunnion.solve.system import Values, felt
 from trunnion.studio.loaded import Loaded
 from trunnion.studio.sketch import Sketch
 from trunnion.views.common.cycle import abscissa, names
@@ -25,13 +23,12 @@ from trunnion.views.common.cycle import abscissa, names
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["cures", "locks_of", "margin_of", "margins_without"]
+__all__ = ["cures", "margin_of"]
 
 Array = NDArray[np.float64]
 
 ENOUGH = 0.9  # of the friction at which it just runs: what is tried
 SIZES = {"pin.radius": ENOUGH, "guide.length": 1.0 / ENOUGH}  # a shorter arm, a longer guide
-MOST_BLOCKS = 24  # each of them takes an analysis
 
 
 def margin_of(result: xr.Dataset, rubs: bool) -> dict[str, Any]:
@@ -61,37 +58,6 @@ def margin_of(result: xr.Dataset, rubs: bool) -> dict[str, Any]:
     if figure is not None and figure.aspect != MORE_THAN:
         least = {"value": figure.value, "beyond": False, "at": figure.place.removeprefix("at ")}
     return {"margin": shown, "margin_least": least, "margin_why": None}
-
-
-@np.errstate(all="ignore")
-def locks_of(run: Run, time: Array, status: ArrayLike, values: Values | None = None) -> dict[str, Array]:
-    """Joints that lock at some of the times, with the multiple of the friction at which they do; NaN where they do not.
-
-    It is the joint whose own friction need be lowered the least, and the multiple is of that alone. Where no joint
-    alone can be lowered enough, it is every joint of the group, and the multiple is of all of them.
-    """
-    from trunnion.cycle.locking_course import critical_multiples  # not for the first picture
-
-    lanes = np.flatnonzero(np.asarray(status) == Status.LOCKED)
-    if not len(lanes):
-        return {}
-    method = FrictionMethod(name="newton")
-    seated = run.seats and values is None
-    back = seating_of(run, method).at(time[lanes], method).back if seated else run.solve(time[lanes], values, method)
-    multiples = critical_multiples(back, 1.0)
-    if not multiples:
-        return {}
-    alone = np.array([np.where(multiple < 1.0, multiple, 0.0) for multiple in multiples.values()])
-    columns = {joint: np.full(len(time), np.nan) for joint in multiples}
-    best = np.argmax(alone, axis=0)
-    for number, settled in zip(reversed(range(len(run.system.plan.modules))), back.settled, strict=True):
-        share = np.broadcast_to(np.asarray(settled.share, float), len(lanes))
-        for joint in multiples.keys() & set(run.system.plan.modules[number].joints):
-            row = list(multiples).index(joint)
-            decides = (best == row) & (alone[row] > 0)
-            together = (share < 1.0) & ~(np.max(alone, axis=0) > 0)
-            columns[joint][lanes] = np.where(decides, alone[row], np.where(together, share, np.nan))
-    return {joint: column for joint, column in columns.items() if np.any(np.isfinite(column))}
 
 
 def cures(state: Loaded, finding: Finding) -> list[dict[str, Any]]:
@@ -138,23 +104,3 @@ def _resized(entries: dict[str, Any], numbers: Values, joint: str | None, multip
         length = sketch.length(float(f"{times * before:.3g}"))
         label = f"{key.replace('.', ' ')} of {joint} {sketch.length(before)} → {length}"
         yield {"label": label, "gestures": [{"do": "set", "path": path, "value": length}]}
-
-
-def margins_without(run: Run, steps: int) -> list[Array | None]:
-    """For each block the locking margin over the cycle without the friction of its joints; None where a law has no
-    number that takes it away, and of very many blocks.
-    """
-    from trunnion.cycle.positions import positions  # not for the first picture
-
-    modules, mechanism = run.system.plan.modules, run.system.mechanism
-    rubs, margins = felt(run.system, run.values), list[Array | None]()
-    for module in modules:
-        scales = {joint: scale_of(run.system, run.values, joint) for joint in module.joints if joint in rubs}
-        if len(modules) > MOST_BLOCKS or not all(scales.values()):
-            margins.append(None)
-            continue
-        quiet = mechanism.with_values({f"joints.{joint}.friction.{scale}": 0.0 for joint, scale in scales.items()})
-        with np.errstate(all="ignore"):
-            margin = positions(prepare(quiet), steps, averaged=False).arrays["locking_margin"]
-        margins.append(np.minimum(margin, MARGIN))
-    return margins

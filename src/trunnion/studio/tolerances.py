@@ -4,32 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.namespace import Number
-from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import chosen, outputs
-from trunnion.model.measure_kinds import dimension_kinds
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import quantity
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.shifts import play_of
+from trunnion.studies.tolerance.corner import worst_corner
+from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.views.cycle.scene import scene
 
-if TYPE_CHECKING:
-    from trunnion.studies.tolerance.first_order import ToleranceStudy
-    from trunnion.studies.tolerance.linear import Of
-
-__all__ = ["measured", "worst_corner"]
-
-Array = NDArray[np.float64]
-
-SIDES = ("least", "largest")
-ROUNDS, AROUND = 4, 17  # in which the place is looked for, and places about it in each
+__all__ = ["corner_of", "measured"]
 
 
 def measured(run: Run) -> dict[str, list[str]]:
@@ -46,74 +35,29 @@ def measured(run: Run) -> dict[str, list[str]]:
 
 
 @np.errstate(all="ignore")
-def worst_corner(mechanism: Mechanism, name: str, side: str | None, steps: int) -> dict[str, Any]:
-    """Return the corner at which a measure is least or largest, or whichever of both is farther from nominal.
-
-    Pins that loads would press to one side may lie anywhere in their holes, as in `tolerance --seat free`.
+def corner_of(mechanism: Mechanism, name: str, side: str | None, steps: int) -> dict[str, Any]:
+    """Return the worst corner for a measure as the page shows it.
 
     Returns
     -------
     dict
-        values: least and largest deviation, SI, as the search of `tolerance` has them, and their texts; side: the
-        shown one, 0 or 1; index, at: position nearest to where it stands, and that in words, None of a figure of the
-        whole cycle; rows: numbers that matter, [name, nominal, change]; scene: of the mechanism there, its errors
-        being those against the nominal one.
+        values: least and largest deviation, SI, and their texts; side: the shown one, 0 or 1; index, at: position
+        nearest to where it stands, and that in words, None of a figure of the whole cycle; rows: numbers that matter,
+        [name, nominal, change]; scene: of the mechanism there, its errors being those against the nominal one.
     """
-    from trunnion.studies.tolerance.effects import NOBODY, EffectRow  # not for the first picture
-    from trunnion.studies.tolerance.first_order import study
-    from trunnion.studies.tolerance.linear import searched
-
-    if "loaded" in mechanism.seated.values():
-        mechanism = mechanism.with_seats("free")
-    prepared = study(mechanism, [name], steps)
-    run, (of,), effects = prepared.run, prepared.linear.measures, prepared.effects
-    ends = searched(prepared.many, prepared.linear, of)
-    values = [corner.value for corner in ends]
-    if not np.all(np.isfinite(values)):
-        raise MechanismError(Finding("has no worst corner: the figure is undefined", f"measures.{name}"))
-    shown = SIDES.index(side) if side in SIDES else int(abs(values[1]) >= abs(values[0]))
-    corner = ends[shown]
-    there = replace(effects, rows=(EffectRow(NOBODY, 0, {}, ""),)).values(corner.at)
-    numbers = {path: float(np.ravel(primal(number))[0]) for path, number in there.items()}
-    unit = of.measure.figure_unit(run.system, run.values)
-    time, index = _place(prepared, of, there, 2 * shown - 1, run.cycle.times(steps))
-    dimensions = {f"dimensions.{dimension}": kind for dimension, kind in dimension_kinds(mechanism).items()}
-    kinds = {**mechanism.parameter_kinds(), **dimensions}
-    rows = []
-    for i, tolerance in enumerate(prepared.inputs.tolerances):
-        if of.figure.spread.half[i] == 0:
-            continue  # it does nothing to the measure
-        kind, nominal = kinds.get(tolerance.path), effects.nominal(i)
-        of_number = kind.unit if kind else "m"
-        rows.append(
-            [tolerance.path, quantity(nominal, of_number), signed(numbers[tolerance.path] - nominal, of_number)]
-        )
+    corner = worst_corner(mechanism, name, side, steps)
+    run, time = corner.prepared.run, corner.time
+    whole = not np.isfinite(time)
     return {
-        "values": values,
-        "texts": [signed(value, unit) for value in values],
-        "side": shown,
-        "index": index,
-        "at": None if index is None else run.system.dial(run.values, np.array([time])).at(0),
-        "rows": rows,
-        "scene": _scene(prepared, numbers, steps),
-    }
-
-
-def _place(prepared: ToleranceStudy, of: Of, there: Mapping[str, Number], sign: int, times: Array) -> Any:
-    """Time, s, at which a figure stands at its corner, and the nearest position; None of one of the whole cycle."""
-    time = of.time
-    if of.measure.rule == "deviation" and len(of.reference.parts) == 1:
-        at = of.reference.window.time
-        for _ in range(ROUNDS):
-            courses = (prepared.kernel.courses(numbers, at)[0] for numbers in (there, prepared.inputs.nominal))
-            moved, nominal = (np.ravel(primal(course[of.measure.name][0])) for course in courses)
-            change = np.broadcast_to(moved - nominal, at.shape)
-            if of.reference.turning:
-                change = change - 2 * np.pi * np.round(change / (2 * np.pi))
-            top = int(np.nanargmax(sign * change))
-            time, last = float(at[top]), len(at) - 1
-            at = np.linspace(at[max(top - 1, 0)], at[min(top + 1, last)], AROUND if last else 1)
-    return (time, int(np.argmin(np.abs(times - time)))) if np.isfinite(time) else (None, None)
+        "values": list(corner.deviations),
+        "texts": [_signed(value, corner.unit) for value in corner.deviations],
+        "side": corner.side,
+        "index": None if whole else int(np.argmin(np.abs(run.cycle.times(steps) - time))),
+        "at": None if whole else run.system.dial(run.values, np.array([time])).at(0),
+        "rows": [[path, quantity(nominal, unit), _signed(there - nominal, unit)]
+                 for path, unit, nominal, there in corner.rows],
+        "scene": _scene(corner.prepared, corner.numbers, steps),
+    }  # fmt: skip
 
 
 def _scene(prepared: ToleranceStudy, numbers: Mapping[str, float], steps: int) -> dict[str, Any]:
@@ -139,6 +83,6 @@ def _scene(prepared: ToleranceStudy, numbers: Mapping[str, float], steps: int) -
     return shown
 
 
-def signed(value: float, unit: str) -> str:
+def _signed(value: float, unit: str) -> str:
     """A change with its sign and unit."""
     return f"{'−' if value < 0 else '+'}{quantity(abs(float(value)), unit)}"

@@ -22,9 +22,18 @@ Array = NDArray[np.float64]
 def locks_of(run: Run, time: Array, status: ArrayLike, values: Values | None = None) -> dict[str, Array]:
     """Joints that lock at some of the times, with the multiple of the friction at which they do; NaN where they do not.
 
-    time: s; status: at each of them; values: other numbers than those of the run. It is the joint whose own
-    friction need be lowered the least, and the multiple is of that alone. Where no joint alone can be lowered enough, it
-    is every joint of the group, and the multiple is of all of them.
+    It is the joint whose own friction need be lowered the least, and the multiple is of that alone. Where no joint
+    alone can be lowered enough, it is every joint of the group, and the multiple is of all of them.
+
+    Parameters
+    ----------
+    run : Run
+    time : array
+        s.
+    status : array
+        That of the run at each of them.
+    values : mapping, optional
+        Other numbers than those of the run, SI, by path.
     """
     lanes = np.flatnonzero(np.asarray(status) == Status.LOCKED)
     if not len(lanes):

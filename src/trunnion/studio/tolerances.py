@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,9 +14,10 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import quantity
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.shifts import play_of
-from trunnion.studies.tolerance.corner import worst_corner
-from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.views.cycle.scene import scene
+
+if TYPE_CHECKING:
+    from trunnion.studies.tolerance.first_order import ToleranceStudy
 
 __all__ = ["corner_of", "measured"]
 
@@ -45,6 +46,8 @@ def corner_of(mechanism: Mechanism, name: str, side: str | None, steps: int) -> 
         nearest to where it stands, and that in words, None of a figure of the whole cycle; rows: numbers that matter,
         [name, nominal, change]; scene: of the mechanism there, its errors being those against the nominal one.
     """
+    from trunnion.studies.tolerance.corner import worst_corner  # it takes long to load
+
     corner = worst_corner(mechanism, name, side, steps)
     run, time = corner.prepared.run, corner.time
     whole = not np.isfinite(time)

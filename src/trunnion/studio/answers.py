@@ -30,25 +30,35 @@ from trunnion.results.scales import without_noise
 from trunnion.results.tables import selected
 from trunnion.solve.assembly_modes import choices
 from trunnion.solve.backward import Backward
+from trunnion.solve.forward import Forward
 from trunnion.solve.run import prepare
+from trunnion.studies.design import instant_centres, transmission_angles
 from trunnion.studio.acting import bar_mass, centre, driver, gear, load, spring
 from trunnion.studio.blocks import blocks_of
 from trunnion.studio.changing import add_row, delete, put_value, rename
 from trunnion.studio.exports import exported
-from trunnion.studio.figures import figures
-from trunnion.studio.findings import missing, reached, readiness, remedied, sentence, spoken
+from trunnion.studio.findings import (
+    cures,
+    figures,
+    margin_of,
+    missing,
+    reached,
+    readiness,
+    remedied,
+    sentence,
+    spoken,
+)  # fmt: skip
 from trunnion.studio.group import group
 from trunnion.studio.live import live_columns, live_margin, places_at, solved_with
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
-from trunnion.studio.margin import cures, margin_of
-from trunnion.studio.message import packed
-from trunnion.studio.overlays import centres, seats, transmission
-from trunnion.studio.placed import plain, tracks
+from trunnion.studio.message import Exact, packed
+from trunnion.studio.placed import column, plain, tracks
 from trunnion.studio.sketch import Sketch, Vector
 from trunnion.studio.strokes import add_point, held, join, link, lock, move, pinned, slide, vector
 from trunnion.studio.tolerances import corner_of, measured
 from trunnion.studio.wiring import block
 from trunnion.version import __version__
+from trunnion.views.cycle.deviations import seated
 from trunnion.views.cycle.scene import scene
 from trunnion.views.space.bodies import gathered
 
@@ -60,6 +70,7 @@ __all__ = ["ANSWERS", "answer", "examples"]
 Array = NDArray[np.float64]
 
 MOST_OTHERS = 3  # assemblies
+MOST_LINKS = 12  # whose instant centres against each other are told; of more only those against the ground
 MOST_BLOCKS = 24  # whose share of the margin is told: each takes an analysis
 KEPT = 1e-2  # of the size: a locked joint that stays may be off by as much as a position is fine
 
@@ -344,12 +355,45 @@ def _layers(asked: Asked) -> dict[str, Any]:
     layers: dict[str, Any] = _columns(result, asked)
     if run.system.mechanism.space == "planar":
         if "seats" in wanted:
-            layers["seats"] = seats(result)
+            layers["seats"] = _seats(result)
         if wanted & {"centres", "transmission"}:
             walk = solved_with(run, {}, asked.steps).walk
-            shown = {"centres": centres, "transmission": transmission}
+            shown = {"centres": _centres, "transmission": _transmission}
             layers |= {name: tell(walk, asked.steps) for name, tell in shown.items() if name in wanted}
     return layers
+
+
+def _centres(walk: Forward, steps: int) -> list[dict[str, Any]]:
+    """Instant centres of the pairs of links; `ground`: whether one of them is it."""
+    ground = walk.system.mechanism.fixed_link
+    return [
+        {**vars(one), "ground": ground in one.pair, "far": one.far and dict(zip("xy", one.far, strict=True))}
+        for one in instant_centres(walk, steps, MOST_LINKS)
+    ]
+
+
+def _seats(result: xr.Dataset) -> list[dict[str, Any]]:
+    """Of each joint with a seat, at each end: offset of the pin from the middle of its hole, m, and force of the pin on
+    the hole, N, both in the hole's axes.
+    """
+    return [
+        {
+            "joint": one.joint, "kind": one.kind, "clearance": one.clearance, "length": one.length,
+            "ends": [{what: {axis: Exact(row) for axis, row in zip("xy", rows, strict=True)}
+                      for what, rows in (("offset", offset), ("force", force))}
+                     for offset, force in zip(one.offsets, one.forces, strict=True)],
+        }
+        for one in seated(result)
+    ]  # fmt: skip
+
+
+@np.errstate(all="ignore")
+def _transmission(walk: Forward, steps: int) -> list[dict[str, Any]]:
+    """Transmission angle of each dyad, rad, 0 … π/2, and its middle joint."""
+    middle = {"-".join(module.joints): module.joints[1:2] for module in walk.system.plan.modules}
+    angles = transmission_angles(walk)
+    return [{"name": name, "joint": joint, "angle": column(angle, steps)}
+            for name, angle in angles.items() for joint in middle[name]]  # fmt: skip
 
 
 def _blocks(asked: Asked) -> dict[str, Any]:

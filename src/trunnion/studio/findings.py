@@ -1,26 +1,40 @@
-"""What the page says of a model: findings in the words of the sheet, what it can be asked, what it still lacks."""
+"""What the page says of a model: its figures and its locking margin; findings in the words of the sheet, what can be
+tried against them, what the model can be asked and what it still lacks.
+"""
 
 from __future__ import annotations
 
+import copy
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from trunnion.errors import Finding, Severity, Status, counted
+from trunnion.measures.many import figures_of
+from trunnion.measures.measures import Measure, outputs
 from trunnion.model.joint_parts import has_play
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import summary_of, units_of
+from trunnion.results.figure import MORE_THAN, Figure
+from trunnion.results.quantities import quantity
 from trunnion.results.variables import VARIABLES
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import prepare
-from trunnion.solve.system import rubbing
+from trunnion.solve.system import Values, felt, rubbing
+from trunnion.studio.loaded import Asked, Loaded
 from trunnion.studio.sketch import Sketch
+from trunnion.views.common.cycle import abscissa, names
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["missing", "reached", "readiness", "remedied", "sentence", "spoken"]
+__all__ = ["cures", "figures", "margin_of", "missing", "reached", "readiness", "remedied", "sentence", "spoken"]
 
+ENOUGH = 0.9  # of the friction at which it just runs: what is tried
+SIZES = {"pin.radius": ENOUGH, "guide.length": 1.0 / ENOUGH}  # a shorter arm, a longer guide
 NOUNS = {
     "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair",
     "dimensions": "dimension", "loop": "joint", "measures": "measure", "tables": "table",
@@ -36,6 +50,75 @@ REACHED = {
     "spring.undefined": Status.LOAD_UNDEFINED, "position.singular": Status.SINGULAR,
     "assembly.open": Status.NOT_ASSEMBLED,
 }  # fmt: skip
+
+
+# ---- figures and margin --------------------------------------------------------------------------------------------
+
+
+def figures(asked: Asked) -> list[dict[str, Any]]:
+    """The figures one looks at first, without those of the solution: of the result, and time ratios.
+
+    Returns
+    -------
+    list
+        name: by which that of another model is found; label; title: without its place; text: with its unit; value: SI,
+        None where there is none, or nothing but a bound.
+    """
+    units = units_of(asked.result)
+    found = [one for one in summary_of(asked.result) if not one.numerical]
+    ratios = [Figure(f"{joint}.time_ratio", f"time ratio of {joint}", ratio) for joint, ratio in _ratios(asked.state)]
+    rows = []
+    for one in (*found, *ratios):
+        bound = one.aspect == MORE_THAN
+        text = one.value if isinstance(one.value, str) else quantity(one.value, one.unit, units) or "—"
+        rows.append({
+            "name": one.name,
+            "label": one.label,
+            "title": ", ".join(part for part in (one.subject, "minimum" if bound else one.aspect) if part),
+            "text": f"> {text}" if bound else text,
+            "value": None if bound or isinstance(one.value, str) else one.value,
+        })  # fmt: skip
+    return rows
+
+
+@lru_cache(maxsize=8)
+def _ratios(state: Loaded) -> tuple[tuple[str, float], ...]:
+    """Time ratios of what slides on the ground, or where nothing does of what turns back on it."""
+    run = state.run
+    found = [] if run.seats or run.cycle.duration <= 0 else outputs(run.system)
+    found = [one for one in found if one.kind == "slide"] or found
+    measures = [Measure(one.subject, "time_ratio", one.subject) for one in found]
+    ratios = figures_of(run, measures, FrictionMethod()) if measures else {}
+    return tuple((joint, float(ratio)) for joint, ratio in ratios.items() if np.isfinite(ratio))
+
+
+def margin_of(result: xr.Dataset, rubs: bool) -> dict[str, Any]:
+    """The locking margin over the cycle, the least and where it is; where there is none, `margin_why` says why.
+
+    It is the multiple of the friction at which a position locks: 1 and less where it locks, at most MARGIN; `beyond`:
+    it is more everywhere. Positions that cannot be assembled have none, nor has a mechanism whose joints carry nothing.
+    The least is the figure of the cycle where the result has that, else that of the positions.
+    """
+    margin = np.where(result["status"].values <= Status.LOCKED, result["locking_margin"].values, np.nan)
+    reactions = np.concatenate([np.ravel(result[name].values) for name in ("reaction_force", "reaction_moment")])
+    why = None
+    if not rubs:
+        why = "no friction"
+    elif not names(result, "driver"):
+        why = "no driver"
+    elif np.all(np.isnan(margin)):
+        why = "no position is solved"
+    elif not np.any(np.nan_to_num(reactions)):
+        why = "nothing loads its joints"
+    if why is not None:
+        return {"margin": None, "margin_least": None, "margin_why": why}
+    index = int(np.flatnonzero(margin == np.nanmin(margin))[0])  # `nanargmin` takes a nan for inf
+    beyond, shown = bool(margin[index] > MARGIN), np.minimum(margin, MARGIN)
+    least = {"value": float(shown[index]), "beyond": beyond, "at": abscissa(result).say(index)}
+    figure = next((one for one in summary_of(result) if one.name == "locking_margin" and one.value is not None), None)
+    if figure is not None and figure.aspect != MORE_THAN:
+        least = {"value": figure.value, "beyond": False, "at": figure.place.removeprefix("at ")}
+    return {"margin": shown, "margin_least": least, "margin_why": None}
 
 
 # ---- in words -----------------------------------------------------------------------------------------------------
@@ -84,6 +167,51 @@ def reached(finding: Finding, result: xr.Dataset) -> int | None:
         return None
     margins = np.nan_to_num(result["locking_margin"].values[places], nan=np.inf)
     return int(places[np.argmin(margins) if finding.code == "friction.locked" else 0])
+
+
+# ---- what can be tried --------------------------------------------------------------------------------------------
+
+
+def cures(state: Loaded, finding: Finding) -> list[dict[str, Any]]:
+    """What the remedy of a locked position comes to in numbers: gestures that write it, with the words for them."""
+    facts, entries, numbers = finding.figures, dict(state.entries or {}), state.run.values
+    joints = entries.get("joints")
+    if finding.code != "friction.locked" or not isinstance(joints, Mapping):
+        return []
+    coefficients = {joint: f"joints.{joint}.friction.coefficient" for joint in felt(state.run.system, numbers)}
+    coefficients = {joint: path for joint, path in coefficients.items() if path in numbers}
+    alike = facts["whole"] >= (1 - 1e-3) * facts["share"]  # else other joints lock where these no longer do
+    trials = [(list(facts["joints"]) if alike else list(coefficients), min(facts["share"], facts["whole"]))]
+    decides, multiple = facts["decides"], facts["multiple"]
+    if decides and multiple and trials[0][0] != [decides]:
+        trials.insert(0, ([decides], multiple))
+    listed = []
+    for chosen, times in trials:
+        if times > 0 and all(joint in coefficients and isinstance(joints.get(joint), Mapping) for joint in chosen):
+            befores = [float(np.ravel(numbers[coefficients[joint]])[0]) for joint in chosen]
+            values = [float(f"{ENOUGH * times * before:.3g}") for before in befores]
+            stated = [isinstance(joints[joint].get("friction", {}), Mapping) for joint in chosen]
+            gestures = [{"do": "set", "path": ["joints", joint, "friction", *["coefficient"] * inside], "value": value}
+                        for joint, inside, value in zip(chosen, stated, values, strict=True)]  # fmt: skip
+            change = f"{befores[0]:.3g} → {values[0]:.3g}" if len(chosen) == 1 else f"× {ENOUGH * times:.3g}"
+            what = f"friction coefficient{'s' * (len(chosen) > 1)} of {', '.join(chosen)}"
+            listed.append({"label": f"{what} {change}", "gestures": gestures})
+    return listed + list(_resized(entries, numbers, decides, multiple))
+
+
+def _resized(entries: dict[str, Any], numbers: Values, joint: str | None, multiple: float) -> Iterator[dict[str, Any]]:
+    """The radius and length by which the friction of a joint is as much less as it need be, where they are stated."""
+    sketch = Sketch(copy.deepcopy(entries))
+    for key, enough in SIZES.items():
+        path = ["joints", str(joint), *key.split(".")]
+        part = entries["joints"].get(joint, {}).get(path[2], {})
+        if ".".join(path) not in numbers or not isinstance(part, Mapping) or "fit" in part:
+            continue  # a fit states the radius
+        before = float(np.ravel(numbers[".".join(path)])[0])
+        times = enough * (multiple if key == "pin.radius" else 1.0 / multiple)
+        length = sketch.length(float(f"{times * before:.3g}"))
+        label = f"{key.replace('.', ' ')} of {joint} {sketch.length(before)} → {length}"
+        yield {"label": label, "gestures": [{"do": "set", "path": path, "value": length}]}
 
 
 # ---- what it can be asked -----------------------------------------------------------------------------------------

@@ -267,6 +267,22 @@ if CHROMIUM:
         user.until("s.solved.value")
         assert page.locator(".formula .term").all_inner_texts() == ["I(0,1)R", "II(2,3)RRR"]
 
+    def test_a_cardan_joint_is_built_of_two_blocks(user):
+        page = user.page
+        user.new_sheet()
+        page.get_by_role("tab", name="Blocks").click()
+        page.get_by_label("Place of pin 1").fill("0 mm, 0 mm")
+        page.get_by_role("button", name="Place the block").press("Enter")
+        user.until("Object.keys(s.answer.value?.entries?.links ?? {}).length === 2")
+        page.get_by_label("Kind of block").select_option("CCC")
+        assert page.get_by_label("Place of pin 1").count() == 0
+        page.get_by_label("Angle between the shafts").fill("40 deg")
+        page.get_by_role("button", name="Place the block").press("Enter")
+        user.until("s.solved.value && s.spatial.value")
+        assert page.locator(".formula .term").all_inner_texts() == ["I(0,1)R", "II(2,3)CCC"]
+        assert user.state("s.answer.value.entries.loop")[3]["twist"] == "140 deg"
+        assert page.get_by_label("Kind of block").count() == 0  # blocks of the plane
+
     def test_the_scrub_track_is_red_where_it_is_near_to_locking(user):
         text = EXAMPLES["drawing-press"]
         opened(user, text.replace("friction: 0.1", "friction: 0.3"))

@@ -361,7 +361,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         assert Path(download.value.path()).read_bytes() == drawn[90] != drawn[0]
 
     @pytest.mark.slow
-    @pytest.mark.parametrize("what", ["CSV", "PNG", "SVG", "GIF", "Report", "Python"])
+    @pytest.mark.parametrize("what", ["CSV", "PNG", "SVG", "GIF", "Report"])
     def test_files_are_had(user, what):
         user.page.click("summary:has-text('Export')")
         with user.page.expect_download(timeout=60000) as told:

@@ -260,7 +260,7 @@ function Palette() {
     const ends = Array.from({ length: fields }, (_, order) => (count && there(order) ? there(order) : { ground: typed.ground[order] }));
     if (!(await edit([{ do: "block", kind, pins: ends, at: typed.at, ratio: typed.ratio }]))) return;
     setTyped({ ...typed, at: "" });
-    sheet.fit();
+    if (!state.spatial.value) sheet.fit();
   };
   const inner = { driver: "End at", RPR: "End at", RPP: "Guide at", CCC: "Angle between the shafts", triad: "Middle at" }[kind] ?? "Inner pin at";
   return html`<form class="palette" aria-label="Add a block" onSubmit=${place}>

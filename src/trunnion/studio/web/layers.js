@@ -44,11 +44,12 @@ export const columnsOf = (point) => (point ? RATES.flatMap((rate) => ["x", "y", 
 
 /** Velocity, m/s, and acceleration, m/s², of a point by axis, from columns; null where there are none. */
 export function motionOf(columns, point) {
-  const parts = RATES.map((rate) => [rate, Object.fromEntries(["x", "y", "z"].flatMap((axis) => {
+  const parts = (rate) => Object.fromEntries(["x", "y", "z"].flatMap((axis) => {
     const column = columns[`${point}.${rate}_${axis}`];
     return column ? [[axis, column.values]] : [];
-  }))]); // prettier-ignore
-  return "x" in parts[0][1] ? { key: point, ...Object.fromEntries(parts) } : null;
+  })); // prettier-ignore
+  const [velocity, acceleration] = RATES.map(parts);
+  return velocity.x ? { key: point, velocity, acceleration } : null;
 }
 
 /**

@@ -3,7 +3,7 @@
 import { effect, signal, untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { lineChart } from "../web/chart.js";
-import { at, full, magnitude, say as position } from "../web/data.js";
+import { full, magnitude, say as position } from "../web/data.js";
 import { quantity } from "../web/format.js";
 import { polarChart } from "../web/polar.js";
 import { charts } from "../web/report.js";

@@ -52,7 +52,7 @@ def test_the_kernel_answers_as_the_server_does(widget) -> None:
     np.testing.assert_allclose(found["scene"]["drivers"][0]["effort"], effort, rtol=1e-5)
     for path, status in (
         ("/files", 200),
-        ("/first/mechanism.yaml", 200),
+        ("/file/mechanism.yaml", 200),
         ("/thumbnail/jansen", 200),
         ("/import/a.step", 404),
     ):

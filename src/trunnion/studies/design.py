@@ -12,7 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra import plane
 from trunnion.algebra.course import Accuracy, Courses, Place
+from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import CANCELLED, GAUSS_WEIGHTS, INTEGRAL, ON_GAUSS
 from trunnion.cycle.course import Mean, course_of, magnitude
@@ -31,6 +33,7 @@ from trunnion.solve.status import pose_status
 from trunnion.solve.switches import Mechanisms, knots_of
 
 __all__ = [
+    "Centre",
     "Counterweight",
     "Design",
     "Extremes",
@@ -40,6 +43,7 @@ __all__ = [
     "design",
     "grashof",
     "instant_centre",
+    "instant_centres",
     "limits",
     "motor",
     "pressure_angles",
@@ -52,6 +56,8 @@ Array = NDArray[np.float64]
 
 EXACT = Accuracy(1e-12, 1e-14, shortest=1e-14)  # of the motion alone: dead centres and limits
 RESTS = 1e-9  # of the mean rate of a driver: less is none
+FAR = 1e4  # sizes of the mechanism: an instant centre farther away lies at infinity
+AT_REST = 1e-9  # of the speeds typical of the mechanism: slower than this two links move as one
 BESIDE = 1e-6  # of the cycle: before and after a place at which a link may turn back
 
 
@@ -208,6 +214,52 @@ def instant_centre(walk: Forward, first: str, second: str) -> tuple[Array, Array
     w = np.asarray(two.twist.w - base.twist.w, float)
     with np.errstate(all="ignore"):
         return -(two.twist.y - base.twist.y) / w, (two.twist.x - base.twist.x) / w
+
+
+@dataclass(frozen=True)
+class Centre:
+    """Instant centre of two links over a walk: x, y, m, where they have the same velocity.
+
+    Where it lies at infinity, for the two turn alike, x, y are NaN and `far` is the unit vector (x, y) towards it;
+    where they move as one there is neither. `joint`: the revolute that holds the two, in which the centre stays.
+    """
+
+    pair: tuple[str, str]
+    joint: str | None
+    x: Array
+    y: Array
+    far: tuple[Array, Array] | None
+
+
+@np.errstate(all="ignore")
+def instant_centres(walk: Forward, count: int, most: int) -> list[Centre]:
+    """Return the instant centre of each pair of links, those of the ground first.  [Norton, Design of Machinery]
+
+    count: positions of the walk; most: links whose centres against each other are told; of more only those against the
+    ground.
+    """
+    mechanism = walk.system.mechanism
+    links = sorted(mechanism.links, key=lambda link: link != mechanism.fixed_link)
+    held = {frozenset(ends): name for name, (kind, ends) in walk.system.joints.items() if kind == "revolute"}
+    pairs = [(a, b) for i, a in enumerate(links) for b in links[i + 1 :] if i == 0 or len(links) <= most]
+    return [_centre(walk, pair, held.get(frozenset(pair)), count) for pair in pairs]
+
+
+def _centre(walk: Forward, pair: tuple[str, str], joint: str | None, count: int) -> Centre:
+    one, two = (walk.motions[link] for link in pair)
+    # velocity of the second against the first at the second's origin; the centre lies across it
+    speeds = plane.velocity_at(plane.minus(two.twist, one.twist), two.frame[:2])
+    numbers = (*instant_centre(walk, *pair), *speeds, two.twist.w - one.twist.w, walk.size, walk.pace)
+    x, y, vx, vy, turn, size, pace = (np.broadcast_to(np.asarray(primal(part), float), (count,)) for part in numbers)
+    speed = np.hypot(vx, vy)
+    still = (np.abs(turn) <= AT_REST * pace) & (speed <= AT_REST * pace * size)
+    away = ~(np.hypot(x, y) <= FAR * size) & (speed > AT_REST * pace * size)
+    x, y = (np.where(away | still, np.nan, part) for part in (x, y))
+    if not np.any(away):
+        return Centre(pair, joint, x, y, None)
+    sign = np.where(turn < 0, -1.0, 1.0)
+    far = (np.where(away, part / speed, np.nan) for part in (-sign * vy, sign * vx))
+    return Centre(pair, joint, x, y, (next(far), next(far)))
 
 
 def curvature(walk: Forward, link: str, point: str) -> Array:

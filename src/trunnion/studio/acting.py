@@ -8,9 +8,9 @@ from itertools import combinations
 from math import atan2, degrees, dist, hypot
 from typing import Any
 
-from trunnion.model.units import KINDS, UnitError
-from trunnion.studio.ends import begin, numbered, point_of, refused, typed, vector
+from trunnion.model.units import KINDS
 from trunnion.studio.sketch import Sketch, Vector
+from trunnion.studio.strokes import begin, numbered, point_of, refused, typed, vector
 
 __all__ = ["bar_mass", "centre", "driver", "gear", "load", "spring"]
 
@@ -129,12 +129,8 @@ def _bar(sketch: Sketch, link: str) -> tuple[float, Vector]:
 
 def _above_zero(text: Any, key: str, kind: str) -> float:
     """A quantity that was typed, in SI."""
-    try:
-        value = typed(text, kind)
-    except (UnitError, ValueError, TypeError) as error:
-        remedy = getattr(error, "remedy", "") or f"type it as {KINDS[kind].example}"
-        raise refused(f"'{str(text or '')[:30]}' is no {kind}", f"the {key}", remedy) from None
-    if not 0 < value < float("inf"):
+    value = typed(text, kind, f"the {key}")
+    if value <= 0:
         raise refused("is not above 0", f"the {key}", f"type it as {KINDS[kind].example}")
     return value
 

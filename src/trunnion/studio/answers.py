@@ -19,32 +19,45 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.cycle.locks import locks_of, margins_without
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.file import text_of
+from trunnion.model.mechanism import Mechanism
 from trunnion.model.rewrite import changed_text
-from trunnion.results.attributes import findings_of, summary_of, units_of
-from trunnion.results.quantities import quantity
+from trunnion.results.attributes import findings_of
 from trunnion.results.scales import without_noise
 from trunnion.results.tables import selected
-from trunnion.solve.system import rubbing
-from trunnion.studio.assemblies import other_assemblies
+from trunnion.solve.assembly_modes import choices
+from trunnion.solve.forward import Forward
+from trunnion.solve.run import prepare
+from trunnion.studies.design import instant_centres, transmission_angles
+from trunnion.studio.acting import bar_mass, centre, driver, gear, load, spring
 from trunnion.studio.blocks import blocks_of
-from trunnion.studio.ends import held, vector
+from trunnion.studio.changing import add_row, delete, put_value, rename
 from trunnion.studio.exports import exported
-from trunnion.studio.gestures import done
+from trunnion.studio.findings import (
+    cures,
+    figures,
+    margin_of,
+    missing,
+    reached,
+    readiness,
+    remedied,
+    sentence,
+    spoken,
+)  # fmt: skip
+from trunnion.studio.group import group
 from trunnion.studio.live import Live, live_in_space, places_at, uncollected
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
-from trunnion.studio.margin import cures, locks_of, margin_of, margins_without
-from trunnion.studio.message import packed
-from trunnion.studio.overlays import centres, circles, place_motion, point_motion, seats, transmission
-from trunnion.studio.placed import plain, tracks
-from trunnion.studio.readiness import missing, readiness
+from trunnion.studio.message import Exact, packed
+from trunnion.studio.placed import column, plain, tracks
 from trunnion.studio.sketch import Sketch, Vector
-from trunnion.studio.tolerances import measured, tolerated, worst_corner
-from trunnion.studio.variants import overlaid
-from trunnion.studio.words import remedied, spoken
+from trunnion.studio.strokes import add_point, held, join, link, lock, move, pinned, slide, vector
+from trunnion.studio.tolerances import corner_of, measured
+from trunnion.studio.wiring import block
 from trunnion.version import __version__
+from trunnion.views.cycle.deviations import seated
 from trunnion.views.cycle.scene import scene
 from trunnion.views.space.bodies import gathered
 
@@ -55,6 +68,9 @@ __all__ = ["ANSWERS", "answer", "examples"]
 
 Array = NDArray[np.float64]
 
+MOST_OTHERS = 3  # assemblies
+MOST_LINKS = 12  # whose instant centres against each other are told; of more only those against the ground
+MOST_BLOCKS = 24  # whose share of the margin is told: each takes an analysis
 KEPT = 1e-2  # of the size: a locked joint that stays may be off by as much as a position is fine
 
 
@@ -75,15 +91,10 @@ def answer(request: bytes, turn: AbstractContextManager[object] | None = None) -
         with nullcontext() if turn is None or about in BESIDE else turn:
             return packed(head | about(asked))
     except MechanismError as error:
-        return packed(head | {"error": "; ".join(_sentence(one) for one in error.findings[:3])})
+        return packed(head | {"error": "; ".join(sentence(one) for one in error.findings[:3])})
     except Exception as error:  # whatever it is: whoever asked gets a sentence, and can go on asking
         why = f"{type(error).__name__}: {str(error)[:300]}"
         return packed(head | {"error": f"The question cannot be answered ({why})"})
-
-
-def _sentence(finding: Finding) -> str:
-    remedy = f"— {remedied(finding.remedy)}" if finding.remedy else ""
-    return " ".join(part for part in (spoken(finding.where), finding.what, remedy) if part)
 
 
 # ---- what there is to begin with --------------------------------------------------------------------------------
@@ -166,15 +177,9 @@ def _cycle(asked: Asked) -> dict[str, Any]:
     result, told = _solved(asked, lambda: asked.result)
     if result is None:
         return told
-    units = units_of(result)
-    figures = {
-        one.label: one.value if isinstance(one.value, str) else quantity(one.value, one.unit, units) or "—"
-        for one in summary_of(result)
-        if not one.numerical
-    }
-    figures |= dict(row for way in asked.state.ways(asked.steps) for row in way.rows)
+    rows = [[one["label"], one["text"]] for one in figures(asked)]
     least = margin_of(result, asked.rubs)["margin_least"]
-    return told | {"figures": [[label, value] for label, value in figures.items()], "margin_least": least}
+    return told | {"figures": rows, "margin_least": least}
 
 
 def _solved(asked: Asked, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset | None, dict[str, Any]]:
@@ -192,33 +197,19 @@ def _solved(asked: Asked, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset |
     return result, {"findings": [_row(state, one, result) for one in findings], "missing": lacks, "ready": ready}
 
 
-# what positions have that findings speak of
-REACHED = {
-    "friction.interval": Status.ZERO_SLIP, "position.near_singular": Status.NEAR_SINGULAR,
-    "contact.lost": Status.CONTACT_LOST, "friction.not_converged": Status.NOT_CONVERGED,
-    "friction.locked": Status.LOCKED, "load.undefined": Status.LOAD_UNDEFINED,
-    "spring.undefined": Status.LOAD_UNDEFINED, "position.singular": Status.SINGULAR,
-    "assembly.open": Status.NOT_ASSEMBLED,
-}  # fmt: skip
-
-
 def _row(state: Loaded, one: Finding, result: xr.Dataset | None) -> dict[str, Any]:
     """A finding as the page has it: with the part that it is about, its line, and a position at which it holds."""
     section, _, names = one.where.replace(" ", ".", 1).partition(".")  # "links coupler, rocker"
     joint = one.figures.get("decides") or next(iter(one.figures.get("joints") or ()), None)
     part = f"joints.{joint}" if joint else f"{section}.{names.split(', ')[0]}" if names else one.where
-    index = None
-    if result is not None and len(there := np.flatnonzero(result["status"].values == REACHED.get(one.code, -1))):
-        margins = np.nan_to_num(result["locking_margin"].values[there], nan=np.inf)
-        index = int(there[np.argmin(margins) if one.code == "friction.locked" else 0])
     return {
         "severity": one.severity.value,
         "place": one.kind_of_part or spoken(one.where),
         "remedy": remedied(one.remedy),
         "part": part,
         "line": (one if one.where.startswith(part) else state.placed((replace(one, where=part, line=None),))[0]).line,
-        "index": index,
-        "cures": cures(state, one) if result is not None else [],
+        "index": None if result is None else reached(one, result),
+        "cures": [] if result is None else cures(state, one),
     } | {key: getattr(one, key) for key in ("code", "what", "where")}
 
 
@@ -304,7 +295,7 @@ def _edit(asked: Asked) -> dict[str, Any]:
     if not text.strip():
         sketch.entries = {"trunnion": 1, "name": "New mechanism", "space": "planar"}
     sketch.turns = partial(_turns, state)
-    says = [done(sketch, given) for given in asked["gestures"]]
+    says = [_done(sketch, given) for given in asked["gestures"]]
     empty = ("links", "drivers", "loads", "springs", "gears", "assembly", "dimensions", "joints")
     after = {key: one for key, one in sketch.entries.items() if one or key not in empty}
     changed = changed_text(text, after) if text.strip() else text_of(after)
@@ -318,6 +309,29 @@ def _edit(asked: Asked) -> dict[str, Any]:
     }
 
 
+GESTURES: dict[str, Callable[[Sketch, Mapping[str, Any]], str]] = {
+    "link": link, "pin": pinned, "join": join, "slide": slide, "add-point": add_point, "driver": driver, "load": load,
+    "spring": spring, "gear": gear, "block": block, "bar-mass": bar_mass, "centre": centre, "move": move,
+    "group": group, "lock": lock, "set": put_value, "delete": delete, "rename": rename, "add-row": add_row,
+}  # fmt: skip
+
+
+def _done(sketch: Sketch, given: Mapping[str, Any]) -> str:
+    """Do a gesture; what it is called. MechanismError if it cannot be done."""
+    gesture = GESTURES.get(str(given.get("do")))
+    if gesture is None:
+        raise MechanismError(Finding(f"'{given.get('do')}' is no gesture", "studio", f"use {', '.join(GESTURES)}"))
+    try:
+        said = gesture(sketch, given)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        if isinstance(error, MechanismError):
+            raise
+        what = f"the gesture '{given['do']}' does not fit the model ({error})"
+        raise MechanismError(Finding(what, "studio", "undo, or correct the text of the model")) from error
+    sketch.forget()
+    return said
+
+
 def _turns(state: Loaded, index: int) -> dict[str, Array]:
     """Rotation of every moving link in space, (3, 3), at a position of the cycle; MechanismError where it has none."""
     poses = gathered(state.motion(STEPS, True)).poses
@@ -329,12 +343,25 @@ def _turns(state: Loaded, index: int) -> dict[str, Array]:
 
 
 def _assemblies(asked: Asked) -> dict[str, Any]:
-    """The other assemblies of a model in the plane, with the gestures that take them."""
-    state, steps = asked.state, asked.steps
-    if state.run.system.mechanism.space != "planar":
-        return {"others": []}
-    others = other_assemblies(state.run, state.entries or {}, steps)
-    rows = [{"name": name, "gestures": gestures, "points": tracks(walk, steps)} for name, gestures, walk in others]
+    """The other assemblies of a model in the plane, a few at most, with the gestures that take them.
+
+    Each is that of one group, named in place of the hints inside it; the groups after it follow by their own hints.
+    """
+    entries, rows = dict(asked.state.entries or {}), list[dict[str, Any]]()
+    if asked.state.run.system.mechanism.space != "planar":
+        return {"others": rows}
+    stated = dict(entries.get("assembly") or {})
+    ways = [(modes, way) for modes in choices(asked.state.run) for way in modes.ways if not way.taken]
+    for modes, way in ways[:MOST_OTHERS]:
+        changes = {name: None for name in stated if name in way.joints or name in modes.links} | {modes.link: way.name}
+        hints = {name: hint for name, hint in (stated | changes).items() if hint is not None}
+        with suppress(MechanismError):  # what is stated elsewhere in the model may forbid this one
+            run = prepare(Mechanism(**{**entries, "assembly": hints}))
+            gestures = [{"do": "set", "path": ["assembly", name], "value": hint} for name, hint in changes.items()]
+            with np.errstate(all="ignore"):
+                points = tracks(run.walk(run.cycle.times(asked.steps)), asked.steps)
+            name = f"{' and '.join(modes.links)} assembled the other way ({way.name})"
+            rows.append({"name": name, "gestures": gestures, "points": points})
     return {"others": rows}
 
 
@@ -342,22 +369,53 @@ def _assemblies(asked: Asked) -> dict[str, Any]:
 
 
 def _layers(asked: Asked) -> dict[str, Any]:
-    """What the sheet shows over the mechanism, of what is wanted: motion of a point, and in the plane instant centres,
-    friction circles, transmission angles, pins in their holes.
+    """What the sheet shows over the mechanism, of what is wanted: columns of the table by their names, and in the plane
+    instant centres, transmission angles, pins in their holes.
     """
-    result, system, wanted = asked.motion, asked.state.run.system, set(asked.get("wanted") or ())
-    layers: dict[str, Any] = {"point": _moving(asked, result)}
-    if system.mechanism.space != "planar":
-        return layers
-    if "seats" in wanted:
-        layers["seats"] = seats(result)
-    if "circles" in wanted:
-        layers["circles"] = circles(result, [joint for joint in rubbing(system) if joint not in system.screws])
-    if wanted & {"centres", "transmission"}:
-        walk = asked.state.run.walk(asked.state.run.cycle.times(asked.steps))
-        shown = {"centres": centres, "transmission": transmission}
-        layers |= {name: tell(walk, asked.steps) for name, tell in shown.items() if name in wanted}
+    result, run, wanted = asked.motion, asked.state.run, set(asked.get("wanted") or ())
+    layers: dict[str, Any] = _columns(result, asked)
+    if run.system.mechanism.space == "planar":
+        if "seats" in wanted:
+            layers["seats"] = _seats(result)
+        if wanted & {"centres", "transmission"}:
+            with np.errstate(all="ignore"):
+                walk = run.walk(run.cycle.times(asked.steps))
+            shown = {"centres": _centres, "transmission": _transmission}
+            layers |= {name: tell(walk, asked.steps) for name, tell in shown.items() if name in wanted}
     return layers
+
+
+def _centres(walk: Forward, steps: int) -> list[dict[str, Any]]:
+    """Instant centres of the pairs of links; `ground`: whether one of them is it."""
+    ground = walk.system.mechanism.fixed_link
+    return [
+        {**vars(one), "ground": ground in one.pair, "far": one.far and dict(zip("xy", one.far, strict=True))}
+        for one in instant_centres(walk, steps, MOST_LINKS)
+    ]
+
+
+def _seats(result: xr.Dataset) -> list[dict[str, Any]]:
+    """Of each joint with a seat, at each end: offset of the pin from the middle of its hole, m, and force of the pin on
+    the hole, N, both in the hole's axes.
+    """
+    return [
+        {
+            "joint": one.joint, "kind": one.kind, "clearance": one.clearance, "length": one.length,
+            "ends": [{what: {axis: Exact(row) for axis, row in zip("xy", rows, strict=True)}
+                      for what, rows in (("offset", offset), ("force", force))}
+                     for offset, force in zip(one.offsets, one.forces, strict=True)],
+        }
+        for one in seated(result)
+    ]  # fmt: skip
+
+
+@np.errstate(all="ignore")
+def _transmission(walk: Forward, steps: int) -> list[dict[str, Any]]:
+    """Transmission angle of each dyad, rad, 0 … π/2, and its middle joint."""
+    middle = {"-".join(module.joints): module.joints[1:2] for module in walk.system.plan.modules}
+    angles = transmission_angles(walk)
+    return [{"name": name, "joint": joint, "angle": column(angle, steps)}
+            for name, angle in angles.items() for joint in middle[name]]  # fmt: skip
 
 
 def _blocks(asked: Asked) -> dict[str, Any]:
@@ -367,32 +425,45 @@ def _blocks(asked: Asked) -> dict[str, Any]:
 
 def _margins(asked: Asked) -> dict[str, Any]:
     """For each block, the ground but not, the locking margin without its friction; none without friction."""
-    return {"without": margins_without(asked.state.run, asked.steps) if asked.friction else []}
+    run = asked.state.run
+    if not asked.friction or len(run.system.plan.modules) > MOST_BLOCKS:
+        return {"without": [None] * len(run.system.plan.modules) if asked.friction else []}
+    return {"without": margins_without(run, asked.steps)}
 
 
 def _curves(asked: Asked) -> dict[str, Any]:
-    """Names and units of all columns of the table of a cycle, and those that are wanted, in SI."""
-    table = selected(without_noise(asked.result), ["all"])
+    """Names and units of all columns of the table of a cycle, and those that are wanted."""
+    return _columns(asked.result, asked)
+
+
+def _columns(result: xr.Dataset, asked: Asked) -> dict[str, Any]:
+    """Names and units of the columns of numbers of a result, and those of the `names` that are asked for, in SI."""
+    table = selected(without_noise(result), ["all"])
     columns = {column.name: column for column in table if column.values.dtype.kind == "f"}
-    wanted = [name for name in asked.get("names") or () if name in columns]
+    wanted = [str(name) for name in asked.get("names") or () if str(name) in columns]
     return {
         "names": [[column.name, column.unit] for column in columns.values()],
         "columns": {name: {"unit": columns[name].unit, "values": columns[name].values} for name in wanted},
     }
 
 
-def _moving(asked: Asked, result: xr.Dataset) -> dict[str, Any] | None:
-    """Motion of the point, or in the plane of the place on a link, that is asked for; None where there is none."""
-    if asked.get("place") and result.sizes["axis"] == 2:
-        return place_motion(result, asked["place"])
-    point = str(asked.get("point"))
-    return point_motion(result, point) if point in result["point"].values else None
-
-
 def _compare(asked: Asked) -> dict[str, Any]:
-    """Other variants, `{text, friction}` each, laid over the present result, and the table of figures against it."""
-    others = [Asked({**other, "steps": asked.steps}) for other in asked["others"]]
-    return {"others": [overlaid(other, asked, partial(_moving, asked)) for other in others]}
+    """Figures of the present result, and other variants, `{text, friction}` each, to lay over it: with their figures,
+    or why they have none.
+    """
+    others = list[dict[str, Any]]()
+    for other in asked["others"]:
+        variant = Asked({**other, "steps": asked.steps})
+        try:
+            result = variant.result
+        except MechanismError as error:
+            others.append({"scene": None, "why": f"cannot be solved: {sentence(error.findings[0])}", "figures": []})
+            continue
+        others.append({
+            "scene": scene(result, max_positions=MOST_STEPS), "why": None, "figures": figures(variant),
+            "margin": margin_of(result, variant.rubs)["margin"], "columns": _columns(result, asked)["columns"],
+        })  # fmt: skip
+    return {"figures": figures(asked), "others": others}
 
 
 def _export(asked: Asked) -> dict[str, Any]:
@@ -402,14 +473,9 @@ def _export(asked: Asked) -> dict[str, Any]:
     return exported(asked.state, str(asked["what"]), asked.steps, asked.index)
 
 
-def _tolerances(asked: Asked) -> dict[str, Any]:
-    """What the tolerances of a model do to its largest effort and strokes."""
-    return tolerated(asked.run.system.mechanism, asked.steps)
-
-
 def _corner(asked: Asked) -> dict[str, Any]:
     """The worst corner of the tolerances and plays for a measure, on the stated side or the worse of both."""
-    return worst_corner(asked.run.system.mechanism, str(asked["measure"]), asked.get("side"), asked.steps)
+    return corner_of(asked.run.system.mechanism, str(asked["measure"]), asked.get("side"), asked.steps)
 
 
 ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
@@ -427,7 +493,6 @@ ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "margins": _margins,
     "curves": _curves,
     "compare": _compare,
-    "tolerances": _tolerances,
     "corner": _corner,
 }
 BESIDE = (_cycle, _margins, _corner)

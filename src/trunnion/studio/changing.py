@@ -1,66 +1,25 @@
-"""Changing a drawing: moved and locked joints, values, what goes."""
+"""Changing a drawing: values, what goes, and other names, wherever a part is spoken of."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
-from math import isfinite
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.model.expression import MOTION, RESERVED
-from trunnion.studio.ends import NUMBER, free, held, letter, numbered, refused, vector
-from trunnion.studio.renaming import names_dimensions
+from trunnion.model.renaming import renamed
+from trunnion.studio.findings import spoken
 from trunnion.studio.sketch import Sketch
-from trunnion.studio.words import spoken
+from trunnion.studio.strokes import NUMBER, free, letter, numbered, refused, rename_point, taken
 
-__all__ = ["add_row", "delete", "lock", "move", "put_value"]
+__all__ = ["add_row", "delete", "put_value", "rename"]
 
 Given = Mapping[str, Any]
 SECTIONS = {
     "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair"
 }  # fmt: skip
-WORDS = ("off", "none", "yes", "no", "true", "false")  # that are no new name of a dimension
+NAMED = ("links", "joints", "dimensions", "loads", "springs", "gears")
+SIDES = ("links", "joints")  # of "link.point"
 DEFINED = re.compile(r"\s*([^\W\d]\w*)\s*=(.+)")  # crank = 30 mm
-
-
-def move(sketch: Sketch, given: Given) -> str:
-    """A joint or point goes to a place; in space by so much, as the links are turned at a position."""
-    if "by" in given:
-        return _move_in_space(sketch, given)
-    point, to = str(given["point"]), vector(given["to"])
-    sketch.write(sketch.moved(point, to, bool(given.get("keep"))))
-    hints = sketch.entries.get("assembly") or {}
-    if isinstance(hints.get(point), list) and not given.get("index"):
-        hints[point] = [sketch.length(part) for part in to]
-    links, name = sketch.links_at(point)
-    for link in links:
-        sketch.places[f"{link}.{name}"] = to
-    for link in links:
-        sketch.show(link, sketch.frame(link))
-    return f"Move {point}"
-
-
-def _move_in_space(sketch: Sketch, given: Given) -> str:
-    point, by, index = str(given["point"]), [float(part) for part in given["by"]], int(given.get("index") or 0)
-    if len(by) != 3 or not all(map(isfinite, by)):
-        raise ValueError(f"{by} is no way")
-    sketch.size = float(given["size"])
-    turns = sketch.turns(index)
-    hint = (sketch.entries.get("assembly") or {}).get(point)
-    if isinstance(hint, list) and index == 0:
-        pairs = zip(sketch.vector(f"assembly.{point}", "xyz"), by, strict=True)
-        sketch.entries["assembly"][point] = [sketch.length(sum(pair)) for pair in pairs]
-    sketch.write(sketch.shifted(point, by, turns))
-    return f"Move {point}"
-
-
-def lock(sketch: Sketch, given: Given) -> str:
-    """A joint or point stays where it is while others are dragged; done again, it may be dragged itself."""
-    point = str(given["point"])
-    held(sketch, point)
-    sketch.locked ^= {point}
-    return f"{'Lock' if point in sketch.locked else 'Unlock'} {point}"
 
 
 def put_value(sketch: Sketch, given: Given) -> str:
@@ -78,14 +37,10 @@ def put_value(sketch: Sketch, given: Given) -> str:
     stated = spoken(path)
     if value is not None:
         if path not in ("name", "notes") and way != ["dimensions"]:
-            before = group.get(last) if isinstance(group, dict) else group[last]
-            value = _named(sketch, value, before)
+            value = _defined(sketch, value)
         group[last] = _typed(value)
         told = ("no", "yes")[value] if isinstance(value, bool) else value
         return f"Set {stated} to {', '.join(map(str, value)) if isinstance(value, list) else told}"
-    if way == ["dimensions"] and (users := list(_users(sketch.entries, str(last)))):
-        what = f"is in use: by {', '.join(users[:3])}{' and others' if users[3:] else ''}"
-        raise refused(what, path, "type another value, or change what uses it first")
     if way[:1] == ["gears"] and last in ("ratio", "radius", "lead"):
         raise refused("is what makes a gear pair", path, "type another, or delete the gear pair")
     if isinstance(group, dict):
@@ -105,35 +60,15 @@ def _refuse_missing(sketch: Sketch, path: list[Any]) -> None:
         raise refused("is not there", ".".join(map(str, path)), "choose what is drawn")
 
 
-def _users(group: Any, name: str, way: tuple[str, ...] = ()) -> Iterator[str]:
-    """What speaks of a dimension, in words."""
-    if isinstance(group, dict):
-        for key, one in group.items():
-            yield from _users(one, name, (*way, str(key)))
-    elif isinstance(group, list):
-        for one in group:
-            yield from dict.fromkeys(_users(one, name, way))
-    elif isinstance(group, str) and names_dimensions(way):
-        stated = way != ("dimensions", name) and re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", group)
-        yield from [spoken(".".join(way))] if stated else []
-
-
-def _named(sketch: Sketch, value: Any, before: Any) -> Any:
-    """The name of a dimension that "crank = 30 mm" makes, or a new name alone, with the value that was there."""
+def _defined(sketch: Sketch, value: Any) -> Any:
+    """The name of a dimension that "crank = 30 mm" makes."""
     if isinstance(value, list):
-        there = before if isinstance(before, list) else value
-        return [_named(sketch, *pair) for pair in zip(value, there, strict=False)]
+        return [_defined(sketch, part) for part in value]
     found = DEFINED.fullmatch(value) if isinstance(value, str) else None
-    if found:
-        sketch.section("dimensions")[found[1]] = _typed(found[2].strip())
-        return found[1]
-    number = isinstance(before, (int, float)) or (isinstance(before, str) and re.match(NUMBER, before.strip()))
-    if not number or not isinstance(value, str) or not value.isidentifier():
+    if not found:
         return value
-    if value in {*sketch.section("dimensions"), *sketch.of("tables"), *RESERVED, *MOTION, *FRICTION_LAWS, *WORDS}:
-        return value
-    sketch.section("dimensions")[value] = before
-    return value
+    sketch.section("dimensions")[found[1]] = _typed(found[2].strip())
+    return found[1]
 
 
 def _typed(value: Any) -> Any:
@@ -230,3 +165,37 @@ def _drop(sketch: Sketch, section: str, gone: Callable[[Mapping[str, Any]], bool
     for name, one in sketch.of(section).items():
         if gone(one):
             del sketch.section(section)[name]
+
+
+# ---- renamed --------------------------------------------------------------------------------------------------------
+
+
+def rename(sketch: Sketch, given: Given) -> str:
+    """A part gets another name wherever it is spoken of; a driver has that of its joint."""
+    (section, old), new = map(str, given["what"]), str(given["to"]).strip()
+    section = "joints" if section == "drivers" else section
+    in_rows = section in SIDES and any(row.get(section[:-1]) == old for row in sketch.rows)
+    known = section == "points" or in_rows or (section in NAMED and old in sketch.section(section))
+    if not known:
+        raise refused("is not there", f"{section}.{old}", "choose what is drawn")
+    beside = sketch.section(section) if section != "points" else {}
+    if not new or "." in new or new in taken(sketch) or new in beside:
+        raise refused(f"'{new}' is not a free name", f"{section}.{old}", "choose another")
+    if section == "points":
+        rename_point(sketch, old, new)
+        return f"Rename {old} to {new}"
+    sketch.entries = dict(renamed(sketch.entries, section, old, new))
+    if section == "links" and old == sketch.ground:
+        sketch.entries["ground"] = new
+    if section in SIDES:
+        sketch.places = {_key(key, section, old, new): place for key, place in sketch.places.items()}
+        sketch.locked = {_key(key, section, old, new) for key in sketch.locked}
+    return f"Rename {old} to {new}"
+
+
+def _key(key: str, section: str, old: str, new: str) -> str:
+    """The key "link.P" of a point, or the name of a joint, after a link or joint is renamed."""
+    link, dot, point = key.rpartition(".")
+    if section == "links":
+        return f"{new if link == old else link}{dot}{point}"
+    return f"{link}{dot}{new if point == old else point}"

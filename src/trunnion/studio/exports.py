@@ -1,4 +1,4 @@
-"""Files of a solved cycle for the page: table, report, pictures, a script that does the same."""
+"""Files of a solved cycle for the page: table, report, pictures, an animation."""
 
 from __future__ import annotations
 
@@ -7,10 +7,15 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from trunnion.errors import Finding, MechanismError
 from trunnion.studio.loaded import Loaded
 
 __all__ = ["EXPORTS", "exported"]
+
+IMAGES, PACE = 60, 50  # of an animation, and ms that each is shown
+ROOM = 0.09  # of the size, around what is drawn
 
 
 def exported(state: Loaded, what: str, steps: int, index: int = 0) -> dict[str, Any]:
@@ -45,32 +50,27 @@ def _picture(state: Loaded, steps: int, index: int, kind: str) -> bytes:
 
 
 def _animation(state: Loaded, steps: int, _: int) -> bytes:
-    from trunnion.studio.animation import animation
+    """A cycle of 60 pictures in 3 seconds; MechanismError in space."""
+    from matplotlib.figure import Figure
+    from PIL import Image
 
-    return animation(state.result(steps, True))
+    from trunnion.views.common.drawing import bare, facts, picture, sketch
 
-
-def _script(state: Loaded, steps: int, _: int) -> bytes:
-    """The model and what was asked of it, as Python; it writes no file that is not named to it."""
-    return f'''"""The session of the studio as a script: the model and its cycle; with a file's name also its table."""
-
-import sys
-from pathlib import Path
-from tempfile import TemporaryDirectory
-
-import trunnion
-
-MODEL = {state.text!r}
-
-with TemporaryDirectory() as folder:
-    path = Path(folder, "model.yaml")
-    path.write_text(MODEL, encoding="utf-8")
-    mechanism = trunnion.read(path)
-result = trunnion.analyse(mechanism, steps={steps})
-print(result.trunnion)
-if len(sys.argv) > 1:  # as in: python session.py table.csv
-    trunnion.save(result, sys.argv[1], units="model")
-'''.encode()
+    result = state.result(steps, True)
+    if result.sizes["axis"] > 2:
+        raise MechanismError(Finding("is not drawn as GIF in space", remedy="write the report, whose drawing moves"))
+    shown, figure, images = picture(result), Figure((6, 6), layout="constrained"), list[Image.Image]()
+    low, high = np.array(shown.box[:2]) - ROOM * shown.size, np.array(shown.box[2:]) + ROOM * shown.size
+    for index in range(0, steps, -(-steps // IMAGES)):
+        figure.clear()
+        axes = bare(figure.subplots(), low, high, facts(result, index))
+        sketch(axes, shown, index)
+        stream = io.BytesIO()
+        figure.savefig(stream, format="png")
+        images.append(Image.open(stream).convert("P"))
+    stream = io.BytesIO()
+    images[0].save(stream, "GIF", save_all=True, append_images=images[1:], duration=PACE, loop=0)
+    return stream.getvalue()
 
 
 EXPORTS: dict[str, tuple[str, str, Callable[[Loaded, int, int], bytes]]] = {
@@ -79,5 +79,4 @@ EXPORTS: dict[str, tuple[str, str, Callable[[Loaded, int, int], bytes]]] = {
     "png": ("png", "image/png", partial(_picture, kind="png")),
     "svg": ("svg", "image/svg+xml", partial(_picture, kind="svg")),
     "gif": ("gif", "image/gif", _animation),
-    "script": ("py", "text/x-python", _script),
 }

@@ -148,16 +148,15 @@ def _end(process: subprocess.Popen[bytes], how: str) -> None:
 
 def _options(form: Mapping[str, Any], given: Mapping[str, Any]) -> list[str]:
     """The words of the command line: each value is one word with its flag, and so can be no other option."""
-    fields = {str(one["flag"]): one for one in form["fields"]}
-    words = []
+    fields, words = {str(one["flag"]): one for one in form["fields"]}, []
     for flag, value in given.items():
         if flag not in fields:
             raise ValueError(f"{form['verb']} has no option {json.dumps(flag)[:40]}")
         if fields[flag]["kind"] == "flag":
             words += [flag] if value is True else []
             continue
-        values = value if isinstance(value, list) else [value]
-        texts = [str(one).strip() for one in values if str(one).strip()]
+        texts = [str(one).strip() for one in (value if isinstance(value, list) else [value])]
+        texts = [text for text in texts if text]
         if len(texts) > 1 and not fields[flag]["several"]:
             raise ValueError(f"{flag} is given once")
         words += [f"{flag}={text}" for text in texts]

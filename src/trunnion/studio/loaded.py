@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from trunnion.cycle.positions import Positions
-    from trunnion.studio.ways import Way
 
 __all__ = ["MOST_LINKS", "Asked", "Loaded", "loaded"]
 
@@ -91,16 +90,6 @@ class Loaded:
         found, run = self.positions(steps, friction), self.run if friction else self.frictionless_run
         with np.errstate(all="ignore"):
             return result_of(run, over_cycle(run, found)).dataset
-
-    @lru_cache(maxsize=2)  # noqa: B019
-    def ways(self, steps: int) -> tuple[Way, ...]:
-        """How far what moves on the ground goes, and its time ratio; none where its cycle is not solved."""
-        from trunnion.studio.ways import ways  # not for the first picture
-
-        try:
-            return tuple(ways(self.run, steps))
-        except MechanismError:
-            return ()
 
 
 @lru_cache(maxsize=8)

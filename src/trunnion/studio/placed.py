@@ -1,7 +1,4 @@
-"""Where the points of a mechanism are over its cycle, before its forces are known: what first pictures are drawn of.
-
-It loads a third of what the analysis does, so that a model is seen while the rest is loaded and solved.
-"""
+"""Where the points of a mechanism are over its cycle, without its forces; small pictures of the examples."""
 
 from __future__ import annotations
 
@@ -19,28 +16,13 @@ from trunnion.solve.forward import Forward
 from trunnion.studio.loaded import Loaded, loaded
 from trunnion.studio.message import packed
 
-__all__ = ["column", "placed", "plain", "thumbnail", "tracked", "tracks"]
+__all__ = ["column", "plain", "thumbnail", "tracked", "tracks"]
 
 Array = NDArray[np.float64]
 
-STEPS = 360
 SMALL_STEPS = 60  # of a small picture
 SHOWN = 8  # position of them that is drawn: at the start many mechanisms lie in line
 TURNED, TILTED = radians(35), radians(25)  # of the view of mechanisms in space, in which z is up
-
-
-def placed(text: str) -> bytes:
-    """As an answer: entries, numbers and tracks of a text; tracks None in space and where the start has no answer."""
-    state = loaded(text)
-    head = {"text": text, "entries": state.entries, "tracks": None}
-    if state.mechanism is not None and state.mechanism.space == "planar":
-        try:
-            points = tracked(state, STEPS)
-        except MechanismError:
-            points = {}
-        if points and all(np.isfinite(track[axis][0]) for track in points.values() for axis in "xy"):
-            head |= {"tracks": points, "numbers": plain(state.run.values)}
-    return packed(head)
 
 
 @lru_cache(maxsize=4)
@@ -83,17 +65,18 @@ def thumbnail(text: str) -> bytes:
         places = {key: _projected(list(track.values())) for key, track in tracked(state, SMALL_STEPS).items()}
     except MechanismError:
         places = {}
-    reached = np.flatnonzero(np.all([np.isfinite(track).all(axis=0) for track in places.values()], axis=0))
-    if not places or not len(reached):
+    whole = np.all([np.isfinite(track).all(axis=0) for track in places.values()], axis=0) if places else [False]
+    if not np.any(whole):
         return packed({"links": [], "paths": []})
-    shown, ground = reached[min(SHOWN, len(reached) - 1)], state.run.system.mechanism.fixed_link
+    reached, ground = np.flatnonzero(whole), state.run.system.mechanism.fixed_link
+    shown = reached[min(SHOWN, len(reached) - 1)]
     links: dict[str, list[list[float]]] = {}
     for key, track in places.items():
         links.setdefault(key.rpartition(".")[0], []).append([float(part) for part in track[:, shown]])
     moved = [track[:, reached] for key, track in places.items() if key.rpartition(".")[0] != ground]
     return packed({
         "links": [{"ground": link == ground, "points": points} for link, points in links.items()],
-        "paths": [{"x": track[0], "y": track[1]} for track in _different(moved)],
+        "paths": [{"x": x, "y": y} for x, y in moved if np.ptp(x) + np.ptp(y) > 0],
     })  # fmt: skip
 
 
@@ -103,13 +86,3 @@ def _projected(place: list[Array]) -> Array:
     x, y, z = place
     across, depth = cos(TURNED) * x + sin(TURNED) * y, cos(TURNED) * y - sin(TURNED) * x
     return np.array([across, cos(TILTED) * z + sin(TILTED) * depth])
-
-
-def _different(tracks: list[Array]) -> list[Array]:
-    """Those that move, once each: the points of a joint lie on each other."""
-    kept: list[Array] = []
-    for track in tracks:
-        size = float(np.max(np.ptp(track, axis=1)))
-        if size and not any(np.allclose(track, other, rtol=0, atol=1e-6 * size) for other in kept):
-            kept.append(track)
-    return kept

@@ -22,7 +22,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequenc
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from threading import Event, Lock
+from threading import Lock
 from typing import Any
 
 import uvicorn
@@ -54,7 +54,6 @@ MODELS = (".yaml", ".yml")
 MOST_BYTES = 2_000_000
 MOST_FILES = 500
 MOST_OF_A_QUESTION = 64 << 20  # bytes; a text that is longer than the studio reads is to be told so
-PATIENCE = 1.0  # s that the rest waits for the page
 Handler = Callable[[Request], Awaitable[Response]]
 
 ANSWERING = Lock()  # one after another: the second about a text finds what was read for the first
@@ -73,7 +72,6 @@ class Studio:
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
     entrances: set[str] = field(default_factory=set)  # codes of addresses that were not opened yet
     forms: Sequence[Mapping[str, Any]] = ()
-    seen: Event = field(default_factory=Event)  # that the page has what its first picture is drawn of
 
     @property
     def address(self) -> str:
@@ -104,8 +102,8 @@ class Studio:
             Route("/", self._own(self._page)),
             Route("/modules.js", self._own(self._modules)),
             Route("/files", self._admitted(self._files)),
-            Route("/first/{name:path}", self._admitted(self._first)),
             Route("/thumbnail/{name}", self._admitted(_thumbnail)),
+            Route("/file/{name:path}", self._admitted(self._read)),
             Route("/file/{name:path}", self._admitted(self._write), methods=["PUT"]),
             Route("/import/{name}", self._admitted(_imported), methods=["PUT"]),
             Route("/jobs", self._admitted(self._jobs)),
@@ -123,10 +121,9 @@ class Studio:
         text = ""
         with contextlib.suppress(ValueError, OSError):
             text = self._text(self.opened or "")
-        warming = asyncio.get_running_loop().run_in_executor(None, _look, text, self.seen)
+        warming = asyncio.get_running_loop().run_in_executor(None, _warm, text)
         yield
         self.jobs.close()
-        self.seen.set()
         await warming
 
     # ---- who may ask ----------------------------------------------------------------------------------------------
@@ -241,11 +238,9 @@ class Studio:
             raise ValueError(f"'{path.name}' is larger than {MOST_BYTES:,} bytes")
         return path.read_text(encoding="utf-8")
 
-    async def _first(self, request: Request) -> Response:
-        """A model's text with what its first picture is drawn of, as an answer to a question."""
-        content = await run_in_threadpool(_pictured, self._text(request.path_params["name"]))
-        self.seen.set()
-        return Response(content, media_type="application/octet-stream")
+    async def _read(self, request: Request) -> Response:
+        """The text of a model."""
+        return JSONResponse({"text": self._text(request.path_params["name"])})
 
     async def _write(self, request: Request) -> Response:
         """Save `{text, opened, saved, over}` under a name, .yaml where it has no ending.
@@ -335,11 +330,11 @@ class Studio:
 
 async def _imported(request: Request) -> Response:
     """The text of a model made of a dropped file of another program, `{text, says}`."""
-    text, says = await run_in_threadpool(_read, request.path_params["name"], await request.body())
+    text, says = await run_in_threadpool(_import, request.path_params["name"], await request.body())
     return JSONResponse({"text": text, "says": says})
 
 
-def _read(name: str, content: bytes) -> tuple[str, list[str]]:
+def _import(name: str, content: bytes) -> tuple[str, list[str]]:
     from trunnion.exchange.formats import import_file
     from trunnion.exchange.model_file import model_text
 
@@ -357,32 +352,24 @@ def _read(name: str, content: bytes) -> tuple[str, list[str]]:
 
 async def _thumbnail(request: Request) -> Response:
     """The small picture of an example, as an answer to a question."""
+    content = await run_in_threadpool(_pictured, request.path_params["name"])
+    return Response(content, media_type="application/octet-stream", headers={"Cache-Control": "max-age=3600"})
+
+
+def _pictured(name: str) -> bytes:
     from trunnion.studio.answers import examples
+    from trunnion.studio.placed import thumbnail
 
-    text = examples().get(request.path_params["name"])
-    if text is None:
-        return PlainTextResponse("There is no such example.", status_code=404)
-    headers = {"Cache-Control": "max-age=3600"}
-    content = await run_in_threadpool(_pictured, text, True)
-    return Response(content, media_type="application/octet-stream", headers=headers)
+    if name not in examples():
+        raise ValueError("there is no such example")
+    with ANSWERING:
+        return thumbnail(examples()[name])
 
 
-def _look(text: str, seen: Event) -> None:
-    """Load what answers, the first picture before the rest, and have the model solved before the page asks for it."""
-    _pictured(text)
-    seen.wait(PATIENCE)  # to load the rest beside would hold up the page
-    import trunnion.studio.answers  # noqa: F401  # not while answers are being made: the page may ask for the picture
-
+def _warm(text: str) -> None:
+    """Load what answers, and have the model solved before the page asks for it."""
     for ask in ("model", "cycle"):
         _answered(json.dumps({"ask": ask, "text": text}).encode())
-
-
-def _pictured(text: str, small: bool = False) -> bytes:
-    """What the first picture of a model, or a small one, is drawn of, as an answer to a question."""
-    from trunnion.studio.placed import placed, thumbnail
-
-    with ANSWERING:
-        return (thumbnail if small else placed)(text)
 
 
 def _answered(question: bytes) -> bytes:

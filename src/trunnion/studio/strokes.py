@@ -1,35 +1,219 @@
-"""Drawing: links, pins, guides and slots, points; and ends that are drawn already, joined."""
+"""Drawing: links, pins, guides and slots, points, and ends that are joined; with names that are free.
+
+An end is a joint "J", a free point "link.P", {on: link, at: place} for a place on a link, {ground: place} for a place
+on the ground, or a place [x, y], m.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from math import atan2, cos, hypot, sin
-from typing import Any
+import itertools
+import re
+from collections.abc import Iterable, Mapping
+from math import atan2, cos, hypot, isfinite, sin
+from typing import Any, NamedTuple
 
-from trunnion.studio.changing import move
-from trunnion.studio.ends import (
-    SHORTEST,
-    begin,
-    doubled,
-    free,
-    held,
-    joined,
-    letter,
-    line_near,
-    numbered,
-    pin,
-    place_of,
-    point_of,
-    put,
-    refused,
-    vector,
-)
-from trunnion.studio.renaming import rename_point
-from trunnion.studio.sketch import Frame, Sketch, Vector
+import numpy as np
 
-__all__ = ["add_point", "bar", "join", "link", "pinned", "slide"]
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import KINDS, UnitError
+from trunnion.studio.sketch import TOGETHER, Frame, Sketch, Vector
+
+__all__ = [
+    "NUMBER", "add_point", "bar", "begin", "free", "held", "join", "letter", "line_near", "link", "lock", "move",
+    "numbered", "pinned", "place_of", "point_of", "refused", "rename_point", "slide", "taken", "typed", "vector",
+]  # fmt: skip
 
 Given = Mapping[str, Any]
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+SHORTEST = 1e-9  # m
+
+
+def refused(what: str, where: str, remedy: str) -> MechanismError:
+    """The error of a gesture that cannot be done."""
+    return MechanismError(Finding(what, where, remedy))
+
+
+def vector(given: Any) -> Vector:
+    """A place of the page, m."""
+    x, y = map(float, given)
+    if not (isfinite(x) and isfinite(y)):
+        raise ValueError(f"({x}, {y}) is no place")
+    return x, y
+
+
+def typed(text: Any, kind: str, where: str, unit: str = "") -> float:
+    """A quantity as it was typed, SI; unit: of a plain number. MechanismError where it is none."""
+    text = str(text or "").strip()
+    try:
+        read = Quantity.read(f"{text} {unit}" if unit and NUMBER.fullmatch(text) else text, KINDS[kind])
+        value = float(np.asarray(read.evaluate()))
+    except (UnitError, ValueError, TypeError, KeyError) as error:
+        remedy = getattr(error, "remedy", "") or f"type it as {KINDS[kind].example}"
+        raise refused(f"'{text[:30]}' is no {kind}", where, remedy) from None
+    if not isfinite(value):
+        raise refused(f"'{text[:30]}' is no {kind}", where, f"type it as {KINDS[kind].example}")
+    return value
+
+
+# ---- names ----------------------------------------------------------------------------------------------------
+
+
+def taken(sketch: Sketch) -> set[str]:
+    """Names of joints, points, links and dimensions."""
+    links = sketch.of("links")
+    points = (name for link in links for name in sketch.points(link))
+    rows = (str(row.get(key)) for row in sketch.rows for key in ("joint", "link"))
+    return {*sketch.joints, *points, *links, *rows, *sketch.of("dimensions"), *sketch.section("dimensions")}
+
+
+def letter(sketch: Sketch, also: Iterable[str] = ()) -> str:
+    """The next free name of a point: A, B, …, Z, A2, …; also: names that are spoken for."""
+    used = {*taken(sketch), *also}
+    names = (one + number for number in ("", *map(str, range(2, 1000))) for one in LETTERS)
+    return next(name for name in names if name not in used)
+
+
+def numbered(sketch: Sketch, section: str, stem: str) -> str:
+    """The next free name of a link, load, spring or gear pair: link1, link2, …"""
+    used = {*sketch.section(section), *taken(sketch)}
+    return next(name for number in itertools.count(1) if (name := f"{stem}{number}") not in used)
+
+
+# ---- ends -----------------------------------------------------------------------------------------------------
+
+
+def begin(sketch: Sketch) -> None:
+    """The fixed link is there."""
+    sketch.section("links").setdefault(sketch.ground, {"points": {}})
+    sketch.section("links")[sketch.ground].setdefault("points", {})
+    sketch.section("joints")
+
+
+def place_of(sketch: Sketch, end: Any) -> Vector:
+    """Where an end is."""
+    if isinstance(end, str):
+        return sketch.places[".".join(held(sketch, end))]
+    if isinstance(end, Mapping):
+        return vector(end["at"] if "on" in end else end["ground"])
+    return vector(end)
+
+
+def held(sketch: Sketch, name: str) -> tuple[str, str]:
+    """Link and point of a joint, or of a free point "link.P"."""
+    (*_, link), point = sketch.links_at(name)
+    if name not in sketch.joints and point not in sketch.points(link):
+        raise refused("is not a joint or a point", name, "choose one that is drawn")
+    return link, point
+
+
+def free(sketch: Sketch, name: str) -> tuple[str, str]:
+    """Link and name of a point that is no joint."""
+    link, _, point = str(name).partition(".")
+    if point not in sketch.points(link):
+        raise refused("is not a free point", str(name), "choose the free end of a link")
+    if point in sketch.joints:
+        remedy = "delete the joint first, or draw another link from it"
+        raise refused("is a joint already", f"links.{link}.points.{point}", remedy)
+    return link, point
+
+
+def point_of(sketch: Sketch, end: Any) -> tuple[str, str]:
+    """Link and point of an end, where a force acts or a spring is fastened: on the moving link of a pin on the ground.
+
+    A place on a link, or on the ground, becomes a point of it.
+    """
+    if isinstance(end, str):
+        link, point = held(sketch, end)
+        other = sketch.joints[end]["links"][0] if end in sketch.joints else link
+        return (other, point) if link == sketch.ground and point in sketch.points(other) else (link, point)
+    begin(sketch)
+    link = str(end["on"]) if isinstance(end, Mapping) and "on" in end else sketch.ground
+    point = letter(sketch)
+    put(sketch, link, point, place_of(sketch, end))
+    return link, point
+
+
+def joined(sketch: Sketch, link: str, end: Any, place: Vector) -> str:
+    """The name of an end of a new link, and the joint that it makes."""
+    if isinstance(end, Mapping):
+        point, other = letter(sketch), str(end.get("on", sketch.ground))
+        put(sketch, other, point, place)
+        pin(sketch, point, other, link, place)
+        return point
+    if not isinstance(end, str):
+        return letter(sketch)
+    other, point = held(sketch, end)
+    if point in sketch.joints:
+        point = doubled(sketch, other, point)
+    sketch.places[f"{other}.{point}"] = place
+    pin(sketch, point, other, link, place)
+    return point
+
+
+def doubled(sketch: Sketch, link: str, point: str, name: str = "") -> str:
+    """Another point of a link on the spot of one that is a joint already, for a second pin there: its name."""
+    stated, name = sketch.points(link)[point], name or letter(sketch)
+    sketch.section("links")[link]["points"][name] = list(stated["at"] if isinstance(stated, dict) else stated)
+    sketch.places[f"{link}.{name}"] = sketch.places[f"{link}.{point}"]
+    sketch.forget()
+    return name
+
+
+def put(sketch: Sketch, link: str, point: str, place: Vector, axis: float | None = None) -> None:
+    """A point on a link where a place is; axis: its direction in the plane, rad."""
+    frame = sketch.frame(link)
+    least = max(SHORTEST, sketch.fine / 20.0)  # a smaller one is what rounding left
+    at = [sketch.length(value) if abs(value) > least else 0 for value in frame.into(place)]
+    stated: Any = at
+    if axis is not None:
+        c, s = cos(axis), sin(axis)
+        parts = (frame.c * c + frame.s * s, frame.c * s - frame.s * c)  # in the frame of the link
+        stated = {"at": at, "axis": [_short(part) for part in parts]}
+    sketch.section("links")[link]["points"][point] = stated
+    sketch.places[f"{link}.{point}"] = place
+    sketch.forget()
+
+
+def _short(part: float) -> float | int:
+    """A component of a direction, without the noise of rounding."""
+    found = round(part, 12) + 0.0
+    return int(found) if found.is_integer() else found
+
+
+def pin(sketch: Sketch, name: str, first: str, second: str, place: Vector) -> None:
+    """A revolute joint; where it is at the start chooses the assembly."""
+    sketch.section("joints")[name] = {"type": "revolute", "links": [first, second]}
+    sketch.places[f"{second}.{name}"] = place
+    if first != sketch.ground:
+        sketch.section("assembly")[name] = [sketch.length(part) for part in place]
+
+
+class Line(NamedTuple):
+    """A line of a link: where it begins, m, its direction, and how far left of it a place lies, m."""
+
+    start: Vector
+    direction: Vector
+    beside: float
+
+
+def line_near(sketch: Sketch, link: str, place: Vector) -> Line:
+    """The line through two points of a link that passes nearest to a place; of several the longest."""
+    spots = [sketch.places[key] for point in sketch.points(link) if (key := f"{link}.{point}") in sketch.places]
+    found: list[tuple[float, float, Line]] = []
+    for (x, y), (a, b) in itertools.combinations(spots, 2):
+        length = hypot(a - x, b - y)
+        if length > TOGETHER * sketch.size:
+            c, s = (a - x) / length, (b - y) / length
+            beside = c * (place[1] - y) - s * (place[0] - x)
+            found.append((round(abs(beside) / sketch.size, 6), -length, Line((x, y), (c, s), beside)))
+    if not found:
+        raise refused("has no two points that a slot could go along", f"links.{link}", "add a point to it first")
+    return min(found, key=lambda row: row[:2])[2]
+
+
+# ---- gestures -----------------------------------------------------------------------------------------------------
 
 
 def link(sketch: Sketch, given: Given) -> str:
@@ -162,10 +346,7 @@ def _end_to_slide(sketch: Sketch, name: str, carrier: str) -> tuple[str, str]:
 
 
 def join(sketch: Sketch, given: Given) -> str:
-    """Two ends are pinned together where the second is; the first goes there, unless it is a place on a link.
-
-    An end is a joint "J", a free point "link.P", or {on: link, at: place}.
-    """
+    """Two ends are pinned together where the second is; the first goes there, unless it is a place on a link."""
     begin(sketch)
     first, second = given["ends"]
     place = place_of(sketch, second)
@@ -216,3 +397,64 @@ def _call(sketch: Sketch, link: str, end: Any, name: str, place: Vector) -> None
         doubled(sketch, link, point, name)
     elif point != name:
         rename_point(sketch, f"{link}.{point}", name)
+
+
+# ---- what is drawn already ------------------------------------------------------------------------------------------
+
+
+def move(sketch: Sketch, given: Given) -> str:
+    """A joint or point goes to a place; in space by so much, as the links are turned at a position."""
+    if "by" in given:
+        return _move_in_space(sketch, given)
+    point, to = str(given["point"]), vector(given["to"])
+    sketch.write(sketch.moved(point, to, bool(given.get("keep"))))
+    hints = sketch.entries.get("assembly") or {}
+    if isinstance(hints.get(point), list) and not given.get("index"):
+        hints[point] = [sketch.length(part) for part in to]
+    links, name = sketch.links_at(point)
+    for link in links:
+        sketch.places[f"{link}.{name}"] = to
+    for link in links:
+        sketch.show(link, sketch.frame(link))
+    return f"Move {point}"
+
+
+def _move_in_space(sketch: Sketch, given: Given) -> str:
+    point, by, index = str(given["point"]), [float(part) for part in given["by"]], int(given.get("index") or 0)
+    if len(by) != 3 or not all(map(isfinite, by)):
+        raise ValueError(f"{by} is no way")
+    sketch.size = float(given["size"])
+    turns = sketch.turns(index)
+    hint = (sketch.entries.get("assembly") or {}).get(point)
+    if isinstance(hint, list) and index == 0:
+        pairs = zip(sketch.vector(f"assembly.{point}", "xyz"), by, strict=True)
+        sketch.entries["assembly"][point] = [sketch.length(sum(pair)) for pair in pairs]
+    sketch.write(sketch.shifted(point, by, turns))
+    return f"Move {point}"
+
+
+def lock(sketch: Sketch, given: Given) -> str:
+    """A joint or point stays where it is while others are dragged; done again, it may be dragged itself."""
+    point = str(given["point"])
+    held(sketch, point)
+    sketch.locked ^= {point}
+    return f"{'Lock' if point in sketch.locked else 'Unlock'} {point}"
+
+
+def rename_point(sketch: Sketch, old: str, new: str) -> None:
+    """A point of a link that is no joint, with the loads and springs at it."""
+    link, point = free(sketch, old)
+    entry = sketch.section("links")[link]
+    entry["points"] = {(new if one == point else one): at for one, at in entry["points"].items()}
+    for load in sketch.of("loads").values():
+        if (load.get("link"), load.get("at")) == (link, point):
+            load["at"] = new
+    for spring in sketch.of("springs").values():
+        if "between" in spring:
+            spring["between"] = [f"{link}.{new}" if end == old else end for end in spring["between"]]
+    hints = sketch.section("assembly")
+    if old in hints:
+        hints[f"{link}.{new}"] = hints.pop(old)
+    if old in sketch.places:
+        sketch.places[f"{link}.{new}"] = sketch.places.pop(old)
+    sketch.locked = {f"{link}.{new}" if key == old else key for key in sketch.locked}

@@ -1,43 +1,25 @@
-"""What tolerances and plays do: the table that comes soon, to first order, of the largest effort and the strokes; and
-the worst corner for a measure, as `tolerance` finds it, with the mechanism there.
-"""
+"""The worst corner of tolerances and plays for a measure, as `tolerance` finds it, with the mechanism there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.namespace import Number
-from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.joints.pairs import GUIDED
 from trunnion.measures.measures import chosen, outputs
-from trunnion.model.measure_kinds import dimension_kinds
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import findings_of
-from trunnion.results.dataset import units_along
 from trunnion.results.quantities import quantity
-from trunnion.results.scales import without_noise
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.shifts import play_of
-from trunnion.studio.ways import ways
 from trunnion.views.cycle.scene import scene
 
 if TYPE_CHECKING:
     from trunnion.studies.tolerance.first_order import ToleranceStudy
-    from trunnion.studies.tolerance.linear import Of
 
-__all__ = ["measured", "tolerated", "worst_corner"]
-
-Array = NDArray[np.float64]
-
-MOST = 4  # strokes that are told
-SIDES = ("least", "largest")
-ROUNDS, AROUND = 4, 17  # in which the place is looked for, and places about it in each
+__all__ = ["corner_of", "measured"]
 
 
 def measured(run: Run) -> dict[str, list[str]]:
@@ -54,76 +36,31 @@ def measured(run: Run) -> dict[str, list[str]]:
 
 
 @np.errstate(all="ignore")
-def worst_corner(mechanism: Mechanism, name: str, side: str | None, steps: int) -> dict[str, Any]:
-    """Return the corner at which a measure is least or largest, or whichever of both is farther from nominal.
-
-    Pins that loads would press to one side may lie anywhere in their holes, as in `tolerance --seat free`.
+def corner_of(mechanism: Mechanism, name: str, side: str | None, steps: int) -> dict[str, Any]:
+    """Return the worst corner for a measure as the page shows it.
 
     Returns
     -------
     dict
-        values: least and largest deviation, SI, as the search of `tolerance` has them, and their texts; side: the
-        shown one, 0 or 1; index, at: position nearest to where it stands, and that in words, None of a figure of the
-        whole cycle; rows: numbers that matter, [name, nominal, change]; scene: of the mechanism there, its errors
-        being those against the nominal one.
+        values: least and largest deviation, SI, and their texts; side: the shown one, 0 or 1; index, at: position
+        nearest to where it stands, and that in words, None of a figure of the whole cycle; rows: numbers that matter,
+        [name, nominal, change]; scene: of the mechanism there, its errors being those against the nominal one.
     """
-    from trunnion.studies.tolerance.effects import NOBODY, EffectRow  # not for the first picture
-    from trunnion.studies.tolerance.first_order import study
-    from trunnion.studies.tolerance.linear import searched
+    from trunnion.studies.tolerance.corner import worst_corner  # it takes long to load
 
-    if "loaded" in mechanism.seated.values():
-        mechanism = mechanism.with_seats("free")
-    prepared = study(mechanism, [name], steps)
-    run, (of,), effects = prepared.run, prepared.linear.measures, prepared.effects
-    ends = searched(prepared.many, prepared.linear, of)
-    values = [corner.value for corner in ends]
-    if not np.all(np.isfinite(values)):
-        raise MechanismError(Finding("has no worst corner: the figure is undefined", f"measures.{name}"))
-    shown = SIDES.index(side) if side in SIDES else int(abs(values[1]) >= abs(values[0]))
-    corner = ends[shown]
-    there = replace(effects, rows=(EffectRow(NOBODY, 0, {}, ""),)).values(corner.at)
-    numbers = {path: float(np.ravel(primal(number))[0]) for path, number in there.items()}
-    unit = of.measure.figure_unit(run.system, run.values)
-    time, index = _place(prepared, of, there, 2 * shown - 1, run.cycle.times(steps))
-    dimensions = {f"dimensions.{dimension}": kind for dimension, kind in dimension_kinds(mechanism).items()}
-    kinds = {**mechanism.parameter_kinds(), **dimensions}
-    rows = []
-    for i, tolerance in enumerate(prepared.inputs.tolerances):
-        if of.figure.spread.half[i] == 0:
-            continue  # it does nothing to the measure
-        kind, nominal = kinds.get(tolerance.path), effects.nominal(i)
-        of_number = kind.unit if kind else "m"
-        rows.append(
-            [tolerance.path, quantity(nominal, of_number), signed(numbers[tolerance.path] - nominal, of_number)]
-        )
+    corner = worst_corner(mechanism, name, side, steps)
+    run, time = corner.prepared.run, corner.time
+    whole = not np.isfinite(time)
     return {
-        "values": values,
-        "texts": [signed(value, unit) for value in values],
-        "side": shown,
-        "index": index,
-        "at": None if index is None else run.system.dial(run.values, np.array([time])).at(0),
-        "rows": rows,
-        "scene": _scene(prepared, numbers, steps),
-    }
-
-
-def _place(prepared: ToleranceStudy, of: Of, there: Mapping[str, Number], sign: int, times: Array) -> Any:
-    """Time, s, at which a figure stands at its corner, and the nearest position; None of one of the whole cycle."""
-    time = of.time
-    if of.measure.rule == "deviation" and len(of.reference.parts) == 1:
-        name, at = of.measure.name, of.reference.window.time
-        for _ in range(ROUNDS):
-            both = (prepared.kernel.courses(numbers, at)[0][name][0] for numbers in (there, prepared.inputs.nominal))
-            moved, nominal = (np.broadcast_to(np.ravel(primal(part)), at.shape) for part in both)
-            change = moved - nominal
-            if of.reference.turning:
-                change = change - 2 * np.pi * np.round(change / (2 * np.pi))
-            top = int(np.nanargmax(sign * change))
-            time = float(at[top])
-            if len(at) == 1:
-                break
-            at = np.linspace(at[max(top - 1, 0)], at[min(top + 1, len(at) - 1)], AROUND)
-    return (time, int(np.argmin(np.abs(times - time)))) if np.isfinite(time) else (None, None)
+        "values": list(corner.deviations),
+        "texts": [_signed(value, corner.unit) for value in corner.deviations],
+        "side": corner.side,
+        "index": None if whole else int(np.argmin(np.abs(run.cycle.times(steps) - time))),
+        "at": None if whole else run.system.dial(run.values, np.array([time])).at(0),
+        "rows": [[path, quantity(nominal, unit), _signed(there - nominal, unit)]
+                 for path, unit, nominal, there in corner.rows],
+        "scene": _scene(corner.prepared, corner.numbers, steps),
+    }  # fmt: skip
 
 
 def _scene(prepared: ToleranceStudy, numbers: Mapping[str, float], steps: int) -> dict[str, Any]:
@@ -149,51 +86,6 @@ def _scene(prepared: ToleranceStudy, numbers: Mapping[str, float], steps: int) -
     return shown
 
 
-# ---- the table ------------------------------------------------------------------------------------------------------
-
-
-def tolerated(mechanism: Mechanism, steps: int) -> dict[str, Any]:
-    """Rows of the table: label, and texts of the nominal value, the worst case and the standard deviation.
-
-    MechanismError where the study has no answer; `why` says what first order does not describe.
-    """
-    from trunnion.studies.tolerance.study import tolerance  # not for the first picture
-
-    told = dict(_measures(mechanism, steps))
-    if not told:
-        return {"rows": [], "why": []}
-    study = without_noise(tolerance(mechanism, list(told), methods=("linear",), steps=steps, jobs=1, engine="numpy"))
-    units = units_along(study["nominal"], "measure")
-    values = (study[name].values for name in ("nominal", "worst_case_lower", "worst_case_upper", "deviation_linear"))
-    rows = []
-    for label, unit, nominal, lower, upper, deviation in zip(told.values(), units, *values, strict=True):
-        even = np.isclose(-lower, upper, rtol=1e-3)
-        worst = f"± {quantity(float(upper), unit)}" if even else f"{signed(lower, unit)} / {signed(upper, unit)}"
-        texts = [quantity(float(nominal), unit), worst, quantity(float(deviation), unit)]
-        numbers = {"nominal": float(nominal), "worst": [float(lower), float(upper)], "deviation": float(deviation)}
-        rows.append({"label": label, "texts": texts, **numbers})
-    doubts = [one.what for one in findings_of(study) if one.severity is not Severity.NOTE]
-    return {"rows": rows, "why": doubts[:1]}
-
-
-def signed(value: float, unit: str) -> str:
+def _signed(value: float, unit: str) -> str:
     """A change with its sign and unit."""
     return f"{'−' if value < 0 else '+'}{quantity(abs(float(value)), unit)}"
-
-
-def _measures(mechanism: Mechanism, steps: int) -> Iterator[tuple[str, str]]:
-    """Measures by their names on the command line, with what they are called here."""
-    run = prepare(mechanism)
-    system = run.system
-    for driver in mechanism.drivers:
-        yield f"largest:effort:{driver}", f"largest {'torque' if system.turns(driver) else 'force'}, drive {driver}"
-    held = [
-        name
-        for name, (kind, links) in system.joints.items()
-        if mechanism.fixed_link in links and name not in mechanism.drivers and kind in GUIDED
-    ]
-    for joint in held[:MOST]:
-        yield f"stroke:{joint}", f"stroke of {joint}"
-    for way in ways(run, steps):
-        if way.ratio > 0 and way.joint in held[:MOST]:
-            yield f"time_ratio:{way.joint}", f"time ratio of {way.joint}"

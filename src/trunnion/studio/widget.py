@@ -15,7 +15,7 @@ from trunnion.model.file import entries_of, text_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.studio.answers import answer, examples
 from trunnion.studio.page import found, one_file
-from trunnion.studio.placed import placed, thumbnail
+from trunnion.studio.placed import thumbnail
 
 __all__ = ["StudioWidget", "studio"]
 
@@ -66,8 +66,7 @@ class StudioWidget(anywidget.AnyWidget):
         kind, _, name = path.strip("/").partition("/")
         known: dict[str, Callable[[], bytes]] = {
             "files": self._files,
-            "first": lambda: placed(self.text),
-            "file": lambda: self._saved(body),
+            "file": lambda: self._saved(body) if body else json.dumps({"text": self.text}).encode(),
             "thumbnail": lambda: thumbnail(examples()[unquote(name)]),
             "jobs": lambda: json.dumps({"forms": [], "jobs": []}).encode(),
         }

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import atan2, cos, hypot, sin
+from math import atan2, cos, degrees, hypot, sin
 from typing import Any
 
-from trunnion.errors import Finding, MechanismError
-from trunnion.model.units import UnitError
 from trunnion.studio.acting import driver, gear
-from trunnion.studio.ends import begin, letter, line_near, numbered, place_of, point_of, refused, typed
 from trunnion.studio.sketch import Frame, Sketch, Vector
-from trunnion.studio.strokes import bar, slide
+from trunnion.studio.strokes import (
+    bar,
+    begin,
+    letter,
+    line_near,
+    numbered,
+    place_of,
+    point_of,
+    refused,
+    slide,
+    typed,
+)  # fmt: skip
 
 __all__ = ["block"]
 
@@ -28,7 +36,7 @@ def block(sketch: Sketch, given: Given) -> str:
     """A block of the list BLOCKS.
 
     pins: joints, free points "link.P", or {ground: "x, y"} for a new pin on the ground. at: "x, y" of the inner pin,
-    of a driver or RPR the end of its link; as it fits if empty. ratio: of gears.
+    of a driver or RPR the end of its link, of a CCC the angle between the shafts; as it fits if empty. ratio: of gears.
     """
     kind = str(given["kind"])
     if kind not in BLOCKS:
@@ -36,6 +44,8 @@ def block(sketch: Sketch, given: Given) -> str:
     begin(sketch)
     if len(set(map(str, given["pins"]))) < len(given["pins"]):
         raise refused("has the same pin twice", "the block", "choose other pins")
+    if kind == "CCC":
+        return _loop_in_space(sketch, given.get("at") or "30 deg")
     if kind == "gear":
         if not all(isinstance(pin, str) for pin in given["pins"]):
             raise refused("need two pivots that are drawn", "the gears", "choose two pins")
@@ -48,12 +58,11 @@ def block(sketch: Sketch, given: Given) -> str:
 def _place(sketch: Sketch, text: Any) -> Vector:
     """A place of two lengths, "120 mm, 0.4 in", m; plain numbers are in the unit of the sheet."""
     parts = str(text).replace(";", ",").split(",")
-    try:
-        x, y = (typed(part, "length", sketch.unit) for part in parts)
-        return x, y
-    except (UnitError, ValueError, KeyError) as error:
-        what = f"'{str(text)[:40]}' is no place ({getattr(error, 'what', 'two lengths are needed')})"
-        raise MechanismError(Finding(what, "the block", "write two lengths, such as 120 mm, 40 mm")) from None
+    if len(parts) != 2:
+        what = f"'{str(text)[:40]}' is no place (two lengths are needed)"
+        raise refused(what, "the block", "write two lengths, such as 120 mm, 40 mm")
+    x, y = (typed(part, "length", "the block", sketch.unit) for part in parts)
+    return x, y
 
 
 def _end(sketch: Sketch, name: str) -> str:
@@ -135,6 +144,31 @@ def _triad(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
     bar(sketch, pins[2], {"on": plate, "at": corners[2]})
 
 
+def _loop_in_space(sketch: Sketch, angle: str) -> str:
+    """Three cylindrical pairs from the link of a driver to the ground: with it a loop in space, here a Cardan joint.
+
+    The axes of both shafts and of the cross meet in a point, and the pins of the cross are at right angles.
+    """
+    plain = ("trunnion", "name", "space", "notes", "links", "joints", "drivers", "assembly", "joint_defaults")
+    joints, links = list(sketch.joints), [link for link in sketch.of("links") if link != sketch.ground]
+    more = [key for key, part in sketch.entries.items() if part and key not in plain]
+    if more or len(links) > 1 or len(joints) > 1 or sketch.entries.get("space") == "spatial":
+        remedy = "place it on a new sheet, or on that of a driver alone; change a loop by its table"
+        raise refused("closes a loop in space with a driver", "a CCC", remedy)
+    joints += [name for name in "ABCDE" if name not in joints][: 4 - len(joints)]
+    links += [name for name in ("link1", "link2", "link3", "link4") if name not in links][: 3 - len(links)]
+    driver = sketch.of("drivers").get(joints[0], {"speed": "60 rpm"})
+    shafts, start = typed(angle, "angle", "the CCC", "deg"), typed(driver.get("start") or "0 deg", "angle", "the CCC")
+    rows = [{"joint": joint, "type": "cylindrical", "link": link, "twist": "90 deg"}
+            for joint, link in zip(joints, [*links, sketch.ground], strict=True)]  # fmt: skip
+    rows[0]["type"], rows[3]["twist"] = "revolute", f"{round(180.0 - degrees(shafts), 12):.15g} deg"
+    output = degrees(atan2(-cos(start) * cos(shafts), sin(start)))  # the pins of the cross are at right angles
+    head = {key: part for key, part in sketch.entries.items() if key in ("trunnion", "name", "notes", "joint_defaults")}
+    moved = {"drivers": {joints[0]: driver}, "assembly": {joints[3]: f"{output:.6g} deg"}}
+    sketch.entries, sketch.places = {**head, "space": "spatial", "loop": rows, **moved}, {}
+    return "Add CCC"
+
+
 BLOCKS: dict[str, Callable[[Sketch, list[Any], Vector | None], None]] = {
     "driver": _crank,
     "RRR": _rrr,
@@ -143,5 +177,6 @@ BLOCKS: dict[str, Callable[[Sketch, list[Any], Vector | None], None]] = {
     "PRP": _prp,
     "RPP": _rpp,
     "triad": _triad,
+    "CCC": lambda *_: None,
     "gear": lambda *_: None,
 }

@@ -6,7 +6,7 @@ import { isPart } from "./fields.js";
 import { placesAt, posedAt, stemOf } from "./geometry.js";
 import { enterTab, forget, forgetOwn, keepSteps, lastSheet, left, leftBehind, lookForTabs, takeUp } from "./keeping.js";
 import { apart, sheet } from "./sheet.js";
-import { connection, decode, request } from "./socket.js";
+import { connection, request } from "./socket.js";
 
 const STEPS = 360; // positions of a run
 const TYPING = 350; // ms of quiet before typed text is solved
@@ -240,15 +240,13 @@ let sheets = 0; // that were opened or asked for: the latest is the one that is 
 
 /**
  * Open a sheet with a text; its steps, and work that was left of it unsaved, are taken up again.
- * `first` has what it is drawn of before it is solved.
  */
-export function openSheet({ name, saved, content, first = null }) {
+export function openSheet({ name, saved, content }) {
   sheets += 1;
   const work = takeUp(name);
   const found = work && (name === null || work.text === saved || work.text !== work.saved) ? work : null;
   state.begin({ name, saved: name === null && found ? found.saved : saved, content: found?.text ?? content, steps: found });
-  if (first?.tracks && first.text === state.text.value) showFirst(first);
-  else if (!state.text.value.trim()) showFirst({ text: state.text.value, entries: {}, numbers: {}, tracks: null });
+  if (!state.text.value.trim()) state.answer.value = { text: state.text.value, entries: {}, numbers: {}, findings: [], ready: [], solved: false, scene: null };
   state.dialog.value = null;
   return solve();
 }
@@ -279,21 +277,15 @@ export function openFile(name) {
 async function fetched(name) {
   const mine = (sheets += 1);
   const leaves = mine > 1 && state.unsaved.value && state.fileName.value !== name ? state.fileName.value : undefined;
-  const reply = await request(`/first/${encodeURIComponent(name)}`);
+  const reply = await request(`/file/${encodeURIComponent(name)}`);
   await lookForTabs();
   if (!reply.ok) return state.say(`${name} could not be read.`, true);
-  const first = decode(await reply.arrayBuffer());
+  const { text } = await reply.json();
   if (mine !== sheets) return;
-  const opened = openSheet({ name, saved: first.text, content: first.text, first });
+  const opened = openSheet({ name, saved: text, content: text });
   if (mine > 1) state.say(`${name} opened.`);
   if (leaves !== undefined) state.waiting.value = left(leaves);
   await opened;
-}
-
-/** Draw a mechanism by where its points go, or an empty sheet, until its answer is there; the window then stays. */
-function showFirst({ text, entries, numbers, tracks }) {
-  if (tracks) state.places.value = Object.fromEntries(Object.entries(tracks).map(([key, { x, y }]) => [key, [x[0], y[0]]]));
-  state.answer.value = { text, entries, numbers, tracks, findings: [], ready: [], solved: false, scene: null };
 }
 
 /** A new sheet with a text that is in no file of the folder yet; work on a sheet without a name comes back by undo, that on a file as the file is opened. */

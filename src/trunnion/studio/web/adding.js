@@ -8,7 +8,7 @@ import { focusOn, html } from "./ui.js";
 
 const NAME = /^[^\W\d]\w*$/u;
 
-/** Fields for a dimension that there is not yet; a name typed for a number elsewhere makes one too. */
+/** Fields for a dimension that there is not yet; a definition typed for a number elsewhere makes one too. */
 export function AddDimension() {
   const add = async (event) => {
     event.preventDefault();
@@ -25,7 +25,7 @@ export function AddDimension() {
   return html`<form class="new-dimension" aria-label="New dimension" onSubmit=${add}>
     <input name="name" aria-label="Name of the new dimension" placeholder="name" spellcheck=${false} />
     <input name="value" aria-label="Value of the new dimension" placeholder="e.g. 30 mm" spellcheck=${false} />
-    <button type="submit" class="plain" title="Then type its name where a number stands; a new name typed there makes one of that number">Add dimension</button>
+    <button type="submit" class="plain" title="Then type its name where a number stands; crank = 30 mm typed there makes one, too">Add dimension</button>
   </form>`; // prettier-ignore
 }
 

@@ -228,6 +228,7 @@ const KINDS = {
   RPR: { label: "RPR: a slider along a link, between two pins", pins: 2 },
   PRP: { label: "PRP: a pin between a link and a guide", pins: 1 },
   RPP: { label: "RPP: a pin in the slot of a guided link", pins: 1 },
+  CCC: { label: "CCC: three cylindrical pairs, with a driver a loop in space", pins: 0 },
   triad: { label: "Class III: a plate on three rods", pins: 3 },
   gear: { label: "Gears of two pivots", pins: 2 },
 };
@@ -251,20 +252,21 @@ function Palette() {
   const choices = pinsOf();
   const there = (order) => (choices.some(({ value }) => value === pins[order]) ? pins[order] : ""); // it may be gone
   const { pins: count } = KINDS[kind];
+  const fields = kind === "CCC" ? 0 : Math.max(count, 1);
   const take = (order) => (event) => setPins(pins.map((one, at) => (at === order ? event.target.value : one)));
   const write = (order) => (event) => setTyped({ ...typed, ground: typed.ground.map((one, at) => (at === order ? event.target.value : one)) });
   const place = async (event) => {
     event.preventDefault();
-    const ends = Array.from({ length: Math.max(count, 1) }, (_, order) => (count && there(order) ? there(order) : { ground: typed.ground[order] }));
+    const ends = Array.from({ length: fields }, (_, order) => (count && there(order) ? there(order) : { ground: typed.ground[order] }));
     if (!(await edit([{ do: "block", kind, pins: ends, at: typed.at, ratio: typed.ratio }]))) return;
     setTyped({ ...typed, at: "" });
-    sheet.fit();
+    if (!state.spatial.value) sheet.fit();
   };
-  const inner = { driver: "End at", RPR: "End at", RPP: "Guide at", triad: "Middle at" }[kind] ?? "Inner pin at";
+  const inner = { driver: "End at", RPR: "End at", RPP: "Guide at", CCC: "Angle between the shafts", triad: "Middle at" }[kind] ?? "Inner pin at";
   return html`<form class="palette" aria-label="Add a block" onSubmit=${place}>
     <h2>Add a block</h2>
     <label>Block <select aria-label="Kind of block" value=${kind} onChange=${(event) => (setKind(event.target.value), setTyped({ ...typed, at: "" }))}>${Object.entries(KINDS).map(([name, { label }]) => html`<option value=${name}>${label}</option>`)}</select></label>
-    ${Array.from({ length: Math.max(count, 1) }, (_, order) => html`<label>Pin ${order + 1}
+    ${Array.from({ length: fields }, (_, order) => html`<label>Pin ${order + 1}
       ${count > 0 && html`<select aria-label=${`Pin ${order + 1}`} value=${there(order)} onChange=${take(order)}>${choices.map(({ value, label }) => html`<option value=${value}>${label}</option>`)}</select>`}
       ${(!count || !there(order)) && kind !== "gear" && html`<input aria-label=${`Place of pin ${order + 1}`} value=${typed.ground[order]} onInput=${write(order)} />`}</label>`)}
     ${kind === "gear"

@@ -1,6 +1,7 @@
 // What can be shown over the mechanism: its names, and what of it is asked of Python when it is wanted.
 
 import { computed, effect, signal, untracked } from "@preact/signals";
+import { at } from "../web/data.js";
 import { askOf } from "./actions.js";
 import * as state from "./state.js";
 
@@ -29,20 +30,43 @@ export const LAYERS = [
 /** A scene for charts, which cut peaks near dead centres unless they are wanted whole. */
 export const framed = (scene) => (state.layers.value.peaks ? { ...scene, ease: [] } : { ...scene, whole: "choose Show, Whole peaks in plots." });
 
-/** {link, at, index}: the place on a link that was clicked and the position it was clicked at, or null. */
-export const clicked = signal(null);
-
-/** {point: "link.point"} of the chosen point or joint, {place} of the place that was clicked on the chosen link, or {}. */
+/** "link.point" of the chosen point or joint, or null. */
 const watched = computed(() => {
   const { kind, name } = state.selection.value ?? {};
-  if (kind === "points") return { point: name };
-  if (kind === "links") return clicked.value?.link === name ? { place: clicked.value } : {};
-  const joint = kind === "joints" && state.answer.value?.scene?.joints.find((one) => one.name === name);
-  return joint ? { point: joint.at } : {};
+  if (kind === "points") return name;
+  return (kind === "joints" && state.answer.value?.scene?.joints.find((one) => one.name === name)?.at) || null;
 });
 
-/** A place on a link as it was clicked, and what is the same when the model has changed: {link, start, local}. */
-const held = { clicked: null, same: null };
+const RATES = ["velocity", "acceleration"];
+
+/** Names of the columns that have the motion of a point. */
+export const columnsOf = (point) => (point ? RATES.flatMap((rate) => ["x", "y", "z"].map((axis) => `${point}.${rate}_${axis}`)) : []);
+
+/** Velocity, m/s, and acceleration, m/s², of a point by axis, from columns; null where there are none. */
+export function motionOf(columns, point) {
+  const parts = (rate) => Object.fromEntries(["x", "y", "z"].flatMap((axis) => {
+    const column = columns[`${point}.${rate}_${axis}`];
+    return column ? [[axis, column.values]] : [];
+  })); // prettier-ignore
+  const [velocity, acceleration] = RATES.map(parts);
+  return velocity.x ? { key: point, velocity, acceleration } : null;
+}
+
+/**
+ * Friction circles of the journals that rub, [{joint, radius, offset}], m, at every position: their radius is |M|/|F|, for Coulomb's
+ * law f′ r. `offset`: of the line of action of both together from the middle of the pin, M/|F|, to the right of F where
+ * positive; null where the joint rests, for friction is an interval there, and the radius that of the position before.
+ */
+export function circlesOf(columns, { joints, count }) {
+  return joints.flatMap(({ name, reaction }) => {
+    const torque = columns[`${name}.friction_torque`]?.values ?? [];
+    const offset = torque.map((moment, index) => moment / Math.hypot(at(reaction.x, index), at(reaction.y, index))).map((arm) => (Number.isFinite(arm) && arm !== 0 ? arm : null));
+    let last = offset.findLast((arm) => arm !== null);
+    if (last === undefined) return [];
+    const radius = Array.from({ length: count }, (_, index) => Math.abs((last = offset[index] ?? last)));
+    return [{ joint: name, radius, offset }];
+  });
+}
 
 /** {scene, point, centres, circles, transmission, seats} of the scene that is shown, as far as it is wanted; or null. */
 export const laid = signal(null);
@@ -55,40 +79,16 @@ export function keepLayers() {
     return Object.entries({ centres: centres || relative, circles, transmission, seats: seated }).filter(([, shown]) => shown).map(([name]) => name).join(" ");
   }); // prettier-ignore
   effect(() => {
-    const [names, { point, place }] = [wanted.value, watched.value];
+    const [layers, point] = [wanted.value, watched.value];
     const scene = state.solved.value ? state.answer.value.scene : null;
     untracked(() => {
       if (laid.value?.scene !== scene) laid.value = null;
-      if (!scene || (!names && !point && !place)) laid.value = null;
-      else
-        askOf("layers", { point, place: held.clicked === place ? held.same : place, wanted: names.split(" ") }).then((found) => {
-          if (!found) return;
-          if (place && found.point) Object.assign(held, { clicked: place, same: { link: place.link, start: found.point.start, local: found.point.local } });
-          laid.value = { ...found, scene };
-        });
+      if (!scene || (!layers && !point)) return void (laid.value = null);
+      const round = layers.includes("circles") && !state.spatial.value;
+      const names = [...columnsOf(point), ...(round ? scene.joints.map(({ name }) => `${name}.friction_torque`) : [])];
+      askOf("layers", { names, wanted: layers.split(" ") }).then((found) => {
+        if (found) laid.value = { ...found, scene, point: motionOf(found.columns, point), ...(round ? { circles: circlesOf(found.columns, scene) } : {}) };
+      });
     });
   });
-}
-
-const STILL = 3; // px that a click may move
-
-/** A click on a link with nothing in hand: the place there is watched. Returns what ends it. */
-export function listenToPlaces(root, view) {
-  let from = null;
-  const down = (event) => {
-    const part = event.target.closest?.("[data-kind]");
-    const link = event.button === 0 && state.tool.value === "select" && ["links", "centres"].includes(part?.dataset.kind) ? part.dataset.name : null;
-    from = link && { link, x: event.clientX, y: event.clientY };
-  };
-  const up = (event) => {
-    if (!from || Math.hypot(event.clientX - from.x, event.clientY - from.y) > STILL || !state.solved.value || view.ideal) return;
-    const box = root.getBoundingClientRect();
-    clicked.value = { link: from.link, at: view.frame.from([event.clientX - box.left, event.clientY - box.top]), index: view.posed };
-  };
-  root.addEventListener("pointerdown", down);
-  root.addEventListener("pointerup", up);
-  return () => {
-    root.removeEventListener("pointerdown", down);
-    root.removeEventListener("pointerup", up);
-  };
 }

@@ -48,12 +48,11 @@ function fill(holder) {
   const whole = state.solved.value ? state.answer.value.scene : null;
   const scene = whole?.drivers.length ? whole : null;
   const first = state.findings.value.find(({ severity }) => severity === "error");
-  const begun = Boolean(state.answer.value?.tracks); // the cycle is being solved
   untracked(() => {
     if (!scene) {
       crank.player?.pause();
       crank.player = null;
-      const words = begun ? "The cycle is being solved …" : first ? `It does not move yet: ${first.what}${first.place ? ` (${first.place})` : ""}.` : whole ? "It stands still: no joint is driven." : "The mechanism moves as soon as it is whole and has a driver.";
+      const words = first ? `It does not move yet: ${first.what}${first.place ? ` (${first.place})` : ""}.` : whole ? "It stands still: no joint is driven." : "The mechanism moves as soon as it is whole and has a driver.";
       holder.replaceChildren(element("p", { class: "calm" }, words));
       return;
     }

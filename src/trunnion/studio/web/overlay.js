@@ -3,11 +3,11 @@
 
 import { arrow } from "../web/arrow.js";
 import { told as rounded } from "../web/built.js";
-import { angleAt, at, forceAt, magnitude, peak, place } from "../web/data.js";
+import { at, forceAt, magnitude, peak, place } from "../web/data.js";
 import { set, svg } from "../web/dom.js";
 import { quantity, roundBelow, short, stated } from "../web/format.js";
-import { outline, standing, trackPath } from "../web/plane.js";
-import { KEY, metres, perNewton } from "./drawing.js";
+import { outline, standing } from "../web/plane.js";
+import { KEY, perNewton } from "./drawing.js";
 import { roundAbove } from "./geometry.js";
 import { laid } from "./layers.js";
 import { massMarks } from "./masses.js";
@@ -46,7 +46,7 @@ export function poseOverlay(view) {
   const wanted = state.layers.peek();
   const found = known && laid.peek()?.scene === (scene.of ?? scene) ? laid.peek() : {};
   const corner = Boolean(view.ideal && cornered.peek()); // of which nothing but its places is told
-  const point = corner || found.point?.position ? null : found.point;
+  const point = corner ? null : found.point;
   const told = view.ideal ? { point, seats: corner ? null : found.seats } : found; // the rest is where it is
   const key = []; // lines of the key, from below
   room = view.frame.width - 6;
@@ -59,7 +59,7 @@ export function poseOverlay(view) {
   layers.overlay.replaceChildren(
     ...dimensionMarks(view, words, (x, y, text) => taken.push({ left: x - 0.5 * LETTER * text.length, right: x + 0.5 * LETTER * text.length, y: y + 4 })),
     ...(told.circles ? circles(view, told.circles, key) : []),
-    ...(told.transmission ? told.transmission.flatMap((one) => angle(view, one)) : []),
+    ...(told.transmission ? told.transmission.flatMap((one) => transmission(view, one)) : []),
     ...(told.centres ? centres(view, told.centres, wanted) : []),
     ...(known && !corner && wanted.reactions && wanted.values ? values(view) : []),
     ...pinsInHoles(view, seats, wanted, words),
@@ -97,12 +97,10 @@ function keyed({ frame }, wide, text, drawn) {
 
 function motion(view, point, wanted, key) {
   const { frame, exact: index, scene } = view;
-  const scenery = point.position ? { ...scene, points: { [point.key]: point.position } } : scene;
-  const found = place(scenery, point.key, index);
+  const found = place(scene, point.key, index);
   if (!found) return [];
   const [x, y] = frame.to(found);
-  const path = point.position ? [curve(view, scenery, point), svg("circle", { class: "clicked-place", cx: x, cy: y, r: 4 })] : [];
-  return path.concat(VECTORS.filter(([name]) => wanted[name]).flatMap(([name, sign, unit]) => {
+  return VECTORS.filter(([name]) => wanted[name]).flatMap(([name, sign, unit]) => {
     const parts = point[name];
     const sizes = magnitude(parts, scene.count);
     const scale = (0.2 * Math.min(frame.width, frame.height)) / peak(sizes);
@@ -113,14 +111,7 @@ function motion(view, point, wanted, key) {
     if (dx === null || dy === null) return [];
     const vector = svg("path", { class: `motion ${name}`, d: arrow(x, y, dx * scale, -dy * scale) });
     return [vector, beyond([x, y], [dx * scale, -dy * scale], `${sign} = ${quantity(at(sizes, index), unit, peak(sizes))}`)];
-  }));
-}
-
-/** The path of a place that was clicked; it is drawn in metres once. */
-function curve({ frame }, scenery, point) {
-  point.path ??= trackPath(scenery, point.key, metres);
-  const transform = `matrix(${frame.scale},0,0,${-frame.scale},${frame.left},${frame.foot})`;
-  return svg("path", { class: "track free", d: point.path, transform, "vector-effect": "non-scaling-stroke" });
+  });
 }
 
 // ---- instant centres ------------------------------------------------------------------------------------------------
@@ -216,22 +207,13 @@ function locking({ frame, scene, posed, drawn }) {
 
 // ---- transmission angles --------------------------------------------------------------------------------------------
 
-function angle({ frame, exact: index }, { x, y, first, angle: turn }) {
-  const [a, b, by] = [x, y, turn].map((one) => at(one, index));
-  const from = angleAt(first, index);
-  if ([a, b, from, by].includes(null)) return [];
-  const spot = frame.to([a, b]);
-  const on = (way, far) => [spot[0] + far * Math.cos(way), spot[1] - far * Math.sin(way)];
-  const pair = (/** @type {number[]} */ [px, py]) => `${px.toFixed(1)},${py.toFixed(1)}`;
-  const [start, end] = [on(from, 38), on(from + by, 38)];
-  const rays = [from, from + by].map((way) => `M${pair(on(way, 10))}L${pair(on(way, 58))}`).join("");
-  const middle = on(from + by / 2, 66);
-  const text = `transmission angle ${((Math.abs(by) * 180) / Math.PI).toFixed(1)}°`;
-  return [
-    svg("path", { class: "transmission rays", d: rays }),
-    svg("path", { class: "transmission", d: `M${pair(start)}A38,38 0 0 ${by > 0 ? 0 : 1} ${pair(end)}` }),
-    words(middle[0], middle[1], text, middle[0] < spot[0] ? "to-left" : ""),
-  ];
+/** The transmission angle of a dyad, at its middle joint. */
+function transmission({ frame, scene, exact: index }, { joint: name, angle }) {
+  const found = place(scene, scene.joints.find((one) => one.name === name)?.at, index);
+  const size = at(angle, index);
+  if (!found || size === null) return [];
+  const [x, y] = frame.to(found);
+  return words(x + 12, y - 22, `transmission angle ${((size * 180) / Math.PI).toFixed(1)}°`);
 }
 
 // ---- values of the reactions ----------------------------------------------------------------------------------------

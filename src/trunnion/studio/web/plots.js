@@ -3,18 +3,16 @@
 import { effect, signal, untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { lineChart } from "../web/chart.js";
-import { at, full, magnitude, say as position } from "../web/data.js";
+import { full, magnitude, say as position } from "../web/data.js";
 import { quantity } from "../web/format.js";
 import { polarChart } from "../web/polar.js";
 import { charts } from "../web/report.js";
 import { seatCharts } from "../web/seat.js";
-import { edit } from "./actions.js";
 import { chosenCharts, Choice } from "./curves.js";
-import { clicked, framed, laid } from "./layers.js";
+import { framed, laid } from "./layers.js";
 import { crank } from "./motion.js";
 import { kindsOf } from "./sheet.js";
 import * as state from "./state.js";
-import { Tolerances } from "./tolerances.js";
 import { Button, html } from "./ui.js";
 import { Variants, compared } from "./variants.js";
 
@@ -32,14 +30,12 @@ const plane = signal("x–y");
 export function Plots() {
   return html`<div class="plots">
     <${Variants} />
-    <${Place} />
     <${Curves} class="charts" listOf=${curves} />
     <${Chosen} />
     <${Polars} />
     <${Seats} />
     <${Joints} />
     <${Figures} />
-    <${Tolerances} />
     ${!state.solved.value && html`<p class="calm">Curves appear as soon as the mechanism is solved.</p>`}
   </div>`;
 }
@@ -119,23 +115,6 @@ function ofPoint({ key, velocity, acceleration }) {
     const axes = Object.entries(parts).map(([axis, values], order) => ({ label: axis, values: full(values, count), kind: `k${order} d${order + 1}` }));
     return { title: `${word} of ${key}`, unit, series: [{ label: "magnitude", values: magnitude(parts, count), kind: "ink" }, ...axes] };
   }); // prettier-ignore
-}
-
-/** A place that was clicked: it can become a point of its link. A link chosen otherwise offers its middle. */
-function Place() {
-  const { kind, name } = state.selection.value ?? {};
-  if (kind !== "links" || !state.solved.value || state.spatial.value) return null;
-  const { scene } = state.answer.value;
-  const here = (track) => ["x", "y"].map((axis) => at(track[axis], state.index.peek()));
-  const point = laid.value?.scene === scene && laid.value.point?.link === name ? laid.value.point : null;
-  const keep = () => edit([{ do: "add-point", link: name, at: here(point.position) }]);
-  const middle = () => {
-    const spots = scene.links.find((one) => one.name === name).points.map((key) => here(scene.points[key]));
-    clicked.value = { link: name, at: [0, 1].map((axis) => spots.reduce((sum, spot) => sum + spot[axis], 0) / spots.length), index: state.index.peek() };
-  };
-  return html`<p class="row-of-buttons of-place">${point
-    ? html`<span>The place clicked on ${name}.</span> <${Button} label="Make it a point" onClick=${keep} />`
-    : html`<span>Click ${name} on the sheet: the place there draws its curve.</span> <${Button} label="Its middle" onClick=${middle} />`}</p>`;
 }
 
 /** Curves that the reader has chosen from the table of the cycle. */

@@ -14,7 +14,7 @@ export const shown = computed(() => {
   if (!found || state.spatial.value) return null;
   if (!state.solved.value || !assembled(found.scene)) {
     const scene = sketch(found.entries, state.places.value, found.numbers);
-    return { scene: found.tracks ? { ...scene, points: found.tracks } : scene, structure: scene, sketched: true };
+    return { scene, structure: scene, sketched: true };
   }
   const live = state.live.value;
   const scene = live?.points && tells(live, state.index.value) ? changing(found.scene, live) : found.scene;

@@ -5,7 +5,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { set, svg } from "../web/dom.js";
 import { build, drawTracks, drawing, pose } from "./drawing.js";
 import { others, poseGhosts } from "./ghosts.js";
-import { laid, listenToPlaces } from "./layers.js";
+import { laid } from "./layers.js";
 import { addOverlay, poseOverlay } from "./overlay.js";
 import { compared } from "./variants.js";
 import { boxTo, groupMarks } from "./group.js";
@@ -42,7 +42,6 @@ function mount(holder) {
   const stop = [
     watchSize(holder, view),
     listenToPointer(root, view),
-    listenToPlaces(root, view),
     effect(() => show(view)),
     effect(() => {
       state.selection.value;

@@ -1,31 +1,25 @@
 // Variant A: the state that was kept, beside the present one in plots, sheet and a table; and the same without friction.
 
-import { computed, effect, signal, untracked } from "@preact/signals";
+import { effect, signal, untracked } from "@preact/signals";
 import { askOf, takeText } from "./actions.js";
-import { laid } from "./layers.js";
+import { columnsOf, laid, motionOf } from "./layers.js";
 import * as state from "./state.js";
 import { Button, html } from "./ui.js";
 
-/** Variants beside the present scene: [{name, ghost, heads, scene, margin, shifted, why, rows}]. */
+/** Variants beside the present scene: [{name, ghost, heads, scene, margin, why, rows}]. */
 export const compared = signal([]);
-
-/** The point or place whose motion is shown, as a question says it; "" for none. */
-const moves = computed(() => {
-  const point = laid.value?.point;
-  return point ? JSON.stringify(point.link ? { place: { link: point.link, start: point.start, local: point.local } } : { point: point.key }) : "";
-});
 
 /** Ask for the variants whenever one is wanted and there is a new answer. */
 export function keepCompared() {
   effect(() => {
     const found = state.solved.value ? state.answer.value : null;
-    const moving = moves.value ? JSON.parse(moves.value) : {};
+    const point = laid.value?.point?.key;
     const wanted = found ? variants(state.variant.value, found, state.friction.value === "compare") : [];
     untracked(() => {
       if (!wanted.length) compared.value = [];
       else
-        askOf("compare", { ...moving, others: wanted.map(({ text, friction }) => ({ text, friction })) }).then((told) => {
-          if (told) compared.value = told.others.map((one, order) => ({ ...wanted[order], ...one, of: found.text }));
+        askOf("compare", { names: columnsOf(point), others: wanted.map(({ text, friction }) => ({ text, friction })) }).then((told) => {
+          if (told) compared.value = told.others.map((one, order) => ({ ...wanted[order], ...laidOver(one, found.scene), point: point && one.scene ? motionOf(one.columns, point) : null, rows: rowsOf(told.figures, one.figures), of: found.text }));
         });
     });
   });
@@ -38,6 +32,23 @@ export function variants(own, { text, friction }, free) {
     list.push({ name: "variant A", ghost: own.text !== text, heads: ["variant A", "now"], ...own });
   if (free) list.push({ name: "without friction", ghost: false, heads: ["without", "with"], text, friction: "off" });
   return list;
+}
+
+/** A variant without its scene where it runs over other positions of the drive. */
+function laidOver(one, { abscissa }) {
+  const own = one.scene?.abscissa;
+  const near = 1e-5 * (Math.max(...abscissa.values.map(Math.abs)) || 1);
+  const same = own && own.label === abscissa.label && own.unit === abscissa.unit && own.values.length === abscissa.values.length && own.values.every((value, index) => Math.abs(value - abscissa.values[index]) <= near);
+  return same || !own ? one : { ...one, scene: null, why: "runs over other positions of the drive than the present one: its curves cannot be laid over" };
+}
+
+/** Rows of the table, [{label, texts}]: the figures of a variant beside the present ones, and their change. */
+function rowsOf(now, before) {
+  return now.map(({ name, title, text, value }) => {
+    const other = before.find((one) => one.name === name);
+    const change = other?.value && value !== null ? (100 * (value - other.value)) / Math.abs(other.value) : null;
+    return { label: title, texts: [other?.text ?? "—", text, change === null ? "—" : `${change < 0 ? "−" : "+"}${Math.abs(change).toFixed(1)} %`] };
+  });
 }
 
 function keep() {
@@ -62,11 +73,10 @@ export function Variants() {
   </section>`; // prettier-ignore
 }
 
-function Changes({ one: { name, heads, rows, why, shifted, of } }) {
+function Changes({ one: { name, heads, rows, why, of } }) {
   const title = `${name[0].toUpperCase()}${name.slice(1)}`;
   return html`<div class=${of === state.text.value ? "changes" : "changes stale"}>
     ${why && html`<p class="calm">${title} ${why}.</p>`}
-    ${shifted && html`<p class="calm">${title} runs over another range of the drive: each position shows the nearest of its own.</p>`}
     ${rows.length > 0 && html`<table>
       <caption class="unseen">${title} and the present state</caption>
       <thead><tr><th scope="col"><span class="unseen">Figure</span></th>${[...heads, "change"].map((head) => html`<th scope="col" class="figure">${head}</th>`)}</tr></thead>

@@ -1,0 +1,85 @@
+"""The mechanism at the worst corner of its tolerances and plays for a measure, as the search of the study finds it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.measure_kinds import dimension_kinds
+from trunnion.model.mechanism import Mechanism
+from trunnion.studies.tolerance.effects import NOBODY, EffectRow
+from trunnion.studies.tolerance.first_order import ToleranceStudy, study
+from trunnion.studies.tolerance.linear import Of, searched
+
+__all__ = ["Corner", "worst_corner"]
+
+SIDES = ("least", "largest")
+ROUNDS, AROUND = 4, 17  # in which the place is looked for, and places about it in each
+
+
+@dataclass(frozen=True)
+class Corner:
+    """A corner of the tolerances and plays of a mechanism.
+
+    deviations: least and largest of the measure, in `unit`; side: that of this corner, 0 or 1; time: where it stands
+    there, s, NaN of a figure of the whole cycle; numbers: of the mechanism there, SI, by path; rows: of those that
+    matter path, unit, nominal value and that of the corner.
+    """
+
+    prepared: ToleranceStudy
+    deviations: tuple[float, float]
+    unit: str
+    side: int
+    time: float
+    numbers: Mapping[str, float]
+    rows: list[tuple[str, str, float, float]]
+
+
+@np.errstate(all="ignore")
+def worst_corner(mechanism: Mechanism, name: str, side: str | None, steps: int) -> Corner:
+    """Return the corner at which a measure is "least" or "largest", or whichever of both is farther from nominal.
+
+    Pins that loads would press to one side may lie anywhere in their holes, as in `tolerance --seat free`.
+    """
+    if "loaded" in mechanism.seated.values():
+        mechanism = mechanism.with_seats("free")
+    prepared = study(mechanism, [name], steps)
+    run, (of,), effects = prepared.run, prepared.linear.measures, prepared.effects
+    ends = searched(prepared.many, prepared.linear, of)
+    least, largest = (corner.value for corner in ends)
+    if not np.isfinite([least, largest]).all():
+        raise MechanismError(Finding("has no worst corner: the figure is undefined", f"measures.{name}"))
+    shown = SIDES.index(side) if side in SIDES else int(abs(largest) >= abs(least))
+    there = replace(effects, rows=(EffectRow(NOBODY, 0, {}, ""),)).values(ends[shown].at)
+    numbers = {path: float(np.ravel(primal(number))[0]) for path, number in there.items()}
+    dimensions = {f"dimensions.{dimension}": kind for dimension, kind in dimension_kinds(mechanism).items()}
+    kinds = {**mechanism.parameter_kinds(), **dimensions}
+    rows = []
+    for i, tolerance in enumerate(prepared.inputs.tolerances):
+        if of.figure.spread.half[i] != 0:  # else it does nothing to the measure
+            kind = kinds.get(tolerance.path)
+            rows.append((tolerance.path, kind.unit if kind else "m", effects.nominal(i), numbers[tolerance.path]))
+    unit, time = of.measure.figure_unit(run.system, run.values), _place(prepared, of, there, 2 * shown - 1)
+    return Corner(prepared, (least, largest), unit, shown, time, numbers, rows)
+
+
+def _place(prepared: ToleranceStudy, of: Of, there: Mapping[str, Number], sign: int) -> float:
+    """Time, s, at which a figure stands at its corner; NaN of one of the whole cycle."""
+    time = of.time
+    if of.measure.rule == "deviation" and len(of.reference.parts) == 1:
+        at = of.reference.window.time
+        for _ in range(ROUNDS):
+            courses = (prepared.kernel.courses(numbers, at)[0] for numbers in (there, prepared.inputs.nominal))
+            moved, nominal = (np.ravel(primal(course[of.measure.name][0])) for course in courses)
+            change = np.broadcast_to(moved - nominal, at.shape)
+            if of.reference.turning:
+                change = change - 2 * np.pi * np.round(change / (2 * np.pi))
+            top = int(np.nanargmax(sign * change))
+            time, last = float(at[top]), len(at) - 1
+            at = np.linspace(at[max(top - 1, 0)], at[min(top + 1, last)], AROUND if last else 1)
+    return time

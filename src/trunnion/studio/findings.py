@@ -1,0 +1,278 @@
+"""What the page says of a model: its figures and its locking margin; findings in the words of the sheet, what can be
+tried against them, what the model can be asked and what it still lacks.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.errors import Finding, Severity, Status, counted
+from trunnion.measures.many import figures_of
+from trunnion.measures.measures import Measure, outputs
+from trunnion.model.joint_parts import has_play
+from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import summary_of, units_of
+from trunnion.results.figure import MORE_THAN, Figure
+from trunnion.results.quantities import quantity
+from trunnion.results.variables import VARIABLES
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.run import prepare
+from trunnion.solve.system import Values, felt, rubbing
+from trunnion.studio.loaded import Asked, Loaded
+from trunnion.studio.sketch import Sketch
+from trunnion.views.common.cycle import abscissa, names
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["cures", "figures", "margin_of", "missing", "reached", "readiness", "remedied", "sentence", "spoken"]
+
+ENOUGH = 0.9  # of the friction at which it just runs: what is tried
+SIZES = {"pin.radius": ENOUGH, "guide.length": 1.0 / ENOUGH}  # a shorter arm, a longer guide
+NOUNS = {
+    "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair",
+    "dimensions": "dimension", "loop": "joint", "measures": "measure", "tables": "table",
+}  # fmt: skip
+NESTED = re.compile(r"\b([a-z_]+): \{([a-z_]+): ([^{},]*)\}")
+STATED = re.compile(r"\b([a-z_]+): (?=-?\d|…)")
+PATH = re.compile(r"[^\s.,]+(\.[^\s.,]+)+")
+# what positions have that findings speak of
+REACHED = {
+    "friction.interval": Status.ZERO_SLIP, "position.near_singular": Status.NEAR_SINGULAR,
+    "contact.lost": Status.CONTACT_LOST, "friction.not_converged": Status.NOT_CONVERGED,
+    "friction.locked": Status.LOCKED, "load.undefined": Status.LOAD_UNDEFINED,
+    "spring.undefined": Status.LOAD_UNDEFINED, "position.singular": Status.SINGULAR,
+    "assembly.open": Status.NOT_ASSEMBLED,
+}  # fmt: skip
+
+
+# ---- figures and margin --------------------------------------------------------------------------------------------
+
+
+def figures(asked: Asked) -> list[dict[str, Any]]:
+    """The figures one looks at first, without those of the solution: of the result, and time ratios.
+
+    Returns
+    -------
+    list
+        name: by which that of another model is found; label; title: without its place; text: with its unit; value: SI,
+        None where there is none, or nothing but a bound.
+    """
+    units = units_of(asked.result)
+    found = [one for one in summary_of(asked.result) if not one.numerical]
+    ratios = [Figure(f"{joint}.time_ratio", f"time ratio of {joint}", ratio) for joint, ratio in _ratios(asked.state)]
+    rows = []
+    for one in (*found, *ratios):
+        bound = one.aspect == MORE_THAN
+        text = one.value if isinstance(one.value, str) else quantity(one.value, one.unit, units) or "—"
+        rows.append({
+            "name": one.name,
+            "label": one.label,
+            "title": ", ".join(part for part in (one.subject, "minimum" if bound else one.aspect) if part),
+            "text": f"> {text}" if bound else text,
+            "value": None if bound or isinstance(one.value, str) else one.value,
+        })  # fmt: skip
+    return rows
+
+
+@lru_cache(maxsize=8)
+def _ratios(state: Loaded) -> tuple[tuple[str, float], ...]:
+    """Time ratios of what slides on the ground, or where nothing does of what turns back on it."""
+    run = state.run
+    found = [] if run.seats or run.cycle.duration <= 0 else outputs(run.system)
+    found = [one for one in found if one.kind == "slide"] or found
+    measures = [Measure(one.subject, "time_ratio", one.subject) for one in found]
+    ratios = figures_of(run, measures, FrictionMethod()) if measures else {}
+    return tuple((joint, float(ratio)) for joint, ratio in ratios.items() if np.isfinite(ratio))
+
+
+def margin_of(result: xr.Dataset, rubs: bool) -> dict[str, Any]:
+    """The locking margin over the cycle, the least and where it is; where there is none, `margin_why` says why.
+
+    It is the multiple of the friction at which a position locks: 1 and less where it locks, at most MARGIN; `beyond`:
+    it is more everywhere. Positions that cannot be assembled have none, nor has a mechanism whose joints carry nothing.
+    The least is the figure of the cycle where the result has that, else that of the positions.
+    """
+    margin = np.where(result["status"].values <= Status.LOCKED, result["locking_margin"].values, np.nan)
+    reactions = np.concatenate([np.ravel(result[name].values) for name in ("reaction_force", "reaction_moment")])
+    why = None
+    if not rubs:
+        why = "no friction"
+    elif not names(result, "driver"):
+        why = "no driver"
+    elif np.all(np.isnan(margin)):
+        why = "no position is solved"
+    elif not np.any(np.nan_to_num(reactions)):
+        why = "nothing loads its joints"
+    if why is not None:
+        return {"margin": None, "margin_least": None, "margin_why": why}
+    index = int(np.flatnonzero(margin == np.nanmin(margin))[0])  # `nanargmin` takes a nan for inf
+    beyond, shown = bool(margin[index] > MARGIN), np.minimum(margin, MARGIN)
+    least = {"value": float(shown[index]), "beyond": beyond, "at": abscissa(result).say(index)}
+    figure = next((one for one in summary_of(result) if one.name == "locking_margin" and one.value is not None), None)
+    if figure is not None and figure.aspect != MORE_THAN:
+        least = {"value": figure.value, "beyond": False, "at": figure.place.removeprefix("at ")}
+    return {"margin": shown, "margin_least": least, "margin_why": None}
+
+
+# ---- in words -----------------------------------------------------------------------------------------------------
+
+
+def spoken(where: str) -> str:
+    """A path of the file in words, as "mass of link crank" for `links.crank.mass`; what is no path stays."""
+    if not PATH.fullmatch(where):
+        return where
+    section, name, *inner = where.split(".")
+    if section == "joint_defaults":
+        return _plain([name, *inner], "all joints")
+    if section not in NOUNS:
+        return f"start of {'.'.join([name, *inner])}" if section == "assembly" else _plain([section, name, *inner])
+    part = name if section == "dimensions" and not inner else f"{NOUNS[section]} {name}"
+    if section == "links" and len(inner) > 1 and inner[0] == "points":
+        part = f"point {inner[1]} of {part}"
+        inner = [dict(zip("012", "xyz", strict=True)).get(key, key) for key in inner[2:] if key not in "xyz at"]
+    return _plain(inner, part)
+
+
+def _plain(keys: Sequence[str], part: str = "") -> str:
+    return " of ".join(text for text in (" ".join(keys).replace("_", " "), part) if text)
+
+
+def remedied(remedy: str) -> str:
+    """A remedy without the signs of the file: "state pin radius" where it says `state pin: {radius: …}`."""
+    if " --" in remedy and "trunnion " not in remedy:  # options: the page has none; whole commands stay
+        remedy = re.sub(r"[,;][^,;]* --.*", "", remedy)
+    if (" --" in remedy and "trunnion " not in remedy) or any("_" in name and name in remedy for name in VARIABLES):
+        return ""  # it names columns of the result, or is about an option alone
+    plain = STATED.sub(r"\1 ", NESTED.sub(r"\1 \2 \3", remedy))
+    return plain.replace(": {…}", "").replace(" …", "")
+
+
+def sentence(finding: Finding) -> str:
+    """A finding as one sentence."""
+    remedy = remedied(finding.remedy)
+    return " ".join(part for part in (spoken(finding.where), finding.what, remedy and f"— {remedy}") if part)
+
+
+def reached(finding: Finding, result: xr.Dataset) -> int | None:
+    """The position at which a finding holds: of those that lock the worst, else the first."""
+    places = np.flatnonzero(result["status"].values == REACHED.get(finding.code, -1))
+    if not len(places):
+        return None
+    margins = np.nan_to_num(result["locking_margin"].values[places], nan=np.inf)
+    return int(places[np.argmin(margins) if finding.code == "friction.locked" else 0])
+
+
+# ---- what can be tried --------------------------------------------------------------------------------------------
+
+
+def cures(state: Loaded, finding: Finding) -> list[dict[str, Any]]:
+    """What the remedy of a locked position comes to in numbers: gestures that write it, with the words for them."""
+    facts, entries, numbers = finding.figures, dict(state.entries or {}), state.run.values
+    joints = entries.get("joints")
+    if finding.code != "friction.locked" or not isinstance(joints, Mapping):
+        return []
+    coefficients = {joint: f"joints.{joint}.friction.coefficient" for joint in felt(state.run.system, numbers)}
+    coefficients = {joint: path for joint, path in coefficients.items() if path in numbers}
+    alike = facts["whole"] >= (1 - 1e-3) * facts["share"]  # else other joints lock where these no longer do
+    trials = [(list(facts["joints"]) if alike else list(coefficients), min(facts["share"], facts["whole"]))]
+    decides, multiple = facts["decides"], facts["multiple"]
+    if decides and multiple and trials[0][0] != [decides]:
+        trials.insert(0, ([decides], multiple))
+    listed = []
+    for chosen, times in trials:
+        if times > 0 and all(joint in coefficients and isinstance(joints.get(joint), Mapping) for joint in chosen):
+            befores = [float(np.ravel(numbers[coefficients[joint]])[0]) for joint in chosen]
+            values = [float(f"{ENOUGH * times * before:.3g}") for before in befores]
+            stated = [isinstance(joints[joint].get("friction", {}), Mapping) for joint in chosen]
+            gestures = [{"do": "set", "path": ["joints", joint, "friction", *["coefficient"] * inside], "value": value}
+                        for joint, inside, value in zip(chosen, stated, values, strict=True)]  # fmt: skip
+            change = f"{befores[0]:.3g} → {values[0]:.3g}" if len(chosen) == 1 else f"× {ENOUGH * times:.3g}"
+            what = f"friction coefficient{'s' * (len(chosen) > 1)} of {', '.join(chosen)}"
+            listed.append({"label": f"{what} {change}", "gestures": gestures})
+    return listed + list(_resized(entries, numbers, decides, multiple))
+
+
+def _resized(entries: dict[str, Any], numbers: Values, joint: str | None, multiple: float) -> Iterator[dict[str, Any]]:
+    """The radius and length by which the friction of a joint is as much less as it need be, where they are stated."""
+    sketch = Sketch(copy.deepcopy(entries))
+    for key, enough in SIZES.items():
+        path = ["joints", str(joint), *key.split(".")]
+        part = entries["joints"].get(joint, {}).get(path[2], {})
+        if ".".join(path) not in numbers or not isinstance(part, Mapping) or "fit" in part:
+            continue  # a fit states the radius
+        before = float(np.ravel(numbers[".".join(path)])[0])
+        times = enough * (multiple if key == "pin.radius" else 1.0 / multiple)
+        length = sketch.length(float(f"{times * before:.3g}"))
+        label = f"{key.replace('.', ' ')} of {joint} {sketch.length(before)} → {length}"
+        yield {"label": label, "gestures": [{"do": "set", "path": path, "value": length}]}
+
+
+# ---- what it can be asked -----------------------------------------------------------------------------------------
+
+
+def readiness(
+    mechanism: Mechanism | None, result: xr.Dataset | None, findings: Sequence[Finding], lacks: Sequence[str] = ()
+) -> list[dict[str, Any]]:
+    """For motion, forces, friction, play, tolerance and time: whether there is what it takes, and why.
+
+    lacks: what is not drawn yet.
+    """
+    if mechanism is None or result is None:
+        errors = [finding for finding in findings if finding.severity is Severity.ERROR]
+        why = f"{spoken(errors[0].where)} {errors[0].what}".strip() if errors else "Draw links and drive a joint."
+        answers = [(False, " ".join(lacks) or why), *[(False, "The motion comes first.")] * 5]
+    else:
+        answers = [_moves(mechanism, result, lacks), *_acts(mechanism)]
+    subjects = ("motion", "forces", "friction", "play", "tolerance", "time")
+    return [{"what": what, "ok": ok, "why": why} for what, (ok, why) in zip(subjects, answers, strict=True)]
+
+
+def _moves(mechanism: Mechanism, result: xr.Dataset, lacks: Sequence[str]) -> tuple[bool, str]:
+    count, able = result.sizes["position"], int(np.sum(result["status"].values < Status.SINGULAR))
+    if not mechanism.drivers:
+        return False, " ".join(lacks) or "No joint is driven: it stands still."
+    rest = f"; the other {count - able} cannot be reached" if able < count else ""
+    return able > 0, f"Moves through {able} of {counted(count, 'position')}{rest}."
+
+
+def _acts(mechanism: Mechanism) -> Iterator[tuple[bool, str]]:
+    numbers = mechanism.parameters()
+    weighs = any(path.endswith((".mass", ".stiffness")) and bool(np.any(numbers[path])) for path in numbers)
+    subjects = (
+        (bool(mechanism.loads) or weighs, "Loads or masses act on it.", "Add a load, a mass or a spring."),
+        (bool(rubbing(prepare(mechanism).system)), "Joints rub.",
+         "State friction of a joint, and the radius of its pin."),
+        (any(map(has_play, mechanism.effective_joints.values())), "Pins have play: the study shows what it does.",
+         "State a clearance or fit of a pin."),
+        (bool(mechanism.tolerated()), "Numbers have tolerances: the study shows what they do.",
+         "Write a tolerance, such as 60 mm ± 0.05 mm."),
+        (any(driver.found for driver in mechanism.drivers.values()), "A motor drives it: the study lets it run.",
+         "Give a driver a motor in the text, as motor: {kind: constant, effort: 5 N m}."),
+    )  # fmt: skip
+    for ok, done, remedy in subjects:
+        yield ok, done if ok else remedy
+
+
+# ---- what it lacks ------------------------------------------------------------------------------------------------
+
+
+def missing(sketch: Sketch, findings: Sequence[Finding]) -> list[str]:
+    """The next step of the hand, where nothing but steps of drawing is missing; none where something is wrong."""
+    errors = [one for one in findings if one.severity is Severity.ERROR]
+    if not errors and sketch.joints and not sketch.of("drivers"):
+        return ["It stands still: its joints let no link move. Take one away, or let an end slide."]
+    unfinished = [
+        error.what.startswith(("there are no", "no joint connects"))
+        or (error.where == "drivers" and error.remedy.startswith("drive a joint"))
+        for error in errors
+    ]
+    if not errors or not all(unfinished):
+        return []
+    return [f"{errors[0].what[:1].upper()}{errors[0].what[1:]}: {remedied(errors[0].remedy)}."]

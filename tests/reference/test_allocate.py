@@ -174,16 +174,6 @@ def test_a_yield_that_is_to_be_sure_has_it_at_the_lower_end_of_fresh_samples() -
     assert float(sure["cost_total"]) > float(plain["cost_total"])
 
 
-def test_written_and_read_again(tmp_path: Path) -> None:
-    """The file holds what was verified."""
-    model = trunnion.read(EXAMPLES / "fourbar-by-grades.yaml")
-    result = trunnion.allocate(model, steps=36, samples=500)
-    model.with_tolerances(half_widths(result)).write(tmp_path / "bought.yaml")
-    again = trunnion.tolerance(trunnion.read(tmp_path / "bought.yaml"), samples=500, steps=36)
-    for key in ("worst_case_upper", "searched_upper", "rss", "mean", "yield", "deviation"):
-        np.testing.assert_array_equal(again[key].values, result[key].values)
-
-
 def test_bounds_of_a_figure() -> None:
     """at_least and at_most leave room to one side each: from the nominal figure."""
     course = trunnion.tolerance(fourbar(), ["rotation:D"], ["linear"], at="60 deg", steps=4)
@@ -257,16 +247,3 @@ def test_curve_of_cost_over_accuracy() -> None:
     # of a power model without a constant part the cost goes with the power of the limits
     assert result["trade_off_cost"].values == pytest.approx(float(result["cost_total"]) * np.array([2, 1, 0.5]) ** 0.45)
     assert result["trade_off_tolerance"].values[2, :4] == pytest.approx(2 * result["tolerance"].values[:4])
-
-
-def test_the_curve_of_a_yield_passes_through_the_answer() -> None:
-    """Samples ask for another margin than normal deviations do: the curve is of that one."""
-    model = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
-    result = trunnion.allocate(model, ["rocker-angle"], "yield", 0.9, steps=12, samples=500, curve=3)
-    costs = result["trade_off_cost"].values
-    assert costs[1] == float(result["cost_total"])
-    assert list(costs) == sorted(costs, reverse=True)
-    assert float(result["yield_checked_high"]) >= 0.9
-    plain = trunnion.allocate(model, ["rocker-angle"], "yield", 0.9, steps=12, samples=0, curve=3)
-    ratio = costs / plain["trade_off_cost"].values
-    assert ratio == pytest.approx(np.full(3, ratio[1]), rel=2e-2)  # as much dearer everywhere

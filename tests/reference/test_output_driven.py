@@ -166,16 +166,3 @@ def test_its_derivatives_are_those_of_differences() -> None:
     several = efforts(np.array([[R - 1e-4], [R], [R + 1e-4]]))
     assert several.shape == (3, 9)
     assert several[2] == pytest.approx(efforts(R + 1e-4), rel=1e-12)
-
-
-def test_tolerances_take_it() -> None:
-    own = {"peak": {"effort": "O", "as": "largest"}}
-    model = press(
-        {"O": {"moves": "S", **RAM}}, measures=own, tolerances={"links.rod.points.Q.x": {"limits": "±0.1 mm"}}
-    )
-    found = trunnion.tolerance(model, methods=("linear",), steps=24).isel(measure=0)
-    low, high = (
-        float(trunnion.analyse(model.with_values({"links.rod.points.Q.x": L + d}), steps=4).measure_figure[0])
-        for d in (-1e-4, 1e-4)
-    )
-    assert 2 * float(found.worst_case_upper) == pytest.approx(abs(high - low), rel=1e-2)

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 from presses import press
-from scipy.stats import norm
 
 import mechanisms
 import mechanisms_space
@@ -32,7 +31,7 @@ from played import (
     with_play,
 )
 from toleranced import slider_crank as sized_slider
-from trunnion import Mechanism, MechanismError, Status
+from trunnion import Mechanism
 from trunnion.joints.clearance import worst_case
 from trunnion.measures.measures import named, outputs
 from trunnion.results.attributes import findings_of, summary_of
@@ -42,9 +41,6 @@ from trunnion.solve.run import Run, prepare
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 NOW = np.zeros(1)
-
-
-# ---- known numbers --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("joint", "ABCD")
@@ -95,9 +91,6 @@ def test_ends_and_dimensions_of_a_play_scatter_by_one_rule() -> None:
         seen |= set(count[np.isfinite(radius)].tolist())
         np.testing.assert_allclose(result["deviation"] ** 2, np.nansum(parts, axis=-1), rtol=1e-12)
     assert seen == {1, 2, 3}
-
-
-# ---- virtual load, derivatives, brute force -------------------------------------------------------------------
 
 
 def _agree(run: Run, names: list[str], time: np.ndarray) -> None:
@@ -223,9 +216,6 @@ def test_end_float() -> None:
     assert float(result["sensitivity"].values[0, 0, 2, 2, 0]) == pytest.approx(-6.11075, abs=1e-4)
 
 
-# ---- the result -----------------------------------------------------------------------------------------------
-
-
 def test_totals_and_attributes() -> None:
     mechanism = trunnion.read(EXAMPLES / "toleranced-slider-crank.yaml")
     result = trunnion.play(mechanism, steps=36)
@@ -258,37 +248,6 @@ def test_limit(place: dict[str, str]) -> None:
         result = trunnion.play(trunnion.Mechanism(**data), steps=72)
         assert [one.code for one in result.trunnion.findings if one.where == "measures.swing.limit"] == [code]
         assert bool(json.loads(result.attrs["missed"])) == (factor < 1)
-
-
-def test_dead_centres_have_no_answer_and_say_so() -> None:
-    data = four_bar("C").data()
-    data["links"]["crank"]["points"]["B"] = ["65 mm", 0]  # no crank any more
-    result = trunnion.play(trunnion.Mechanism(**data), steps=360)
-    out = result["status"].values >= Status.SINGULAR
-    assert 10 < out.sum() < 350
-    assert np.array_equal(np.isnan(result["worst_case"].values[0, 0]), out)
-    assert any(row["code"] == "play.no_answer" for row in json.loads(result.attrs["findings"]))
-    result = trunnion.play(trunnion.Mechanism(**data), steps=36000)
-    sound = result["status"].values < Status.NEAR_SINGULAR
-    told = summary_of(result)[0].value  # close to a dead centre first order says little
-    total = result["worst_case_total"].values[0]
-    (last,) = np.flatnonzero(sound & (total == np.max(total[sound])))
-    assert total[last] <= told <= np.max(total[last - 1 : last + 2])  # where the position begins to be near it
-    assert told < 0.5 * np.nanmax(result["worst_case_total"].values)
-
-
-@pytest.mark.parametrize(
-    ("measure", "what"),
-    [
-        ("max:effort:A", "did you mean 'maximum'"),
-        ("angel:rocker", "'angle'"),
-        ("angle:rocker.z", "no point"),
-        ("rocker.C.z", "no z"),
-    ],
-)
-def test_measures_that_mean_nothing(measure: str, what: str) -> None:
-    with pytest.raises(MechanismError, match=what):
-        trunnion.play(four_bar("C"), [measure], steps=4)
 
 
 def test_redundant_constraints_make_it_a_bound() -> None:
@@ -410,28 +369,3 @@ def moment(crank: float, x: Any, y: Any, rod: float = 0.1, force: float = 1000.0
     angle = np.arctan2(y, x) + np.arccos((crank**2 + away**2 - rod**2) / (2 * crank * away))
     lean = np.arcsin((crank * np.sin(angle) - y) / rod)
     return force * crank * np.sin(angle + lean) / np.cos(lean)
-
-
-def test_samples_about_a_contact_that_is_just_open_have_their_quantiles() -> None:
-    """Half of them press: y = max(0, c d) of a normal deviation d, which first order does not see."""
-    half, stiffness = 3e-4, 1e6
-    model = {
-        "name": "Stop",
-        "links": {
-            "ground": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}, "W": [0.2, 0]}},
-            "ram": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}, "T": ["tip", 0]}},
-        },
-        "dimensions": {"tip": 0.05, "gap": 0.1},
-        "joints": {"S": {"type": "prismatic", "links": ["ground", "ram"]}},
-        "springs": {
-            "stop": {"between": ["ground.W", "ram.T"], "stiffness": stiffness, "free_length": "gap", "only": "push"}
-        },
-        "drivers": {"S": {"range": [0, 0.05], "speed": 0.1}},
-        "measures": {"force": {"spring_force": "stop", "at": 0.05}},
-        "tolerances": {"tip": half},
-    }
-    found = trunnion.tolerance(trunnion.Mechanism(**model), samples=4000, steps=12, seed=3).sel(measure="force")
-    assert float(found["deviation_linear"]) == 0
-    low = float(found["quantile_value"].sel(quantile=0.05, method="nearest"))
-    level = float(found["quantile"].sel(quantile=0.05, method="nearest"))
-    assert low == pytest.approx(stiffness * half / 3 * norm.ppf(level), rel=0.06)

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy import stats
 
 import trunnion
@@ -47,8 +45,6 @@ def figures(mechanism: Mechanism, u: Array, **options: Any) -> Array:
     """Of the first measure."""
     return sampler(study(mechanism, **options)).figures(u)["figure"][0]
 
-
-# ---- sample by sample -----------------------------------------------------------------------------------------
 
 CASES: dict[str, tuple[Mechanism, Callable[..., Any], Mapping[str, float], list[Law]]] = {
     "clutch": (clutch(), clutch_angle, CLUTCH, [normal(0.0125 * MM), normal(0.01 * MM), normal(0.0125 * MM)]),
@@ -165,29 +161,6 @@ def test_seats_and_run_outs_sample_by_sample(joint: str) -> None:
     np.testing.assert_allclose(figures(run_out, u), own, rtol=0, atol=1e-12)
 
 
-@given(
-    st.tuples(*(st.floats(-0.1, 0.1) for _ in range(4))),
-    st.floats(1e-6, 0.08),
-    st.floats(-180, 180),
-    st.integers(0, 10**6),
-)
-def test_any_four_bar_sample_by_sample(changes: tuple[float, ...], width: float, place: float, seed: int) -> None:
-    """Any sizes, any width, anywhere on the turn; where the circles do not meet there is no figure."""
-    sizes = {name: value * (1 + change) for (name, value), change in zip(FOURBAR.items(), changes, strict=True)}
-    mechanism = fourbar(
-        dimensions=sizes, tolerances={name: width * value for name, value in sizes.items()},
-        measures={"angle": {"angle": "rocker", "at": f"{place} deg"}},
-    )  # fmt: skip
-    u = uniforms(seed, 0, 4, 50)
-    lengths = [value * (1 + width / 3 * stats.norm.ppf(row)) for value, row in zip(sizes.values(), u, strict=True)]
-    own = fourbar_angle(*lengths, crank=np.radians(place))
-    found = figures(mechanism, u)
-    away = np.abs(np.remainder(found - own + np.pi, 2 * np.pi) - np.pi)
-    assert np.all((away < 1e-9) | (np.isnan(found) & np.isnan(own)))
-
-
-# ---- what a run says of its samples ---------------------------------------------------------------------------
-
 LIMITS = {"angle": {"angle": "rocker", "at": "60 deg", "limit": "+0.05/-0.07 deg"}}
 SIGMA = np.linalg.norm([13.654, 13.401, 15.623, 6.323]) * 0.05e-3 / 3
 
@@ -296,9 +269,6 @@ def test_sobol_points() -> None:
     assert found == pytest.approx((np.mean(shares) - half, np.mean(shares) + half), abs=0.12 * half)
 
 
-# ---- large tolerances: brute force ----------------------------------------------------------------------------
-
-
 def test_large_tolerances_against_brute_force() -> None:
     """±8 mm of each link, uniform: a million samples of one's own, with random numbers of another kind."""
     tolerances = {name: {"limits": "±8 mm", "distribution": "uniform"} for name in FOURBAR}
@@ -327,9 +297,6 @@ def test_large_tolerances_against_brute_force() -> None:
     assert 0.5 < both < min(inside) < 0.99
     assert result["searched_upper"].values[0] >= np.max(own) - nominal - 1e-12
     assert result["searched_lower"].values[0] <= np.min(own) - nominal + 1e-12
-
-
-# ---- small tolerances: first order ----------------------------------------------------------------------------
 
 
 SEEDS = 200
@@ -362,9 +329,6 @@ def of_sledge() -> list[float]:
     ends = [(-0.015, 0.015), (-0.02, 0.02), (-0.01, 0.004), (-0.015, np.inf), (-0.028, 0.028)]
     found = [float(stats.norm.cdf(high / 0.01) - stats.norm.cdf(low / 0.01)) for low, high in ends]
     return [*found, found[2]]
-
-
-# ---- honest intervals -----------------------------------------------------------------------------------------
 
 
 def intervals(mechanism: Mechanism, method: str, samples: int) -> dict[str, Array]:

@@ -163,29 +163,6 @@ def test_positions_in_line_have_no_forces() -> None:
     assert np.flatnonzero(np.isnan(effort)).tolist() == [0, 18]
 
 
-def test_a_slider_crank_with_a_rod_like_its_crank() -> None:
-    """x = 2 r cos θ, through the middle, where the slider could also stay."""
-    data: dict[str, Any] = {
-        "links": {
-            "ground": {"points": {"A": [0, 0], "P": {"at": [0, 0], "axis": [1, 0]}}},
-            "crank": {"points": {"A": [0, 0], "B": [0.3, 0]}},
-            "rod": {"points": {"B": [0, 0], "C": [0.3, 0]}},
-            "slider": {"points": {"C": [0, 0], "P": {"at": [0, 0], "axis": [1, 0]}}},
-        },
-        "joints": {
-            "A": {"type": "revolute", "links": ["ground", "crank"]},
-            "B": {"type": "revolute", "links": ["crank", "rod"]},
-            "C": {"type": "revolute", "links": ["rod", "slider"]},
-            "P": {"type": "prismatic", "links": ["ground", "slider"]},
-        },
-        "drivers": {"A": {"speed": 1.0, "start": 0.2}},
-        "assembly": {"C": [0.6, 0.0]},
-    }
-    result = brief(Mechanism(**data), 200)
-    x = result["point_position"].sel(point="slider.C").values[0]
-    np.testing.assert_allclose(x, 0.6 * np.cos(0.2 + result["time"].values), atol=1e-12)
-
-
 @pytest.mark.parametrize("kind", ["deltoid", pytest.param("antiparallelogram", marks=pytest.mark.slow)])
 def test_in_space(kind: str) -> None:
     """A general group, which is followed by Newton's method, goes on as the closed form does."""

@@ -40,7 +40,7 @@ ARM, GUIDE, LOAD = 0.15, 0.12, 40.0
 CRITICAL = GUIDE / (2 * ARM)
 
 
-def pushed_slider(coefficient: float, load: float = -LOAD, speed: float = 0.1) -> Mechanism:
+def pushed_slider(coefficient: float, load: float = -LOAD) -> Mechanism:
     """A ram pushes a slider through a rod parallel to the guide, ARM beside its middle."""
     data: Data = {
         "links": {
@@ -55,7 +55,7 @@ def pushed_slider(coefficient: float, load: float = -LOAD, speed: float = 0.1) -
             "Q": revolute("rod", "slider"),
             "G": {**prismatic("ground", "slider"), "friction": coefficient, "guide": {"length": GUIDE}},
         },
-        "drivers": {"X": {"speed": speed, "range": [0.0, 0.2 * np.sign(speed)]}},
+        "drivers": {"X": {"speed": 0.1, "range": [0.0, 0.2]}},
         "loads": {"work": {"link": "slider", "at": "G", "force": [load, 0.0]}},
         "assembly": {"Q": [0.6, ARM]},
     }
@@ -353,13 +353,13 @@ def ram(coefficient: float, aside: float = 0.0) -> Mechanism:
             "slide": {"points": {"E": [0, 0], "G": axis}},
         },
         joints={
-            "A": {"type": "revolute", "links": ["ground", "crank"]},
-            "C": {"type": "revolute", "links": ["ground", "lever"]},
-            "D": {"type": "revolute", "links": ["lever", "rod"]},
-            "F": {"type": "prismatic", "links": ["lever", "block"]},
-            "B": {"type": "revolute", "links": ["crank", "block"]},
-            "G": {"type": "prismatic", "links": ["ground", "slide"]},
-            "E": {"type": "revolute", "links": ["rod", "slide"]},
+            "A": revolute("ground", "crank"),
+            "C": revolute("ground", "lever"),
+            "D": revolute("lever", "rod"),
+            "F": prismatic("lever", "block"),
+            "B": revolute("crank", "block"),
+            "G": prismatic("ground", "slide"),
+            "E": revolute("rod", "slide"),
         },
         assembly={"D": [0, 0.1], "F": 0.11, "B": [0, 0.03], "E": [-0.1, 0.1]},
         drivers={"A": {"speed": 6.0, "start": 1.6}},
@@ -403,21 +403,14 @@ def test_joints_of_a_group_without_loads_have_no_critical_multiple() -> None:
         assert np.all(np.isnan(found["critical_multiple"].sel(joint=joint).values[locked]) == unknown)
 
 
-def drawer(arm: float, coefficient: float, length: float = 0.3) -> Data:
+def drawer(arm: float, coefficient: float) -> Data:
     """A slide driven along its middle against a useful load beside it."""
     return {
         "links": {
             "ground": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}}},
             "block": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}, "P": [0, arm]}},
         },
-        "joints": {
-            "S": {
-                "type": "prismatic",
-                "links": ["ground", "block"],
-                "guide": {"length": length},
-                "friction": coefficient,
-            }
-        },
+        "joints": {"S": {**prismatic("ground", "block"), "guide": {"length": 0.3}, "friction": coefficient}},
         "drivers": {"S": {"speed": 0.1, "range": [0, 0.2]}},
         "loads": {"weight": {"link": "block", "at": "P", "force": [-50.0, 0], "useful": True}},
     }

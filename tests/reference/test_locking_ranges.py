@@ -15,9 +15,7 @@ from mechanisms_parts import Data, plunger, revolute
 from trunnion import Mechanism, Status
 from trunnion.cycle.locking import LockingState, locking, look, report_figures
 from trunnion.cycle.locking_course import NO_MARGIN, LockingCourse, locking_course, passed
-from trunnion.results.attributes import summary_of
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
-from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.run import prepare
 
@@ -154,24 +152,6 @@ def test_a_useful_spring_drives_backward_as_a_load_does() -> None:
     efficiency = found["efficiency_reverse_instant"].values
     np.testing.assert_allclose(efficiency[pushed], 1 - FRICTION * RADIUS / arm[pushed], rtol=1e-9)
     np.testing.assert_allclose(found["useful_power"].values, -found["spring_power"].values[0], rtol=1e-12)
-
-
-def test_without_useful_work_there_is_no_efficiency_and_it_says_why() -> None:
-    """NaN, not 0: over the cycle, at each position, backward, over a sweep and as a measure."""
-    crank = {"points": {"A": [0, 0], "P": [ARM, 0]}, "mass": 100 / 9.81, "centre": [ARM, 0]}
-    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True) | {"loads": {}, "gravity": [0, -9.81]}
-    mechanism = Mechanism(**{**data, "links": {**data["links"], "crank": crank}})
-    result = trunnion.analyse(mechanism, 12)
-    assert np.isnan(float(result["efficiency"]))
-    assert np.all(np.isnan(result["efficiency_instant"]))
-    assert np.all(result["useful_power"] == 0)
-    (row,) = [one for one in summary_of(result) if one.name == "efficiency"]
-    assert (row.value, row.note) == (None, f"{NOTHING_USEFUL}: {STATE_USEFUL}")
-    speed = f"drivers.{next(iter(mechanism.drivers))}.speed"
-    swept = trunnion.sweep(mechanism, {speed: [1e-6, 2e-6]}, steps=12)
-    assert np.all(np.isnan(swept["efficiency"]))
-    with pytest.raises(trunnion.MechanismError, match=NOTHING_USEFUL):
-        trunnion.sweep(mechanism, {speed: [1e-6, 2e-6]}, steps=12, measures=["efficiency:cycle"])
 
 
 @pytest.mark.parametrize("last", [1.2, 1.9, 2.5])

@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import trunnion
 from brief import brief
-from mechanisms import four_bar, model, slider_crank, transformed
+from mechanisms import four_bar, model, slider_crank
 from mechanisms_parts import body, revolute
 from mechanisms_space import cardan, closed, rssr
 from reference.maximal_space import Array, Data, Drive, Frame
@@ -61,9 +59,6 @@ def offsets_of(run: Run, result: xr.Dataset) -> dict[str, Array]:
     return found
 
 
-# ---- planar ---------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("friction", [0.0, 0.12, 0.3])
 @pytest.mark.parametrize("name", LINKAGES)
@@ -103,9 +98,6 @@ def test_seats_reactions_and_places(name: str, friction: float) -> None:
         assert effort == pytest.approx(settled.solution.effort["A"], abs=1e-8 * size)
 
 
-# ---- loss of contact ------------------------------------------------------------------------------------------
-
-
 def losses(result: xr.Dataset, joint: str) -> Array:
     """Positions at which a joint is said to lose contact."""
     return np.flatnonzero(result.contact_lost.sel(joint=joint).values)
@@ -142,9 +134,6 @@ def test_crank_whose_bearing_is_relieved_at_one_angle(steps: int) -> None:
     finding = next(f for f in json.loads(result.attrs["findings"]) if f["code"] == "contact.lost")
     assert finding["severity"] == "warning"
     assert "at 90" in finding["figures"]["at"] or f"at {angle[where[0]]:.4g}" in finding["figures"]["at"]
-
-
-# ---- power ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.12])
@@ -209,27 +198,6 @@ def test_where_a_pin_crosses_or_lifts_off_does_not_depend_on_the_positions() -> 
     first, second = ([one.figures for one in rows if one.code == "contact.lifted"] for rows in found)
     assert first
     assert first == second
-
-
-# ---- symmetry -------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@settings(max_examples=3)
-@given(st.sampled_from(list(LINKAGES)), st.floats(-3, 3), st.booleans(), st.sampled_from([0.0, 0.2]))
-def test_in_another_frame_and_in_a_mirror(name: str, turn: float, mirror: bool, friction: float) -> None:
-    """Seats are stated in the links: turned and shifted they are the same, in a mirror their y and ξ change sign."""
-    data = loaded(name, friction)
-    other = transformed(data, turn, (0.7, -0.2), mirror)
-    one, two = analysed(data, 18), analysed(other, 18)
-    sign = np.array([1.0, -1.0 if mirror else 1.0])[:, None]
-    np.testing.assert_allclose(two.seat_offset.values, one.seat_offset.values * sign, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(two.end_force.values, one.end_force.values * sign, rtol=0, atol=1e-4)
-    np.testing.assert_allclose(two.link_error.values, one.link_error.values * sign[1], rtol=0, atol=1e-8)
-    np.testing.assert_allclose(two.drive_effort_change.values, sign[1] * one.drive_effort_change.values, atol=1e-5)
-
-
-# ---- space ----------------------------------------------------------------------------------------------------
 
 
 def numbers(frame: Any) -> Frame:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import gc
-import weakref
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -95,20 +93,6 @@ def test_errors_stand_beside_the_ideal_mechanism() -> None:
     agree(one, other)
 
 
-def test_findings_and_summary_are_the_same() -> None:
-    mechanism = trunnion.read(EXAMPLES / "slider-crank.yaml")
-    one, other = (trunnion.analyse(mechanism, 200, engine=engine) for engine in ("numpy", "compiled"))
-    assert [found.what for found in one.trunnion.findings] == [found.what for found in other.trunnion.findings]
-    figures = [{figure.name: figure.value for figure in result.trunnion.summary} for result in (one, other)]
-    assert figures[0].keys() == figures[1].keys()
-    for name, value in figures[0].items():
-        if name not in ("power_residual", "friction_iterations") and isinstance(value, float):
-            assert figures[1][name] == pytest.approx(value, rel=1e-9, nan_ok=True), name
-
-
-# ---- machine code that is kept --------------------------------------------------------------------------------
-
-
 def kernel_of(figure: str, described: str | None = "efforts") -> WalkKernel:
     run = prepare(trunnion.read(DURANGO))
     return WalkKernel(run, {figure: lambda back: back.efforts["A"]}, described=described)
@@ -151,15 +135,6 @@ def test_without_a_home_folder_it_is_compiled_anew(monkeypatch: pytest.MonkeyPat
     assert np.array_equal(curve(kernel_of("one")), expected)
     both(trunnion.read(DURANGO), 40)
     assert not list(tmp_path.iterdir())
-
-
-def test_a_sweep_again_records_nothing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Neither to see whether it can be compiled, nor with times of each mechanism."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    over = {"A.speed": [5.0, 6.0]}
-    first = trunnion.sweep(trunnion.read(DURANGO), over, 24, engine="compiled")
-    monkeypatch.setattr(WalkKernel, "_recorded", lambda self, inputs: pytest.fail("it was recorded again"))
-    assert trunnion.sweep(trunnion.read(DURANGO), over, 24, engine="compiled").identical(first)
 
 
 def test_kept_code_of_another_law_is_not_taken(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -247,25 +222,6 @@ def test_auto_takes_numpy_where_a_mechanism_cannot_be_compiled(monkeypatch: pyte
 @pytest.mark.parametrize("steps", [1, 5])
 def test_few_positions(steps: int) -> None:
     agree(*both(trunnion.read(DURANGO), steps))
-
-
-@pytest.mark.parametrize("engine", ["numpy", "compiled"])
-def test_the_memory_of_a_result_goes_with_it(engine: str) -> None:
-    """At once, not when Python looks for objects that hold each other: a result may take all the memory there is."""
-    mechanism = trunnion.read(EXAMPLES / "fourbar-by-grades.yaml")
-    trunnion.analyse(mechanism, 24, engine=engine)
-    gc.collect()
-    gc.disable()
-    try:
-        result = trunnion.analyse(mechanism, 24, engine=engine)
-        held = [weakref.ref(result[name].variable.values) for name in ("point_position", "reaction_force", "status")]
-        del result
-        assert [array() for array in held] == [None] * len(held)
-    finally:
-        gc.enable()
-
-
-# ---- samples --------------------------------------------------------------------------------------------------
 
 
 def same_as_numpy(run: Run, names: Sequence[str], time: Any, spread: float = 1e-3) -> tuple[WalkKernel, Any]:

@@ -17,7 +17,6 @@ from mechanisms import Array, Data, build, four_bar, positions_of, slider_crank
 from mechanisms_parts import prismatic, slide
 from trunnion import Mechanism, read
 from trunnion.algebra.dual import Dual, derivative
-from trunnion.errors import Status
 from trunnion.results.tables.cycle import positions
 from trunnion.solve.bristles import _chained
 from trunnion.solve.friction_method import FrictionMethod
@@ -120,19 +119,6 @@ def test_two_blocks_of_which_one_stays() -> None:
     for joint, (speed, friction) in cases.items():
         way = on_slope(found, slope, speed, friction)
         assert found["joint_slide"].sel(joint=joint).values == pytest.approx(way, abs=1e-7), joint
-
-
-@pytest.mark.parametrize("name", ["durango-fourbar", "rssr"])
-def test_rolling_is_a_pin_of_that_moment(name: str) -> None:
-    """Moment arm · N: Coulomb's law with coefficient times radius = arm has the same."""
-    data = trunnion.read(f"examples/{name}.yaml").data()
-    radius = 0.02
-    data["joints"]["D"]["pin"] = {"radius": radius, "bearing": 0.03}
-    coulomb = brief(with_friction(data, "D", 0.1), steps=48)
-    data["joints"]["D"]["pin"] = {"radius": 5 * radius, "bearing": 0.03}
-    rolls = brief(with_friction(data, "D", {"law": "rolling", "arm": 0.1 * radius}), steps=48)
-    for variable in ("drive_effort", "friction_torque", "friction_power", "drive_effort_lower", "locking_margin"):
-        assert rolls[variable].values == pytest.approx(coulomb[variable].values, rel=1e-9, abs=1e-12), variable
 
 
 def test_a_loaded_roller() -> None:
@@ -325,16 +311,6 @@ def test_friction_counts_these_loads(name: str, joint: str, engine: Any) -> None
     assert found["friction_power"].sel(joint=joint).values == pytest.approx(lost, rel=1e-7, abs=1e-9)
 
 
-def test_loads_of_both_signs_are_followed() -> None:
-    """The largest of the summary does not depend on the rows; at a place of rest it is that beside it."""
-    model = trunnion.read("examples/double-cardan.yaml")
-    coarse, fine = (trunnion.analyse(model, steps=steps) for steps in (7, 3600))
-    summary = {row["name"]: row["value"] for row in json.loads(coarse.attrs["summary"])}
-    for joint in "ABCD":
-        most = np.nanmax(sizes(fine, joint))
-        assert most * (1 - 1e-12) <= summary[f"{joint}.end_load_max"] <= most * (1 + 1e-3)
-
-
 DAHL = {"law": "dahl", "coefficient": 0.12, "stiffness": 4e3}
 LUGRE = {
     "law": "lugre", "coefficient": 0.1, "static": 0.16, "stribeck_speed": 2e-3, "stiffness": 2e4, "damping": 0.3,
@@ -423,14 +399,6 @@ def test_lugre_slides_steadily_by_stribecks_curve() -> None:
         for one in (bristles, curve)
     ]
     np.testing.assert_allclose(*ratios, rtol=1e-3)
-
-
-def test_bristles_in_a_linkage_with_gaps() -> None:
-    """Where it cannot be assembled there is no state; after the gap the bristles start at rest."""
-    result = positions_of(four_bar(2.0, 1.5, 1.5, 4.0), 72, friction=DAHL)
-    solved = result["status"].values < Status.NOT_CONVERGED
-    assert 0 < np.count_nonzero(solved) < 72
-    assert np.all(np.isfinite(result["drive_effort"].values[:, solved]))
 
 
 def test_samples_of_speed_and_duals_of_the_law() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +16,6 @@ from mechanisms_space import rssr
 from timed import LINEAR, wheel
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative
-from trunnion.cycle.vocabulary import vocabulary
-from trunnion.dynamics.measured import figures_in_time
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.measures import Measure, named
 from trunnion.solve.forward import forward
@@ -188,7 +185,6 @@ PARTS: dict[str, tuple[str, dict[str, str]]] = {  # variable of `analyse` and wh
     "friction_power:C": ("friction_power", {"joint": "C"}), "efficiency:instant": ("efficiency_instant", {}),
     **{f"{kind}:{name}": (kind, {"spring": name}) for kind in ("spring_force", "spring_elongation")
        for name in ("line", "coil")},
-    "locking_margin:mechanism": ("locking_margin", {}),
 }  # fmt: skip
 
 
@@ -265,26 +261,6 @@ def test_play_of_a_speed() -> None:
                 np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5)
 
 
-@pytest.mark.spread(1)
-@pytest.mark.parametrize("example", ["toleranced-slider-crank", "toleranced-rssr", "fourbar-with-play", "sarrus"])
-def test_everything_that_is_listed_can_be_asked_for(example: str) -> None:
-    """Names mean the numbers they stand for; measures can be named, and have the units and values that are told."""
-    mechanism = trunnion.read(EXAMPLES / f"{example}.yaml")
-    found = vocabulary(mechanism, 24)
-    values, run = mechanism.parameters(), prepare(mechanism)
-    assert {one.path for one in found.numbers} == set(mechanism.parameter_kinds())
-    for number in found.numbers:
-        assert mechanism.path_of(number.name) == number.path
-        assert number.value == pytest.approx(values[number.path])
-    measures = named(mechanism, [one.name for one in found.measures], run.values)
-    for measure, told in zip(measures, found.measures, strict=True):
-        assert measure.figure_unit(run.system, run.values) == told.unit
-        assert ("sweep" in told.verbs) == (
-            measure.rule != "deviation" and not measure.of.against and not measure.of_attitude(run.system)
-        )
-    json.dumps(found.data(), allow_nan=False)
-
-
 LINKS = {"links": {**four_bar()["links"]}, "dimensions": {"ab": "0.3 m"}}
 LINKS["links"] = {
     **LINKS["links"],
@@ -305,19 +281,6 @@ def test_a_lead_is_the_difference_of_angles_without_jumps() -> None:
     assert values - values[0] == pytest.approx(lead - lead[0], abs=1e-12)
 
 
-def test_figures_of_an_expression_do_not_depend_on_the_steps() -> None:
-    """Half the difference of input and output over a range of it: least and largest of the same course, finely."""
-    own = {"input": "A.rotation", "half": {"expression": "(input - D.rotation) / 2", "as": "maximum",
-                                           "over": ["60 deg", "200 deg"]}}  # fmt: skip
-    few, many = (trunnion.analyse(model(**own), steps=steps) for steps in (7, 7200))
-    figures = [float(found.measure_figure.sel(measure="half")) for found in (few, many)]
-    assert figures[0] == pytest.approx(figures[1], abs=1e-12)
-    turned = many.joint_rotation.sel(joint="A").values
-    inside = (turned >= np.radians(60)) & (turned <= np.radians(200))
-    course = (turned - np.unwrap(many.joint_rotation.sel(joint="D").values))[inside] / 2
-    assert figures[0] == pytest.approx(np.max(course), abs=1e-6)
-
-
 def test_error_of_a_universal_joint_against_even_rotation() -> None:
     """θ₂ − θ₁ of a Cardan joint bent by β swings between ±arctan((1 − cos β)/(2 √cos β)).
 
@@ -328,17 +291,6 @@ def test_error_of_a_universal_joint_against_even_rotation() -> None:
     bend = float(np.radians(30.0))
     swing = 2 * np.arctan((1 - np.cos(bend)) / (2 * np.sqrt(np.cos(bend))))
     assert float(found.measure_figure.sel(measure="error")) == pytest.approx(swing, rel=1e-9)
-
-
-def test_leverage_is_the_ratio_of_speeds_without_friction() -> None:
-    """Power in is power out: effort over the load's torque is the output's speed over the input's."""
-    still = {"links": {name: {"points": link["points"]} for name, link in four_bar()["links"].items()}}
-    load = {"loads": {"brake": {"joint": "D", "resisting_torque": "3 N m"}}}
-    leverage = {"leverage": "A.effort / (3 N m)", "speed": {"rate": "D"}, "ratio": "speed / (4 rad/s)"}
-    found = trunnion.analyse(model({**still, **load}, **leverage), steps=60)
-    values = found.measure_value
-    ratio = np.abs(values.sel(measure="ratio").values)
-    assert values.sel(measure="leverage").values == pytest.approx(ratio, abs=1e-10)
 
 
 def test_derivatives_are_those_of_differences() -> None:
@@ -463,20 +415,6 @@ def test_a_sweep_has_the_figures_of_each_point() -> None:
     found = trunnion.sweep(longer, {"links.wheel.inertia": inertias}, 24, measures=["start"])["start"].values
     np.testing.assert_allclose(found, [starting_time(one) for one in inertias], rtol=1e-7)
     assert swept["peak_effort:A"].attrs["units"] == "N m"
-
-
-def test_the_summary_of_a_simulation_has_the_same_figures() -> None:
-    mechanism = wheel(LINEAR)
-    result = trunnion.simulate(mechanism, DURATION, 100)
-    figures = {one.name: one.value for one in result.trunnion.summary}
-    run = prepare(mechanism)
-    own = figures_in_time(run, "A", run.values, 1, DURATION)
-    for key, name in (
-        ("starting_time", "starting_time"),
-        ("speed_mean", "steady_speed"),
-        ("fluctuation", "fluctuation"),
-    ):
-        assert figures[f"A.{key}"] == pytest.approx(own[name][0], rel=1e-7, abs=1e-9)
 
 
 @pytest.mark.slow

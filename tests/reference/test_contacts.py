@@ -170,29 +170,6 @@ def test_a_rod_that_no_joint_holds() -> None:
     assert np.allclose(force, 0.21 * centre + 0.14 * slider, rtol=1e-7, atol=1e-6 * float(abs(force).max()))
 
 
-@pytest.mark.slow
-def test_a_slider_rests_on_its_guide() -> None:
-    """Falls through its play, bounces, and then lies on two corners with the weight that it carries."""
-    mechanism = loose_slider()
-    result = trunnion.simulate(mechanism, duration=0.1, steps=300)
-    lower = result["contact_gap"].sel(contact=["S.1", "S.2", "S.3", "S.4"])
-    assert float(lower.min()) > -1e-4  # soft walls, some 50 N
-    assert np.allclose(
-        result["contact_gap"].sel(contact="S.1") + result["contact_gap"].sel(contact="S.3"), 2e-3, rtol=1e-6
-    )
-    assert int(result.sizes["impact"]) > 2
-    assert float(abs(result["energy_residual"]).max()) < 1e-8 * max(1.0, float(abs(result["work_drive"]).max()))
-
-
-def test_a_drive_that_hardly_moves() -> None:
-    """The mass matrix keeps its digits where weights are all that is large."""
-    slow = rattling({}, gravity=[0, -9.81]).data()
-    result = trunnion.simulate(
-        rattling(gravity=[0, -9.81], drivers={"O": {**slow["drivers"]["O"], "speed": 1e-5}}), 0.02, 20
-    )
-    assert float(abs(result["energy_residual"]).max()) < 1e-9 * float(np.ptp(result["potential_energy"].values))
-
-
 def test_friction_at_the_contact_only_loses() -> None:
     data = rattling().data()
     law = {"law": "brown-mcphee", "coefficient": 0.1, "static": 0.15, "transition_speed": "0.05 m/s"}
@@ -461,9 +438,3 @@ def test_stiff_contacts_tend_to_rigid_impacts() -> None:
     for wide, narrow in zip(*missed, strict=True):
         assert 4.5 < wide / narrow < 8.5
     assert missed[1][0] < 0.013 * 4.3858
-
-
-# ---- accelerations at contacts ----------------------------------------------------------------------------------
-
-
-# ---- what is stated ---------------------------------------------------------------------------------------------

@@ -245,11 +245,8 @@ ROUGHNESS = 0.3
 
 
 def times_of(data: Any) -> list[tuple[str, str, float]]:
-    """Kind, joint and time, s, of all times_of."""
-    return [
-        (kind, of, float(time))
-        for (kind, of, *_), time in zip(json.loads(data.attrs["times_of"]), data.event_time, strict=True)
-    ]
+    """Kind, joint and time, s, of all events."""
+    return [one[:3] for one in events(data)]
 
 
 @dataclass
@@ -309,13 +306,13 @@ class Reference:
         return own
 
     def run(self, state: Array, end: float) -> tuple[Array, list[tuple[str, int, float]]]:
-        """The state at the end, and the times_of."""
+        """The state at the end, and the events."""
         time, count, found = 0.0, len(state) // 2, list[tuple[str, int, float]]()
         self.modes = self.consistent(state)
         while True:
             part = solve_ivp(
                 lambda t, y: np.concatenate([y[count:], self.solved(y, self.modes)[0]]), (time, end), state,
-                method="DOP853", rtol=1e-11, atol=1e-12, times_of=[self.watched(k) for k in range(len(self.ways))],
+                method="DOP853", rtol=1e-11, atol=1e-12, events=[self.watched(k) for k in range(len(self.ways))],
                 max_step=0.02,
             )  # fmt: skip
             time, state = float(part.t[-1]), part.y[:, -1].copy()
@@ -328,13 +325,13 @@ class Reference:
                     found.append(("stick" if before else "break-away", i, time))
 
 
-# ---- stacked ---------------------------------------------------------------------------------------------------
+# ---- blocks ----------------------------------------------------------------------------------------------------
 
 LOWER, UPPER, STIFF = 2.0, 1.0, 60.0
 
 
 def stacked(**more: Any) -> Mechanism:
-    """Two stacked stacked on the ground, the lower one held by a spring, the upper one by friction alone."""
+    """Two blocks on the ground, the lower one held by a spring, the upper one by friction alone."""
     axis = {"at": [0, 0], "axis": [1, 0]}
     data: dict[str, Any] = {
         "gravity": [0, -G],
@@ -421,7 +418,7 @@ def _pendulum_parts(y: Array) -> tuple[Array, Array]:
 
 
 def _pendulum_limits(y: Array, second: Array) -> Array:
-    """f r |ROUGHNESS| of both pins, from Newton's law for the centres of mass."""
+    """f r |R| of both pins, from Newton's law for the centres of mass."""
     a, b, u, v = y
     one, other = np.exp(1j * a), np.exp(1j * (a + b))
     first = (1j * second[0] - u * u) * one

@@ -14,9 +14,7 @@ from mechanisms import Array
 from reference.mujoco_engine import Engine, mj
 from timed import LINEAR, mass_on_a_belt, pulled_mass, slider_crank, three_posts, wheel
 from trunnion import analyse, read, simulate
-from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.measured import figures_in_time
-from trunnion.dynamics.solution import Solution
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute
 from trunnion.solve.run import prepare
@@ -249,9 +247,6 @@ def test_a_pulled_mass_with_bristles() -> None:
     assert bristles == pytest.approx(1.18168e-5, abs=5e-11)
 
 
-# ---- against an integration in maximal coordinates, written here --------------------------------------------------
-
-
 # ---- limits -----------------------------------------------------------------------------------------------------
 
 
@@ -342,25 +337,6 @@ def test_the_account_of_the_examples_as_they_begin(example: str) -> None:
     assert unbalanced(simulate(read(EXAMPLES / f"{example}.yaml"), MOVING[example], 200)) < 1e-8
 
 
-@pytest.mark.slow
-def test_a_motion_whose_account_is_off_is_found_again_with_a_finer_tolerance(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Coarsened, all that is integrated with 1e-9 is off by more than 1e-8."""
-    asked: list[float] = []
-    plain = Integration.run
-
-    def coarse(integration: Integration, row: Array) -> Solution:
-        asked.append(integration.tolerance)
-        integration.tolerance *= 1e3
-        return plain(integration, row)
-
-    monkeypatch.setattr(Integration, "run", coarse)
-    result = simulate(slider_crank(), 0.2, 20)
-    assert asked == pytest.approx([1e-9, 1e-10, 1e-11][: len(asked)])
-    assert len(asked) > 1
-    turned_over = float(np.abs(result["work_drive"].values).max())
-    assert float(np.abs(result["energy_residual"].values).max()) < 1e-7 * turned_over
-
-
 STALL, NO_LOAD, ROTOR, PULL = 8.0, 157.0, 1e-3, 40.0  # N m, rad/s, kg m², N
 AXIS = {"at": [0, 0], "axis": [1, 0]}
 SLIDER_CRANK: dict[str, Any] = {  # a slider-crank; the flywheel is in the crank's inertia
@@ -424,7 +400,7 @@ RUN_UP: dict[str, Any] = {"kind": "constant", "effort": 4, "off_from": 0.5, "ine
 
 
 def kinds_of(result: Any) -> list[tuple[str, float]]:
-    rows = attribute(result, "kinds_of")
+    rows = attribute(result, "events")
     return [(row[0], float(time)) for row, time in zip(rows, result["event_time"].values, strict=True)]
 
 

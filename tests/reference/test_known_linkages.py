@@ -1,4 +1,4 @@
-"""More of what other means say of the examples, over whole runs; the gallery has one figure of each."""
+"""Known linkages: what other means say of the examples, published states and figures of the theory sheet."""
 
 from __future__ import annotations
 
@@ -85,8 +85,7 @@ def test_double_butterfly_pins_and_torque() -> None:
         assert float(result["drive_effort"][0, k]) == pytest.approx(butterfly_torque(turn), abs=1e-5)
 
 
-# ---- Andrews' squeezer: the published states (test set for IVP solvers, release 2.4, problem andrews) --------------
-
+# Andrews' squeezer: the published states (test set for IVP solvers, release 2.4, problem andrews)
 ANGLES = (15.81077119629904, -15.75637105984298, 0.04082224013073101, -0.5347301163226948, 0.5244099658805304,
           0.5347301163226948, 1.048080741042263)  # fmt: skip
 RATES = (1139.920302151208, -1424.379294994111, 11.03291221937134, 19.29337464421385, 0.5735699284790808,
@@ -171,59 +170,25 @@ def results() -> dict[str, Any]:
     return {"friction": trunnion.analyse(mechanism), "ideal": trunnion.analyse(mechanism.with_friction("off"))}
 
 
-def torque(result: Any) -> Any:
-    return result["drive_effort"].sel(driver="A").values
+AT_SIXTY_DEGREES = {  # on the second link of the joint by the first: crank, coupler, rocker, rocker
+    "A": (-3388.683339, -2499.828824), "B": (-3148.683339, -2084.136630),
+    "C": (229.965844, 905.533667), "D": (-639.235315, -1207.667824),
+}  # fmt: skip
 
 
-def at(result: Any, degrees: int, variable: str, **where: str) -> Any:
-    return result[variable].sel(**where).isel(position=degrees).values
-
-
-@pytest.mark.parametrize(
-    ("case", "least", "most"), [("ideal", -18747.140121, 9177.173578), ("friction", -18552.874991, 9288.302313)]
-)
-def test_extremes_of_the_torque(results: dict[str, Any], case: str, least: float, most: float) -> None:
-    found = torque(results[case])
-    assert found.min() == pytest.approx(least, abs=1e-6)
-    assert found.max() == pytest.approx(most, abs=1e-6)
-
-
-def test_friction_power(results: dict[str, Any]) -> None:
+def test_torque_power_and_reactions_of_durangos_four_bar(results: dict[str, Any]) -> None:
+    """The figures of the theory sheet; T with friction − T without = P_friction/ω₁ at every position."""
+    ideal, rubbed = (results[case]["drive_effort"].sel(driver="A").values for case in ("ideal", "friction"))
+    extremes = [ideal.min(), ideal.max(), rubbed.min(), rubbed.max()]
+    assert extremes == pytest.approx([-18747.140121, 9177.173578, -18552.874991, 9288.302313], abs=1e-6)
+    assert [ideal[60], rubbed[60]] == pytest.approx([3364.879649, 3393.503681], abs=1e-6)
     lost = results["friction"]["friction_power"].sum("joint").values
-    assert lost.mean() == pytest.approx(517.465106, abs=1e-6)
-    assert lost.max() == pytest.approx(2375.340, abs=5e-4)
-    assert np.argmax(lost) == 358
-
-
-def test_values_at_sixty_degrees(results: dict[str, Any]) -> None:
-    assert torque(results["ideal"])[60] == pytest.approx(3364.879649, abs=1e-6)
-    assert torque(results["friction"])[60] == pytest.approx(3393.503681, abs=1e-6)
-    lost = results["friction"]["friction_power"].sum("joint").values
-    assert lost[60] == pytest.approx(286.240327, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("joint", "sign", "expected"),
-    [
-        ("A", 1, (-3388.683339, -2499.828824)),
-        ("B", 1, (-3148.683339, -2084.136630)),
-        ("C", 1, (229.965844, 905.533667)),
-        ("D", 1, (-639.235315, -1207.667824)),
-    ],
-)
-def test_reactions_at_sixty_degrees(
-    results: dict[str, Any], joint: str, sign: int, expected: tuple[float, float]
-) -> None:
-    """Each on the second link of the joint by the first: crank, coupler, rocker, rocker."""
-    found = sign * at(results["friction"], 60, "reaction_force", joint=joint)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
-
-
-def test_friction_costs_exactly_its_power(results: dict[str, Any]) -> None:
-    """T with friction − T without = P_friction/ω₁ at every position."""
-    lost = results["friction"]["friction_power"].sum("joint").values
-    difference = torque(results["friction"]) - torque(results["ideal"])
-    np.testing.assert_allclose(difference, lost / RATE, rtol=0, atol=1e-12 * np.abs(torque(results["ideal"])).max())
+    assert [lost.mean(), lost[60]] == pytest.approx([517.465106, 286.240327], abs=1e-6)
+    assert (lost.max(), np.argmax(lost)) == (pytest.approx(2375.340, abs=5e-4), 358)
+    np.testing.assert_allclose(rubbed - ideal, lost / RATE, rtol=0, atol=1e-12 * np.abs(ideal).max())
+    for joint, expected in AT_SIXTY_DEGREES.items():
+        found = results["friction"]["reaction_force"].sel(joint=joint).isel(position=60)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
 
 
 def test_zero_slip_is_an_interval(results: dict[str, Any]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +13,7 @@ import trunnion
 from brief import brief
 from mechanisms import MODELS, build, model
 from mechanisms_space import cardan, floating, rssr
-from reference.maximal_space import Data, unrolled
-from reference.space_oracle import Oracle
-from reference.test_newton_euler_space import Compared
+from reference.maximal_space import Data
 from reference.test_space_values import loop
 from trunnion.solve.run import prepare
 from trunnion.solve.space.determinacy import LOOKED
@@ -79,41 +76,6 @@ def test_nothing_is_lost_without_friction(data: Data) -> None:
     assert float(result.efficiency) == pytest.approx(taken / given, abs=1e-13)
     assert float(result.efficiency) == pytest.approx(1.0, abs=1e-12)
 
-
-@pytest.mark.slow
-@pytest.mark.parametrize("model", ["two-contact", "pezzuti"])
-def test_pin_at_rest(model: str) -> None:
-    """At θ₁ = 0 a pin of the Cardan joint does not turn: its friction is an interval, and so is the torque.
-
-    The ends are the oracle's answers with the pin taken to slip one way and the other, by [P] to turn and to slide so.
-    """
-    data = cardan(error=0.0, offset=0.0, model=model) if model == "two-contact" else cardan(model=model)
-    result = analysed(data, 8)
-    assert int(result.status.values[0]) == int(trunnion.Status.ZERO_SLIP)
-    compared = Compared.__new__(Compared)
-    compared.result, compared.oracle = result, Oracle(unrolled(data))
-    motions, oracle = compared.motion(0), compared.oracle
-    rates = {joint: oracle.slip(motions, joint) for joint in oracle.joints}
-    if model == "two-contact":  # nothing slides in a joint without errors: what is left is rounding
-        rates = {joint: rate._replace(slide=0.0) for joint, rate in rates.items()}
-    still = min(rates, key=lambda joint: abs(rates[joint].turn))
-    assert abs(rates[still].turn) < 1e-9
-    ends = []
-    for turn, slide in product(*[(1.0, 0.0, -1.0)] * 2) if model == "pezzuti" else [(1.0, 0.0), (-1.0, 0.0)]:
-        rates[still] = rates[still]._replace(turn=turn, slide=slide)
-        oracle.slip = lambda _, joint: rates[joint]  # type: ignore[method-assign]
-        ends.append(oracle.rub(motions)[0].effort["input"])
-    lower, upper = (float(result[f"drive_effort_{end}"].values[0, 0]) for end in ("lower", "upper"))
-    assert upper - lower > 0.1
-    if model == "two-contact":
-        np.testing.assert_allclose([lower, upper], [min(ends), max(ends)], rtol=1e-8)
-    else:  # the least effort lies inside the interval of the friction, where `test_rest` scans it
-        assert upper == pytest.approx(max(ends), rel=1e-8)
-        assert min(ends) - 0.03 * (upper - lower) < lower < min(ends)
-    assert lower <= float(result.drive_effort.values[0, 0]) <= upper
-
-
-# ---- screws -----------------------------------------------------------------------------------------------------
 
 PITCH, MEAN, LOAD = 0.010, 0.012, 5000.0
 LEAD = np.arctan(PITCH / (2 * np.pi * MEAN))
@@ -220,8 +182,6 @@ def test_friction_that_drags_a_rod_round(turned: tuple[str, ...]) -> None:
         dragged += friction * radius * force * np.sum(turn * line, axis=0) / np.linalg.norm(turn, axis=0)
     assert run.determinacy.dragged["rod"] == pytest.approx(np.max(np.abs(dragged)), rel=1e-6)
 
-
-# ---- forces that statics leaves open ---------------------------------------------------------------------------------
 
 DOOR, ARM_OF_WEIGHT = 20.0, 0.4
 STILL = {"drivers": {"lower": {"speed": 1e-6, "range": [0.0, 1.5]}}}

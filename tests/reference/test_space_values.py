@@ -65,9 +65,6 @@ def missed(result: xr.Dataset, rows: list[Data]) -> float:
     return worst
 
 
-# ---- RCCC and RSSR ----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("general", [False, True])
 def test_rccc(general: bool) -> None:
     """Computed from the closure by another program; loop and links with points say the same."""
@@ -140,9 +137,6 @@ def test_rssr(branch: int, degrees: float) -> None:
     assert np.max(np.abs(result.closure_residual.values)) < 1e-12
 
 
-# ---- Cardan joints ----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("general", [False, True])
 @pytest.mark.parametrize("delta", [15.0, 70.0])
 def test_ideal_cardan(delta: float, general: bool) -> None:
@@ -177,32 +171,12 @@ def test_imperfect_cardan_closes(general: bool) -> None:
     assert np.ptp(slides) > 0.1 * offset, "errors make the pins slide"
 
 
-# ---- over-constrained -------------------------------------------------------------------------------------------
-
-
 def test_no_bennett() -> None:
     """Without sin α : a = sin β : b four pins in space do not move: there is no number, and it is said why."""
     data = loop("RRRR", (40, 100, 40, 100), (0.2, 0.2, 0.2, 0.2), start=0.1, over_constraint="minimum-norm")
     result = trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), 12)
     assert set(result.status.values[1:]) == {int(trunnion.Status.NOT_ASSEMBLED)}
     assert np.isnan(result.joint_rotation.sel(joint="B").values[1:]).all()
-
-
-@pytest.mark.slow
-def test_rod_of_a_wrong_length() -> None:
-    """The RSSR has numbers where its quadratic equation has a root, the right ones, and nowhere else."""
-    rod = 0.060
-    with np.errstate(invalid="ignore"):
-        expected, _ = rocker_angle(np.linspace(0.0, 6.0, 61), 1, b=rod)
-    missing = np.isnan(expected)
-    data = rssr(float(expected[0] if not missing[0] else expected[~missing][0]), range=[0.0, 6.0])
-    data["dimensions"] = {**RSSR, "b": rod}
-    result = analysed(data, 61)
-    found = value(result, "joint_rotation", "D")
-    assert 5 < missing.sum() < 55
-    np.testing.assert_array_equal(np.isnan(found), missing)
-    np.testing.assert_allclose(np.exp(1j * found[~missing]), np.exp(1j * expected[~missing]), rtol=0, atol=1e-9)
-    assert set(result.status.values[missing]) == {int(trunnion.Status.NOT_ASSEMBLED)}
 
 
 COUNT = 4000

@@ -76,16 +76,6 @@ def test_one_row_has_its_closed_form(criterion: Criterion, seed: int) -> None:
     assert answer.proven
 
 
-def test_exponential_costs_of_one_row_have_their_closed_form() -> None:
-    """B_i k_i exp(−k_i t_i) = λ S_i: linear in log λ, with all t above 0."""
-    s, b, k, limit = np.array([1.0, 2.0, 0.5]), np.array([5.0, 4.0, 3.0]), np.array([3.0, 2.0, 4.0]), 2.0
-    costs = [Cost("exponential", {"B": b[i], "k": k[i], "unit": 1.0}) for i in range(3)]
-    answer = solve(AllocationProblem(bought(costs), rows(s[None], limit)))
-    log_price = (np.sum(s / k * np.log(b * k / s)) - limit) / np.sum(s / k)
-    assert answer.tolerances == pytest.approx((np.log(b * k / s) - log_price) / k, rel=HALF_WIDTH)
-    assert answer.proven
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_the_dual_of_a_worst_case_is_worth_its_cost(seed: int) -> None:
     """With prices λ of the rows each half width is by itself where k B/t^(k+1) = Σ λ|S|, or at a bound: six decades."""
@@ -241,15 +231,20 @@ def test_a_group_takes_the_option_of_one_name() -> None:
 PLAIN = Cost("power", {"B": 1.0, "k": 1.0, "unit": 1.0})
 
 
+def share_of(kept: NDArray[np.bool_]) -> SampledYield:
+    """The share of samples that are kept, with its interval."""
+    share = float(np.mean(kept))
+    half = 1.96 * float(np.sqrt(max(share * (1 - share), 1e-9) / len(kept)))
+    return SampledYield(share, share - half, share + half)
+
+
 def sampled(problem: AllocationProblem, wider: float = 1.0, count: int = 100_000) -> Verify:
     """A yield of normal deviations by plain samples, with standard deviations `wider` than reckoned."""
 
     def verify(t: Array, number: int) -> SampledYield:
         rng = np.random.default_rng(5 + number)
         draws = rng.normal(size=(count, len(t))) @ (wider * problem.effects.sigma() * t).T
-        share = float(np.mean(np.all((draws <= problem.effects.upper) & (draws >= problem.effects.lower), axis=1)))
-        half = 1.96 * float(np.sqrt(share * (1 - share) / count))
-        return SampledYield(share, share - half, share + half)
+        return share_of(np.all((draws <= problem.effects.upper) & (draws >= problem.effects.lower), axis=1))
 
     return verify
 
@@ -328,9 +323,7 @@ def bounded(problem: AllocationProblem, count: int = 20_000) -> Verify:
     def verify(t: Array, number: int) -> SampledYield:
         rng = np.random.default_rng(5 + number)
         draws = rng.choice([-1.0, 1.0], size=(count, len(t))) @ (problem.effects.sigma() * t).T
-        share = float(np.mean(np.all((draws <= problem.effects.upper) & (draws >= problem.effects.lower), axis=1)))
-        half = 1.96 * float(np.sqrt(max(share * (1 - share), 1e-9) / count))
-        return SampledYield(share, share - half, share + half)
+        return share_of(np.all((draws <= problem.effects.upper) & (draws >= problem.effects.lower), axis=1))
 
     return verify
 
@@ -365,9 +358,7 @@ def with_pins(t: Array, seed: int, count: int = 100_000) -> SampledYield:
     """A yield with two pins anywhere in their holes, and three lengths that are normal."""
     rng = np.random.default_rng(seed)
     holes = PLAY * np.sqrt(rng.random((2, count))) * np.cos(2 * np.pi * rng.random((2, count)))
-    share = float(np.mean(np.abs(np.sum(holes, axis=0) + rng.normal(size=(count, 3)) @ t[2:] / 3) <= 0.08))
-    half = 1.96 * float(np.sqrt(share * (1 - share) / count))
-    return SampledYield(share, share - half, share + half)
+    return share_of(np.abs(np.sum(holes, axis=0) + rng.normal(size=(count, 3)) @ t[2:] / 3) <= 0.08)
 
 
 def test_plays_that_nearly_fill_a_limit_leave_the_others_what_samples_say() -> None:

@@ -139,6 +139,8 @@ def test_the_drive_of_a_press_whose_load_jumps() -> None:
     swing = work * (1 - (end - BEGIN) / (2 * np.pi))
     assert found.energy_swing == pytest.approx(swing, rel=1e-7)
     assert found.flywheel(0.05) == pytest.approx(swing / (0.05 * (2 * np.pi) ** 2), rel=1e-7)
+    with pytest.raises(trunnion.MechanismError):
+        found.flywheel(0.0)
 
 
 START, R, L = 0.222, 0.03, 0.2

@@ -191,8 +191,3 @@ def test_a_ball_in_space_has_the_worse_of_two_seats(links: list[str]) -> None:
     found = trunnion.tolerance(rssr(tolerances={}, joints=joints, measures=measures), methods=METHODS, steps=180)
     assert found["worst_case_upper"].item() == pytest.approx(worse, rel=2e-3)
     assert found["searched_upper"].item() == pytest.approx(worse, rel=1e-2)
-
-
-def on(data: Data, link: str) -> Mechanism:
-    """The mechanism that says which link carries the seat in B."""
-    return Mechanism(**{**data, "joints": {**data["joints"], "B": {**data["joints"]["B"], "seat_on": link}}})

@@ -29,8 +29,8 @@ def test_two_wheels() -> None:
             "wheel": {"points": {"E": [0, 0]}},
         },
         "joints": {
-            "A": {"type": "revolute", "links": ["ground", "pinion"]},
-            "E": {"type": "revolute", "links": ["ground", "wheel"]},
+            "A": revolute("ground", "pinion"),
+            "E": revolute("ground", "wheel"),
         },
         "gears": {"mesh": {"joints": ["A", "E"], "ratio": "-1/2", "pressure_angle": "25 deg"}},
         "drivers": {"A": {"speed": 10.0}},
@@ -108,11 +108,8 @@ def test_cycle_of_a_chain_of_gear_pairs() -> None:
         },
         "drivers": {"A": {"speed": 2 * np.pi}},
     }
-    mechanism = Mechanism(**data)
-    run = prepare(mechanism)
-    assert run.cycle.duration == pytest.approx(8.0)
-    assert run.cycle.periodic
-    result = brief(mechanism, 80)
+    cycle, result = prepare(Mechanism(**data)).cycle, brief(Mechanism(**data), 80)
+    assert (cycle.duration, cycle.periodic) == (pytest.approx(8.0), True)
     turned = result["joint_rotation"].sel(joint="D").values / (2 * np.pi)
     np.testing.assert_allclose(turned, -result["time"].values / 8, atol=1e-9)
 
@@ -375,13 +372,8 @@ def test_a_screw_is_a_driven_slide() -> None:
     screw = positions_of(turned, 9, friction=None)
     driven = positions_of(plain, 9, friction=None)
     for joint in "ACD":
-        for axis in "xy":
-            np.testing.assert_allclose(
-                at(screw, "reaction_force", axis, joint=joint),
-                at(driven, "reaction_force", axis, joint=joint),
-                rtol=1e-9,
-                atol=1e-9,
-            )
+        forces = (at(one, "reaction_force", joint=joint) for one in (screw, driven))
+        np.testing.assert_allclose(*forces, rtol=1e-9, atol=1e-9)
     torque, force = at(screw, "drive_effort", driver="W"), at(driven, "drive_effort", driver="S")
     np.testing.assert_allclose(torque, force * rate, rtol=1e-9)
 

@@ -115,27 +115,27 @@ def test_a_hand_that_two_drivers_move() -> None:
 
 def hand() -> dict[str, Any]:
     """Two cranks A and D, two rods to a hand H, which slides along y on a slide along x."""
+    x, y = {"at": [0, 0], "axis": [1, 0]}, {"at": [0, 0], "axis": [0, 1]}
+    bars = {"left": ("A", "B", 0.4, 0.15), "right": ("D", "C", 0.4, 0.15), "rod": ("B", "H", 0.3, 0.18),
+            "other": ("C", "J", 0.3, 0.18)}  # fmt: skip
+    pins = {"A": "ground left", "D": "ground right", "B": "left rod", "C": "right other", "H": "rod hand",
+            "J": "other hand"}  # fmt: skip
+    links: dict[str, Any] = {
+        one: {"points": {near: [0, 0], far: [length, 0]}, "mass": mass, "centre": [length / 2, 0], "inertia": 1e-3}
+        for one, (near, far, mass, length) in bars.items()
+    }
+    links |= {
+        "ground": {"points": {"A": [0, 0], "D": [0.15, 0], "X": x}},
+        "sledge": {"points": {"X": x, "Y": y}, "mass": 1},
+        "hand": {"points": {"Y": y, "H": [0, 0], "J": [0, 0]}, "mass": 2.0},
+    }
+    joints = {name: {"type": "revolute", "links": pair.split()} for name, pair in pins.items()}
+    joints |= {"X": {"type": "prismatic", "links": ["ground", "sledge"]},
+               "Y": {"type": "prismatic", "links": ["sledge", "hand"]}}  # fmt: skip
     return {
         "gravity": [0, -9.81],
-        "links": {
-            "ground": {"points": {"A": [0, 0], "D": [0.15, 0], "X": {"at": [0, 0], "axis": [1, 0]}}},
-            "left": {"points": {"A": [0, 0], "B": [0.15, 0]}, "mass": 0.4, "centre": [0.07, 0], "inertia": 1e-3},
-            "right": {"points": {"D": [0, 0], "C": [0.15, 0]}, "mass": 0.4, "centre": [0.07, 0], "inertia": 1e-3},
-            "rod": {"points": {"B": [0, 0], "H": [0.18, 0]}, "mass": 0.3, "centre": [0.09, 0], "inertia": 1e-3},
-            "other": {"points": {"C": [0, 0], "J": [0.18, 0]}, "mass": 0.3, "centre": [0.09, 0], "inertia": 1e-3},
-            "sledge": {"points": {"X": {"at": [0, 0], "axis": [1, 0]}, "Y": {"at": [0, 0], "axis": [0, 1]}}, "mass": 1},
-            "hand": {"points": {"Y": {"at": [0, 0], "axis": [0, 1]}, "H": [0, 0], "J": [0, 0]}, "mass": 2.0},
-        },
-        "joints": {
-            "A": {"type": "revolute", "links": ["ground", "left"]},
-            "D": {"type": "revolute", "links": ["ground", "right"]},
-            "B": {"type": "revolute", "links": ["left", "rod"]},
-            "C": {"type": "revolute", "links": ["right", "other"]},
-            "H": {"type": "revolute", "links": ["rod", "hand"]},
-            "J": {"type": "revolute", "links": ["other", "hand"]},
-            "X": {"type": "prismatic", "links": ["ground", "sledge"]},
-            "Y": {"type": "prismatic", "links": ["sledge", "hand"]},
-        },
+        "links": links,
+        "joints": joints,
         "assembly": {"B": [-0.08, 0.12], "C": [0.23, 0.12], "H": [0.05, 0.2]},
     }
 

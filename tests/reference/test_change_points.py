@@ -22,9 +22,7 @@ GRAVITY, PUSH, BRAKE, AT = 9.81, (12.0, -30.0), -7.0, (0.4, 0.3)
 
 def four_bar(a: float, b: float, c: float, d: float, hint: Any, begin: float, turns: float | None) -> Mechanism:
     """Masses in the middles of the links, a push on the coupler and a brake on the rocker; without friction."""
-    drive: dict[str, Any] = {"speed": 1.0, "start": begin}
-    if turns is not None:
-        drive = {"speed": 1.0, "range": [begin, begin + turns * TURN]}
+    where = {"start": begin} if turns is None else {"range": [begin, begin + turns * TURN]}
     sides = {"crank": ("A", "B", a), "coupler": ("B", "C", b), "rocker": ("D", "C", c)}
     links: dict[str, Any] = {
         name: {"points": {first: [0, 0], last: [length, 0]}, "mass": MASSES[name], "centre": [length / 2, 0]}
@@ -38,7 +36,7 @@ def four_bar(a: float, b: float, c: float, d: float, hint: Any, begin: float, tu
             for name, ends in {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"],
                                "D": ["ground", "rocker"]}.items()
         },
-        drivers={"A": drive},
+        drivers={"A": {"speed": 1.0, **where}},
         loads={
             "push": {"link": "coupler", "at": "E", "force": list(PUSH)},
             "brake": {"link": "rocker", "moment": BRAKE},

@@ -21,6 +21,7 @@ from trunnion.solve.walk_kernel import WalkKernel
 EXAMPLES = DURANGO.parent
 OF_THE_ITERATION = {"friction_iterations", "friction_change", "friction_residual", "friction_contraction"}
 ROUNDING = {"power_residual", "closure_residual"}
+LAW = "joint_defaults.friction.coefficient"
 AGREE = 1e-9  # of the peak
 RATIOS = 1e-6  # no sharper where the drive turns round
 
@@ -159,12 +160,8 @@ def test_samples_are_the_same_by_any_number_of_threads() -> None:
 @pytest.mark.parametrize(
     ("example", "over", "margin"),
     [
-        (
-            "durango-fourbar",
-            {"AB": ("0.9 m", "1.1 m", 3), "joint_defaults.friction.coefficient": ("0.05", "0.2", 2)},
-            False,
-        ),
-        ("slider-crank", {"joint_defaults.friction.coefficient": ("0.05", "0.3", 4)}, True),
+        ("durango-fourbar", {"AB": ("0.9 m", "1.1 m", 3), LAW: ("0.05", "0.2", 2)}, False),
+        ("slider-crank", {LAW: ("0.05", "0.3", 4)}, True),
     ],
 )
 def test_a_sweep_has_the_figures_of_numpy(example: str, over: dict[str, Any], margin: bool) -> None:
@@ -219,11 +216,6 @@ def test_auto_takes_numpy_where_a_mechanism_cannot_be_compiled(monkeypatch: pyte
     assert np.array_equal(swept[0]["drive_effort_max"], swept[1]["drive_effort_max"], equal_nan=True)
 
 
-@pytest.mark.parametrize("steps", [1, 5])
-def test_few_positions(steps: int) -> None:
-    agree(*both(trunnion.read(DURANGO), steps))
-
-
 def same_as_numpy(run: Run, names: Sequence[str], time: Any, spread: float = 1e-3) -> tuple[WalkKernel, Any]:
     """Drive effort of five samples, numbers of these names a random share more or less, by both; the statuses."""
     mechanism, rng = run.system.mechanism, np.random.default_rng(4)
@@ -254,7 +246,7 @@ def test_friction_laws_of_samples(law: dict[str, Any]) -> None:
     data = trunnion.read(DURANGO).data()
     data["joint_defaults"]["friction"] = law
     run = prepare(Mechanism(**data))
-    same_as_numpy(run, ["AB", "joint_defaults.friction.coefficient"], run.cycle.times(36))
+    same_as_numpy(run, ["AB", LAW], run.cycle.times(36))
 
 
 def test_friction_without_proof_of_one_solution_is_numpys() -> None:

@@ -131,27 +131,6 @@ def test_tables() -> None:
     assert np.array_equal(taken, entries[np.searchsorted(rising, x)])
 
 
-def expression(seed: int) -> Callable[..., Any]:
-    """A random sum, product, choice … of two numbers, the same for NumPy and for what is recorded."""
-
-    def made(x: Any, y: Any) -> Any:
-        rng, known = np.random.default_rng(seed), [x, y, 0.0, 1.0, -1.0, 0.75]
-        for _ in range(30):
-            a, b, c = (known[k] for k in rng.integers(len(known), size=3))
-            known.append(
-                [
-                    lambda a, b, c: a + b, lambda a, b, c: a - b, lambda a, b, c: a * b, lambda a, b, c: -(a - b),
-                    lambda a, b, c: a / (1.5 + np.cos(b)), lambda a, b, c: np.where(a < b, b, c),
-                    lambda a, b, c: np.sin(a) * np.cos(a), lambda a, b, c: np.maximum(a, -b),
-                    lambda a, b, c: np.where((a < b) & ~(b > c), a, c), lambda a, b, c: np.abs(-a),
-                    lambda a, b, c: np.tanh(a - b), lambda a, b, c: np.sqrt(np.abs(a)),
-                ][rng.integers(12)](a, b, c)
-            )  # fmt: skip
-        return sum(known[6:], start=0.0 * x)
-
-    return made
-
-
 def test_loops_within_loops() -> None:
     """Square roots by Newton's method, each quotient by a loop of its own; what does not change stays outside."""
 

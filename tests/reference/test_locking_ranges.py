@@ -216,17 +216,10 @@ def test_effort_to_open_a_clamp_past_its_dead_centre(share: float) -> None:
     r, rod, stiffness, pressed, mu, stop = 0.02, 0.08, 5e4, 0.002, 0.1, np.radians(3.0)
     model = {
         **plunger(r, rod, {"O": {"pin": {"radius": 0.004}, "friction": mu}}),
-        "springs": {
-            "work": {
-                "between": ["ground.W", "ram.B"],
-                "stiffness": stiffness,
-                "free_length": 0.2 - (r + rod - pressed),
-                "only": "push",
-                "useful": True,
-            }
-        },
+        "springs": {"work": {"between": ["ground.W", "ram.B"], "stiffness": stiffness, "only": "push", "useful": True,
+                             "free_length": 0.2 - (r + rod - pressed)}},
         "drivers": {"O": {"range": ["-60 deg", "3 deg"], "speed": "60 deg/s"}},
-    }
+    }  # fmt: skip
     tilt = np.arcsin(r * np.sin(stop) / rod)
     force = stiffness * (r * np.cos(stop) + rod * np.cos(tilt) - (r + rod - pressed)) / np.cos(tilt)
     opens = -force * r * np.sin(stop + tilt) - mu * 0.004 * force

@@ -1,4 +1,4 @@
-"""Means over the cycle: the same however many positions are asked for, and those of an integral taken very finely."""
+"""Means over the cycle, however many positions are asked for, by fine integrals; useful work and work beside it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motion in time against closed forms and published solutions."""
+"""Motion in time against closed forms, published solutions and MuJoCo: motors, clutches, controllers, linkages."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from test_known_linkages import ANGLES, START
 
 from mechanisms import Array
 from reference.mujoco_engine import Engine, mj
@@ -176,17 +177,6 @@ def test_a_controller_on_the_brink_breaks_the_wheel_away_at_once() -> None:
     assert events(result, "break-away") == pytest.approx([0.0], abs=1e-9)
 
 
-# Andrews' squeezer, from the test set of Mazzia and Magherini: β, Θ, γ, Φ, δ, Ω, ε at the start and at 0.03 s
-START = np.array([
-    -0.0617138900142764496, 0.0, 0.455279819163070380, 0.222668390165885884, 0.487364979543842550,
-    -0.222668390165885884, 1.23054744454982119,
-])  # fmt: skip
-WANTED = np.array([
-    15.81077119629904, -15.75637105984298, 0.04082224013073101, -0.5347301163226948, 0.5244099658805304,
-    0.5347301163226948, 1.048080741042263,
-])  # fmt: skip
-
-
 # ---- linkages: published solutions ----------------------------------------------------------------------------
 
 
@@ -204,11 +194,11 @@ def test_andrews_squeezer_in_time() -> None:
     """Published angles after 0.03 s from rest under 0.033 N m: the example as it is."""
     result = simulate(read(EXAMPLES / "andrews-squeezer-in-time.yaml"), 0.03, 1, 1e-12)
     links = result["link_angle"].sel(link=["K1", "K2", "K3", "K4", "K5", "K6", "K7"]).values
-    beta, theta, gamma, phi, delta, omega, epsilon = WANTED - START
+    beta, theta, gamma, phi, delta, omega, epsilon = np.subtract(ANGLES, START)
     # some of the benchmark's angles count from another link: so K2 turns by β + Θ, K4 by δ + Φ, K6 by ε + Ω
     wanted = [beta, beta + theta, gamma, delta + phi, delta, epsilon + omega, epsilon]
     turned = (links[:, -1] - links[:, 0]) - np.array(wanted)
-    assert at(result, "drive_coordinate", 0.03) == pytest.approx(WANTED[0], rel=1e-9)
+    assert at(result, "drive_coordinate", 0.03) == pytest.approx(ANGLES[0], rel=1e-9)
     assert np.angle(np.exp(1j * turned)) == pytest.approx(0.0, abs=1e-8)
 
 

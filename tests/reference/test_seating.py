@@ -205,21 +205,20 @@ def numbers(frame: Any) -> Frame:
     return Frame(np.array([float(np.ravel(n)[0]) for n in frame.place]), axes)
 
 
-def settled_alike(data: Data, steps: int, places: Any, limit: float, moving: float = np.inf) -> None:
-    """Seats to a share of the clearance and reactions to 1e-7, at some positions; moving: to what seats that travel do."""
+def settled_alike(data: Data, steps: int, places: Any, limit: float, moving: float = np.inf) -> int:
+    """Seats to a share of the clearance, reactions to 1e-7, at some positions; moving: of what travel adds. Rounds."""
     run, result = prepare(trunnion.Mechanism(trunnion=1, **data)), analysed(data, steps)
     (driver,), rho = data["drivers"], data["joint_defaults"]["pin"]["clearance"]
     assert int(result.seat_rounds.max()) <= 10
-    offsets, looked = offsets_of(run, result), 0
+    offsets, rounds = offsets_of(run, result), list[int]()
     for i in places:
         if result.status.values[i] != Status.SOLVED:
             continue
-        looked += 1
         back = run.at(result.time.values[i : i + 1], {path: part[i : i + 1] for path, part in offsets.items()})
         home = {link: numbers(motion.frame) for link, motion in back.walk.motions.items() if link != "ground"}
         turned = float(result.joint_rotation.sel(joint=driver).values[i])
         settled = settle(data, home, {driver: Drive(turned, data["drivers"][driver]["speed"])})
-        assert settled.rounds <= 8
+        rounds.append(settled.rounds)
         size = max(np.linalg.norm(force) for force in settled.solution.force.values())
         for joint, ends in settled.offsets.items():
             found = np.nan_to_num(result.seat_offset.sel(joint=joint).values[: len(ends), :, i])
@@ -228,7 +227,8 @@ def settled_alike(data: Data, steps: int, places: Any, limit: float, moving: flo
             np.testing.assert_allclose(force, settled.solution.force[joint], rtol=0, atol=1e-7 * size)
             written = result.reaction_force.sel(joint=joint).values[:, i]
             assert np.max(np.abs(written - force)) <= moving * size  # with the slip and the inertia of the seats
-    assert looked >= 5
+    assert len(rounds) >= 5
+    return max(rounds)
 
 
 @pytest.mark.slow
@@ -238,7 +238,7 @@ def test_rssr_with_play_in_all_joints(friction: float) -> None:
     data = copy.deepcopy(rssr(start=START, friction=friction).data)
     data["assembly"] = {"D": 1.3}
     data["joint_defaults"] |= {"pin": {**data["joint_defaults"]["pin"], "clearance": 2e-5}, "seat": "loaded"}
-    settled_alike(data, 60, range(5, 60, 9), 2e-6, 5e-3)
+    assert settled_alike(data, 60, range(5, 60, 9), 2e-6, 5e-3) <= 8
 
 
 @pytest.mark.slow

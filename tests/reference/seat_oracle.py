@@ -97,8 +97,6 @@ class Linkage:
     def move(self, theta: float, offsets: Offsets) -> dict[str, Link]:
         raise NotImplementedError
 
-    # ---- forces ----
-
     def bodies(self, links: Mapping[str, Link]) -> dict[str, newton_euler.Body]:
         found = {}
         for name, link in links.items():
@@ -162,8 +160,6 @@ class Linkage:
         couple = found.moment[name] / self.parts[name]["guide"]["length"]
         return float(sense * (abs(across / 2 + couple) + abs(across / 2 - couple)))
 
-    # ---- seats ----
-
     def loads(self, links: Mapping[str, Link], found: Solution, name: str) -> tuple[complex, ...]:
         """Q of each end: in the axes of the second link; of a guide the components across."""
         second = self.joints[name]["links"][1]
@@ -191,13 +187,10 @@ class Linkage:
         links = self.move(theta, offsets)
         return links, *self.balance(links, offsets)
 
-    def settle(self, theta: float, limit: float = 1e-12, most: int = 200) -> Settled:
-        """Seats and reactions in turn from the ideal position, until no seat moves by more than `limit` ρ.
-
-        AssertionError if it does not come to rest.
-        """
+    def settle(self, theta: float) -> Settled:
+        """Seats and reactions in turn from the ideal position, until no seat moves by more than 1e-12 ρ."""
         offsets: Offsets = {}
-        for rounds in range(most):
+        for rounds in range(200):
             links, found, friction = self.solve(theta, offsets)
             wanted, loads = self.seats(links, found)
             change = max(
@@ -205,13 +198,14 @@ class Linkage:
                 for name, ends in wanted.items()
                 for a, b in zip(ends, offsets.get(name, (0j,) * len(ends)), strict=True)
             )
-            if change <= limit:
+            if change <= 1e-12:
                 return Settled(offsets, loads, links, found, friction, rounds)
             offsets = wanted
         raise AssertionError(f"the seats do not settle: {change:.2g} of the clearance")
 
-    def travelling(self, theta: float, step: float = 2e-3) -> Settled:
+    def travelling(self, theta: float) -> Settled:
         """A position with the whole motion of its links: differences of fourth order of their settled places."""
+        step = 2e-3
         five = [self.settle(theta + k * step) for k in (-2, -1, 0, 1, 2)]
         links = {}
         for name in five[2].links:

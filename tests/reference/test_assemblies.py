@@ -16,12 +16,10 @@ import pytest
 from benchmarks.drawn import planar, spatial
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 import trunnion
 from brief import brief
-from geared import geared_loop
-from mechanisms import MODELS, analyse, build, class_three, excavator, findings, four_bar
+from mechanisms import MODELS, analyse, build, class_three, findings, four_bar
 from mechanisms_parts import Data
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.nested import flat
@@ -31,7 +29,6 @@ from trunnion.solve.assembly_modes import GroupModes, choices, put_together
 from trunnion.solve.run import prepare
 from trunnion.views.assembly.modes import places
 
-Array = NDArray[np.float64]
 START = np.array([0.0])
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 
@@ -41,17 +38,9 @@ def named(data: Data, **assembly: str) -> Data:
     return {**copy.deepcopy(data), "assembly": assembly}
 
 
-def at_start(mechanism: Mechanism, link: str, point: str) -> Array:
-    place = prepare(mechanism).solve(START).walk.point(link, point).place
-    return np.array([float(np.ravel(n)[0]) for n in place])
-
-
 def choice_of(data: Data) -> GroupModes:
     (choice,) = trunnion.check(build(data), 12).choices
     return choice
-
-
-# ---- closed forms ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("link", "name", "side"), [("coupler", "way-1", 1.0), ("rocker", "way-2", -1.0)])
@@ -108,9 +97,6 @@ def test_a_start_in_line_is_listed_where_its_ways_are_apart() -> None:
     assert np.hypot(*(places[0] - places[1])) > 1e-3
 
 
-# ---- general groups -------------------------------------------------------------------------------------------
-
-
 def plate_angles(crank: float, turn: float, steps: int = 3600) -> list[float]:
     """Angles of the plate of `class_three` at which the third rod has its length, with the crank at an angle."""
     b = crank * np.exp(1j * turn)
@@ -146,19 +132,6 @@ def test_the_ways_of_a_class_three_group_are_all_there_are() -> None:
 
 
 @pytest.mark.spread(1)
-@pytest.mark.parametrize("model", [class_three, excavator, geared_loop])
-def test_the_numbering_is_the_same_on_every_run_and_whichever_is_taken(model: Any) -> None:
-    first = choice_of(model())
-    for way in first.ways:
-        again = choice_of(named(model(), **{first.links[-1]: way.name}))
-        assert [one.name for one in again.ways if one.taken] == [way.name]
-        assert [one.joints for one in again.ways] == [one.joints for one in first.ways]
-
-
-# ---- hints ----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.spread(1)
 @pytest.mark.parametrize(("model", "link", "pin"), [(four_bar, "rocker", "C"), (class_three, "plate", "P")])
 def test_a_name_beats_a_place_and_says_so(model: Any, link: str, pin: str) -> None:
     data = model()
@@ -168,18 +141,6 @@ def test_a_name_beats_a_place_and_says_so(model: Any, link: str, pin: str) -> No
         assert [one.name for one in choice_of(both).ways if one.taken] == [way.name]
         (said,) = [one for one in trunnion.check(build(both), 12).findings if one.where == f"assembly.{link}"]
         assert said.severity is (Severity.NOTE if way.name == by_place.name else Severity.WARNING)
-
-
-@pytest.mark.parametrize(("away", "doubted"), [(0.9, False), (1.1, True)])
-def test_a_hint_that_is_far_from_its_point_is_doubted(away: float, doubted: bool) -> None:
-    data = four_bar()
-    start = at_start(build(data), "rocker", "C")
-    data["assembly"] = {"C": list(start + np.array([0.0, away]))}  # the longest link is of 1 m
-    far = [one for one in trunnion.check(build(data), 12).findings if one.code == "assembly.far_hint"]
-    assert [one.where for one in far] == ["assembly.C"] * doubted
-
-
-# ---- what `check` prints as a hint ------------------------------------------------------------------------------
 
 
 def stated(text: str) -> dict[str, Any]:
@@ -240,32 +201,6 @@ def test_the_turn_of_a_universal_joint_is_a_hint(name: str) -> None:
     assert selected_by_what_is_printed(mechanism) == len(choice.ways)
 
 
-# ---- a group that comes apart and is put together again ----------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def islands() -> Any:
-    """`class_three` with a crank that cannot turn fully; chosen by place."""
-    data = class_three()
-    data["links"]["crank"]["points"]["B"] = [0.3, 0]
-    return analyse(named(data, plate="way-2"), 360)
-
-
-@pytest.mark.slow
-def test_a_group_is_found_again_on_both_ranges_of_the_crank(islands: Any) -> None:
-    """Everywhere that the sweep finds an assembly the analysis has one, and nowhere else, to a degree."""
-    exists = np.array([bool(plate_angles(0.3, turn, 1440)) for turn in np.radians(np.arange(360))])
-    solved = np.isfinite(islands.closure_residual.values)
-    edge = np.flatnonzero(exists != np.roll(exists, 1))
-    assert len(edge) == 4  # two ranges
-    unequal = np.flatnonzero(solved != exists)
-    assert all(min(abs(position - edge)) <= 1 for position in unequal)
-    assert len(unequal) <= 4
-
-
-# ---- where the driver is when a hint holds ---------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("name", "share"), [("four-bar", 0.7), ("class III", 0.7), ("in space", 0.2)])
 def test_a_hint_holds_where_its_driver_is(name: str, share: float) -> None:
     """Of every assembly the places at a position of the driver select it, though at the start others are nearer."""
@@ -301,9 +236,6 @@ SAID_AT: dict[str, Any] = {
     "class III": lambda: build(class_three()).data(),
     "in space": in_space_at,
 }
-
-
-# ---- assemblies that move alike ----------------------------------------------------------------------------------
 
 
 def jacked(first: str, **tube: Any) -> Mechanism:

@@ -22,9 +22,7 @@ GRAVITY, PUSH, BRAKE, AT = 9.81, (12.0, -30.0), -7.0, (0.4, 0.3)
 
 def four_bar(a: float, b: float, c: float, d: float, hint: Any, begin: float, turns: float | None) -> Mechanism:
     """Masses in the middles of the links, a push on the coupler and a brake on the rocker; without friction."""
-    drive: dict[str, Any] = {"speed": 1.0, "start": begin}
-    if turns is not None:
-        drive = {"speed": 1.0, "range": [begin, begin + turns * TURN]}
+    where = {"start": begin} if turns is None else {"range": [begin, begin + turns * TURN]}
     sides = {"crank": ("A", "B", a), "coupler": ("B", "C", b), "rocker": ("D", "C", c)}
     links: dict[str, Any] = {
         name: {"points": {first: [0, 0], last: [length, 0]}, "mass": MASSES[name], "centre": [length / 2, 0]}
@@ -38,7 +36,7 @@ def four_bar(a: float, b: float, c: float, d: float, hint: Any, begin: float, tu
             for name, ends in {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"],
                                "D": ["ground", "rocker"]}.items()
         },
-        drivers={"A": drive},
+        drivers={"A": {"speed": 1.0, **where}},
         loads={
             "push": {"link": "coupler", "at": "E", "force": list(PUSH)},
             "brake": {"link": "rocker", "moment": BRAKE},
@@ -161,29 +159,6 @@ def test_positions_in_line_have_no_forces() -> None:
     status, effort = result["status"].values, result["drive_effort"].values[0]
     assert np.flatnonzero(status == 7).tolist() == [0, 18]
     assert np.flatnonzero(np.isnan(effort)).tolist() == [0, 18]
-
-
-def test_a_slider_crank_with_a_rod_like_its_crank() -> None:
-    """x = 2 r cos θ, through the middle, where the slider could also stay."""
-    data: dict[str, Any] = {
-        "links": {
-            "ground": {"points": {"A": [0, 0], "P": {"at": [0, 0], "axis": [1, 0]}}},
-            "crank": {"points": {"A": [0, 0], "B": [0.3, 0]}},
-            "rod": {"points": {"B": [0, 0], "C": [0.3, 0]}},
-            "slider": {"points": {"C": [0, 0], "P": {"at": [0, 0], "axis": [1, 0]}}},
-        },
-        "joints": {
-            "A": {"type": "revolute", "links": ["ground", "crank"]},
-            "B": {"type": "revolute", "links": ["crank", "rod"]},
-            "C": {"type": "revolute", "links": ["rod", "slider"]},
-            "P": {"type": "prismatic", "links": ["ground", "slider"]},
-        },
-        "drivers": {"A": {"speed": 1.0, "start": 0.2}},
-        "assembly": {"C": [0.6, 0.0]},
-    }
-    result = brief(Mechanism(**data), 200)
-    x = result["point_position"].sel(point="slider.C").values[0]
-    np.testing.assert_allclose(x, 0.6 * np.cos(0.2 + result["time"].values), atol=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["deltoid", pytest.param("antiparallelogram", marks=pytest.mark.slow)])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import gc
-import weakref
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -23,6 +21,7 @@ from trunnion.solve.walk_kernel import WalkKernel
 EXAMPLES = DURANGO.parent
 OF_THE_ITERATION = {"friction_iterations", "friction_change", "friction_residual", "friction_contraction"}
 ROUNDING = {"power_residual", "closure_residual"}
+LAW = "joint_defaults.friction.coefficient"
 AGREE = 1e-9  # of the peak
 RATIOS = 1e-6  # no sharper where the drive turns round
 
@@ -95,20 +94,6 @@ def test_errors_stand_beside_the_ideal_mechanism() -> None:
     agree(one, other)
 
 
-def test_findings_and_summary_are_the_same() -> None:
-    mechanism = trunnion.read(EXAMPLES / "slider-crank.yaml")
-    one, other = (trunnion.analyse(mechanism, 200, engine=engine) for engine in ("numpy", "compiled"))
-    assert [found.what for found in one.trunnion.findings] == [found.what for found in other.trunnion.findings]
-    figures = [{figure.name: figure.value for figure in result.trunnion.summary} for result in (one, other)]
-    assert figures[0].keys() == figures[1].keys()
-    for name, value in figures[0].items():
-        if name not in ("power_residual", "friction_iterations") and isinstance(value, float):
-            assert figures[1][name] == pytest.approx(value, rel=1e-9, nan_ok=True), name
-
-
-# ---- machine code that is kept --------------------------------------------------------------------------------
-
-
 def kernel_of(figure: str, described: str | None = "efforts") -> WalkKernel:
     run = prepare(trunnion.read(DURANGO))
     return WalkKernel(run, {figure: lambda back: back.efforts["A"]}, described=described)
@@ -153,15 +138,6 @@ def test_without_a_home_folder_it_is_compiled_anew(monkeypatch: pytest.MonkeyPat
     assert not list(tmp_path.iterdir())
 
 
-def test_a_sweep_again_records_nothing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Neither to see whether it can be compiled, nor with times of each mechanism."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    over = {"A.speed": [5.0, 6.0]}
-    first = trunnion.sweep(trunnion.read(DURANGO), over, 24, engine="compiled")
-    monkeypatch.setattr(WalkKernel, "_recorded", lambda self, inputs: pytest.fail("it was recorded again"))
-    assert trunnion.sweep(trunnion.read(DURANGO), over, 24, engine="compiled").identical(first)
-
-
 def test_kept_code_of_another_law_is_not_taken(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Another coefficient is the same program, another law is not."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
@@ -184,12 +160,8 @@ def test_samples_are_the_same_by_any_number_of_threads() -> None:
 @pytest.mark.parametrize(
     ("example", "over", "margin"),
     [
-        (
-            "durango-fourbar",
-            {"AB": ("0.9 m", "1.1 m", 3), "joint_defaults.friction.coefficient": ("0.05", "0.2", 2)},
-            False,
-        ),
-        ("slider-crank", {"joint_defaults.friction.coefficient": ("0.05", "0.3", 4)}, True),
+        ("durango-fourbar", {"AB": ("0.9 m", "1.1 m", 3), LAW: ("0.05", "0.2", 2)}, False),
+        ("slider-crank", {LAW: ("0.05", "0.3", 4)}, True),
     ],
 )
 def test_a_sweep_has_the_figures_of_numpy(example: str, over: dict[str, Any], margin: bool) -> None:
@@ -244,30 +216,6 @@ def test_auto_takes_numpy_where_a_mechanism_cannot_be_compiled(monkeypatch: pyte
     assert np.array_equal(swept[0]["drive_effort_max"], swept[1]["drive_effort_max"], equal_nan=True)
 
 
-@pytest.mark.parametrize("steps", [1, 5])
-def test_few_positions(steps: int) -> None:
-    agree(*both(trunnion.read(DURANGO), steps))
-
-
-@pytest.mark.parametrize("engine", ["numpy", "compiled"])
-def test_the_memory_of_a_result_goes_with_it(engine: str) -> None:
-    """At once, not when Python looks for objects that hold each other: a result may take all the memory there is."""
-    mechanism = trunnion.read(EXAMPLES / "fourbar-by-grades.yaml")
-    trunnion.analyse(mechanism, 24, engine=engine)
-    gc.collect()
-    gc.disable()
-    try:
-        result = trunnion.analyse(mechanism, 24, engine=engine)
-        held = [weakref.ref(result[name].variable.values) for name in ("point_position", "reaction_force", "status")]
-        del result
-        assert [array() for array in held] == [None] * len(held)
-    finally:
-        gc.enable()
-
-
-# ---- samples --------------------------------------------------------------------------------------------------
-
-
 def same_as_numpy(run: Run, names: Sequence[str], time: Any, spread: float = 1e-3) -> tuple[WalkKernel, Any]:
     """Drive effort of five samples, numbers of these names a random share more or less, by both; the statuses."""
     mechanism, rng = run.system.mechanism, np.random.default_rng(4)
@@ -298,7 +246,7 @@ def test_friction_laws_of_samples(law: dict[str, Any]) -> None:
     data = trunnion.read(DURANGO).data()
     data["joint_defaults"]["friction"] = law
     run = prepare(Mechanism(**data))
-    same_as_numpy(run, ["AB", "joint_defaults.friction.coefficient"], run.cycle.times(36))
+    same_as_numpy(run, ["AB", LAW], run.cycle.times(36))
 
 
 def test_friction_without_proof_of_one_solution_is_numpys() -> None:

@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks.engines import compared
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import trunnion
@@ -51,9 +49,6 @@ def compiled(function: Callable[..., Sequence[Any]], *arrays: Array, width: int 
 def last_places(found: Array, exact: Any) -> float:
     """Largest error in units of the last place of the exact number."""
     return float(np.max(np.abs((found - exact) / np.spacing(np.abs(exact.astype(float))))))
-
-
-# ---- functions ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -136,44 +131,6 @@ def test_tables() -> None:
     assert np.array_equal(taken, entries[np.searchsorted(rising, x)])
 
 
-# ---- graphs ---------------------------------------------------------------------------------------------------
-
-
-def expression(seed: int) -> Callable[..., Any]:
-    """A random sum, product, choice … of two numbers, the same for NumPy and for what is recorded."""
-
-    def made(x: Any, y: Any) -> Any:
-        rng, known = np.random.default_rng(seed), [x, y, 0.0, 1.0, -1.0, 0.75]
-        for _ in range(30):
-            a, b, c = (known[k] for k in rng.integers(len(known), size=3))
-            known.append(
-                [
-                    lambda a, b, c: a + b, lambda a, b, c: a - b, lambda a, b, c: a * b, lambda a, b, c: -(a - b),
-                    lambda a, b, c: a / (1.5 + np.cos(b)), lambda a, b, c: np.where(a < b, b, c),
-                    lambda a, b, c: np.sin(a) * np.cos(a), lambda a, b, c: np.maximum(a, -b),
-                    lambda a, b, c: np.where((a < b) & ~(b > c), a, c), lambda a, b, c: np.abs(-a),
-                    lambda a, b, c: np.tanh(a - b), lambda a, b, c: np.sqrt(np.abs(a)),
-                ][rng.integers(12)](a, b, c)
-            )  # fmt: skip
-        return sum(known[6:], start=0.0 * x)
-
-    return made
-
-
-@pytest.mark.slow
-@settings(max_examples=40, deadline=None)
-@given(st.integers(0, 10**9))
-def test_random_expressions(seed: int) -> None:
-    """Folding and sharing change nothing beyond rounding."""
-    rng = np.random.default_rng(seed)
-    x, y = rng.normal(size=(2, 21))
-    (found,) = compiled(lambda x, y: (expression(seed)(x, y),), x, y)
-    with np.errstate(all="ignore"):
-        expected = expression(seed)(x, y)
-    reached = np.abs(expected) < 1e4  # beyond, the sine of a sum has lost its digits
-    np.testing.assert_allclose(found[reached], expected[reached], rtol=1e-7, atol=1e-9)
-
-
 def test_loops_within_loops() -> None:
     """Square roots by Newton's method, each quotient by a loop of its own; what does not change stays outside."""
 
@@ -188,9 +145,6 @@ def test_loops_within_loops() -> None:
     x, y = rng.uniform(0.5, 4.0, (2, 33))
     (found,) = compiled(roots, x, y)
     np.testing.assert_allclose(found, np.sqrt(x), rtol=1e-15)
-
-
-# ---- runs -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("width", [2, 4])
@@ -253,9 +207,6 @@ def test_random_planar_mechanisms(seed: int) -> None:
 def test_random_spatial_mechanisms(seed: int) -> None:
     found = compared("spatial", seed)
     assert found.refused or found.agrees
-
-
-# ---- what is kept on disk -------------------------------------------------------------------------------------
 
 
 def kept(folder: Path) -> list[Path]:

@@ -11,39 +11,12 @@ import pytest
 import trunnion
 from brief import brief
 from geared import geared_five_bar, geared_loop, planet_drive, rocker_train, screwed_strut
-from mechanisms import Data, analyse, build, findings, model, positions_of
+from mechanisms import Data, analyse, build, model, positions_of
 from mechanisms_parts import prismatic, revolute, slide
 from trunnion import Mechanism, Status
 from trunnion.solve.run import prepare
 
 TOOTHED = {"five-bar": geared_five_bar, "planet": planet_drive, "loop": geared_loop}
-
-
-def straight_line_gears(radius: float) -> Data:
-    """Cardan's circles: a planet of half the ring's radius; a point of its pitch circle runs on a diameter."""
-    return {
-        "links": {
-            "ground": {"points": {"A": [0, 0]}},
-            "carrier": {"points": {"A": [0, 0], "B": [radius, 0]}},
-            "planet": {"points": {"B": [0, 0], "P": [radius, 0]}, "mass": 2.0},
-        },
-        "joints": {
-            "A": {"type": "revolute", "links": ["ground", "carrier"]},
-            "B": {"type": "revolute", "links": ["carrier", "planet"]},
-        },
-        "gears": {"ring": {"joints": ["A", "B"], "ratio": -2, "phase": 0}},
-        "drivers": {"A": {"speed": 2.0}},
-    }
-
-
-def test_cardan_circles() -> None:
-    """x = 2 r cos θ, y = 0 (La Hire, 1706)."""
-    result = brief(Mechanism(**straight_line_gears(0.07)), 60)
-    theta = 2.0 * result["time"].values
-    np.testing.assert_allclose(
-        result["point_position"].sel(point="planet.P", axis="x"), 0.14 * np.cos(theta), atol=1e-15
-    )
-    np.testing.assert_allclose(result["point_position"].sel(point="planet.P", axis="y"), 0.0, atol=1e-15)
 
 
 def test_two_wheels() -> None:
@@ -56,8 +29,8 @@ def test_two_wheels() -> None:
             "wheel": {"points": {"E": [0, 0]}},
         },
         "joints": {
-            "A": {"type": "revolute", "links": ["ground", "pinion"]},
-            "E": {"type": "revolute", "links": ["ground", "wheel"]},
+            "A": revolute("ground", "pinion"),
+            "E": revolute("ground", "wheel"),
         },
         "gears": {"mesh": {"joints": ["A", "E"], "ratio": "-1/2", "pressure_angle": "25 deg"}},
         "drivers": {"A": {"speed": 10.0}},
@@ -119,20 +92,6 @@ def test_ratio_is_kept_over_all_turns() -> None:
     assert train["time"].values[-1] == pytest.approx(2 * np.pi / 5 * 89 / 90)  # the rocker makes no whole turn
 
 
-def cycle_of(data: Data) -> float:
-    return float(prepare(build(data)).cycle.duration)
-
-
-def test_cycle_whichever_way_a_gear_pair_is_stated() -> None:
-    """φ_E = ½ φ_A + 0.4 and φ_A = 2 φ_E − 0.8 are one gear pair: two turns of the crank."""
-    one, other = geared_five_bar(), geared_five_bar()
-    other["gears"]["mesh"] = {"joints": ["E", "A"], "ratio": 2.0, "phase": -0.8}
-    assert cycle_of(one) == pytest.approx(2 * 2 * np.pi / 3)
-    assert cycle_of(other) == pytest.approx(cycle_of(one))
-    plain, turned = positions_of(one, 60), positions_of(other, 60)
-    np.testing.assert_allclose(turned["drive_effort"], plain["drive_effort"], rtol=1e-9)
-
-
 def test_cycle_of_a_chain_of_gear_pairs() -> None:
     """½ · ½ · ½ of a turn: eight turns of the driver, with the pairs stated in any direction."""
     names = "ABCD"
@@ -149,11 +108,8 @@ def test_cycle_of_a_chain_of_gear_pairs() -> None:
         },
         "drivers": {"A": {"speed": 2 * np.pi}},
     }
-    mechanism = Mechanism(**data)
-    run = prepare(mechanism)
-    assert run.cycle.duration == pytest.approx(8.0)
-    assert run.cycle.periodic
-    result = brief(mechanism, 80)
+    cycle, result = prepare(Mechanism(**data)).cycle, brief(Mechanism(**data), 80)
+    assert (cycle.duration, cycle.periodic) == (pytest.approx(8.0), True)
     turned = result["joint_rotation"].sel(joint="D").values / (2 * np.pi)
     np.testing.assert_allclose(turned, -result["time"].values / 8, atol=1e-9)
 
@@ -286,22 +242,6 @@ def test_chain_hoist() -> None:
     assert float(rough["efficiency"]) == pytest.approx(0.06 / 0.061, rel=1e-12)
 
 
-@pytest.mark.parametrize(("peak", "slack"), [(0.5, False), (1.5, True)])
-def test_a_rope_that_would_push(peak: float, slack: bool) -> None:
-    """A load that swings with A ω² = 0.5 g and 1.5 g pulls with m (g ∓ A ω²): the second would push with m g/2."""
-    data = hoist()
-    rate = 2 * np.pi
-    data["drivers"]["A"] = {
-        "law": "harmonic", "mean": 1.0, "amplitude": peak * 9.81 / (0.06 * rate**2), "period": 1.0, "phase": 0.0
-    }  # fmt: skip
-    notes = [one for one in findings(trunnion.analyse(Mechanism(**data), 5)) if one["code"] == "gears.slack"]
-    assert len(notes) == int(slack)
-    for note in notes:
-        weight = 100.0 * 9.81
-        forces = sorted(abs(note["figures"][key]) for key in ("lower", "upper"))
-        assert forces == pytest.approx([0.5 * weight, 2.5 * weight], rel=1e-9)
-
-
 def test_a_falling_load_turns_its_wheel() -> None:
     """s̈ = g m r²/(m r² + J), the wheel's motion free."""
     data = hoist()
@@ -311,8 +251,6 @@ def test_a_falling_load_turns_its_wheel() -> None:
     time = result["time"].values
     np.testing.assert_allclose(at(result, "drive_coordinate", driver="A"), -second * time**2 / 2, atol=1e-10)
 
-
-# ---- screws ---------------------------------------------------------------------------------------------------
 
 ARM, LEAD, MEAN, LOAD = 0.15, 0.004, 0.006, 5000.0
 SLOPE = np.arctan(LEAD / (2 * np.pi * MEAN))
@@ -434,18 +372,10 @@ def test_a_screw_is_a_driven_slide() -> None:
     screw = positions_of(turned, 9, friction=None)
     driven = positions_of(plain, 9, friction=None)
     for joint in "ACD":
-        for axis in "xy":
-            np.testing.assert_allclose(
-                at(screw, "reaction_force", axis, joint=joint),
-                at(driven, "reaction_force", axis, joint=joint),
-                rtol=1e-9,
-                atol=1e-9,
-            )
+        forces = (at(one, "reaction_force", joint=joint) for one in (screw, driven))
+        np.testing.assert_allclose(*forces, rtol=1e-9, atol=1e-9)
     torque, force = at(screw, "drive_effort", driver="W"), at(driven, "drive_effort", driver="S")
     np.testing.assert_allclose(torque, force * rate, rtol=1e-9)
-
-
-# ---- a nut in space -------------------------------------------------------------------------------------------
 
 
 def test_a_turn_of_a_screw_is_no_cycle_that_comes_back() -> None:

@@ -10,11 +10,11 @@ import pytest
 import xarray as xr
 
 import trunnion
-from mechanisms import MODELS, build, four_bar, model
+from mechanisms import MODELS, four_bar, model
 from mechanisms_space import MODELS as SPACE_MODELS
 from mechanisms_space import Drawn, rssr
 from reference.maximal_space import Array, Data, Drive, Frame, Linkage, Motion, element, point, rotation
-from reference.shifted_space import moved
+from reference.seat_oracle_space import moved
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.solve.run import prepare
 
@@ -156,52 +156,7 @@ def test_dimensions_off_nominal() -> None:
     assert float(result.efficiency_ideal) == pytest.approx(float(meant.efficiency), nan_ok=True)
 
 
-FOUR_BAR = (0.100, 0.030, 0.090, 0.070)  # ground, crank, coupler, rocker; m
-SIZE, THETA = 2e-5, np.pi / 3
 NOW = np.array([0.0])
-HOLES = {"A": "crank", "B": "coupler", "C": "rocker", "D": "rocker"}  # the second link of each joint
-
-
-# ---- four-bar ---------------------------------------------------------------------------------------------------
-
-
-def rocker_angle(shift: dict[str, Any]) -> Any:
-    """Angle of the rocker at 60°, open branch, pins off the middle of their holes by vectors x + i y, global axes.
-
-    The hole is on the second link: its point lies at −c from where the first link's is.
-    """
-    ground, ab, bc, cd = FOUR_BAR
-    start = -shift.get("A", 0) + ab * np.exp(1j * THETA) - shift.get("B", 0)
-    end = ground - shift.get("D", 0) + shift.get("C", 0)  # middle of the coupler pin's circle, as C is on the coupler
-    far = np.abs(end - start)
-    along = (bc**2 - cd**2 + far**2) / (2 * far)
-    pin = start + (end - start) / far * (along + 1j * np.sqrt(bc**2 - along**2))
-    return np.angle(pin - end)
-
-
-def test_four_bar_of_the_engine_with_given_offsets() -> None:
-    """The same angle from `seats.JOINT.1.x` among the values, to 1e-12, in all joints at once."""
-    ground, ab, bc, cd = FOUR_BAR
-    data = four_bar(ab, bc, cd, ground)
-    data["drivers"]["A"]["start"] = THETA
-    run, rng = prepare(build(data, friction=None)), np.random.default_rng(9)
-    for _ in range(20):
-        c = {joint: SIZE * complex(*rng.normal(size=2)) for joint in HOLES}
-        seats = {f"seats.{joint}.1.{axis}": float(part) for joint, vector in c.items()
-                 for axis, part in (("x", vector.real), ("y", vector.imag))}  # fmt: skip
-        found = run.solve(NOW, values={**run.values, **seats}).walk
-        frames = {link: motion.frame for link, motion in found.motions.items()}
-        # stated in the axes of the link with the hole: in global ones by that link's angle as it comes
-        turns = {link: complex(np.ravel(frame.c)[0], np.ravel(frame.s)[0]) for link, frame in frames.items()}
-        shift = {joint: vector * turns[HOLES[joint]] for joint, vector in c.items()}
-        assert np.angle(turns["crank"]) == pytest.approx(THETA, abs=1e-12)
-        assert np.angle(turns["rocker"]) == pytest.approx(rocker_angle(shift), abs=1e-12)
-
-
-# ---- RSSR -------------------------------------------------------------------------------------------------------
-
-
-# ---- any mechanism: another model with its elements moved by hand ----------------------------------------------
 
 
 def offsets_for(space: str, data: Data, size: float, seed: int) -> dict[str, float]:

@@ -206,15 +206,21 @@ def test_several_accelerations_are_told(torque: float, rough: float, known: int)
 # ---- rest -----------------------------------------------------------------------------------------------------
 
 
+def beside(one: Mechanism, speed: float = 3.0) -> Mechanism:
+    """A mechanism with a wheel beside it, that is free as well."""
+    data = one.data()
+    ground = one.fixed_link
+    links = {**data["links"], "disc": {"points": {"W": [0, 0]}, "inertia": 0.05}}
+    links[ground] = {**links[ground], "points": {**links[ground]["points"], "W": [1, 1]}}
+    joints = {**data["joints"], "W": {"type": "revolute", "links": [ground, "disc"], "friction": 0}}
+    drivers = {**data["drivers"], "W": {"speed": 100, "free": True, "initial": {"speed": speed}}}
+    return Mechanism(**{**data, "links": links, "joints": joints, "drivers": drivers})
+
+
 def wheels(motor: dict[str, Any] | None = None, speed: float = 3.0) -> Mechanism:
     """Two wheels beside each other, each with its drag."""
-    data = wheel(motor, drag=0.6, initial={"speed": 2 * speed}).data()
-    links = {**data["links"], "disc": {"points": {"W": [0, 0]}, "inertia": 0.05}}
-    links["ground"] = {"points": {"A": [0, 0], "W": [1, 1]}}
-    joints = {**data["joints"], "W": {"type": "revolute", "links": ["ground", "disc"]}}
-    drivers = {**data["drivers"], "W": {"speed": 100, "free": True, "initial": {"speed": speed}}}
-    loads = {**data["loads"], "seal": {"joint": "W", "resisting_torque": 0.6}}
-    return Mechanism(**{**data, "links": links, "joints": joints, "drivers": drivers, "loads": loads})
+    data = beside(wheel(motor, drag=0.6, initial={"speed": 2 * speed}), speed).data()
+    return Mechanism(**{**data, "loads": {**data["loads"], "seal": {"joint": "W", "resisting_torque": 0.6}}})
 
 
 def test_all_free_drivers_come_to_rest() -> None:
@@ -245,11 +251,8 @@ ROUGHNESS = 0.3
 
 
 def times_of(data: Any) -> list[tuple[str, str, float]]:
-    """Kind, joint and time, s, of all times_of."""
-    return [
-        (kind, of, float(time))
-        for (kind, of, *_), time in zip(json.loads(data.attrs["times_of"]), data.event_time, strict=True)
-    ]
+    """Kind, joint and time, s, of all events."""
+    return [one[:3] for one in events(data)]
 
 
 @dataclass
@@ -309,13 +312,13 @@ class Reference:
         return own
 
     def run(self, state: Array, end: float) -> tuple[Array, list[tuple[str, int, float]]]:
-        """The state at the end, and the times_of."""
+        """The state at the end, and the events."""
         time, count, found = 0.0, len(state) // 2, list[tuple[str, int, float]]()
         self.modes = self.consistent(state)
         while True:
             part = solve_ivp(
                 lambda t, y: np.concatenate([y[count:], self.solved(y, self.modes)[0]]), (time, end), state,
-                method="DOP853", rtol=1e-11, atol=1e-12, times_of=[self.watched(k) for k in range(len(self.ways))],
+                method="DOP853", rtol=1e-11, atol=1e-12, events=[self.watched(k) for k in range(len(self.ways))],
                 max_step=0.02,
             )  # fmt: skip
             time, state = float(part.t[-1]), part.y[:, -1].copy()
@@ -328,32 +331,31 @@ class Reference:
                     found.append(("stick" if before else "break-away", i, time))
 
 
-# ---- stacked ---------------------------------------------------------------------------------------------------
+# ---- blocks ----------------------------------------------------------------------------------------------------
 
 LOWER, UPPER, STIFF = 2.0, 1.0, 60.0
 
 
-def stacked(**more: Any) -> Mechanism:
-    """Two stacked stacked on the ground, the lower one held by a spring, the upper one by friction alone."""
+def stacked() -> Mechanism:
+    """Two blocks on the ground, the lower one held by a spring, the upper one by friction alone."""
     axis = {"at": [0, 0], "axis": [1, 0]}
-    data: dict[str, Any] = {
-        "gravity": [0, -G],
-        "links": {
+    return Mechanism(
+        gravity=[0, -G],
+        links={
             "ground": {"points": {"A": axis}},
             "low": {"points": {"A": axis, "B": axis}, "mass": LOWER},
             "high": {"points": {"B": axis}, "mass": UPPER},
         },
-        "joints": {
+        joints={
             "A": {"type": "prismatic", "links": ["ground", "low"], "friction": 0.05, "guide": {"length": 20}},
             "B": {"type": "prismatic", "links": ["low", "high"], "friction": ROUGHNESS, "guide": {"length": 20}},
         },
-        "drivers": {
-            "A": {"speed": 1, "range": [-1, 1], "free": True, "initial": {"coordinate": 0.4, "speed": 0}},
-            "B": {"speed": 1, "range": [-1, 1], "free": True, "initial": {"coordinate": 0, "speed": 0}},
+        drivers={
+            name: {"speed": 1, "range": [-1, 1], "free": True, "initial": {"coordinate": start, "speed": 0}}
+            for name, start in (("A", 0.4), ("B", 0))
         },
-        "springs": {"k": {"joint": "A", "stiffness": STIFF, "free_length": 0}},
-    }
-    return Mechanism(**{**data, **more})
+        springs={"k": {"joint": "A", "stiffness": STIFF, "free_length": 0}},
+    )
 
 
 def test_blocks_stick_and_slip_as_their_equations_say() -> None:
@@ -379,27 +381,26 @@ LENGTH, PIN = 0.5, 0.06
 M, J, C = (1.0, 0.8), (0.02, 0.015), (0.25, 0.2)
 
 
-def pendulum(friction: float = ROUGHNESS, **more: Any) -> Mechanism:
+def pendulum() -> Mechanism:
     """Two links that hang from thick pins; relative angles are the coordinates."""
     bars = {name: {"mass": M[i], "inertia": J[i], "centre": [C[i], 0]} for i, name in enumerate(("upper", "lower"))}
-    data: dict[str, Any] = {
-        "gravity": [0, -G],
-        "links": {
+    return Mechanism(
+        gravity=[0, -G],
+        links={
             "ground": {"points": {"A": [0, 0]}},
             "upper": {"points": {"A": [0, 0], "B": [LENGTH, 0]}, **bars["upper"]},
             "lower": {"points": {"B": [0, 0]}, **bars["lower"]},
         },
-        "joints": {
+        joints={
             "A": {"type": "revolute", "links": ["ground", "upper"]},
             "B": {"type": "revolute", "links": ["upper", "lower"]},
         },
-        "joint_defaults": {"pin": {"radius": PIN}, **({"friction": friction} if friction else {})},
-        "drivers": {
-            "A": {"speed": 1, "free": True, "initial": {"coordinate": -0.3, "speed": 0}},
-            "B": {"speed": 1, "free": True, "initial": {"coordinate": 0.5, "speed": 0}},
+        joint_defaults={"pin": {"radius": PIN}, "friction": ROUGHNESS},
+        drivers={
+            name: {"speed": 1, "free": True, "initial": {"coordinate": start, "speed": 0}}
+            for name, start in (("A", -0.3), ("B", 0.5))
         },
-    }
-    return Mechanism(**{**data, **more})
+    )
 
 
 def _pendulum_parts(y: Array) -> tuple[Array, Array]:
@@ -421,7 +422,7 @@ def _pendulum_parts(y: Array) -> tuple[Array, Array]:
 
 
 def _pendulum_limits(y: Array, second: Array) -> Array:
-    """f r |ROUGHNESS| of both pins, from Newton's law for the centres of mass."""
+    """f r |R| of both pins, from Newton's law for the centres of mass."""
     a, b, u, v = y
     one, other = np.exp(1j * a), np.exp(1j * (a + b))
     first = (1j * second[0] - u * u) * one
@@ -444,17 +445,6 @@ def test_a_double_pendulum_comes_to_rest_in_friction_as_its_equations_say() -> N
 
 
 # ---- coordinates that know nothing of each other --------------------------------------------------------------
-
-
-def beside(one: Mechanism) -> Mechanism:
-    """A mechanism with a wheel beside it, that is free as well."""
-    data = one.data()
-    ground = one.fixed_link
-    links = {**data["links"], "disc": {"points": {"W": [0, 0]}, "inertia": 0.05}}
-    links[ground] = {**links[ground], "points": {**links[ground]["points"], "W": [1, 1]}}
-    joints = {**data["joints"], "W": {"type": "revolute", "links": [ground, "disc"], "friction": 0}}
-    drivers = {**data["drivers"], "W": {"speed": 100, "free": True, "initial": {"speed": 3.0}}}
-    return Mechanism(**{**data, "links": links, "joints": joints, "drivers": drivers})
 
 
 def test_a_braked_motor_with_a_lossy_gear_stops_as_its_closed_form_says() -> None:

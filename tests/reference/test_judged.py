@@ -12,10 +12,8 @@ from benchmarks.free_motions import examine as examine_free
 from benchmarks.free_motions import examine_spatial as examine_free_spatial
 from benchmarks.judged import planar as judged_planar
 from benchmarks.judged import spatial as judged_spatial
-from benchmarks.judged.verdict import CHECKS, Results, slope
+from benchmarks.judged.verdict import CHECKS, Results
 from benchmarks.random_mechanisms import examine, result_of
-
-from trunnion.joints.friction import FRICTION_LAWS
 
 STEPS = 24
 # slider-cranks that rub in their guides alone, whose loads cross from one of its ends to the other
@@ -74,20 +72,11 @@ def altered(result: Results, name: str, factor: float) -> Results:
 @pytest.mark.parametrize("space", DRAWN)
 @pytest.mark.parametrize(
     ("name", "check"),
-    [
-        ("reaction_force", "balance"),
-        ("reaction_moment", "balance"),
-        ("drive_effort", "balance"),
-        ("friction_power", "power"),
-        ("friction_torque", "law"),
-        ("friction_force", "law"),
-        ("point_position", "motion"),
-        ("point_velocity", "motion"),
-        ("point_acceleration", "motion"),
-        ("joint_rotation_velocity", "motion"),
-        ("joint_slide_velocity", "motion"),
-    ],
-)
+    [("reaction_force", "balance"), ("reaction_moment", "balance"), ("drive_effort", "balance"),
+     ("friction_power", "power"), ("friction_torque", "law"), ("friction_force", "law"), ("point_position", "motion"),
+     ("point_velocity", "motion"), ("point_acceleration", "motion"), ("joint_rotation_velocity", "motion"),
+     ("joint_slide_velocity", "motion")],
+)  # fmt: skip
 def test_the_judge_sees_a_wrong_number(space: str, name: str, check: str) -> None:
     """A result that is off by 1e-6 of itself is over the limit in the check that is about it."""
     if space == "spatial" and name == "friction_torque":
@@ -97,19 +86,6 @@ def test_the_judge_sees_a_wrong_number(space: str, name: str, check: str) -> Non
     result = result_of(data, STEPS, whole=False)
     wrong = JUDGED[space](data, altered(result, name, 1 + 1e-6))
     assert wrong.worst(check)[0] > 1e-8 > CHECKS[check]
-
-
-def test_the_judge_has_laws_of_its_own() -> None:
-    """They agree with those of Trunnion, sign and all, and are odd."""
-    slip = np.linspace(-0.4, 0.4, 41)
-    stated = {"coefficient": 0.2, "pair_factor": 4 / 3, "viscous": 0.1, "static": 0.3}
-    for name in ("coulomb", "viscous", "stribeck", "brown-mcphee", "rolling-bearing"):
-        law = FRICTION_LAWS[name]
-        given = {"stribeck_speed": 0.05, "transition_speed": 0.02, **stated}
-        given = {key: value for key, value in given.items() if key in law.parameters}
-        mine = slope({"law": name, **given}, slip)
-        np.testing.assert_allclose(mine, law.function(1.0, slip, **given), rtol=1e-14, err_msg=name)
-        np.testing.assert_allclose(mine, -slope({"law": name, **given}, -slip), rtol=1e-14, err_msg=name)
 
 
 LET_GO = (1, 2, 12, 5, 10, 24, 34)

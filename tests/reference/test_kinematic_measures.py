@@ -1,8 +1,7 @@
-"""Speeds, accelerations, transmission angles, powers and dwells as measures, against closed forms and differences."""
+"""Speeds, angles, dwells, expressions and starting times as measures, against closed forms and differences."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +16,6 @@ from mechanisms_space import rssr
 from timed import LINEAR, wheel
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative
-from trunnion.cycle.vocabulary import vocabulary
-from trunnion.dynamics.measured import figures_in_time
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.measures import Measure, named
 from trunnion.solve.forward import forward
@@ -47,9 +44,6 @@ def course(run: Run, name: str, time: Any) -> Any:
     measure = named(run.system.mechanism, [name], run.values)[0]
     back = run.solve(time) if not measure.of_motion else run.walk(time)
     return np.broadcast_to(measure.curve(back)[0], np.shape(time))
-
-
-# ---- the slider-crank -----------------------------------------------------------------------------------------
 
 
 def test_speeds_of_the_slider_crank(centric: Run) -> None:
@@ -109,9 +103,6 @@ def test_dwell_within_a_band(centric: Run) -> None:
     assert band.figure_unit(centric.system, centric.values) == "1"
 
 
-# ---- the four-bar ---------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_transmission_angle_by_the_law_of_cosines(side: float) -> None:
     """cos μ = (b² + c² − d²)/(2 b c), d² = a² + g² − 2 a g cos θ, folded; least where the crank is in line."""
@@ -130,9 +121,6 @@ def test_transmission_angle_by_the_law_of_cosines(side: float) -> None:
     with pytest.raises(MechanismError) as raised:
         course(run, "transmission_angle:A", time)
     assert raised.value.findings[0].where == "joints.A"
-
-
-# ---- in space -------------------------------------------------------------------------------------------------
 
 
 def slope(run: Run, name: str, time: Any, step: float = 1e-5) -> Any:
@@ -165,9 +153,6 @@ def test_speeds_in_space_by_differences(spatial: Run) -> None:
         course(spatial, "transmission_angle:A", time)
 
 
-# ---- in the verbs ---------------------------------------------------------------------------------------------
-
-
 def books() -> Mechanism:
     """A slider-crank with friction, a load that does work, two springs, and measures of its own."""
     data = slider_crank(R, L, 0.1)
@@ -188,7 +173,6 @@ PARTS: dict[str, tuple[str, dict[str, str]]] = {  # variable of `analyse` and wh
     "friction_power:C": ("friction_power", {"joint": "C"}), "efficiency:instant": ("efficiency_instant", {}),
     **{f"{kind}:{name}": (kind, {"spring": name}) for kind in ("spring_force", "spring_elongation")
        for name in ("line", "coil")},
-    "locking_margin:mechanism": ("locking_margin", {}),
 }  # fmt: skip
 
 
@@ -249,52 +233,19 @@ def test_play_of_a_speed() -> None:
         one = result["sensitivity"].isel(measure=row)
         for joint in result["joint"].values:
             for axis in "xy":
-                ends = [
-                    measure.curve(
-                        forward(
-                            run.system,
-                            {**run.values, f"{HOLE}.{joint}.1.{axis}": sign * 1e-7},
-                            run.chosen.assembly,
-                            result["time"].values,
-                        )
-                    )[0]
-                    for sign in (1, -1)
-                ]
+                path, time = f"{HOLE}.{joint}.1.{axis}", result["time"].values
+                moved = ({**run.values, path: off} for off in (1e-7, -1e-7))
+                ends = [measure.curve(forward(run.system, one, run.chosen.assembly, time))[0] for one in moved]
                 expected = np.broadcast_to((ends[0] - ends[1]) / 2e-7, 12)
                 found = one.sel(joint=joint, end="1", axis=axis).values
                 np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5)
 
 
-@pytest.mark.spread(1)
-@pytest.mark.parametrize("example", ["toleranced-slider-crank", "toleranced-rssr", "fourbar-with-play", "sarrus"])
-def test_everything_that_is_listed_can_be_asked_for(example: str) -> None:
-    """Names mean the numbers they stand for; measures can be named, and have the units and values that are told."""
-    mechanism = trunnion.read(EXAMPLES / f"{example}.yaml")
-    found = vocabulary(mechanism, 24)
-    values, run = mechanism.parameters(), prepare(mechanism)
-    assert {one.path for one in found.numbers} == set(mechanism.parameter_kinds())
-    for number in found.numbers:
-        assert mechanism.path_of(number.name) == number.path
-        assert number.value == pytest.approx(values[number.path])
-    measures = named(mechanism, [one.name for one in found.measures], run.values)
-    for measure, told in zip(measures, found.measures, strict=True):
-        assert measure.figure_unit(run.system, run.values) == told.unit
-        assert ("sweep" in told.verbs) == (
-            measure.rule != "deviation" and not measure.of.against and not measure.of_attitude(run.system)
-        )
-    json.dumps(found.data(), allow_nan=False)
-
-
-LINKS = {"links": {**four_bar()["links"]}, "dimensions": {"ab": "0.3 m"}}
-LINKS["links"] = {
-    **LINKS["links"],
-    "crank": {"points": {"A": [0, 0], "B": ["ab", 0]}, "mass": 1.0, "centre": ["ab/2", 0], "inertia": 0.1},
-}
-
-
 def model(more: dict[str, Any] | None = None, **measures: Any) -> Mechanism:
     """A crank and rocker without friction, and its measures."""
-    return Mechanism(**{**four_bar(), **LINKS, **(more or {}), "measures": measures})
+    data = four_bar() | {"dimensions": {"ab": "0.3 m"}, "measures": measures, **(more or {})}
+    crank = {"points": {"A": [0, 0], "B": ["ab", 0]}, "mass": 1.0, "centre": ["ab/2", 0], "inertia": 0.1}
+    return Mechanism(**data | {"links": data["links"] | {"crank": crank}})
 
 
 def test_a_lead_is_the_difference_of_angles_without_jumps() -> None:
@@ -305,40 +256,17 @@ def test_a_lead_is_the_difference_of_angles_without_jumps() -> None:
     assert values - values[0] == pytest.approx(lead - lead[0], abs=1e-12)
 
 
-def test_figures_of_an_expression_do_not_depend_on_the_steps() -> None:
-    """Half the difference of input and output over a range of it: least and largest of the same course, finely."""
-    own = {"input": "A.rotation", "half": {"expression": "(input - D.rotation) / 2", "as": "maximum",
-                                           "over": ["60 deg", "200 deg"]}}  # fmt: skip
-    few, many = (trunnion.analyse(model(**own), steps=steps) for steps in (7, 7200))
-    figures = [float(found.measure_figure.sel(measure="half")) for found in (few, many)]
-    assert figures[0] == pytest.approx(figures[1], abs=1e-12)
-    turned = many.joint_rotation.sel(joint="A").values
-    inside = (turned >= np.radians(60)) & (turned <= np.radians(200))
-    course = (turned - np.unwrap(many.joint_rotation.sel(joint="D").values))[inside] / 2
-    assert figures[0] == pytest.approx(np.max(course), abs=1e-6)
-
-
 def test_error_of_a_universal_joint_against_even_rotation() -> None:
     """θ₂ − θ₁ of a Cardan joint bent by β swings between ±arctan((1 − cos β)/(2 √cos β)).
 
     Source: F. Duditza, Kardangelenkgetriebe und ihre Anwendungen, 1973.
     """
     bare = trunnion.read("examples/universal-joint.yaml").data()
-    found = trunnion.analyse(Mechanism(**{**bare, "measures": EVEN}), steps=4)
+    error = {"expression": "output.rotation - input.rotation", "as": "peak-to-peak"}
+    found = trunnion.analyse(Mechanism(**{**bare, "measures": {"error": error}}), steps=4)
     bend = float(np.radians(30.0))
     swing = 2 * np.arctan((1 - np.cos(bend)) / (2 * np.sqrt(np.cos(bend))))
     assert float(found.measure_figure.sel(measure="error")) == pytest.approx(swing, rel=1e-9)
-
-
-def test_leverage_is_the_ratio_of_speeds_without_friction() -> None:
-    """Power in is power out: effort over the load's torque is the output's speed over the input's."""
-    still = {"links": {name: {"points": link["points"]} for name, link in four_bar()["links"].items()}}
-    load = {"loads": {"brake": {"joint": "D", "resisting_torque": "3 N m"}}}
-    leverage = {"leverage": "A.effort / (3 N m)", "speed": {"rate": "D"}, "ratio": "speed / (4 rad/s)"}
-    found = trunnion.analyse(model({**still, **load}, **leverage), steps=60)
-    values = found.measure_value
-    ratio = np.abs(values.sel(measure="ratio").values)
-    assert values.sel(measure="leverage").values == pytest.approx(ratio, abs=1e-10)
 
 
 def test_derivatives_are_those_of_differences() -> None:
@@ -346,8 +274,6 @@ def test_derivatives_are_those_of_differences() -> None:
     mechanism = model(**own)
     run = prepare(mechanism)
     measures = named(mechanism, ["lead", "mixed"], run.values)
-    from trunnion.algebra.dual import Dual
-
     kernel, time = NumpyKernel(run, measures, FrictionMethod()), np.linspace(0.1, 1.4, 7)
 
     def at(ab: Any) -> Any:
@@ -395,9 +321,6 @@ def test_an_expression_that_is_its_own_circle_or_means_nothing_is_a_finding() ->
             model(**own)
         assert all(one.where.startswith("measures.lead") for one in error.value.findings), text
         assert says in str(error.value), text
-
-
-EVEN = {"error": {"expression": "output.rotation - input.rotation", "as": "peak-to-peak"}}
 
 
 DURATION = 12.0
@@ -463,42 +386,3 @@ def test_a_sweep_has_the_figures_of_each_point() -> None:
     found = trunnion.sweep(longer, {"links.wheel.inertia": inertias}, 24, measures=["start"])["start"].values
     np.testing.assert_allclose(found, [starting_time(one) for one in inertias], rtol=1e-7)
     assert swept["peak_effort:A"].attrs["units"] == "N m"
-
-
-def test_the_summary_of_a_simulation_has_the_same_figures() -> None:
-    mechanism = wheel(LINEAR)
-    result = trunnion.simulate(mechanism, DURATION, 100)
-    figures = {one.name: one.value for one in result.trunnion.summary}
-    run = prepare(mechanism)
-    own = figures_in_time(run, "A", run.values, 1, DURATION)
-    for key, name in (
-        ("starting_time", "starting_time"),
-        ("speed_mean", "steady_speed"),
-        ("fluctuation", "fluctuation"),
-    ):
-        assert figures[f"A.{key}"] == pytest.approx(own[name][0], rel=1e-7, abs=1e-9)
-
-
-@pytest.mark.slow
-def test_tolerances_are_allocated_to_a_limit_of_the_starting_time() -> None:
-    """Two tolerances of equal cost per share of what they do to the start: B₁/t₁ + B₂/t₂ with s₁ t₁ + s₂ t₂ = limit.
-
-    Lagrange: t_i = limit √(B_i/s_i)/Σ √(B_j s_j), with the derivatives of the closed form.
-    """
-    start = starting_time(0.05)
-    mechanism = stated(
-        wheel(LINEAR),
-        tolerances={"links.wheel.inertia": 0.001, "loads.drag.resisting_torque": 0.05},
-        measures={"start": {**MEASURE, "limit": 0.1}},
-        costs={name: {"model": "power", "B": cost, "k": 1, "unit": unit}
-               for name, cost, unit in (("links.wheel.inertia", 1e-3, "kg m^2"),
-                                        ("loads.drag.resisting_torque", 0.05, "N m"))},
-    )  # fmt: skip
-    found = trunnion.allocate(mechanism, samples=100, jobs=1)
-    widths = dict(zip(found["parameter"].values, found["parameter_upper"].values, strict=True))
-    slope = (starting_time(0.0505) - starting_time(0.0495)) / 0.001
-    assert float(found["nominal"].item()) == pytest.approx(start, rel=1e-7)
-    drag = np.abs(np.ravel(found["sensitivity"])[list(found["parameter"].values).index("loads.drag.resisting_torque")])
-    costs, slopes = np.array([1e-3, 0.05]), np.array([abs(slope), drag])
-    wanted = 0.1 * np.sqrt(costs / slopes) / np.sum(np.sqrt(costs * slopes))
-    assert [widths["links.wheel.inertia"], widths["loads.drag.resisting_torque"]] == pytest.approx(wanted, rel=1e-3)

@@ -1,4 +1,4 @@
-"""More of what other means say of the examples, over whole runs; the gallery has one figure of each."""
+"""Known linkages: what other means say of the examples, published states and figures of the theory sheet."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gallery.drawing import turns
 from gallery.entry import STEPS
 from gallery.plane import slope
 from gallery.presses import jaw_angle
-from mechanisms import DURANGO, revolute
+from mechanisms import DURANGO
 from trunnion import FrictionMethod, Status
 from trunnion.solve.run import prepare
 
@@ -85,8 +85,9 @@ def test_double_butterfly_pins_and_torque() -> None:
         assert float(result["drive_effort"][0, k]) == pytest.approx(butterfly_torque(turn), abs=1e-5)
 
 
-# ---- Andrews' squeezer: the published states (test set for IVP solvers, release 2.4, problem andrews) --------------
-
+# Andrews' squeezer: the published states (test set for IVP solvers, release 2.4, problem andrews)
+START = (-0.0617138900142764496, 0, 0.455279819163070380, 0.222668390165885885, 0.487364979543842550,
+         -0.222668390165885885, 1.23054744454982119)  # fmt: skip
 ANGLES = (15.81077119629904, -15.75637105984298, 0.04082224013073101, -0.5347301163226948, 0.5244099658805304,
           0.5347301163226948, 1.048080741042263)  # fmt: skip
 RATES = (1139.920302151208, -1424.379294994111, 11.03291221937134, 19.29337464421385, 0.5735699284790808,
@@ -115,9 +116,7 @@ def relative(one: Any, variable: str) -> Any:
 def test_squeezer_from_rest() -> None:
     """At the start: published accelerations, the torque that they come from and the first two multipliers."""
     start = brief(example("andrews-squeezer"), 4).isel(position=0)
-    expected = [-0.0617138900142764496, 0, 0.455279819163070380, 0.222668390165885885, 0.487364979543842550,
-                -0.222668390165885885, 1.23054744454982119]  # fmt: skip
-    np.testing.assert_allclose(relative(start, "link_angle"), expected, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(relative(start, "link_angle"), START, rtol=0, atol=1e-13)
     seconds = relative(start, "link_angle_acceleration")
     np.testing.assert_allclose(seconds, [14222.4439199541387, -10666.8329399655854, 0, 0, 0, 0, 0], rtol=0, atol=1e-9)
     assert float(start["drive_effort"][0]) == pytest.approx(0.033, abs=1e-13)
@@ -137,31 +136,6 @@ def test_squeezer_at_the_end() -> None:
     np.testing.assert_allclose(forces, MULTIPLIERS, rtol=0, atol=5e-5)
 
 
-def test_pendulum_driver_holds_a_weight() -> None:
-    """One link on a driven pin: T = m g l cos φ + J_A α, here without acceleration; R = m (a − g)."""
-    mechanism = trunnion.Mechanism(
-        gravity=[0, -9.81],
-        links={
-            "ground": {"points": {"A": [0, 0]}},
-            "arm": {"points": {"A": [0, 0]}, "mass": 3.0, "centre": [0.5, 0], "inertia": 0.2},
-        },
-        joints={"A": {**revolute("ground", "arm"), "pin": {"radius": 0.02}, "friction": 0.1}},
-        drivers={"A": {"speed": 2.0}},
-    )
-    result = trunnion.analyse(mechanism, 16)
-    q = 2.0 * result["time"].values
-    fx = -3.0 * 0.5 * 4.0 * np.cos(q)
-    fy = 3.0 * 9.81 - 3.0 * 0.5 * 4.0 * np.sin(q)
-    force = result["reaction_force"].values[0]
-    np.testing.assert_allclose(force, [fx, fy], rtol=0, atol=1e-12)
-    friction = 0.1 * 0.02 * np.hypot(fx, fy)
-    np.testing.assert_allclose(result["friction_torque"].values[0], -friction, rtol=0, atol=1e-14)
-    np.testing.assert_allclose(
-        result["drive_effort"].values[0], 3.0 * 9.81 * 0.5 * np.cos(q) + friction, rtol=0, atol=1e-12
-    )
-    assert result.attrs["formula"] == "I(0,1)R"
-
-
 RATE = 10.0  # rad/s, of the crank
 
 
@@ -171,59 +145,26 @@ def results() -> dict[str, Any]:
     return {"friction": trunnion.analyse(mechanism), "ideal": trunnion.analyse(mechanism.with_friction("off"))}
 
 
-def torque(result: Any) -> Any:
-    return result["drive_effort"].sel(driver="A").values
+AT_SIXTY_DEGREES = {  # on the second link of the joint by the first: crank, coupler, rocker, rocker
+    "A": (-3388.683339, -2499.828824), "B": (-3148.683339, -2084.136630),
+    "C": (229.965844, 905.533667), "D": (-639.235315, -1207.667824),
+}  # fmt: skip
 
 
-def at(result: Any, degrees: int, variable: str, **where: str) -> Any:
-    return result[variable].sel(**where).isel(position=degrees).values
-
-
-@pytest.mark.parametrize(
-    ("case", "least", "most"), [("ideal", -18747.140121, 9177.173578), ("friction", -18552.874991, 9288.302313)]
-)
-def test_extremes_of_the_torque(results: dict[str, Any], case: str, least: float, most: float) -> None:
-    found = torque(results[case])
-    assert found.min() == pytest.approx(least, abs=1e-6)
-    assert found.max() == pytest.approx(most, abs=1e-6)
-
-
-def test_friction_power(results: dict[str, Any]) -> None:
+def test_torque_power_and_reactions_of_durangos_four_bar(results: dict[str, Any]) -> None:
+    """The figures of the theory sheet; T with friction − T without = P_friction/ω₁ at every position."""
+    ideal, rubbed = (results[case]["drive_effort"].sel(driver="A").values for case in ("ideal", "friction"))
+    extremes = [ideal.min(), ideal.max(), rubbed.min(), rubbed.max()]
+    assert extremes == pytest.approx([-18747.140121, 9177.173578, -18552.874991, 9288.302313], abs=1e-6)
+    assert [ideal[60], rubbed[60]] == pytest.approx([3364.879649, 3393.503681], abs=1e-6)
     lost = results["friction"]["friction_power"].sum("joint").values
-    assert lost.mean() == pytest.approx(517.465106, abs=1e-6)
-    assert lost.max() == pytest.approx(2375.340, abs=5e-4)
-    assert np.argmax(lost) == 358
-
-
-def test_values_at_sixty_degrees(results: dict[str, Any]) -> None:
-    assert torque(results["ideal"])[60] == pytest.approx(3364.879649, abs=1e-6)
-    assert torque(results["friction"])[60] == pytest.approx(3393.503681, abs=1e-6)
-    lost = results["friction"]["friction_power"].sum("joint").values
-    assert lost[60] == pytest.approx(286.240327, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("joint", "sign", "expected"),
-    [
-        ("A", 1, (-3388.683339, -2499.828824)),
-        ("B", 1, (-3148.683339, -2084.136630)),
-        ("C", 1, (229.965844, 905.533667)),
-        ("D", 1, (-639.235315, -1207.667824)),
-    ],
-)
-def test_reactions_at_sixty_degrees(
-    results: dict[str, Any], joint: str, sign: int, expected: tuple[float, float]
-) -> None:
-    """Each on the second link of the joint by the first: crank, coupler, rocker, rocker."""
-    found = sign * at(results["friction"], 60, "reaction_force", joint=joint)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
-
-
-def test_friction_costs_exactly_its_power(results: dict[str, Any]) -> None:
-    """T with friction − T without = P_friction/ω₁ at every position."""
-    lost = results["friction"]["friction_power"].sum("joint").values
-    difference = torque(results["friction"]) - torque(results["ideal"])
-    np.testing.assert_allclose(difference, lost / RATE, rtol=0, atol=1e-12 * np.abs(torque(results["ideal"])).max())
+    assert [lost.mean(), lost[60]] == pytest.approx([517.465106, 286.240327], abs=1e-6)
+    assert (lost.max(), np.argmax(lost)) == (pytest.approx(2375.340, abs=5e-4), 358)
+    assert float(results["friction"]["efficiency"]) == 0.0  # constant loads over a closed cycle do no useful work
+    np.testing.assert_allclose(rubbed - ideal, lost / RATE, rtol=0, atol=1e-12 * np.abs(ideal).max())
+    for joint, expected in AT_SIXTY_DEGREES.items():
+        found = results["friction"]["reaction_force"].sel(joint=joint).isel(position=60)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
 
 
 def test_zero_slip_is_an_interval(results: dict[str, Any]) -> None:
@@ -277,8 +218,3 @@ def test_three_iterations_suffice(limit: int, share: float) -> None:
         error = np.hypot(few.reactions[joint].x - reaction.x, few.reactions[joint].y - reaction.y)
         assert np.all(error < share * size), joint
     assert np.max(few.settled[0].iterations) == limit
-
-
-def test_loads_do_no_net_work(results: dict[str, Any]) -> None:
-    """Constant force and moment over a closed cycle give back what they take: useful work and efficiency are 0."""
-    assert float(results["friction"]["efficiency"]) == 0.0

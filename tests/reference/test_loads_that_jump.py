@@ -31,9 +31,6 @@ Array = NDArray[np.float64]
 FORCE, BEGIN = 50e3, np.radians(320.3)
 
 
-# ---- a jump at an angle of the crank ------------------------------------------------------------------------------
-
-
 def cut(force: str = "-50 kN * between(drive, 320.3 deg, 350 deg)", start: float = 180.0, **more: Any) -> Mechanism:
     """The press with a force on its ram along x."""
     loads = {"cut": {"link": "ram", "at": "Q", "force": [force, 0]}}
@@ -142,9 +139,9 @@ def test_the_drive_of_a_press_whose_load_jumps() -> None:
     swing = work * (1 - (end - BEGIN) / (2 * np.pi))
     assert found.energy_swing == pytest.approx(swing, rel=1e-7)
     assert found.flywheel(0.05) == pytest.approx(swing / (0.05 * (2 * np.pi) ** 2), rel=1e-7)
+    with pytest.raises(trunnion.MechanismError):
+        found.flywheel(0.0)
 
-
-# ---- a jump at a place of the ram: its extreme --------------------------------------------------------------------
 
 START, R, L = 0.222, 0.03, 0.2
 LIMIT = {"r": 0.02e-3, "l": 0.05e-3, "x0": 0.03e-3}
@@ -272,8 +269,6 @@ def test_two_corners_that_are_as_high_do_not_cancel() -> None:
     assert found["worst_case_upper"].values == pytest.approx(6.13845e-3, rel=1e-4)  # its derivative by e
     assert found["searched_upper"].values == pytest.approx(6.13845e-3, rel=1e-2)
 
-
-# ---- the same: its means ------------------------------------------------------------------------------------------
 
 PUSH, CRANK, TOUCH, TIME = 800.0, 0.05, 0.24, 0.5
 FIGURES: dict[str, dict[str, Any]] = {

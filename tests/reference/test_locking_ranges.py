@@ -15,9 +15,7 @@ from mechanisms_parts import Data, plunger, revolute
 from trunnion import Mechanism, Status
 from trunnion.cycle.locking import LockingState, locking, look, report_figures
 from trunnion.cycle.locking_course import NO_MARGIN, LockingCourse, locking_course, passed
-from trunnion.results.attributes import summary_of
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
-from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.run import prepare
 
@@ -156,24 +154,6 @@ def test_a_useful_spring_drives_backward_as_a_load_does() -> None:
     np.testing.assert_allclose(found["useful_power"].values, -found["spring_power"].values[0], rtol=1e-12)
 
 
-def test_without_useful_work_there_is_no_efficiency_and_it_says_why() -> None:
-    """NaN, not 0: over the cycle, at each position, backward, over a sweep and as a measure."""
-    crank = {"points": {"A": [0, 0], "P": [ARM, 0]}, "mass": 100 / 9.81, "centre": [ARM, 0]}
-    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True) | {"loads": {}, "gravity": [0, -9.81]}
-    mechanism = Mechanism(**{**data, "links": {**data["links"], "crank": crank}})
-    result = trunnion.analyse(mechanism, 12)
-    assert np.isnan(float(result["efficiency"]))
-    assert np.all(np.isnan(result["efficiency_instant"]))
-    assert np.all(result["useful_power"] == 0)
-    (row,) = [one for one in summary_of(result) if one.name == "efficiency"]
-    assert (row.value, row.note) == (None, f"{NOTHING_USEFUL}: {STATE_USEFUL}")
-    speed = f"drivers.{next(iter(mechanism.drivers))}.speed"
-    swept = trunnion.sweep(mechanism, {speed: [1e-6, 2e-6]}, steps=12)
-    assert np.all(np.isnan(swept["efficiency"]))
-    with pytest.raises(trunnion.MechanismError, match=NOTHING_USEFUL):
-        trunnion.sweep(mechanism, {speed: [1e-6, 2e-6]}, steps=12, measures=["efficiency:cycle"])
-
-
 @pytest.mark.parametrize("last", [1.2, 1.9, 2.5])
 def test_without_friction_all_that_a_useful_spring_stored_comes_back(last: float) -> None:
     """Wherever the range ends: nothing but the spring supplies work, and rounding makes no other answer."""
@@ -236,17 +216,10 @@ def test_effort_to_open_a_clamp_past_its_dead_centre(share: float) -> None:
     r, rod, stiffness, pressed, mu, stop = 0.02, 0.08, 5e4, 0.002, 0.1, np.radians(3.0)
     model = {
         **plunger(r, rod, {"O": {"pin": {"radius": 0.004}, "friction": mu}}),
-        "springs": {
-            "work": {
-                "between": ["ground.W", "ram.B"],
-                "stiffness": stiffness,
-                "free_length": 0.2 - (r + rod - pressed),
-                "only": "push",
-                "useful": True,
-            }
-        },
+        "springs": {"work": {"between": ["ground.W", "ram.B"], "stiffness": stiffness, "only": "push", "useful": True,
+                             "free_length": 0.2 - (r + rod - pressed)}},
         "drivers": {"O": {"range": ["-60 deg", "3 deg"], "speed": "60 deg/s"}},
-    }
+    }  # fmt: skip
     tilt = np.arcsin(r * np.sin(stop) / rod)
     force = stiffness * (r * np.cos(stop) + rod * np.cos(tilt) - (r + rod - pressed)) / np.cos(tilt)
     opens = -force * r * np.sin(stop + tilt) - mu * 0.004 * force

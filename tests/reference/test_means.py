@@ -1,4 +1,4 @@
-"""Means over the cycle: the same however many positions are asked for, and those of an integral taken very finely."""
+"""Means over the cycle, however many positions are asked for, by fine integrals; useful work and work beside it."""
 
 from __future__ import annotations
 
@@ -122,20 +122,6 @@ def test_one_way_springs_and_laws_part_the_integral() -> None:
     assert values[0] == pytest.approx(finely(prepare(Mechanism(**data)), 200_000), rel=1e-5)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("points", "interpolation"), [(500, "linear")])
-def test_a_peak_of_one_point_of_a_long_table_counts(points: int, interpolation: str) -> None:
-    """Points close together are a smooth course only where they are: a peak of one of them is not passed over."""
-    values = [f"{50 if k == round(0.29 * points) else 1} N" for k in range(points + 1)]
-    rows = [[f"{360 * k / points:.9g} deg", value] for k, value in enumerate(values)]
-    table = {"over": "drive", "points": rows, "periodic": True, "interpolation": interpolation}
-    mechanism = press("200 * p", tables={"p": table})
-    found = trunnion.analyse(mechanism, 60)
-    value = finely(prepare(mechanism), 200_000)
-    assert float(found["efficiency"]) == pytest.approx(value, rel=1e-4)
-    assert float(found["efficiency_error"]) < 1e-4
-
-
 def test_bends_are_where_the_model_switches() -> None:
     run = prepare(press())
     (found,) = bends(Mechanisms(run.system, run.chosen.assembly, run.values, [run.cycle]))
@@ -144,9 +130,6 @@ def test_bends_are_where_the_model_switches() -> None:
     dead = [np.degrees(np.arcsin(-60 / 200)) % 360, 180 - np.degrees(np.arcsin(60 / 120))]
     for place in (340, 343, 90, 270, *dead):
         assert np.min(np.abs(degrees - place)) < 1e-8
-
-
-# ---- positions that are not valid -----------------------------------------------------------------------------
 
 
 @pytest.mark.spread(1)
@@ -169,9 +152,6 @@ def test_extremes_are_of_positions_that_are_valid(model: str) -> None:
     most = [rows[f"{joint}.reaction_max"] for joint in result["joint"].values]
     np.testing.assert_allclose(swept["reaction_max"].values[:, 0], most, rtol=1e-12)
     assert int(swept["not_valid"][0]) == np.count_nonzero(lost)
-
-
-# ---- the rule -------------------------------------------------------------------------------------------------
 
 
 def test_useful_work_is_that_of_the_loads_marked_so() -> None:
@@ -233,17 +213,6 @@ def test_root_mean_square_of_an_effort() -> None:
     result = trunnion.analyse(crank, 12)
     (row,) = (row for row in summary_of(result) if row.aspect == "RMS")
     assert row.value == pytest.approx(2.0 * 9.81 * 0.3 / np.sqrt(2), rel=1e-9)
-
-
-def test_a_load_that_begins_elsewhere_with_pins_in_seats_takes_more_rounds() -> None:
-    """Against the powers of 14 400 positions, whose one step at the jump is what they may be off by."""
-    loads = {"work": {**PRESS["loads"]["work"], "resisting_force": "1 kN * between(S.slide, 150 mm, 152 mm)"}}
-    joints = {**PRESS["joints"], "P": {**PRESS["joints"]["P"], "pin": {"clearance": "0.2 mm"}, "seat": {"xi": 0}}}
-    mechanism = Mechanism(**{"trunnion": 1, "gravity": [0, 0], **PRESS, "joints": joints, "loads": loads})
-    result = trunnion.analyse(mechanism, 14_400)
-    ratio = float(result["useful_power"].mean() / result["drive_power"].sum("driver").mean())
-    assert result["efficiency_error"] < 1e-3
-    assert float(result["efficiency"]) == pytest.approx(ratio, abs=2e-5)
 
 
 LIFTED, HELPED, HINDERED = 10.0, 4.0, 5.0  # J: constant forces, N, over a rise of 1 m

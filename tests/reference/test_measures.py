@@ -46,9 +46,6 @@ def durango() -> Run:
     return prepare(trunnion.read(DURANGO))
 
 
-# ---- strokes and dead centres ---------------------------------------------------------------------------------
-
-
 def stroke_of(r: Any = R, length: Any = L, offset: Any = E) -> Any:
     """From both positions in which crank and rod are in line."""
     return np.sqrt((length + r) ** 2 - offset**2) - np.sqrt((length - r) ** 2 - offset**2)
@@ -103,15 +100,6 @@ def test_derivatives_of_stroke_and_dead_centres(crank: Run, path: str) -> None:
         assert float(np.ravel(derivative(found[name]))[0]) == pytest.approx(slope, rel=2e-7, abs=1e-8)
 
 
-def test_dead_centres_of_the_four_bar(durango: Run) -> None:
-    """14.361511563° and 212.157208609°, known to all digits."""
-    most = Measure("most", "dead_centre", "D")
-    least = Measure("least", "dead_centre", "D", statistic="place-of-minimum")
-    found = figures(durango, [most, least], 720)
-    assert np.degrees(found["most"]) % 360 == pytest.approx(212.157208609, abs=2e-9)
-    assert np.degrees(found["least"]) % 360 == pytest.approx(14.361511563, abs=2e-9)
-
-
 @pytest.mark.parametrize("pivots", [25, 90, 120 / 1.00025, 300])
 def test_time_ratio_of_a_quick_return(pivots: float) -> None:
     """Ram in line with the lever's pivot. Inside the crank's circle the lever turns right round (Whitworth) and stands
@@ -162,17 +150,16 @@ def test_time_ratio_is_of_a_whole_turn(durango: Run) -> None:
 
 
 def test_dead_centre_outside_its_window(durango: Run) -> None:
-    """Told from the end of a range, where the motion goes on."""
+    """14.361511563° and 212.157208609°, known to all digits; told from the end of a range, where the motion goes on."""
     inside = Measure("inside", "dead_centre", "D", over=(np.radians(180), np.radians(240)))
     outside = Measure("outside", "dead_centre", "D", over=(np.radians(220), np.radians(300)))
     place = Measure("place", "rotation", "D", over=outside.over, statistic="place-of-maximum")
-    found = figures(durango, [inside, outside, place], 360)
-    assert np.degrees(found["inside"]) == pytest.approx(212.157208609, abs=1e-7)
+    least = Measure("least", "dead_centre", "D", statistic="place-of-minimum")
+    found = figures(durango, [inside, outside, place, least], 720)
+    assert np.degrees(found["inside"]) == pytest.approx(212.157208609, abs=2e-9)
+    assert np.degrees(found["least"]) % 360 == pytest.approx(14.361511563, abs=2e-9)
     assert np.isnan(found["outside"])
     assert np.degrees(found["place"]) == pytest.approx(220, abs=1e-9)
-
-
-# ---- angles, places, deviations -------------------------------------------------------------------------------
 
 
 def test_rotation_over_whole_turns(durango: Run) -> None:
@@ -215,9 +202,6 @@ def test_angles_over_the_cut(durango: Run) -> None:
         found = figures(run, measures, 72, {"links.coupler.points.C.x": np.array([[0.9005], [0.8995]])})
         assert max(np.max(number) for number in found.values()) < 2e-3
         assert min(np.min(number) for name, number in found.items() if name != "acrank") > 1e-4
-
-
-# ---- straightness ---------------------------------------------------------------------------------------------
 
 
 def width(x: Any, y: Any) -> float:
@@ -283,14 +267,6 @@ def test_straightness_in_space() -> None:
     assert found == pytest.approx(2 * np.max(np.linalg.norm(rest, axis=0)), rel=1e-4)
 
 
-# ---- forces ---------------------------------------------------------------------------------------------------
-
-
-def loaded() -> Run:
-    """A slider-crank whose load does work."""
-    return prepare(trunnion.read(EXAMPLES / "offset-slider-crank.yaml"))
-
-
 @pytest.mark.slow
 def test_locking_margin() -> None:
     """The least of the analysis to where it is looked for; no derivative, rather than a silent 0."""
@@ -325,24 +301,6 @@ def test_a_locking_margin_beyond_what_is_looked_for_is_infinite() -> None:
     assert (studied["nominal"][0], studied["yield"][0]) == (np.inf, 1)
 
 
-def test_means_over_part_of_a_turn() -> None:
-    """Of smooth courses off by h⁴: a mean, an RMS, the straightness of a path."""
-    run = loaded()
-    over = (0.3, 2.1)
-    measures = [
-        Measure("mean", "slide", "S", over=over, statistic="mean"),
-        Measure("rms", "slide", "S", over=over, statistic="rms"),
-        Measure("straight", "straightness", "rod.Q", over=over),
-        Measure("line", "straightness", "crank.P", over=over),
-    ]
-    exact = figures(run, measures, 5000)
-    off = [{name: abs(value - exact[name]) for name, value in figures(run, measures, steps).items()}
-           for steps in (60, 240)]  # fmt: skip
-    for name in ("mean", "rms", "line"):
-        assert off[0][name] < 1e-5 * abs(exact[name])
-        assert off[1][name] < off[0][name] / 100 or off[1][name] < 1e-12
-
-
 @pytest.mark.parametrize("scale", [1.0, 1e-7])
 def test_turn_of_a_link_in_space(scale: float) -> None:
     """About each global axis the component of the rotation vector from the nominal attitude, however far it is."""
@@ -370,11 +328,6 @@ def test_turn_of_a_link_in_space(scale: float) -> None:
         slope = (ends[axis][0] - ends[axis][1]) / (2 * step)
         assert float(np.ravel(derivative(slopes[axis]))[0]) == pytest.approx(slope, rel=1e-6, abs=1e-7)
 
-
-# ---- speeds and loads of joints -------------------------------------------------------------------------------
-
-
-# ---- every kind with every statistic --------------------------------------------------------------------------
 
 SUBJECTS = {
     "point": ("piston.P", "x"), "path_error": ("piston.P", ""), "straightness": ("rod.P", ""), "angle": ("rod", ""),
@@ -431,9 +384,6 @@ def test_every_kind_with_every_statistic(crank: Run) -> None:
             size = np.max(np.nan_to_num(np.abs(read.shown[1])))  # of a power that touches zero rounding is left
             np.testing.assert_allclose(dual, read.figure[1], rtol=1e-8, atol=1e-12 + 1e-9 * size, err_msg=one.name)
         assert np.all((read.least <= read.most) | np.isnan(read.most))
-
-
-# ---- positions ------------------------------------------------------------------------------------------------
 
 
 def press(**driver: Any) -> Run:

@@ -1,4 +1,4 @@
-"""Motion in time against closed forms and published solutions."""
+"""Motion in time against closed forms, published solutions and MuJoCo: motors, clutches, controllers, linkages."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from test_known_linkages import ANGLES, START
 
 from mechanisms import Array
 from reference.mujoco_engine import Engine, mj
 from timed import LINEAR, mass_on_a_belt, pulled_mass, slider_crank, three_posts, wheel
 from trunnion import analyse, read, simulate
-from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.measured import figures_in_time
-from trunnion.dynamics.solution import Solution
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute
 from trunnion.solve.run import prepare
@@ -178,17 +177,6 @@ def test_a_controller_on_the_brink_breaks_the_wheel_away_at_once() -> None:
     assert events(result, "break-away") == pytest.approx([0.0], abs=1e-9)
 
 
-# Andrews' squeezer, from the test set of Mazzia and Magherini: β, Θ, γ, Φ, δ, Ω, ε at the start and at 0.03 s
-START = np.array([
-    -0.0617138900142764496, 0.0, 0.455279819163070380, 0.222668390165885884, 0.487364979543842550,
-    -0.222668390165885884, 1.23054744454982119,
-])  # fmt: skip
-WANTED = np.array([
-    15.81077119629904, -15.75637105984298, 0.04082224013073101, -0.5347301163226948, 0.5244099658805304,
-    0.5347301163226948, 1.048080741042263,
-])  # fmt: skip
-
-
 # ---- linkages: published solutions ----------------------------------------------------------------------------
 
 
@@ -206,11 +194,11 @@ def test_andrews_squeezer_in_time() -> None:
     """Published angles after 0.03 s from rest under 0.033 N m: the example as it is."""
     result = simulate(read(EXAMPLES / "andrews-squeezer-in-time.yaml"), 0.03, 1, 1e-12)
     links = result["link_angle"].sel(link=["K1", "K2", "K3", "K4", "K5", "K6", "K7"]).values
-    beta, theta, gamma, phi, delta, omega, epsilon = WANTED - START
+    beta, theta, gamma, phi, delta, omega, epsilon = np.subtract(ANGLES, START)
     # some of the benchmark's angles count from another link: so K2 turns by β + Θ, K4 by δ + Φ, K6 by ε + Ω
     wanted = [beta, beta + theta, gamma, delta + phi, delta, epsilon + omega, epsilon]
     turned = (links[:, -1] - links[:, 0]) - np.array(wanted)
-    assert at(result, "drive_coordinate", 0.03) == pytest.approx(WANTED[0], rel=1e-9)
+    assert at(result, "drive_coordinate", 0.03) == pytest.approx(ANGLES[0], rel=1e-9)
     assert np.angle(np.exp(1j * turned)) == pytest.approx(0.0, abs=1e-8)
 
 
@@ -247,9 +235,6 @@ def test_a_pulled_mass_with_bristles() -> None:
     steady, damping = 1 + 0.5 * np.exp(-((speed / 1e-3) ** 2)), np.sqrt(1e5)
     bristles = (force - (damping + 0.4) * speed) / (1e5 - damping * 1e5 * abs(speed) / steady)
     assert bristles == pytest.approx(1.18168e-5, abs=5e-11)
-
-
-# ---- against an integration in maximal coordinates, written here --------------------------------------------------
 
 
 # ---- limits -----------------------------------------------------------------------------------------------------
@@ -342,25 +327,6 @@ def test_the_account_of_the_examples_as_they_begin(example: str) -> None:
     assert unbalanced(simulate(read(EXAMPLES / f"{example}.yaml"), MOVING[example], 200)) < 1e-8
 
 
-@pytest.mark.slow
-def test_a_motion_whose_account_is_off_is_found_again_with_a_finer_tolerance(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Coarsened, all that is integrated with 1e-9 is off by more than 1e-8."""
-    asked: list[float] = []
-    plain = Integration.run
-
-    def coarse(integration: Integration, row: Array) -> Solution:
-        asked.append(integration.tolerance)
-        integration.tolerance *= 1e3
-        return plain(integration, row)
-
-    monkeypatch.setattr(Integration, "run", coarse)
-    result = simulate(slider_crank(), 0.2, 20)
-    assert asked == pytest.approx([1e-9, 1e-10, 1e-11][: len(asked)])
-    assert len(asked) > 1
-    turned_over = float(np.abs(result["work_drive"].values).max())
-    assert float(np.abs(result["energy_residual"].values).max()) < 1e-7 * turned_over
-
-
 STALL, NO_LOAD, ROTOR, PULL = 8.0, 157.0, 1e-3, 40.0  # N m, rad/s, kg m², N
 AXIS = {"at": [0, 0], "axis": [1, 0]}
 SLIDER_CRANK: dict[str, Any] = {  # a slider-crank; the flywheel is in the crank's inertia
@@ -424,7 +390,7 @@ RUN_UP: dict[str, Any] = {"kind": "constant", "effort": 4, "off_from": 0.5, "ine
 
 
 def kinds_of(result: Any) -> list[tuple[str, float]]:
-    rows = attribute(result, "kinds_of")
+    rows = attribute(result, "events")
     return [(row[0], float(time)) for row, time in zip(rows, result["event_time"].values, strict=True)]
 
 

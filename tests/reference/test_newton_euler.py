@@ -1,7 +1,7 @@
 """Whole mechanisms against the Newton–Euler equations of all links at once, which share nothing with Trunnion.
 
 The oracle is given accelerations differentiated here from Trunnion's positions only, so that a consistent error of
-velocity, acceleration and force could not cancel; friction is given from the reactions found.
+velocity, acceleration and force could not cancel; friction is given from the reactions found. MuJoCo has its own.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Spatial mechanisms against the Newton–Euler equations of all links at once, which share nothing with Trunnion.
 
 The oracle has its own motion, in maximal coordinates; from Trunnion it takes only the frames of the links, which tell
-its Newton the assembly. Friction is given from the result in one test, and found by the oracle's own law in another.
-Velocities and accelerations of the result are differences of its own poses too.
+its Newton the assembly, and finds friction by its own law. MuJoCo has a motion and forces of its own.
 """
 
 from __future__ import annotations
@@ -11,19 +10,16 @@ import functools
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import trunnion
 from brief import brief
 from mechanisms_space import MODELS, cardan, rssr
-from reference.maximal_space import Array, Data, Drive, Frame, Motion, rotation, unrolled
+from reference.maximal_space import Array, Data, Drive, Frame, Motion, carried, unrolled
 from reference.mujoco_space import Engine, quaternion
-from reference.newton_euler_space import Body, Joint, Load, Solution, solve
+from reference.newton_euler_space import Solution
 from reference.space_oracle import Oracle
 
 STEPS = 9
-FIRST = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
-SECOND = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560])
 
 LOOPS: dict[str, Data] = {
     "Cardan joint of Pezzuti": cardan(),
@@ -81,11 +77,14 @@ class Compared:
     @functools.cache  # noqa: B019 - a dozen objects, all kept below
     def motion(self, i: int) -> dict[str, Motion]:
         """The oracle's own motion at a position."""
-        drive = {
+        frames = {link: self.frame(link, i) for link in self.oracle.moving}
+        return self.oracle.move(frames, self.drive(i))
+
+    def drive(self, i: int) -> dict[str, Drive]:
+        return {
             name: Drive(*(float(self.array(f"joint_{self.way(name)}{rate}", i, joint=name)) for rate in RATES))
             for name in self.oracle.drivers
         }
-        return self.oracle.move({link: self.frame(link, i) for link in self.oracle.moving}, drive)
 
     def way(self, joint: str) -> str:
         return "slide" if self.oracle.joint[joint]["type"] == "prismatic" else "rotation"
@@ -101,8 +100,8 @@ class Compared:
             found[joint] = np.concatenate([force, self.array("friction_moment", i, joint=joint)])
         return found
 
-    def forces_agree(self, i: int, found: Solution, limit: float) -> None:
-        """Reactions and efforts, by the largest force and the size of the mechanism."""
+    def forces_agree(self, i: int, found: Solution, limit: float) -> float:
+        """Reactions and efforts by the largest force and the largest couple, which is given back."""
         scale = max(float(np.linalg.norm(force)) for force in found.force.values())
         couple = max(float(np.linalg.norm(moment)) for moment in found.moment.values())
         couple = max([couple, *(abs(effort) for effort in found.effort.values())])
@@ -114,6 +113,7 @@ class Compared:
             size = scale if self.way(driver) == "slide" else couple
             given = float(self.array("drive_effort", i, driver=driver))
             assert given == pytest.approx(effort, abs=limit * size), driver
+        return couple
 
 
 @functools.cache
@@ -123,7 +123,6 @@ def comparison(name: str, friction: bool) -> Compared:
 
 
 RATES = ("", "_velocity", "_acceleration")
-POINT = ("position", "velocity", "acceleration")
 
 
 @pytest.mark.spread(1)
@@ -143,6 +142,17 @@ def test_motion(name: str) -> None:
             np.testing.assert_allclose(given, spin, rtol=0, atol=1e-10 * size)
             given = compared.array("link_angular_acceleration", i, link=link)
             np.testing.assert_allclose(given, rate, rtol=0, atol=1e-10 * max(size**2, float(np.linalg.norm(rate))))
+        for label in compared.result.point.values:
+            link, _, point = str(label).partition(".")
+            if link not in motions:
+                continue
+            stated = compared.oracle.links[link]["points"][point]
+            place = np.asarray(stated["at"] if isinstance(stated, dict) else stated, float)
+            moved = carried(motions[link], Frame(place, np.eye(3)))
+            for what, own in (("velocity", moved.velocity), ("acceleration", moved.acceleration)):
+                size = max(1.0, float(np.linalg.norm(own)))
+                given = compared.array(f"point_{what}", i, point=label)
+                np.testing.assert_allclose(given, own, rtol=0, atol=1e-10 * size, err_msg=label)
         for joint in compared.oracle.joints:
             slip = compared.oracle.slip(motions, joint)
             if compared.oracle.joint[joint]["type"] in ("revolute", "cylindrical", "helical", "prismatic"):
@@ -176,153 +186,36 @@ def test_forces_with_friction_by_its_law(name: str) -> None:
             np.testing.assert_allclose(given, friction[joint], rtol=0, atol=1e-8 * scale, err_msg=joint)
 
 
-@pytest.mark.spread(2)
-@pytest.mark.parametrize("name", FAST)
-def test_rates_are_differences_of_poses(name: str) -> None:
-    """Eighth-order central differences of the result's own points, and of the matrices of the links.
-
-    The angle of a free spin is anything, so the matrix of such a link is not compared, but its points on the line are.
-    """
-    compared = Compared(stated(name, False), 241)
-    h = float(compared.result.time[1] - compared.result.time[0])
-    for i in (40, 131, 220):
-        around = slice(i - 4, i + 5)
-        places, velocity, acceleration = (compared.result[f"point_{what}"].values for what in POINT)
-        pace = max(1.0, float(np.max(np.abs(compared.result.link_angular_velocity.values[..., i]))))
-        np.testing.assert_allclose(places[..., around] @ FIRST / h, velocity[..., i], rtol=0, atol=1e-9 * pace)
-        np.testing.assert_allclose(
-            places[..., around] @ SECOND / h**2, acceleration[..., i], rtol=0, atol=3e-8 * pace**2
-        )
-        for link in set(compared.oracle.moving) - set(compared.oracle.free):
-            axes = np.array([compared.frame(link, n).axes for n in range(i - 4, i + 5)])
-            spin, rate = (
-                skew_part(np.tensordot(weights, axes, axes=1) @ axes[4].T)  # of R̈ Rᵀ = [α]× + [ω]×² too
-                for weights in (FIRST / h, SECOND / h**2)
-            )
-            given = compared.array("link_angular_velocity", i, link=link)
-            np.testing.assert_allclose(given, spin, rtol=0, atol=1e-9 * pace, err_msg=link)
-            given = compared.array("link_angular_acceleration", i, link=link)
-            np.testing.assert_allclose(given, rate, rtol=0, atol=3e-8 * pace**2, err_msg=link)
-
-
-def skew_part(matrix: Array) -> Array:
-    """w of the antisymmetric part [w]×."""
-    half = (matrix - matrix.T) / 2
-    return np.array([half[2, 1], half[0, 2], half[1, 0]])
-
-
-def test_skew_rotor() -> None:
-    """A disc fixed askew on a shaft that turns at Ω: the couple ½ (C − A) Ω² sin 2φ across the shaft."""
-    phi, spin, a, c = 0.3, 20.0, 0.02, 0.035
-    tilt = rotation([0, 1, 0], phi)
-    inertia = tilt @ np.diag([a, a, c]) @ tilt.T
-    disc = Body(2.0, inertia, np.zeros(3), np.zeros(3), [0, 0, spin], np.zeros(3))
-    found = solve({"disc": disc}, {"shaft": Joint("revolute", None, "disc", np.zeros(3), driven=True)})
-    expected = [0, 0.5 * (c - a) * spin**2 * np.sin(2 * phi) * -1, 0]
-    np.testing.assert_allclose(np.abs(found.moment["shaft"]), np.abs(expected), rtol=1e-13, atol=1e-13)
-    axis = tilt[:, 2]
-    exact = np.cross([0, 0, spin], a * np.array([0, 0, spin]) + (c - a) * (axis @ [0, 0, spin]) * axis)
-    np.testing.assert_allclose(found.moment["shaft"], exact, rtol=1e-13, atol=1e-13)
-    assert abs(found.effort["shaft"]) < 1e-13
-
-
-def test_top_in_steady_precession() -> None:
-    """A heavy top on its tip, at 90°: m g l = C n Ω (slow precession), so the tip needs no moment."""
-    c, a, n, m, length, g = 0.02, 0.05, 80.0, 1.2, 0.3, 9.81
-    big = m * g * length / (c * n)
-    about, spin, arm = np.array([0, 0, big]), np.array([n, 0, 0]), np.array([length, 0, 0])
-    centre = np.cross(about, np.cross(about, arm))
-    top = Body(m, np.diag([c, a, a]), arm, centre, about + spin, np.cross(about, spin))
-    found = solve({"top": top}, {"tip": Joint("fixed", None, "top", np.zeros(3))}, [0, 0, -g])
-    np.testing.assert_allclose(found.moment["tip"], 0, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(found.force["tip"], [-m * big**2 * length, 0, m * g], rtol=1e-13)
-
-
-def test_screw_press() -> None:
-    """A screw pushed by W along its axis: the torque W p/2π of the driven thread, and no reaction turns it."""
-    push, pitch = 500.0, 0.01
-    screw = Body(0.0, np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), [Load(force=[0, 0, -push])])
-    joint = Joint("helical", None, "screw", np.zeros(3), pitch=pitch, driven=True)
-    found = solve({"screw": screw}, {"thread": joint})
-    assert found.effort["thread"] == pytest.approx(push * pitch / (2 * np.pi), rel=1e-14)
-    np.testing.assert_allclose(found.force["thread"], [0, 0, push], rtol=1e-14)
-
-
-FEW = 8
-SHAFTS: dict[str, Data] = {
-    "Cardan joint of Pezzuti": cardan(),
-    "Cardan joint at 45 degrees under gravity": {**cardan(0.08, 45.0, 0.5, 30.0), "gravity": [3.0, -5.0, 8.0]},
-}
 IN_MUJOCO = [
     "RSSR of the theory",
-    *SHAFTS,
+    "Cardan joint of Pezzuti",
+    "Cardan joint at 45 degrees under gravity",
     *("RSSP", "RCCC", "RRRSR", "RSUR", "PSUR", "CRSR", "RCSC, two drivers", "RRRRRRR"),
 ]
-
-
-def without_friction(name: str) -> Data:
-    """The model without friction; the Cardan joints start off the position where a pin is at rest."""
-    if name in SHAFTS:
-        data = {**SHAFTS[name], "drivers": {"input": {"speed": 100.0, "start": 0.07}}}
-    else:
-        data = dict(rssr().data if name == "RSSR of the theory" else MODELS[name]().data)
-    defaults = {key: part for key, part in data.get("joint_defaults", {}).items() if key != "friction"}
-    return {**data, "joint_defaults": defaults}
 
 
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("name", IN_MUJOCO)
 def test_agrees_with_mujoco(name: str) -> None:
     """Motion and forces to 1e-11 of the largest of their kind."""
-    data = without_friction(name)
-    result = brief(trunnion.Mechanism(trunnion=1, **data), FEW)
+    compared, data = comparison(name, False), stated(name, False)
     engine = Engine(unrolled(data) if "loop" in data else data)
-    for i in range(FEW):
-        here = result.isel(position=i)
-        frames = {}
-        for link in engine.oracle.moving:
-            w, x, y, z = here.link_rotation.sel(link=link).values
-            axes = np.array(
-                [
-                    [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-                ]
-            )
-            frames[link] = Frame(here.link_position.sel(link=link).values, axes)
-        drive = {}
-        for driver in engine.drivers:
-            kind = "slide" if engine.joints[driver]["type"] == "prismatic" else "rotation"
-            values = (
-                float(here[f"joint_{kind}{rate}"].sel(joint=driver)) for rate in ("", "_velocity", "_acceleration")
-            )
-            drive[driver] = Drive(*values)
-        motions = engine.move(frames, drive)
+    for i in compared.positions:
+        frames = {link: compared.frame(link, i) for link in engine.oracle.moving}
+        motions = engine.move(frames, compared.drive(i))
         pace = max(1.0, *(float(np.max(np.abs(motion.spin))) for motion in motions.values()))
         for link, motion in motions.items():
             centre, _ = engine.oracle.centre(link, motion)
             c = np.asarray(engine.links[link]["centre"], float)
-            w, second = (here[f"link_angular_{what}"].sel(link=link).values for what in ("velocity", "acceleration"))
+            w, second = (compared.array(f"link_angular_{what}", i, link=link) for what in ("velocity", "acceleration"))
             np.testing.assert_allclose(frames[link].place + frames[link].axes @ c, centre, rtol=0, atol=1e-11)
             np.testing.assert_allclose(w, motion.spin, rtol=0, atol=1e-11 * pace)
             np.testing.assert_allclose(second, motion.spin_rate, rtol=0, atol=1e-10 * pace**2)
             if link not in engine.oracle.free:
                 turn = quaternion(frames[link].axes @ motion.frame.axes.T)
                 assert abs(abs(turn[0]) - 1) < 1e-12
-        compare_forces(here, engine)
-
-
-def compare_forces(here: xr.Dataset, engine: Engine) -> None:
-    """Reactions, efforts and moments of free spins of one position."""
-    forces = engine.forces()
-    scale = max(float(np.linalg.norm(force)) for force, _ in forces.reactions.values())
-    couple = max(float(np.linalg.norm(moment)) for _, moment in forces.reactions.values())
-    couple = max([couple, *map(abs, forces.efforts.values())])
-    for joint, (force, moment) in forces.reactions.items():
-        given = here.sel(joint=joint)
-        np.testing.assert_allclose(given.reaction_force.values, force, rtol=0, atol=1e-11 * scale, err_msg=joint)
-        np.testing.assert_allclose(given.reaction_moment.values, moment, rtol=0, atol=1e-11 * couple, err_msg=joint)
-    for driver, effort in forces.efforts.items():
-        size = scale if engine.joints[driver]["type"] == "prismatic" else couple
-        assert float(here.drive_effort.sel(driver=driver)) == pytest.approx(effort, abs=1e-11 * size), driver
-    assert all(abs(moment) < 1e-11 * couple for moment in forces.spins.values())
+        forces = engine.forces()
+        reactions = {joint: force for joint, (force, _) in forces.reactions.items()}
+        moments = {joint: moment for joint, (_, moment) in forces.reactions.items()}
+        couple = compared.forces_agree(i, Solution(reactions, moments, forces.efforts, forces.spins, 0.0), 1e-11)
+        assert all(abs(moment) < 1e-11 * couple for moment in forces.spins.values())

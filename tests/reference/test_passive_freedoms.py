@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from brief import brief
-from trunnion import Mechanism, MechanismError, analyse, simulate
+from trunnion import Mechanism, MechanismError, analyse
 
 Array = NDArray[np.float64]
 UPPER, LOWER = [0.1, 0.3, 0.8], [0.5, 0.05, 0.1]
@@ -43,9 +43,6 @@ def arm(slide: str | None, driver: str = "H", **parts: Any) -> Mechanism:
 
 def codes(result: Any) -> list[str]:
     return [one.code for one in result.trunnion.findings]
-
-
-# ---- any leg between two balls -----------------------------------------------------------------------------------
 
 
 def leg(kind: str, seed: int, driver: dict[str, Any] | None = None) -> Mechanism:
@@ -113,25 +110,12 @@ def test_a_leg_of_any_shape_does_not_spin(kind: str) -> None:
     np.testing.assert_allclose((place[:, 2:] - place[:, :-2]) / (2 * step), speed[:, 1:-1], atol=1e-5)
 
 
-@pytest.mark.slow
-def test_a_leg_changes_no_motion_in_time() -> None:
-    moved = []
-    for mechanism in (arm(None), leg("revolute", 2)):
-        data = mechanism.data()
-        data["links"]["arm"] |= {"mass": 20.0, "centre": [0.3, 0, 0], "inertia": {"xx": 1.0, "yy": 1.5, "zz": 1.5}}
-        data["drivers"] = {"H": {"speed": 1.0, "range": [-0.9, 0.9], "free": True, "initial": {"coordinate": 0.0}}}
-        moved.append(simulate(Mechanism(**data), 0.12, 10, 1e-10))
-    np.testing.assert_allclose(moved[1]["drive_coordinate"], moved[0]["drive_coordinate"], rtol=1e-8, atol=1e-10)
-
-
 def test_a_mass_beside_the_line_of_a_leg_is_refused() -> None:
     data = leg("revolute", 0).data()
     data["links"]["rod"] |= {"mass": 1.0, "centre": [0.3, 0, 0]}
     with pytest.raises(MechanismError, match=r"the links tube, rod together may spin about U-L.*U a universal joint"):
         analyse(Mechanism(**data), 5)
 
-
-# ---- double wishbone -------------------------------------------------------------------------------------------
 
 PLACES: dict[str, Any] = {  # m, as drawn
     "A": [0.0, 0.35, 0.20], "B": [0.0, 0.42, 0.45], "E": [0.0, 0.78, 0.18], "F": [-0.02, 0.72, 0.47],
@@ -196,9 +180,6 @@ def test_a_double_wishbone_with_a_strut() -> None:
         np.testing.assert_allclose(forces.sel(joint="F"), found[3:6], rtol=1e-8, atol=1e-6)
         np.testing.assert_allclose(forces.sel(joint="N"), found[6] * tie, rtol=1e-8, atol=1e-6)
         np.testing.assert_allclose(result["drive_effort"].values[0, k], found[7], rtol=1e-8)
-
-
-# ---- a pad under a ball ------------------------------------------------------------------------------------------
 
 
 def test_a_pad_on_a_plane_under_a_ball() -> None:

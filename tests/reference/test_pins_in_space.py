@@ -4,22 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import trunnion
 from brief import brief
 from playing import rattling
 from playing_space import CENTRE, FLOAT, MASS, WIDTH, cardan, dropped, on_a_plate, own_shaft, rattling_in_space, tilting
-from trunnion.algebra.nested import flat
-from trunnion.dynamics.opened import in_play, opened
-from trunnion.dynamics.rates import Layout, Walks
-from trunnion.dynamics.start import initial_row
-from trunnion.dynamics.state import FreeMotion
-from trunnion.dynamics.stated_contacts import contacts_of
-from trunnion.model.mechanism import Mechanism
-from trunnion.solve.run import prepare
-
-Array = NDArray[np.float64]
 
 
 def test_a_long_pin_is_a_pin_in_the_plane() -> None:
@@ -83,32 +72,6 @@ def test_less_clearance_gives_force_and_moment_without_play() -> None:
     assert misses[1][1] < 0.05 * 0.5
 
 
-# ---- how it is opened -----------------------------------------------------------------------------------------------
-
-
-def _opened(mechanism: Mechanism) -> tuple[FreeMotion, Array]:
-    run = prepare(mechanism)
-    motion = FreeMotion.of(prepare(opened(run).mechanism), contacts_of(run, in_play(mechanism)))
-    return motion, initial_row(motion)
-
-
-@pytest.mark.parametrize(
-    "mechanism", [tilting(), cardan(), on_a_plate(), dropped()], ids=["ball", "cross", "plate", "free"]
-)
-def test_it_begins_with_pins_in_the_middle_and_velocities_without_play(mechanism: Mechanism) -> None:
-    """Whatever joints the chains stand in for."""
-    motion, row = _opened(mechanism)
-    each = motion.contacts.each
-    at = Layout.of(motion).moment(np.zeros(1), row[:, None])._replace(onsets=(None,) * len(each))
-    seen = Walks(motion).look(at)
-    assert np.allclose(seen.gap[:, 0], [one.clearance for one in each], rtol=1e-9)
-    assert np.allclose(seen.rate[:, 0], 0.0, atol=1e-10)
-    walk, whole = motion.walk(at, np.zeros_like(at.q)), prepare(mechanism).walk(np.zeros(1))
-    for link in mechanism.links:
-        for part, wanted in zip(flat(walk.motions[link][:2]), flat(whole.motions[link][:2]), strict=True):
-            assert np.allclose(part, wanted, atol=1e-9)
-
-
 @pytest.mark.slow
 def test_a_cross_beside_a_bearing_with_play() -> None:
     """tan θ₂ = tan θ₁/cos β of a Cardan joint (β = 30°, θ from where the driving fork lies across both shafts), but for
@@ -138,6 +101,3 @@ def test_a_coupler_that_slides_on_a_plate() -> None:
     centre = result["point_acceleration"].sel(point="coupler.B").values[:2] - w[2] ** 2 * arm
     centre = centre + change[2] * np.array([-arm[1], arm[0]])
     assert np.allclose(force[:2], 0.3 * centre, atol=1e-7 * float(np.max(np.abs(force))))
-
-
-# ---- bad input ------------------------------------------------------------------------------------------------------

@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import trunnion
 from brief import brief
-from mechanisms import four_bar, model, slider_crank, transformed
+from mechanisms import four_bar, model, slider_crank
 from mechanisms_parts import body, revolute
 from mechanisms_space import cardan, closed, rssr
 from reference.maximal_space import Array, Data, Drive, Frame
@@ -61,9 +59,6 @@ def offsets_of(run: Run, result: xr.Dataset) -> dict[str, Array]:
     return found
 
 
-# ---- planar ---------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("friction", [0.0, 0.12, 0.3])
 @pytest.mark.parametrize("name", LINKAGES)
@@ -103,9 +98,6 @@ def test_seats_reactions_and_places(name: str, friction: float) -> None:
         assert effort == pytest.approx(settled.solution.effort["A"], abs=1e-8 * size)
 
 
-# ---- loss of contact ------------------------------------------------------------------------------------------
-
-
 def losses(result: xr.Dataset, joint: str) -> Array:
     """Positions at which a joint is said to lose contact."""
     return np.flatnonzero(result.contact_lost.sel(joint=joint).values)
@@ -142,9 +134,6 @@ def test_crank_whose_bearing_is_relieved_at_one_angle(steps: int) -> None:
     finding = next(f for f in json.loads(result.attrs["findings"]) if f["code"] == "contact.lost")
     assert finding["severity"] == "warning"
     assert "at 90" in finding["figures"]["at"] or f"at {angle[where[0]]:.4g}" in finding["figures"]["at"]
-
-
-# ---- power ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.12])
@@ -211,87 +200,58 @@ def test_where_a_pin_crosses_or_lifts_off_does_not_depend_on_the_positions() -> 
     assert first == second
 
 
-# ---- symmetry -------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@settings(max_examples=3)
-@given(st.sampled_from(list(LINKAGES)), st.floats(-3, 3), st.booleans(), st.sampled_from([0.0, 0.2]))
-def test_in_another_frame_and_in_a_mirror(name: str, turn: float, mirror: bool, friction: float) -> None:
-    """Seats are stated in the links: turned and shifted they are the same, in a mirror their y and ξ change sign."""
-    data = loaded(name, friction)
-    other = transformed(data, turn, (0.7, -0.2), mirror)
-    one, two = analysed(data, 18), analysed(other, 18)
-    sign = np.array([1.0, -1.0 if mirror else 1.0])[:, None]
-    np.testing.assert_allclose(two.seat_offset.values, one.seat_offset.values * sign, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(two.end_force.values, one.end_force.values * sign, rtol=0, atol=1e-4)
-    np.testing.assert_allclose(two.link_error.values, one.link_error.values * sign[1], rtol=0, atol=1e-8)
-    np.testing.assert_allclose(two.drive_effort_change.values, sign[1] * one.drive_effort_change.values, atol=1e-5)
-
-
-# ---- space ----------------------------------------------------------------------------------------------------
-
-
 def numbers(frame: Any) -> Frame:
     axes = np.array([[float(np.ravel(axis[i])[0]) for axis in frame[:3]] for i in range(3)])
     return Frame(np.array([float(np.ravel(n)[0]) for n in frame.place]), axes)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("friction", [0.1, 0.4])
-def test_rssr_with_play_in_all_joints(friction: float) -> None:
-    """Tilted pins and balls under inertia, weight and a brake: seats to 1e-6 of the clearance, forces to 1e-8."""
-    data = copy.deepcopy(rssr(start=START, friction=friction).data)
-    data["assembly"] = {"D": 1.3}
-    data["joint_defaults"]["pin"]["clearance"] = 2e-5
-    data["joint_defaults"]["seat"] = "loaded"
-    run, steps = prepare(trunnion.Mechanism(trunnion=1, **data)), 60
-    result = analysed(data, steps)
-    offsets = offsets_of(run, result)
-    for i in range(5, steps, 9):
+def settled_alike(data: Data, steps: int, places: Any, limit: float, moving: float = np.inf) -> int:
+    """Seats to a share of the clearance, reactions to 1e-7, at some positions; moving: of what travel adds. Rounds."""
+    run, result = prepare(trunnion.Mechanism(trunnion=1, **data)), analysed(data, steps)
+    (driver,), rho = data["drivers"], data["joint_defaults"]["pin"]["clearance"]
+    assert int(result.seat_rounds.max()) <= 10
+    offsets, rounds = offsets_of(run, result), list[int]()
+    for i in places:
         if result.status.values[i] != Status.SOLVED:
             continue
-        now = result.time.values[i : i + 1]
-        back = run.at(now, {path: part[i : i + 1] for path, part in offsets.items()})
+        back = run.at(result.time.values[i : i + 1], {path: part[i : i + 1] for path, part in offsets.items()})
         home = {link: numbers(motion.frame) for link, motion in back.walk.motions.items() if link != "ground"}
-        settled = settle(data, home, {"A": Drive(float(result.joint_rotation.sel(joint="A").values[i]), 30.0)})
-        assert settled.rounds <= 8
+        turned = float(result.joint_rotation.sel(joint=driver).values[i])
+        settled = settle(data, home, {driver: Drive(turned, data["drivers"][driver]["speed"])})
+        rounds.append(settled.rounds)
         size = max(np.linalg.norm(force) for force in settled.solution.force.values())
         for joint, ends in settled.offsets.items():
             found = np.nan_to_num(result.seat_offset.sel(joint=joint).values[: len(ends), :, i])
-            np.testing.assert_allclose(found, ends, rtol=0, atol=2e-6 * 2e-5)
+            np.testing.assert_allclose(found, ends, rtol=0, atol=limit * rho)
             force = [float(np.ravel(n)[0]) for n in back.reactions[joint].u]
             np.testing.assert_allclose(force, settled.solution.force[joint], rtol=0, atol=1e-7 * size)
             written = result.reaction_force.sel(joint=joint).values[:, i]
-            # with the slip and the inertia of seats that travel
-            np.testing.assert_allclose(written, force, rtol=0, atol=5e-3 * size)
+            assert np.max(np.abs(written - force)) <= moving * size  # with the slip and the inertia of the seats
+    assert len(rounds) >= 5
+    return max(rounds)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", [0.1, 0.4])
+def test_rssr_with_play_in_all_joints(friction: float) -> None:
+    """Tilted pins and balls under inertia, weight and a brake."""
+    data = copy.deepcopy(rssr(start=START, friction=friction).data)
+    data["assembly"] = {"D": 1.3}
+    data["joint_defaults"] |= {"pin": {**data["joint_defaults"]["pin"], "clearance": 2e-5}, "seat": "loaded"}
+    assert settled_alike(data, 60, range(5, 60, 9), 2e-6, 5e-3) <= 8
 
 
 @pytest.mark.slow
 def test_cardan_with_play_in_all_joints() -> None:
-    """Table II of Pezzuti et al. with 0.01 mm all over, friction 0.42, pins that slide along: to 1e-6 and 1e-7."""
-    start, rho, steps = 0.3, 1e-5, 72
+    """Table II of Pezzuti et al. with 0.01 mm all over, friction 0.42, pins that slide along."""
+    start = 0.3
     drawn = closed(cardan(), start)
     data = copy.deepcopy(drawn.data)
     data["drivers"]["input"]["start"] = start
-    data["joint_defaults"] |= {"pin": {**data["joint_defaults"]["pin"], "clearance": rho}, "seat": "loaded"}
+    data["joint_defaults"] |= {"pin": {**data["joint_defaults"]["pin"], "clearance": 1e-5}, "seat": "loaded"}
     data["assembly"] = {
         f"{link}.{name}": [float(n) for n in frame.place + frame.axes @ np.array(at["at"])]
         for link, frame in drawn.home.items()
         for name, at in data["links"][link]["points"].items()
     }
-    run, result = prepare(trunnion.Mechanism(trunnion=1, **data)), analysed(data, steps)
-    assert int(result.seat_rounds.max()) <= 10
-    offsets = offsets_of(run, result)
-    for i in (0, 15, 31, 50, 65):
-        assert result.status.values[i] == Status.SOLVED
-        back = run.at(result.time.values[i : i + 1], {path: part[i : i + 1] for path, part in offsets.items()})
-        home = {link: numbers(motion.frame) for link, motion in back.walk.motions.items() if link != "ground"}
-        turned = float(result.joint_rotation.sel(joint="input").values[i])
-        settled = settle(data, home, {"input": Drive(turned, 100.0)})
-        size = max(np.linalg.norm(force) for force in settled.solution.force.values())
-        for joint, ends in settled.offsets.items():
-            found = np.nan_to_num(result.seat_offset.sel(joint=joint).values[:, :, i])
-            np.testing.assert_allclose(found, ends, rtol=0, atol=1e-6 * rho)
-            force = [float(np.ravel(n)[0]) for n in back.reactions[joint].u]
-            np.testing.assert_allclose(force, settled.solution.force[joint], rtol=0, atol=1e-7 * size)
+    settled_alike(data, 72, (0, 15, 31, 50, 65), 1e-6)

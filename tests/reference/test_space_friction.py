@@ -1,8 +1,7 @@
-"""Friction and efficiency in space against closed forms: massless Cardan joint, screws, locking, no friction at all."""
+"""Friction in space against closed forms and the plane: Cardan joint, screw, hinges of a door, coupled wheels."""
 
 from __future__ import annotations
 
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +12,8 @@ import xarray as xr
 import trunnion
 from brief import brief
 from mechanisms import MODELS, build, model
-from mechanisms_space import cardan, floating, rssr
-from reference.maximal_space import Data, unrolled
-from reference.space_oracle import Oracle
-from reference.test_newton_euler_space import Compared
+from mechanisms_space import cardan, rssr
+from reference.maximal_space import Data
 from reference.test_space_values import loop
 from trunnion.solve.run import prepare
 from trunnion.solve.space.determinacy import LOOKED
@@ -80,41 +77,6 @@ def test_nothing_is_lost_without_friction(data: Data) -> None:
     assert float(result.efficiency) == pytest.approx(1.0, abs=1e-12)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("model", ["two-contact", "pezzuti"])
-def test_pin_at_rest(model: str) -> None:
-    """At θ₁ = 0 a pin of the Cardan joint does not turn: its friction is an interval, and so is the torque.
-
-    The ends are the oracle's answers with the pin taken to slip one way and the other, by [P] to turn and to slide so.
-    """
-    data = cardan(error=0.0, offset=0.0, model=model) if model == "two-contact" else cardan(model=model)
-    result = analysed(data, 8)
-    assert int(result.status.values[0]) == int(trunnion.Status.ZERO_SLIP)
-    compared = Compared.__new__(Compared)
-    compared.result, compared.oracle = result, Oracle(unrolled(data))
-    motions, oracle = compared.motion(0), compared.oracle
-    rates = {joint: oracle.slip(motions, joint) for joint in oracle.joints}
-    if model == "two-contact":  # nothing slides in a joint without errors: what is left is rounding
-        rates = {joint: rate._replace(slide=0.0) for joint, rate in rates.items()}
-    still = min(rates, key=lambda joint: abs(rates[joint].turn))
-    assert abs(rates[still].turn) < 1e-9
-    ends = []
-    for turn, slide in product(*[(1.0, 0.0, -1.0)] * 2) if model == "pezzuti" else [(1.0, 0.0), (-1.0, 0.0)]:
-        rates[still] = rates[still]._replace(turn=turn, slide=slide)
-        oracle.slip = lambda _, joint: rates[joint]  # type: ignore[method-assign]
-        ends.append(oracle.rub(motions)[0].effort["input"])
-    lower, upper = (float(result[f"drive_effort_{end}"].values[0, 0]) for end in ("lower", "upper"))
-    assert upper - lower > 0.1
-    if model == "two-contact":
-        np.testing.assert_allclose([lower, upper], [min(ends), max(ends)], rtol=1e-8)
-    else:  # the least effort lies inside the interval of the friction, where `test_rest` scans it
-        assert upper == pytest.approx(max(ends), rel=1e-8)
-        assert min(ends) - 0.03 * (upper - lower) < lower < min(ends)
-    assert lower <= float(result.drive_effort.values[0, 0]) <= upper
-
-
-# ---- screws -----------------------------------------------------------------------------------------------------
-
 PITCH, MEAN, LOAD = 0.010, 0.012, 5000.0
 LEAD = np.arctan(PITCH / (2 * np.pi * MEAN))
 
@@ -129,18 +91,11 @@ def test_screw_jack(friction: float, way: float) -> None:
             "ground": {"points": {"A": {"at": [0, 0, 0], "axis": [0, 0, 1]}}},
             "screw": {"points": {"A": {"at": [0, 0, 0], "axis": [0, 0, 1]}, "top": [0, 0, 0.2]}},
         },
-        "joints": {
-            "A": {
-                "type": "helical",
-                "links": ["ground", "screw"],
-                "pitch": PITCH,
-                "pin": {"radius": MEAN, "bearing": 0.1},
-                "friction": friction,
-            }
-        },
+        "joints": {"A": {"type": "helical", "links": ["ground", "screw"], "pitch": PITCH, "friction": friction,
+                         "pin": {"radius": MEAN, "bearing": 0.1}}},
         "drivers": {"A": {"speed": way, "range": [0.0, 9.0][:: int(way)]}},
         "loads": {"weight": {"link": "screw", "at": "top", "force": [0, 0, -LOAD], "useful": True}},
-    }
+    }  # fmt: skip
     result = analysed(data, 5)
     phi = np.arctan(friction)
     np.testing.assert_allclose(result.drive_effort.values, LOAD * MEAN * np.tan(LEAD + way * phi), rtol=1e-12)
@@ -157,40 +112,6 @@ def test_screw_jack(friction: float, way: float) -> None:
     held = np.tan(LEAD) / friction if phi > LEAD else np.nan  # by the load it raises or is lowered by
     found = trunnion.locking(trunnion.Mechanism(trunnion=1, **data), 5)
     np.testing.assert_allclose(found["holding_multiple"].values, held, rtol=1e-9)
-
-
-@pytest.mark.parametrize("friction", [0.05, 0.2])
-def test_nut_pushed_along_its_screw(friction: float) -> None:
-    """Force T/(r tan(λ − φ)); self-locking from φ = λ on, and the margin is tan λ/f."""
-    y, z = {"at": [0, 0, 0], "axis": [0, 1, 0]}, {"at": [0, 0, 0], "axis": [0, 0, 1]}
-    torque, (links, joints) = 3.0, floating("nut")
-    pin = {"pin": {"radius": MEAN, "bearing": 0.1}, "friction": friction}
-    data = {
-        "space": "spatial",
-        "links": {
-            "ground": {"points": {"P": z, "R": z}},
-            "nut": {"points": {"U": y, "H": z}},
-            "screw": {"points": {"H": z, "R": z}},
-            **links,
-        },
-        "joints": {
-            **joints,
-            "H": {"type": "helical", "links": ["nut", "screw"], "pitch": PITCH, **pin},
-            "R": {"type": "revolute", "links": ["ground", "screw"]},
-        },
-        "drivers": {"P": {"speed": 0.01, "range": [0.0, 0.02]}},
-        "loads": {"brake": {"joint": "R", "resisting_torque": torque, "useful": True}},
-    }
-    result = analysed(data, 5)
-    phi = np.arctan(friction)
-    np.testing.assert_allclose(result.locking_margin.values, np.tan(LEAD) / friction, rtol=1e-6)
-    if phi > LEAD:
-        assert set(result.status.values) == {LOCKED}
-        return
-    np.testing.assert_allclose(result.drive_effort.values, torque / (MEAN * np.tan(LEAD - phi)), rtol=1e-10)
-    assert float(result.efficiency) == pytest.approx(np.tan(LEAD - phi) / np.tan(LEAD), rel=1e-10)
-    turn = np.ptp(result.joint_rotation.sel(joint="R").values)
-    assert float(turn) == pytest.approx(2 * np.pi * 0.02 / PITCH, rel=1e-12)
 
 
 @pytest.mark.parametrize("turned", [(), ("B",)])
@@ -220,8 +141,6 @@ def test_friction_that_drags_a_rod_round(turned: tuple[str, ...]) -> None:
         dragged += friction * radius * force * np.sum(turn * line, axis=0) / np.linalg.norm(turn, axis=0)
     assert run.determinacy.dragged["rod"] == pytest.approx(np.max(np.abs(dragged)), rel=1e-6)
 
-
-# ---- forces that statics leaves open ---------------------------------------------------------------------------------
 
 DOOR, ARM_OF_WEIGHT = 20.0, 0.4
 STILL = {"drivers": {"lower": {"speed": 1e-6, "range": [0.0, 1.5]}}}
@@ -365,9 +284,9 @@ def test_planar_mechanism_in_space(name: str, friction: float | None) -> None:
         assert np.nanmax(np.abs(flat.friction_power.values)) > 1e-3
 
 
-def coupled_wheels(third: tuple[float, float], stiffness: dict[str, float] | None = None) -> Data:
+def coupled_wheels(stiffness: dict[str, float]) -> Data:
     """Three equal cranks on one coupling rod: mobility 0 by the count, 1 by rank."""
-    feet = {"A": (0.0, 0.0), "B": (1.2, 0.0), "C": third}
+    feet = {"A": (0.0, 0.0), "B": (1.2, 0.0), "C": (1.7, 0.9)}
     pins = dict(zip(feet, "DEF", strict=True))
     links: Data = {"ground": {"points": {name: list(place) for name, place in feet.items()}}}
     joints: Data = {}
@@ -377,14 +296,13 @@ def coupled_wheels(third: tuple[float, float], stiffness: dict[str, float] | Non
         joints[pin] = {"type": "revolute", "links": [f"wheel-{name}", "rod"]}
     rod = {pin: list(feet[name]) for name, pin in pins.items()}
     links["rod"] = {"points": rod, "mass": 30.0, "inertia": 8.0, "centre": [1.0, 0.1]}
-    for name, radial in (stiffness or {}).items():
+    for name, radial in stiffness.items():
         joints[name]["stiffness"] = {"radial": radial}
     return {
         "over_constraint": "minimum-norm",
         "gravity": [0, -9.81],
         "links": links,
         "joints": joints,
-        "joint_defaults": {"pin": {"radius": 0.02}, "friction": 0.05},
         "drivers": {"A": {"speed": 10.0, "range": [0.4, 2.6]}},
         "loads": {"pull": {"joint": "C", "resisting_torque": 100.0, "useful": True}},
     }
@@ -393,26 +311,15 @@ def coupled_wheels(third: tuple[float, float], stiffness: dict[str, float] | Non
 def test_three_wheels_share_their_load_by_stiffness() -> None:
     """Without friction: forces of the one self-stress shift the energy nowhere, Σ F · S / k = 0."""
     stiffness = dict(zip("ABCDEF", (2e7, 5e6, 8e6, 3e7, 1e6, 4e6), strict=True))
-    data = {**coupled_wheels((1.7, 0.9), stiffness), "joint_defaults": {}}
-    result = trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), STEPS)
+    result = trunnion.analyse(trunnion.Mechanism(trunnion=1, **coupled_wheels(stiffness)), STEPS)
     place = {name: result.point_position.sel(point=name).values for name in result.point.values}
     for step in range(STEPS):
         pins = np.array([place[f"rod.{name}"][:, step] for name in "DEF"])
         crank = place["wheel-A.D"][:, step] - place["wheel-A.A"][:, step]
         unit = crank / np.linalg.norm(crank)  # a massless crank passes on what is along it; the driven one anything
         # forces of the cranks on the rod that balance: a along unit at E and F, any at D
-        matrix = np.array(
-            [
-                [1.0, 0.0, unit[0], unit[0]],
-                [0.0, 1.0, unit[1], unit[1]],
-                [
-                    -pins[0][1],
-                    pins[0][0],
-                    pins[1][0] * unit[1] - pins[1][1] * unit[0],
-                    pins[2][0] * unit[1] - pins[2][1] * unit[0],
-                ],
-            ]
-        )
+        moments = [-pins[0][1], pins[0][0], *(x * unit[1] - y * unit[0] for x, y in pins[1:])]
+        matrix = np.array([[1.0, 0.0, unit[0], unit[0]], [0.0, 1.0, unit[1], unit[1]], moments])
         null = np.linalg.svd(matrix)[2][-1]
         own = np.array([null[:2], null[2] * unit, null[3] * unit])
         forces = np.array([result.reaction_force.sel(joint=name).values[:, step] for name in "ABCDEF"])

@@ -1,4 +1,4 @@
-"""Motion of spatial mechanisms, as `trunnion.analyse` has it, against closed forms and published numbers."""
+"""Motion in space against closed forms and published numbers, and the chain of three cylindrical joints by itself."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given
-from hypothesis import strategies as st
 
 import trunnion
 from brief import brief
@@ -17,7 +15,6 @@ from spatial_numbers import apart
 from trunnion.algebra.dual import Dual, functions, parts, primal, spatial
 from trunnion.algebra.line import line
 from trunnion.algebra.pose import compose, inverse, link
-from trunnion.algebra.vector import cross, dot
 from trunnion.groups import GROUPS, ccc
 
 SPEED = 2.0
@@ -63,9 +60,6 @@ def missed(result: xr.Dataset, rows: list[Data]) -> float:
             found = found @ Frame(np.array([row["distance"], 0, 0]), rotation([1, 0, 0], row["twist"]))
         worst = max(worst, float(np.max(np.abs(found.place))), float(np.max(np.abs(found.axes - np.eye(3)))))
     return worst
-
-
-# ---- RCCC and RSSR ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("general", [False, True])
@@ -140,9 +134,6 @@ def test_rssr(branch: int, degrees: float) -> None:
     assert np.max(np.abs(result.closure_residual.values)) < 1e-12
 
 
-# ---- Cardan joints ----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("general", [False, True])
 @pytest.mark.parametrize("delta", [15.0, 70.0])
 def test_ideal_cardan(delta: float, general: bool) -> None:
@@ -163,46 +154,12 @@ def test_ideal_cardan(delta: float, general: bool) -> None:
         np.testing.assert_allclose(value(result, "joint_slide", joint), 0, rtol=0, atol=1e-14)
 
 
-@pytest.mark.parametrize("general", [False, True])
-def test_imperfect_cardan_closes(general: bool) -> None:
-    """Errors of 0.5° and 0.5 mm: 1e-12 at every degree, by the product of its own joint motions."""
-    twist, offset = 0.5, 0.5e-3
-    twists, offsets = (90 - twist, 90 + twist, 90 - twist, 135 - twist), (offset, -offset, 2 * offset, offset)
-    data = loop("RCCC", twists, offsets)
-    result = analysed(unrolled(data) if general else data, 36 if general else 360)
-    assert np.isfinite(result.joint_rotation.values).all()
-    assert np.max(np.abs(result.closure_residual.values)) < 1e-12
-    assert missed(result, data["loop"]) < 1e-12
-    slides = value(result, "joint_slide", "C")
-    assert np.ptp(slides) > 0.1 * offset, "errors make the pins slide"
-
-
-# ---- over-constrained -------------------------------------------------------------------------------------------
-
-
 def test_no_bennett() -> None:
     """Without sin α : a = sin β : b four pins in space do not move: there is no number, and it is said why."""
     data = loop("RRRR", (40, 100, 40, 100), (0.2, 0.2, 0.2, 0.2), start=0.1, over_constraint="minimum-norm")
     result = trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), 12)
     assert set(result.status.values[1:]) == {int(trunnion.Status.NOT_ASSEMBLED)}
     assert np.isnan(result.joint_rotation.sel(joint="B").values[1:]).all()
-
-
-@pytest.mark.slow
-def test_rod_of_a_wrong_length() -> None:
-    """The RSSR has numbers where its quadratic equation has a root, the right ones, and nowhere else."""
-    rod = 0.060
-    with np.errstate(invalid="ignore"):
-        expected, _ = rocker_angle(np.linspace(0.0, 6.0, 61), 1, b=rod)
-    missing = np.isnan(expected)
-    data = rssr(float(expected[0] if not missing[0] else expected[~missing][0]), range=[0.0, 6.0])
-    data["dimensions"] = {**RSSR, "b": rod}
-    result = analysed(data, 61)
-    found = value(result, "joint_rotation", "D")
-    assert 5 < missing.sum() < 55
-    np.testing.assert_array_equal(np.isnan(found), missing)
-    np.testing.assert_allclose(np.exp(1j * found[~missing]), np.exp(1j * expected[~missing]), rtol=0, atol=1e-9)
-    assert set(result.status.values[missing]) == {int(trunnion.Status.NOT_ASSEMBLED)}
 
 
 COUNT = 4000
@@ -254,24 +211,6 @@ def test_a_chain_is_found_again_on_one_of_the_branches() -> None:
 def angle_missed(found: Dual, wanted: Dual) -> Array:
     """Distance of two dual angles, whole turns aside."""
     return np.abs(np.exp(1j * found.real) - np.exp(1j * wanted.real)) + np.abs(found.dual - wanted.dual)
-
-
-@given(st.floats(0.05, 1.5), st.floats(0.05, 1.5), st.floats(-2, 2), st.floats(-2, 2), st.sampled_from(ccc.BRANCHES))
-def test_meet_has_both_angles(alpha: float, beta: float, a: float, c: float, branch: int) -> None:
-    """ĉ is a line at the dual angles asked for, on the side of the plane that the branch says; −branch mirrors it."""
-    b = line((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    d = line((0.3, 0.4, 0.0), (np.sin(1.2), 0.0, np.cos(1.2)))
-    bc, cd = spatial(alpha, a), spatial(beta, c)
-    found = ccc.meet(b, d, bc, cd, branch)
-    if not np.isfinite(primal(found[0])) or abs(primal(dot(found, cross(b, d)))) < 1e-3:
-        return
-    for cosine, angle in ((dot(found, b), bc), (dot(found, d), cd)):
-        for part, expected in zip(parts(cosine), (np.cos(angle.real), -angle.dual * np.sin(angle.real)), strict=True):
-            assert float(part) == pytest.approx(expected, abs=1e-10)
-    square = dot(found, found)
-    assert float(square.real) == pytest.approx(1.0, abs=1e-13)
-    assert float(square.dual) == pytest.approx(0.0, abs=1e-10)
-    assert np.sign(primal(dot(found, cross(b, d)))) == branch
 
 
 def test_small_angles_keep_their_digits() -> None:

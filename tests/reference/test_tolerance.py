@@ -11,7 +11,6 @@ import pytest
 from scipy import stats
 
 import trunnion
-from mechanisms import Array, build, slider_crank
 from toleranced import (
     CLUTCH,
     FOURBAR,
@@ -21,14 +20,16 @@ from toleranced import (
     clutch_angle,
     fourbar,
     fourbar_angle,
-    numbers,
     rssr,
     rssr_angle,
+    sampler,
     slider_place,
     slopes,
 )  # fmt: skip
 from toleranced import slider_crank as sized_slider
 from trunnion import Mechanism
+from trunnion.statistics.streams import uniforms
+from trunnion.studies.tolerance.first_order import study
 
 FAST = ("linear", "worst-case")
 Case = tuple[Callable[..., Mechanism], Callable[..., Any], dict[str, float]]
@@ -49,9 +50,6 @@ def sensitivities(result: Any, measure: int = 0) -> dict[str, float]:
 @pytest.fixture(scope="module")
 def results() -> dict[str, Any]:
     return {name: trunnion.tolerance(build_(), methods=FAST) for name, (build_, _, _) in CASES.items()}
-
-
-# ---- known numbers --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -84,24 +82,6 @@ def test_one_way_clutch(results: dict[str, Any]) -> None:
     assert high == pytest.approx(7.5333, abs=5e-5)
 
 
-@pytest.mark.parametrize("joint", "BD")
-def test_clearance_of_the_four_bar(joint: str) -> None:
-    """0.02 mm in any joint turns the rocker by up to 0.017902°; ends uniform in the disc scatter by half of it."""
-    mechanism = fourbar(tolerances={}, joint_defaults={})
-    play = numbers(mechanism, {f"joints.{joint}.pin.radius": 5e-3, f"joints.{joint}.pin.clearance": 2e-5})
-    found = trunnion.tolerance(play, methods=FAST)
-    assert [str(name) for name in found["parameter"].values] == [f"joints.{joint}.clearance"]
-    assert np.degrees(found["worst_case_upper"].item()) == pytest.approx(0.017902, abs=5e-7)
-    assert found["sensitivity"].item() * 2e-5 == pytest.approx(found["worst_case_upper"].item(), rel=1e-12)
-    assert found["deviation_linear"].item() == pytest.approx(found["worst_case_upper"].item() / 2, rel=1e-12)
-    # the pins move the ends of the rods by 0.02 mm: as a rod that is longer or shorter
-    ends = [fourbar_angle(**(FOURBAR | {"l3": 0.09 + sign * 2e-5})) - fourbar_angle(**FOURBAR) for sign in (1, -1)]
-    if joint in "BC":
-        searched = found["searched_lower"].item(), found["searched_upper"].item()
-        assert searched == pytest.approx((min(ends), max(ends)), rel=1e-3)
-        assert max(np.abs(searched)) >= max(np.abs(ends)) * (1 - 1e-9)
-
-
 def test_clearance_of_the_spatial_crank_rocker() -> None:
     """0.044402° by the formula, 0.044448° on the mechanism itself, the pin shifted and leaning in its hole."""
     pin = {"radius": "10 mm", "hole_radius": "10.02 mm", "length": "20 mm"}
@@ -110,9 +90,6 @@ def test_clearance_of_the_spatial_crank_rocker() -> None:
     ends = np.degrees([-found["searched_lower"].item(), found["searched_upper"].item()])
     assert max(ends) == pytest.approx(0.044448, abs=5e-7)
     assert np.mean(ends) == pytest.approx(0.044402, abs=5e-7)
-
-
-# ---- against closed forms -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -202,8 +179,6 @@ def test_worst_case_of_the_least_and_the_largest_deviation(rule: str, ends: tupl
     assert found["worst_case_upper"].item() == pytest.approx(upper(worst), rel=1e-6)
 
 
-# ---- what a number's distribution makes of it -----------------------------------------------------------------
-
 T = 5e-5
 DISTRIBUTIONS: dict[str, tuple[dict[str, Any], Any]] = {
     "normal": ({}, stats.norm(0, T / 3)),
@@ -213,13 +188,17 @@ DISTRIBUTIONS: dict[str, tuple[dict[str, Any], Any]] = {
     "uniform": ({"distribution": "uniform"}, stats.uniform(-T, 2 * T)),
     "triangular": ({"distribution": "triangular", "mode": "0.02 mm"}, stats.triang(0.7, -T, 2 * T)),
     "truncated": ({"distribution": "truncated", "cp": 0.5}, stats.truncnorm(-1.5, 1.5, 0, T / 1.5)),
+    "truncated, shift": (
+        {"distribution": "truncated", "cp": 0.4, "shift": "0.0125 mm"},
+        stats.truncnorm(-1.5, 0.9, T / 4, T / 1.2),
+    ),
     "beta": ({"distribution": "beta", "alpha": 2, "beta": 3}, stats.beta(2, 3, -T, 2 * T)),
 }
 
 
 @pytest.mark.parametrize("name", DISTRIBUTIONS)
 def test_moments_of_a_distribution(name: str) -> None:
-    """Mean and standard deviation carried by the derivative, against SciPy's distributions."""
+    """Mean and standard deviation carried by the derivative, and every sample, against SciPy's distributions."""
     keys, law = DISTRIBUTIONS[name]
     mechanism = fourbar(tolerances={"l3": {"limits": "±0.05 mm"} | keys})
     found = trunnion.tolerance(mechanism, methods=["linear"])
@@ -228,6 +207,9 @@ def test_moments_of_a_distribution(name: str) -> None:
     assert found["parameter_shift"].item() == pytest.approx(law.mean(), rel=1e-9, abs=1e-18)
     assert found["deviation_linear"].item() == pytest.approx(abs(steep) * law.std(), rel=1e-8)
     assert found["shift_linear"].item() == pytest.approx(steep * law.mean(), rel=1e-8, abs=1e-15)
+    u = uniforms(2, 0, 1, 800)
+    angles = sampler(study(mechanism)).figures(u)["figure"][0]
+    np.testing.assert_allclose(angles, fourbar_angle(**FOURBAR | {"l3": 0.09 + law.ppf(u[0])}), rtol=0, atol=1e-11)
 
 
 def test_limits_to_one_side() -> None:
@@ -242,34 +224,6 @@ def test_limits_to_one_side() -> None:
     np.testing.assert_allclose(found["corner_upper"].values[0], [0.03 - 1e-5, 0.07 + 3e-5], rtol=1e-14)
 
 
-def test_measured_samples() -> None:
-    values = np.array([0.02, -0.01, 0.035, 0.0, 0.011]) * 1e-3
-    given = [f"{1e3 * value:.12g} mm" for value in values]
-    found = trunnion.tolerance(
-        fourbar(tolerances={"l3": {"distribution": "sample", "values": given}}), methods=["linear"]
-    )
-    steep = slopes(fourbar_angle, FOURBAR, 3e-5)[2]
-    assert found["shift_linear"].item() == pytest.approx(steep * values.mean(), rel=1e-8)
-    assert found["deviation_linear"].item() == pytest.approx(-steep * values.std(), rel=1e-8)
-
-
-@pytest.mark.parametrize("rho", [0.6, -0.9])
-def test_correlated_tolerances(rho: float) -> None:
-    """σ = √(sᵀ C s); and the scatter of own samples of the closed form."""
-    mechanism = fourbar(
-        correlations=[{"of": ["l1", "l3"], "coefficient": rho}, {"of": ["l2", "l4"], "coefficient": 0.3}]
-    )
-    found = trunnion.tolerance(mechanism, methods=["linear"])
-    matrix = np.eye(4)
-    matrix[0, 2] = matrix[2, 0] = rho
-    matrix[1, 3] = matrix[3, 1] = 0.3
-    covariance = (T / 3) ** 2 * matrix
-    steep = slopes(fourbar_angle, FOURBAR, 3e-5)
-    assert found["deviation_linear"].item() == pytest.approx(np.sqrt(steep @ covariance @ steep), rel=1e-8)
-    drawn = np.random.default_rng(2).multivariate_normal(list(FOURBAR.values()), covariance, 200_000)
-    assert np.std(fourbar_angle(*drawn.T)) == pytest.approx(found["deviation_linear"].item(), rel=0.01)
-
-
 def test_number_that_follows_another() -> None:
     """The length of the coupler by a dimension, and where its pin is drilled from there: both move the pin."""
     mechanism = fourbar(tolerances={"l3": "±0.05 mm", "links.coupler.points.C.x": "±0.01 mm"})
@@ -279,110 +233,6 @@ def test_number_that_follows_another() -> None:
     assert found["worst_case_upper"].item() == pytest.approx(-6e-5 * steep, rel=1e-8)
     least = fourbar_angle(**(FOURBAR | {"l3": 0.09 - 6e-5})) - fourbar_angle(**FOURBAR)
     assert found["searched_upper"].item() == pytest.approx(least, rel=1e-11)
-
-
-# ---- friction, masses, loads ----------------------------------------------------------------------------------
-
-
-def pressed(law: Any = 0.1) -> Mechanism:
-    """A slider-crank with friction, whose load, masses and coefficients vary."""
-    data = slider_crank()
-    data["loads"]["work"] = {"joint": "C", "resisting_force": 40.0, "useful": True}
-    data["tolerances"] = {
-        "loads.gas.force.x": "±2 N",
-        "links.piston.mass": "±0.05 kg",
-        "links.rod.centre.x": "±1 mm",
-        "links.rod.inertia": "±1e-3 kg m^2",
-        "links.crank.points.B.x": "±0.2 mm",
-        "drivers.A.speed": "±0.05 rad/s",
-        "joints.P.friction.coefficient": "±0.02",
-        "joints.C.friction.coefficient": "±0.03",
-        "joints.B.pin.radius": "±0.1 mm",
-    }
-    data["measures"] = {
-        "effort": {"effort": "A", "at": "70 deg"},
-        "push": {"reaction": "C", "at": "200 deg"},
-        "rms": {"effort": "A", "as": "rms"},
-        "share": {"efficiency": "cycle"},
-        "peak": {"effort": "A", "as": "maximum"},
-    }
-    return build(data, friction=law)
-
-
-def books(mechanism: Mechanism) -> Array:
-    """Effort at 70°, reaction of the guide at 200°, r.m.s. effort, efficiency of the cycle, largest effort."""
-    found = trunnion.analyse(mechanism, 360)
-    effort = found["drive_effort"].values[0]
-    push = np.linalg.norm(found["reaction_force"].sel(joint="C").values, axis=0)
-    rms, share = float(found["drive_effort_rms"][0]), float(found["efficiency"])
-    return np.array([effort[360 - 70], push[360 - 200], rms, share, np.max(effort)])
-
-
-@pytest.mark.slow
-def test_derivatives_of_efforts_with_friction() -> None:
-    """Against central differences of mechanisms with other numbers, each analysed by itself."""
-    mechanism = pressed()
-    found = trunnion.tolerance(mechanism, methods=["linear"])
-    paths = [str(path) for path in found["parameter"].values]
-    assert len(paths) == 9
-    known = books(mechanism)
-    np.testing.assert_allclose(found["nominal"].values[:4], known[:4], rtol=1e-6)
-    assert found["nominal"].values[4] == pytest.approx(known[4], rel=1e-4)
-    for i, path in enumerate(paths):
-        value = found["parameter_nominal"].values[i]
-        step = 1e-4 * value
-        ends = [books(numbers(mechanism, {path: value + sign * step})) for sign in (1, -1)]
-        slope = (ends[0] - ends[1]) / (2 * step)
-        own = found["sensitivity"].values[:, i]
-        away = np.abs(own - slope) * abs(value) / np.abs(known)  # per unit of relative change
-        # a length moves the dead centre where friction turns round, means of samples are parted at that of the nominal
-        mean = 3e-4 if path == "links.crank.points.B.x" else 1e-7
-        assert np.all(away < [1e-7, 1e-7, mean, mean, 5e-3]), (path, away)  # of a maximum, the grid shows
-    assert np.max(np.abs(found["sensitivity"].values), axis=0).min() > 0  # nothing is without effect
-
-
-# ---- errors with a direction, seats, fits ---------------------------------------------------------------------
-
-
-def test_run_out_of_any_direction() -> None:
-    """The hole of the coupler lies off by up to 0.02 mm, to any side of it: the coupler is longer or shorter."""
-    mechanism = fourbar(
-        tolerances={"joints.B.misalignment.offset": {"limits": "+0.02/0 mm", "direction": "uniform"}},
-        joints=fourbar().data()["joints"] | {"B": {**fourbar().data()["joints"]["B"], "misalignment": {"offset": 0.0}}},
-    )
-    found = trunnion.tolerance(mechanism, methods=FAST)
-    steep = abs(slopes(fourbar_angle, FOURBAR, 3e-5)[2])
-    assert found["worst_case_upper"].item() == pytest.approx(2e-5 * steep, rel=1e-8)
-    assert found["worst_case_lower"].item() == pytest.approx(-2e-5 * steep, rel=1e-8)
-    square = 1e-5**2 + (2e-5 / 6) ** 2  # E r², r normal about the middle
-    assert found["deviation_linear"].item() == pytest.approx(steep * np.sqrt(square / 2), rel=1e-8)
-    ends = [fourbar_angle(**(FOURBAR | {"l3": 0.09 + sign * 2e-5})) - fourbar_angle(**FOURBAR) for sign in (1, -1)]
-    assert found["searched_lower"].item() == pytest.approx(min(ends), rel=1e-4)
-    assert found["searched_upper"].item() == pytest.approx(max(ends), rel=1e-4)
-
-
-def seated(xi: str = "0 deg", clearance: str = "0.02 mm", **options: Any) -> Mechanism:
-    pin = {"radius": "5 mm", "clearance": clearance}
-    joint = {**fourbar().data()["joints"]["B"], "pin": pin, "seat": {"xi": xi}}
-    return fourbar(joints=fourbar().data()["joints"] | {"B": joint}, **options)
-
-
-def test_seat_at_any_angle() -> None:
-    """The pin lies at the wall of its hole, anywhere around; nominally at 0°, where the coupler is shortest."""
-    mechanism = seated(tolerances={"joints.B.seat.xi": {"distribution": "direction"}})
-    found = trunnion.tolerance(mechanism, methods=FAST)
-    assert [str(name) for name in found["parameter"].values] == ["joints.B.seat.xi"]
-    steep = abs(slopes(fourbar_angle, FOURBAR, 3e-5)[2])
-    # a finite circle, whose second harmonic is of second order in its radius
-    ends = sorted(
-        (0.0, fourbar_angle(**(FOURBAR | {"l3": 0.09 + 2e-5})) - fourbar_angle(**(FOURBAR | {"l3": 0.09 - 2e-5})))
-    )
-    assert found["worst_case_lower"].item() == pytest.approx(ends[0], rel=1e-3, abs=1e-12)
-    assert found["worst_case_upper"].item() == pytest.approx(ends[1], rel=1e-3, abs=1e-12)
-    assert found["shift_linear"].item() == pytest.approx(sum(ends) / 2, rel=1e-3)
-    assert found["searched_lower"].item() == pytest.approx(ends[0], rel=1e-3, abs=1e-12)
-    assert found["searched_upper"].item() == pytest.approx(ends[1], rel=1e-3, abs=1e-12)
-    assert found["deviation_linear"].item() == pytest.approx(2e-5 * steep / np.sqrt(2), rel=1e-3)
 
 
 def test_play_of_a_fit() -> None:
@@ -400,11 +250,6 @@ def test_play_of_a_fit() -> None:
     assert found["deviation_linear"].item() == pytest.approx(load * np.sqrt(square / 4), rel=1e-12)
     assert found["parameter_upper"].values[2] == pytest.approx(18e-6, rel=1e-12)
 
-
-# ---- names, places --------------------------------------------------------------------------------------------
-
-
-# ---- figures of a course --------------------------------------------------------------------------------------
 
 FINE = np.linspace(0, 2 * np.pi, 7200, endpoint=False)
 CURVES: dict[str, dict[str, Any]] = {

@@ -64,21 +64,6 @@ def told(result: Any, key: str) -> dict[str, Any]:
     return dict(zip(result.measure.values.tolist(), json.loads(result.attrs[key]), strict=True))
 
 
-def test_place_of_the_nominal_extreme() -> None:
-    """The rod is steepest with the crank at 90 and 270°."""
-    measures = {
-        "top": {"point": "piston.P", "axis": "x", "at": "60 deg"},
-        "swing": {"angle": "rod", "as": "maximum"},
-        "back": {"angle": "rod", "as": "minimum", "over": ["-10 deg", "180 deg"]},
-    }
-    model = slider_crank(dimensions={"r": "50 mm", "l": "200 mm", "e": "0 mm"}, measures=measures)
-    result = tolerance(model, methods=("linear",), steps=72)
-    place = dict(zip(result.measure.values.tolist(), result.place.values.tolist(), strict=True))
-    assert place["swing"] == pytest.approx(270)
-    assert place["back"] == pytest.approx(90)
-    assert place["top"] == pytest.approx(60)
-
-
 WIDE = 0.05e-3 / 3  # σ of each length
 
 

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy import stats
 
 import trunnion
@@ -48,8 +46,6 @@ def figures(mechanism: Mechanism, u: Array, **options: Any) -> Array:
     return sampler(study(mechanism, **options)).figures(u)["figure"][0]
 
 
-# ---- sample by sample -----------------------------------------------------------------------------------------
-
 CASES: dict[str, tuple[Mechanism, Callable[..., Any], Mapping[str, float], list[Law]]] = {
     "clutch": (clutch(), clutch_angle, CLUTCH, [normal(0.0125 * MM), normal(0.01 * MM), normal(0.0125 * MM)]),
     "four-bar": (fourbar(), fourbar_angle, FOURBAR, [normal(0.05 * MM)] * 4),
@@ -71,38 +67,15 @@ def test_sample_by_sample(name: str, method: str) -> None:
 
 
 T = 0.4 * MM
-LAWS: dict[str, tuple[dict[str, Any], Law]] = {
-    "normal, cpk": (
-        {"limits": "±0.4 mm", "cp": 1.33, "cpk": 1},
-        lambda u: stats.norm.ppf(u, T * 0.33 / 1.33, T / 3.99),
-    ),
-    "one side": ({"limits": "+0.4/0 mm"}, lambda u: stats.norm.ppf(u, T / 2, T / 6)),
-    "uniform": ({"limits": "+0.4/-0.2 mm", "distribution": "uniform"}, lambda u: stats.uniform.ppf(u, -T / 2, 1.5 * T)),
-    "triangular": (
-        {"limits": "±0.4 mm", "distribution": "triangular", "mode": "0.2 mm"},
-        lambda u: stats.triang.ppf(u, 0.75, -T, 2 * T),
-    ),
-    "truncated": (
-        {"limits": "±0.4 mm", "distribution": "truncated", "cp": 0.4, "shift": "0.1 mm"},
-        lambda u: stats.truncnorm.ppf(u, -1.5, 0.9, T / 4, T / 1.2),
-    ),
-    "beta": (
-        {"limits": "±0.4 mm", "distribution": "beta", "alpha": 2, "beta": 3.5},
-        lambda u: stats.beta.ppf(u, 2, 3.5, -T, 2 * T),
-    ),
-    "sample": (
-        {"distribution": "sample", "values": ["0.3 mm", "-0.1 mm", "0.05 mm", "0.2 mm"]},
-        lambda u: np.array([-0.1, 0.05, 0.2, 0.3])[np.ceil(4 * u).astype(int) - 1] * MM,
-    ),
-}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_every_distribution_sample_by_sample(name: str) -> None:
-    keys, law = LAWS[name]
+def test_measured_numbers_sample_by_sample() -> None:
+    """A number takes one of its measured values, each as often."""
     u = uniforms(2, 0, 1, 800)
+    keys = {"distribution": "sample", "values": ["0.3 mm", "-0.1 mm", "0.05 mm", "0.2 mm"]}
+    values = np.array([-0.1, 0.05, 0.2, 0.3])[np.ceil(4 * u[0]).astype(int) - 1] * MM
     found = figures(fourbar(tolerances={"l4": keys}), u)
-    np.testing.assert_allclose(found, fourbar_angle(**FOURBAR | {"l4": 0.07 + law(u[0])}), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(found, fourbar_angle(**FOURBAR | {"l4": 0.07 + values}), rtol=0, atol=1e-11)
 
 
 def test_correlated_sample_by_sample() -> None:
@@ -164,29 +137,6 @@ def test_seats_and_run_outs_sample_by_sample(joint: str) -> None:
     own = shifted(joint, size * np.cos(towards), size * np.sin(towards))
     np.testing.assert_allclose(figures(run_out, u), own, rtol=0, atol=1e-12)
 
-
-@given(
-    st.tuples(*(st.floats(-0.1, 0.1) for _ in range(4))),
-    st.floats(1e-6, 0.08),
-    st.floats(-180, 180),
-    st.integers(0, 10**6),
-)
-def test_any_four_bar_sample_by_sample(changes: tuple[float, ...], width: float, place: float, seed: int) -> None:
-    """Any sizes, any width, anywhere on the turn; where the circles do not meet there is no figure."""
-    sizes = {name: value * (1 + change) for (name, value), change in zip(FOURBAR.items(), changes, strict=True)}
-    mechanism = fourbar(
-        dimensions=sizes, tolerances={name: width * value for name, value in sizes.items()},
-        measures={"angle": {"angle": "rocker", "at": f"{place} deg"}},
-    )  # fmt: skip
-    u = uniforms(seed, 0, 4, 50)
-    lengths = [value * (1 + width / 3 * stats.norm.ppf(row)) for value, row in zip(sizes.values(), u, strict=True)]
-    own = fourbar_angle(*lengths, crank=np.radians(place))
-    found = figures(mechanism, u)
-    away = np.abs(np.remainder(found - own + np.pi, 2 * np.pi) - np.pi)
-    assert np.all((away < 1e-9) | (np.isnan(found) & np.isnan(own)))
-
-
-# ---- what a run says of its samples ---------------------------------------------------------------------------
 
 LIMITS = {"angle": {"angle": "rocker", "at": "60 deg", "limit": "+0.05/-0.07 deg"}}
 SIGMA = np.linalg.norm([13.654, 13.401, 15.623, 6.323]) * 0.05e-3 / 3
@@ -296,9 +246,6 @@ def test_sobol_points() -> None:
     assert found == pytest.approx((np.mean(shares) - half, np.mean(shares) + half), abs=0.12 * half)
 
 
-# ---- large tolerances: brute force ----------------------------------------------------------------------------
-
-
 def test_large_tolerances_against_brute_force() -> None:
     """±8 mm of each link, uniform: a million samples of one's own, with random numbers of another kind."""
     tolerances = {name: {"limits": "±8 mm", "distribution": "uniform"} for name in FOURBAR}
@@ -327,9 +274,6 @@ def test_large_tolerances_against_brute_force() -> None:
     assert 0.5 < both < min(inside) < 0.99
     assert result["searched_upper"].values[0] >= np.max(own) - nominal - 1e-12
     assert result["searched_lower"].values[0] <= np.min(own) - nominal + 1e-12
-
-
-# ---- small tolerances: first order ----------------------------------------------------------------------------
 
 
 SEEDS = 200
@@ -362,9 +306,6 @@ def of_sledge() -> list[float]:
     ends = [(-0.015, 0.015), (-0.02, 0.02), (-0.01, 0.004), (-0.015, np.inf), (-0.028, 0.028)]
     found = [float(stats.norm.cdf(high / 0.01) - stats.norm.cdf(low / 0.01)) for low, high in ends]
     return [*found, found[2]]
-
-
-# ---- honest intervals -----------------------------------------------------------------------------------------
 
 
 def intervals(mechanism: Mechanism, method: str, samples: int) -> dict[str, Array]:

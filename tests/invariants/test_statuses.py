@@ -160,7 +160,6 @@ def test_a_number_of_positions_that_memory_cannot_hold(steps: int) -> None:
     assert finding.remedy == "give a whole number from 1 to 10,000,000, for all positions are held in memory"
 
 
-# ordinary extremes
 def test_massless_and_unloaded() -> None:
     """Nothing acts: all forces are 0, not NaN, and nothing is said to be locked."""
     data = model(four_bar())
@@ -186,19 +185,6 @@ def test_range_includes_both_ends() -> None:
     with pytest.raises(MechanismError) as error:
         analyse(data, 4)
     assert "range" in str(error.value)
-
-
-def test_inertia_about_the_origin() -> None:
-    """The same body stated about its own origin: J_O = J_S + m r²."""
-    data, other = four_bar(), four_bar()
-    for link in other["links"].values():
-        if "mass" in link:
-            x, y = link["centre"]
-            link["inertia"] += link["mass"] * (x * x + y * y)
-            link["inertia_about"] = "origin"
-    np.testing.assert_allclose(
-        positions_of(other, 12)["drive_effort"], positions_of(data, 12)["drive_effort"], rtol=1e-10
-    )
 
 
 def test_too_few_rounds_is_said() -> None:
@@ -317,3 +303,16 @@ def test_wide_steps_along_a_branch_come_to_what_narrow_ones_do(name: str, monkey
         assert one.coordinates == pytest.approx(other.coordinates, abs=1e-12, nan_ok=True)
         assert one.orientation == other.orientation
         assert np.array_equal(one.again, other.again)
+
+
+def test_inertia_about_the_origin() -> None:
+    """The same body stated about its own origin: J_O = J_S + m r²."""
+    data, other = four_bar(), four_bar()
+    for link in other["links"].values():
+        if "mass" in link:
+            x, y = link["centre"]
+            link["inertia"] += link["mass"] * (x * x + y * y)
+            link["inertia_about"] = "origin"
+    np.testing.assert_allclose(
+        positions_of(other, 12)["drive_effort"], positions_of(data, 12)["drive_effort"], rtol=1e-10
+    )

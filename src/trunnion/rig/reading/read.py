@@ -139,7 +139,7 @@ class _Recording:
         self.mapping, self.path, self.entry = mapping, path, entry
         self.findings: list[Finding] = []
         self.done: list[str] = []
-        self.sensors: dict[str, channels.Sensor] = {}
+        self.sensors: dict[str, channels.ChannelReading] = {}
         self.readings: dict[str, Array] = {}
         self.parts: list[_Part] = []
         self.cycle, self.start = float(mapping.cycle.evaluate()), float(mapping.start.evaluate())
@@ -308,7 +308,7 @@ class _Recording:
                 self.say(finding)
         return [self._condition(part, accuracies) for part in self.parts]
 
-    def _courses(self, name: str, sensor: channels.Sensor, step: float) -> Accuracy:
+    def _courses(self, name: str, sensor: channels.ChannelReading, step: float) -> Accuracy:
         """Put the courses of a channel into the parts; the accuracy of its sensor."""
         line, size, low_pass = self.line, sensor.size, self.mapping.filter
         readings, step = self.readings.pop(name), sensor.step or step
@@ -382,7 +382,7 @@ class _Recording:
 # ---- helpers --------------------------------------------------------------------------------------------------
 
 
-def _key(name: str, sensor: channels.Sensor) -> StepKey:
+def _key(name: str, sensor: channels.ChannelReading) -> StepKey:
     return name, sensor.unit, sensor.scale.factor
 
 

@@ -180,14 +180,13 @@ class _Recording:
         allowed = (self.line.seconds >= begin) & (self.line.seconds <= end)
         share, spoilt = self._cycles(allowed)
         for part in self._settings():
-            rows = allowed & part.rows
-            part.turns = cut(share, self.line, rows, mapping.positions, spoilt, say, part.where)
+            part.turns = cut(share, self.line, part.rows, allowed, mapping.positions, spoilt, say, part.where)
             if part.turns.numbers.size:
                 self.parts.append(part)
             else:
-                cycles = share[rows & np.isfinite(share)]
+                cycles = share[allowed & part.rows & np.isfinite(share)]
                 what = f"there is no whole turn: {np.ptp(cycles) if cycles.size else 0:.3g} cycles in "
-                what, remedy = what + counted(int(rows.sum()), "row"), "check angle, or record for longer"
+                what, remedy = what + counted(cycles.size, "row"), "check angle, or record for longer"
                 say(Finding(what, part.where, remedy, code="data.turns.none"))
         if self.parts:
             self._check_sampling()

@@ -68,4 +68,4 @@ def test_what_cannot_be_followed_is_named(verb: str, name: str) -> None:
         VERBS[verb](name)
     told = " ".join(str(one) for one in caught.value.findings)
     assert name in told
-    assert ("did you mean 'turned'" if name == "turn" else "no number of a single position") in told
+    assert ("did you mean 'turned'" if name == "turn" else "the model gives it") in told

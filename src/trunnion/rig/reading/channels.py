@@ -20,23 +20,8 @@ from trunnion.rig.reading.turns import Turns, turn_means
 from trunnion.rig.reading.units import Amount, SensorScale, alike, default_unit
 
 __all__ = [
-    "LOOKED_AT",
-    "WIDTH",
-    "ChannelReading",
-    "Drift",
-    "check_filter",
-    "clipped",
-    "common_drift",
-    "faults",
-    "filtered",
-    "mean_uncertainty",
-    "missing",
-    "noise_of",
-    "resolution",
-    "sensor_of",
-    "signs",
-    "spikes",
-    "steady",
+    "LOOKED_AT", "WIDTH", "ChannelReading", "Drift", "check_filter", "clipped", "common_drift", "faults", "filtered",
+    "mean_uncertainty", "missing", "noise_of", "resolution", "sensor_of", "signs", "spikes", "steady",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]

@@ -113,7 +113,7 @@ def test_gaps_and_single_turns() -> None:
 
 
 def test_a_dead_sensor_is_told() -> None:
-    with pytest.raises(MechanismError, match="there is no input power: T1 or n1 reads 0"):
+    with pytest.raises(MechanismError, match="there is no input power: T1 or n1 reads 0 throughout"):
         efficiency_of(condition({**exact(), "T1": np.zeros((3, POSITIONS))}))
 
 

@@ -72,7 +72,8 @@ def measure_of(mechanism: Mechanism, run: Run, channel: str, name: str, section:
     except MechanismError as error:
         raise MechanismError([replace(finding, where=where) for finding in error.findings]) from None
     if not measure.everywhere or not measure.single(run.system):
-        what = f"'{name}' is no number of a single position, as a sensor shows it"
+        what = f"'{name}' is no number of a single position, as a sensor shows it: the model gives it at a place, over "
+        what += "a range, as a statistic or of a motion in time"
         remedy = "a sensor measures such as effort:DRIVER, rate:JOINT, load:LOAD, rotation:JOINT or link.point.x"
         raise MechanismError(Finding(what, where, remedy))
     return measure

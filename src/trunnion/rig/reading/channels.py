@@ -20,7 +20,7 @@ from trunnion.rig.reading.turns import Turns, turn_means
 from trunnion.rig.reading.units import Amount, SensorScale, alike, default_unit
 
 __all__ = [
-    "LOOKED_AT", "WIDTH", "Drift", "Sensor", "check_filter", "clipped", "common_drift", "faults", "filtered",
+    "LOOKED_AT", "WIDTH", "ChannelReading", "Drift", "check_filter", "clipped", "common_drift", "faults", "filtered",
     "mean_uncertainty", "missing", "noise_of", "resolution", "sensor_of", "signs", "spikes", "steady",
 ]  # fmt: skip
 
@@ -45,7 +45,7 @@ APART = 0.03  # of a mean speed, between the angle and the channel that reads it
 
 
 @dataclass(frozen=True)
-class Sensor:
+class ChannelReading:
     """A channel in one file: what its readings are, and what is uncertain in them.
 
     unit: of the readings; limit, step, zero, zero_uncertainty: in readings, of what is stated None and 0 without;
@@ -90,7 +90,7 @@ class Sensor:
         return (self.unit, self.scale.raw) if self.unit and self.scale.direct else ("", 1.0)
 
 
-def sensor_of(name: str, channel: Channel, column: Column, values: Array, line: Timeline, say: Say) -> Sensor:
+def sensor_of(name: str, channel: Channel, column: Column, values: Array, line: Timeline, say: Say) -> ChannelReading:
     """The sensor of a channel: its unit, else the file's, else that of what it measures in SI; its zero.
 
     values: readings, (row,). What is no number or at the end of the range becomes NaN in them.
@@ -115,7 +115,7 @@ def sensor_of(name: str, channel: Channel, column: Column, values: Array, line: 
     if limit is not None:
         say(clipped(where, values, limit, unit, line.seconds))
     read = () if isinstance(channel.zero, Amount) else _zero_over(name, channel.zero.over, values, line, say)
-    return Sensor(channel, scale, unit, limit, step, accuracy, *(read or (zero,)))
+    return ChannelReading(channel, scale, unit, limit, step, accuracy, *(read or (zero,)))
 
 
 def _zero_over(
@@ -382,7 +382,7 @@ def steady(turns: Turns, step: float, where: str) -> Finding | None:
 
 
 def signs(
-    sensors: Mapping[str, Sensor], courses: Mapping[str, Array], zeros: Mapping[str, float], turning: float
+    sensors: Mapping[str, ChannelReading], courses: Mapping[str, Array], zeros: Mapping[str, float], turning: float
 ) -> Iterator[Finding]:
     """Channels that are likely to have the wrong sign or unit: a speed of the driver that is not that of the angle, a
     power into a driver or out at a load below zero in nearly all turns of a file.

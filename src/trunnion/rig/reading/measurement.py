@@ -378,7 +378,8 @@ def efficiency_of(condition: Condition, joints: Mapping[str, str] | None = None)
         raise MechanismError(Finding(what, condition.name, "see the gaps reported by `trunnion data`"))
     power_in, power_out = float(np.mean(powers_in)), float(np.mean(powers_out))
     if not power_in:
-        what = f"there is no input power: {' or '.join(one.channel for pair in pairs.driven for one in pair)} reads 0"
+        names = " or ".join(course.channel for pair in pairs.driven for course in pair)
+        what = f"there is no input power: {names} reads 0 throughout"
         raise MechanismError(Finding(what, condition.name, "check these channels: a sensor may have failed"))
     value = power_out / power_in
     with np.errstate(all="ignore"):

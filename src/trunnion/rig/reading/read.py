@@ -139,7 +139,7 @@ class _Recording:
         self.mapping, self.path, self.entry = mapping, path, entry
         self.findings: list[Finding] = []
         self.done: list[str] = []
-        self.sensors: dict[str, channels.Sensor] = {}
+        self.sensors: dict[str, channels.ChannelReading] = {}
         self.readings: dict[str, Array] = {}
         self.parts: list[_Part] = []
         self.cycle, self.start = float(mapping.cycle.evaluate()), float(mapping.start.evaluate())
@@ -180,14 +180,13 @@ class _Recording:
         allowed = (self.line.seconds >= begin) & (self.line.seconds <= end)
         share, spoilt = self._cycles(allowed)
         for part in self._settings():
-            rows = allowed & part.rows
-            part.turns = cut(share, self.line, rows, mapping.positions, spoilt, say, part.where)
+            part.turns = cut(share, self.line, part.rows, allowed, mapping.positions, spoilt, say, part.where)
             if part.turns.numbers.size:
                 self.parts.append(part)
             else:
-                cycles = share[rows & np.isfinite(share)]
+                cycles = share[allowed & part.rows & np.isfinite(share)]
                 what = f"there is no whole turn: {np.ptp(cycles) if cycles.size else 0:.3g} cycles in "
-                what, remedy = what + counted(int(rows.sum()), "row"), "check angle, or record for longer"
+                what, remedy = what + counted(cycles.size, "row"), "check angle, or record for longer"
                 say(Finding(what, part.where, remedy, code="data.turns.none"))
         if self.parts:
             self._check_sampling()
@@ -308,7 +307,7 @@ class _Recording:
                 self.say(finding)
         return [self._condition(part, accuracies) for part in self.parts]
 
-    def _courses(self, name: str, sensor: channels.Sensor, step: float) -> Accuracy:
+    def _courses(self, name: str, sensor: channels.ChannelReading, step: float) -> Accuracy:
         """Put the courses of a channel into the parts; the accuracy of its sensor."""
         line, size, low_pass = self.line, sensor.size, self.mapping.filter
         readings, step = self.readings.pop(name), sensor.step or step
@@ -382,7 +381,7 @@ class _Recording:
 # ---- helpers --------------------------------------------------------------------------------------------------
 
 
-def _key(name: str, sensor: channels.Sensor) -> StepKey:
+def _key(name: str, sensor: channels.ChannelReading) -> StepKey:
     return name, sensor.unit, sensor.scale.factor
 
 

@@ -7,7 +7,7 @@ to the position along the slope there; with fewer it is interpolated by a cubic 
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +29,10 @@ APART = 0.5  # of the usual length of a turn, by which one may differ from it
 
 @dataclass(frozen=True)
 class Turns:
-    """Whole turns of one condition in a file.
+    """Whole turns of one condition in a file, among the rows of a window.
 
-    share: (row,), the cycle counted on, rising, whole at the start of each; numbers: of the turns; begin, end: their
-    times, s; rows: those that belong to them, (row,); positions: how many a turn; line: time of the rows.
+    share: (row of the window,), the cycle counted on, rising, whole at the start of each; numbers: of the turns; begin,
+    end: their times, s; rows: those that belong to them; positions: how many a turn; line: time of the rows.
     """
 
     share: Array
@@ -42,6 +42,7 @@ class Turns:
     rows: Mask
     positions: int
     line: Timeline
+    window: slice
 
     @property
     def density(self) -> float:
@@ -49,12 +50,18 @@ class Turns:
         return float(np.mean(self.end - self.begin)) / (self.line.step * self.positions) if self.numbers.size else 0.0
 
 
-def cut(share: Array, line: Timeline, allowed: Mask, positions: int, spoilt: Array, say: Say, where: str) -> Turns:
-    """Find the whole turns among the rows that are allowed.
+def cut(
+    shares: Array, times: Timeline, of: Mask, allowed: Mask, positions: int, spoilt: Array, say: Say, where: str
+) -> Turns:
+    """Find the whole turns of a condition.
 
-    share: cycles gone through, rising with time, NaN where not known, (row,); positions: of a turn; spoilt: stretches
-    of time to leave out, (stretch, 2); say: takes findings about turns that are left out; where: what these are about.
+    shares: cycles gone through, rising with time, NaN where not known, (row,); times: of the rows; of: rows of the
+    condition; allowed: those that may be used; positions: of a turn; spoilt: stretches of time to leave out, (stretch,
+    2); say: takes findings about turns that are left out; where: what these are about.
     """
+    rows = np.flatnonzero(of)  # the rest is not looked at: a file may have hundreds of conditions
+    window = slice(int(rows[0]), int(rows[-1]) + 1)
+    share, line, allowed = shares[window], replace(times, seconds=times.seconds[window]), (allowed & of)[window]
     begin, end, numbers = _whole(share, line)
     refused = np.concatenate([[0], np.cumsum(~allowed)])  # turns some of whose rows are not allowed
     low, high = (np.searchsorted(line.seconds, edge) for edge in (begin + 0.5 * line.step, end - 0.5 * line.step))
@@ -73,8 +80,8 @@ def cut(share: Array, line: Timeline, allowed: Mask, positions: int, spoilt: Arr
         slack = min(line.step, 0.25 * (high - low))  # an index may lie where a turn begins
         keep &= (begin > high - slack) | (end < low + slack)
     begin, end = begin[keep], end[keep]
-    rows = _rows_of(share, begin, end, line, allowed, positions)
-    return Turns(share, numbers[keep], begin, end, rows, positions, line)
+    moving = _rows_of(share, begin, end, line, allowed, positions)
+    return Turns(share, numbers[keep], begin, end, moving, positions, line, window)
 
 
 def _whole(share: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]]:
@@ -127,7 +134,8 @@ def resampled(turns: Turns, channel: Array, angle: Array | None = None) -> Array
     """
     if not turns.numbers.size:
         return np.empty((0, turns.positions))
-    course = _averaged(turns, channel) if turns.density >= DENSE else _interpolated(turns, channel)
+    values = channel[turns.window]
+    course = _averaged(turns, values) if turns.density >= DENSE else _interpolated(turns, values)
     if angle is None or not np.isfinite(course).any():
         return course
     raw, first = resampled(turns, angle), int(np.argmax(np.count_nonzero(np.isfinite(course), axis=1)))
@@ -243,7 +251,7 @@ def left_in_turns(turns: Turns, course: Array, readings: Array, noise: float) ->
     share, samples = in_step(turns, course), float(np.median(turns.end - turns.begin)) / turns.line.step
     every = share > ALIKE
     if every:  # then what a reading differs by from that a turn later is noise
-        rows = np.where(turns.rows, readings, np.nan)
+        rows = np.where(turns.rows, readings[turns.window], np.nan)
         apart = rows[round(samples) :] - rows[: -round(samples)]
         apart = apart[np.isfinite(apart)]
         noise = noise_before(float(np.sqrt(np.mean(apart**2) / 2))) if apart.size else 0.0

@@ -21,7 +21,6 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measures.measures import Measure, named
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.identification.findings import findings_of
 from trunnion.rig.identification.fit import (
     EFFICIENCY,
     FILE_ZERO,
@@ -152,8 +151,7 @@ def identify(
     other_speed = any(apart(condition.speed, cycle.speed) for condition, cycle in zip(conditions, cycles, strict=True))
     causes = _causes(fit, begin, spread.test.reduced) if spread.test.misfit and not other_speed else []
     groups = inseparable(fit, best.x, spread)
-    identified = Identified(mechanism, measurement, fit, best, spread, groups, causes, encoder)
-    return dataset(identified, findings_of(identified))
+    return dataset(Identified(mechanism, measurement, fit, best, spread, groups, causes, encoder))
 
 
 # ---- the data -------------------------------------------------------------------------------------------------

@@ -394,3 +394,33 @@ def test_a_load_that_rests_takes_no_power():
     result = compare(Measurement("bench", (Condition("a", {}, np.arange(24) / 24, blank),)), mechanism)
     assert np.isnan(result.model.sel(channel="L").values).any()
     assert np.isfinite(result.efficiency_model.values).all()
+
+
+def test_an_angle_that_runs_backwards_is_refused():
+    data = measured(channels=("speed", "out"))
+    back = replace(data, conditions=tuple(replace(one, speed=-4.0) for one in data.conditions))
+    with pytest.raises(MechanismError) as caught:
+        compare(back)
+    assert {one.code for one in caught.value.findings} == {"data.angle.backwards"}
+    assert caught.value.findings[0].figures["measured"] == -4.0
+
+
+def test_another_cycle_or_start_is_refused():
+    whole = measured()
+    for start, cycle, words in ((0.5, 2 * np.pi, "state start: 0 deg"), (0.0, 4 * np.pi, "state cycle: 360 deg")):
+        other = tuple(replace(one, start=start, cycle=cycle) for one in whole.conditions)
+        with pytest.raises(MechanismError, match=words):
+            compare(replace(whole, conditions=other))
+    same = tuple(replace(one, start=2 * np.pi, cycle=2 * np.pi) for one in whole.conditions)
+    assert codes(compare(replace(whole, conditions=same))) == {Verdict.WITHIN}
+
+
+@pytest.mark.parametrize(
+    "verb", [trunnion.rig.compare, lambda model, data: trunnion.rig.identify(model, data, ["A.friction"])]
+)
+def test_a_force_in_place_of_a_torque_is_refused(verb):
+    data = measured(rocker())
+    torque = replace(data.conditions[0].courses["torque"], unit="N")
+    one = replace(data.conditions[0], courses={**data.conditions[0].courses, "torque": torque})
+    with pytest.raises(MechanismError, match=r"is in N, and effort:A is in N m — name another column"):
+        verb(rocker(), replace(data, conditions=(one,)))

@@ -18,6 +18,7 @@ from trunnion.errors import MechanismError
 from trunnion.measures.measures import named
 from trunnion.model.mechanism import read_mechanism
 from trunnion.rig.identification import identify, with_estimates
+from trunnion.rig.identification.run import held_out
 from trunnion.rig.identification.signals import Model, described, limits, unknowns
 from trunnion.rig.reading.measurement import Accuracy, Measurement
 from trunnion.solve.friction_method import FrictionMethod
@@ -240,6 +241,14 @@ def test_what_is_held_out_is_predicted(four_bar: trunnion.Mechanism, torque: Tru
     turns = identify(four_bar, data, [FRICTION], hold_out=0.3)
     assert turns["turns"].values.tolist() == [[7] * 5]
     assert turns["held_out_turns"].values.tolist() == [[3] * 5]
+
+
+def test_a_value_names_all_conditions_that_have_it(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    data = torque.measured(1)
+    names = ("angle 25 deg, 10 rpm", "angle 5 deg, 10 rpm", "angle -5 deg, 20 rpm")
+    data = replace(data, conditions=tuple(replace(c, name=n) for c, n in zip(data.conditions, names, strict=False)))
+    for text, places in (("10 rpm", {0, 1}), ("5 deg", {1}), ("-5 deg", {2}), ("20", {2}), ("A.speed=4", {1})):
+        assert held_out(four_bar, data, text) == ({names[k] for k in places}, 0.0)
 
 
 def test_conditions_that_disagree_make_it_wider(four_bar: trunnion.Mechanism, torque: True_) -> None:

@@ -258,3 +258,12 @@ def test_negative_sensitivity_is_read_back(mechanism: Mechanism, seen: Observati
     down.write(tmp_path)
     read = trunnion.rig.read(tmp_path / "mapping.yaml").conditions[0].courses["T1"]
     assert read.mean.mean() == pytest.approx(seen.measurement(360).conditions[0].courses["T1"].mean.mean(), abs=0.02)
+
+
+def test_clipped_readings_and_lost_pulses_are_told(mechanism: Mechanism) -> None:
+    sensors = SENSORS | {"T1": SENSORS["T1"] | {"range": "1 N m"}}
+    found = trunnion.rig.observe(mechanism, rig(sensors=sensors, encoder={"per_turn": 360, "kind": "level"}))
+    told = {one.where: one.what for one in found.findings}
+    assert "readings are clipped" in told["sensors.T1.range"]
+    assert "pulses are lost" in told["encoder.kind"]
+    assert np.max(np.abs(next(found.records()).columns["T1"])) <= 1.0

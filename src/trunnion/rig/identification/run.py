@@ -21,7 +21,6 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.measures.measures import Measure, named
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.identification.findings import findings_of
 from trunnion.rig.identification.fit import (
     EFFICIENCY,
     FILE_ZERO,
@@ -152,8 +151,7 @@ def identify(
     other_speed = any(apart(condition.speed, cycle.speed) for condition, cycle in zip(conditions, cycles, strict=True))
     causes = _causes(fit, begin, spread.test.reduced) if spread.test.misfit and not other_speed else []
     groups = inseparable(fit, best.x, spread)
-    identified = Identified(mechanism, measurement, fit, best, spread, groups, causes, encoder)
-    return dataset(identified, findings_of(identified))
+    return dataset(Identified(mechanism, measurement, fit, best, spread, groups, causes, encoder))
 
 
 # ---- the data -------------------------------------------------------------------------------------------------
@@ -199,13 +197,13 @@ def _blocks(
 def _efficiency(condition: Condition, joints: Mapping[str, str]) -> tuple[Signal, dict[str, float]]:
     """The efficiency of each turn as a course of one position, and what the errors of its sensors do to it."""
     efficiency, effects = efficiency_of(condition, joints), dict[str, float]()
-    for one in efficiency.contributions:
-        accuracy = condition.courses[one.channel].accuracy if one.channel in condition.courses else Accuracy()
-        if one.source == "gain":
-            effects[f"gain of {one.channel}"] = one.sensitivity * one.input
-        elif one.source == "zero":
-            effects[f"zero of {one.channel}"] = one.sensitivity * shared_zero(accuracy)
-            effects[f"{FILE_ZERO} of {one.channel}"] = one.sensitivity * accuracy.own
+    for term in efficiency.contributions:
+        accuracy = condition.courses[term.channel].accuracy if term.channel in condition.courses else Accuracy()
+        if term.source == "gain":
+            effects[f"gain of {term.channel}"] = term.sensitivity * term.input
+        elif term.source == "zero":
+            effects[f"zero of {term.channel}"] = term.sensitivity * shared_zero(accuracy)
+            effects[f"{FILE_ZERO} of {term.channel}"] = term.sensitivity * accuracy.own
     return Signal(EFFICIENCY, "efficiency:cycle", "1", efficiency.per_turn[:, None]), effects
 
 
@@ -220,29 +218,31 @@ def held_out(mechanism: Mechanism, measurement: Measurement, hold_out: HoldOut) 
             what = f"a share of {hold_out:g} of the turns cannot be held out"
             raise MechanismError(Finding(what, "hold_out", "give a share between 0 and 1, or names of conditions"))
         return frozenset(), float(hold_out)
-    conditions, held = measurement.conditions, set[str]()
+    conditions, picked = measurement.conditions, set[str]()
     for text in [hold_out] if isinstance(hold_out, str) else hold_out or ():
         exact, parts, part = set[str](), set[str](), text.strip()
         name, equals, value = (item.strip() for item in text.partition("="))
-        for one in conditions:
-            if text in (one.name, *(end for file in one.files for end in (PurePath(file).stem, PurePath(file).name))):
-                exact.add(one.name)
-            elif part and re.search(rf"(?<![\w.-]){re.escape(part)}(?![\w.-])", one.name):
-                parts.add(one.name)
+        for condition in conditions:
+            files = [PurePath(file) for file in condition.files]
+            if text in (condition.name, *(file.name for file in files), *(file.stem for file in files)):
+                exact.add(condition.name)
+            elif part and re.search(rf"(?<![\w.-]){re.escape(part)}(?![\w.-])", condition.name):
+                parts.add(condition.name)
             elif equals:
-                path, settings = mechanism.path_of(name), {mechanism.path_of(key): v for key, v in one.values.items()}
+                path = mechanism.path_of(name)
+                settings = {mechanism.path_of(key): setting for key, setting in condition.values.items()}
                 number: float | str = value
                 with suppress(ValueError):  # with a unit
                     number = float(value)
                 stated = float(np.ravel(mechanism.with_values({path: number}).parameters()[path])[0])
                 if np.isclose(settings.get(path, np.nan), stated, rtol=SAME, atol=0):
-                    exact.add(one.name)
+                    exact.add(condition.name)
         if not exact | parts:
             names = "; ".join(condition.name for condition in conditions[:MOST_NAMED])
             remedy = f"name one of {names}{'; …' * (len(conditions) > MOST_NAMED)}; or a file, or NAME=VALUE"
             raise MechanismError(Finding(f"there is no condition '{text}'", "hold_out", remedy))
-        held |= exact or parts
-    return frozenset(held), 0.0
+        picked |= exact or parts
+    return frozenset(picked), 0.0
 
 
 # ---- the model ------------------------------------------------------------------------------------------------
@@ -295,9 +295,9 @@ def _acted_on(model: Model) -> dict[str, Measure]:
     """The channels that an unknown acts on, as far as the start shows; all if there are none."""
     courses = model.courses(np.array([unknown.start for unknown in model.unknowns]))
     sizes, moved = np.array([unknown.size or 1.0 for unknown in model.unknowns])[:, None], dict[str, Measure]()
-    for name, one in (pair for said in courses.said for pair in said.items()):
-        most = float(np.nanmax(np.abs(one.value), initial=0.0)) or 1.0
-        if np.nanmax(np.abs(np.nan_to_num(one.slope)) * sizes, initial=0.0) > NOTHING * most:
+    for name, course in (pair for row in courses.said for pair in row.items()):
+        most = float(np.nanmax(np.abs(course.value), initial=0.0)) or 1.0
+        if np.nanmax(np.abs(np.nan_to_num(course.slope)) * sizes, initial=0.0) > NOTHING * most:
             moved[name] = model.measures[name]
     return {name: measure for name, measure in model.measures.items() if name in moved} or dict(model.measures)
 

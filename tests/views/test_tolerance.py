@@ -16,8 +16,8 @@ from matplotlib.text import Text
 from stand_in_tolerances import CASES, LIMIT, QUANTILES, gap, toleranced
 
 import trunnion
-from trunnion.cli.result import check_files
-from trunnion.cli.tolerance import shown_of
+from trunnion.cli.options import Files, Model
+from trunnion.cli.result import Shown, check_files
 from trunnion.errors import MechanismError
 from trunnion.results.export import save as export
 from trunnion.views.allocation import PriceCurve, tolerance_cost, trade_off
@@ -301,13 +301,16 @@ def test_corners_indices_and_failures_are_told():
 
 
 def test_files_are_refused_before_anything_is_computed(tmp_path):
-    check_files([tmp_path / "a.csv", tmp_path / "a.svg"], tmp_path / "a.html")
+    check_files(Files([tmp_path / "a.csv", tmp_path / "a.svg"], tmp_path / "a.html"))
     check_kind("histogram", KINDS)
     for check, what in (
-        (lambda: check_files([tmp_path / "a.xyz"]), "cannot write a result as '.xyz'"),
-        (lambda: check_files([tmp_path / "a.svg"], drawn=False), "cannot write a result as '.svg'"),
-        (lambda: check_files([], tmp_path / "a.txt"), "a report is HTML"),
-        (lambda: check_files([tmp_path / "a.contributions.csv"], of="tolerance"), "there is no table 'contributions'"),
+        (lambda: check_files(Files([tmp_path / "a.xyz"])), "cannot write a result as '.xyz'"),
+        (lambda: check_files(Files([tmp_path / "a.svg"]), drawn=False), "cannot write a result as '.svg'"),
+        (lambda: check_files(Files(report=tmp_path / "a.txt")), "a report is HTML"),
+        (
+            lambda: check_files(Files([tmp_path / "a.contributions.csv"]), "tolerance"),
+            "there is no table 'contributions'",
+        ),
         (lambda: check_kind("pie", KINDS), "there is no figure 'pie'"),
     ):
         with pytest.raises(MechanismError, match=what):
@@ -319,10 +322,11 @@ def test_the_verb_writes_what_is_asked_for(tmp_path, capsys):
     out = [tmp_path / name for name in ("t.csv", "t.parameters.csv", "t.nc", "t.json", "t.svg", "t.pdf")]
     result, page = toleranced(24, 500), tmp_path / "t.html"
     with pytest.raises(typer.Exit):
-        shown_of(result, "Four-bar", tmp_path / "none.yaml", out, True, "histogram", page).finish()
+        Shown(result, Model(tmp_path / "none.yaml"), Files(out, page, units_row=True), "measures",
+              drawn={"kind": "histogram"}, tables=tables(result)).finish()  # fmt: skip
     assert {path.name for path in tmp_path.iterdir()} == {*(path.name for path in out), "t.html"}
     told = capsys.readouterr().out
-    assert told.startswith("Four-bar\nangle-error: angle of rocker")
+    assert told.startswith("Four-bar with tolerances\nangle-error: angle of rocker")
     assert "wrote " in told
     assert json.loads((tmp_path / "t.json").read_text())["attrs"]["seed"] == 1
 

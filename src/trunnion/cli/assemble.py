@@ -5,40 +5,30 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Annotated
 
-import typer
+from typer import Option
 
-from trunnion.cli.model import lines_of, stated
-from trunnion.cli.options import File, Out, Report, Set, Steps, TableUnits, Units, UnitsRow
+from trunnion.cli.files import verb
+from trunnion.cli.options import Files, Model, Steps
 from trunnion.cli.result import Shown, check_files
 from trunnion.cli.terminal import bar
 
 __all__ = ["assemble"]
 
-
-class Uniform(StrEnum):
-    """What has one and the same clearance where the smallest is looked for."""
-
-    PINS = "pins"
-    ALL = "all"
+Uniform = StrEnum("Uniform", ["pins", "all"])
 
 
+@verb(lacks="table friction seat columns")
 def assemble(
-    file: File,
-    steps: Steps = 360,
-    set_: Set = None,
+    model: Model, files: Files, steps: Steps = 360,
     uniform: Annotated[
-        Uniform, typer.Option("--uniform", help="Joints with one common clearance: pins, or all kinds of play.")
-    ] = Uniform.PINS,
-    out: Out = None,
-    report: Report = None,
-    units_row: UnitsRow = False,
-    units: Units = TableUnits.si,
-) -> None:
+        Uniform, Option("--uniform", help="Joints with one common clearance: pins, or all kinds of play.")
+    ] = Uniform.pins,
+) -> None:  # fmt: skip
     """Clearance needed to assemble a linkage with axis errors."""
     from trunnion.studies.assembly import assemble as run
 
-    check_files(out or [], report)
-    mechanism = stated(file, set_)
-    with lines_of(file), bar("positions", steps, least=1000) as progress:
-        result = run(mechanism, steps, uniform.value, progress)
-    Shown(result, file, ["assembly"], out or [], report, units_row, units=units).finish()
+    check_files(files)
+    mechanism = model.read()
+    with model.lines(), bar("positions", steps, least=1000) as progress:
+        result = run(mechanism, steps, uniform.value, progress)  # type: ignore[arg-type]  # it checks it
+    Shown(result, model, files, "assembly").finish()

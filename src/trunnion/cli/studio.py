@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-from trunnion.cli.terminal import console
+from trunnion.cli.files import verb
+from trunnion.cli.terminal import line
 from trunnion.errors import Finding, MechanismError
 
 __all__ = ["studio"]
@@ -17,6 +18,7 @@ __all__ = ["studio"]
 USUAL = 8765
 
 
+@verb()
 def studio(
     file: Annotated[Path | None, typer.Argument(help="Model to open, or the folder of models.")] = None,
     port: Annotated[
@@ -38,8 +40,8 @@ def studio(
     folder, opened = (path, None) if path.is_dir() else (path.parent, path.name)
     bound = _usual() if port is None else _bound(port)
     own = Studio(folder, opened, bound.getsockname()[1], forms=forms())
-    for line in (f"studio: {own.address}", "It answers this machine alone. Ctrl-C ends it."):
-        console().print(line, markup=False, highlight=False, soft_wrap=True)
+    line(f"studio: {own.address}")
+    line("It answers this machine alone. Ctrl-C ends it.")
     if open_:
         import webbrowser
 

@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import Finding, Severity
-from trunnion.results.attributes import Described, attribute
 from trunnion.results.quantities import parts
 
 if TYPE_CHECKING:
     from trunnion.results.figure import Figure
 
-__all__ = ["bar", "console", "say", "say_missed", "show_figures", "show_rows", "wrote"]
+__all__ = ["bar", "console", "line", "say", "show_figures", "show_rows", "wrote"]
 
 # notes that nearly every result has: they are left to the report and to `check`
 QUIET = frozenset({"model.gravity", "samples.engine", "simulate.centred"})
@@ -29,9 +28,14 @@ def console() -> Any:
     return Console(emoji=False)  # else `effort:O:` has a circle
 
 
+def line(text: str = "", style: str = "") -> None:
+    """Print a text as it is, on one line however long."""
+    console().print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+
+
 def wrote(path: Path) -> None:
     """Tell of a file that is written."""
-    console().print(f"wrote {path}", markup=False, highlight=False, soft_wrap=True)
+    line(f"wrote {path}")
 
 
 def show_figures(title: str, figures: Sequence[Figure]) -> None:
@@ -144,12 +148,6 @@ def _broken(text: str, width: int, length: Callable[[str], int]) -> str:
         else:
             lines.append(word)
     return "\n".join(lines)
-
-
-def say_missed(result: Described) -> None:
-    """What of the limits is not kept, before anything else."""
-    for line in attribute(result, "missed"):
-        console().print(line, style="bold", markup=False, highlight=False, soft_wrap=True)
 
 
 def say(findings: Iterable[Finding], every: bool = False) -> None:

@@ -129,6 +129,21 @@ def test_one_mistake_is_found_where_it_is(mistake: Mistake, case: tuple[Any, ...
     mistake(VARIED, case)
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"AD": {"group": "g"}, "CD": {"group": "g"}}, "'g' \\(CD, AD\\) has no choice in common"),
+        ({"BC": {"group": "bores", "least": "1 mm"}}, "bounds of the group 'bores' \\(AB, BC\\) exclude one another"),
+    ],
+)
+def test_members_of_a_group_can_be_alike(varied: Mechanism, changes: dict[str, dict[str, str]], said: str) -> None:
+    data = varied.data()
+    for name, change in changes.items():
+        data["costs"][name] |= change
+    with pytest.raises(MechanismError, match=said):
+        Mechanism(**data)
+
+
 def test_a_cost_of_what_varies_as_measured_is_doubted(varied: Mechanism, tmp_path: Path) -> None:
     path = tmp_path / "sample.csv"
     path.write_text("0.01\n0.02\n", encoding="utf-8")

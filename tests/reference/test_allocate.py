@@ -321,6 +321,8 @@ def test_what_cannot_be_asked() -> None:
     ):
         with pytest.raises(MechanismError, match=text):
             trunnion.allocate(model, **options)
+    with pytest.raises(MechanismError, match="no continuous choice"):
+        trunnion.allocate(trunnion.read(EXAMPLES / "fourbar-by-grades.yaml"), choice="continuous")
     with pytest.raises(MechanismError, match="no tolerance has a cost"):
         trunnion.allocate(fourbar(costs={}))
     with pytest.raises(MechanismError, match="no measure is stated"):

@@ -11,9 +11,8 @@ from allocations import FOUR_BAR, PRICES, bought, four_bar, random_costs, rocker
 from numpy.typing import NDArray
 from scipy.optimize import NonlinearConstraint, minimize
 
-from trunnion.errors import MechanismError
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation.problem import AllocationProblem, Answer, Contribution, Criterion, RowEffects
+from trunnion.studies.allocation.problem import AllocationProblem, Answer, Criterion, RowEffects
 from trunnion.studies.allocation.solve import solve, trade_off
 
 Array = NDArray[np.float64]
@@ -197,19 +196,6 @@ def test_what_cannot_be_met_says_where_and_by_how_much() -> None:
     fixed = (replace(problem.contributions[0], cost=None, value=0.5), *problem.contributions[1:])
     said = str(solve(replace(problem, contributions=fixed)).findings[0])
     assert "first narrow 'l1', which has no cost" in said
-
-
-@pytest.mark.parametrize(
-    ("contribution", "said"),
-    [
-        (Contribution("a", cost=Cost("power", {"B": 1.0, "k": -1.0, "unit": 1.0})), "'k' is -1"),
-        (Contribution("a", cost=Cost("power", {"B": 1.0, "k": 1.0, "unit": 1.0}), least=2, most=1), "do not agree"),
-        (Contribution("a", value=1.0), "no tolerance has a cost"),
-    ],
-)
-def test_what_is_no_problem_is_refused(contribution: Contribution, said: str) -> None:
-    with pytest.raises(MechanismError, match=said):
-        solve(AllocationProblem((contribution,), rows(np.ones((1, 1)), 1.0)))
 
 
 def test_a_tolerance_that_nothing_limits_is_refused() -> None:

@@ -194,7 +194,7 @@ def test_processes_meet_a_yield_at_least_cost() -> None:
     rng = np.random.default_rng(2)
     parts = tuple(Contribution(f"p{i}", options=random_options(rng, 6)) for i in range(4))
     problem = AllocationProblem(parts, rows(rng.normal(size=(5, 4)), 0.12), "yield")
-    answer = solve(problem, "discrete", 0.95, sampled(problem, count=100_000))
+    answer = solve(problem, 0.95, sampled(problem, count=100_000))
     assert answer.sampled is not None
     assert answer.sampled.share >= 0.95
     assert not answer.findings

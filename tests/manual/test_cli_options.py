@@ -11,9 +11,9 @@ import trunnion
 from manual.conftest import Run
 from manual.test_cli import EXAMPLES
 from trunnion import MechanismError
+from trunnion.cli.built import tolerance
 from trunnion.cli.files import flags_of
 from trunnion.cli.options import PLOT_KINDS, over, points
-from trunnion.cli.tolerance import tolerance
 from trunnion.views.cycle.plots import PLOTS
 
 TOLERANCED = EXAMPLES / "toleranced-fourbar.yaml"

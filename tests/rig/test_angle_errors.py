@@ -13,7 +13,7 @@ import pytest
 
 import trunnion
 from measured_data.four_bar import FOUR_BAR, rocker
-from trunnion.cli.identify import estimated
+from trunnion.cli.measured import estimated
 from trunnion.rig.reading.measurement import Accuracy
 from trunnion.rig.reading.read import read_measured
 from trunnion.views.identify import sensors

@@ -6,35 +6,18 @@ Exit status: 0 fine, 1 findings (cannot be assembled somewhere, locks, dead cent
 from __future__ import annotations
 
 import sys
-from enum import StrEnum
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer import Argument, Option
 from typer.core import TyperGroup
 
-from trunnion.cli.allocate import allocate
-from trunnion.cli.analyse import analyse, design, plot, report
-from trunnion.cli.assemble import assemble
-from trunnion.cli.check import check
-from trunnion.cli.compare import compare
-from trunnion.cli.data import data
+from trunnion.cli.built import allocate, assemble, play, tolerance
 from trunnion.cli.edge import status_of
 from trunnion.cli.exchange import export, import_
-from trunnion.cli.files import verb
-from trunnion.cli.identify import identify
-from trunnion.cli.locking import locking
-from trunnion.cli.play import play
-from trunnion.cli.result import write_text
-from trunnion.cli.rig import rig
-from trunnion.cli.simulate import simulate
-from trunnion.cli.studio import studio
+from trunnion.cli.measured import compare, data, identify, rig
+from trunnion.cli.model import check, examples, schema, studio
+from trunnion.cli.motion import analyse, design, locking, plot, report, simulate
 from trunnion.cli.sweep import sweep
-from trunnion.cli.terminal import line, wrote
-from trunnion.cli.tolerance import tolerance
-from trunnion.errors import Finding, MechanismError
-from trunnion.files import folder
 from trunnion.version import __version__
 
 GROUPS = {
@@ -100,61 +83,6 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-
-
-FileKind = StrEnum("FileKind", ["model", "data"])  # files that have a JSON Schema
-
-
-@verb()
-def examples(
-    name: Annotated[str | None, Argument(help="Example to copy; without it, all are listed.")] = None,
-    to: Annotated[Path, Option("--to", help="Folder to copy it into.")] = Path(),
-    force: Annotated[bool, Option("--force", help="Overwrite a file of that name.")] = False,
-) -> None:
-    """List the example models, rigs and drawings, or copy one."""
-    from trunnion.files import whole
-
-    here = Path(__file__).resolve().parent.parent
-    place = here / "examples" if (here / "examples").is_dir() else here.parents[1] / "examples"  # of the source tree
-    paths = {path.stem: path for kind in ("*.yaml", "rig/*-rig.yaml", "*.step") for path in sorted(place.glob(kind))}
-    for path in paths.values() if name is None else ():
-        texts = path.read_text("utf-8").splitlines()
-        drawing = "a drawing for `trunnion import`" if path.suffix == ".step" else ""
-        line(f"{path.stem:<28} {next((text[5:].strip() for text in texts if text.startswith('name:')), drawing)}")
-    if name is None:
-        return
-    source = paths.get(name.removesuffix(".yaml").removesuffix(".step"))
-    if source is None:
-        raise MechanismError(Finding(f"there is no example '{name}'", remedy=f"use one of {', '.join(paths)}"))
-    folder(to)
-    target = to / source.name
-    if target.exists() and not force:
-        raise MechanismError(Finding("exists already", str(target), "use --force to overwrite it"))
-    with whole(target) as temporary:
-        temporary.write_bytes(source.read_bytes())
-    wrote(target)
-
-
-@verb()
-def schema(
-    of: Annotated[
-        FileKind, Option("--of", help="File: model, or data for the mapping of measured data.")
-    ] = FileKind.model,
-    out: Annotated[Path | None, Option("--out", "-o", help="Write it to a file.")] = None,
-) -> None:
-    """Print the JSON Schema of model or mapping file, for editors."""
-    if of is FileKind.data:
-        from trunnion.rig.reading.mapping import schema_text
-
-        text = schema_text()
-    else:
-        from trunnion.model.schema import SCHEMA_FILE
-
-        text = SCHEMA_FILE.read_text("utf-8")
-    if out is None:
-        print(text, end="")
-    else:
-        write_text(text, out)
 
 
 for function in (

@@ -9,15 +9,11 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, Union, get_args, get_origin
 
-from trunnion.cli.allocate import allocate
-from trunnion.cli.assemble import assemble
-from trunnion.cli.compare import compare
+from trunnion.cli.built import allocate, assemble, play, tolerance
 from trunnion.cli.files import options_of
-from trunnion.cli.identify import identify
-from trunnion.cli.play import play
-from trunnion.cli.simulate import simulate
+from trunnion.cli.measured import compare, identify
+from trunnion.cli.motion import simulate
 from trunnion.cli.sweep import sweep
-from trunnion.cli.tolerance import tolerance
 
 __all__ = ["forms"]
 

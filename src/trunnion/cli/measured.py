@@ -1,27 +1,164 @@
-"""`trunnion identify`: numbers of the model from measured data, with what they are worth."""
+"""`trunnion rig`, `data`, `compare` and `identify`: data of test rigs, and the model beside them."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from typer import Option
+import typer
+from typer import Argument, Option
 
 from trunnion.cli.files import verb
-from trunnion.cli.options import DataFiles, Files, Force, MappingFile, Model, Write, setting
-from trunnion.cli.result import Shown, check_files, check_model
-from trunnion.cli.terminal import bar
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.cli.options import DATA, DataFiles, Files, Force, MappingFile, Model, Seed, Write, setting
+from trunnion.cli.result import Shown, check_files, check_model, exit_status, show_tables, write_text
+from trunnion.cli.terminal import bar, line, say, wrote
+from trunnion.errors import Finding, MechanismError, Severity, counted
 from trunnion.results.attributes import findings_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from trunnion.model.mechanism import Mechanism
+    from trunnion.rig.virtual.observe import Observation
 
-__all__ = ["estimated", "identify"]
+__all__ = ["compare", "data", "estimated", "identify", "rig"]
 
-MOST_ROWS = 24
+
+# ---- rig -------------------------------------------------------------------------------------------------------------
+
+FEWEST = 20  # conditions from which a progress bar is worth it
+MOST_COMPARED, MOST_IDENTIFIED = 40, 24  # rows of the tables that are printed
+
+
+@verb()
+def rig(
+    model: Model,
+    rig_file: Annotated[Path, Argument(help="Rig file: YAML, JSON or TOML.")],
+    out: Annotated[
+        Path | None, Option("--out", "-o", help="Folder for data files, mapping.yaml and truth.yaml.")
+    ] = None,
+    format_: Annotated[str, Option("--format", help="csv, parquet or tdms; default: as stated in the rig file.")] = "",
+    seed: Seed = 1,
+) -> None:
+    """Virtual test rig: write simulated data files.
+
+    Without --out the rig file is only checked.
+    """
+    from trunnion.model.file import read_entries
+    from trunnion.rig.reading.rig_file import Rig, placed_in_rig
+    from trunnion.rig.virtual.files import check_folder, check_form
+    from trunnion.rig.virtual.observe import observe
+
+    if format_:
+        check_form(format_)
+    if "trunnion-rig" in read_entries(model.file)[0]:
+        raise MechanismError(
+            Finding("is a rig file", remedy="name the model first, then the rig", file=str(model.file))
+        )
+    mechanism = model.read()
+    stated = Rig.read(rig_file)
+    if out and not format_:
+        check_form(stated.format)
+    count = len(stated.schedule.rows())
+    with model.lines():
+        try:
+            if out:
+                check_folder(stated, out, format_)
+            with bar("conditions", count, least=FEWEST) as progress:
+                observation = observe(mechanism, stated, seed, progress)
+        except MechanismError as error:  # findings about the rig bear the line of its file
+            raise MechanismError(placed_in_rig(error.findings, rig_file)) from None
+    _about(observation)
+    if out:
+        with bar("files", len(observation.cases), least=FEWEST) as progress:
+            names = observation.write(out, format_, progress)
+        wrote(out)
+        first, last, *_ = (*names[:1], *names[-3:-2])
+        span = first if first == last else f"{first} … {last}"
+        line(f"  {span}, {', '.join(names[-2:])}")
+    say(placed_in_rig(observation.findings, rig_file))
+    raise typer.Exit(exit_status(observation.findings) or int(bool(observation.skipped)))
+
+
+def _about(observation: Observation) -> None:
+    """What is recorded: conditions, turns, samples."""
+    conditions = len(observation.cases)
+    rows = max(case.rows for case in observation.cases)
+    line(observation.rig.name or "Test rig", "bold")
+    texts = (
+        observation.mechanism.name or "no name",
+        f"{counted(conditions, 'condition')} of {counted(observation.rig.schedule.turns, 'cycle')}",
+        f"{observation.rate:g} samples a second",
+        counted(observation.rows, "row") + (f", at most {rows:,} a file" if conditions > 1 else ""),
+    )
+    line("; ".join(texts))
+
+
+# ---- data ------------------------------------------------------------------------------------------------------------
+
+
+@verb(lacks="report units columns", out=DATA)
+def data(
+    mapping: Annotated[Path, typer.Argument(help="Mapping file: YAML, JSON or TOML.")],
+    shared: Files,
+    files: Annotated[
+        list[Path] | None, typer.Argument(help="Data files instead of those it names: .csv .parquet .tdms.")
+    ] = None,
+) -> None:
+    """Read measured files: conditions, channels, scatter, faults."""
+    from trunnion.results.export import save
+    from trunnion.rig.reading.measurement import dataset
+    from trunnion.rig.reading.read import read_measured
+    from trunnion.views.measured import tables
+
+    check_files(shared, drawn=False)
+    measurement = read_measured(mapping, files)
+    show_tables("", tables(measurement))
+    for text in ["", *measurement.done] if measurement.done else []:
+        line(text)
+    for path in shared.out or ():
+        save(dataset(measurement), path, shared.units_row)
+        wrote(path)
+    say(measurement.findings)
+    raise typer.Exit(int(any(finding.severity is not Severity.NOTE for finding in measurement.findings)))
+
+
+# ---- compare ---------------------------------------------------------------------------------------------------------
+
+
+@verb(lacks="units columns")
+def compare(
+    model: Model, mapping: MappingFile, files: Files, data: DataFiles = None,
+    channel: Annotated[
+        list[str] | None, Option("--channel", help="A channel by its name in the mapping. Repeatable.")
+    ] = None,
+    condition: Annotated[str | None, Option("--condition", help="The condition to draw.")] = None,
+    kind: Annotated[str | None, Option("--kind", help="Figure of --out: efficiency or overlay.")] = None,
+) -> None:  # fmt: skip
+    """Compare a model with measured data: residual, bias, verdict.
+
+    Every channel, and the efficiency as a test rig determines it. Exit status 0 if all agree within the expanded
+    uncertainty, 1 if not or if that is undecided.
+    """
+    from trunnion.rig.comparison import compare as run
+    from trunnion.rig.reading.read import read_measured
+    from trunnion.rig.reading.timebase import gathered
+    from trunnion.views.compare import tables
+
+    check_files(files, "comparison", kind)
+    mechanism = model.read()
+    measurement = read_measured(mapping, [str(path) for path in data] if data else None)
+    with model.lines(), bar("conditions", len(measurement.conditions)) as progress:
+        result = run(mechanism, measurement, channel, progress=progress)
+    errors = exit_status([*measurement.findings, *findings_of(result)])
+    Shown(
+        result, model, files, "assembly measures", tables=tables(result), most=MOST_COMPARED, rest="FILE.figures.csv",
+        drawn={"kind": kind, "condition": condition, "channel": channel[0] if channel and len(channel) == 1 else None},
+        others=gathered(measurement.findings),
+    ).finish(int(not result.attrs["all_within"] or errors))  # fmt: skip
+
+
+# ---- identify --------------------------------------------------------------------------------------------------------
 
 
 @verb(lacks="units columns")
@@ -80,7 +217,7 @@ def identify(
         finding for finding in measurement.findings if finding.severity is not Severity.NOTE or finding.where == "files"
     )
     shown = Shown(result, model, files, "assembly measures", drawn={"kind": kind}, tables=tables(result),
-                  most=MOST_ROWS, rest="FILE.residuals.csv", others=others)  # fmt: skip
+                  most=MOST_IDENTIFIED, rest="FILE.residuals.csv", others=others)  # fmt: skip
     shown.write()
     findings = findings_of(result)
     if write is not None:
@@ -164,7 +301,6 @@ def _check_mapping(write: Path | None, mapping: Path, force: bool) -> None:
 
 def _write_mapping(result: xr.Dataset, mapping: Path, write: Path, written: list[Path]) -> list[Finding]:
     """The mapping with the zeros that were found, beside the data that it names."""
-    from trunnion.cli.result import write_text
     from trunnion.model.file import read_entries
     from trunnion.model.rewrite import changed_text
     from trunnion.rig.identification import corrected_mapping

@@ -1,4 +1,4 @@
-"""`trunnion analyse`, `plot`, `report` and `design`: a cycle as numbers, pictures and a page, and its design values."""
+"""`trunnion analyse`, `simulate`, `locking`, `design`, `plot`, `report`: motion and forces, in numbers and pictures."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ from trunnion.cli.options import (
     Picture,
     Steps,
     Uncut,
+    seconds,
 )
 from trunnion.cli.result import Shown, check_files, check_page, end, exit_status, write_text
-from trunnion.cli.terminal import bar, show_figures, show_rows, wrote
+from trunnion.cli.terminal import bar, line, show_figures, show_rows, wrote
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.files import folder
 from trunnion.results.attributes import findings_of
@@ -34,7 +35,10 @@ if TYPE_CHECKING:
     from trunnion.results.result import Result
     from trunnion.solve.friction_method import FrictionMethod
 
-__all__ = ["analyse", "design", "plot", "report"]
+__all__ = ["analyse", "design", "locking", "plot", "report", "simulate"]
+
+
+# ---- analyse ---------------------------------------------------------------------------------------------------------
 
 
 @verb(out=DATA)
@@ -174,3 +178,111 @@ def _page(mechanism: Mechanism, analysed: Result, uncut: bool) -> str:
     result = analysed.dataset
     shown = whole_peaks(with_worst_case(result, mechanism), uncut)
     return page(shown, _ideal(mechanism, result.sizes["position"]))
+
+
+# ---- simulate --------------------------------------------------------------------------------------------------------
+
+PERCENT = 100
+EVALUATIONS = 2_000_000  # as `simulate` has it
+
+
+@verb(lacks="seat columns")
+def simulate(
+    model: Model, files: Files,
+    time: Annotated[
+        str | None, Option("--time", help="Duration, as 2s or 300ms; default: ten cycles of the stated motion.")
+    ] = None,
+    steps: Annotated[int, Option("--steps", help="Equal intervals of time in the result.")] = 1000,
+    tolerance: Annotated[float, Option("--tolerance", help="Relative tolerance of the integration.")] = 1e-9,
+    steady: Annotated[
+        bool, Option("--steady", help="The cycle that the motion comes to repeat, as `analyse` gives a cycle.")
+    ] = False,
+    evaluations: Annotated[
+        int, Option("--evaluations", help="Evaluations of the forces, after which the motion ends.")
+    ] = EVALUATIONS,
+    kind: Annotated[
+        str | None,
+        Option("--kind",
+               help="Figure to write: sheet, speed, effort, reactions, energy, phase; in play contacts, gaps, orbit, "
+               "spectrum; of a steady cycle those of `trunnion plot`."),
+    ] = None,
+) -> None:  # fmt: skip
+    """Motion in time: start-up, run-down, rest, locking, pins in play.
+
+    The motion of drivers that are free or have a motor, with friction, stick and slip, forces, energy and events.
+    """
+    from trunnion.dynamics.opened import in_play
+    from trunnion.dynamics.simulate import simulated
+    from trunnion.dynamics.steady_cycle import UnsteadyError
+
+    of = "cycle" if steady else "motion"
+    check_files(files, of, kind if files.out else None)
+    duration = seconds(time, "--time", "2s")
+    mechanism = model.read()
+    if files.out and not in_play(mechanism):
+        _check_without_play(files, of, kind)
+    with model.lines(), bar("%", PERCENT) as progress:
+        reached = None if progress is None else lambda share: progress(int(PERCENT * share))
+        try:
+            result = simulated(mechanism, duration, steps, tolerance, reached, steady, evaluations)
+        except UnsteadyError as unsteady:
+            end(unsteady.findings, model.file, "drivers")
+    Shown(result, model, files, "drivers", drawn={"kind": kind}).finish()
+
+
+def _check_without_play(files: Files, of: str, kind: str | None) -> None:
+    """MechanismError for a table or figure of contacts, of which there are none without joints in play."""
+    from trunnion.results.tables import check_table
+
+    for path in files.out or ():
+        check_table(path, of, in_play=False)
+    if kind:
+        from trunnion.views.motion.figure import check_contacts
+
+        check_contacts(kind, in_play=False)
+
+
+# ---- locking ---------------------------------------------------------------------------------------------------------
+
+MOST_RANGES = 24  # rows of the table of ranges
+
+
+@verb(lacks="report")
+def locking(
+    model: Model, files: Files, steps: Steps = 360,
+    near: Annotated[
+        float, Option("--near", help="Locking margin below which a position counts as near locking.")
+    ] = 1.5,
+) -> None:  # fmt: skip
+    """Margin against locking by friction; backdriving.
+
+    The margin for the friction of all joints and of each joint alone, and the ranges of the drive in which the
+    mechanism locks, is near locking, is self-locking or can be backdriven.
+    """
+    from trunnion.cycle.locking import look, report_figures
+    from trunnion.cycle.locking_course import HEAD
+    from trunnion.results.attributes import attribute
+    from trunnion.solve.run import prepare
+
+    check_files(files)
+    files.columns = files.columns or ["locking"]
+    mechanism = model.read()
+    with model.lines():
+        run = prepare(mechanism)
+        with bar("positions", steps, least=200_000) as progress:
+            result = look(run, steps, progress, near)
+    figures = report_figures(run)
+
+    def show() -> None:
+        show_figures(mechanism.name or str(model.file), figures)
+        if not mechanism.drivers:
+            return
+        line()
+        ranges = attribute(result, "locking_ranges", "{}")
+        title = f"ranges of {ranges['of']}".removesuffix(" of ") + ", pins centred" * bool(run.seats)
+        rows = [row["cells"] for row in ranges["rows"]]  # in the order of the cycle; those near locking last
+        show_rows(title, list(HEAD), rows[:MOST_RANGES])
+        if len(rows) > MOST_RANGES:
+            line(f"{len(rows) - MOST_RANGES} more ranges; --out has every position")
+
+    Shown(result, model, files, "assembly", drawn={"kind": "locking"}, show=show).finish()

@@ -1,10 +1,11 @@
-"""`trunnion allocate`: the tolerances and plays of least cost that keep the limits of measures."""
+"""`trunnion assemble`, `play`, `tolerance` and `allocate`: mechanisms as they are built."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Option
 
@@ -14,19 +15,23 @@ from trunnion.cli.options import (
     IMAGES,
     WRITTEN,
     At,
+    Engine,
     Files,
     Force,
     Jobs,
     Measures,
     Model,
+    OnePosition,
+    Samples,
     Seed,
     Steps,
+    Uncut,
     Write,
+    named_file,
     share,
 )
 from trunnion.cli.result import Shown, check_files, check_model, exit_status
 from trunnion.cli.terminal import bar, line
-from trunnion.cli.tolerance import SECTIONS
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import findings_of
 
@@ -35,10 +40,125 @@ if TYPE_CHECKING:
 
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["allocate"]
+__all__ = ["allocate", "assemble", "play", "tolerance"]
+
+
+# ---- assemble --------------------------------------------------------------------------------------------------------
+
+Uniform = StrEnum("Uniform", ["pins", "all"])
+
+
+@verb(lacks="table friction seat columns")
+def assemble(
+    model: Model, files: Files, steps: Steps = 360,
+    uniform: Annotated[
+        Uniform, Option("--uniform", help="Joints with one common clearance: pins, or all kinds of play.")
+    ] = Uniform.pins,
+) -> None:  # fmt: skip
+    """Clearance needed to assemble a linkage with axis errors."""
+    from trunnion.studies.assembly import assemble as run
+
+    check_files(files)
+    mechanism = model.read()
+    with model.lines(), bar("positions", steps, least=1000) as progress:
+        result = run(mechanism, steps, uniform.value, progress)  # type: ignore[arg-type]  # it checks it
+    Shown(result, model, files, "assembly").finish()
+
+
+# ---- play ------------------------------------------------------------------------------------------------------------
+
+
+@verb(lacks="seat columns")
+def play(
+    model: Model,
+    files: Files,
+    measure: Measures = None,
+    steps: Steps = 360,
+    at: OnePosition = None,
+    uncut: Uncut = False,
+) -> None:
+    """Effect of the play of each joint on measures.
+
+    Worst case, share of each joint, standard deviation.
+    """
+    from trunnion.studies.play import play as run
+    from trunnion.views.common.peaks import whole_peaks
+    from trunnion.views.play import MOST_PANELS, figure, tables
+
+    check_files(files)
+    mechanism = model.read()
+    with model.lines():
+        result = run(mechanism, measure, steps, at)
+    pictured = whole_peaks(result, uncut)
+
+    def draw(path: object) -> Any:
+        if result.sizes["measure"] > MOST_PANELS:
+            what = f"{result.sizes['measure']} measures do not fit one figure"
+            raise MechanismError(Finding(what, str(path), f"name at most {MOST_PANELS} by --measure"))
+        return figure(pictured)
+
+    Shown(result, model, files, "measures joints", pictured, draw=draw, tables=tables(result), apart=False).finish()
+
+
+# ---- tolerance -------------------------------------------------------------------------------------------------------
+
+OF_TOLERANCE = f"The name says which table: x.csv has the measures, x.parameters.csv the contributions, {CURVES}."
+SECTIONS = "measures joints tolerances"
+
+
+@verb(lacks="units columns", out=f"{WRITTEN} {OF_TOLERANCE}")
+def tolerance(
+    model: Model, files: Files, measure: Measures = None, at: At = None,
+    method: Annotated[
+        list[str] | None,
+        Option(
+            "--method",
+            help="linear, worst-case, monte-carlo, quasi-monte-carlo, sobol. Repeatable; the first three if not given.",
+        ),
+    ] = None,
+    target: Annotated[
+        float | None,
+        Option("--yield", parser=share, metavar="SHARE",
+               help="Required share within limits, 0.99 or 99%; then it alone decides the exit status."),
+    ] = None,
+    samples: Samples = 10_000, seed: Seed = 1, steps: Steps = 360, jobs: Jobs = None, engine: Engine = "auto",
+    cluster: Annotated[str | None, Option("--cluster", help="Address of a Dask scheduler, or local.")] = None,
+    checkpoint: Annotated[
+        Path | None, Option("--checkpoint", help="File that keeps the samples done; the same command continues.")
+    ] = None,
+    sample: Annotated[
+        list[str] | None,
+        Option("--sample", help="NAME=FILE.csv: measured deviations of a number, one column. Repeatable."),
+    ] = None,
+    kind: Annotated[
+        str | None,
+        Option("--kind", help="A single figure: histogram, contributions, envelope, convergence or sobol."),
+    ] = None,
+) -> None:  # fmt: skip
+    """Effect of tolerances and play: worst case, RSS, yield, shares."""
+    from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
+    from trunnion.studies.tolerance.study import DEFAULT_METHODS
+    from trunnion.studies.tolerance.study import tolerance as run
+    from trunnion.views.tolerance import tables
+
+    check_files(files, "tolerance", kind)
+    mechanism = model.read()
+    for text in sample or ():
+        mechanism = mechanism.with_samples(*named_file(text, "--sample"))
+    methods = tuple(method or (name for name in DEFAULT_METHODS if samples or name not in SAMPLINGS))
+    drawn = samples if set(methods) & set(SAMPLINGS) else 0
+    with model.lines(), bar("samples", drawn, least=1000) as progress:
+        result = run(
+            mechanism, measure, methods, samples, seed, steps, at, jobs=jobs, engine=engine,  # type: ignore[arg-type]
+            cluster=cluster, checkpoint=checkpoint, progress=progress, target=target,
+        )  # fmt: skip
+    Shown(result, model, files, SECTIONS, drawn={"kind": kind}, tables=tables(result)).finish()
+
+
+# ---- allocate --------------------------------------------------------------------------------------------------------
 
 DIGITS = 5  # significant ones of a tolerance in the model that is written
-NAMES = (
+OF_ALLOCATION = (
     "The name says which table: x.csv has the tolerances, x.measures.csv the measures, x.offers.csv the cost over "
     f"accuracy, {CURVES}."
 )
@@ -46,7 +166,7 @@ Criterion = StrEnum("Criterion", {"worst_case": "worst-case", "rss": "rss", "yie
 Choice = StrEnum("Choice", ["auto", "continuous", "discrete"])
 
 
-@verb(lacks="units columns", out=f"{WRITTEN} {NAMES}")
+@verb(lacks="units columns", out=f"{WRITTEN} {OF_ALLOCATION}")
 def allocate(
     model: Model, files: Files, measure: Measures = None,
     criterion: Annotated[

@@ -10,7 +10,7 @@ from typer import Argument, Option
 
 from trunnion.cli.files import verb
 from trunnion.cli.options import Model
-from trunnion.cli.result import end, write_text
+from trunnion.cli.result import YAML, check_target, end, write_text
 from trunnion.cli.terminal import line, wrote
 from trunnion.errors import Finding, MechanismError, counted
 
@@ -35,10 +35,7 @@ def import_(
     from trunnion.model.file import entries_of, place
     from trunnion.model.mechanism import Mechanism
 
-    if out.suffix.lower() not in (".yaml", ".yml"):
-        raise MechanismError(Finding(f"a model is not written as '{out.suffix}'", "--out", "write .yaml"))
-    if out.exists() and not force:
-        raise MechanismError(Finding(f"'{out}' exists", "--out", "name another file, or add --force"))
+    check_target(out, "--out", "a model", YAML, force)
     draft = import_file(file, ground, drive, speed, material, density, gap, unit)
     text = model_text(draft)
     write_text(text, out)

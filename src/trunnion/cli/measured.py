@@ -10,7 +10,16 @@ from typer import Argument, Option
 
 from trunnion.cli.files import verb
 from trunnion.cli.options import DATA, DataFiles, Files, Force, MappingFile, Model, Seed, Write, setting
-from trunnion.cli.result import Shown, check_files, check_model, exit_status, show_tables, write_text
+from trunnion.cli.result import (
+    YAML,
+    Shown,
+    check_files,
+    check_model,
+    check_target,
+    exit_status,
+    show_tables,
+    write_text,
+)
 from trunnion.cli.terminal import bar, line, say, wrote
 from trunnion.errors import Finding, MechanismError, Severity, counted
 from trunnion.results.attributes import findings_of
@@ -288,15 +297,10 @@ def _check_mapping(write: Path | None, mapping: Path, force: bool) -> None:
     """MechanismError for a mapping that cannot be written, is in another folder than its data, or is there already."""
     if write is None:
         return
-    if write.suffix.lower() not in (".yaml", ".yml"):
-        what, remedy = f"a mapping is not written as '{write.suffix}'", "write .yaml"
-    elif write.resolve().parent != mapping.resolve().parent:
-        what, remedy = f"'{write}' is not in the folder of '{mapping}', whose data it names", "name a file there"
-    elif write.exists() and not force:
-        what, remedy = f"'{write}' exists", "name another file, or add --force"
-    else:
-        return
-    raise MechanismError(Finding(what, "--write-mapping", remedy))
+    if write.resolve().parent != mapping.resolve().parent:
+        what = f"'{write}' is not in the folder of '{mapping}', whose data it names"
+        raise MechanismError(Finding(what, "--write-mapping", "name a file there"))
+    check_target(write, "--write-mapping", "a mapping", YAML, force)
 
 
 def _write_mapping(result: xr.Dataset, mapping: Path, write: Path, written: list[Path]) -> list[Finding]:

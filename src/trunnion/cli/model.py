@@ -15,7 +15,7 @@ from typer import Argument, Option
 
 from trunnion.cli.files import verb
 from trunnion.cli.options import Model, placed
-from trunnion.cli.result import end, write_text
+from trunnion.cli.result import check_target, end, write_text
 from trunnion.cli.terminal import line, say, show_rows, wrote
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import folder, whole
@@ -93,8 +93,8 @@ def _list(model: Model, out: Path | None) -> None:
     from trunnion.cycle.vocabulary import vocabulary
 
     mechanism = model.read()
-    if out is not None and out.suffix.lower() != ".json":
-        raise MechanismError(Finding(f"the list is JSON, '{out.name}' is not", "--out", "name a .json file"))
+    if out is not None:
+        check_target(out, "--out", "the list", (".json",))
     with model.lines():
         words = vocabulary(mechanism)
     for swept, use in ((True, "parameters for --set and sweep --over"), (False, "parameters for --set only")):

@@ -20,10 +20,11 @@ if TYPE_CHECKING:
 
     from trunnion.model.mechanism import Mechanism
 
-__all__ = ["Shown", "check_files", "check_model", "check_page", "end", "exit_status", "show_tables", "write_text"]
+__all__ = ["YAML", "Shown", "check_files", "check_model", "check_page", "check_target", "end", "exit_status",
+           "show_tables", "write_text"]  # fmt: skip
 
 PAGES = (".html", ".htm")
-MODELS = (".yaml", ".yml", ".json")
+YAML, MODELS = (".yaml", ".yml"), (".yaml", ".yml", ".json")
 
 
 # ---- before anything is computed ------------------------------------------------------------------------------
@@ -60,12 +61,20 @@ def check_page(path: Path | None, option: str) -> None:
         raise MechanismError(Finding(what, option, "write a .html file and print it"))
 
 
+def check_target(path: Path, option: str, what: str, kinds: Sequence[str], over: bool = True) -> None:
+    """MechanismError for a file of no such kind, or one that is there already unless it may be written over."""
+    if path.suffix.lower() not in kinds:
+        remedy = f"write {' or '.join(kind for kind in kinds if kind != '.yml')}"
+        raise MechanismError(Finding(f"{what} is not written as '{path.suffix}'", option, remedy))
+    if path.exists() and not over:
+        raise MechanismError(Finding(f"'{path}' exists", option, "name another file, or add --force"))
+
+
 def check_model(write: Path | None, file: Path, force: bool) -> None:
     """MechanismError for a model that cannot be written, or over the one that is read."""
     if write is None:
         return
-    if write.suffix.lower() not in MODELS:
-        raise MechanismError(Finding(f"a model is not written as '{write.suffix}'", "--write", "write .yaml or .json"))
+    check_target(write, "--write", "a model", MODELS)
     if not force and write.exists() and file.exists() and write.samefile(file):
         raise MechanismError(Finding(f"'{write}' is the model itself", "--write", "name another file, or add --force"))
 

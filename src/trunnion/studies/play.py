@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.findings import model_notes
+from trunnion.cycle.findings import of_run
 from trunnion.cycle.positions import check_steps
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import inputs, references
@@ -252,15 +252,12 @@ def _by_joint(first: FirstOrder, blank: Array) -> JointEffects:
 
 
 def _findings(played: Played) -> Iterator[Finding]:
-    run, mechanism = played.run, played.run.system.mechanism
-    yield from (one for one in model_notes(mechanism, run.system) if one.severity is not Severity.NOTE)
-    yield from run.chosen.findings
-    if run.determinacy is not None:
-        yield from run.determinacy.findings()
-        if any(part.redundant for part in run.determinacy.parts):
-            what = "constraints are redundant: the worst case is an upper bound, because pins constrain one another"
-            remedy = "the deviation assumes that each pin can be anywhere within its play"
-            yield Finding.warning("play.redundant", "joints", what, remedy)
+    run = played.run
+    yield from of_run(run, notes=False)
+    if run.determinacy is not None and any(part.redundant for part in run.determinacy.parts):
+        what = "constraints are redundant: the worst case is an upper bound, because pins constrain one another"
+        remedy = "the deviation assumes that each pin can be anywhere within its play"
+        yield Finding.warning("play.redundant", "joints", what, remedy)
     yield from _left_out(run, played.inputs.loose)
     yield from _spinning(run, played.measures)
     if run.seats:

@@ -65,8 +65,7 @@ class Inputs:
     @cached_property
     def dims(self) -> int:
         """How many uniform numbers a sample takes."""
-        play = sum(len(end) for name in self.loose for end in self.ends(name))
-        return len(self.tolerances) + sum(bool(tolerance.direction) for tolerance in self.tolerances) + play
+        return sum(map(len, self.parts))
 
     @property
     def parts(self) -> list[list[int]]:

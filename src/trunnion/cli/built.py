@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
@@ -83,21 +83,14 @@ def play(
     """
     from trunnion.studies.play import play as run
     from trunnion.views.common.peaks import whole_peaks
-    from trunnion.views.play import MOST_PANELS, figure, tables
+    from trunnion.views.play import tables
 
     check_files(files)
     mechanism = model.read()
     with model.lines():
         result = run(mechanism, measure, steps, at)
     pictured = whole_peaks(result, uncut)
-
-    def draw(path: object) -> Any:
-        if result.sizes["measure"] > MOST_PANELS:
-            what = f"{result.sizes['measure']} measures do not fit one figure"
-            raise MechanismError(Finding(what, str(path), f"name at most {MOST_PANELS} by --measure"))
-        return figure(pictured)
-
-    Shown(result, model, files, "measures joints", pictured, draw=draw, tables=tables(result), apart=False).finish()
+    Shown(result, model, files, "measures joints", pictured, tables=tables(result), apart=False).finish()
 
 
 # ---- tolerance -------------------------------------------------------------------------------------------------------

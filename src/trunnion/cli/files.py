@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from copy import copy
 from dataclasses import MISSING, fields, is_dataclass, replace
 from enum import Enum
@@ -22,6 +22,7 @@ from trunnion.files import Target, writing
 
 __all__ = ["flags_of", "options_of", "outputs", "verb"]
 
+Hints = dict[str, Any]  # types by the names of parameters
 IN_PLACE = {"write": "file", "write_mapping": "mapping"}  # may name that input itself; the verb asks for --force then
 
 
@@ -38,7 +39,7 @@ def verb(lacks: str = "", **helps: str) -> Callable[[Callable[..., None]], Calla
 
     def decorated(function: Callable[..., None]) -> Callable[..., None]:
         hints = get_type_hints(function, include_extras=True)
-        groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
+        groups: Hints = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
 
         @functools.wraps(function)
         def run(**options: Any) -> None:
@@ -63,11 +64,7 @@ def verb(lacks: str = "", **helps: str) -> Callable[[Callable[..., None]], Calla
 
 
 def _spread(
-    function: Callable[..., None],
-    hints: dict[str, Any],
-    groups: dict[str, Any],
-    lacks: list[str],
-    helps: dict[str, str],
+    function: Callable[..., None], hints: Hints, groups: Hints, lacks: Collection[str], helps: Mapping[str, str]
 ) -> list[inspect.Parameter]:
     """The arguments of a verb, those of groups first, and its options, those of groups last."""
     every: list[tuple[int, inspect.Parameter]] = []
@@ -87,11 +84,17 @@ def _spread(
         if name not in groups:
             add(name, hints[name], MISSING if parameter.default is parameter.empty else parameter.default, False)
             continue
-        types = get_type_hints(groups[name], include_extras=True)
+        types = _types(groups[name])
         for part in fields(groups[name]):
             if part.name not in lacks:
                 add(part.name, types[part.name], part.default, True)
     return [parameter for _, parameter in sorted(every, key=lambda pair: pair[0])]
+
+
+@functools.cache
+def _types(group: type) -> Hints:
+    """The types of the options of a group, read once for all verbs."""
+    return get_type_hints(group, include_extras=True)
 
 
 def _word(hint: Any) -> str | None:

@@ -1,7 +1,5 @@
 """`trunnion assemble`, `play`, `tolerance` and `allocate`: mechanisms as they are built."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -226,7 +224,7 @@ def allocate(
     shown.end(findings)
 
 
-def _bought(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
+def _bought(mechanism: "Mechanism", result: "xr.Dataset") -> "Mechanism":
     """The mechanism with what was found: options as they are, all others rounded down, so that the limits hold."""
     from trunnion.studies.allocation.allocate import half_widths
 
@@ -237,7 +235,7 @@ def _bought(mechanism: Mechanism, result: xr.Dataset) -> Mechanism:
     return mechanism.with_tolerances(options).with_tolerances(others, DIGITS)
 
 
-def _named(findings: list[Finding], mechanism: Mechanism) -> list[Finding]:
+def _named(findings: list[Finding], mechanism: "Mechanism") -> list[Finding]:
     """Findings about costs by the names that the file has for them."""
     from trunnion.model.tolerances import cost_paths
 

@@ -1,7 +1,5 @@
 """`trunnion import` and `trunnion export`: files of other programs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated

@@ -29,6 +29,8 @@ IN_PLACE = {"write": "file", "write_mapping": "mapping"}  # may name that input 
 def verb(lacks: str = "", **helps: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Make a function a verb: Typer sees the options of its groups (`Model`, `Files`, …) as if they were its own.
 
+    Modules with verbs do not postpone their annotations: as texts all options would be compiled at every start.
+
     Parameters
     ----------
     lacks

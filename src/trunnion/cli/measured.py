@@ -1,7 +1,5 @@
 """`trunnion rig`, `data`, `compare` and `identify`: data of test rigs, and the model beside them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -89,7 +87,7 @@ def rig(
     raise typer.Exit(exit_status(observation.findings) or int(bool(observation.skipped)))
 
 
-def _about(observation: Observation) -> None:
+def _about(observation: "Observation") -> None:
     """What is recorded: conditions, turns, samples."""
     conditions = len(observation.cases)
     rows = max(case.rows for case in observation.cases)
@@ -266,7 +264,7 @@ def _held_out(texts: list[str]) -> float | list[str] | None:
         return texts or None
 
 
-def estimated(mechanism: Mechanism, result: xr.Dataset, write: Path) -> tuple[Mechanism | None, list[Finding]]:
+def estimated(mechanism: "Mechanism", result: "xr.Dataset", write: Path) -> "tuple[Mechanism | None, list[Finding]]":
     """The model with the estimates, if they are worth it, and findings about what is not in it."""
     from trunnion.rig.identification import with_estimates
 
@@ -303,7 +301,7 @@ def _check_mapping(write: Path | None, mapping: Path, force: bool) -> None:
     check_target(write, "--write-mapping", "a mapping", YAML, force)
 
 
-def _write_mapping(result: xr.Dataset, mapping: Path, write: Path, written: list[Path]) -> list[Finding]:
+def _write_mapping(result: "xr.Dataset", mapping: Path, write: Path, written: list[Path]) -> list[Finding]:
     """The mapping with the zeros that were found, beside the data that it names."""
     from trunnion.model.file import read_entries
     from trunnion.model.rewrite import changed_text

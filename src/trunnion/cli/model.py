@@ -1,7 +1,5 @@
 """`trunnion check`, `examples`, `schema` and `studio`: the model file itself."""
 
-from __future__ import annotations
-
 import json
 import math
 import os
@@ -68,7 +66,7 @@ def check(
     end(checked.findings, model.file, "assembly measures", every=True)
 
 
-def _show_structure(checked: Check, drivers: int) -> None:
+def _show_structure(checked: "Check", drivers: int) -> None:
     """Mobility, structural formula, modules with the ways to assemble them, and pairs of gears, a line each."""
     from trunnion.views.assembly.modes import gear_line, lines
 
@@ -113,7 +111,7 @@ def _list(model: Model, out: Path | None) -> None:
         wrote(out)
 
 
-def _row(entry: NamedNumber | NamedMeasure, text: str) -> list[str]:
+def _row(entry: "NamedNumber | NamedMeasure", text: str) -> list[str]:
     """Name, value, unit and what it is of a number that can be set or a measure."""
     value = f"{entry.value + 0.0:.6g}" if math.isfinite(entry.value) else ""
     return [entry.name, value, "" if entry.unit in ("1", "SI") else entry.unit, text]

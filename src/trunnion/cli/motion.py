@@ -1,7 +1,5 @@
 """`trunnion analyse`, `simulate`, `locking`, `design`, `plot`, `report`: motion and forces, in numbers and pictures."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -154,7 +152,7 @@ def report(
     raise Exit(exit_status(findings_of(result)))
 
 
-def _analysed(mechanism: Mechanism, steps: int, method: FrictionMethod | None = None, *more: Any) -> Result:
+def _analysed(mechanism: "Mechanism", steps: int, method: "FrictionMethod | None" = None, *more: Any) -> "Result":
     """Analyse, with a progress bar when it takes long enough to need one. more: engine, … of `analysed`."""
     from trunnion.cycle.analyse import analysed
 
@@ -162,14 +160,14 @@ def _analysed(mechanism: Mechanism, steps: int, method: FrictionMethod | None = 
         return analysed(mechanism, steps, method, progress, *more)
 
 
-def _ideal(mechanism: Mechanism, steps: int) -> xr.Dataset | None:
+def _ideal(mechanism: "Mechanism", steps: int) -> "xr.Dataset | None":
     """The cycle without friction, to compare with; None if there is none."""
     if all(joint.friction is None for joint in mechanism.effective_joints.values()):
         return None
     return _analysed(mechanism.with_friction("off"), steps).dataset
 
 
-def _page(mechanism: Mechanism, analysed: Result, uncut: bool) -> str:
+def _page(mechanism: "Mechanism", analysed: "Result", uncut: bool) -> str:
     """The report of a cycle as HTML."""
     from trunnion.views.common.peaks import whole_peaks
     from trunnion.views.cycle.deviations import with_worst_case

@@ -1,7 +1,5 @@
 """The options that verbs share, each stated once: those of the model, of the files and of friction go in groups."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -77,7 +75,7 @@ class Model:
         str | None, Option("--seat", help="loaded or free: position of the pins in all joints with play.")
     ] = None
 
-    def read(self, swept: Mapping[str, float | str] | None = None) -> Mechanism:
+    def read(self, swept: Mapping[str, float | str] | None = None) -> "Mechanism":
         """The model with the options applied: `--table` and `--seat` first, then `--friction` together with `--set`.
 
         So a number that is set stands against what is said of all joints, and may be one that only the other law has.
@@ -109,7 +107,7 @@ class Model:
             raise MechanismError(placed(error.findings, self.file)) from None
 
 
-def _bare(mechanism: Mechanism, values: Mapping[str, float | str]) -> Iterator[Finding]:
+def _bare(mechanism: "Mechanism", values: Mapping[str, float | str]) -> Iterator[Finding]:
     """Numbers that lack the unit that the model has."""
     from trunnion.model.checks.magnitudes import bare_number
 
@@ -164,7 +162,7 @@ class Friction:
     ] = None  # fmt: skip
     iterations: Annotated[int, Option("--iterations", help="Limit of friction iterations.")] = 200
 
-    def checked(self) -> FrictionMethod:
+    def checked(self) -> "FrictionMethod":
         """The method; MechanismError for a name that there is not."""
         from trunnion.solve.friction_method import FrictionMethod
 

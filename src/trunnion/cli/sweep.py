@@ -1,7 +1,5 @@
 """`trunnion sweep`: figures of the cycle over a grid of numbers of the model, as tables, files, curves and maps."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any

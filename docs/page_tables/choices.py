@@ -58,7 +58,7 @@ def costs_table() -> str:
         (
             code(name),
             code(model.formula),
-            ", ".join(f"{code(key)}: {one.meaning}" for key, one in model.parameters.items()),
+            ", ".join(f"{code(key)}: {meaning}" for key, meaning in model.parameters.items()),
             model.source,
         )
         for name, model in COST_MODELS.items()

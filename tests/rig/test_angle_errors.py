@@ -13,7 +13,7 @@ import pytest
 
 import trunnion
 from measured_data.four_bar import FOUR_BAR, rocker
-from trunnion.cli.identify import _write_model
+from trunnion.cli.measured import estimated
 from trunnion.rig.reading.measurement import Accuracy
 from trunnion.rig.reading.read import read_measured
 from trunnion.views.identify import sensors
@@ -157,6 +157,7 @@ def test_a_zero_far_beyond_what_is_stated_is_an_error_though_the_model_fits(tmp_
     assert (found.severity, found.where) == ("error", "zero of M")
     assert found.figures["times"] == pytest.approx(20, abs=3)
     model = trunnion.Mechanism.model_validate(LOADED)
-    (unwritten,) = _write_model(model, result, tmp_path / "old.yaml", tmp_path / "new.yaml", False, [])
+    nothing, (unwritten,) = estimated(model, result, tmp_path / "new.yaml")
+    assert nothing is None
     assert "new.yaml' is not written: zero of M is off" in unwritten.what
     assert np.all(np.abs(result["sensor_error"].values) <= 5 + 1e-9)

@@ -26,21 +26,6 @@ def test_values_by_hand() -> None:
     assert Cost("exponential", GIVEN).value(0.0) == 21.0
 
 
-@pytest.mark.parametrize(
-    ("model", "change", "said"),
-    [
-        ("linear", {}, "'linear' is no cost model"),
-        ("power", {"k": 0.0}, "'k' is 0, it has to be above 0"),
-        ("exponential", {"B": -1.0}, "'B' is -1, it has to be at least 0"),
-        ("power", {"unit": None}, "'unit' is missing"),
-    ],
-)
-def test_what_is_wrong_is_said(model: str, change: dict[str, float | None], said: str) -> None:
-    given = {name: value for name, value in {**GIVEN, **change}.items() if value is not None}
-    assert [str(one) for one in Cost(model, given).findings("costs.AB") if said in str(one)]
-    assert not Cost("power", GIVEN).findings()
-
-
 @pytest.mark.parametrize("model", sorted(COST_MODELS))
 def test_cost_that_no_tolerance_changes(model: str) -> None:
     """Without B a tolerance of 0 costs A, and its slope is 0."""

@@ -1,53 +1,43 @@
 """`trunnion import` and `trunnion export`: files of other programs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
-from trunnion.cli.model import exit_status, lines_of, placed, stated
-from trunnion.cli.options import File, Set
-from trunnion.cli.terminal import console, say, wrote
+from trunnion.cli.files import verb
+from trunnion.cli.options import Model
+from trunnion.cli.result import YAML, check_target, end, write_text
+from trunnion.cli.terminal import line, wrote
 from trunnion.errors import Finding, MechanismError, counted
 
 __all__ = ["export", "import_"]
 
 
+@verb()
 def import_(
-    file: Annotated[Path, typer.Argument(help="Drawing or model of another program, by extension.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="The model file to write: .yaml.")],
-    ground: Annotated[str, typer.Option("--ground", help="The part that does not move.")] = "",
-    drive: Annotated[str, typer.Option("--drive", help="The joint that is driven.")] = "",
-    speed: Annotated[str, typer.Option("--speed", help="Speed of the driver: 60rpm, 0.1m/s.")] = "",
-    material: Annotated[
-        str, typer.Option("--material", help="Material of parts without one: steel, aluminium, …")
-    ] = "steel",
-    density: Annotated[str | None, typer.Option("--density", help="Density instead: 7850kg/m^3.")] = None,
-    gap: Annotated[
-        str, typer.Option("--gap", help="Greatest difference of the radii of a pin and its hole.")
-    ] = "0.5mm",
-    unit: Annotated[str, typer.Option("--unit", help="Length unit of a file that states none: mm, in, m.")] = "mm",
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the model file if it exists.")] = False,
+    file: Annotated[Path, Argument(help="Drawing or model of another program, by extension.")],
+    out: Annotated[Path, Option("--out", "-o", help="The model file to write: .yaml.")],
+    ground: Annotated[str, Option("--ground", help="The part that does not move.")] = "",
+    drive: Annotated[str, Option("--drive", help="The joint that is driven.")] = "",
+    speed: Annotated[str, Option("--speed", help="Speed of the driver: 60rpm, 0.1m/s.")] = "",
+    material: Annotated[str, Option("--material", help="Material of parts without one: steel, aluminium, …")] = "steel",
+    density: Annotated[str | None, Option("--density", help="Density instead: 7850kg/m^3.")] = None,
+    gap: Annotated[str, Option("--gap", help="Greatest difference of the radii of a pin and its hole.")] = "0.5mm",
+    unit: Annotated[str, Option("--unit", help="Length unit of a file that states none: mm, in, m.")] = "mm",
+    force: Annotated[bool, Option("--force", help="Overwrite the model file if it exists.")] = False,
 ) -> None:
     """Make a model file of a drawing or a model of another program."""
     from trunnion.exchange import import_file, model_text
-    from trunnion.files import whole
     from trunnion.model.file import entries_of, place
     from trunnion.model.mechanism import Mechanism
 
-    if out.suffix.lower() not in (".yaml", ".yml"):
-        raise MechanismError(Finding(f"a model is not written as '{out.suffix}'", "--out", "write .yaml"))
-    if out.exists() and not force:
-        raise MechanismError(Finding(f"'{out}' exists", "--out", "name another file, or add --force"))
+    check_target(out, "--out", "a model", YAML, force)
     draft = import_file(file, ground, drive, speed, material, density, gap, unit)
     text = model_text(draft)
-    with whole(out) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
-    bodies, pairs = counted(len(draft.bodies), "link"), counted(len(draft.pairs), "joint")
-    console().print(f"{draft.source}: {bodies}, {pairs}", markup=False)
+    write_text(text, out)
+    line(f"{draft.source}: {counted(len(draft.bodies), 'link')}, {counted(len(draft.pairs), 'joint')}")
     wrote(out)
     data, lines = entries_of(text)
     checked: Iterable[Finding] = ()  # links without joints, as those of a mesh, are no mechanism yet
@@ -56,31 +46,28 @@ def import_(
             checked = Mechanism.model_validate(data).checked
         except MechanismError as error:
             checked = error.findings
-    findings = [*draft.findings, *place(checked, str(out), lines, data)]
-    say(findings, every=True)
-    raise typer.Exit(exit_status(findings))
+    end([*draft.findings, *place(checked, str(out), lines, data)], out, every=True)
 
 
+@verb(lacks="table friction seat")
 def export(
-    file: File,
-    out: Annotated[Path, typer.Option("--out", "-o", help="The file to write; its extension is the format.")],
-    at: Annotated[str | None, typer.Option("--at", help="Position of the mechanism: 60deg, 20mm, 0.1s.")] = None,
-    frames: Annotated[int, typer.Option("--frames", help="Number of positions in a file that moves.")] = 120,
+    model: Model,
+    out: Annotated[Path, Option("--out", "-o", help="The file to write; its extension is the format.")],
+    at: Annotated[str | None, Option("--at", help="Position of the mechanism: 60deg, 20mm, 0.1s.")] = None,
+    frames: Annotated[int, Option("--frames", help="Number of positions in a file that moves.")] = 120,
     original: Annotated[
         str | None,
-        typer.Option("--from", metavar="FILE", help="The STEP file it was imported from, whose parts are to be moved."),
+        Option("--from", metavar="FILE", help="The STEP file it was imported from, whose parts are to be moved."),
     ] = None,
     magnify: Annotated[
-        float, typer.Option("--magnify", help="Factor of the links' displacements by errors and play: 100.")
+        float, Option("--magnify", help="Factor of the links' displacements by errors and play: 100.")
     ] = 1.0,
-    set_: Set = None,
 ) -> None:
     """Write a mechanism for another program, at a position."""
     from trunnion.exchange import export_model
 
-    mechanism = stated(file, set_)
-    with lines_of(file):
+    mechanism = model.read()
+    with model.lines():
         findings = export_model(mechanism, out, at, frames, original, magnify)
     wrote(out)
-    say(placed(findings, file), every=True)
-    raise typer.Exit(exit_status(findings))
+    end(findings, model.file, every=True)

@@ -1,94 +1,143 @@
-"""What every verb writes: the files that its options name, said before it begins, so that none is one that it reads.
+"""What makes a function a verb: its groups of options spread out, its outputs said before it begins.
 
-Also what its help calls files, numbers and texts, which follows from the types of its options too.
+No output is a file that the verb reads, and no two are one file; both follow from the types of its options, as what its
+help calls files, numbers and texts does.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+import inspect
+from collections.abc import Callable, Collection, Iterator, Mapping
+from copy import copy
+from dataclasses import MISSING, fields, is_dataclass, replace
 from enum import Enum
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Annotated, Any, get_args, get_type_hints
 
 from typer.models import ArgumentInfo, OptionInfo, ParameterInfo
 
 from trunnion.errors import MechanismError
 from trunnion.files import Target, writing
 
-__all__ = ["flags_of", "guarded", "named_words", "outputs"]
+__all__ = ["flags_of", "options_of", "outputs", "verb"]
 
+Hints = dict[str, Any]  # types by the names of parameters
 IN_PLACE = {"write": "file", "write_mapping": "mapping"}  # may name that input itself; the verb asks for --force then
 
 
-def guarded(verb: Callable[..., None]) -> Callable[..., None]:
-    """The verb, run so that nothing it writes is something it reads, and no two outputs are one file."""
-    names, flags = outputs(verb), flags_of(verb)
+def verb(lacks: str = "", **helps: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Make a function a verb: Typer sees the options of its groups (`Model`, `Files`, …) as if they were its own.
 
-    @functools.wraps(verb)
-    def run(*arguments: Any, **options: Any) -> None:
-        try:
-            with writing(list(_targets(names, options))):
-                verb(*arguments, **options)
-        except MechanismError as error:  # what Python calls by the name of an argument is an option here
-            raise MechanismError(
-                [replace(one, where=flags.get(one.where, one.where)) for one in error.findings]
-            ) from None
+    Modules with verbs do not postpone their annotations: as texts all options would be compiled at every start.
 
-    return run
+    Parameters
+    ----------
+    lacks
+        Options of the groups that this verb has not.
+    **helps
+        What options of the groups do, where it is not what they do elsewhere.
+    """
 
+    def decorated(function: Callable[..., None]) -> Callable[..., None]:
+        hints = get_type_hints(function, include_extras=True)
+        groups: Hints = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
 
-def flags_of(verb: Callable[..., None]) -> dict[str, str]:
-    """The options of a verb by the names of their parameters."""
-    flags: dict[str, str] = {}
-    for name, hint in get_type_hints(verb, include_extras=True).items():
-        for info in (one for one in getattr(hint, "__metadata__", ()) if isinstance(one, OptionInfo)):
-            words = (info.default, *(info.param_decls or ()))  # of an annotation Typer calls the first the default
-            stated = next((str(word) for word in words if str(word).startswith("--")), "")
-            flags[name.strip("_")] = stated or f"--{name.replace('_', '-')}"
-    return flags
+        @functools.wraps(function)
+        def run(**options: Any) -> None:
+            own = {name: value for name, value in options.items() if name in hints}
+            for name, group in groups.items():
+                own[name] = group(**{part.name: options[part.name] for part in fields(group) if part.name in options})
+            try:
+                with writing(list(_targets(outputs(run), options))):
+                    function(**own)
+            except MechanismError as error:  # what Python calls by the name of an argument is an option here
+                flags = flags_of(run)
+                raise MechanismError(
+                    [replace(finding, where=flags.get(finding.where, finding.where)) for finding in error.findings]
+                ) from None
 
+        parameters = _spread(function, hints, groups, lacks.split(), helps)
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+        return run
 
-def outputs(verb: Callable[..., None]) -> list[str]:
-    """The parameters that name files to be written: every option that takes a path. Inputs are arguments or texts."""
-    hints = get_type_hints(verb, include_extras=True)
-    return [name for name, hint in hints.items() if _is_option(hint) and _takes_path(hint)]
-
-
-def _is_option(hint: Any) -> bool:
-    return any(isinstance(one, OptionInfo) for one in getattr(hint, "__metadata__", ()))
-
-
-def _takes_path(hint: Any) -> bool:
-    return hint is Path or any(_takes_path(one) for one in get_args(hint))
+    return decorated
 
 
-def _targets(names: list[str], options: dict[str, Any]) -> Iterator[Target]:
-    for name in names:
-        given = options.get(name)
-        for path in given if isinstance(given, list) else [given] if given is not None else []:
-            yield Target(f"--{name.strip('_').replace('_', '-')}", path, options.get(IN_PLACE.get(name, "")))
+def _spread(
+    function: Callable[..., None], hints: Hints, groups: Hints, lacks: Collection[str], helps: Mapping[str, str]
+) -> list[inspect.Parameter]:
+    """The arguments of a verb, those of groups first, and its options, those of groups last."""
+    every: list[tuple[int, inspect.Parameter]] = []
+
+    def add(name: str, hint: Any, usual: Any, shared: bool) -> None:
+        kind, info = get_args(hint)[0], copy(hint.__metadata__[0])
+        info.help = helps.get(name, info.help)
+        argument = isinstance(info, ArgumentInfo)
+        info.metavar = info.metavar or (name.upper() if argument else _word(kind))
+        default = inspect.Parameter.empty if usual is MISSING else usual
+        parameter = inspect.Parameter(
+            name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, info]
+        )
+        every.append(((1 - shared) if argument else (2 + shared), parameter))
+
+    for name, parameter in inspect.signature(function).parameters.items():
+        if name not in groups:
+            add(name, hints[name], MISSING if parameter.default is parameter.empty else parameter.default, False)
+            continue
+        types = _types(groups[name])
+        for part in fields(groups[name]):
+            if part.name not in lacks:
+                add(part.name, types[part.name], part.default, True)
+    return [parameter for _, parameter in sorted(every, key=lambda pair: pair[0])]
 
 
-# ---- help ----------------------------------------------------------------------------------------------------------
-
-
-def named_words(verb: Callable[..., None]) -> None:
-    """What the help calls the words of a verb: an argument by its name, else FILE, NUMBER, TEXT, the choices."""
-    hints = get_type_hints(verb, include_extras=True)
-    for name, hint in hints.items():
-        for info in getattr(hint, "__metadata__", ()):
-            if isinstance(info, ParameterInfo) and info.metavar is None:
-                info.metavar = name.upper() if isinstance(info, ArgumentInfo) else _word(get_args(hint)[0])
-    verb.__annotations__ = hints  # evaluated once: each evaluation of a text makes other options
+@functools.cache
+def _types(group: type) -> Hints:
+    """The types of the options of a group, read once for all verbs."""
+    return get_type_hints(group, include_extras=True)
 
 
 def _word(hint: Any) -> str | None:
-    """The word for a value of a type; none for a switch."""
-    kinds = [one for one in get_args(hint) if one is not type(None)]
+    """The word of the help for a value of a type; none for a switch."""
+    kinds = [part for part in get_args(hint) if part is not type(None)]
     if kinds:
         return _word(kinds[0])
     if issubclass(hint, Enum):
         return "|".join(str(member.value) for member in hint)
     return {Path: "FILE", int: "NUMBER", float: "NUMBER", str: "TEXT"}.get(hint)
+
+
+# ---- what the types of a verb say ----------------------------------------------------------------------------------
+
+
+def options_of(verb: Callable[..., None]) -> Iterator[tuple[str, Any, OptionInfo, str]]:
+    """The options of a verb: the parameter, its type, what Typer knows of it, and the flag."""
+    for name, hint in get_type_hints(verb, include_extras=True).items():
+        info: ParameterInfo | None = next(iter(getattr(hint, "__metadata__", ())), None)
+        if isinstance(info, OptionInfo):
+            words = (info.default, *(info.param_decls or ()))  # of an annotation Typer calls the first the default
+            flag = next((str(word) for word in words if str(word).startswith("--")), f"--{name.replace('_', '-')}")
+            yield name, get_args(hint)[0], info, flag
+
+
+def flags_of(verb: Callable[..., None]) -> dict[str, str]:
+    """The options of a verb by the names of their parameters."""
+    return {name.strip("_"): flag for name, _, _, flag in options_of(verb)}
+
+
+def outputs(verb: Callable[..., None]) -> list[str]:
+    """The parameters that name files to be written: every option that takes a path. Inputs are arguments or texts."""
+    return [name for name, hint, _, _ in options_of(verb) if _takes_path(hint)]
+
+
+def _takes_path(hint: Any) -> bool:
+    return hint is Path or any(_takes_path(part) for part in get_args(hint))
+
+
+def _targets(names: list[str], options: dict[str, Any]) -> Iterator[Target]:
+    for name in names:
+        paths = options.get(name)
+        for path in paths if isinstance(paths, list) else [paths] if paths is not None else []:
+            yield Target(f"--{name.strip('_').replace('_', '-')}", path, options.get(IN_PLACE.get(name, "")))

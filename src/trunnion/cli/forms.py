@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from enum import Enum
-from inspect import signature
+from inspect import Parameter, signature
 from pathlib import Path
 from types import UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, Union, get_args, get_origin
 
-from typer.models import ArgumentInfo, OptionInfo
-
-from trunnion.cli.allocate import allocate
-from trunnion.cli.assemble import assemble
-from trunnion.cli.compare import compare
-from trunnion.cli.files import flags_of
-from trunnion.cli.identify import identify
-from trunnion.cli.play import play
-from trunnion.cli.simulate import simulate
+from trunnion.cli.built import allocate, assemble, play, tolerance
+from trunnion.cli.files import options_of
+from trunnion.cli.measured import compare, identify
+from trunnion.cli.motion import simulate
 from trunnion.cli.sweep import sweep
-from trunnion.cli.tolerance import tolerance
 
 __all__ = ["forms"]
 
@@ -33,56 +27,39 @@ LEFT_OUT = {
 
 def forms() -> list[dict[str, Any]]:
     """Every study with its options: verb, help, whether it reads a mapping, and fields {flag, help, kind, choices}."""
-    return [_form(study) for study in STUDIES]
+    return [
+        {
+            "verb": study.__name__,
+            "help": (study.__doc__ or "").strip().splitlines()[0],
+            "mapping": "mapping" in signature(study).parameters,
+            "fields": list(_fields(study)),
+        }
+        for study in STUDIES
+    ]
 
 
-def _form(study: Callable[..., None]) -> dict[str, Any]:
-    hints = get_type_hints(study, include_extras=True)
-    hints.pop("return", None)
-    arguments = [name for name, hint in hints.items() if _info(hint, ArgumentInfo) is not None]
-    return {
-        "verb": study.__name__,
-        "help": (study.__doc__ or "").strip().splitlines()[0],
-        "mapping": "mapping" in arguments,
-        "fields": list(
-            _fields(hints, flags_of(study), {name: one.default for name, one in signature(study).parameters.items()})
-        ),
-    }
-
-
-def _fields(hints: dict[str, Any], flags: Mapping[str, str], usual: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    for name, hint in hints.items():
-        info = _info(hint, OptionInfo)
-        kind = get_args(hint)[0] if info is not None else None
-        if info is None or name.strip("_") in LEFT_OUT or _is(kind, Path):
+def _fields(study: Callable[..., None]) -> Iterator[dict[str, Any]]:
+    usual = {name: parameter.default for name, parameter in signature(study).parameters.items()}
+    for name, hint, info, flag in options_of(study):
+        types = set(_types(hint))
+        if name.strip("_") in LEFT_OUT or Path in types:
             continue
-        flag = flags[name.strip("_")].partition("/")[0]
-        choices = next(([str(one.value) for one in part] for part in _parts(kind) if _is_enum(part)), None)
-        sort = "flag" if _is(kind, bool) else "number" if _is(kind, int) or _is(kind, float) else "text"
-        several = any(get_origin(part) is list for part in (kind, *get_args(kind)))
-        value = usual[name] if usual[name] not in (None, False) else ""
-        said = (info.help or "").replace(" Repeatable.", "").replace(" Repeatable;", ";")
+        choices = [[str(member.value) for member in part] for part in types if issubclass(part, Enum)]
+        value = usual[name] if usual[name] not in (None, False, Parameter.empty) else ""
         yield {
-            "flag": flag, "help": said, "kind": sort, "choices": choices, "several": several,
+            "flag": flag.partition("/")[0],
+            "help": (info.help or "").replace(" Repeatable.", "").replace(" Repeatable;", ";"),
+            "kind": "flag" if bool in types else "number" if types & {int, float} else "text",
+            "choices": choices[0] if choices else None,
+            "several": any(get_origin(part) is list for part in (hint, *get_args(hint))),
             "usual": str(getattr(value, "value", value)),
-        }  # fmt: skip
+        }
 
 
-def _info(hint: Any, of: type) -> Any:
-    return next((one for one in getattr(hint, "__metadata__", ()) if isinstance(one, of)), None)
-
-
-def _parts(kind: Any) -> Iterator[Any]:
+def _types(hint: Any) -> Iterator[type]:
     """The types that a type is made of."""
-    yield kind
-    if get_origin(kind) in (Union, UnionType, list):
-        for part in get_args(kind):
-            yield from _parts(part)
-
-
-def _is(kind: Any, wanted: type) -> bool:
-    return any(part is wanted for part in _parts(kind))
-
-
-def _is_enum(kind: Any) -> bool:
-    return isinstance(kind, type) and issubclass(kind, Enum)
+    if get_origin(hint) in (Union, UnionType, list):
+        for part in get_args(hint):
+            yield from _types(part)
+    else:
+        yield hint

@@ -1,81 +1,232 @@
-"""What verbs do with the model they are given: read it, apply the options, say where in the file a finding stands."""
+"""`trunnion check`, `examples`, `schema` and `studio`: the model file itself."""
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+import json
+import math
+import os
+import socket
+from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from trunnion.cli.options import named_file, setting
-from trunnion.errors import Finding, MechanismError, Severity
+import typer
+from typer import Argument, Option
+
+from trunnion.cli.files import verb
+from trunnion.cli.options import Model, placed
+from trunnion.cli.result import check_target, end, write_text
+from trunnion.cli.terminal import line, say, show_rows, wrote
+from trunnion.errors import Finding, MechanismError
+from trunnion.files import folder, whole
 
 if TYPE_CHECKING:
-    from trunnion.model.mechanism import Mechanism
+    from trunnion.cycle.inspect import Check
+    from trunnion.cycle.vocabulary import NamedMeasure, NamedNumber
 
-__all__ = ["exit_status", "lines_of", "placed", "stated"]
-
-
-def stated(
-    file: Path,
-    settings: list[str] | None = None,
-    tables: list[str] | None = None,
-    friction: str | None = None,
-    seat: str | None = None,
-    swept: Mapping[str, float | str] | None = None,
-) -> Mechanism:
-    """The model with the options applied: `--table` and `--seat` first, then `--friction` together with `--set`.
-
-    So a number that is set stands against what is said of all joints, and may be one that only the other law has.
-    swept: a value of each number that the verb replaces, which may be such a one too.
-    """
-    from trunnion.model.mechanism import read_mechanism
-    from trunnion.model.screen import follow, stated_units
-
-    mechanism = read_mechanism(file, dict(named_file(text) for text in tables or ()))
-    values = dict(setting(text) for text in settings or ())
-    if seat is not None:
-        mechanism = mechanism.with_seats(seat)
-    bare = list(_bare(mechanism, values))
-    if friction:
-        mechanism = mechanism.with_friction(friction, {**(swept or {}), **values})
-    elif values:
-        mechanism = mechanism.with_values(values)
-    mechanism.checked[:] = [*(one for one in mechanism.checked if one.where not in {own.where for own in bare}), *bare]
-    follow(stated_units(mechanism))
-    return mechanism
+__all__ = ["check", "examples", "schema", "studio"]
 
 
-def _bare(mechanism: Mechanism, values: Mapping[str, float | str]) -> Iterator[Finding]:
-    """Numbers that lack the unit that the model has."""
-    from trunnion.model.checks.magnitudes import bare_number
+# ---- check -----------------------------------------------------------------------------------------------------------
 
-    numbers = mechanism.parameter_set
-    for name, value in values.items():
-        with suppress(MechanismError):  # of a name that means nothing, which is said where it is set
-            if not isinstance(value, str):
-                yield from bare_number(numbers, numbers.resolve(name), value)
+HEAD = ["name", "value", "unit"]
 
 
-@contextmanager
-def lines_of(file: Path) -> Iterator[None]:
-    """Findings about the model bear the line of its file also where the analysis finds them."""
+@verb(lacks="seat")
+def check(
+    model: Model,
+    assemblies: Annotated[
+        Path | None,
+        Option("--assemblies", help="Also draw the assembly modes of each group: a .png, .svg or .pdf file."),
+    ] = None,
+    list_: Annotated[
+        bool, Option("--list", help="List what can be set, swept and measured, with units and values.")
+    ] = False,
+    out: Annotated[Path | None, Option("--out", "-o", help="Write that list: a .json file.")] = None,
+) -> None:
+    """Check a model: findings, mobility, structure, assembly modes."""
+    if list_ or out:
+        _list(model, out)
+        return
+    from trunnion.cycle.inspect import check as inspect
+
+    if assemblies:
+        from trunnion.views.cycle.plots import check_figure
+
+        check_figure(assemblies)
+    mechanism = model.read()
+    with model.lines():
+        checked = inspect(mechanism)
+    line(mechanism.name or model.file.name, "bold")
+    _show_structure(checked, len(mechanism.drivers))
+    if assemblies:
+        from trunnion.views.assembly.mode_drawings import ways as drawings
+        from trunnion.views.cycle.plots import save
+
+        save(drawings(mechanism, checked.choices), assemblies)
+        wrote(assemblies)
+    end(checked.findings, model.file, "assembly measures", every=True)
+
+
+def _show_structure(checked: "Check", drivers: int) -> None:
+    """Mobility, structural formula, modules with the ways to assemble them, and pairs of gears, a line each."""
+    from trunnion.views.assembly.modes import gear_line, lines
+
+    rank = checked.rank_mobility
+    by_rank = "by rank unknown: no position can be assembled" if rank is None else f"{rank} by rank"
+    line(f"mobility {checked.mobility} by formula, {by_rank}; drivers: {drivers}")
+    line(f"formula  {checked.formula or '(no moving link)'}")
+    for number, (module, count) in enumerate(zip(checked.plan.modules, checked.assemblies, strict=True)):
+        modes = "" if module.rank == 1 else f", {count} assembly {'mode' if count == 1 else 'modes'}"
+        solver = "general group" if module.kind == "general" else "closed form"
+        joints = ", ".join(module.joints)
+        line(f"  {module.label:<24} links {', '.join(module.links)}; joints {joints}; {solver}{modes}")
+        for choice in (choice for choice in checked.choices if choice.module == number):
+            for text in lines(choice):
+                line(f"    {text}")
+    for pair in checked.gears:
+        line(f"gears    {gear_line(pair)}")
+
+
+def _list(model: Model, out: Path | None) -> None:
+    """Print what can be set, swept and measured, and write it if a file is named."""
+    from trunnion.cycle.vocabulary import vocabulary
+
+    mechanism = model.read()
+    if out is not None:
+        check_target(out, "--out", "the list", (".json",))
+    with model.lines():
+        words = vocabulary(mechanism)
+    for swept, use in ((True, "parameters for --set and sweep --over"), (False, "parameters for --set only")):
+        numbers = [number for number in words.numbers if number.swept is swept]
+        if numbers:
+            show_rows(use, [*HEAD, "written as"], [_row(number, number.written) for number in numbers])
+    for verbs in dict.fromkeys(measure.verbs for measure in words.measures):
+        taking = ", ".join(("analyse", "tolerance", "allocate", *verbs))
+        title = f"measures of {taking}: figures of the cycle, or values at the start"
+        measures = [measure for measure in words.measures if measure.verbs == verbs]
+        measures.sort(key=lambda measure: not measure.stated)
+        show_rows(title, [*HEAD, "what"], [_row(measure, measure.text) for measure in measures])
+    say(placed(words.findings, model.file, ["measures"]))
+    if out is not None:
+        write_text(json.dumps(words.data(), ensure_ascii=False, indent=1) + "\n", out)
+        wrote(out)
+
+
+def _row(entry: "NamedNumber | NamedMeasure", text: str) -> list[str]:
+    """Name, value, unit and what it is of a number that can be set or a measure."""
+    value = f"{entry.value + 0.0:.6g}" if math.isfinite(entry.value) else ""
+    return [entry.name, value, "" if entry.unit in ("1", "SI") else entry.unit, text]
+
+
+# ---- studio ----------------------------------------------------------------------------------------------------------
+
+USUAL = 8765
+
+
+@verb()
+def studio(
+    file: Annotated[Path | None, typer.Argument(help="Model to open, or the folder of models.")] = None,
+    port: Annotated[
+        int | None, typer.Option("--port", help="Port on this machine; default: 8765, or any if that is taken.")
+    ] = None,
+    open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the browser.")] = True,
+) -> None:
+    """Draw a mechanism in the browser, drag it, watch its forces."""
+    from trunnion.cli.forms import forms
+
     try:
-        yield
-    except MechanismError as error:
-        raise MechanismError(placed(error.findings, file)) from None
+        from trunnion.studio.server import Studio
+    except ImportError:
+        what = "the studio is not installed"
+        raise MechanismError(Finding(what, remedy="install it: pip install 'trunnion[studio]'")) from None
+    path = Path(os.path.realpath(file or Path()))  # a link in a circle stays one, and does not exist
+    if file is not None and not path.exists():
+        raise MechanismError(Finding("does not exist", str(file), "name a model file or a folder"))
+    folder, opened = (path, None) if path.is_dir() else (path.parent, path.name)
+    bound = _usual() if port is None else _bound(port)
+    own = Studio(folder, opened, bound.getsockname()[1], forms=forms())
+    line(f"studio: {own.address}")
+    line("It answers this machine alone. Ctrl-C ends it.")
+    if open_:
+        import webbrowser
+
+        webbrowser.open(own.entrance())
+    own.server().run(sockets=[bound])
 
 
-def placed(findings: Iterable[Finding], file: Path, sections: Iterable[str] = ()) -> list[Finding]:
-    """Findings with the line of the model file, if it can be read."""
-    from trunnion.model.file import placed as place
-
+def _usual() -> socket.socket:
+    """A socket on the usual port, where the browser finds unsaved work again; on any if that is taken."""
     try:
-        return place(findings, file, sections)
-    except MechanismError:  # the file itself is what the findings are about
-        return list(findings)
+        return _bound(USUAL)
+    except MechanismError:
+        return _bound(0)
 
 
-def exit_status(findings: Iterable[Finding]) -> int:
-    """1 if any finding is an error."""
-    return 1 if any(finding.severity is Severity.ERROR for finding in findings) else 0
+def _bound(port: int) -> socket.socket:
+    """A socket on the loopback; MechanismError if the port is taken."""
+    found = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        found.bind(("127.0.0.1", port))
+        found.listen(128)  # a browser that comes before the server runs waits instead of being refused
+    except (OSError, OverflowError) as error:
+        found.close()
+        reason = getattr(error, "strerror", None) or str(error)
+        raise MechanismError(
+            Finding(f"port {port} cannot be had: {reason}", "--port", "choose another, or 0")
+        ) from None
+    return found
+
+
+# ---- examples and schema ------------------------------------------------------------------------------------------
+
+FileKind = StrEnum("FileKind", ["model", "data"])  # files that have a JSON Schema
+
+
+@verb()
+def examples(
+    name: Annotated[str | None, Argument(help="Example to copy; without it, all are listed.")] = None,
+    to: Annotated[Path, Option("--to", help="Folder to copy it into.")] = Path(),
+    force: Annotated[bool, Option("--force", help="Overwrite a file of that name.")] = False,
+) -> None:
+    """List the example models, rigs and drawings, or copy one."""
+    here = Path(__file__).resolve().parent.parent
+    place = here / "examples" if (here / "examples").is_dir() else here.parents[1] / "examples"  # of the source tree
+    paths = {path.stem: path for kind in ("*.yaml", "rig/*-rig.yaml", "*.step") for path in sorted(place.glob(kind))}
+    for path in paths.values() if name is None else ():
+        texts = path.read_text("utf-8").splitlines()
+        drawing = "a drawing for `trunnion import`" if path.suffix == ".step" else ""
+        line(f"{path.stem:<28} {next((text[5:].strip() for text in texts if text.startswith('name:')), drawing)}")
+    if name is None:
+        return
+    source = paths.get(name.removesuffix(".yaml").removesuffix(".step"))
+    if source is None:
+        raise MechanismError(Finding(f"there is no example '{name}'", remedy=f"use one of {', '.join(paths)}"))
+    folder(to)
+    target = to / source.name
+    if target.exists() and not force:
+        raise MechanismError(Finding("exists already", str(target), "use --force to overwrite it"))
+    with whole(target) as temporary:
+        temporary.write_bytes(source.read_bytes())
+    wrote(target)
+
+
+@verb()
+def schema(
+    of: Annotated[
+        FileKind, Option("--of", help="File: model, or data for the mapping of measured data.")
+    ] = FileKind.model,
+    out: Annotated[Path | None, Option("--out", "-o", help="Write it to a file.")] = None,
+) -> None:
+    """Print the JSON Schema of model or mapping file, for editors."""
+    if of is FileKind.data:
+        from trunnion.rig.reading.mapping import schema_text
+
+        text = schema_text()
+    else:
+        from trunnion.model.schema import SCHEMA_FILE
+
+        text = SCHEMA_FILE.read_text("utf-8")
+    if out is None:
+        print(text, end="")
+    else:
+        write_text(text, out)

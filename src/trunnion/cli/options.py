@@ -1,158 +1,194 @@
-"""The options that verbs share, and what their texts say: `name=value`, `name=file`, `name=from:to:count`."""
-
-from __future__ import annotations
+"""The options that verbs share, each stated once: those of the model, of the files and of friction go in groups."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from trunnion.errors import Finding, MechanismError
 
+if TYPE_CHECKING:
+    from trunnion.model.mechanism import Mechanism
+    from trunnion.solve.friction_method import FrictionMethod
+
 __all__ = [
-    "IMAGES",
-    "At",
-    "Criterion",
-    "Data",
-    "DataFiles",
-    "Dtype",
-    "Engine",
-    "File",
-    "Force",
-    "FrictionLaw",
-    "Jobs",
-    "Kinds",
-    "MappingFile",
-    "Measures",
-    "Method",
-    "OnePosition",
-    "Out",
-    "OutAllocation",
-    "OutTolerance",
-    "Report",
-    "Rounds",
-    "Seats",
-    "Seed",
-    "Set",
-    "Steps",
-    "TableFile",
-    "TableUnits",
-    "Units",
-    "UnitsRow",
-    "Variables",
-    "Write",
-    "named_file",
-    "over",
-    "points",
-    "seconds",
-    "setting",
-    "share",
-]
+    "CURVES", "DATA", "IMAGES", "PLOT_KINDS", "WRITTEN", "At", "DataFiles", "Engine", "Files", "Force", "Friction",
+    "Jobs", "MappingFile", "Measures", "Model", "OnePosition", "Picture", "Samples", "Seed", "Steps", "Uncut",
+    "Write", "named", "named_file", "over", "placed", "points", "seconds", "setting", "share",
+]  # fmt: skip
 
 IMAGES = (".png", ".svg", ".pdf", ".jpg", ".jpeg")
 PLOT_KINDS = (
     "torque, speed, friction-power, reactions, polar, power, mechanism, motion, error, seat, beta, locking or measures"
 )
-
-File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.")]
-Steps = Annotated[int, typer.Option("--steps", help="Equally spaced positions over the turn or range.")]
-Set = Annotated[
-    list[str] | None,
-    typer.Option("--set", help="Replace a value: AB=2.1m, crank.mass=5kg, B.friction.coefficient=0.3. Repeatable."),
-]
-TableFile = Annotated[
-    list[str] | None,
-    typer.Option("--table", help="NAME=FILE.csv: points of a driver or table, two columns. Repeatable."),
-]
-FrictionLaw = Annotated[
-    str | None, typer.Option("--friction", help="off, or a friction law for all joints with friction.")
-]
-Seats = Annotated[
-    str | None, typer.Option("--seat", help="loaded or free: position of the pins in all joints with play.")
-]
-Method = Annotated[
-    str,
-    typer.Option("--friction-method", "--method", help="newton, or successive-approximation (Durango et al., 2010)."),
-]
-Criterion = Annotated[
-    float | None,
-    typer.Option(
-        "--criterion", help="Friction iteration: largest change of a load, N, at convergence; default: by the residual."
-    ),
-]
-Rounds = Annotated[int, typer.Option("--iterations", help="Limit of friction iterations.")]
-At = Annotated[str | None, typer.Option("--at", help="Position for measures that state none: 60deg, 20mm, 0.1s.")]
-OnePosition = Annotated[str | None, typer.Option("--at", help="One position instead of the cycle: 60deg, 20mm, 0.1s.")]
-Seed = Annotated[int, typer.Option("--seed", help="Seed of the random numbers; the same seed gives the same result.")]
-Jobs = Annotated[int | None, typer.Option("--jobs", help="Number of processes; default: one per core for long work.")]
-MappingFile = Annotated[Path, typer.Argument(help="Mapping of the data: YAML.")]
-DataFiles = Annotated[
-    list[Path] | None, typer.Argument(help="Data files instead of those in the mapping: CSV, Parquet, TDMS.")
-]
-Write = Annotated[Path | None, typer.Option("--write", help="Write the model with the values found: .yaml or .json.")]
-Force = Annotated[bool, typer.Option("--force", help="With --write: allow overwriting the input itself.")]
-Report = Annotated[Path | None, typer.Option("--report", help="Also write the report, one HTML file.")]
+DATA = "Write the result: .csv .xlsx .json .nc .zarr .parquet. Repeatable."  # of --out where no figure is written
 WRITTEN = "Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable."
-TABLES = "x.positions.csv the curves, x.histogram.csv the samples, x.convergence.csv how they settle"
-OF_TOLERANCE = f"The name says which table: x.csv has the measures, x.parameters.csv the contributions, {TABLES}."
-OF_ALLOCATION = (
-    "The name says which table: x.csv has the tolerances, x.measures.csv the measures, x.offers.csv the cost over "
-    f"accuracy, {TABLES}."
-)
-Out = Annotated[list[Path] | None, typer.Option("--out", "-o", help=WRITTEN)]
-OutTolerance = Annotated[list[Path] | None, typer.Option("--out", "-o", help=f"{WRITTEN} {OF_TOLERANCE}")]
-OutAllocation = Annotated[list[Path] | None, typer.Option("--out", "-o", help=f"{WRITTEN} {OF_ALLOCATION}")]
-Engine = Annotated[str, typer.Option("--engine", help="numpy, compiled, or auto: by size.")]
-Data = Annotated[
-    list[Path] | None,
-    typer.Option("--out", "-o", help="Write the result: .csv .xlsx .json .nc .zarr .parquet. Repeatable."),
-]
-Uncut = Annotated[
-    bool, typer.Option("--uncut", help="Show peaks near dead centres in full; default: cut at the frame.")
-]
-Columns = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--columns",
-        help="Columns of a table file: usual, motion (velocities, accelerations), locking, all, or names. Repeatable.",
-    ),
-]
-Variables = Annotated[
-    list[str] | None,
-    typer.Option("--variables", help="Keep these variables only: reaction_force, drive_effort … Repeatable."),
-]
-Dtype = Annotated[str, typer.Option("--dtype", help="Numbers of the files: float64, or float32.")]
-UnitsRow = Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")]
+CURVES = "x.positions.csv the curves, x.histogram.csv the samples, x.convergence.csv how they settle"
 
+TableUnits = StrEnum("TableUnits", ["si", "model"])
 
-class TableUnits(StrEnum):
-    """What tables are written in."""
-
-    si = "si"
-    model = "model"
-
-
-Units = Annotated[
-    TableUnits, typer.Option("--units", help="Units of table files: si, or model for those of the model file.")
-]
-Kinds = Annotated[list[str] | None, typer.Option("--kind", help=f"{PLOT_KINDS}. Repeatable; all if not given.")]
+Steps = Annotated[int, Option("--steps", help="Equally spaced positions over the turn or range.")]
+At = Annotated[str | None, Option("--at", help="Position for measures that state none: 60deg, 20mm, 0.1s.")]
+OnePosition = Annotated[str | None, Option("--at", help="One position instead of the cycle: 60deg, 20mm, 0.1s.")]
 Measures = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         "--measure", help="A measure of the model, or rocker.C.x, angle:rocker, effort:A … (check --list). Repeatable."
     ),
 ]
+Samples = Annotated[int, Option("--samples", help="Number of random mechanisms.")]
+Seed = Annotated[int, Option("--seed", help="Seed of the random numbers; the same seed gives the same result.")]
+Jobs = Annotated[int | None, Option("--jobs", help="Number of processes; default: one per core for long work.")]
+Engine = Annotated[str, Option("--engine", help="numpy, compiled, or auto: by size.")]
+Uncut = Annotated[bool, Option("--uncut", help="Show peaks near dead centres in full; default: cut at the frame.")]
+Picture = Annotated[str, Option("--format", help="png, svg, pdf or jpg, for a folder of figures.")]
+Write = Annotated[Path | None, Option("--write", help="Write the model with the values found: .yaml or .json.")]
+Force = Annotated[bool, Option("--force", help="With --write: allow overwriting the input itself.")]
+MappingFile = Annotated[Path, Argument(help="Mapping of the data: YAML.")]
+DataFiles = Annotated[
+    list[Path] | None, Argument(help="Data files instead of those in the mapping: CSV, Parquet, TDMS.")
+]
+
+
+@dataclass
+class Model:
+    """The model file, with the numbers and laws that stand in for its own."""
+
+    file: Annotated[Path, Argument(help="Model file: YAML, JSON or TOML.")]
+    set_: Annotated[
+        list[str] | None,
+        Option("--set", help="Replace a value: AB=2.1m, crank.mass=5kg, B.friction.coefficient=0.3. Repeatable."),
+    ] = None
+    table: Annotated[
+        list[str] | None,
+        Option("--table", help="NAME=FILE.csv: points of a driver or table, two columns. Repeatable."),
+    ] = None
+    friction: Annotated[
+        str | None, Option("--friction", help="off, or a friction law for all joints with friction.")
+    ] = None
+    seat: Annotated[
+        str | None, Option("--seat", help="loaded or free: position of the pins in all joints with play.")
+    ] = None
+
+    def read(self, swept: Mapping[str, float | str] | None = None) -> "Mechanism":
+        """The model with the options applied: `--table` and `--seat` first, then `--friction` together with `--set`.
+
+        So a number that is set stands against what is said of all joints, and may be one that only the other law has.
+        swept: a value of each number that the verb replaces, which may be such a one too.
+        """
+        from trunnion.model.mechanism import read_mechanism
+        from trunnion.model.screen import follow, stated_units
+
+        mechanism = read_mechanism(self.file, dict(named_file(text) for text in self.table or ()))
+        values = dict(setting(text) for text in self.set_ or ())
+        if self.seat is not None:
+            mechanism = mechanism.with_seats(self.seat)
+        bare = list(_bare(mechanism, values))
+        if self.friction:
+            mechanism = mechanism.with_friction(self.friction, {**(swept or {}), **values})
+        elif values:
+            mechanism = mechanism.with_values(values)
+        again = {finding.where for finding in bare}
+        mechanism.checked[:] = [*(finding for finding in mechanism.checked if finding.where not in again), *bare]
+        follow(stated_units(mechanism))
+        return mechanism
+
+    @contextmanager
+    def lines(self) -> Iterator[None]:
+        """Findings about the model bear the line of its file also where the analysis finds them."""
+        try:
+            yield
+        except MechanismError as error:
+            raise MechanismError(placed(error.findings, self.file)) from None
+
+
+def _bare(mechanism: "Mechanism", values: Mapping[str, float | str]) -> Iterator[Finding]:
+    """Numbers that lack the unit that the model has."""
+    from trunnion.model.checks.magnitudes import bare_number
+
+    numbers = mechanism.parameter_set
+    for name, value in values.items():
+        with suppress(MechanismError):  # of a name that means nothing, which is said where it is set
+            if not isinstance(value, str):
+                yield from bare_number(numbers, numbers.resolve(name), value)
+
+
+def placed(findings: Iterable[Finding], file: Path, sections: Iterable[str] = ()) -> list[Finding]:
+    """Findings with the line of the model file, if it can be read."""
+    from trunnion.model.file import placed as place
+
+    try:
+        return place(findings, file, sections)
+    except MechanismError:  # the file itself is what the findings are about
+        return list(findings)
+
+
+@dataclass
+class Files:
+    """Where a result goes, and what its tables have."""
+
+    out: Annotated[list[Path] | None, Option("--out", "-o", help=WRITTEN)] = None
+    report: Annotated[Path | None, Option("--report", help="Also write the report, one HTML file.")] = None
+    units_row: Annotated[bool, Option("--units-row", help="Second CSV header row with the units.")] = False
+    units: Annotated[
+        TableUnits, Option("--units", help="Units of table files: si, or model for those of the model file.")
+    ] = TableUnits.si
+    columns: Annotated[
+        list[str] | None,
+        Option(
+            "--columns",
+            help="Columns of a table file: usual, motion (velocities, accelerations), locking, all, or names. "
+            "Repeatable.",
+        ),
+    ] = None
+
+
+@dataclass
+class Friction:
+    """How friction and reactions are settled."""
+
+    method: Annotated[
+        str, Option("--friction-method", "--method", help="newton, or successive-approximation (Durango et al., 2010).")
+    ] = "newton"
+    criterion: Annotated[
+        float | None,
+        Option("--criterion",
+               help="Friction iteration: largest change of a load, N, at convergence; default: by the residual."),
+    ] = None  # fmt: skip
+    iterations: Annotated[int, Option("--iterations", help="Limit of friction iterations.")] = 200
+
+    def checked(self) -> "FrictionMethod":
+        """The method; MechanismError for a name that there is not."""
+        from trunnion.solve.friction_method import FrictionMethod
+
+        return FrictionMethod(self.method, self.criterion, self.iterations)  # type: ignore[arg-type]  # it checks it
+
+
+# ---- what texts say -----------------------------------------------------------------------------------------------
+
+
+def named(text: str, option: str, what: str, remedy: str) -> tuple[str, str]:
+    """The name and the value of `name=value`; MechanismError with this sentence and remedy if either lacks."""
+    name, _, value = (part.strip() for part in text.partition("="))
+    if not name or not value:
+        raise MechanismError(Finding(f"'{text}' {what}", option, remedy))
+    return name, value
+
+
+def named_file(text: str, option: str = "--table") -> tuple[str, str]:
+    """A name and its file from `name=file`."""
+    return named(text, option, "names no file", "write NAME=FILE, e.g. A=motion.csv")
 
 
 def setting(text: str) -> tuple[str, float | str]:
     """A name and its value from `name=value`."""
-    name, equals, value = text.partition("=")
-    if not equals or not name.strip() or not value.strip():
-        raise MechanismError(Finding(f"'{text}' sets no value", "--set", "write name=value, e.g. AB=2.1m"))
-    return name.strip(), _plain(value)
+    name, value = named(text, "--set", "sets no value", "write name=value, e.g. AB=2.1m")
+    return name, _plain(value)
 
 
 def share(text: str) -> float:
@@ -188,25 +224,26 @@ def seconds(text: str | None, option: str, usual: str) -> float | None:
         raise MechanismError(Finding(error.what, option, error.remedy or remedy)) from None
     if stated.names:  # of a model, which is not asked here
         raise MechanismError(Finding(f"'{text.strip()}' is no time", option, remedy))
-    found = float(stated.evaluate())
-    if not found > 0:
+    time = float(stated.evaluate())
+    if not time > 0:
         raise MechanismError(Finding(f"a time of {text.strip()} is not above 0", option, remedy))
-    return found
+    return time
 
 
 def over(texts: list[str]) -> dict[str, Any]:
     """Values to sweep over, by name: from, to and count of `name=0deg:30deg:7`, or the list of `name=0deg,5deg`."""
-    found: dict[str, Any] = {}
+    grid: dict[str, Any] = {}
+    what = "is no range and no list of values"
+    remedy = "write NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,…, e.g. misalignment=0deg:30deg:7"
     for text in texts:
-        name, _, values = (part.strip() for part in text.partition("="))
+        name, values = named(text, "--over", what, remedy)
         parts = values.split(":")
-        if not name or not all(part.strip() for part in parts) or len(parts) not in (1, 3):
-            remedy = "write NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,…, e.g. misalignment=0deg:30deg:7"
-            raise MechanismError(Finding(f"'{text}' is no range and no list of values", "--over", remedy))
-        if name in found:
+        if not all(part.strip() for part in parts) or len(parts) not in (1, 3):
+            raise MechanismError(Finding(f"'{text}' {what}", "--over", remedy))
+        if name in grid:
             raise MechanismError(Finding(f"'{name}' is given twice", "--over", "give all its values at once"))
-        found[name] = _range(name, parts) if len(parts) == 3 else [_plain(value) for value in values.split(",")]
-    return found
+        grid[name] = _range(name, parts) if len(parts) == 3 else [_plain(value) for value in values.split(",")]
+    return grid
 
 
 def _range(name: str, parts: list[str]) -> tuple[float | str, float | str, int]:
@@ -220,11 +257,3 @@ def _range(name: str, parts: list[str]) -> tuple[float | str, float | str, int]:
 def points(grid: Mapping[str, Any]) -> int:
     """How many points a grid has."""
     return math.prod(values[2] if isinstance(values, tuple) else len(values) for values in grid.values())
-
-
-def named_file(text: str, option: str = "--table") -> tuple[str, str]:
-    """A name and its file from `name=file`."""
-    name, _, path = (part.strip() for part in text.partition("="))
-    if not name or not path:
-        raise MechanismError(Finding(f"'{text}' names no file", option, "write NAME=FILE, e.g. A=motion.csv"))
-    return name, path

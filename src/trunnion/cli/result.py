@@ -9,39 +9,34 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 
-from trunnion.cli.model import exit_status, placed
-from trunnion.cli.options import IMAGES
-from trunnion.cli.terminal import console, say, say_missed, show_figures, show_rows, wrote
-from trunnion.errors import Finding, MechanismError, counted
-from trunnion.results.attributes import Described, findings_of, summary_of
+from trunnion.cli.options import IMAGES, Files, Model, placed
+from trunnion.cli.terminal import line, say, show_figures, show_rows, wrote
+from trunnion.errors import Finding, MechanismError, Severity, counted
+from trunnion.results.attributes import attribute, findings_of, summary_of
 from trunnion.results.result import Result
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Shown", "check_files", "check_model", "check_page", "show_summary", "show_tables"]
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = ["YAML", "Shown", "check_files", "check_model", "check_page", "check_target", "end", "exit_status",
+           "show_tables", "write_text"]  # fmt: skip
 
 PAGES = (".html", ".htm")
-MODELS = (".yaml", ".yml", ".json")
+YAML, MODELS = (".yaml", ".yml"), (".yaml", ".yml", ".json")
 
 
 # ---- before anything is computed ------------------------------------------------------------------------------
 
 
-def check_files(
-    out: Sequence[Path],
-    report: Path | None = None,
-    drawn: bool = True,
-    of: str = "",
-    kind: str | None = None,
-    instead: str = "",
-) -> None:
+def check_files(files: Files, of: str = "", kind: str | None = None, drawn: bool = True, instead: str = "") -> None:
     """MechanismError for a file that cannot be written, or a table or figure that a result of some kind (`of`) has not.
 
     drawn: whether figures can be written; instead: what writes them where they cannot.
     """
     others = IMAGES if drawn else ()
-    for path in out:
+    for path in files.out or ():
         if instead and path.suffix.lower() in IMAGES:
             what = f"cannot write a result as '{path.suffix.lower()}'"
             raise MechanismError(Finding(what, "--out", f"figures: {instead} --out {path}"))
@@ -52,7 +47,7 @@ def check_files(
             check_format(path, others)
             if of:
                 check_table(path, of)
-    check_page(report, "--report")
+    check_page(files.report, "--report")
     if kind is not None:
         from trunnion.views.shown import check_kind
 
@@ -66,12 +61,20 @@ def check_page(path: Path | None, option: str) -> None:
         raise MechanismError(Finding(what, option, "write a .html file and print it"))
 
 
+def check_target(path: Path, option: str, what: str, kinds: Sequence[str], over: bool = True) -> None:
+    """MechanismError for a file of no such kind, or one that is there already unless it may be written over."""
+    if path.suffix.lower() not in kinds:
+        remedy = f"write {' or '.join(kind for kind in kinds if kind != '.yml')}"
+        raise MechanismError(Finding(f"{what} is not written as '{path.suffix}'", option, remedy))
+    if path.exists() and not over:
+        raise MechanismError(Finding(f"'{path}' exists", option, "name another file, or add --force"))
+
+
 def check_model(write: Path | None, file: Path, force: bool) -> None:
     """MechanismError for a model that cannot be written, or over the one that is read."""
     if write is None:
         return
-    if write.suffix.lower() not in MODELS:
-        raise MechanismError(Finding(f"a model is not written as '{write.suffix}'", "--write", "write .yaml or .json"))
+    check_target(write, "--write", "a model", MODELS)
     if not force and write.exists() and file.exists() and write.samefile(file):
         raise MechanismError(Finding(f"'{write}' is the model itself", "--write", "name another file, or add --force"))
 
@@ -79,78 +82,105 @@ def check_model(write: Path | None, file: Path, force: bool) -> None:
 # ---- afterwards -----------------------------------------------------------------------------------------------
 
 
+def exit_status(findings: Iterable[Finding]) -> int:
+    """1 if any finding is an error."""
+    return int(any(finding.severity is Severity.ERROR for finding in findings))
+
+
+def end(findings: Sequence[Finding], file: Path, sections: str = "", every: bool = False) -> NoReturn:
+    """Findings with their lines in the model on the error stream, and the exit status: 1 with any error.
+
+    sections: of the model, to which lines are limited; every: also notes that nearly every result has.
+    """
+    say(placed(findings, file, sections.split()), every)
+    raise typer.Exit(exit_status(findings))
+
+
 @dataclass
 class Shown:
     """A result and what is done with it.
 
-    file: of the model, whose lines the findings get, in these sections where they name no place. out, report: files to
-    write. drawn: options of the figure, such as its kind; draw: another figure, by the path of its file, or None; page:
-    the report as HTML; show: prints the tables, the summary if not given; others: findings beside those of the result,
-    which are said as they are; columns, units: those of a table file, see `save`.
+    sections: of the model, whose lines findings get. pictured: what figures and report are made of, the result if not
+    given; drawn, paged: options of figure and report, as the view has them; draw: another figure, by the path of its
+    file. tables: what is printed, `most` rows of each, the file `rest` has the others; the summary if there are none.
+    show: prints something else. others: findings beside those of the result, which are said as they are.
     """
 
     result: xr.Dataset | Result
-    file: Path
-    sections: Sequence[str]
-    out: Sequence[Path] = ()
-    report: Path | None = None
-    units_row: bool = False
+    model: Model
+    files: Files
+    sections: str
+    pictured: xr.Dataset | None = None
     drawn: Mapping[str, Any] = field(default_factory=dict)
+    paged: Mapping[str, Any] = field(default_factory=dict)
     draw: Callable[[Path], Any] | None = None
-    page: Callable[[], str] | None = None
+    tables: Sequence[Any] = ()
+    most: int = 0
+    rest: str = ""
+    apart: bool = True
     show: Callable[[], None] | None = None
-    others: Iterable[Finding] = ()
+    others: Sequence[Finding] = ()
     written: list[Path] = field(default_factory=list)
-    columns: Sequence[str] | None = None
-    units: str = "si"
 
     @property
     def dataset(self) -> xr.Dataset:
-        """The result as files, figures and reports take it."""
+        """The result as files take it."""
         return self.result.dataset if isinstance(self.result, Result) else self.result
 
+    @property
+    def name(self) -> str:
+        """Whose result it is."""
+        return str(self.result.attrs["name"] or self.model.file)
+
     def write(self) -> None:
-        """Write every file that is asked for."""
-        for path in self.out:
-            if path.suffix.lower() not in IMAGES:
+        """Write every file that is named."""
+        files = self.files
+        for path in files.out or ():
+            if path.suffix.lower() in IMAGES:
+                from trunnion.views.cycle.plots import save as save_figure
+                from trunnion.views.shown import figure_of
+
+                of = self.dataset if self.pictured is None else self.pictured
+                save_figure(self.draw(path) if self.draw else figure_of(of, **self.drawn), path)
+            else:
                 from trunnion.results.export import save
 
-                save(self.dataset, path, self.units_row, self.columns, self.units)  # type: ignore[arg-type]  # it checks them
-            elif not self._drawn(path):
-                continue
+                save(self.dataset, path, files.units_row, files.columns, files.units)  # type: ignore[arg-type]  # it checks them
             self.written.append(path)
-        if self.report is not None:
+        if files.report is not None:
             from trunnion.views.shown import report_of
 
-            write_text(self.page() if self.page else report_of(self.dataset), self.report)
-            self.written.append(self.report)
+            of = self.dataset if self.pictured is None else self.pictured
+            write_text(report_of(of, **self.paged), files.report)
+            self.written.append(files.report)
 
-    def _drawn(self, path: Path) -> bool:
-        from trunnion.views.cycle.plots import save
-        from trunnion.views.shown import figure_of
+    def write_model(self, mechanism: Mechanism, path: Path, over: bool) -> None:
+        """Write the model with what was found; over: also over the one that was read."""
+        from trunnion.model.rewrite import rewrite_mechanism
 
-        figure = self.draw(path) if self.draw else figure_of(self.dataset, **self.drawn)
-        if figure is None:
-            return False
-        save(figure, path)
-        return True
+        rewrite_mechanism(mechanism, self.model.file, path, over)
+        self.written.append(path)
 
     def end(self, findings: Sequence[Finding] | None = None, status: int | None = None) -> NoReturn:
         """Tables and files on the output, findings on the error stream, and the exit status: 1 with any error.
 
         findings: those of the result if not given; status: where another than that of the findings.
         """
-        if self.show is None:
-            show_summary(self.result, self.file)
-        else:
-            say_missed(self.result)
+        if self.tables or self.show:
+            for text in attribute(self.result, "missed"):  # what of the limits is not kept, before anything else
+                line(text, "bold")
+        if self.show:
             self.show()
+        elif self.tables:
+            show_tables(self.name, self.tables, self.apart, self.most, self.rest)
+        else:
+            show_figures(f"{self.name}\n{self.result.attrs['formula']}", summary_of(self.result))
         for path in self.written:
             wrote(path)
-        told, others = findings_of(self.result) if findings is None else findings, list(self.others)
-        say(others)
-        say(placed(told, self.file, self.sections))
-        raise typer.Exit(exit_status([*others, *told]) if status is None else status)
+        findings = findings_of(self.result) if findings is None else findings
+        say(self.others)
+        say(placed(findings, self.model.file, self.sections.split()))
+        raise typer.Exit(exit_status([*self.others, *findings]) if status is None else status)
 
     def finish(self, status: int | None = None) -> NoReturn:
         """Write, show and end."""
@@ -163,12 +193,7 @@ def write_text(text: str, path: Path) -> None:
     from trunnion.files import whole
 
     with whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-
-
-def show_summary(result: Described, file: Path) -> None:
-    """The summary of a result under its name and formula."""
-    show_figures(f"{result.attrs['name'] or file}\n{result.attrs['formula']}", summary_of(result))
+        temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def show_tables(name: str, tables: Sequence[Any], apart: bool = True, most: int = 0, rest: str = "") -> None:
@@ -177,9 +202,8 @@ def show_tables(name: str, tables: Sequence[Any], apart: bool = True, most: int 
     """
     for i, table in enumerate(tables):
         if i and apart:
-            console().print()
+            line()
         title = f"{name}\n{table.title}" if i == 0 and name else table.title
         show_rows(title, table.head, table.rows[: most or None])
         if most and len(table.rows) > most:
-            more = f"{counted(len(table.rows) - most, 'row')} more; --out {rest} has all"
-            console().print(more, markup=False, highlight=False)
+            line(f"{counted(len(table.rows) - most, 'row')} more; --out {rest} has all")

@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import Finding, Severity
-from trunnion.results.attributes import Described, attribute
 from trunnion.results.quantities import parts
 
 if TYPE_CHECKING:
     from trunnion.results.figure import Figure
 
-__all__ = ["bar", "console", "say", "say_missed", "show_figures", "show_rows", "wrote"]
+__all__ = ["bar", "console", "line", "say", "show_figures", "show_rows", "wrote"]
 
 # notes that nearly every result has: they are left to the report and to `check`
 QUIET = frozenset({"model.gravity", "samples.engine", "simulate.centred"})
@@ -29,9 +28,14 @@ def console() -> Any:
     return Console(emoji=False)  # else `effort:O:` has a circle
 
 
+def line(text: str = "", style: str = "") -> None:
+    """Print a text as it is, on one line however long."""
+    console().print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+
+
 def wrote(path: Path) -> None:
     """Tell of a file that is written."""
-    console().print(f"wrote {path}", markup=False, highlight=False, soft_wrap=True)
+    line(f"wrote {path}")
 
 
 def show_figures(title: str, figures: Sequence[Figure]) -> None:
@@ -58,15 +62,12 @@ def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
     shown in parts, one below the other, each with the columns that name its rows. Where no terminal sets a width, it is
     as wide as its words need: no number is broken.
     """
-    from rich.cells import cell_len
     from rich.table import Table
 
+    line(title, "italic")
     out = console()
-    out.print(title, style="italic", markup=False, highlight=False, soft_wrap=True)
     if not out.is_terminal and "COLUMNS" not in os.environ:
-        columns = zip(head, *rows, strict=True)
-        least = (max(cell_len(word) for cell in column for word in cell.split(" ")) for column in columns)
-        out.width = max(out.width, sum(least) + _frame(head))
+        out.width = max(out.width, sum(_widths([head, *rows])[0]) + _frame(head))
     gap = next((gap for gap in GAPS if len(_parts([head, *rows], out.width, gap)) == 1), GAPS[0])
     for number, columns_shown in enumerate(_parts([head, *rows], out.width, gap)):
         if number:
@@ -90,29 +91,35 @@ def _frame(columns: Sequence[Any], gap: int = 3) -> int:
     return gap * len(columns) - 1
 
 
+def _widths(rows: list[list[str]]) -> tuple[list[int], list[int]]:
+    """How wide each column is at least, by its longest word, and how wide it is by its longest cell."""
+    from rich.cells import cell_len
+
+    columns = list(zip(*rows, strict=True))
+    least = [max(cell_len(word) for cell in column for word in cell.split(" ")) for column in columns]
+    return least, [max(map(cell_len, column)) for column in columns]
+
+
 def _parts(rows: list[list[str]], width: int, gap: int = 3) -> list[list[int]]:
     """Columns of each table that a table is shown as: all in one if their words fit the width.
 
     Otherwise each begins with the columns in which every row differs from the others.
     """
-    from rich.cells import cell_len
-
-    columns = list(zip(*rows, strict=True))
-    least = [max(cell_len(word) for cell in column for word in cell.split(" ")) for column in columns]
-    if sum(least) + _frame(columns, gap) <= width:
-        return [list(range(len(columns)))]
-    wanted = [max(low, min(WIDE, max(map(cell_len, column)))) for low, column in zip(least, columns, strict=True)]
-    telling = (k for k in range(1, min(4, len(columns))) if len({tuple(row[:k]) for row in rows}) == len(rows))
+    least, longest = _widths(rows)
+    if sum(least) + _frame(least, gap) <= width:
+        return [list(range(len(least)))]
+    room = [max(low, min(WIDE, high)) for low, high in zip(least, longest, strict=True)]
+    telling = (k for k in range(1, min(4, len(room))) if len({tuple(row[:k]) for row in rows}) == len(rows))
     count = next(telling, 1)
     names = list(range(count))
-    found = [list(names)]
-    for k in range(count, len(columns)):
-        taken = [*found[-1], k]
-        if len(found[-1]) > count and sum(wanted[j] for j in taken) + _frame(taken) > width:
-            found.append([*names, k])
+    parts = [list(names)]
+    for k in range(count, len(room)):
+        longer = [*parts[-1], k]
+        if len(parts[-1]) > count and sum(room[j] for j in longer) + _frame(longer) > width:
+            parts.append([*names, k])
         else:
-            found[-1] = taken
-    return found
+            parts[-1] = longer
+    return parts
 
 
 WIDE = 20  # of a column that is not broken into more lines, where a table is shown in parts
@@ -121,35 +128,27 @@ WIDE = 20  # of a column that is not broken into more lines, where a table is sh
 def _fitted(rows: list[list[str]], room: int) -> list[list[str]]:
     """The cells broken into lines at plain spaces so that all columns take so much room; as they are if they do, or
     cannot. rich itself breaks at spaces that are not to be broken, too."""
-    from rich.cells import cell_len
-
-    columns = list(zip(*rows, strict=True))
-    widths = [max(cell_len(cell) for cell in column) for column in columns]
-    least = [max(cell_len(word) for cell in column for word in cell.split(" ")) for column in columns]
+    least, widths = _widths(rows)
     if sum(widths) <= room or sum(least) > room:
         return rows
     while sum(widths) > room:
         widest = max((k for k in range(len(widths)) if widths[k] > least[k]), key=widths.__getitem__)
         widths[widest] -= 1
-    return [[_broken(cell, width, cell_len) for cell, width in zip(row, widths, strict=True)] for row in rows]
+    return [[_broken(cell, width) for cell, width in zip(row, widths, strict=True)] for row in rows]
 
 
-def _broken(text: str, width: int, length: Callable[[str], int]) -> str:
+def _broken(text: str, width: int) -> str:
     """A text in lines no wider than this, broken at plain spaces."""
+    from rich.cells import cell_len
+
     lines = [""]
     for word in text.split(" "):
         longer = f"{lines[-1]} {word}" if lines[-1] else word
-        if length(longer) <= width or not lines[-1]:
+        if cell_len(longer) <= width or not lines[-1]:
             lines[-1] = longer
         else:
             lines.append(word)
     return "\n".join(lines)
-
-
-def say_missed(result: Described) -> None:
-    """What of the limits is not kept, before anything else."""
-    for line in attribute(result, "missed"):
-        console().print(line, style="bold", markup=False, highlight=False, soft_wrap=True)
 
 
 def say(findings: Iterable[Finding], every: bool = False) -> None:

@@ -21,7 +21,7 @@ from trunnion.cycle.course import CycleCourse, Means, course_of, magnitude
 from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import scales_of
-from trunnion.errors import Finding, Status, agreeing
+from trunnion.errors import Finding, Severity, Status, agreeing
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.joint_parts import clearance
 from trunnion.model.mechanism import Mechanism
@@ -44,7 +44,16 @@ from trunnion.solve.system import System, felt, rubbing
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["Cycle", "beside_the_drive", "effort_units", "findings", "listed", "model_notes", "shared_dimensions"]
+__all__ = [
+    "Cycle",
+    "beside_the_drive",
+    "effort_units",
+    "findings",
+    "listed",
+    "model_notes",
+    "of_run",
+    "shared_dimensions",
+]
 
 Array = NDArray[np.float64]
 RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
@@ -123,10 +132,14 @@ def findings(cycle: Cycle) -> list[Finding]:
 
 def _of_the_model(cycle: Cycle) -> list[Finding]:
     """What the model says that this analysis leaves out, how it was assembled, and what statics leaves open."""
-    run = cycle.run
-    notes = run.once("notes", lambda: model_notes(run.system.mechanism, run.system))
-    hints = run.once("far hints", lambda: list(_far_hints(run)))
-    return [*notes, *run.chosen.findings, *hints, *(run.determinacy.findings() if run.determinacy else [])]
+    return of_run(cycle.run, cycle.run.once("far hints", lambda: list(_far_hints(cycle.run))))
+
+
+def of_run(run: Run, hints: Sequence[Finding] = (), notes: bool = True) -> list[Finding]:
+    """What there is to say before any position is solved. hints: on how it is assembled; notes: of the model, too."""
+    model = run.once("notes", lambda: model_notes(run.system.mechanism, run.system))
+    graver = [finding for finding in model if notes or finding.severity is not Severity.NOTE]
+    return [*graver, *run.chosen.findings, *hints, *(run.determinacy.findings() if run.determinacy else [])]
 
 
 def _far_hints(run: Run) -> Iterator[Finding]:

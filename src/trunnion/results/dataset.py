@@ -37,7 +37,8 @@ class Variable:
 
     units: or a word for one that only a result knows, as "parameter" for that of its parameters, see `described`. Of
     what not every result has: part, such as "errors" of a mechanism with any; space, the only one, "planar" or
-    "spatial".
+    "spatial". column: what stands behind the name of its member in tables of a cycle, None in none; usual, motion: of
+    which tables.
     """
 
     dims: tuple[str, ...]
@@ -46,6 +47,9 @@ class Variable:
     dtype: type[Any] = np.float64
     part: str = ""
     space: str = ""
+    column: str | None = None
+    usual: bool = True
+    motion: bool = False
 
     def over(self, *dims: str) -> Variable:
         """The same with more dimensions, last."""

@@ -22,131 +22,136 @@ if TYPE_CHECKING:
 __all__ = ["CYCLE", "OF_SOME_JOINTS", "VARIABLES", "allocate", "dataset", "variables"]
 
 
-def _rates(name: str, dims: tuple[str, ...], unit: str, long_name: str, space: str = "") -> dict[str, Variable]:
-    """A quantity with its first and second derivative by time."""
+def _coordinate(
+    name: str, dim: str, unit: str, long_name: str, column: str, space: str = "", usual: int = 3
+) -> dict[str, Variable]:
+    """A coordinate with its first and second derivative by time; usual: how many of them every table has."""
+    parts = {"": ("", long_name), "_velocity": ("/s", f"rate of the {long_name}"),
+             "_acceleration": ("/s^2", f"second derivative of the {long_name}")}  # fmt: skip
     return {
-        name: Variable(dims, unit, long_name, space=space),
-        f"{name}_velocity": Variable(dims, f"{unit}/s", f"rate of the {long_name}", space=space),
-        f"{name}_acceleration": Variable(dims, f"{unit}/s^2", f"second derivative of the {long_name}", space=space),
+        f"{name}{rate}": Variable(
+            (dim,), f"{unit}{per}", text, space=space, column=f"{column}{rate}", usual=k < usual, motion=True
+        )
+        for k, (rate, (per, text)) in enumerate(parts.items())
     }
 
 
+Dims = tuple[str, ...]
+
+
+def _motion(dims: Dims, unit: str, long_name: str, column: str, space: str = "", usual: bool = True) -> Variable:
+    """A vector of the motion."""
+    return Variable(dims, unit, long_name, space=space, column=column, usual=usual, motion=True)
+
+
+def _bearing(dims: Dims, unit: str, long_name: str, column: str) -> Variable:
+    """What only joints with ends, or with pins of a stated size, have."""
+    return Variable(dims, unit, long_name, part="bearings", column=column)
+
+
+def _seat(
+    dims: Dims, unit: str, long_name: str, column: str | None = None, dtype: type[Any] = np.float64
+) -> Variable:  # fmt: skip
+    """What only mechanisms whose pins have seats have."""
+    return Variable(dims, unit, long_name, dtype, "seats", column=column)
+
+
+def _error(dims: Dims, unit: str, long_name: str, column: str | None = None) -> Variable:
+    """What only mechanisms with errors have."""
+    return Variable(dims, unit, long_name, part="errors", column=column)
+
+
+J, D, S, NOTHING = ("joint",), ("driver",), ("spring",), ()
+JA, LA, PA, JE = ("joint", "axis"), ("link", "axis"), ("point", "axis"), ("joint", "end", "axis")
+# in the order in which the columns of a joint, a link, … stand in a table
 VARIABLES: dict[str, Variable] = {
-    **_rates("joint_rotation", ("joint",), "rad", "rotation of the joint, second link against first"),
-    **_rates("joint_slide", ("joint",), "m", "slide of the joint, second link against first"),
-    **_rates("link_angle", ("link",), "rad", "angle of the link's x axis", "planar"),
-    "link_position": Variable(("link", "axis"), "m", "place of the link's origin", space="spatial"),
-    "link_rotation": Variable(("link", "component"), "1", "unit quaternion of the link's axes", space="spatial"),
-    "link_angular_velocity": Variable(("link", "axis"), "rad/s", "angular velocity of the link", space="spatial"),
-    "link_angular_acceleration": Variable(
-        ("link", "axis"), "rad/s^2", "angular acceleration of the link", space="spatial"
-    ),
-    "point_position": Variable(("point", "axis"), "m", "place of the point"),
-    "point_velocity": Variable(("point", "axis"), "m/s", "velocity of the point"),
-    "point_acceleration": Variable(("point", "axis"), "m/s^2", "acceleration of the point"),
-    "reaction_force": Variable(("joint", "axis"), "N", "reaction on the second link by the first"),
-    "reaction_moment": Variable(("joint",), "N m", "reaction moment on the second link, about the joint's point"),
-    "friction_torque": Variable(("joint",), "N m", "friction torque on the second link by the first"),
-    "friction_force": Variable(("joint",), "N", "friction force along the slide on the second link by the first"),
-    "friction_moment": Variable(
-        ("joint", "axis"), "N m", "friction moment on the second link, about the middle of the bearing", space="spatial"
-    ),
-    "friction_power": Variable(("joint",), "W", "power lost to friction"),
-    "end_load": Variable(
-        ("joint", "bearing_end", "axis"),
-        "N",
+    **_coordinate("joint_rotation", "joint", "rad", "rotation of the joint, second link against first", "rotation",
+                  usual=2),
+    **_coordinate("joint_slide", "joint", "m", "slide of the joint, second link against first", "slide", usual=2),
+    **_coordinate("link_angle", "link", "rad", "angle of the link's x axis", "angle", "planar"),
+    "link_position": _motion(LA, "m", "place of the link's origin", "", "spatial"),
+    "link_rotation": _motion(("link", "component"), "1", "unit quaternion of the link's axes", "rotation", "spatial"),
+    "link_angular_velocity": _motion(LA, "rad/s", "angular velocity of the link", "angular_velocity", "spatial"),
+    "link_angular_acceleration": _motion(
+        LA, "rad/s^2", "angular acceleration of the link", "angular_acceleration", "spatial"),
+    "point_position": _motion(PA, "m", "place of the point", ""),
+    "point_velocity": _motion(PA, "m/s", "velocity of the point", "velocity", usual=False),
+    "point_acceleration": _motion(PA, "m/s^2", "acceleration of the point", "acceleration", usual=False),
+    "reaction_force": Variable(JA, "N", "reaction on the second link by the first", column="reaction"),
+    "reaction_moment": Variable(
+        J, "N m", "reaction moment on the second link, about the joint's point", column="reaction_moment"),
+    "end_load": _bearing(
+        ("joint", "bearing_end", "axis"), "N",
         "load on each end of the bearing or guide, global axes; of a cross 3 and 4 on the pin of the second link",
-        part="bearings",
-    ),
-    "pin_pressure": Variable(
-        ("joint",),
-        "Pa",
-        "load over projected area of the pin, F/(d b), in space of the end that bears more",
-        part="bearings",
-    ),
-    "drive_effort": Variable(("driver",), "effort", "drive effort on the second link by the first"),
-    "drive_effort_lower": Variable(("driver",), "effort", "least drive effort where a friction is an interval"),
-    "drive_effort_upper": Variable(("driver",), "effort", "largest drive effort where a friction is an interval"),
-    "drive_power": Variable(("driver",), "W", "power of the driver"),
+        "end_load"),
+    "pin_pressure": _bearing(
+        J, "Pa", "load over projected area of the pin, F/(d b), in space of the end that bears more", "pin_pressure"),
+    "friction_torque": Variable(
+        J, "N m", "friction torque on the second link by the first", column="friction_torque"),
+    "friction_force": Variable(
+        J, "N", "friction force along the slide on the second link by the first", column="friction_force"),
+    "friction_moment": Variable(
+        JA, "N m", "friction moment on the second link, about the middle of the bearing", space="spatial"),
+    "friction_power": Variable(J, "W", "power lost to friction", column="friction_power"),
+    "drive_effort": Variable(D, "effort", "drive effort on the second link by the first", column="effort"),
+    "drive_effort_lower": Variable(
+        D, "effort", "least drive effort where a friction is an interval", column="effort_lower"),
+    "drive_effort_upper": Variable(
+        D, "effort", "largest drive effort where a friction is an interval", column="effort_upper"),
+    "drive_power": Variable(D, "W", "power of the driver"),
     "spring_force": Variable(
-        ("spring",), "spring_force", "pull of the spring and its damper; a torque in a joint that turns"
-    ),
+        S, "spring_force", "pull of the spring and its damper; a torque in a joint that turns", column="force"),
     "spring_elongation": Variable(
-        ("spring",), "spring_elongation", "length beyond the free length; an angle in a joint that turns"
-    ),
-    "spring_power": Variable(("spring",), "W", "power of the spring and its damper, positive into the mechanism"),
-    "damping_power": Variable(("spring",), "W", "power lost in the spring's damper"),
+        S, "spring_elongation", "length beyond the free length; an angle in a joint that turns", column="elongation"),
+    "spring_power": Variable(
+        S, "W", "power of the spring and its damper, positive into the mechanism", column="spring_power"),
+    "damping_power": Variable(S, "W", "power lost in the spring's damper", column="damping_power"),
     "gear_torque": Variable(
-        ("gear",),
-        "N m",
+        ("gear",), "N m",
         "torque of the gear pair in its second joint, on its second link; of a rack or screw in what turns",
-    ),
+        column="torque"),
     "gear_force": Variable(
-        ("gear", "axis"), "N", "tooth force on the gear of the second joint by that of the first; on the rack or nut"
-    ),
-    "useful_power": Variable((), "W", "power delivered to the useful loads"),
-    "efficiency_instant": Variable((), "1", "useful power over drive power"),
-    "closure_residual": Variable((), "m", "largest opening of a closed loop"),
-    "condition": Variable((), "1", "largest condition number of a module's Jacobian"),
-    "power_residual": Variable((), "W", "drive + loads + inertia − friction power; 0 but for rounding"),
-    "friction_iterations": Variable((), "1", "rounds to settle friction and reactions", np.int32),
-    "friction_change": Variable((), "N", "largest change of a reaction in the last round"),
-    "friction_residual": Variable((), "N", "largest difference between a friction and its law for the load found"),
-    "friction_contraction": Variable((), "1", "contraction of the friction iteration; from 1 on it may diverge"),
-    "locking_margin": Variable((), "1", "multiple of the friction at which the position locks, ∞ if beyond 10"),
-    "status": Variable((), "1", "code of the position's status; see the attribute flag_meanings", np.int8),
-    "seat_offset": Variable(
-        ("joint", "end", "axis"), "m", "offset of the pin's axis from the hole's at each end, hole's axes", part="seats"
-    ),
-    "seat_beta": Variable(("joint",), "rad", "angle β between the seats of a pin's ends", part="seats"),
-    "seat_xi": Variable(("joint",), "rad", "direction ξ of a pin's seat in its hole", part="seats"),
-    "seat_xi_pin": Variable(("joint",), "rad", "direction ξ of a pin's seat in the pin's own frame", part="seats"),
-    "end_force": Variable(
-        ("joint", "end", "axis"), "N", "force of the pin on each end of its hole, hole's axes", part="seats"
-    ),
-    "contact_position": Variable(
-        ("joint", "end", "axis"), "m", "place where the pin touches its hole at each end", part="seats"
-    ),
-    "contact_lost": Variable(("joint",), "1", "1 where the pin loses contact", np.int8, part="seats"),
-    "contact_loss_number": Variable(
-        ("joint",), "rad/(N s)", "rate of turn of the reaction over its size (Earles and Wu)", part="seats"
-    ),
-    "seat_travel": Variable(
-        (),
-        "1",
-        "1 where velocities and accelerations include the motion of pins within their play",
-        np.int8,
-        part="seats",
-    ),
-    "seat_rounds": Variable((), "1", "iterations of seats and reactions", np.int32, part="seats"),
-    "seat_change": Variable((), "1", "change of a seat in one more iteration, relative to its clearance", part="seats"),
-    "point_error": Variable(("point", "axis"), "m", "place of the point against the ideal mechanism", part="errors"),
-    "link_error": Variable(("link",), "rad", "angle of the link against the ideal mechanism", part="errors"),
-    "joint_rotation_error": Variable(
-        ("joint",), "rad", "rotation of the joint against the ideal mechanism", part="errors"
-    ),
-    "joint_slide_error": Variable(("joint",), "m", "slide of the joint against the ideal mechanism", part="errors"),
-    "reaction_force_change": Variable(
-        ("joint", "axis"), "N", "reaction less that of the ideal mechanism", part="errors"
-    ),
-    "drive_effort_change": Variable(
-        ("driver",), "effort", "drive effort less that of the ideal mechanism", part="errors"
-    ),
-    "friction_power_change": Variable(
-        ("joint",), "W", "power lost to friction less that of the ideal mechanism", part="errors"
-    ),
-}
+        ("gear", "axis"), "N", "tooth force on the gear of the second joint by that of the first; on the rack or nut",
+        column="force"),
+    "useful_power": Variable(NOTHING, "W", "power delivered to the useful loads"),
+    "efficiency_instant": Variable(NOTHING, "1", "useful power over drive power"),
+    "closure_residual": Variable(NOTHING, "m", "largest opening of a closed loop"),
+    "condition": Variable(NOTHING, "1", "largest condition number of a module's Jacobian"),
+    "power_residual": Variable(NOTHING, "W", "drive + loads + inertia − friction power; 0 but for rounding"),
+    "friction_iterations": Variable(NOTHING, "1", "rounds to settle friction and reactions", np.int32),
+    "friction_change": Variable(NOTHING, "N", "largest change of a reaction in the last round"),
+    "friction_residual": Variable(
+        NOTHING, "N", "largest difference between a friction and its law for the load found"),
+    "friction_contraction": Variable(
+        NOTHING, "1", "contraction of the friction iteration; from 1 on it may diverge"),
+    "locking_margin": Variable(NOTHING, "1", "multiple of the friction at which the position locks, ∞ if beyond 10"),
+    "status": Variable(NOTHING, "1", "code of the position's status; see the attribute flag_meanings", np.int8),
+    "point_error": _error(PA, "m", "place of the point against the ideal mechanism", "error"),
+    "link_error": _error(("link",), "rad", "angle of the link against the ideal mechanism"),
+    "joint_rotation_error": _error(J, "rad", "rotation of the joint against the ideal mechanism", "rotation_error"),
+    "joint_slide_error": _error(J, "m", "slide of the joint against the ideal mechanism", "slide_error"),
+    "reaction_force_change": _error(JA, "N", "reaction less that of the ideal mechanism", "reaction_change"),
+    "drive_effort_change": _error(D, "effort", "drive effort less that of the ideal mechanism", "effort_change"),
+    "friction_power_change": _error(J, "W", "power lost to friction less that of the ideal mechanism"),
+    "seat_offset": _seat(JE, "m", "offset of the pin's axis from the hole's at each end, hole's axes", "seat"),
+    "end_force": _seat(JE, "N", "force of the pin on each end of its hole, hole's axes", "end_force"),
+    "contact_position": _seat(JE, "m", "place where the pin touches its hole at each end", "contact"),
+    "seat_beta": _seat(J, "rad", "angle β between the seats of a pin's ends", "seat_beta"),
+    "seat_xi": _seat(J, "rad", "direction ξ of a pin's seat in its hole", "seat_xi"),
+    "seat_xi_pin": _seat(J, "rad", "direction ξ of a pin's seat in the pin's own frame", "seat_xi_pin"),
+    "contact_lost": _seat(J, "1", "1 where the pin loses contact", "contact_lost", np.int8),
+    "contact_loss_number": _seat(J, "rad/(N s)", "rate of turn of the reaction over its size (Earles and Wu)"),
+    "seat_travel": _seat(
+        NOTHING, "1", "1 where velocities and accelerations include the motion of pins within their play",
+        dtype=np.int8),
+    "seat_rounds": _seat(NOTHING, "1", "iterations of seats and reactions", dtype=np.int32),
+    "seat_change": _seat(NOTHING, "1", "change of a seat in one more iteration, relative to its clearance"),
+}  # fmt: skip
 # what is a vector in space
 IN_SPACE = {
-    "reaction_moment": Variable(
-        ("joint", "axis"), "N m", "reaction moment on the second link, about the middle of the bearing"
-    ),
-    "friction_torque": Variable(
-        ("joint",), "N m", "friction torque on the second link about its axis, or against its turn"
-    ),
-    "link_error": Variable(
-        ("link", "axis"), "rad", "rotation vector of the link against the ideal mechanism", part="errors"
-    ),
+    "reaction_moment": Variable(JA, "N m", "reaction moment on the second link, about the middle of the bearing"),
+    "friction_torque": Variable(J, "N m", "friction torque on the second link about its axis, or against its turn"),
+    "link_error": _error(LA, "rad", "rotation vector of the link against the ideal mechanism"),
 }
 OF_SOME_JOINTS = ("seats", "bearings")  # parts whose numbers not every joint has
 # the same array until something sets them apart

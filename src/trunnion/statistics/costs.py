@@ -13,36 +13,20 @@ from typing import Literal
 
 import numpy as np
 
-from trunnion.errors import Finding
-
-__all__ = ["COST_MODELS", "Cost", "CostModel", "CostParameter"]
-
-
-@dataclass(frozen=True)
-class CostParameter:
-    """One parameter of a model: its unit (empty if none), default (None: must be given), least value.
-
-    above: whether it has to be above that least value.
-    """
-
-    unit: str = ""
-    default: float | None = None
-    minimum: float = 0.0
-    above: bool = False
-    meaning: str = ""
+__all__ = ["COST_MODELS", "Cost", "CostModel"]
 
 
 @dataclass(frozen=True)
 class CostModel:
     """A cost of a tolerance, with its derivative with respect to the half width.
 
-    value, slope: of (t, *, A, B, k, unit), t the half width, m or rad; cone: the cone of a conic program that its
-    epigraph is: of z ≥ x^−k, or of z ≥ exp(−k x), with x = t/unit.
+    value, slope: of (t, *, A, B, k, unit), t the half width, m or rad; parameters: what each means; cone: the cone of
+    a conic program that its epigraph is: of z ≥ x^−k, or of z ≥ exp(−k x), with x = t/unit.
     """
 
     value: Callable[..., float]
     slope: Callable[..., float]
-    parameters: Mapping[str, CostParameter]
+    parameters: Mapping[str, str]
     formula: str
     source: str
     cone: Literal["power", "exponential"]
@@ -68,11 +52,11 @@ def exponential_slope(t: float, *, A: float, B: float, k: float, unit: float) ->
     return -k * B / unit * float(np.exp(-k * t / unit))
 
 
-_PARAMETERS: Mapping[str, CostParameter] = {
-    "A": CostParameter(default=0.0, minimum=-np.inf, meaning="cost that no tolerance changes"),
-    "B": CostParameter(meaning="cost that the tolerance changes"),
-    "k": CostParameter(above=True, meaning="how fast the cost falls as the tolerance widens"),
-    "unit": CostParameter(unit="m or rad", above=True, meaning="the half width that counts as 1"),
+_PARAMETERS = {
+    "A": "cost that no tolerance changes",
+    "B": "cost that the tolerance changes",
+    "k": "how fast the cost falls as the tolerance widens",
+    "unit": "the half width that counts as 1",
 }
 
 COST_MODELS: dict[str, CostModel] = {
@@ -105,9 +89,8 @@ class Cost:
     parameters: Mapping[str, float] = field(default_factory=dict)
 
     def numbers(self) -> dict[str, float]:
-        """The parameters by name, those that are not stated with their defaults."""
-        parameters = COST_MODELS[self.model].parameters
-        return {name: self.parameters.get(name, parameter.default or 0.0) for name, parameter in parameters.items()}
+        """The parameters by name, A being 0 where it is not stated."""
+        return {"A": 0.0, **self.parameters}
 
     def value(self, t: float) -> float:
         """Cost of a half width t, m or rad."""
@@ -116,20 +99,3 @@ class Cost:
     def slope(self, t: float) -> float:
         """Rise of the cost with t: never above zero."""
         return COST_MODELS[self.model].slope(t, **self.numbers())
-
-    def findings(self, where: str = "") -> list[Finding]:
-        """What is missing or out of range."""
-        if self.model not in COST_MODELS:
-            names = ", ".join(COST_MODELS)
-            return [Finding(f"'{self.model}' is no cost model", where, f"write one of {names}")]
-        findings_here = []
-        for name, parameter in COST_MODELS[self.model].parameters.items():
-            value = self.parameters.get(name, parameter.default)
-            if value is None:
-                findings_here.append(Finding(f"'{name}' is missing ({parameter.meaning})", where, "add it"))
-            elif not value > parameter.minimum and (parameter.above or value != parameter.minimum):
-                limit = f"{'above' if parameter.above else 'at least'} {parameter.minimum:g}"
-                findings_here.append(
-                    Finding(f"'{name}' is {value:g}, it has to be {limit}", where, "else wider costs more")
-                )
-        return findings_here

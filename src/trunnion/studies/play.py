@@ -24,14 +24,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.findings import model_notes
+from trunnion.cycle.findings import of_run
 from trunnion.cycle.positions import check_steps
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import inputs, references
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.measures.curves import MOTIONS
-from trunnion.measures.measures import Measure, chosen, outputs
+from trunnion.measures.measures import Measure, chosen
 from trunnion.measures.positions import place_of
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.joint_parts import clearance
@@ -40,14 +40,13 @@ from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.results.figure import Figure
 from trunnion.results.quantities import readable
-from trunnion.solve import shifts
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.space.determinacy import spins_of
 from trunnion.statistics.population import Population
 from trunnion.studies.tolerance.effects import FirstOrder
-from trunnion.studies.tolerance.first_order import ToleranceStudy, none_stated
-from trunnion.studies.tolerance.inputs import Inputs
+from trunnion.studies.tolerance.first_order import ToleranceStudy, stated_or_outputs
+from trunnion.studies.tolerance.inputs import Inputs, plays_of
 from trunnion.studies.tolerance.linear import Linear, Of, searched
 
 if TYPE_CHECKING:
@@ -65,6 +64,8 @@ Array = NDArray[np.float64]
 # unit "measure": that of each measure; "sensitivity": that over m
 OVER = ("measure", "position")
 BY_JOINT = ("measure", "joint", "position")
+AT = "worst case at the place of a measure: a stated one, that of its maximum or minimum, else of the largest total"
+LOADS = "change of the measure for an offset of 1 m at an end, of the link on which the worst case is larger"
 VARIABLES: dict[str, Variable] = {
     "value": Variable(OVER, "measure", "the measure with every pin in the middle of its hole"),
     "worst_case": Variable(BY_JOINT, "measure", "largest change that the play of the joint can make, to either side"),
@@ -76,17 +77,9 @@ VARIABLES: dict[str, Variable] = {
     "deviation_total": Variable(
         OVER, "measure", "standard deviation by the play of all joints, independent of one another"
     ),
-    "sensitivity": Variable(
-        ("measure", "joint", "end", "axis", "position"),
-        "sensitivity",
-        "change of the measure for an offset of 1 m at an end, of the link on which the worst case is larger",
-    ),
+    "sensitivity": Variable(("measure", "joint", "end", "axis", "position"), "sensitivity", LOADS),
     "radius": Variable(("joint", "end"), "m", "largest displacement of the pin from the middle, at an end"),
-    "extreme_worst_case": Variable(
-        ("measure", "joint"),
-        "measure",
-        "worst case at the place of a measure: a stated one, that of its maximum or minimum, else of the largest total",
-    ),
+    "extreme_worst_case": Variable(("measure", "joint"), "measure", AT),
     "extreme_deviation": Variable(("measure", "joint"), "measure", "standard deviation at that place"),
     "extreme_time": Variable(("measure",), "s", "time of that place"),
     "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings", np.int8),
@@ -188,49 +181,38 @@ def play(
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    found, notes = _measures(run, measures)
+    stated, notes = _measures(run, measures)
     plays = _plays(run)
-    if at is None:
-        courses = [replace(one, at=None, over=None, statistic="") for one in found]
-    else:
-        value, timed = place_of(mechanism, at)
-        courses = found = [replace(one, at=value, timed=timed, over=None, statistic="") for one in found]
+    value, timed = (None, False) if at is None else place_of(mechanism, at)
+    courses = [replace(measure, at=value, timed=timed, over=None, statistic="") for measure in stated]
     if run.cycle.duration <= 0:  # there is one position
-        courses = found = [replace(one, statistic="value") for one in courses]
-    over_cycle = ToleranceStudy(run, plays, tuple(courses), steps, FrictionMethod())
-    there = over_cycle
-    if found is not courses:
-        largest = (of.time for of in over_cycle.linear.measures)
+        courses = [replace(measure, statistic="value") for measure in courses]
+    over_cycle = figures = ToleranceStudy(run, plays, tuple(courses), steps, FrictionMethod())
+    if at is not None or run.cycle.duration <= 0:
+        stated = courses
+    else:
+        largest = [of.time for of in over_cycle.linear.measures]
         placed = [
-            replace(one, at=time, timed=True) if one.rule == "deviation" and np.isfinite(time) else one
-            for one, time in zip(found, largest, strict=True)
+            replace(measure, at=time, timed=True) if measure.rule == "deviation" and np.isfinite(time) else measure
+            for measure, time in zip(stated, largest, strict=True)
         ]
-        there = replace(over_cycle, measures=tuple(placed))
-    return _dataset(played := Played(run, found, over_cycle, there), [*_findings(played), *notes])
+        figures = replace(over_cycle, measures=tuple(placed))
+    return _dataset(played := Played(run, stated, over_cycle, figures), [*_findings(played), *notes])
 
 
 def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], list[Finding]]:
     """The measures asked for; notes where they are chosen because none is stated, or some are left out."""
-    found = chosen(run.system.mechanism, names, run.values)
-    others = [one.name for one in found if not _covered(run, one)]
-    what = f"this study covers measures with one value at every position, which {', '.join(others)} has not"
-    remedy = "use `trunnion tolerance` for other measures"
+    stated = chosen(run.system.mechanism, names, run.values)
+    others = [measure.name for measure in stated if not _covered(run, measure)]
+    remedy, notes = "use `trunnion tolerance` for other measures", []
     if others and names is not None:
+        what = f"this study covers measures with one value at every position, which {', '.join(others)} has not"
         raise MechanismError(Finding(what, "measures", remedy))
-    notes = []
     if others:
-        short = f"left out: {', '.join(others)}, which have no one value at every position"
-        notes = [Finding.note("play.measures_left_out", "measures", short, remedy, measures=others)]
-    found = [one for one in found if one.name not in others]
-    if found:
-        return found, notes
-    found = outputs(run.system)
-    remedy = "state measures: in the model, or give --measure link.point.x"
-    if not found:
-        raise MechanismError(
-            Finding("no measure is stated, and no joint to the ground is an output", "measures", remedy)
-        )
-    return found, [none_stated(found), *notes]
+        what = f"left out: {', '.join(others)}, which have no one value at every position"
+        notes = [Finding.note("play.measures_left_out", "measures", what, remedy, measures=others)]
+    measures, taken = stated_or_outputs(run, [measure for measure in stated if measure.name not in others])
+    return measures, [*taken, *notes]
 
 
 def _covered(run: Run, measure: Measure) -> bool:
@@ -240,17 +222,10 @@ def _covered(run: Run, measure: Measure) -> bool:
 
 def _plays(run: Run) -> Inputs:
     """The plays of all joints; MechanismError if there is none, or not all that is to know of one."""
-    plays = {
-        name: one
-        for name, (kind, _) in run.system.joints.items()
-        if (one := shifts.play_of(run.system.mechanism.space, kind, run.values, name)) is not None
-    }
+    plays = plays_of(run)
     if not plays:
         remedy = "state joints.NAME.pin.clearance (guide.clearance), such as 20 um"
         raise MechanismError(Finding("no joint states a clearance", "joints", remedy))
-    findings = [finding for name, one in plays.items() for finding in shifts.unstated_length(name, one)]
-    if findings:
-        raise MechanismError(findings)
     return Inputs(run, (), tuple(plays), (), (), Population([], None))
 
 
@@ -259,35 +234,30 @@ def _by_joint(first: FirstOrder, blank: Array) -> JointEffects:
     inputs, ends = first.inputs, max(len(first.inputs.ends(joint)) for joint in first.inputs.loose)
     shape = (len(inputs.loose), *first.slope.shape[1:])
     loads = np.full((shape[0], ends, 3, *shape[1:]), np.nan)
-    found = JointEffects(np.zeros(shape), np.zeros(shape), loads)
+    effects = JointEffects(np.zeros(shape), np.zeros(shape), loads)
     for j, joint in enumerate(inputs.loose):
         carriers = first.plays(j)
         worst = np.array([pin.worst for pin in carriers])
-        best = np.argmax(np.nan_to_num(worst) > (1 - EQUAL) * np.nan_to_num(np.max(worst, axis=0)), axis=0)
-        found.worst_case[j] = np.take_along_axis(worst, best[None], axis=0)[0]
-        scatters = np.array([pin.deviation for pin in carriers])
-        found.deviation[j] = np.take_along_axis(scatters, best[None], axis=0)[0]
+        best = np.argmax(np.nan_to_num(worst) > (1 - EQUAL) * np.nan_to_num(np.max(worst, axis=0)), axis=0)[None]
+        effects.worst_case[j] = np.take_along_axis(worst, best, axis=0)[0]
+        effects.deviation[j] = np.take_along_axis(np.array([pin.deviation for pin in carriers]), best, axis=0)[0]
         for k, keys in enumerate(inputs.ends(joint)):
             at_end = np.array([pin.loads[k] for pin in carriers])  # (carrier, component, …)
             for key, load in zip(keys, np.moveaxis(at_end, 1, 0), strict=True):
-                axis = "xyz".index(key.rpartition(".")[2])
-                found.loads[j, k, axis] = np.take_along_axis(load, best[None], axis=0)[0]
-    return JointEffects(*(part + blank for part in found))
+                loads[j, k, "xyz".index(key.rpartition(".")[2])] = np.take_along_axis(load, best, axis=0)[0]
+    return JointEffects(*(part + blank for part in effects))
 
 
 # ---- findings -------------------------------------------------------------------------------------------------
 
 
 def _findings(played: Played) -> Iterator[Finding]:
-    run, mechanism = played.run, played.run.system.mechanism
-    yield from (one for one in model_notes(mechanism, run.system) if one.severity is not Severity.NOTE)
-    yield from run.chosen.findings
-    if run.determinacy is not None:
-        yield from run.determinacy.findings()
-        if any(part.redundant for part in run.determinacy.parts):
-            what = "constraints are redundant: the worst case is an upper bound, because pins constrain one another"
-            remedy = "the deviation assumes that each pin can be anywhere within its play"
-            yield Finding.warning("play.redundant", "joints", what, remedy)
+    run = played.run
+    yield from of_run(run, notes=False)
+    if run.determinacy is not None and any(part.redundant for part in run.determinacy.parts):
+        what = "constraints are redundant: the worst case is an upper bound, because pins constrain one another"
+        remedy = "the deviation assumes that each pin can be anywhere within its play"
+        yield Finding.warning("play.redundant", "joints", what, remedy)
     yield from _left_out(run, played.inputs.loose)
     yield from _spinning(run, played.measures)
     if run.seats:
@@ -301,19 +271,17 @@ def _findings(played: Played) -> Iterator[Finding]:
     for i, of in enumerate(played.figures.linear.measures):
         yield from _idle(played, i)
         yield from _beyond_first_order(played, i, of)
-    dial = run.system.dial(run.values, played.time)
+    dial, remedy = run.system.dial(run.values, played.time), "the effect of play is undefined there"
     for code in Status:
         where = np.flatnonzero(played.course.status == code)
         if code >= Status.NOT_CONVERGED and len(where):
-            what = f"{code.text} {dial.intervals(where)}"
-            remedy = "the effect of play is undefined there"
-            yield Finding.error("play.no_answer", "", what, remedy, at=dial.intervals(where), status=code.text)
+            what, at = f"{code.text} {dial.intervals(where)}", dial.intervals(where)
+            yield Finding.error("play.no_answer", "", what, remedy, at=at, status=code.text)
     for measure, effects, of in zip(played.measures, played.over_cycle, played.course.measures, strict=True):
         lost = np.any(np.isnan(effects.worst_case), axis=0) & np.isfinite(_nominal(of))
         where = np.flatnonzero(lost & (played.course.status < Status.SINGULAR))
         if len(where):
             what = f"a magnitude that is 0 has no derivative {dial.intervals(where)}"
-            remedy = "the effect of play is undefined there"
             yield Finding.warning("play.no_answer", f"measures.{measure.name}", what, remedy, at=dial.intervals(where))
 
 
@@ -432,21 +400,13 @@ def _beyond_first_order(played: Played, i: int, of: Of) -> Iterator[Finding]:
     low, high = least.value, largest.value
     off = max(abs(low + first), abs(high - first)) / first
     if off > SLIGHT:
-        yield Finding.weighed(
-            Severity.WARNING if max(-low, high) > (1 + GRAVE) * first else Severity.NOTE,
-            "play.beyond_first_order",
-            f"measures.{measure.name}",
-            f"to first order it changes by ±{readable(first, measure.unit(played.run.system))} at "
-            f"{played.place(i)}; the worst found on the mechanism itself is "
-            f"{readable(low, measure.unit(played.run.system))} and "
-            f"{readable(high, measure.unit(played.run.system))}",
-            "use these figures",
-            low=low,
-            high=high,
-            first=first,
-            unit=measure.unit(played.run.system),
-            at=played.place(i),
-        )
+        unit, place = measure.unit(played.run.system), played.place(i)
+        severity = Severity.WARNING if max(-low, high) > (1 + GRAVE) * first else Severity.NOTE
+        what = f"to first order it changes by ±{readable(first, unit)} at {place}; the worst found on the mechanism "
+        what += f"itself is {readable(low, unit)} and {readable(high, unit)}"
+        figures = {"low": low, "high": high, "first": first, "unit": unit, "at": place}
+        where = f"measures.{measure.name}"
+        yield Finding.weighed(severity, "play.beyond_first_order", where, what, "use these figures", **figures)
 
 
 # ---- the result -----------------------------------------------------------------------------------------------

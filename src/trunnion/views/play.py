@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import prefixed, quantity
@@ -73,12 +74,15 @@ def _play(result: xr.Dataset, j: int) -> str:
 def figure(result: xr.Dataset, measures: Sequence[int] | None = None) -> Figure:
     """A panel for each measure: the joints' worst cases on top of one another, their RSS dashed.
 
-    measures: their numbers; the first ones if not given.
+    measures: their numbers, all if not given; MechanismError if they are more than MOST_PANELS.
     """
     from trunnion.views.draw import figure as draw
 
     result = without_noise(result)
-    picked = range(result.sizes["measure"])[:MOST_PANELS] if measures is None else measures
+    picked = range(result.sizes["measure"]) if measures is None else measures
+    if len(picked) > MOST_PANELS:
+        what = f"{len(picked)} measures do not fit one figure"
+        raise MechanismError(Finding(what, "--measure", f"name at most {MOST_PANELS}"))
     return draw("Effect of the play of the joints", result, [_panel(result, i) for i in picked])
 
 

@@ -353,7 +353,7 @@ def cost_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
             yield from _formula(cost, where, kind)
             yield from _price(price(mechanism, path, cost, numbers), where)
             yield from _process(mechanism, cost, path, where, kind, numbers)
-    yield from _groups(mechanism)
+    yield from _groups(mechanism, numbers)
 
 
 def _unknown(mechanism: Numbers, name: str, where: str, numbers: ParameterSet) -> Finding:
@@ -446,14 +446,20 @@ def _process(
             return
 
 
-def _groups(mechanism: Numbers) -> Iterator[Finding]:
+def _groups(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
     """The members of a group have one half width: each is priced by a formula, or all by the same choices."""
-    members: dict[str, list[tuple[str, Cost]]] = {}
+    groups: dict[str, dict[str, list[Price]]] = {}
     for name, cost in mechanism.costs.items():
         if cost.group:
-            members.setdefault(cost.group, []).append((name, cost))
-    for group, costs in members.items():
-        if len({cost.model is not None for _, cost in costs}) > 1:
-            names = ", ".join(name for name, _ in costs)
-            what = f"the group '{group}' ({names}) has formulas and choices"
-            yield Finding(what, f"costs.{costs[0][0]}.group", "state the same for all, or two groups")
+            paths = cost_paths(mechanism, name, numbers)
+            groups.setdefault(cost.group, {})[name] = [price(mechanism, path, cost, numbers) for path in paths]
+    for group, members in groups.items():
+        where, of = f"costs.{next(iter(members))}.group", f"the group '{group}' ({', '.join(members)})"
+        prices = [one for several in members.values() for one in several]
+        choices = [{choice.name for choice in one.choices} for one in prices]
+        if len({bool(mechanism.costs[name].model) for name in members}) > 1:
+            yield Finding(f"{of} has formulas and choices", where, "state the same for all, or two groups")
+        elif any(choices) and not set.intersection(*choices):
+            yield Finding(f"{of} has no choice in common", where, "give its members the same choices")
+        elif prices and max(one.least for one in prices) > min(one.most for one in prices):
+            yield Finding(f"the bounds of {of} exclude one another", where, "widen them")

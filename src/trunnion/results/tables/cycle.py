@@ -16,6 +16,7 @@ from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import attribute
 from trunnion.results.dataset import Column, flat
+from trunnion.results.variables import VARIABLES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,63 +38,19 @@ __all__ = [
 Stems = Mapping[str, str]  # by variable: what stands behind the name of the member
 Has = Callable[[int, str, tuple[int, ...]], bool]  # whether a member has a variable at an index along the others
 
-LINKS: Stems = {
-    "link_angle": "angle",
-    "link_angle_velocity": "angle_velocity",
-    "link_angle_acceleration": "angle_acceleration",
-    "link_position": "",
-    "link_rotation": "rotation",
-    "link_angular_velocity": "angular_velocity",
-    "link_angular_acceleration": "angular_acceleration",
-}
-SEATS: Stems = {
-    "seat_offset": "seat",
-    "end_force": "end_force",
-    "contact_position": "contact",
-    "seat_beta": "seat_beta",
-    "seat_xi": "seat_xi",
-    "seat_xi_pin": "seat_xi_pin",
-    "contact_lost": "contact_lost",
-}
-BEARINGS: Stems = {"end_load": "end_load", "pin_pressure": "pin_pressure"}
-# by dimension
-POSITIONS: dict[str, Stems] = {
-    "joint": {
-        "joint_rotation": "rotation",
-        "joint_rotation_velocity": "rotation_velocity",
-        "joint_slide": "slide",
-        "joint_slide_velocity": "slide_velocity",
-        "reaction_force": "reaction",
-        "reaction_moment": "reaction_moment",
-        **BEARINGS,
-        "friction_torque": "friction_torque",
-        "friction_force": "friction_force",
-        "friction_power": "friction_power",
-        "joint_rotation_error": "rotation_error",
-        "joint_slide_error": "slide_error",
-        "reaction_force_change": "reaction_change",
-        **SEATS,
-    },
-    "driver": {f"drive_effort{end}": f"effort{end}" for end in ("", "_lower", "_upper", "_change")},
-    "spring": {
-        "spring_force": "force",
-        "spring_elongation": "elongation",
-        "spring_power": "spring_power",
-        "damping_power": "damping_power",
-    },
-    "gear": {"gear_torque": "torque", "gear_force": "force"},
-    "link": LINKS,
-    "point": {"point_position": "", "point_error": "error"},
-}
-MOTION: dict[str, Stems] = {
-    "joint": {
-        f"joint_{name}{rate}": f"{name}{rate}"
-        for name in ("rotation", "slide")
-        for rate in ("", "_velocity", "_acceleration")
-    },
-    "link": LINKS,
-    "point": {"point_position": "", "point_velocity": "velocity", "point_acceleration": "acceleration"},
-}
+MEMBERS = ("joint", "driver", "spring", "gear", "link", "point")  # in the order of the columns
+
+
+def _stems(dim: str, motion: bool) -> Stems:
+    """What stands behind the name of a member of a dimension: of the usual tables, or of that of the motion."""
+    return {
+        name: variable.column
+        for name, variable in VARIABLES.items()
+        if variable.dims[:1] == (dim,) and variable.column is not None
+        if (variable.motion if motion else variable.usual)
+    }
+
+
 # what only `rest` has, beside the motion: variable, the dimension of its members, what stands behind their names
 REST = (
     ("drive_power", "driver", "power"),
@@ -136,7 +93,7 @@ def of_members(result: xr.Dataset, dim: str, stems: Stems, has: Has = lambda *_:
 
 def positions(result: xr.Dataset) -> list[Column]:
     """Joints, drivers, springs, gears, links and points, power, status and measures."""
-    columns = [*time_column(result), *_members(result, POSITIONS)]
+    columns = [*time_column(result), *_members(result)]
     if "drive_power" in result:
         columns.append(Column("power_in", "W", result["drive_power"].values.sum(axis=0)))
     columns += [*flat(result, "useful_power", "power_useful"), *flat(result, "seat_rounds", "seat_rounds")]
@@ -145,7 +102,7 @@ def positions(result: xr.Dataset) -> list[Column]:
 
 def motion(result: xr.Dataset) -> list[Column]:
     """Coordinates, velocities and accelerations of joints, links and points."""
-    return [*time_column(result), *_members(result, MOTION)]
+    return [*time_column(result), *_members(result, motion=True)]
 
 
 def rest(result: xr.Dataset) -> list[Column]:
@@ -177,21 +134,23 @@ def locking(result: xr.Dataset) -> list[Column]:
     return [*columns, *_locking_state(result), status_column(result)]
 
 
-def _members(result: xr.Dataset, stems: Mapping[str, Stems]) -> Iterator[Column]:
+def _members(result: xr.Dataset, motion: bool = False) -> Iterator[Column]:
     """The columns of members, of joints those that their kinds have."""
     scene = attribute(result, "scene", "{}")
     spatial = scene.get("space") == "spatial"
     kinds = [scene["joints"][str(joint)]["type"] for joint in result["joint"].values]
 
     def moves(i: int, variable: str, index: tuple[int, ...]) -> bool:
-        if variable in SEATS:  # of joints and ends that have one
+        part = VARIABLES[variable].part
+        if part == "seats":  # of joints and ends that have one
             return bool(np.any(np.isfinite(result["seat_offset"].values[(i, *index[:1])])))
-        if variable in BEARINGS:  # of joints with ends, or with a pin whose size is stated
+        if part == "bearings":  # of joints with ends, or with a pin whose size is stated
             return bool(np.any(np.isfinite(result[variable].values[(i, *index)])))
         return _has(kinds[i], variable, spatial)
 
-    for dim, stems_of in stems.items():
-        yield from of_members(result, dim, stems_of, moves) if dim == "joint" else of_members(result, dim, stems_of)
+    for dim in MEMBERS:
+        stems = _stems(dim, motion)
+        yield from of_members(result, dim, stems, moves) if dim == "joint" else of_members(result, dim, stems)
 
 
 def _has(kind: str, variable: str, spatial: bool) -> bool:

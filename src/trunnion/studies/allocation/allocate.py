@@ -31,7 +31,6 @@ from trunnion.studies.allocation.problem import (
     none,
 )
 from trunnion.studies.allocation.rows import Rows, joined, part_of, rows_of
-from trunnion.studies.allocation.solve import Choice as Way
 from trunnion.studies.allocation.solve import solve, trade_off
 from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.studies.tolerance.linear import limits
@@ -46,6 +45,7 @@ from trunnion.studies.allocation.result import (
     Allocated,
     AllocationRequest,
     Choice,
+    Way,
     dataset,
     share_of,
 )
@@ -166,35 +166,26 @@ def _found(asked: AllocationRequest) -> Allocated:
     now = asked.studied(absent)
     prices, notes = _prices(now)
     before = {**_stated(now, prices), **{path: 0.0 for path in absent if path in prices}}
-    way: Way = asked.choice if asked.choice != "auto" else _way(prices)
-    search = _Search(asked, prices, way)
+    listed = next((path for path, price in prices.items() if price.choices), "")
+    if listed and asked.choice == "continuous":
+        what, remedy = "has a table of processes, which is no continuous choice", "choose discrete, or state a model"
+        raise MechanismError(Finding(what, f"costs.{listed}", remedy))
+    search = _Search(asked, prices)
     answer, now, rows, more = search.run(now)
     if asked.exact and asked.criterion == "worst-case" and answer.found:
         answer, now, rows, more = search.tightened(answer, now, rows, more)
     offers: list[tuple[float, Answer]] = []
     if asked.curve and answer.found:
-        offers = _curve(answer, way, asked)
-    notes += [
-        Finding.warning(
-            "allocation.unknown",
-            f"measures.{name}",
-            "the measure has no first-order result: its limits were ignored in the allocation",
-            "check with the samples whether they are met",
-        )
-        for name in rows.unknown
-    ]
+        factors: list[float] = np.geomspace(*RANGE, asked.curve).tolist()  # of a yield with the margin that it has
+        wider = trade_off(answer.problem, factors)
+        offers = [
+            (factor, answer if abs(factor - 1) < SAME else one) for factor, one in zip(factors, wider, strict=True)
+        ]
+    what = "the measure has no first-order result: its limits were ignored in the allocation"
+    remedy = "check with the samples whether they are met"
+    notes += [Finding.warning("allocation.unknown", f"measures.{name}", what, remedy) for name in rows.unknown]
+    way: Way = "discrete" if listed or asked.choice == "discrete" else "continuous"
     return Allocated(asked, now, rows, answer, way, prices, before, (*notes, *more), search.tight, tuple(offers))
-
-
-def _curve(answer: Answer, way: Way, asked: AllocationRequest) -> list[tuple[float, Answer]]:
-    """Factors of all limits with the answers of least cost; of a yield they have the margin that the answer has."""
-    factors: list[float] = np.geomspace(*RANGE, asked.curve).tolist()
-    offers = trade_off(answer.problem, factors, way)
-    return [(factor, answer if abs(factor - 1) < SAME else one) for factor, one in zip(factors, offers, strict=True)]
-
-
-def _way(prices: Mapping[str, Price]) -> Way:
-    return "discrete" if any(one.choices for one in prices.values()) else "continuous"
 
 
 # ---- what is bought -------------------------------------------------------------------------------------------
@@ -284,7 +275,6 @@ class _Search:
 
     asked: AllocationRequest
     prices: Mapping[str, Price]
-    way: Way
     tight: dict[str, float] = field(default_factory=dict)
 
     def run(self, now: ToleranceStudy) -> Found:
@@ -308,20 +298,9 @@ class _Search:
                 kept = moving if kept is None else joined(moving, kept)
                 rows, now = ahead, after
         else:
-            return (
-                answer,
-                now,
-                whole,
-                [
-                    Finding.warning(
-                        "allocation.unsettled",
-                        "costs",
-                        f"the effects depend on the tolerances themselves and did not converge in {ROUNDS} iterations",
-                        "use the verification",
-                        rounds=ROUNDS,
-                    )
-                ],
-            )
+            what = f"the effects depend on the tolerances themselves and did not converge in {ROUNDS} iterations"
+            doubt = Finding.warning("allocation.unsettled", "costs", what, "use the verification", rounds=ROUNDS)
+            return answer, now, whole, [doubt]
         return answer, now, whole, []
 
     def tightened(self, answer: Answer, now: ToleranceStudy, rows: Rows, found: list[Finding]) -> Found:
@@ -356,7 +335,7 @@ class _Search:
             )  # fmt: skip
             return SampledYield(*(float(sampled[f"yield_all{end}"]) for end in ("", "_low", "_high")))
 
-        return solve(problem, self.way, asked.target, verify if asked.samples else None, asked.sure)
+        return solve(problem, asked.target, verify if asked.samples else None, asked.sure)
 
 
 def _same(problem: AllocationProblem, tolerances: Array, rows: Rows, ahead: Rows) -> bool:

@@ -19,7 +19,7 @@ from scipy import sparse
 
 from trunnion.errors import Finding
 from trunnion.statistics.costs import COST_MODELS
-from trunnion.studies.allocation.problem import PROVEN, AllocationProblem, Answer, none, shortfalls
+from trunnion.studies.allocation.problem import AllocationProblem, Answer, none, optimum, shortfalls
 from trunnion.studies.allocation.task import Task, sides, task_of
 
 __all__ = ["Optimum", "allocate_continuous", "minimise", "unbounded"]
@@ -52,12 +52,7 @@ class Optimum:
 
 
 def allocate_continuous(problem: AllocationProblem) -> Answer:
-    """The half widths of least cost, or why there are none."""
-    problem.check()
-    chosen = [contribution.name for contribution in problem.contributions if contribution.options]
-    if chosen:
-        what = "has a table of processes, which is no continuous choice"
-        return none(problem, [Finding(what, f"costs.{chosen[0]}", "choose discrete, or give it a cost model")])
+    """The half widths of least cost where all costs are formulas, or why there are none."""
     task = task_of(problem, sides(problem))
     early = shortfalls(problem, task.tolerances(task.low)) if np.any(task.sides.room < 0) else []
     trouble = early or unbounded(task) or _unmet(problem, task)
@@ -65,44 +60,20 @@ def allocate_continuous(problem: AllocationProblem) -> Answer:
         return none(problem, trouble)
     point = minimise(task)
     if point is None:
-        return none(
-            problem,
-            [
-                Finding.error(
-                    "allocation.not_found",
-                    "costs",
-                    "the solver found no allocation, although the limits may be feasible",
-                    "check the orders of magnitude of costs and bounds",
-                )
-            ],
-        )
+        what = "the solver found no allocation, although the limits may be feasible"
+        remedy = "check the orders of magnitude of costs and bounds"
+        return none(problem, [Finding.error("allocation.not_found", "costs", what, remedy)])
     tolerances = task.tolerances(point.u)
-    pairs = zip(problem.contributions, tolerances.tolist(), strict=True)
-    costs = np.array([contribution.cost.value(t) if contribution.cost else 0.0 for contribution, t in pairs])
     price = np.zeros(len(problem.effects.worst))
     np.add.at(price, task.sides.row[point.rows], point.multipliers / task.sides.room[point.rows])
-    proven = point.gap <= PROVEN
-    what = f"the optimality gap is {point.gap:.1e} of the cost of the tolerances"
-    remedy = "check the orders of magnitude of costs and bounds"
-    doubt = Finding.warning("allocation.proven_roughly", "costs", what, remedy, gap=point.gap)
-    return Answer(
-        problem, tolerances, costs, float(np.sum(costs)), point.bound, point.gap, proven,
-        price=price, findings=() if proven else (doubt,), rounds=point.rounds,
-    )  # fmt: skip
+    costs = problem.costs(tolerances)
+    return optimum(problem, tolerances, costs, point.bound, point.gap, price, point.rounds, {})
 
 
 def unbounded(task: Task) -> list[Finding]:
     """Tolerances that neither a limit nor a bound holds."""
-    free = np.flatnonzero(~np.isfinite(task.most))
-    return [
-        Finding.error(
-            "allocation.unbounded",
-            f"costs.{task.names[g]}",
-            "no limit bounds this tolerance, and wider is cheaper",
-            "state `most`",
-        )
-        for g in free
-    ]
+    what, free = "no limit bounds this tolerance, and wider is cheaper", np.flatnonzero(~np.isfinite(task.most))
+    return [Finding.error("allocation.unbounded", f"costs.{task.names[g]}", what, "state `most`") for g in free]
 
 
 def _unmet(problem: AllocationProblem, task: Task) -> list[Finding]:

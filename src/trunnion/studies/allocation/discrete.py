@@ -31,11 +31,12 @@ from trunnion.studies.allocation.problem import (
     Contribution,
     common_options,
     none,
+    optimum,
     shortfalls,
 )
 from trunnion.studies.allocation.task import Sides, Task, sides, task_of
 
-__all__ = ["allocate_discrete"]
+__all__ = ["cheapest"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -44,9 +45,8 @@ AT_ONCE = 16  # rows added in one round
 ROUNDS = 2000
 
 
-def allocate_discrete(problem: AllocationProblem) -> Answer:
-    """The processes, and the half widths of contributions with a cost model, of least cost; or why there are none."""
-    problem.check()
+def cheapest(problem: AllocationProblem) -> Answer:
+    """The processes and the half widths of least cost, or why there are none; without processes a conic program."""
     groups = [members for members in problem.groups().values() if members[0].options]
     if not groups:
         return allocate_continuous(problem)
@@ -227,17 +227,10 @@ class _Search:
             return none(problem, shortfalls(problem, self.narrowest()) or [doubt])
         gap = max(cost - bound, 0.0) / self.scale + (point.gap if point else 0.0)
         t = self._tolerances(taken, point.u if point else np.zeros(0))
-        own = [one.cost.value(float(t[i])) if one.cost else 0.0 for i, one in enumerate(problem.contributions)]
         choices = {
             problem.contributions[i].name: list(options)[int(np.flatnonzero(taken[part])[0])]
             for part, members, options in zip(self.parts, self.members, self.options, strict=True)
             for i in members
         }
-        what = f"the optimality gap is {gap:.1e} of the cost of the tolerances"
-        remedy = "check the orders of magnitude of costs and bounds"
-        doubt = Finding.warning("allocation.proven_roughly", "processes", what, remedy, gap=gap)
-        return Answer(
-            problem, t, self.prices @ taken + own, cost, min(bound, cost), gap, gap <= PROVEN, choices=choices,
-            price=np.full(len(problem.effects.worst), np.nan), findings=() if gap <= PROVEN else (doubt,),
-            rounds=rounds,
-        )  # fmt: skip
+        no_price = np.full(len(problem.effects.worst), np.nan)
+        return optimum(problem, t, self.prices @ taken + problem.costs(t), bound, gap, no_price, rounds, choices)

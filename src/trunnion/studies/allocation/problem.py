@@ -20,7 +20,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError, agreeing
+from trunnion.errors import Finding, agreeing
 from trunnion.model.tolerances import ProcessChoice
 from trunnion.results.quantities import drawn_in, signed
 from trunnion.statistics.costs import Cost
@@ -148,16 +148,6 @@ class AllocationProblem:
         """The same with other effects of its rows, or of the first ones of them alone."""
         return replace(self, effects=effects, caps=None if self.caps is None else self.caps[: len(effects.worst)])
 
-    def check(self) -> None:
-        """Raise `MechanismError` with all that makes it no problem."""
-        found = [finding for one in self.contributions for finding in _contribution(one)]
-        found += [finding for members in self.groups().values() for finding in _group(members)]
-        found += _effects(self.effects, len(self.contributions))
-        if not found and all(one.fixed for one in self.contributions):
-            found.append(Finding("no tolerance has a cost", "costs", "state the cost of a tolerance"))
-        if found:
-            raise MechanismError(found)
-
     def groups(self) -> dict[str, list[Contribution]]:
         """What is bought together, by the name of the group, or of the one contribution."""
         together: dict[str, list[Contribution]] = {}
@@ -165,6 +155,11 @@ class AllocationProblem:
             if not one.fixed:
                 together.setdefault(one.group or f"={one.name}", []).append(one)
         return together
+
+    def costs(self, tolerances: Array) -> Array:
+        """What the half widths cost by formula, (contribution,); 0 of the others."""
+        pairs = zip(self.contributions, tolerances.tolist(), strict=True)
+        return np.array([contribution.cost.value(t) if contribution.cost else 0.0 for contribution, t in pairs])
 
     def at(self, tolerances: Array) -> tuple[Array, Array]:
         """Least and largest deviation of each row that the criterion reckons with, (row,) each."""
@@ -274,17 +269,26 @@ def common_options(members: Sequence[Contribution]) -> dict[str, list[ProcessCho
 
 def none(problem: AllocationProblem, findings: Sequence[Finding]) -> Answer:
     """The answer that there is none."""
-    nothing = np.full(len(problem.contributions), np.nan)
+    count, lost = len(problem.contributions), np.nan
+    no_price = np.full(len(problem.effects.worst), lost)
     return Answer(
-        problem,
-        nothing,
-        nothing.copy(),
-        np.nan,
-        np.nan,
-        np.nan,
-        False,
-        price=np.full(len(problem.effects.worst), np.nan),
+        problem, np.full(count, lost), np.full(count, lost), lost, lost, lost, False, price=no_price,
         findings=tuple(findings),
+    )  # fmt: skip
+
+
+def optimum(
+    problem: AllocationProblem, tolerances: Array, costs: Array, bound: float, gap: float, price: Array, rounds: int,
+    choices: dict[str, str],
+) -> Answer:  # fmt: skip
+    """The answer of a solver, with a doubt where its gap proves no global optimum."""
+    cost, doubts = float(np.sum(costs)), []
+    if not gap <= PROVEN:
+        what, remedy = f"the optimality gap is {gap:.1e} of the cost of the tolerances", "check the orders of magnitude"
+        remedy += " of costs and bounds"
+        doubts.append(Finding.warning("allocation.proven_roughly", "costs", what, remedy, gap=gap))
+    return Answer(
+        problem, tolerances, costs, cost, min(bound, cost), gap, not doubts, choices, price, tuple(doubts), rounds
     )
 
 
@@ -334,52 +338,3 @@ def _norm(parts: Array, correlation: Array | None) -> Array:
     """√(vᵀ C v) of each row of parts, (row,)."""
     turned = parts if correlation is None else parts @ correlation
     return np.asarray(np.sqrt(np.maximum(np.einsum("ri,ri->r", parts, turned), 0.0)), float)
-
-
-def _contribution(one: Contribution) -> list[Finding]:
-    where = f"costs.{one.name}"
-    found = one.cost.findings(where) if one.cost else []
-    if one.cost and one.options:
-        found.append(Finding("has a cost model and options", where, "give one of them"))
-    if not 0 <= one.least <= one.most:
-        found.append(Finding(f"least {one.least:g} and most {one.most:g} do not agree", where, "0 ≤ least ≤ most"))
-    if one.options and not any(one.least <= option.tolerance <= one.most for option in one.options):
-        found.append(Finding("no option lies between least and most", where, "widen the bounds"))
-    if one.fixed and not (one.value >= 0 and np.isfinite(one.value)):
-        found.append(Finding("has neither a cost nor a tolerance", where, "state one of them"))
-    if len({option.name for option in one.options}) < len(one.options):
-        found.append(Finding("two options have the same name", where, "rename one"))
-    return found
-
-
-def _group(members: list[Contribution]) -> list[Finding]:
-    where, names = f"costs.{members[0].name}", ", ".join(one.name for one in members)
-    if len({bool(one.options) for one in members}) > 1:
-        return [Finding(f"group {names} mixes cost models and options", where, "give all members the same")]
-    if members[0].options and not set.intersection(*({each.name for each in one.options} for one in members)):
-        return [Finding(f"group {names} has no option in common", where, "give its members the same options")]
-    if max(one.least for one in members) > min(one.most for one in members):
-        return [Finding(f"bounds of group {names} exclude one another", where, "widen them")]
-    return []
-
-
-def _effects(effects: RowEffects, count: int) -> list[Finding]:
-    if effects.worst.shape[1:] != (count,):
-        return [Finding(f"{count} contributions, effects of {effects.worst.shape[1:]}", "measures", "give one each")]
-    if not len(effects.worst):
-        return [Finding("no measure has a limit", "measures", "state a `limit`")]
-    arrays = [
-        one for one in (effects.worst, effects.half, effects.deviation, effects.mean, effects.offset) if one is not None
-    ]
-    if not all(np.isfinite(one).all() for one in arrays):
-        bad = (
-            int(np.flatnonzero(~np.isfinite(effects.worst).all(axis=1))[0])
-            if not np.isfinite(effects.worst).all()
-            else 0
-        )
-        remedy = "leave positions out that are singular or not assembled"
-        return [Finding("a sensitivity is no number", effects.label(bad), remedy)]
-    bad_rows = np.flatnonzero(~(effects.lower <= effects.upper))
-    if len(bad_rows):
-        return [Finding("the lower limit is above the upper one", effects.label(int(bad_rows[0])), "swap them")]
-    return []

@@ -21,7 +21,6 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import Answer, Criterion
 from trunnion.studies.allocation.rows import Rows
-from trunnion.studies.allocation.solve import Choice as Way
 from trunnion.studies.tolerance.first_order import ToleranceStudy, study
 from trunnion.studies.tolerance.linear import limits
 
@@ -35,12 +34,14 @@ __all__ = [
     "Allocated",
     "AllocationRequest",
     "Choice",
+    "Way",
     "cost_of",
     "dataset",
     "share_of",
 ]
 
 Array = NDArray[np.float64]
+Way = Literal["continuous", "discrete"]
 Choice = Literal["auto", "continuous", "discrete"]
 DEFAULT_YIELD = 0.9973
 CLOSE = 1e-6  # of a limit: how close to it the worst case found is brought

@@ -1,32 +1,20 @@
-"""Allocate: continuous or discrete, under any criterion, and the curve of cost against accuracy."""
+"""Allocate under any criterion, and the curve of cost against accuracy."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.studies.allocation.cones import allocate_continuous
-from trunnion.studies.allocation.discrete import allocate_discrete
+from trunnion.studies.allocation.discrete import cheapest
 from trunnion.studies.allocation.problem import AllocationProblem, Answer
 from trunnion.studies.allocation.yields import Verify, meet
 
-__all__ = ["CHOICES", "Choice", "solve", "trade_off"]
-
-Choice = Literal["continuous", "discrete"]
-CHOICES: dict[Choice, Callable[[AllocationProblem], Answer]] = {
-    "continuous": allocate_continuous,
-    "discrete": allocate_discrete,
-}
+__all__ = ["solve", "trade_off"]
 
 
 def solve(
-    problem: AllocationProblem,
-    choice: Choice = "continuous",
-    target: float | None = None,
-    verify: Verify | None = None,
-    sure: bool = False,
+    problem: AllocationProblem, target: float | None = None, verify: Verify | None = None, sure: bool = False
 ) -> Answer:
     """The allocation of least cost.
 
@@ -34,12 +22,12 @@ def solve(
     `yields.meet`.
     """
     if problem.criterion != "yield" or target is None:
-        return CHOICES[choice](problem)
+        return cheapest(problem)
     if not 0 < target < 1:
         raise MechanismError(Finding(f"a yield of {target:g} is not possible", "yield", "above 0 and below 1"))
-    return meet(problem, target, CHOICES[choice], verify, sure)
+    return meet(problem, target, cheapest, verify, sure)
 
 
-def trade_off(problem: AllocationProblem, factors: Sequence[float], choice: Choice = "continuous") -> list[Answer]:
+def trade_off(problem: AllocationProblem, factors: Sequence[float]) -> list[Answer]:
     """One answer for each factor by which all limits are multiplied; `found` is False where there is none."""
-    return [solve(replace(problem, effects=problem.effects.scaled(factor)), choice) for factor in factors]
+    return [cheapest(replace(problem, effects=problem.effects.scaled(factor))) for factor in factors]

@@ -22,7 +22,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.cycle.course import CycleCourse, Means
 from trunnion.cycle.cycle_kernel import Many
 from trunnion.cycle.fill import CONDITIONS
-from trunnion.cycle.findings import model_notes
+from trunnion.cycle.findings import of_run
 from trunnion.cycle.positions import check_steps, positions
 from trunnion.dynamics.measured import courses_in_time
 from trunnion.errors import Finding, MechanismError, Severity, Status
@@ -114,7 +114,7 @@ class Points:
                 run.determinacy.refuse()
             self.looked.add(index)
             self.erring = self.erring or run.erring
-            for finding in _findings(run):
+            for finding in of_run(run):
                 self.said.setdefault((finding.where, finding.what), {})[index] = finding
         return run
 
@@ -302,13 +302,6 @@ def _with_margin(method: FrictionMethod) -> FrictionMethod:
 def _nth(number: Number, k: int) -> float:
     """The number of one mechanism of a batch."""
     return float(number[k, 0]) if np.ndim(number) else float(number)
-
-
-def _findings(run: Run) -> Iterator[Finding]:
-    yield from model_notes(run.system.mechanism, run.system)
-    yield from run.chosen.findings
-    if run.determinacy is not None:
-        yield from run.determinacy.findings()
 
 
 def _differ(values: Mapping[str, Number], others: Mapping[str, Number], count: int) -> NDArray[np.bool_]:

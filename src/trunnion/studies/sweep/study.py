@@ -131,26 +131,27 @@ def _shared(points: Points) -> Iterator[Finding]:
             yield replace(finding, what=f"{finding.what} (at {count:,} of {all_points})")
 
 
+def _places(swept: Sequence[Swept], mask: NDArray[np.bool_]) -> tuple[str, str, dict[str, Any]]:
+    """How many points of the grid are meant, and where the first is, in words and as figures."""
+    where = np.argwhere(mask)
+    first = say(swept, tuple(int(i) for i in where[0]))
+    of = f"{len(where):,} of {counted(mask.size, 'point')}"
+    return of, f"the first at {first}", {"points": len(where), "of": mask.size}
+
+
 def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
     """An error for every status that leaves points without figures."""
-    status, missing = arrays["status"], arrays["without_answer"]
+    status, names = arrays["status"], " and ".join(number.name for number in swept)
+    remedy = "run `trunnion analyse` with these values to see where in the cycle, and why"
     for code in Status:
-        where = np.argwhere(status == code)
-        if code.solved or not len(where):
+        mask = status == code
+        if code.solved or not mask.any():
             continue
-        first = tuple(int(i) for i in where[0])
-        count = int(missing[first])
-        what = f"{len(where):,} of {counted(status.size, 'point')} {agreeing(len(where), 'has', 'have')} no result, "
-        what += f"the first at {say(swept, first)} ({counted(count, 'position')} not solved): {code.text}"
-        remedy = "run `trunnion analyse` with these values to see where in the cycle, and why"
-        figures = {
-            "points": len(where),
-            "of": status.size,
-            "at": say(swept, first),
-            "positions": count,
-            "status": code.text,
-        }
-        yield Finding.error("sweep.no_answer", " and ".join(number.name for number in swept), what, remedy, **figures)
+        (of, first, figures), missing = _places(swept, mask), int(arrays["without_answer"][mask][0])
+        what = f"{of} {agreeing(figures['points'], 'has', 'have')} no result, {first} "
+        what += f"({counted(missing, 'position')} not solved): {code.text}"
+        figures |= {"at": first.removeprefix("the first at "), "positions": missing, "status": code.text}
+        yield Finding.error("sweep.no_answer", names, what, remedy, **figures)
 
 
 def _no_efficiency(points: Points, arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
@@ -164,24 +165,20 @@ def _no_efficiency(points: Points, arrays: Mapping[str, NDArray[Any]]) -> Iterat
     if not has_useful_work(points.mechanism):
         reasons = {f"{NOTHING_USEFUL}: {STATE_USEFUL}": np.ones(work.shape, bool)}
     for why, so in reasons.items():
-        where = np.argwhere(undefined & so)
-        if len(where):
-            at = say(points.swept, tuple(int(i) for i in where[0]))
-            what = f"the efficiency is undefined at {len(where):,} of {counted(work.size, 'point')}, the first at "
-            what += f"{at}: {why}"
+        if np.any(undefined & so):
+            of, first, figures = _places(points.swept, undefined & so)
             remedy = "see the mean powers there; `trunnion analyse` with these values tells where loads act"
-            yield Finding.note("sweep.no_efficiency", "efficiency", what, remedy, points=len(where), of=work.size)
+            what = f"the efficiency is undefined at {of}, {first}: {why}"
+            yield Finding.note("sweep.no_efficiency", "efficiency", what, remedy, **figures)
 
 
 def _not_steady(points: Points, watched: Iterable[Measure], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
     """A warning for every measure of a motion in time that has no value at some points."""
     for measure in watched:
-        where = np.argwhere(~np.isfinite(arrays[measure.name]))
-        if measure.in_time and len(where):
-            first, size = tuple(int(i) for i in where[0]), arrays[measure.name].size
-            what = f"{measure.name} has no value at {len(where):,} of {counted(size, 'point')}, the first at "
-            what = f"{what}{say(points.swept, first)}: {not_steady(points.run, measure)}"
-            figures = {"points": len(where), "of": size}
+        mask = ~np.isfinite(arrays[measure.name])
+        if measure.in_time and mask.any():
+            of, first, figures = _places(points.swept, mask)
+            what = f"{measure.name} has no value at {of}, {first}: {not_steady(points.run, measure)}"
             yield Finding.warning("sweep.not_steady", f"measures.{measure.name}", what, LONGER, **figures)
 
 

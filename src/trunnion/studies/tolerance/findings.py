@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.findings import model_notes, shared_dimensions
+from trunnion.cycle.findings import of_run, shared_dimensions
 from trunnion.cycle.scales import scales_of
 from trunnion.dynamics.measured import LONGER, not_steady
 from trunnion.errors import Finding, Severity, Status, agreeing, counted
@@ -95,10 +95,7 @@ def findings_of(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
     study = outcome.study
     run = study.run
     yield from _missed(outcome, sampled)
-    yield from (note for note in model_notes(run.system.mechanism, run.system) if note.severity is not Severity.NOTE)
-    yield from run.chosen.findings
-    if run.determinacy is not None:
-        yield from run.determinacy.findings()
+    yield from of_run(run, notes=False)
     if study.effects.correlated:
         what = "RSS and worst case ignore the correlations; standard deviation, shares of variance and samples include "
         yield Finding.note("tolerance.correlations_left_out", "correlations", f"{what}them")

@@ -26,7 +26,7 @@ from trunnion.studies.tolerance.linear import Linear, Reference, linear, referen
 from trunnion.studies.tolerance.sampling import Samples, Sampling, towards
 from trunnion.studies.tolerance.search import Corner
 
-__all__ = ["FEW", "Outcome", "ToleranceStudy", "placed", "study"]
+__all__ = ["FEW", "Outcome", "ToleranceStudy", "placed", "stated_or_outputs", "study"]
 
 
 FEW = 10_000_000  # configurations up to which further processes cost more than they save
@@ -118,15 +118,7 @@ def study(
     check_steps(steps)
     run = prepare(mechanism)
     inputs = inputs_of(run)
-    notes: list[Finding] = []
-    selected = chosen(mechanism, measures, run.values)
-    if not selected:
-        selected = outputs(run.system)
-        note = none_stated(selected)
-        if not selected:
-            what = "no measure is stated, and no joint to the ground is an output"
-            raise MechanismError(Finding(what, "measures", note.remedy))
-        notes.append(note)
+    selected, notes = stated_or_outputs(run, chosen(mechanism, measures, run.values))
     if run.determinacy is not None and not all(measure.of_motion for measure in selected):
         run.determinacy.refuse()
     if run.cycle.duration <= 0:  # there is one position
@@ -136,12 +128,17 @@ def study(
     return ToleranceStudy(run, inputs, tuple(selected), steps, friction or FrictionMethod(), tuple(notes))
 
 
-def none_stated(measures: Sequence[Measure]) -> Finding:
-    """That outputs are taken as measures, as the model states none."""
-    names = [measure.name for measure in measures]
+def stated_or_outputs(run: Run, measures: Sequence[Measure]) -> tuple[list[Measure], list[Finding]]:
+    """The measures, or outputs with a note if there are none; MechanismError if there is no output either."""
+    if measures:
+        return list(measures), []
+    remedy, taken = "state measures: in the model, or use --measure link.point.x", outputs(run.system)
+    if not taken:
+        what = "no measure is stated, and no joint to the ground is an output"
+        raise MechanismError(Finding(what, "measures", remedy))
+    names = [measure.name for measure in taken]
     what = f"the model states no measure; {', '.join(names)} are used (joints to the ground without a driver)"
-    remedy = "state measures: in the model, or use --measure link.point.x"
-    return Finding.note("measure.none_stated", "measures", what, remedy, measures=names)
+    return taken, [Finding.note("measure.none_stated", "measures", what, remedy, measures=names)]
 
 
 def placed(mechanism: Mechanism, measure: Measure, at: float | str) -> Measure:

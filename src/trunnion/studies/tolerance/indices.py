@@ -9,8 +9,7 @@ coordinates of a pin in its hole, and the size and direction of a run-out, count
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,17 +25,13 @@ BOOTSTRAPS = 200
 LEAST, MOST = 64, 1 << 16
 
 
-@dataclass(frozen=True)
-class Indices:
-    """First and total order, (measure, parameter), with the ends of their 95 % intervals; base: points of a matrix."""
+class Indices(NamedTuple):
+    """First and total order, (measure, parameter), with the ends of their 95 % intervals, by the names of the result.
 
-    first: Array
-    first_low: Array
-    first_high: Array
-    total: Array
-    total_low: Array
-    total_high: Array
-    base: int
+    lost: samples without an answer.
+    """
+
+    arrays: dict[str, Array]
     lost: int
 
 
@@ -86,18 +81,18 @@ def _indices(y_one: Array, y_two: Array, mixed: Array, seed: int, lost: int) -> 
     rng = np.random.Generator(np.random.Philox(seed))
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a measure that nothing moves has no shares: NaN
-        first, total = both(slice(None))
+        index = both(slice(None))
         drawn = np.array([both(rng.integers(base, size=base)) for _ in range(BOOTSTRAPS)])
         low, high = np.nanquantile(drawn, [0.025, 0.975], axis=0)
+    ends = ("", index), ("_low", low), ("_high", high)
     return Indices(
-        first, _closed(low[0], first), _closed(high[0], first), total, _closed(low[1], total), _closed(high[1], total),
-        base, lost,
-    )  # fmt: skip
-
-
-def _closed(end: Array, index: Array) -> Array:
-    """An end of an interval, the index itself where nothing scatters."""
-    return np.where(np.isnan(end), index, end)
+        {
+            f"{order}_order{name}": np.where(np.isnan(end[k]), index[k], end[k])  # the index where nothing scatters
+            for k, order in enumerate(("first", "total"))
+            for name, end in ends
+        },
+        lost,
+    )
 
 
 def _filled(y: Array) -> Array:

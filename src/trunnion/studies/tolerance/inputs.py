@@ -26,7 +26,7 @@ from trunnion.solve.shifts import Play, given_offsets
 from trunnion.statistics.population import Marginal, Population
 from trunnion.statistics.streams import correlated
 
-__all__ = ["Inputs", "inputs_of"]
+__all__ = ["Inputs", "inputs_of", "plays_of"]
 
 Array = NDArray[np.float64]
 
@@ -65,8 +65,7 @@ class Inputs:
     @cached_property
     def dims(self) -> int:
         """How many uniform numbers a sample takes."""
-        play = sum(len(end) for name in self.loose for end in self.ends(name))
-        return len(self.tolerances) + sum(bool(tolerance.direction) for tolerance in self.tolerances) + play
+        return sum(map(len, self.parts))
 
     @property
     def parts(self) -> list[list[int]]:
@@ -206,15 +205,12 @@ def inputs_of(run: Run) -> Inputs:
     tolerances = tuple(mechanism.tolerated())
     held = tuple(seat.joint for seat in run.seats if seat.given is not None)
     pressed = tuple(seat.joint for seat in run.seats if seat.given is None)
-    plays = {name: play for name in run.system.joints if (play := _play(run, name)) is not None}
+    plays = plays_of(run)
     loose = tuple(name for name in plays if name not in (*held, *pressed))
     if not tolerances and not loose:
         remedy = "write `60 mm ± 0.05 mm`, an entry in `tolerances`, or a clearance of a joint without a seat"
         raise MechanismError(Finding("nothing has a tolerance or a clearance", "tolerances", remedy))
-    findings = list(_uneven(mechanism, tolerances))
-    for name, play in plays.items():
-        findings += shifts.unstated_length(name, play)
-    if findings:
+    if findings := list(_uneven(mechanism, tolerances)):
         raise MechanismError(findings)
     marginals = [
         Marginal(tolerance.distribution, tolerance.lower, tolerance.upper, tolerance.options)
@@ -233,5 +229,13 @@ def _uneven(mechanism: Mechanism, tolerances: Sequence[Tolerance]) -> Iterator[F
             yield Finding(what, f"tolerances.{tolerance.path}", "leave it out, or vary the start of the driver")
 
 
-def _play(run: Run, joint: str) -> Play | None:
-    return shifts.play_of(run.system.mechanism.space, run.system.joints[joint][0], run.values, joint)
+def plays_of(run: Run) -> dict[str, Play]:
+    """The plays of all joints that have one; MechanismError for one without a length over which its pin leans."""
+    space, plays = run.system.mechanism.space, dict[str, Play]()
+    for name, (kind, _) in run.system.joints.items():
+        if (play := shifts.play_of(space, kind, run.values, name)) is not None:
+            plays[name] = play
+    findings = [finding for name, play in plays.items() for finding in shifts.unstated_length(name, play)]
+    if findings:
+        raise MechanismError(findings)
+    return plays

@@ -126,7 +126,8 @@ def dataset(outcome: Outcome, notes: Sequence[Finding]) -> xr.Dataset:
     counted = sampled(outcome.samples, study) if outcome.samples else None
     job = outcome.samples.job if outcome.samples else None
     findings = [*findings_of(outcome, counted), *notes]
-    arrays = {**_linear(study), **_worst(outcome), **(counted.arrays if counted else {}), **_shares(outcome)}
+    arrays = {**_linear(study), **_worst(outcome), **(counted.arrays if counted else {})}
+    arrays |= outcome.indices.arrays if outcome.indices else {}
     units = [measure.figure_unit(system, study.run.values) for measure in study.measures]
     curve_units = [measure.unit(system) for measure in study.measures]
     dimensions = {f"dimensions.{name}": kind for name, kind in dimension_kinds(mechanism).items()}
@@ -261,16 +262,6 @@ def _worst(outcome: Outcome) -> dict[str, Any]:
             [[corner.at.get(name, radii[i]) for i, name in enumerate(inputs.names)] for corner in corners]
         )
     return values
-
-
-def _shares(outcome: Outcome) -> dict[str, Any]:
-    indices = outcome.indices
-    if indices is None:
-        return {}
-    return {
-        "first_order": indices.first, "first_order_low": indices.first_low, "first_order_high": indices.first_high,
-        "total_order": indices.total, "total_order_low": indices.total_low, "total_order_high": indices.total_high,
-    }  # fmt: skip
 
 
 def text_of(measure: Measure, system: System) -> str:

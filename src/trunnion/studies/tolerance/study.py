@@ -147,17 +147,10 @@ def _check(methods: Sequence[str], samples: int, seed: int, target: float | None
         findings.append(Finding(f"{samples} samples", "samples", remedy))
     if not 0 <= seed < 1 << 63:
         findings.append(Finding(f"a seed of {seed}", "seed", "give a whole number from 0"))
+    if target is not None and not 0 < target < 1:
+        what = f"a yield of {target:g} is not possible"
+        findings.append(Finding(what, "yield", "give a share above 0 and below 1, such as 0.9973"))
+    elif target is not None and not any(method in SAMPLINGS for method in methods):
+        findings.append(Finding("a yield is one of samples", "yield", f"add the method {' or '.join(SAMPLINGS)}"))
     if findings:
         raise MechanismError(findings)
-    _check_target(target, methods)
-
-
-def _check_target(target: float | None, methods: Sequence[str]) -> None:
-    """MechanismError for a yield that is not possible."""
-    if target is None:
-        return
-    if not 0 < target < 1:
-        what = f"a yield of {target:g} is not possible"
-        raise MechanismError(Finding(what, "yield", "give a share above 0 and below 1, such as 0.9973"))
-    if not any(method in SAMPLINGS for method in methods):
-        raise MechanismError(Finding("a yield is one of samples", "yield", f"add the method {' or '.join(SAMPLINGS)}"))

@@ -1,0 +1,243 @@
+"""`trunnion assemble`, `play`, `tolerance` and `allocate`: mechanisms as they are built."""
+
+from dataclasses import replace
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from typer import Option
+
+from trunnion.cli.files import verb
+from trunnion.cli.options import (
+    CURVES,
+    IMAGES,
+    WRITTEN,
+    At,
+    Engine,
+    Files,
+    Force,
+    Jobs,
+    Measures,
+    Model,
+    OnePosition,
+    Samples,
+    Seed,
+    Steps,
+    Uncut,
+    Write,
+    named_file,
+    share,
+)
+from trunnion.cli.result import Shown, check_files, check_model, exit_status
+from trunnion.cli.terminal import bar, line
+from trunnion.errors import Finding, MechanismError
+from trunnion.results.attributes import findings_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.model.mechanism import Mechanism
+
+__all__ = ["allocate", "assemble", "play", "tolerance"]
+
+
+# ---- assemble --------------------------------------------------------------------------------------------------------
+
+Uniform = StrEnum("Uniform", ["pins", "all"])
+
+
+@verb(lacks="table friction seat columns")
+def assemble(
+    model: Model, files: Files, steps: Steps = 360,
+    uniform: Annotated[
+        Uniform, Option("--uniform", help="Joints with one common clearance: pins, or all kinds of play.")
+    ] = Uniform.pins,
+) -> None:  # fmt: skip
+    """Clearance needed to assemble a linkage with axis errors."""
+    from trunnion.studies.assembly import assemble as run
+
+    check_files(files)
+    mechanism = model.read()
+    with model.lines(), bar("positions", steps, least=1000) as progress:
+        result = run(mechanism, steps, uniform.value, progress)  # type: ignore[arg-type]  # it checks it
+    Shown(result, model, files, "assembly").finish()
+
+
+# ---- play ------------------------------------------------------------------------------------------------------------
+
+
+@verb(lacks="seat columns")
+def play(
+    model: Model,
+    files: Files,
+    measure: Measures = None,
+    steps: Steps = 360,
+    at: OnePosition = None,
+    uncut: Uncut = False,
+) -> None:
+    """Effect of the play of each joint on measures.
+
+    Worst case, share of each joint, standard deviation.
+    """
+    from trunnion.studies.play import play as run
+    from trunnion.views.common.peaks import whole_peaks
+    from trunnion.views.play import tables
+
+    check_files(files)
+    mechanism = model.read()
+    with model.lines():
+        result = run(mechanism, measure, steps, at)
+    pictured = whole_peaks(result, uncut)
+    Shown(result, model, files, "measures joints", pictured, tables=tables(result), apart=False).finish()
+
+
+# ---- tolerance -------------------------------------------------------------------------------------------------------
+
+OF_TOLERANCE = f"The name says which table: x.csv has the measures, x.parameters.csv the contributions, {CURVES}."
+SECTIONS = "measures joints tolerances"
+
+
+@verb(lacks="units columns", out=f"{WRITTEN} {OF_TOLERANCE}")
+def tolerance(
+    model: Model, files: Files, measure: Measures = None, at: At = None,
+    method: Annotated[
+        list[str] | None,
+        Option(
+            "--method",
+            help="linear, worst-case, monte-carlo, quasi-monte-carlo, sobol. Repeatable; the first three if not given.",
+        ),
+    ] = None,
+    target: Annotated[
+        float | None,
+        Option("--yield", parser=share, metavar="SHARE",
+               help="Required share within limits, 0.99 or 99%; then it alone decides the exit status."),
+    ] = None,
+    samples: Samples = 10_000, seed: Seed = 1, steps: Steps = 360, jobs: Jobs = None, engine: Engine = "auto",
+    cluster: Annotated[str | None, Option("--cluster", help="Address of a Dask scheduler, or local.")] = None,
+    checkpoint: Annotated[
+        Path | None, Option("--checkpoint", help="File that keeps the samples done; the same command continues.")
+    ] = None,
+    sample: Annotated[
+        list[str] | None,
+        Option("--sample", help="NAME=FILE.csv: measured deviations of a number, one column. Repeatable."),
+    ] = None,
+    kind: Annotated[
+        str | None,
+        Option("--kind", help="A single figure: histogram, contributions, envelope, convergence or sobol."),
+    ] = None,
+) -> None:  # fmt: skip
+    """Effect of tolerances and play: worst case, RSS, yield, shares."""
+    from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
+    from trunnion.studies.tolerance.study import DEFAULT_METHODS
+    from trunnion.studies.tolerance.study import tolerance as run
+    from trunnion.views.tolerance import tables
+
+    check_files(files, "tolerance", kind)
+    mechanism = model.read()
+    for text in sample or ():
+        mechanism = mechanism.with_samples(*named_file(text, "--sample"))
+    methods = tuple(method or (name for name in DEFAULT_METHODS if samples or name not in SAMPLINGS))
+    drawn = samples if set(methods) & set(SAMPLINGS) else 0
+    with model.lines(), bar("samples", drawn, least=1000) as progress:
+        result = run(
+            mechanism, measure, methods, samples, seed, steps, at, jobs=jobs, engine=engine,  # type: ignore[arg-type]
+            cluster=cluster, checkpoint=checkpoint, progress=progress, target=target,
+        )  # fmt: skip
+    Shown(result, model, files, SECTIONS, drawn={"kind": kind}, tables=tables(result)).finish()
+
+
+# ---- allocate --------------------------------------------------------------------------------------------------------
+
+DIGITS = 5  # significant ones of a tolerance in the model that is written
+OF_ALLOCATION = (
+    "The name says which table: x.csv has the tolerances, x.measures.csv the measures, x.offers.csv the cost over "
+    f"accuracy, {CURVES}."
+)
+Criterion = StrEnum("Criterion", {"worst_case": "worst-case", "rss": "rss", "yield_": "yield"})
+Choice = StrEnum("Choice", ["auto", "continuous", "discrete"])
+
+
+@verb(lacks="units columns", out=f"{WRITTEN} {OF_ALLOCATION}")
+def allocate(
+    model: Model, files: Files, measure: Measures = None,
+    criterion: Annotated[
+        Criterion | None,
+        Option("--criterion", help="What must meet the limits: worst-case, rss or yield. [default: worst-case]"),
+    ] = None,
+    target: Annotated[
+        float | None,
+        Option("--yield", parser=share, metavar="SHARE",
+               help="Required share within all limits, 0.99 or 99%; implies --criterion yield."),
+    ] = None,
+    choice: Annotated[
+        Choice, Option("--choice", help="continuous, discrete, or auto: according to the stated costs.")
+    ] = Choice.auto,
+    exact: Annotated[
+        bool, Option("--exact", help="Exact worst case of the mechanism instead of the first-order one.")
+    ] = False,
+    sure: Annotated[
+        bool, Option("--sure", help="The lower end of the 95 % interval of fresh samples has to meet the yield.")
+    ] = False,
+    curve: Annotated[int, Option("--curve", help="Number of points of the cost-accuracy curve; 0: no curve.")] = 0,
+    at: At = None, steps: Steps = 360,
+    samples: Annotated[
+        int, Option("--samples", help="Number of random mechanisms for the verification; 0: none.")
+    ] = 10_000,
+    seed: Seed = 1, jobs: Jobs = None, write: Write = None, force: Force = False,
+    kind: Annotated[str | None, Option("--kind", help="Which figure: cost, trade-off, or one of `tolerance`.")] = None,
+) -> None:  # fmt: skip
+    """Find the tolerances of minimum cost that meet the limits.
+
+    The result is verified by samples; --curve gives cost over accuracy.
+    """
+    from trunnion.studies.allocation.allocate import allocate as run
+    from trunnion.views.allocation import tables
+
+    check_files(files, "allocation", kind)
+    check_model(write, model.file, force)
+    if target is not None and criterion not in (None, Criterion.yield_):
+        what = f"the criterion {criterion} does not use a yield of {target:g}"
+        raise MechanismError(Finding(what, "--yield", f"remove --yield, or remove --criterion {criterion}"))
+    by = Criterion.yield_ if target is not None else criterion or Criterion.worst_case
+    mechanism = model.read()
+    with model.lines(), bar("samples", samples, least=1000) as progress:
+        result = run(
+            mechanism, measure, by.value, target, choice.value, steps, at, samples,  # type: ignore[arg-type]
+            seed, curve, exact=exact, sure=sure, jobs=jobs, progress=progress,
+        )  # fmt: skip
+    allocated, findings = bool(result.attrs["found"]), _named(findings_of(result), mechanism)
+    if not allocated:  # there is nothing to draw then
+        files.out = [path for path in files.out or () if path.suffix.lower() not in IMAGES]
+
+    def nothing() -> None:
+        line(f"{result.attrs.get('name', '')}\nno allocation meets the limits".lstrip())
+
+    parts = tables(result)
+    shown = Shown(result, model, files, f"{SECTIONS} costs", drawn={"kind": kind}, tables=parts,
+                  show=None if parts else nothing)  # fmt: skip
+    shown.write()
+    if write is not None and allocated and not exit_status(findings):
+        shown.write_model(_bought(mechanism, result), write, force)
+    elif write is not None:
+        why = "the tolerances found do not meet the limits" if allocated else "there is no allocation"
+        findings.append(Finding(f"'{write}' is not written: {why}", "--write"))
+    shown.end(findings)
+
+
+def _bought(mechanism: "Mechanism", result: "xr.Dataset") -> "Mechanism":
+    """The mechanism with what was found: options as they are, all others rounded down, so that the limits hold."""
+    from trunnion.studies.allocation.allocate import half_widths
+
+    widths = half_widths(result)
+    made = dict(zip(result["parameter"].values.tolist(), result["choice"].values.tolist(), strict=True))
+    options = {path: width for path, width in widths.items() if made[path]}
+    others = {path: width for path, width in widths.items() if not made[path]}
+    return mechanism.with_tolerances(options).with_tolerances(others, DIGITS)
+
+
+def _named(findings: list[Finding], mechanism: "Mechanism") -> list[Finding]:
+    """Findings about costs by the names that the file has for them."""
+    from trunnion.model.tolerances import cost_paths
+
+    names = {f"costs.{path}": f"costs.{name}" for name in mechanism.costs for path in cost_paths(mechanism, name)}
+    return [replace(finding, where=names.get(finding.where, finding.where)) for finding in findings]

@@ -1,0 +1,316 @@
+"""`trunnion rig`, `data`, `compare` and `identify`: data of test rigs, and the model beside them."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from typer import Argument, Option
+
+from trunnion.cli.files import verb
+from trunnion.cli.options import DATA, DataFiles, Files, Force, MappingFile, Model, Seed, Write, setting
+from trunnion.cli.result import (
+    YAML,
+    Shown,
+    check_files,
+    check_model,
+    check_target,
+    exit_status,
+    show_tables,
+    write_text,
+)
+from trunnion.cli.terminal import bar, line, say, wrote
+from trunnion.errors import Finding, MechanismError, Severity, counted
+from trunnion.results.attributes import findings_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.model.mechanism import Mechanism
+    from trunnion.rig.virtual.observe import Observation
+
+__all__ = ["compare", "data", "estimated", "identify", "rig"]
+
+
+# ---- rig -------------------------------------------------------------------------------------------------------------
+
+FEWEST = 20  # conditions from which a progress bar is worth it
+MOST_COMPARED, MOST_IDENTIFIED = 40, 24  # rows of the tables that are printed
+
+
+@verb()
+def rig(
+    model: Model,
+    rig_file: Annotated[Path, Argument(help="Rig file: YAML, JSON or TOML.")],
+    out: Annotated[
+        Path | None, Option("--out", "-o", help="Folder for data files, mapping.yaml and truth.yaml.")
+    ] = None,
+    format_: Annotated[str, Option("--format", help="csv, parquet or tdms; default: as stated in the rig file.")] = "",
+    seed: Seed = 1,
+) -> None:
+    """Virtual test rig: write simulated data files.
+
+    Without --out the rig file is only checked.
+    """
+    from trunnion.model.file import read_entries
+    from trunnion.rig.reading.rig_file import Rig, placed_in_rig
+    from trunnion.rig.virtual.files import check_folder, check_form
+    from trunnion.rig.virtual.observe import observe
+
+    if format_:
+        check_form(format_)
+    if "trunnion-rig" in read_entries(model.file)[0]:
+        raise MechanismError(
+            Finding("is a rig file", remedy="name the model first, then the rig", file=str(model.file))
+        )
+    mechanism = model.read()
+    stated = Rig.read(rig_file)
+    if out and not format_:
+        check_form(stated.format)
+    count = len(stated.schedule.rows())
+    with model.lines():
+        try:
+            if out:
+                check_folder(stated, out, format_)
+            with bar("conditions", count, least=FEWEST) as progress:
+                observation = observe(mechanism, stated, seed, progress)
+        except MechanismError as error:  # findings about the rig bear the line of its file
+            raise MechanismError(placed_in_rig(error.findings, rig_file)) from None
+    _about(observation)
+    if out:
+        with bar("files", len(observation.cases), least=FEWEST) as progress:
+            names = observation.write(out, format_, progress)
+        wrote(out)
+        first, last, *_ = (*names[:1], *names[-3:-2])
+        span = first if first == last else f"{first} … {last}"
+        line(f"  {span}, {', '.join(names[-2:])}")
+    say(placed_in_rig(observation.findings, rig_file))
+    raise typer.Exit(exit_status(observation.findings) or int(bool(observation.skipped)))
+
+
+def _about(observation: "Observation") -> None:
+    """What is recorded: conditions, turns, samples."""
+    conditions = len(observation.cases)
+    rows = max(case.rows for case in observation.cases)
+    line(observation.rig.name or "Test rig", "bold")
+    texts = (
+        observation.mechanism.name or "no name",
+        f"{counted(conditions, 'condition')} of {counted(observation.rig.schedule.turns, 'cycle')}",
+        f"{observation.rate:g} samples a second",
+        counted(observation.rows, "row") + (f", at most {rows:,} a file" if conditions > 1 else ""),
+    )
+    line("; ".join(texts))
+
+
+# ---- data ------------------------------------------------------------------------------------------------------------
+
+
+@verb(lacks="report units columns", out=DATA)
+def data(
+    mapping: Annotated[Path, typer.Argument(help="Mapping file: YAML, JSON or TOML.")],
+    shared: Files,
+    files: Annotated[
+        list[Path] | None, typer.Argument(help="Data files instead of those it names: .csv .parquet .tdms.")
+    ] = None,
+) -> None:
+    """Read measured files: conditions, channels, scatter, faults."""
+    from trunnion.results.export import save
+    from trunnion.rig.reading.measurement import dataset
+    from trunnion.rig.reading.read import read_measured
+    from trunnion.views.measured import tables
+
+    check_files(shared, drawn=False)
+    measurement = read_measured(mapping, files)
+    show_tables("", tables(measurement))
+    for text in ["", *measurement.done] if measurement.done else []:
+        line(text)
+    for path in shared.out or ():
+        save(dataset(measurement), path, shared.units_row)
+        wrote(path)
+    say(measurement.findings)
+    raise typer.Exit(int(any(finding.severity is not Severity.NOTE for finding in measurement.findings)))
+
+
+# ---- compare ---------------------------------------------------------------------------------------------------------
+
+
+@verb(lacks="units columns")
+def compare(
+    model: Model, mapping: MappingFile, files: Files, data: DataFiles = None,
+    channel: Annotated[
+        list[str] | None, Option("--channel", help="A channel by its name in the mapping. Repeatable.")
+    ] = None,
+    condition: Annotated[str | None, Option("--condition", help="The condition to draw.")] = None,
+    kind: Annotated[str | None, Option("--kind", help="Figure of --out: efficiency or overlay.")] = None,
+) -> None:  # fmt: skip
+    """Compare a model with measured data: residual, bias, verdict.
+
+    Every channel, and the efficiency as a test rig determines it. Exit status 0 if all agree within the expanded
+    uncertainty, 1 if not or if that is undecided.
+    """
+    from trunnion.rig.comparison import compare as run
+    from trunnion.rig.reading.read import read_measured
+    from trunnion.rig.reading.timebase import gathered
+    from trunnion.views.compare import tables
+
+    check_files(files, "comparison", kind)
+    mechanism = model.read()
+    measurement = read_measured(mapping, [str(path) for path in data] if data else None)
+    with model.lines(), bar("conditions", len(measurement.conditions)) as progress:
+        result = run(mechanism, measurement, channel, progress=progress)
+    errors = exit_status([*measurement.findings, *findings_of(result)])
+    Shown(
+        result, model, files, "assembly measures", tables=tables(result), most=MOST_COMPARED, rest="FILE.figures.csv",
+        drawn={"kind": kind, "condition": condition, "channel": channel[0] if channel and len(channel) == 1 else None},
+        others=gathered(measurement.findings),
+    ).finish(int(not result.attrs["all_within"] or errors))  # fmt: skip
+
+
+# ---- identify --------------------------------------------------------------------------------------------------------
+
+
+@verb(lacks="units columns")
+def identify(
+    model: Model, mapping: MappingFile, files: Files, data: DataFiles = None,
+    parameter: Annotated[
+        list[str] | None,
+        Option("--parameter",
+               help="A parameter, named as in --set; NAME=PATH,PATH,… for several with one common value. Repeatable."),
+    ] = None,
+    channel: Annotated[
+        list[str] | None,
+        Option("--channel",
+               help="A channel by its name in the mapping, or efficiency. Repeatable; default: all usable ones."),
+    ] = None,
+    start: Annotated[
+        list[str] | None, Option("--start", help="NAME=VALUE: start value; default: the value in the model.")
+    ] = None,
+    hold_out: Annotated[
+        list[str] | None,
+        Option("--hold-out",
+               help="A condition, or a share of the turns such as 0.2, for validation instead of the fit. Repeatable."),
+    ] = None,
+    guard: Annotated[
+        int | None, Option("--guard", help="Positions left out on each side of a friction reversal.")
+    ] = None,
+    write: Write = None,
+    write_mapping: Annotated[
+        Path | None,
+        Option("--write-mapping",
+               help="Write the mapping with the zero of the angle or of a channel that was found: .yaml."),
+    ] = None,
+    force: Force = False,
+    kind: Annotated[str | None, Option("--kind", help="Which figure: intervals, correlation or residuals.")] = None,
+) -> None:  # fmt: skip
+    """Identify parameters of a model from measured data.
+
+    Estimates, 95 % confidence intervals, and which parameters the data do not separate.
+    """
+    from trunnion.rig.identification import identify as run
+    from trunnion.rig.reading.read import read_measured
+    from trunnion.rig.reading.timebase import gathered
+    from trunnion.views.identify import tables
+
+    check_files(files, "identification", kind)
+    check_model(write, model.file, force)
+    _check_mapping(write_mapping, mapping, force)
+    mechanism = model.read()
+    with model.lines():
+        unknowns, begin = parameters(parameter or []), dict(setting(text) for text in start or ())
+        held_out = _held_out(hold_out or [])
+        measurement = read_measured(mapping, [str(path) for path in data] if data else None)
+        with bar("models evaluated", None) as progress:
+            result = run(mechanism, measurement, unknowns, channel, begin, held_out, guard, progress=progress)
+    others = gathered(  # of the notes those that tell what was set, and why intervals may be too narrow
+        finding for finding in measurement.findings if finding.severity is not Severity.NOTE or finding.where == "files"
+    )
+    shown = Shown(result, model, files, "assembly measures", drawn={"kind": kind}, tables=tables(result),
+                  most=MOST_IDENTIFIED, rest="FILE.residuals.csv", others=others)  # fmt: skip
+    shown.write()
+    findings = findings_of(result)
+    if write is not None:
+        identified, remarks = estimated(mechanism, result, write)
+        findings += remarks
+        if identified:
+            shown.write_model(identified, write, force)
+    if write_mapping is not None:
+        findings += _write_mapping(result, mapping, write_mapping, shown.written)
+    shown.end(findings)
+
+
+def parameters(texts: list[str]) -> dict[str, list[str]]:
+    """Paths by the name of the unknown, from NAME or NAME=PATH,PATH."""
+    unknowns: dict[str, list[str]] = {}
+    for text in texts:
+        name, equals, listed = (part.strip() for part in text.partition("="))
+        paths = [path.strip() for path in listed.split(",")] if equals else [name]
+        if not name or not all(paths):
+            remedy = "write NAME, or NAME=PATH,PATH, e.g. pins=pin-1.friction.coefficient,pin-2.friction.coefficient"
+            raise MechanismError(Finding(f"'{text}' names no number", "--parameter", remedy))
+        if name in unknowns:
+            raise MechanismError(Finding(f"'{name}' is given twice", "--parameter", "give all its numbers at once"))
+        unknowns[name] = paths
+    if not unknowns:
+        remedy = "add --parameter joint_defaults.friction.coefficient, or another number of the model"
+        raise MechanismError(Finding("no parameter to identify is given", "--parameter", remedy))
+    return unknowns
+
+
+def _held_out(texts: list[str]) -> float | list[str] | None:
+    """A share of the turns, or names of conditions."""
+    try:
+        (share,) = map(float, texts)
+        return share
+    except ValueError:
+        return texts or None
+
+
+def estimated(mechanism: "Mechanism", result: "xr.Dataset", write: Path) -> "tuple[Mechanism | None, list[Finding]]":
+    """The model with the estimates, if they are worth it, and findings about what is not in it."""
+    from trunnion.rig.identification import with_estimates
+
+    errors = {finding.code: finding.where for finding in findings_of(result) if finding.severity is Severity.ERROR}
+    if "fit.misfit" in errors or "sensor.off" in errors:
+        reduced = float(f"{float(result['reduced_chi_squared']):.3g}")
+        misfit = f"the model does not fit (reduced χ² {reduced:,.10g})"
+        what = f"'{write}' is not written: {misfit if 'fit.misfit' in errors else errors['sensor.off'] + ' is off'}"
+        explained = "sensor.off" in errors or "fit.cause" in {finding.code for finding in findings_of(result)}
+        correct = "correct what explains the misfit, and identify again"
+        search = "find the cause first: `trunnion compare` shows each channel and names errors of sensors and angle"
+        return None, [Finding(what, "--write", correct if explained else search)]
+    told = zip(result["parameter"].values, result["told"].values, strict=True)
+    lost = [str(name) for name, identifiable in told if not identifiable]
+    if len(lost) == result.sizes["parameter"] or not result.attrs["converged"]:
+        why = "no parameter is identifiable" if result.attrs["converged"] else "the search did not converge"
+        return None, [Finding(f"'{write}' is not written: {why}", "--write")]
+    notes = []
+    if lost:
+        notes.append((f"{', '.join(lost)} unchanged: not identifiable from the data", ""))
+    if encoder := result.attrs["encoder"]:
+        notes.append((f"{encoder} unchanged: by this the encoder is off", "write it into the mapping: --write-mapping"))
+    findings = [Finding(what, "--write", remedy, Severity.NOTE) for what, remedy in notes]
+    return with_estimates(mechanism, result), findings
+
+
+def _check_mapping(write: Path | None, mapping: Path, force: bool) -> None:
+    """MechanismError for a mapping that cannot be written, is in another folder than its data, or is there already."""
+    if write is None:
+        return
+    if write.resolve().parent != mapping.resolve().parent:
+        what = f"'{write}' is not in the folder of '{mapping}', whose data it names"
+        raise MechanismError(Finding(what, "--write-mapping", "name a file there"))
+    check_target(write, "--write-mapping", "a mapping", YAML, force)
+
+
+def _write_mapping(result: "xr.Dataset", mapping: Path, write: Path, written: list[Path]) -> list[Finding]:
+    """The mapping with the zeros that were found, beside the data that it names."""
+    from trunnion.model.file import read_entries
+    from trunnion.model.rewrite import changed_text
+    from trunnion.rig.identification import corrected_mapping
+
+    try:
+        entries = corrected_mapping(read_entries(mapping, "a mapping file")[0], result)
+    except MechanismError as error:
+        return list(error.findings)
+    write_text(changed_text(mapping.read_text("utf-8"), entries), write)
+    written.append(write)
+    return []

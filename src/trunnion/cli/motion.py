@@ -1,0 +1,286 @@
+"""`trunnion analyse`, `simulate`, `locking`, `design`, `plot`, `report`: motion and forces, in numbers and pictures."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from typer import Exit, Option
+
+from trunnion.cli.files import verb
+from trunnion.cli.options import (
+    DATA,
+    IMAGES,
+    PLOT_KINDS,
+    Engine,
+    Files,
+    Friction,
+    Model,
+    OnePosition,
+    Picture,
+    Steps,
+    Uncut,
+    seconds,
+)
+from trunnion.cli.result import Shown, check_files, check_page, end, exit_status, write_text
+from trunnion.cli.terminal import bar, line, show_figures, show_rows, wrote
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.files import folder
+from trunnion.results.attributes import findings_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.model.mechanism import Mechanism
+    from trunnion.results.result import Result
+    from trunnion.solve.friction_method import FrictionMethod
+
+__all__ = ["analyse", "design", "locking", "plot", "report", "simulate"]
+
+
+# ---- analyse ---------------------------------------------------------------------------------------------------------
+
+
+@verb(out=DATA)
+def analyse(
+    model: Model, files: Files, settled: Friction, steps: Steps = 360, at: OnePosition = None, uncut: Uncut = False,
+    engine: Engine = "auto",
+    variables: Annotated[
+        list[str] | None,
+        Option("--variables", help="Keep these variables only: reaction_force, drive_effort … Repeatable."),
+    ] = None,
+    dtype: Annotated[str, Option("--dtype", help="Numbers of the files: float64, or float32.")] = "float64",
+) -> None:  # fmt: skip
+    """Analyse a cycle: motion, reactions, friction, effort, power."""
+    from trunnion.cycle.positions import Kept
+
+    check_files(files, drawn=False, instead=f"trunnion plot {model.file}")
+    kept = Kept.read(variables, dtype)  # type: ignore[arg-type]  # it checks them
+    if files.report and kept.variables is not None:
+        raise MechanismError(Finding("a report is made of all variables", "--variables", "leave one of both out"))
+    if files.report and at:
+        raise MechanismError(Finding("a report is of the whole cycle", "--at", "leave one of both out"))
+    mechanism = model.read()
+    saved = {"units_row": files.units_row, "columns": files.columns, "units": files.units}
+    with model.lines():
+        result = _analysed(mechanism, steps, settled.checked(), engine, kept, files.out or [], saved, at)
+
+    def show_position() -> None:
+        """Every number of one position, with its unit."""
+        from trunnion.results.quantities import parts
+        from trunnion.results.tables import columns
+
+        rows = []
+        for name, unit, values in columns(result.dataset):
+            text, shown = (values[0], "") if isinstance(values[0], str) else parts(float(values[0]), unit)
+            rows.append([name, text, "" if shown == "1" else shown])
+        show_rows(f"{result.attrs['name'] or model.file} at {at}", ["", "value", "unit"], rows)
+
+    shown = Shown(result, model, Files(), "assembly", show=show_position if at else None, written=files.out or [])
+    if files.report is not None:
+        write_text(_page(mechanism, result, uncut), files.report)
+        shown.written.append(files.report)
+    shown.end()
+
+
+@verb(lacks="seat")
+def design(
+    model: Model,
+    fluctuation: Annotated[float, Option("--fluctuation", help="Speed fluctuation that the flywheel allows.")] = 0.05,
+) -> None:
+    """Design values: transmission angle, dead centres, flywheel.
+
+    Transmission angles, dead centres, range, Grashof type, shaking force, balance, flywheel, motor.
+    """
+    from trunnion.studies.design import report_figures
+
+    mechanism = model.read()
+    with model.lines():
+        figures = report_figures(mechanism, fluctuation)
+    show_figures(mechanism.name or str(model.file), figures)
+
+
+@verb()
+def plot(
+    model: Model,
+    out: Annotated[Path, Option("--out", "-o", help="Folder, or a .png .svg .pdf .jpg file of one plot.")],
+    kind: Annotated[list[str] | None, Option("--kind", help=f"{PLOT_KINDS}. Repeatable; all if not given.")] = None,
+    steps: Steps = 360,
+    at: Annotated[
+        str | None,
+        Option("--at", help="Position to draw the mechanism in and to mark in curves: 60deg, 20mm, 0.1s."),
+    ] = None,
+    image: Picture = "png", uncut: Uncut = False,
+) -> None:  # fmt: skip
+    """Plot a cycle: torque, friction power, reactions, mechanism."""
+    from trunnion.views.charts import check_kind
+    from trunnion.views.common.peaks import whole_peaks
+    from trunnion.views.cycle.deviations import with_worst_case
+    from trunnion.views.cycle.plots import PLOTS, drawable, figure, save
+
+    for name in kind or []:
+        check_kind(name, PLOTS)
+    single = out.suffix.lower() in IMAGES
+    if single and len(kind or PLOTS) > 1:
+        what = f"{len(kind or PLOTS)} plots do not fit one file"
+        raise MechanismError(Finding(what, str(out), "name a folder, or one --kind"))
+    mechanism = model.read()
+    with model.lines():
+        result = _analysed(mechanism, steps).dataset
+    ideal = _ideal(mechanism, steps)
+    if not single:
+        folder(out)
+    shown = whole_peaks(with_worst_case(result, mechanism) if "error" in (kind or PLOTS) else result, uncut)
+    for name, picture in [(name, figure(shown, name, ideal, at)) for name in kind or drawable(result)]:
+        path = out if single else out / f"{name}.{image.lstrip('.')}"
+        save(picture, path)
+        wrote(path)
+    end([finding for finding in findings_of(result) if finding.severity is not Severity.NOTE], model.file, "assembly")
+
+
+@verb()
+def report(
+    model: Model,
+    out: Annotated[Path, Option("--out", "-o", help="The HTML file to write.")],
+    settled: Friction, steps: Steps = 360, uncut: Uncut = False,
+) -> None:  # fmt: skip
+    """Write an HTML report: animation, plots, findings, inputs."""
+    check_page(out, "--out")
+    mechanism = model.read()
+    with model.lines():
+        result = _analysed(mechanism, steps, settled.checked())
+    write_text(_page(mechanism, result, uncut), out)
+    wrote(out)
+    raise Exit(exit_status(findings_of(result)))
+
+
+def _analysed(mechanism: "Mechanism", steps: int, method: "FrictionMethod | None" = None, *more: Any) -> "Result":
+    """Analyse, with a progress bar when it takes long enough to need one. more: engine, … of `analysed`."""
+    from trunnion.cycle.analyse import analysed
+
+    with bar("positions", steps, least=200_000) as progress:
+        return analysed(mechanism, steps, method, progress, *more)
+
+
+def _ideal(mechanism: "Mechanism", steps: int) -> "xr.Dataset | None":
+    """The cycle without friction, to compare with; None if there is none."""
+    if all(joint.friction is None for joint in mechanism.effective_joints.values()):
+        return None
+    return _analysed(mechanism.with_friction("off"), steps).dataset
+
+
+def _page(mechanism: "Mechanism", analysed: "Result", uncut: bool) -> str:
+    """The report of a cycle as HTML."""
+    from trunnion.views.common.peaks import whole_peaks
+    from trunnion.views.cycle.deviations import with_worst_case
+    from trunnion.views.cycle.report import report as page
+
+    result = analysed.dataset
+    shown = whole_peaks(with_worst_case(result, mechanism), uncut)
+    return page(shown, _ideal(mechanism, result.sizes["position"]))
+
+
+# ---- simulate --------------------------------------------------------------------------------------------------------
+
+PERCENT = 100
+EVALUATIONS = 2_000_000  # as `simulate` has it
+
+
+@verb(lacks="seat columns")
+def simulate(
+    model: Model, files: Files,
+    time: Annotated[
+        str | None, Option("--time", help="Duration, as 2s or 300ms; default: ten cycles of the stated motion.")
+    ] = None,
+    steps: Annotated[int, Option("--steps", help="Equal intervals of time in the result.")] = 1000,
+    tolerance: Annotated[float, Option("--tolerance", help="Relative tolerance of the integration.")] = 1e-9,
+    steady: Annotated[
+        bool, Option("--steady", help="The cycle that the motion comes to repeat, as `analyse` gives a cycle.")
+    ] = False,
+    evaluations: Annotated[
+        int, Option("--evaluations", help="Evaluations of the forces, after which the motion ends.")
+    ] = EVALUATIONS,
+    kind: Annotated[
+        str | None,
+        Option("--kind",
+               help="Figure to write: sheet, speed, effort, reactions, energy, phase; in play contacts, gaps, orbit, "
+               "spectrum; of a steady cycle those of `trunnion plot`."),
+    ] = None,
+) -> None:  # fmt: skip
+    """Motion in time: start-up, run-down, rest, locking, pins in play.
+
+    The motion of drivers that are free or have a motor, with friction, stick and slip, forces, energy and events.
+    """
+    from trunnion.dynamics.opened import in_play
+    from trunnion.dynamics.simulate import simulated
+    from trunnion.dynamics.steady_cycle import UnsteadyError
+
+    of = "cycle" if steady else "motion"
+    check_files(files, of, kind if files.out else None)
+    duration = seconds(time, "--time", "2s")
+    mechanism = model.read()
+    if files.out and not in_play(mechanism):
+        _check_without_play(files, of, kind)
+    with model.lines(), bar("%", PERCENT) as progress:
+        reached = None if progress is None else lambda share: progress(int(PERCENT * share))
+        try:
+            result = simulated(mechanism, duration, steps, tolerance, reached, steady, evaluations)
+        except UnsteadyError as unsteady:
+            end(unsteady.findings, model.file, "drivers")
+    Shown(result, model, files, "drivers", drawn={"kind": kind}).finish()
+
+
+def _check_without_play(files: Files, of: str, kind: str | None) -> None:
+    """MechanismError for a table or figure of contacts, of which there are none without joints in play."""
+    from trunnion.results.tables import check_table
+
+    for path in files.out or ():
+        check_table(path, of, in_play=False)
+    if kind:
+        from trunnion.views.motion.figure import check_contacts
+
+        check_contacts(kind, in_play=False)
+
+
+# ---- locking ---------------------------------------------------------------------------------------------------------
+
+MOST_RANGES = 24  # rows of the table of ranges
+
+
+@verb(lacks="report")
+def locking(
+    model: Model, files: Files, steps: Steps = 360,
+    near: Annotated[
+        float, Option("--near", help="Locking margin below which a position counts as near locking.")
+    ] = 1.5,
+) -> None:  # fmt: skip
+    """Margin against locking by friction; backdriving.
+
+    The margin for the friction of all joints and of each joint alone, and the ranges of the drive in which the
+    mechanism locks, is near locking, is self-locking or can be backdriven.
+    """
+    from trunnion.cycle.locking import look, report_figures
+    from trunnion.cycle.locking_course import HEAD
+    from trunnion.results.attributes import attribute
+    from trunnion.solve.run import prepare
+
+    check_files(files)
+    files.columns = files.columns or ["locking"]
+    mechanism = model.read()
+    with model.lines():
+        run = prepare(mechanism)
+        with bar("positions", steps, least=200_000) as progress:
+            result = look(run, steps, progress, near)
+    figures = report_figures(run)
+
+    def show() -> None:
+        show_figures(mechanism.name or str(model.file), figures)
+        if not mechanism.drivers:
+            return
+        line()
+        ranges = attribute(result, "locking_ranges", "{}")
+        title = f"ranges of {ranges['of']}".removesuffix(" of ") + ", pins centred" * bool(run.seats)
+        rows = [row["cells"] for row in ranges["rows"]]  # in the order of the cycle; those near locking last
+        show_rows(title, list(HEAD), rows[:MOST_RANGES])
+        if len(rows) > MOST_RANGES:
+            line(f"{len(rows) - MOST_RANGES} more ranges; --out has every position")
+
+    Shown(result, model, files, "assembly", drawn={"kind": "locking"}, show=show).finish()

@@ -346,7 +346,7 @@ def test_a_link_that_the_loop_alone_names_takes_a_mass():
     assert entries_of(text)[0]["links"] == {"crank": {"mass": "2 kg"}}
 
 
-@pytest.mark.parametrize("what", ["csv", "report", "png", "svg", "script", "gif"])
+@pytest.mark.parametrize("what", ["csv", "report", "png", "svg", "gif"])
 def test_files(what):
     found = ask(ask="export", text=EXAMPLES[FOURBAR], what=what, steps=36)
     assert len(found["bytes"]) > 500

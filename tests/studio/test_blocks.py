@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import trunnion
-from studio.asking import EXAMPLES, analysed, model_of, near, sound, unpacked
+from studio.asking import EXAMPLES, analysed, ask, edited, model_of, near, sound, unpacked
 from trunnion.model.file import entries_of, text_of
 from trunnion.results.scales import without_noise
 from trunnion.studio.answers import answer
@@ -109,6 +109,28 @@ def test_dyads_with_a_slider_move():
     assert geared.gears["gear1"].joints == ("A", "C")
 
 
+@pytest.mark.parametrize("angle", ["35 deg", ""])
+@pytest.mark.parametrize("first", [True, False])
+def test_a_driver_and_a_ccc_are_a_cardan_joint(angle, first):
+    """Pins of a cross at right angles, θ and φ from the common normal: sin θ sin φ + cos θ cos φ cos δ = 0,
+    so that ω₂/ω₁ = cos δ / (1 − sin² δ cos² θ).
+    """
+    blocks = [block("CCC", at=angle)]
+    text, _ = edited("", {}, *([block("driver", {"ground": "0 mm, 0 mm"})] if first else []), *blocks)
+    result = analysed(text, 72)
+    assert "CCC" in result.attrs["formula"]
+    theta, phi = (result["joint_rotation"].sel(joint=joint).values for joint in "AD")
+    rates = [result["joint_rotation_velocity"].sel(joint=joint).values for joint in "AD"]
+    delta = np.radians(35 if angle else 30)
+    near = {"rtol": 0, "atol": 1e-12}
+    np.testing.assert_allclose(np.sin(theta) * np.sin(phi) + np.cos(theta) * np.cos(phi) * np.cos(delta), 0, **near)
+    ratio = np.cos(delta) / (1 - np.sin(delta) ** 2 * np.cos(theta) ** 2)
+    np.testing.assert_allclose(rates[1] / rates[0], ratio, **near)
+    assert sound("model", text)["findings"] == []
+    again = ask(ask="edit", text=text, places={}, gestures=blocks)
+    assert "closes a loop in space" in again["error"]
+
+
 def test_groups_with_two_slides_and_of_class_three_move_as_their_closed_forms():
     crank = block("driver", {"ground": "0 mm, 0 mm"}, at="20 mm, 10 mm")
     yoke = built(crank, block("RPP", "link1.B", at="80 mm, 10 mm"))
@@ -139,7 +161,7 @@ def test_groups_with_two_slides_and_of_class_three_move_as_their_closed_forms():
     [
         (block("XYZ"), "is no block"),
         (block("driver", {"ground": "0 mm"}), "is no place"),
-        (block("driver", {"ground": "0 kg, 1 kg"}), "is no place"),
+        (block("driver", {"ground": "0 kg, 1 kg"}), "is no length"),
         (block("RRR", {"ground": "0, 0"}, {"ground": "0, 0"}), "same pin twice"),
         (block("RPR", {"ground": "0, 0"}, {"ground": "1, 0"}), "choose a pin that is drawn"),
         (block("RRR", "none", {"ground": "1, 0"}), "is not a joint or a point"),
@@ -227,3 +249,20 @@ def test_a_mechanism_is_built_of_blocks_by_the_keyboard(user):
     page.get_by_role("button", name="Place the block").press("Enter")
     user.until("s.solved.value")
     assert page.locator(".formula .term").all_inner_texts() == ["I(0,1)R", "II(2,3)RRR"]
+
+
+def test_a_cardan_joint_is_built_of_two_blocks(user):
+    page = user.page
+    user.new_sheet()
+    page.get_by_role("tab", name="Blocks").click()
+    page.get_by_label("Place of pin 1").fill("0 mm, 0 mm")
+    page.get_by_role("button", name="Place the block").press("Enter")
+    user.until("Object.keys(s.answer.value?.entries?.links ?? {}).length === 2")
+    page.get_by_label("Kind of block").select_option("CCC")
+    assert page.get_by_label("Place of pin 1").count() == 0
+    page.get_by_label("Angle between the shafts").fill("40 deg")
+    page.get_by_role("button", name="Place the block").press("Enter")
+    user.until("s.solved.value && s.spatial.value")
+    assert page.locator(".formula .term").all_inner_texts() == ["I(0,1)R", "II(2,3)CCC"]
+    assert user.state("s.answer.value.entries.loop")[3]["twist"] == "140 deg"
+    assert page.get_by_label("Kind of block").count() == 0  # blocks of the plane

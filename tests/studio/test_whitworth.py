@@ -1,4 +1,4 @@
-"""A Whitworth with a ram, as a user draws it: tolerances, loads, dimensions, its animation; in the page by keys."""
+"""A Whitworth with a ram, as a user draws it: loads, dimensions, its animation; in the page by keys."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from studio.asking import EXAMPLES, analysed, ask, edited, solved
+from studio.asking import analysed, ask, edited, solved
 from trunnion.model.file import entries_of
 from trunnion.views.cycle.scene import scene
 
@@ -51,54 +51,7 @@ joint_defaults:
 """
 
 
-WHITWORTH = EXAMPLES["whitworth-quick-return"]
-TOLERANCED = TEXT.replace("crank: 30 mm", "crank: 30 mm ± 0.5 mm")
-MODELS = {"ram": TOLERANCED}
-
-
-def cycle(crank):
-    return analysed(TEXT.replace("crank: 30 mm", f"crank: {crank} mm"), 720)
-
-
-@pytest.mark.slow
-def test_worst_cases_are_those_of_the_numbers_at_their_limits():
-    found = ask(ask="tolerances", text=TOLERANCED, steps=360)
-    torque, stroke, ratio = found["rows"]
-    ends = [cycle(crank) for crank in (29.5, 30, 30.5)]
-    peaks = [float(np.abs(one["drive_effort"]).max()) for one in ends]
-    ways = [float(np.ptp(one["joint_slide"].sel(joint="G").values)) for one in ends]
-    for row, (low, middle, high) in ((torque, peaks), (stroke, ways)):
-        assert row["nominal"] == pytest.approx(middle, rel=1e-3)
-        assert row["worst"] == pytest.approx([-(high - low) / 2, (high - low) / 2], rel=0.03)
-        assert row["deviation"] == pytest.approx((high - low) / 6, rel=0.03)  # limits at three standard deviations
-    assert torque["label"] == "largest torque, drive A"
-    assert stroke["texts"][0] == "135.0\u00a0mm"
-    assert ratio["label"] == "time ratio of G"
-
-
-def test_a_stroke_that_no_tolerance_changes_is_told_as_that():
-    """The stroke of a Whitworth in line with its lever is 2 s whatever the crank; its time ratio is (2π − φ)/φ."""
-    text = WHITWORTH.replace("r: 120 mm", "r: 120 mm ± 0.5 mm")
-    stroke, ratio = ask(ask="tolerances", text=text, steps=360)["rows"][1:]
-    assert stroke["texts"] == ["200.0\u00a0mm", "± 0\u00a0m", "0\u00a0m"]
-    assert stroke["worst"] == [0, 0]
-    short = [2 * np.arccos(60 / crank) for crank in (119.5, 120, 120.5)]
-    low, middle, high = ((2 * np.pi - one) / one for one in short)
-    assert ratio["nominal"] == pytest.approx(middle, rel=1e-7)
-    assert ratio["worst"] == pytest.approx([-(low - high) / 2, (low - high) / 2], rel=1e-4)
-
-
-@pytest.mark.slow
-def test_the_table_stands_under_the_plots(user):
-    user.until("s.solved.value")
-    user.page.click("role=tab[name=Plots]")
-    words = user.page.text_content(".tolerances table")
-    assert "stroke of G" in words
-    assert "± 2.250" in words
-    assert "Samples, yield and shares" in user.page.text_content(".tolerances p")
-    user.of("actions", "m.setValue(['dimensions', 'crank'], '30 mm')")
-    user.until("s.answer.value.numbers['dimensions.crank'] === 0.03 && !s.text.value.includes('±')")
-    assert user.page.locator(".tolerances").count() == 0
+MODELS = {"ram": TEXT}
 
 
 FORCE = "-150 N * max(-1, min(1, G.slide_velocity / (1 mm/s)))"
@@ -128,17 +81,14 @@ def test_of_thinned_positions_it_is_that_of_those_shown_and_of_others_unknown():
 
 
 @pytest.mark.slow
-def test_names_forces_and_loads_are_drawn():
-    frames = {}
-    for force in ("150 N", "0 N"):
-        text = TEXT.replace("-150 N * max", f"-{force} * max")
-        content = ask(ask="export", text=text, what="gif", steps=12)
-        shown = Image.open(io.BytesIO(content["bytes"]))
-        shown.seek(3)
-        frames[force] = np.asarray(shown.convert("RGB"), int)
+def test_the_pictures_of_a_cycle_differ():
+    shown = Image.open(io.BytesIO(ask(ask="export", text=TEXT, what="gif", steps=12)["bytes"]))
     assert shown.n_frames == 12
-    differs = np.abs(frames["150 N"] - frames["0 N"]).sum(axis=2) > 60
-    assert 200 < differs.sum() < 0.05 * differs.size
+    frames = []
+    for index in (0, 6):
+        shown.seek(index)
+        frames.append(np.asarray(shown.convert("RGB"), int))
+    assert 0.001 < np.mean(np.abs(frames[0] - frames[1]).sum(axis=2) > 60) < 0.5
 
 
 PIN = ["links", "link3", "points", "E"]
@@ -150,9 +100,9 @@ def put(text, path, value):
 
 @pytest.mark.parametrize(
     ("typed", "rod"),
-    [("rod", "100 mm"), ("rod = 120 mm", "120 mm"), ("rod=120 mm ± 0.05", "120 mm ± 0.05")],
+    [("rod = 120 mm", "120 mm"), ("rod=120 mm ± 0.05", "120 mm ± 0.05")],
 )
-def test_a_name_typed_for_a_number_makes_a_dimension(typed, rod):
+def test_a_definition_typed_for_a_number_makes_a_dimension(typed, rod):
     text = put(TEXT, PIN, [typed, "0"])
     entries = entries_of(text)[0]
     assert entries["dimensions"] == {"crank": "30 mm", "rod": rod}

@@ -172,12 +172,7 @@ def test_denavit_hartenberg() -> None:
     theta, s, alpha, a = RNG.normal(size=(4, COUNT))
     found = homogeneous(poses.link(spatial(theta, s), spatial(alpha, a)))
     c, n, ca, na, zero, one = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha), 0 * s, 0 * s + 1
-    expected = [
-        [c, -n * ca, n * na, a * c],
-        [n, c * ca, -c * na, a * n],
-        [zero, na, ca, s],
-        [zero, zero, zero, one],
-    ]
+    expected = [[c, -n * ca, n * na, a * c], [n, c * ca, -c * na, a * n], [zero, na, ca, s], [zero, zero, zero, one]]
     same(found, np.moveaxis(np.array(expected), (0, 1), (-2, -1)))
 
 

@@ -33,10 +33,7 @@ def torque_by_virtual_work() -> float:
     def rocker(q: float) -> complex:
         return complex(np.angle(pins(q)[1] - 5.5))
 
-    centres = (
-        (30.0, lambda q: on_coupler(q, 2.8, 0.152)),
-        (7.2, lambda q: (5.5 + pins(q)[1]) / 2),
-    )
+    centres = ((30.0, lambda q: on_coupler(q, 2.8, 0.152)), (7.2, lambda q: (5.5 + pins(q)[1]) / 2))
     q, speed = np.pi / 3, 10.0
     torque = sum(m * speed**2 * (bend(r, q) * np.conj(slope(r, q))).real for m, r in centres)
     for inertia, angle in ((48.80, coupler), (5.50, rocker)):

@@ -395,10 +395,7 @@ def test_a_point_of_a_link_as_a_hint() -> None:
 def test_resisting_loads_take_power() -> None:
     """A brake torque on a pin and a brake force in a guide oppose the motion: useful power = Σ |M ω| + |F v|."""
     data = slider_crank()
-    data["loads"] = {
-        "pump": {"joint": "C", "resisting_force": 30.0},
-        "brake": {"joint": "B", "resisting_torque": 2.0},
-    }
+    data["loads"] = {"pump": {"joint": "C", "resisting_force": 30.0}, "brake": {"joint": "B", "resisting_torque": 2.0}}
     result = analyse(data, 40)
     v = np.abs(result["joint_slide_velocity"].sel(joint="C").values)
     w = np.abs(result["joint_rotation_velocity"].sel(joint="B").values)

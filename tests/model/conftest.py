@@ -1,4 +1,4 @@
-"""What reading a text as a model file raises."""
+"""What reading a text as a model file raises, and the model whose numbers vary in every way."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from model_samples import VARIED
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.mechanism import read_mechanism
+from trunnion.model.mechanism import Mechanism, read_mechanism
 
 
 @pytest.fixture
@@ -27,18 +28,7 @@ def findings_of(tmp_path: Path) -> Callable[..., tuple[Finding, ...]]:
 
 
 @pytest.fixture
-def mistake(findings_of: Callable[..., tuple[Finding, ...]]) -> Callable[..., None]:
-    """One entry of a text replaced by a wrong one: a finding at its line says where, what and what to do."""
-
-    def check(text: str, case: tuple[str, str, int, str, str, str], most: int = 1, whole: bool = False) -> None:
-        old, new, line, where, what, remedy = case
-        assert 1 <= text.count(old) <= most
-        found = findings_of(text.replace(old, new))
-        placed = [one for one in found if (where == one.where if whole else where in one.where)]
-        texts = "\n".join(map(str, found))
-        fitting = [one for one in placed if what in one.what and remedy in one.remedy]
-        assert fitting, texts
-        assert fitting[0].line == line, texts
-        assert all(one.remedy and one.where and one.line for one in found), texts
-
-    return check
+def varied(tmp_path: Path) -> Mechanism:
+    path = tmp_path / "varied.yaml"
+    path.write_text(VARIED, encoding="utf-8")
+    return read_mechanism(path)

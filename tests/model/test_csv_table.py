@@ -1,7 +1,9 @@
-"""Points of drivers and tables from CSV files: what is read, and what is said of a bad one."""
+"""Points of drivers and tables from CSV files, given beside a model or named in it: what is read, what is refused."""
 
 from __future__ import annotations
 
+import json
+import os
 import time
 from pathlib import Path
 
@@ -10,8 +12,10 @@ import pytest
 
 import trunnion
 from trunnion import Mechanism, MechanismError
-from trunnion.model.csv_table import MAX_ROWS
+from trunnion.model.csv_table import MAX_BYTES, MAX_OWN_ROWS, MAX_ROWS
 from trunnion.model.mechanism import read_mechanism
+from trunnion.model.rewrite import rewrite_mechanism
+from trunnion.model.text import MOST_FILES
 
 SLIDER_CRANK = Path(__file__).resolve().parents[2] / "examples" / "slider-crank.yaml"  # driver O, table pressure
 MODEL = read_mechanism(SLIDER_CRANK)
@@ -132,13 +136,6 @@ def test_one_finding_for_each_problem(text: str, expected: list[str], tmp_path: 
         assert "—" in line  # a remedy
 
 
-def test_a_file_in_disorder_is_told_briefly(tmp_path: Path) -> None:
-    found = refused(tmp_path, "\n".join(f"{k};{k}" for k in range(100, 0, -1)))
-    assert len(found) == 9
-    assert "and 92 more like these" in found[-1]
-    assert len(refused(tmp_path, "0;0\n" + "a;b\n" * 50)) == 9
-
-
 def test_a_large_file_is_refused_quickly_with_the_limit(tmp_path: Path) -> None:
     started = time.process_time()
     (finding,) = refused(tmp_path, "".join(f"{k},{k}\n" for k in range(10**6)))
@@ -158,3 +155,345 @@ def test_what_is_no_text_or_not_there(tmp_path: Path) -> None:
         MODEL.with_table("O", tmp_path / "latin.csv")
     with pytest.raises(MechanismError, match="there is no driver or table 'presure' — did you mean 'pressure'"):
         MODEL.with_table("presure", csv(tmp_path, "0,0\n"))
+
+
+SOURCE = SLIDER_CRANK.read_text("utf-8")
+INLINE = SOURCE[SOURCE.index("             points:") : SOURCE.index("loads:")]
+POINTS = read_mechanism(SLIDER_CRANK).tables["pressure"].points
+CSV = "angle [deg];pressure [bar]\n" + "".join(
+    f"{str(place.source).removesuffix(' deg')};{str(value.source).removesuffix(' bar')}\n" for place, value in POINTS
+)
+
+
+def written(folder: Path, stated: str = "file: gas.csv", points: str | None = CSV, name: str = "model.yaml") -> Path:
+    """The example with its table in a file, or stated otherwise."""
+    path = folder / name
+    path.write_text(SOURCE.replace(INLINE, f"             {stated}}}\n"), encoding="utf-8")
+    if points is not None:
+        (folder / "gas.csv").write_text(points, encoding="utf-8")
+    return path
+
+
+def refused_model(path: Path, *, tables: dict[str, str] | None = None) -> list[str]:
+    with pytest.raises(MechanismError) as caught:
+        read_mechanism(path, tables)
+    return [str(one).replace(f"{path.parent}{os.sep}", "") for one in caught.value.findings]
+
+
+# ---- what is read ---------------------------------------------------------------------------------------------
+
+
+def test_the_model_is_the_one_with_the_points_in_it(tmp_path: Path) -> None:
+    """Equal, with the same hash and the same results; another content is another model."""
+    found, meant = read_mechanism(written(tmp_path)), read_mechanism(SLIDER_CRANK)
+    assert found == meant
+    assert found.digest == meant.digest
+    one, two = (trunnion.analyse(each, 24) for each in (found, meant))
+    np.testing.assert_array_equal(one["drive_effort"], two["drive_effort"])
+    assert one.attrs["model_hash"] == two.attrs["model_hash"]
+    (tmp_path / "gas.csv").write_text(CSV.replace("2.5", "2.6"), encoding="utf-8")
+    assert read_mechanism(tmp_path / "model.yaml").digest != meant.digest
+
+
+def test_a_driver_and_a_folder_below(tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "motion.csv").write_text("t [ms];q [deg]\n0;0\n50;12,5\n100;90\n", encoding="utf-8")
+    path = written(tmp_path)
+    text = path.read_text("utf-8").replace("O: {speed: 1450 rpm}", "O: {law: table, file: data/motion.csv}")
+    path.write_text(text, encoding="utf-8")
+    assert read_mechanism(path).parameters()["drivers.O.points.1.time"] == 0.05
+
+
+def test_the_folder_is_that_of_the_model_wherever_one_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    written(tmp_path / "a")
+    (tmp_path / "b" / "linked.yaml").symlink_to(tmp_path / "a" / "model.yaml")
+    monkeypatch.chdir(tmp_path / "b")
+    (tmp_path / "a" / "link.csv").symlink_to("gas.csv")  # a link that stays in the folder
+    written(tmp_path / "a", "file: link.csv", name="other.yaml")
+    data = {**read_mechanism(SLIDER_CRANK).data(), "tables": {"pressure": {"periodic": True, "file": "gas.csv"}}}
+    (tmp_path / "a" / "model.json").write_text(json.dumps(data), encoding="utf-8")
+    for path in ("../a/model.yaml", "linked.yaml", "../a/other.yaml", "../a/model.json"):
+        assert read_mechanism(path).tables["pressure"].points == POINTS
+
+
+def test_the_command_line_goes_before_the_model(tmp_path: Path) -> None:
+    """A file by --table replaces the one that the model names, which need not be there then."""
+    path = written(tmp_path, points=None)
+    other = tmp_path / "other.csv"
+    other.write_text(CSV.replace("2.5", "2.6"), encoding="utf-8")
+    found = read_mechanism(path, {"pressure": str(other)})
+    assert found.parameters()["tables.pressure.points.1.value"] == pytest.approx(2.6e5)
+
+
+def test_what_is_made_of_the_model_needs_the_file_no_more(tmp_path: Path) -> None:
+    """Settings, sweeps, another process, a written copy: the points are part of the model."""
+    mechanism = read_mechanism(written(tmp_path, "file: gas.csv", CSV))
+    (tmp_path / "gas.csv").unlink()
+    changed = mechanism.with_values({"tables.pressure.points.1.value": "3 bar", "r": "36 mm"})
+    assert changed.parameters()["tables.pressure.points.1.value"] == pytest.approx(3e5)
+    swept = trunnion.sweep(mechanism, {"tables.pressure.points.1.value": ["2 bar", "4 bar"]}, 24)
+    assert np.ptp(swept["drive_effort_rms"].values) > 0
+    assert Mechanism(**mechanism.data()) == mechanism
+    varied = Mechanism(**{**mechanism.data(), "tolerances": {"r": "±0.1 mm"}})
+    options = {"methods": ("monte-carlo",), "samples": 40, "steps": 12}
+    one, two = (trunnion.tolerance(varied, ["maximum:effort:O"], jobs=jobs, **options) for jobs in (1, 2))
+    np.testing.assert_array_equal(one["mean"], two["mean"])
+    mechanism.write(tmp_path / "copy.yaml")
+    assert read_mechanism(tmp_path / "copy.yaml") == mechanism
+
+
+def test_a_rewritten_model_goes_on_to_name_its_file(tmp_path: Path) -> None:
+    """Beside it as it was; elsewhere, or with other points, with these in it. Comments stay."""
+    path = written(tmp_path)
+    mechanism = read_mechanism(path).with_values({"r": "36 mm"})
+    (tmp_path / "other").mkdir()
+    for target, named in (("new.yaml", True), ("other/new.yaml", False)):
+        rewrite_mechanism(mechanism, path, tmp_path / target)
+        text = (tmp_path / target).read_text("utf-8")
+        assert read_mechanism(tmp_path / target) == mechanism
+        assert ("gas.csv" in text) is named
+        assert text.startswith("# A small air compressor")
+    changed = mechanism.with_values({"tables.pressure.points.1.value": "3 bar"})
+    rewrite_mechanism(changed, path, tmp_path / "changed.yaml")
+    text = (tmp_path / "changed.yaml").read_text("utf-8")
+    assert read_mechanism(tmp_path / "changed.yaml") == changed
+    assert "gas.csv" not in text
+    assert text.startswith("# A small air compressor")
+
+
+# ---- what is refused_model ------------------------------------------------------------------------------------------
+
+OUTSIDE = ["../gas.csv", "a/../../gas.csv", "/etc/gas.csv", "C:/gas.csv", "c:gas.csv", "..\\\\gas.csv",
+           "\\\\\\\\server\\\\gas.csv"]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_a_name_that_leads_out(name: str, tmp_path: Path) -> None:
+    """Whether there is such a file is not told."""
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "gas.csv").write_text(CSV, encoding="utf-8")
+    path = written(tmp_path / "sub", f'file: "{name}"', None)
+    (only,) = refused_model(path)
+    assert only.startswith("model.yaml:28: error: tables.pressure.file: ")
+    assert "leads out of the folder of the model" in only
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("none.csv", "is not in the folder of the model"),
+        ("folder.csv", "is not a file"),
+        ("out.csv", "leads out of the folder of the model by a link"),
+        ("way/gas.csv", "leads out of the folder of the model by a link"),
+        ("loop.csv", "cannot be reached"),
+        ("pipe.csv", "is not a file"),
+        ("con.csv", "is a device on some systems"),
+        ("gas.txt", "is no CSV file by its name"),
+        (".env", "is no CSV file by its name"),
+        ("a\\\\gas.csv", "has a backslash — write a/gas.csv"),
+        ("gas.csv\\0", "is no name of a file"),
+        ("", "is no name of a file"),
+        ("x" * 300 + ".csv", "is no name of a file"),
+    ],
+)
+def test_what_is_no_plain_file_in_the_folder(name: str, said: str, tmp_path: Path) -> None:
+    folder, other = tmp_path / "folder", tmp_path / "other"
+    folder.mkdir()
+    other.mkdir()
+    (other / "gas.csv").write_text(CSV, encoding="utf-8")
+    (folder / "folder.csv").mkdir()
+    (folder / "out.csv").symlink_to(other / "gas.csv")
+    (folder / "way").symlink_to(other)
+    (folder / "loop.csv").symlink_to("loop.csv")
+    os.mkfifo(folder / "pipe.csv")
+    (folder / "con.csv").write_text(CSV, encoding="utf-8")
+    (only,) = refused_model(written(folder, f'file: "{name}"', None))
+    assert "tables.pressure.file" in only
+    assert said in only
+    assert "root:" not in only
+
+
+def test_sizes_are_bounded(tmp_path: Path) -> None:
+    path = written(tmp_path, points="0;1\n" * (MAX_ROWS + 2))
+    assert "at most 10000" in refused_model(path)[0]
+    written(tmp_path, points="# long\n" * (MAX_BYTES // 7 + 1))
+    assert "1 MB" in refused_model(path)[0]
+    long = "".join(f"{k}e-4;1\n" for k in range(9000))
+    many = "".join(f", p{k}: {{file: gas.csv}}" for k in range(MAX_OWN_ROWS // 9000 + 1))
+    path.write_text(path.read_text("utf-8").replace("tables:\n", "tables: {").replace(
+        "  pressure: {over: drive, periodic: true,               # above that of the air outside\n"
+        "             file: gas.csv}\n", f"pressure: {{file: gas.csv}}{many}}}\n"), encoding="utf-8")  # fmt: skip
+    (tmp_path / "gas.csv").write_text(long, encoding="utf-8")
+    assert any("are too long" in one for one in refused_model(path))
+    (tmp_path / "gas.csv").write_text(CSV, encoding="utf-8")
+    many = "".join(f", q{k}: {{file: gas.csv}}" for k in range(MOST_FILES))
+    path.write_text(path.read_text("utf-8").replace(", p0:", f"{many}, p0:"), encoding="utf-8")
+    assert f"more than {MOST_FILES} files" in refused_model(path)[-1]
+
+
+def test_content_is_told_with_its_own_file_and_line(tmp_path: Path) -> None:
+    assert refused_model(written(tmp_path, points="0;1\n1;x\n"))[0].startswith(
+        "gas.csv:2: error: 'x' is not a finite number"
+    )
+    assert refused_model(written(tmp_path, points="0;1\n2;1\n1;1\n"))[0].startswith(
+        "gas.csv:3: error: tables.pressure.points.2"
+    )
+
+
+def test_both_or_neither(tmp_path: Path) -> None:
+    (only,) = refused_model(written(tmp_path, "file: gas.csv, points: [[0 deg, 1 bar], [360 deg, 1 bar]]"))
+    assert "states both points and a file" in only
+    path = written(tmp_path, "interpolation: linear")
+    (only,) = refused_model(path)
+    assert "tables.pressure: has no points" in only
+    assert read_mechanism(path, {"pressure": str(tmp_path / "gas.csv")}).tables["pressure"].points == POINTS
+    data = read_mechanism(SLIDER_CRANK).data()
+    data["drivers"]["O"] = {"law": "constant", "speed": "10 rpm", "file": "motion.csv"}
+    with pytest.raises(
+        MechanismError, match="has no effect on the motion law constant — remove it, or state law: table"
+    ):
+        Mechanism(**data)
+
+
+@pytest.mark.parametrize("part", ["tables", "drivers"])
+def test_a_model_that_is_no_file_has_no_folder(part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a mapping in Python: a finding with what to do, and nothing is read from where one happens to stand."""
+    (tmp_path / "gas.csv").write_text(CSV, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    data = read_mechanism(SLIDER_CRANK).data()
+    data[part] = {"pressure": {"file": "gas.csv"}} if part == "tables" else {"O": {"law": "table", "file": "gas.csv"}}
+    with pytest.raises(MechanismError) as caught:
+        Mechanism(**data)
+    (only,) = caught.value.findings
+    assert "and has no folder" in only.what
+    assert "give its points instead, or write the model into a file beside it" in only.remedy
+    data[part] = read_mechanism(SLIDER_CRANK).data()[part]
+    assert Mechanism(**data)
+
+
+# ---- periods --------------------------------------------------------------------------------------------------
+
+MEASURED = "angle [deg];pressure [bar]\n" + "".join(f"{10 * k};{4 + np.cos(k * np.pi / 18):.6f}\n" for k in range(36))
+CLOSED = MEASURED + "360;5.000000\n"
+
+
+def test_a_table_that_ends_before_the_turn_is_refused(tmp_path: Path) -> None:
+    """At 350° with another value, and with the same: it would run ahead of the crank by 10° each turn."""
+    (only,) = refused_model(written(tmp_path, points=MEASURED))
+    assert "ends at" in only
+    assert "or state period: 360 deg" in only
+    (only,) = refused_model(written(tmp_path, points=MEASURED.replace(f"{4 + np.cos(np.pi / 18):.6f}", "5.000000")))
+    assert "it repeats after 350 deg" in only
+    assert "state period: 360 deg" in only
+
+
+def test_a_period_closes_a_table(tmp_path: Path) -> None:
+    for interpolation in ("linear", "spline"):
+        stated = f"file: gas.csv, interpolation: {interpolation}"
+        whole = trunnion.analyse(read_mechanism(written(tmp_path, stated, CLOSED)), 72)
+        found = read_mechanism(written(tmp_path, f"{stated}, period: 360 deg", MEASURED))
+        short = trunnion.analyse(found, 72)
+        np.testing.assert_allclose(short["drive_effort"], whole["drive_effort"], rtol=1e-9, atol=1e-9)
+        assert found.with_values({"tables.pressure.period": "365 deg"}).digest != found.digest
+
+
+@pytest.mark.parametrize("end", [120, 360, 720])
+def test_parts_and_multiples_of_a_turn_need_no_period(end: int, tmp_path: Path) -> None:
+    assert read_mechanism(written(tmp_path, points=f"a [deg]; p [bar]\n0;1\n{end / 2};2\n{end};1\n"))
+
+
+def test_a_period_that_cannot_be(tmp_path: Path) -> None:
+    (only,) = refused_model(written(tmp_path, "file: gas.csv, period: 340 deg", MEASURED))
+    assert "tables.pressure.period: is 5.93" in only
+    assert (
+        "is a time where an angle is needed"
+        in refused_model(written(tmp_path, "file: gas.csv, period: 2 s", MEASURED))[0]
+    )
+    path = written(tmp_path, "file: gas.csv, period: 360 deg", MEASURED)
+    path.write_text(path.read_text("utf-8").replace("periodic: true", "periodic: false"), encoding="utf-8")
+    assert "has no effect on a table without a period" in refused_model(path)[0]
+
+
+def test_a_table_over_time_by_the_time_of_a_turn(tmp_path: Path) -> None:
+    """At 1450/min a turn takes 41.3793 ms; a table of 41 ms would not come again with it."""
+    points = "t [ms];p [bar]\n0;1\n20;2\n{end};1\n"
+    over = "over: time, periodic: true"
+    path = written(tmp_path, points=points.format(end=41))
+    path.write_text(path.read_text("utf-8").replace("over: drive, periodic: true", over), encoding="utf-8")
+    (only,) = refused_model(path)
+    assert "it repeats after 0.041 s" in only
+    (tmp_path / "gas.csv").write_text(points.format(end=repr(60e3 / 1450)), encoding="utf-8")
+    assert read_mechanism(path)
+    (tmp_path / "gas.csv").write_text(points.format(end=41), encoding="utf-8")
+    path.write_text(path.read_text("utf-8").replace(over, f"{over}, period: 41 ms"), encoding="utf-8")
+    assert read_mechanism(path)
+
+
+# ---- files with more columns ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("names", ["[pressure, turn]", "[turn, pressure]", "['turn [deg]', pressure]"])
+def test_two_columns_of_more_are_named_by_their_headers(names: str, tmp_path: Path) -> None:
+    """In any order of the file, with and without the unit; a text in a third column does not matter."""
+    rows = [line.split(";") for line in CSV.splitlines()[1:]]
+    text = "note;pressure [bar];turn [deg]\n" + "".join(f"x;{value};{place}\n" for place, value in rows)
+    path = written(tmp_path, f"file: gas.csv, columns: {names}", text)
+    if names.startswith("[pressure"):
+        assert "its unit is that of a pressure" in "\n".join(refused_model(path))
+        return
+    found = read_mechanism(path)
+    assert found == read_mechanism(SLIDER_CRANK)
+    changed = found.with_values({"tables.pressure.points.2.value": 1.0e5})
+    rewrite_mechanism(changed, path, tmp_path / "again.yaml")
+    assert "columns" not in (tmp_path / "again.yaml").read_text("utf-8")
+    assert read_mechanism(tmp_path / "again.yaml") == changed
+
+
+@pytest.mark.parametrize(
+    ("stated", "text", "words"),
+    [
+        ("file: gas.csv, columns: [angle, pressur]", CSV, "gas.csv:1: error: has no column 'pressur'"),
+        ("file: gas.csv, columns: [a, p]", "a;p;p\n0;1;1\n1;2;2\n", "has 2 columns 'p'"),
+        ("file: gas.csv, columns: [angle]", CSV, "tables.pressure.columns"),
+        ("points: [[0 deg, 1 bar], [90 deg, 2 bar]], columns: [angle, pressure]", None, "has no effect without file"),
+    ],
+)
+def test_columns_that_are_not_there(stated: str, text: str | None, words: str, tmp_path: Path) -> None:
+    assert words in "\n".join(refused_model(written(tmp_path, stated, text)))
+
+
+@pytest.mark.parametrize(
+    ("text", "points"),
+    [
+        ("time,turn [deg],p\ns,deg,Pa\n0,0,8\n1,180,5\n2,360,8\n", [(0.0, 8.0), (np.pi, 5.0), (2 * np.pi, 8.0)]),
+        ("time,turn,p\n,deg,\n0,0,8\n1,180,5\n2,360,8\n", [(0.0, 8.0), (np.pi, 5.0), (2 * np.pi, 8.0)]),
+        (f"time,turn,p\n0,0,8\n1,3,5\n2,{2 * np.pi!r},8\n", [(0.0, 8.0), (3.0, 5.0), (2 * np.pi, 8.0)]),
+    ],
+)
+def test_units_below_the_headers_and_numbers_of_si(
+    text: str, points: list[tuple[float, float]], tmp_path: Path
+) -> None:
+    found = read_mechanism(written(tmp_path, "file: gas.csv, columns: [turn, p]", text))
+    stated = found.parameter_set.stated
+    where = [f"tables.pressure.points.{i}" for i in range(len(points))]
+    assert np.array([[stated(f"{place}.at"), stated(f"{place}.value")] for place in where]) == pytest.approx(
+        np.array(points)
+    )
+    assert not [one for one in found.checked if "radians" in one.what]
+
+
+@pytest.mark.parametrize(
+    ("names", "text", "words"),
+    [
+        ("[time, p]", "time,x,p\n0,5,1,2\n1,5,2,3\n", "gas.csv:2: error: has 4 cells, the header has 3"),
+        ('["0", "20"]', f"0,10,20\n0,11,8\n1,12,7\n{2 * np.pi!r},13,8\n", ""),
+    ],
+)
+def test_rows_are_those_of_the_headers(names: str, text: str, words: str, tmp_path: Path) -> None:
+    path = written(tmp_path, f"file: gas.csv, columns: {names}", text)
+    if words:
+        assert words in "\n".join(refused_model(path))
+    else:
+        assert len(read_mechanism(path).tables["pressure"].points) == 3

@@ -1,4 +1,4 @@
-"""Model files: what is read is what is written, and a file that is none says so and does no harm."""
+"""Model files: what is read is what is written and what the schema has; a file that is none does no harm."""
 
 from __future__ import annotations
 
@@ -9,17 +9,24 @@ import random
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from model_samples import DURANGO, EXAMPLES, FOURBAR
+from model_samples import DURANGO, EXAMPLES, FOURBAR, RSSP, VARIED
 
+from trunnion import read
 from trunnion.errors import Finding, MechanismError
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.checks.check import check_model
 from trunnion.model.file import MAX_DEPTH
 from trunnion.model.mechanism import Mechanism, read_mechanism
 from trunnion.model.rewrite import rewrite_mechanism
+from trunnion.model.schema import SCHEMA_FILE, json_schema, schema_text
+from trunnion.rig.reading.mapping import read_mapping
+from trunnion.rig.reading.rig_file import Rig
 
 FindingsOf = Callable[..., tuple[Finding, ...]]
 
@@ -32,13 +39,25 @@ def test_examples_are_read_and_written_without_loss(example: Path, extension: st
     # the pins of Pezzuti et al. are shorter than their diameter, which counts where they lean in their holes
     short = example.stem == "pezzuti-cardan-as-built"
     assert all(short and "less than its diameter" in finding.what for finding in check_model(mechanism))
-    copy = tmp_path / f"copy.{extension}"
-    mechanism.write(copy)
-    again = Mechanism.read(copy)
+    (tmp_path / "copies").mkdir()
+    written_and_read(mechanism, tmp_path / "copies" / f"copy.{extension}")
+    assert os.listdir(tmp_path / "copies") == [f"copy.{extension}"]  # no temporary file stays behind
+
+
+def written_and_read(mechanism: Mechanism, path: Path) -> None:
+    """What is written is what was read."""
+    mechanism.write(path)
+    again = Mechanism.read(path)
     assert again == mechanism
     assert again.digest == mechanism.digest
     assert again.data() == mechanism.data()
-    assert os.listdir(tmp_path) == [copy.name]  # no temporary file stays behind
+
+
+@pytest.mark.parametrize("text", [VARIED, RSSP])
+@pytest.mark.parametrize("extension", ["yaml", "json"])
+def test_a_model_with_every_section_is_read_and_written_without_loss(text: str, extension: str, tmp_path: Path) -> None:
+    (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
+    written_and_read(read_mechanism(tmp_path / "model.yaml"), tmp_path / f"copy.{extension}")
 
 
 def test_toml(tmp_path: Path, findings_of: FindingsOf) -> None:
@@ -78,11 +97,9 @@ def test_json_with_tabs_and_lines(tmp_path: Path, findings_of: FindingsOf) -> No
 
 BOMB = "a: &a [x, x, x]\nb: &b [*a, *a, *a]\nc: &c [*b, *b, *b]\nd: [*c, *c, *c]\n"
 BAD_FILES = [
-    ("", 1, "is empty", "examples"),
-    ("\n  \n", 1, "is empty", "examples"),
+    ("", 1, "is empty", "examples"), ("\n  \n", 1, "is empty", "examples"),
     ("# only a remark\n", 1, "not a group of entries", "examples"),
-    ("- 1\n- 2\n", 1, "not a group of entries", "examples"),
-    ("hello", 1, "not a group of entries", "examples"),
+    ("- 1\n- 2\n", 1, "not a group of entries", "examples"), ("hello", 1, "not a group of entries", "examples"),
     (b"\xff\xfe\x00\x01", 1, "is not UTF-8 text (byte 0)", "UTF-8"),
     (b"trunnion: 1\nname: caf\xe9\n", 2, "is not UTF-8 text (byte 21)", "UTF-8"),
     (b"\x00\x01\x02\x03" * 100, None, "is not YAML", "text file"),
@@ -105,7 +122,7 @@ BAD_FILES = [
     ("trunnion: 1\n", 1, "there are no links", "state"),
     ("trunnion: 1\n3: x\n", 2, "the key '3' is unknown", "known: "),
     ("trunnion: 1\nlinks:\n", 2, "is empty", "value or remove"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("content", "line", "what", "remedy"), BAD_FILES)
@@ -134,25 +151,21 @@ def test_nesting_up_to_the_limit(findings_of: FindingsOf, name: str, depth: int)
 
 
 @pytest.mark.parametrize(
-    ("content", "what"),
+    ("name", "content", "line", "what"),
     [
-        ("{", "is not JSON"),
-        ('{"trunnion": 1, "trunnion": 1}', "given twice"),
-        ("[1]", "not a group of entries"),
-        ('{"trunnion": 1, "name": NaN}', ""),
+        ("model.json", "{", 1, "is not JSON"),
+        ("model.json", '{"trunnion": 1, "trunnion": 1}', 1, "given twice"),
+        ("model.json", "[1]", 1, "not a group of entries"),
+        ("model.json", '{"trunnion": 1, "name": NaN}', 1, ""),
+        ("model.toml", "a = [", None, ""),
+        ("model.toml", "a = 1\na = 2\n", 2, ""),
     ],
 )
-def test_json_that_is_no_model(findings_of: FindingsOf, content: str, what: str) -> None:
-    found = findings_of(content, "model.json")
-    assert any(what in one.what for one in found)
-    assert all(one.line == 1 for one in found)
-
-
-@pytest.mark.parametrize(
-    ("content", "line"), [("a = [", None), ("a = 1\na = 2\n", 2), ("a" + ".a" * 5000 + "=1", None)]
-)
-def test_toml_that_is_no_model(findings_of: FindingsOf, content: str, line: int | None) -> None:
-    found = findings_of(content, "model.toml")
+def test_json_and_toml_that_are_no_model(
+    findings_of: FindingsOf, name: str, content: str, line: Any, what: str
+) -> None:
+    found = findings_of(content, name)
+    assert what in found[0].what
     assert line is None or found[0].line == line
 
 
@@ -255,27 +268,10 @@ def test_no_mutation_of_an_example_gives_anything_but_findings(example: Path, tm
         assert refused is None or refused.findings, "a refusal says why"
 
 
-ODD = [
-    None,
-    True,
-    0,
-    -1,
-    1e308,
-    10**400,
-    float("nan"),
-    "",
-    "A",
-    "AB",
-    "-5 mm",
-    "1/0",
-    [],
-    {},
-    [1],
-    [[1]],
-    {"a": 1},
-    "x" * 600,
-]
-ODD += [{"at": 3}, [0, 0, 0], {"law": "x"}, {1: 2}, ("a", "b"), b"x", object()]
+ODD: list[object] = [
+    None, True, 0, -1, 1e308, 10**400, float("nan"), "", "A", "AB", "-5 mm", "1/0", [], {}, [1], [[1]], {"a": 1},
+    "x" * 600, {"at": 3}, [0, 0, 0], {"law": "x"}, {1: 2}, ("a", "b"), b"x", object(),
+]  # fmt: skip
 
 
 def _holders(data: object) -> list[tuple[dict[object, object] | list[object], object]]:
@@ -319,3 +315,70 @@ def test_anchors_mean_nothing(tmp_path: Path) -> None:
     for values in ({name: "1.5 m"}, {f"errors.{name}": "1 mm"}):
         rewrite_mechanism(mechanism.with_values(values), tmp_path / "anchored.yaml", tmp_path / "other.yaml")
         assert read_mechanism(tmp_path / "other.yaml").data() == mechanism.with_values(values).data()
+
+
+DEEP = 20_000
+BOMBS = {
+    "dotted key": (".toml", "x." * DEEP + "x = 1"),
+    "dotted table": (".toml", "[" + "x." * DEEP + "x]"),
+    "TOML brackets": (".toml", "x = " + "[" * DEEP + "]" * DEEP),
+    "TOML groups": (".toml", "x = " + "{a = " * DEEP + "1" + "}" * DEEP),
+    "tables in tables": (".toml", "".join(f"[[{'.'.join('x' * k)}]]\n" for k in range(1, 300))),
+    "TOML whole number": (".toml", "x = " + "9" * 5000),
+    "long word": (".toml", 'name = """' + "x" * 900_000 + '"""'),
+    "YAML brackets": (".yaml", "x: " + "[" * DEEP + "]" * DEEP),
+    "YAML lists": (".yaml", "- " * DEEP),
+    "YAML aliases": (".yaml", "a: &a [x, x]\nb: &b [*a, *a]\nc: [*b, *b]"),
+    "YAML whole number": (".yaml", "trunnion: " + "9" * 5000),
+    "a key twice": (".yaml", ".nan: 1\n.nan: 2"),
+    "JSON groups": (".json", '{"x": ' * DEEP + "1" + "}" * DEEP),
+    "half a sign": (".json", r'{"trunnion": 1, "name": "\ud800"}'),
+}
+
+
+@pytest.mark.spread(29)
+@pytest.mark.parametrize("bomb", BOMBS)
+@pytest.mark.parametrize("reader", [read, Rig.read, read_mapping])
+def test_what_never_ends_is_a_finding(bomb: str, reader: object, tmp_path: Path) -> None:
+    suffix, text = BOMBS[bomb]
+    path = tmp_path / f"bomb{suffix}"
+    path.write_text(text)
+    begin = time.process_time()
+    with pytest.raises(MechanismError):
+        reader(path)  # type: ignore[operator]
+    assert time.process_time() - begin < 10
+
+
+def test_the_shipped_schema_is_up_to_date() -> None:
+    assert SCHEMA_FILE.read_text(encoding="utf-8") == schema_text(), "run python -m trunnion.model.schema"
+
+
+def test_the_schema_knows_the_tables() -> None:
+    text = json.dumps(json_schema())
+    for law, declared in FRICTION_LAWS.items():
+        assert f'"{law}"' in text
+        assert all(f'"{parameter}": ' in text for parameter in declared.parameters)
+    assert all(f'"{pair}"' in text for pair in PAIRS)
+
+
+@pytest.mark.spread(15)
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_the_examples_satisfy_the_schema(example) -> None:  # type: ignore[no-untyped-def]
+    jsonschema = pytest.importorskip("jsonschema")
+    validator = jsonschema.Draft202012Validator(json_schema())
+    data = read_mechanism(example).data()
+    validator.validate(data)
+    assert not validator.is_valid({**data, "linkz": {}})
+    assert not validator.is_valid({**data, "links": {"a": {"points": {"A": {"axis": [1, 0]}}}}})
+
+
+def test_the_schema_has_the_limits_and_files_of_tables() -> None:
+    parts = json_schema()["$defs"]
+    assert parts["Link"]["properties"]["mass"]["minimum"] == 0
+    assert parts["Driver"]["properties"]["period"]["exclusiveMinimum"] == 0
+    efficiency = parts["Motor"]["properties"]["efficiency"]
+    assert (efficiency["exclusiveMinimum"], efficiency["maximum"]) == (0, 1)
+    jsonschema = pytest.importorskip("jsonschema")
+    data = read_mechanism(next(path for path in EXAMPLES if path.stem == "slider-crank")).data()
+    data["tables"]["pressure"] = {"file": "gas.csv", "period": "360 deg"}
+    jsonschema.Draft202012Validator(json_schema()).validate(data)

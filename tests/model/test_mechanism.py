@@ -1,4 +1,4 @@
-"""The mechanism: its numbers by name, its joints with their defaults, its variants, its identity."""
+"""The mechanism: its numbers by name, joints with their defaults, measures, variants, identity."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ import json
 import math
 import operator
 import pickle
-import subprocess
-import sys
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from trunnion.algebra.dual import Dual
 from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw, LawParameter, coulomb
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.parts import Driver, Friction, Joint, Link, Load, Pin, Point
+from trunnion.model.parts import Driver, Friction, Joint, Link, Load, Pin
 
 DURANGO, CARDAN, SLIDER = (
     Mechanism.read(next(path for path in EXAMPLES if path.stem == name))
@@ -28,57 +27,43 @@ DURANGO, CARDAN, SLIDER = (
 )
 
 
-def test_numbers_of_the_fourbar() -> None:
-    values = DURANGO.parameters()
-    assert values["links.coupler.points.E.x"] == pytest.approx(2.5 * math.cos(math.radians(30)), rel=1e-15)
-    assert values["links.coupler.points.E.y"] == pytest.approx(1.25, rel=1e-15)
-    expected = {
+NUMBERS = [
+    (DURANGO, "ground", {
         "gravity.y": 0.0, "links.ground.points.D.x": 5.5, "links.ground.mass": 0.0, "links.crank.inertia": 1.7,
         "links.coupler.centre.distance": 2.8, "links.coupler.centre.angle": 0.152, "links.rocker.centre.x": 1.5,
+        "links.coupler.points.E.x": 2.5 * math.cos(math.radians(30)), "links.coupler.points.E.y": 1.25,
         "joints.B.pin.radius": 0.0075, "joints.B.friction.coefficient": 0.4, "joints.B.friction.pair_factor": 1.0,
         "drivers.A.speed": 10.0, "drivers.A.start": 0.0, "loads.work.force.y": -1000.0, "loads.brake.moment": -250.0,
-        "assembly.C.x": 7.6,
-    }  # fmt: skip
-    assert {path: values[path] for path in expected} == expected
-    assert all(isinstance(value, float) for value in values.values())
-
-
-def test_numbers_of_the_slider_crank() -> None:
-    values = SLIDER.parameters()
-    expected = {
+        "assembly.C.x": 7.6}),
+    (SLIDER, "frame", {
         "links.frame.points.S.axis.x": 1.0, "links.frame.points.S.y": 0.0, "joints.O.pin.radius": 0.00999325,
-        "joints.O.pin.hole_radius": 0.01000525, "joints.P.pin.radius": 0.0079875,
-        "joints.Q.pin.clearance": 2e-5,
+        "joints.O.pin.hole_radius": 0.01000525, "joints.P.pin.radius": 0.0079875, "joints.Q.pin.clearance": 2e-5,
         "joints.S.guide.length": 0.04, "joints.S.friction.coefficient": 0.12, "gravity.y": -9.81,
-        "drivers.O.speed": 1500 * 2 * math.pi / 60, "links.piston.inertia": 0.0, "links.piston.centre.x": 0.0,
-    }  # fmt: skip
-    assert {path: values[path] for path in expected} == pytest.approx(expected, rel=1e-15)
-    assert SLIDER.fixed_link == "frame"
-    assert SLIDER.tolerances() == {
-        "dimensions.crank": (-2e-5, 2e-5),
-        "dimensions.rod": (-5e-5, 5e-5),
-        "dimensions.offset": (-1e-4, 1e-4),
-        "joints.O.pin.radius": (-3.25e-6, 3.25e-6),
-        "joints.O.pin.hole_radius": (-5.25e-6, 5.25e-6),
-        "joints.P.pin.radius": (-4.5e-6, 4.5e-6),
-        "joints.P.pin.hole_radius": (-4.5e-6, 4.5e-6),
-        "joints.Q.pin.clearance": (-8e-6, 8e-6),
-    }
-    fit = SLIDER.effective_joints["O"].pin.fit  # type: ignore[union-attr]
-    assert (fit.hole, fit.shaft, fit.size.evaluate()) == ("H7", "g6", 0.02)  # type: ignore[union-attr]
-
-
-def test_numbers_of_the_cardan_joint() -> None:
-    values = CARDAN.parameters()
-    expected = {
+        "drivers.O.speed": 1500 * 2 * math.pi / 60, "links.piston.inertia": 0.0, "links.piston.centre.x": 0.0}),
+    (CARDAN, "ground", {
         "loop.input.twist": math.radians(89.9), "loop.output.twist": math.radians(164.9),
         "loop.pin-2.distance": 2e-5, "links.input-shaft.inertia.yz": 0.001026, "links.input-shaft.centre.y": 0.1277,
         "joints.pin-1.pin.radius": 0.01002, "joints.pin-1.pin.bearing": 0.06, "joints.pin-1.pin.length": 0.01,
         "joints.pin-1.pin.clearance": 1e-5, "joints.output.friction.coefficient": 0.42,
-        "loads.brake.resisting_torque": 10.0, "gravity.z": 0.0,
-    }  # fmt: skip
+        "loads.brake.resisting_torque": 10.0, "gravity.z": 0.0}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("mechanism", "fixed", "expected"), NUMBERS)
+def test_numbers_of_examples(mechanism: Mechanism, fixed: str, expected: dict[str, float]) -> None:
+    values = mechanism.parameters()
     assert {path: values[path] for path in expected} == pytest.approx(expected, rel=1e-15)
-    assert CARDAN.fixed_link == "ground"
+    assert mechanism.fixed_link == fixed
+    assert all(isinstance(value, float) for value in values.values())
+
+
+def test_tolerances_and_joints_of_examples() -> None:
+    halves = {
+        "dimensions.crank": 2e-5, "dimensions.rod": 5e-5, "dimensions.offset": 1e-4, "joints.O.pin.radius": 3.25e-6,
+        "joints.O.pin.hole_radius": 5.25e-6, "joints.P.pin.radius": 4.5e-6, "joints.P.pin.hole_radius": 4.5e-6,
+        "joints.Q.pin.clearance": 8e-6,
+    }  # fmt: skip
+    assert SLIDER.tolerances() == {path: (-half, half) for path, half in halves.items()}
     assert CARDAN.effective_joints["pin-1"].links == ("input-shaft", "cross")
     assert CARDAN.effective_joints["input"].links == ("ground", "input-shaft")
 
@@ -122,34 +107,19 @@ def test_defaults_are_followed_until_a_joint_has_its_own_value() -> None:
     [
         ("crnk.mass", "there is no number named 'crnk.mass'", "'crank.mass'"),
         ("mass", "stands for 4 numbers", "links.crank.mass"),
-        ("AD ", "there is no number named 'AD '", "'AD'"),
         ("", "there is no number named ''", "known"),
+        ("A.initial.place", "there is no number named 'A.initial.place'", ""),
+        ("A.initial.coordinate", "the model states no drivers.A.initial.coordinate", "write it into the model file"),
+        ("crank.inertia.xx", "the model states no links.crank.inertia.xx", "write it into the model file"),
     ],
 )
-def test_unknown_names(name: str, what: str, remedy: str) -> None:
-    for call in (DURANGO.parameters, DURANGO.with_values):
-        with pytest.raises(MechanismError) as error:
-            call({name: 1.0})
-        assert what in error.value.findings[0].what
-        assert remedy in error.value.findings[0].remedy
-
-
-@pytest.mark.parametrize(
-    ("name", "what"),
-    [
-        ("A.initial.coordinate", "the model states no drivers.A.initial.coordinate"),
-        ("drivers.A.initial.coordinate", "the model states no drivers.A.initial.coordinate"),
-        ("crank.inertia.xx", "the model states no links.crank.inertia.xx"),
-        ("A.initial.place", "there is no number named 'A.initial.place'"),
-        ("crank.inital", "there is no number named 'crank.inital'"),
-    ],
-)
-def test_what_a_file_may_state_and_does_not_is_no_unknown_name(name: str, what: str) -> None:
+def test_unknown_names_and_numbers_that_are_not_stated(name: str, what: str, remedy: str) -> None:
+    with pytest.raises(MechanismError):
+        DURANGO.parameters({name: 1.0})
     with pytest.raises(MechanismError) as error:
         DURANGO.with_values({name: 1.0})
-    (finding,) = error.value.findings
-    assert finding.what == what
-    assert ("write it into the model file" in finding.remedy) == ("states no" in what)
+    assert what in error.value.findings[0].what
+    assert remedy in error.value.findings[0].remedy
 
 
 def test_every_parameter_can_be_set_and_is_set() -> None:
@@ -214,32 +184,22 @@ def test_a_fit_replaces_the_default_radius_and_the_other_way_round() -> None:
 
 
 def test_building_from_classes_is_building_from_data() -> None:
-    def revolute(*links: str) -> Joint:
-        return Joint(type="revolute", links=links)
-
-    parts = {
-        "links": {
-            "ground": Link(points={"A": Point(at=[0, 0]), "D": [5.5, 0]}),
-            "crank": Link(points={"A": [0, 0], "B": ["2 m", 0]}, mass="4.8 kg"),
-            "coupler": Link(points={"B": [0, 0], "C": [6, 0]}),
-            "rocker": Link(points={"D": [0, 0], "C": [3, 0]}),
-        },
-        "joints": {
-            "A": Joint(
-                type="revolute", links=("ground", "crank"), pin=Pin(radius=0.01), friction=Friction(coefficient=0.1)
-            ),
-            "B": revolute("crank", "coupler"),
-            "C": revolute("coupler", "rocker"),
-            "D": revolute("ground", "rocker"),
-        },
-        "drivers": {"A": Driver(speed=10)},
-        "loads": {"work": Load(link="coupler", at="C", force=[0, "-1 kN"])},
+    data = DURANGO.data()
+    classes = {
+        "links": {name: Link(**link) for name, link in data["links"].items()},
+        "joints": {name: Joint(**joint) for name, joint in data["joints"].items()},
+        "drivers": {"A": Driver(**data["drivers"]["A"])},
+        "loads": {name: Load(**load) for name, load in data["loads"].items()},
     }
-    mechanism = Mechanism(**parts)
-    assert Mechanism(**mechanism.data()) == mechanism
-    assert mechanism.data()["joints"]["A"]["friction"] == 0.1
-    assert mechanism.data()["links"]["ground"]["points"] == {"A": [0, 0], "D": [5.5, 0]}
-    assert Mechanism(**{**mechanism.data(), "links": parts["links"]}) == mechanism
+    mechanism = Mechanism(**{**data, **classes})
+    assert mechanism == DURANGO
+    assert mechanism.data() == data
+    friction = Joint(
+        type="revolute", links=("ground", "crank"), pin=Pin(radius=0.01), friction=Friction(coefficient=0.1)
+    )
+    other = Mechanism(**{**data, "joints": {**data["joints"], "A": friction}})
+    assert other.data()["joints"]["A"]["friction"] == 0.1
+    assert Mechanism(**other.data()) == other
 
 
 def test_equal_mechanisms_have_equal_digests() -> None:
@@ -292,8 +252,94 @@ def test_a_copy_with_an_update_is_checked_and_worked_out_anew() -> None:
         mechanism.model_copy(update={"dimensions": {**mechanism.dimensions, "AB": "2 parsec per"}})
 
 
-@pytest.mark.slow
-def test_importing_the_mechanism_leaves_the_units_alone() -> None:
-    code = "import sys, trunnion.model.mechanism; print('pint' in sys.modules, 'ruamel' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["False", "False"]
+def with_measure(mechanism: Mechanism, **keys: object) -> Mechanism:
+    return Mechanism(**{**mechanism.data(), "measures": {"one": keys}})
+
+
+def test_limits_are_two_numbers(varied: Mechanism) -> None:
+    values = varied.parameters()
+    found = {path: float(value) for path, value in values.items() if path.startswith("measures.")}  # type: ignore[arg-type]
+    assert found == pytest.approx(
+        {
+            "measures.error.limit.lower": -0.1 * DEG,
+            "measures.error.limit.upper": 0.1 * DEG,
+            "measures.theta.at": 60 * DEG,
+            "measures.theta.limit.lower": -0.1 * DEG,
+            "measures.theta.limit.upper": 0.2 * DEG,
+            "measures.later.at": 0.1,
+            "measures.later.limit.lower": -2e-3,
+            "measures.later.limit.upper": 2e-3,
+            "measures.peak.at_most": 12.0,
+            "measures.swing.over.from": 0.0,
+            "measures.swing.over.to": np.pi,
+            "measures.swing.limit.lower": -0.05 / 30,
+            "measures.swing.limit.upper": 0.05 / 30,
+        },
+        rel=1e-14,
+    )
+
+
+def test_a_position_is_a_time_if_it_is_stated_as_one(varied: Mechanism) -> None:
+    kinds = varied.parameter_kinds()
+    assert kinds["measures.theta.at"].name == "angle"
+    assert kinds["measures.later.at"].name == "time"
+    data = {**varied.data(), "dimensions": {**varied.data()["dimensions"], "when": "0.2 s"}}
+    data["measures"] = {"one": {"angle": "rocker", "at": "when / 2"}, "two": {"angle": "rocker", "at": 1.5}}
+    kinds = Mechanism(**data).parameter_kinds()
+    assert [kinds[f"measures.{name}.at"].name for name in ("one", "two")] == ["time", "angle"]
+
+
+DEG = np.pi / 180
+SLIDER = Mechanism.read(Path(__file__).parents[2] / "examples" / "toleranced-slider-crank.yaml")
+UNITS = {"length": "1 um", "angle": "1 deg", "angular speed": "1 rpm", "moment": "1 N m", "force": "1 N", "number": 0.1}
+GIVES = [
+    ("length", {"point": "coupler.C", "axis": "x"}), ("length", {"path_error": "coupler.C"}),
+    ("length", {"straightness": "coupler.C"}), ("length", {"stroke": "S"}), ("length", {"transmission_error": "S"}),
+    ("length", {"slide": "S"}), ("angle", {"angle": "rocker"}), ("angle", {"rotation": "D"}),
+    ("angle", {"transmission_error": "D"}), ("angle", {"stroke": "D"}), ("angle", {"dead_centre": "D"}),
+    ("angle", {"dead_centre": "D", "as": "place-of-minimum"}), ("angle", {"effort": "A", "as": "place-of-maximum"}),
+    ("angular speed", {"rate": "D"}), ("moment", {"effort": "A"}), ("force", {"reaction": "C"}),
+    ("force", {"reaction": "C", "axis": "y"}), ("number", {"efficiency": "cycle"}),
+    ("number", {"efficiency": "instant"}), ("number", {"locking_margin": "mechanism"}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "keys"), GIVES)
+def test_what_a_measure_gives(varied: Mechanism, kind: str, keys: dict[str, str]) -> None:
+    """A limit of another kind is a finding."""
+    model = SLIDER if "S" in keys.values() else varied
+    good = with_measure(model, **keys, limit=UNITS[kind], at_most=UNITS[kind])
+    assert {unit.name for path, unit in good.parameter_kinds().items() if path.startswith("measures.")} == {kind}
+    with pytest.raises(MechanismError) as error:
+        with_measure(model, **keys, limit="1 kg")
+    (finding,) = error.value.findings  # both limits, once
+    assert finding.where == "measures.one.limit"
+    assert f"'1 kg' is a mass where {'an' if kind[0] == 'a' else 'a'} {kind} is needed" in finding.what
+
+
+def test_a_structure_has_no_position_to_choose() -> None:
+    mechanism = Mechanism.read(Path(__file__).parents[2] / "examples" / "one-way-clutch.yaml")
+    with pytest.raises(MechanismError, match="there is no driver whose coordinate it could be"):
+        with_measure(mechanism, angle="strut", at="10 deg")
+
+
+def test_in_space_an_angle_has_an_axis() -> None:
+    mechanism = Mechanism.read(Path(__file__).parents[2] / "examples" / "rssr.yaml")
+    assert with_measure(mechanism, reaction="B", axis="z").measures["one"].axis == "z"
+    with pytest.raises(MechanismError, match="a spherical joint has no rotation or slide about one axis"):
+        with_measure(mechanism, transmission_error="B")
+    with pytest.raises(MechanismError, match="add axis: x, y or z"):
+        with_measure(mechanism, angle="rocker")
+
+
+def test_place_and_window_of_a_measure_can_be_set(varied: Mechanism) -> None:
+    """Also where the file states none; what is no window says so."""
+    bare = with_measure(varied, effort="A")
+    for text in ("10 deg, 50 deg", "[10 deg, 50 deg]"):
+        values = bare.with_values({"measures.one.over": text}).parameters()
+        assert [values[f"measures.one.over.{end}"] for end in ("from", "to")] == pytest.approx([10 * DEG, 50 * DEG])
+    assert bare.with_values({"measures.one.at": "10 deg"}).parameters()["measures.one.at"] == pytest.approx(10 * DEG)
+    for wrong in ("10 deg", 3.0):
+        with pytest.raises(MechanismError) as caught:
+            bare.with_values({"measures.one.over": wrong})
+        assert caught.value.findings[0].where == "measures.one.over"

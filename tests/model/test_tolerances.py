@@ -1,42 +1,30 @@
-"""What varies and how: limits, distributions, correlations; and a model with other tolerances."""
+"""What varies and how, and what it costs: limits, distributions, correlations, formulas, processes, options."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from model_samples import VARIED
 from pydantic_core import PydanticCustomError
-from varied import VARIED
 
 import trunnion
 from trunnion.algebra.dual import Dual, derivative
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import MechanismError, Severity
 from trunnion.model.checks.check import check_model
 from trunnion.model.limits import Limits, number_with
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.rewrite import rewrite_mechanism
-from trunnion.model.tolerance_parts import DISTRIBUTIONS, OPTIONS, Variation
-from trunnion.model.tolerances import Tolerance
+from trunnion.model.tolerance_parts import COST_MODELS, DISTRIBUTIONS, OPTIONS, Variation
+from trunnion.model.tolerances import FORMULA, Price, Tolerance
 from trunnion.model.units import KINDS
 from trunnion.statistics import distributions
 
-FindingsOf = Callable[..., tuple[Finding, ...]]
-Mistake = Callable[..., None]
 DEG = np.pi / 180
-
-
-@pytest.fixture
-def varied(tmp_path: Path) -> Mechanism:
-    path = tmp_path / "varied.yaml"
-    path.write_text(VARIED, encoding="utf-8")
-    return Mechanism.read(path)
 
 
 def of(mechanism: Mechanism) -> dict[str, Tolerance]:
@@ -49,23 +37,13 @@ def of(mechanism: Mechanism) -> dict[str, Tolerance]:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("±0.05 mm", (-5e-5, 5e-5)),
-        ("± 50 um", (-5e-5, 5e-5)),
-        ("+/-0.05 mm", (-5e-5, 5e-5)),
-        ("+-0.05 mm", (-5e-5, 5e-5)),
-        ("0.05 mm", (-5e-5, 5e-5)),
-        (5e-5, (-5e-5, 5e-5)),
-        ("+0.02/-0.01 mm", (-1e-5, 2e-5)),
-        ("+0.02 mm / -10 um", (-1e-5, 2e-5)),
-        ("-0.01/+0.02 mm", (-1e-5, 2e-5)),
-        ("+0.02/0 mm", (0.0, 2e-5)),
-        ("0/-0.05 mm", (-5e-5, 0.0)),
-        ("-7/−20 um", (-2e-5, -7e-6)),
-        ("+0.02/-0.01", (-0.01, 0.02)),
-        ("±0.1 deg", (-0.1 * DEG, 0.1 * DEG)),
-        ("±2 * 0.05 mm", (-1e-4, 1e-4)),
+        ("±0.05 mm", (-5e-5, 5e-5)), ("± 50 um", (-5e-5, 5e-5)), ("+/-0.05 mm", (-5e-5, 5e-5)),
+        ("+-0.05 mm", (-5e-5, 5e-5)), ("0.05 mm", (-5e-5, 5e-5)), (5e-5, (-5e-5, 5e-5)),
+        ("+0.02/-0.01 mm", (-1e-5, 2e-5)), ("+0.02 mm / -10 um", (-1e-5, 2e-5)), ("-0.01/+0.02 mm", (-1e-5, 2e-5)),
+        ("+0.02/0 mm", (0.0, 2e-5)), ("0/-0.05 mm", (-5e-5, 0.0)), ("-7/−20 um", (-2e-5, -7e-6)),
+        ("+0.02/-0.01", (-0.01, 0.02)), ("±0.1 deg", (-0.1 * DEG, 0.1 * DEG)), ("±2 * 0.05 mm", (-1e-4, 1e-4)),
     ],
-)
+)  # fmt: skip
 def test_limits_as_written(text: float | str, expected: tuple[float, float]) -> None:
     found = Limits.read(text)
     assert (found.lower.evaluate(), found.upper.evaluate()) == pytest.approx(expected, rel=1e-15)
@@ -76,29 +54,17 @@ def test_limits_as_written(text: float | str, expected: tuple[float, float]) -> 
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("+0.02 mm", "sign on one side only"),
-        ("-0.02 mm", "sign on one side only"),
-        ("±+0.02 mm", "sign on one side only"),
-        (-0.1, "to either side has no sign"),
-        ("0.1 mm ± 0.05 mm", "tolerance of their own"),
-        ("±0.05 furlongz", "'furlongz' is not known"),
-        ("+0.02 mm/-0.01 oddunit", "'oddunit' is not known"),
-        (True, "a yes/no value"),
-        ([1, 2], "is a list"),
+        ("+0.02 mm", "sign on one side only"), ("-0.02 mm", "sign on one side only"),
+        ("±+0.02 mm", "sign on one side only"), (-0.1, "to either side has no sign"),
+        ("0.1 mm ± 0.05 mm", "tolerance of their own"), ("±0.05 furlongz", "'furlongz' is not known"),
+        ("+0.02 mm/-0.01 oddunit", "'oddunit' is not known"), (True, "a yes/no value"), ([1, 2], "is a list"),
         ("±", "cannot be read"),
     ],
-)
+)  # fmt: skip
 def test_what_are_no_limits(text: object, what: str) -> None:
     with pytest.raises(PydanticCustomError) as error:
         Limits.read(text)
     assert what in str(error.value)
-
-
-@given(st.floats(1e-9, 1e3), st.floats(0, 1e3))
-def test_limits_with_two_signs(upper: float, lower: float) -> None:
-    found = Limits.read(f"+{upper!r}/-{lower!r}") if "e" not in f"{upper!r}{lower!r}" else Limits.read(upper)
-    assert float(found.upper.evaluate()) == upper
-    assert float(found.lower.evaluate()) == -(lower if isinstance(found.source, str) else upper)
 
 
 # ---- what varies ----------------------------------------------------------------------------------------------
@@ -178,16 +144,6 @@ def test_the_table_of_distributions_is_that_of_the_statistics() -> None:
     assert {key for keys in DISTRIBUTIONS.values() for key in keys} == set(OPTIONS) <= Variation.model_fields.keys()
 
 
-def test_every_tolerance_is_a_distribution(varied: Mechanism) -> None:
-    """What the model tells is what the statistics take: finite quantiles and moments."""
-    for one in varied.tolerated():
-        kind = distributions.DISTRIBUTIONS[one.distribution]
-        drawn = kind.quantile(np.array([0.1, 0.5, 0.9]), one.lower, one.upper, one.options)
-        assert np.all(np.isfinite(drawn))
-        assert np.all(np.diff(drawn) >= 0)
-        assert kind.variance(one.lower, one.upper, one.options) > 0
-
-
 # ---- correlation ----------------------------------------------------------------------------------------------
 
 
@@ -235,18 +191,6 @@ def test_a_deviation_of_a_default_is_of_every_joint(varied: Mechanism) -> None:
 # ---- another model --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-@given(st.floats(0, 1e-3), st.floats(1e-9, 0.5))
-def test_other_tolerances(length: float, friction: float) -> None:
-    one = Mechanism.read(Path(__file__).parents[2] / "examples" / "toleranced-slider-crank.yaml").with_values(
-        {"tolerances.P.friction.coefficient": "+0.02/-0.01"}
-    )
-    found = of(one.with_tolerances({"crank": length, "P.friction.coefficient": friction}))
-    assert found["dimensions.crank"].half_width == pytest.approx(length, rel=1e-11, abs=1e-15)
-    two = found["joints.P.friction.coefficient"]
-    assert (two.lower, two.upper) == pytest.approx((0.005 - friction, 0.005 + friction), rel=1e-10, abs=1e-11)
-
-
 def test_other_tolerances_are_written(varied: Mechanism, tmp_path: Path) -> None:
     changed = varied.with_tolerances(
         {
@@ -270,22 +214,6 @@ def test_other_tolerances_are_written(varied: Mechanism, tmp_path: Path) -> None
     assert found["joints.D.friction.coefficient"] == of(varied)["joints.D.friction.coefficient"]
     assert again.parameters()["joints.A.pin.clearance"] == 3e-5
     assert list(again.variations)[: len(varied.variations)] == list(varied.variations)
-
-
-@pytest.mark.parametrize(
-    ("name", "half", "what"),
-    [
-        ("t", 1e-5, "'t' has no tolerance"),
-        ("A.pin.clearance", 1e-5, "varies as measured"),
-        ("B.seat.xi", 1e-5, "varies as measured or over a full turn"),
-        ("AB", -1e-5, "half width of -1e-05"),
-        ("AB", float("nan"), "half width of nan"),
-        ("nothing", 1e-5, "no number named 'nothing'"),
-    ],
-)
-def test_tolerances_that_cannot_be_replaced(varied: Mechanism, name: str, half: float, what: str) -> None:
-    with pytest.raises(MechanismError, match=what):
-        varied.with_tolerances({name: half})
 
 
 def test_tolerances_by_name_and_text(varied: Mechanism) -> None:
@@ -317,14 +245,7 @@ def test_without_friction_nothing_varies_that_is_not_there(varied: Mechanism) ->
     assert [one.of for one in ideal.correlations] == [("AB", "BC")]
     assert "joints.B.seat.xi" not in of(varied.with_seats("loaded"))
     assert [one.of for one in varied.with_friction("coulomb").correlations] == [one.of for one in varied.correlations]
-
-
-def test_without_friction_no_error_of_it_is_left() -> None:
-    path = Path(__file__).parents[2] / "examples" / "slider-crank.yaml"
-    joint = next(name for name, one in Mechanism.read(path).effective_joints.items() if one.friction)
-    mechanism = Mechanism.read(path).with_values({f"errors.{joint}.friction.coefficient": 0.01})
-    assert mechanism.errors
-    assert not mechanism.with_friction("off").errors
+    assert not varied.with_values({"errors.A.friction.coefficient": 0.01}).with_friction("off").errors
 
 
 # ---- measured samples -----------------------------------------------------------------------------------------
@@ -355,6 +276,29 @@ def test_a_sample_from_a_file(varied: Mechanism, tmp_path: Path, text: str, expe
 
 
 @pytest.mark.parametrize(
+    ("name", "half", "what"),
+    [
+        ("t", 1e-5, "'t' has no tolerance"),
+        ("A.pin.clearance", 1e-5, "varies as measured"),
+        ("B.seat.xi", 1e-5, "varies as measured or over a full turn"),
+        ("nothing", 1e-5, "no number named 'nothing'"),
+        ("AB", -1e-5, "half width of -1e-05"),
+        ("AB", float("nan"), "half width of nan"),
+        ("AB", "0.02", "has no unit"),
+        ("AB", "0.02 deg", "is an angle where a length is needed"),
+        ("joints.A.clearance", "+0.02/-0.01 mm", "half width of"),
+        ("joints.A.clearance", "-0.02 mm", "half width of '-0.02 mm'"),
+        ("joints.A.clearance", "AB / 1000", "is no number with a unit"),
+        ("AB", None, "is empty"),
+        ("AB", [1e-5], "is a list"),
+    ],
+)
+def test_tolerances_that_cannot_be_replaced(varied: Mechanism, name: str, half: Any, what: str) -> None:
+    with pytest.raises(MechanismError, match=re.escape(what)):
+        varied.with_tolerances({name: half})
+
+
+@pytest.mark.parametrize(
     ("text", "line", "what"),
     [
         ("d [kg]\n1\n2\n", 1, "its unit is that of a mass"),
@@ -363,115 +307,20 @@ def test_a_sample_from_a_file(varied: Mechanism, tmp_path: Path, text: str, expe
         ("1; 2\n3; 4\n", 1, "has 2 columns, a sample has 1"),
         ("# nothing\n", 1, "only comments"),
         ("", 1, "is empty"),
+        ("0.01\n-0.02\n1e308\n", None, "finite"),
     ],
 )
-def test_a_sample_that_cannot_be_read(varied: Mechanism, tmp_path: Path, text: str, line: int, what: str) -> None:
+def test_a_sample_that_cannot_be_read(
+    varied: Mechanism, tmp_path: Path, text: str, line: int | None, what: str
+) -> None:
     path = tmp_path / "sample.csv"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(MechanismError) as error:
         varied.with_samples("CD", path)
     finding = error.value.findings[0]
     assert what in finding.what
-    assert (finding.file, finding.line) == (str(path), line)
     assert finding.remedy
-
-
-def test_a_sample_without_a_finite_variance(varied: Mechanism, tmp_path: Path) -> None:
-    (tmp_path / "wild.csv").write_text("0.01\n-0.02\n1e308\n", encoding="utf-8")
-    with pytest.raises(MechanismError) as error:
-        varied.with_samples("CD", tmp_path / "wild.csv")
-    assert [one.where for one in error.value.findings] == ["tolerances.CD"]
-
-
-def test_a_sample_of_nothing(varied: Mechanism, tmp_path: Path) -> None:
-    with pytest.raises(MechanismError, match="no number named 'XY'"):
-        varied.with_samples("XY", tmp_path / "sample.csv")
-    with pytest.raises(MechanismError, match="cannot be read"):
-        varied.with_samples("CD", tmp_path / "none.csv")
-
-
-# ---- findings -------------------------------------------------------------------------------------------------
-
-T = VARIED.splitlines().index("tolerances:") + 2  # line of the first tolerance
-R = VARIED.splitlines().index("correlations:") + 1
-CASES = [
-    ("  AB: ±t", "  XY: ±t", T, "tolerances.XY", "no number named 'XY'", "'AD'"),
-    ("  AB: ±t", "  AB: ±tt", T, "tolerances.AB", "'tt', which is not one of the dim", "'t'"),
-    ("  AB: ±t", "  AB: ±0.1 deg", T, "tolerances.AB", "an angle where a length is needed", "60 mm"),
-    ("  AB: ±t", "  AB: ±0.1", T, "tolerances.AB", "'±0.1' has no unit where a length", "60 mm"),
-    ("  AB: ±t", "  AB: -0.1 mm", T, "tolerances.AB", "a sign on one side only", "+0.02/0 mm"),
-    ("  AB: ±t", "  AB: ±(t - 1 mm)", T, "tolerances.AB", "is above the upper one", "±"),
-    ("  AB: ±t", "  AB: {limits: ±t, distribution: gaussian}", T, "tolerances.AB", "'gaussian' is not a distr", "norm"),
-    ("  AB: ±t", "  AB: {limits: ±t, distribution: rectangular}", T, "tolerances.AB", "not a distr", "'uniform'"),
-    ("  AB: ±t", "  AB: {limits: ±t, mode: 1 um}", T, "tolerances.AB.mode", "no effect on the distribution", "tri"),
-    ("  AB: ±t", "  AB: {limits: ±t, cp: 0}", T, "tolerances.AB.cp", "cp is 0", "above 0"),
-    ("  AB: ±t", "  AB: {limits: ±t, cp: 1 mm}", T, "tolerances.AB.cp", "a length where a number", "0.1"),
-    ("  AB: ±t", "  AB: {limits: ±t, cp: 1, cpk: 1.1}", T, "tolerances.AB.cpk", "cpk 1.1 is above cp 1", "at most"),
-    ("  AB: ±t", "  AB: {limits: ±t, cpk: 1.3}", T, "tolerances.AB.cpk", "cpk 1.3 is above cp 1.2", "at most"),
-    ("  AB: ±t", "  AB: {distribution: uniform}", T, "tolerances.AB", "limits of 'dimensions.AB' are missing", "±0.05"),
-    ("  AB: ±t", "  AB: {limits: ±t, direction: uniform}", T, "tolerances.AB.direction", "no direction", "direction"),
-    ("  AB: ±t", "  AB: {distribution: sample}", T, "tolerances.AB", "deviations are missing", "--sample"),
-    ("  AB: ±t", "  AB: {distribution: sample, values: [1 um]}", T, "tolerances.AB.values", "1 entries", "all"),
-    ("  AB: ±t", "  AB: {distribution: sample, values: [1 um, 1 kg]}", T, "tolerances.AB.values.1", "a mass", "mm"),
-    ("  AB: ±t", "  AB: {limits: ±t, alfa: 1}", T, "tolerances.AB.alfa", "'alfa' is unknown", "'alpha'"),
-    ("  AB: ±t", "  AB: ±t\n  dimensions.AB: ±t", T + 1, "tolerances.dimensions.AB", "are the same number", "one"),
-    ("  AB: ±t", "  AB: [1, 2]", T, "tolerances.AB", "not a group", ""),
-    ("  AB: ±t", "  AB: ±t\n  C.x: ±t", T + 1, "tolerances.C.x", "stands for", "which"),
-    ("  AB: ±t", "  AB: ±t\n  assembly.C.x: ±t", T + 1, "tolerances.assembly.C.x", "is not a parameter", "dimens"),
-    ("  AB: ±t", "  AB: ±t\n  theta.at: 1 deg", T + 1, "tolerances.theta.at", "is not a parameter", "dimens"),
-    ("  AB: ±t", "  AB: ±t\n  joint_defaults.pin.clearance: 1 um", T + 1, "clearance", "no number named",
-     "joint_defaults"),
-    ("  B.seat.xi:", "  A.pin.radius:", T + 7, "tolerances.A.pin.radius", "is no angle", "all directions"),
-    ("{distribution: direction}", "{limits: ±1 deg, distribution: direction}", T + 7, "tolerances.B.seat.xi",
-     "over the whole turn has no limits", "uniform"),
-    ("+0.02/0 mm", "±0.02 mm", T + 6, "tolerances.B.misalignment.offset", "a size is not negative", "+0.02/0"),
-    ("mode: 0.005", "mode: 0.05", T + 4, "tolerances.joint_defaults.friction.coefficient.mode", "outside", "density"),
-    ("  A.friction.coefficient: ±0.03", "  A.friction.coefficient: ±10 %", T + 5, "tolerances.A.friction.coefficient",
-     "the limits '±10 %' are in percent", "0.01, if"),
-    ("  AB: ±t", "  AB: ±5 %", T, "tolerances.AB", "a number where a length is needed", "percentage"),
-    ("friction: 0.2}", "friction: 0.2 ± 10 %}", 14, "joint_defaults.friction", "in percent, the value is not", "0.02"),
-    ("BC: 90 mm ± 0.02 mm", "BC: 90 mm +2/-1 %", 3, "dimensions.BC", "in percent", "1.8 mm, -1 % is -0.9 mm"),
-    ("alpha: 2", "alpha: -2", T + 9, "tolerances.drivers.A.speed.alpha", "alpha is -2", "above 0"),
-    ("distribution: truncated, cp: 1.2", "distribution: sample", R - 1, "tolerance_defaults.distribution", "of one",
-     ""),
-    ("distribution: truncated, cp: 1.2", "alpha: 1.2", R - 1, "tolerance_defaults.alpha", "no effect on the", "remove"),
-    ("distribution: truncated, cp: 1.2", "cp: 1, cpk: 2", R - 1, "cpk", "is above cp", "at most"),
-    ("of: [AB, BC], coefficient: 0.5", "of: [AB, XY], coefficient: 0.5", R + 1, "correlations.0.of.1", "'XY'", ""),
-    ("of: [AB, BC], coefficient: 0.5", "of: [AB, t], coefficient: 0.5", R + 1, "correlations.0", "no tolerance",
-     "state"),
-    ("of: [AB, BC], coefficient: 0.5", "of: [AB], coefficient: 0.5", R + 1, "correlations.0", "two parameters", "two"),
-    ("of: [AB, BC], coefficient: 0.5", "of: [AB, AB], coefficient: 0.5", R + 1, "correlations.0", "twice", "two"),
-    ("of: [AB, BC], coefficient: 0.5", "of: [AB, BC], coefficient: 1.5", R + 1, "correlations.0.coefficient", "1.5",
-     "1"),
-    ("of: [AB, BC], coefficient: 0.5", "of: [AB, BC]", R + 1, "correlations.0", "'coefficient' is missing", "add"),
-    ("of: [AB, BC], coefficient: 0.5", "of: [], coefficient: 0.5", R + 1, "correlations.0.of", "has 0 entries", ""),
-    ("coefficient: 0.9", "coefficient: -0.6", R, "correlations", "the least eigenvalue of their matrix is -0.2",
-     "reduce"),
-    ("coefficient: 0.5}", "coefficient: 0.5}\n  - {of: [BC, AB], coefficient: 0.4}", R + 2, "correlations.1", "entry 1",
-     "one"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_one_mistake_is_found_where_it_is(mistake: Mistake, case: tuple[Any, ...]) -> None:
-    mistake(VARIED, case)
-
-
-def test_doubts_are_kept_apart(tmp_path: Path) -> None:
-    path = tmp_path / "model.yaml"
-    text = VARIED.replace("t: 0.05 mm}", "t: 0.05 mm, idle: 1 mm}")
-    path.write_text(text.replace("  AB: ±t", "  AB: {limits: ±t, shift: 0.1 mm}\n  idle: ±t"), encoding="utf-8")
-    found = {one.where: one for one in check_model(Mechanism.read(path))}
-    assert found["tolerances.idle"].severity is Severity.WARNING
-    assert found["tolerances.AB.shift"].severity is Severity.WARNING
-    assert found["tolerances.BC"].severity is Severity.NOTE
-    assert "override those stated with 'dimensions.BC'" in found["tolerances.BC"].what
-
-
-def test_a_load_of_the_motion_has_no_tolerance(findings_of: FindingsOf) -> None:
-    text = VARIED.replace("measures:", "loads: {w: {joint: D, resisting_torque: 1 N m * cos(drive)}}\nmeasures:")
-    (found,) = findings_of(text.replace("  AB: ±t", "  AB: ±t\n  w.resisting_torque: ±1 N m"))
-    assert "varies with the motion" in found.what
+    assert line is None or (finding.file, finding.line) == (str(path), line)
 
 
 # ---- limits that stand with the number ------------------------------------------------------------------------
@@ -519,24 +368,6 @@ def test_limits_are_changed_where_they_stand(varied: Mechanism) -> None:
     assert set(changed["tolerances"]) == {*data["tolerances"], "joints.B.friction.coefficient"}
 
 
-@pytest.mark.parametrize(
-    ("half", "what"),
-    [
-        ("0.02", "has no unit"),
-        ("0.02 deg", "is an angle where a length is needed"),
-        ("+0.02/-0.01 mm", "half width of"),
-        ("-0.02 mm", "half width of '-0.02 mm'"),
-        ("AB / 1000", "is no number with a unit"),
-        (None, "is empty"),
-        ([1e-5], "is a list"),
-    ],
-)
-def test_texts_that_are_no_half_width(varied: Mechanism, half: object, what: str) -> None:
-    for name in ("AB", "joints.A.clearance"):
-        with pytest.raises(MechanismError, match=re.escape(what)):
-            varied.with_tolerances({name: half})
-
-
 def test_a_model_with_less_in_it_is_rewritten(varied: Mechanism, tmp_path: Path) -> None:
     """Entries that went, of a file in one line or another: the file that is written holds the mechanism."""
     (tmp_path / "source.yaml").write_text("# a four-bar\n" + VARIED, encoding="utf-8")
@@ -561,3 +392,72 @@ def test_what_is_said_of_a_joint_stands_against_what_is_said_of_all(varied: Mech
         found = of(Mechanism(**data))
         assert found["joints.B.friction.coefficient"].half_width == pytest.approx(0.005)
         assert found["joints.D.friction.coefficient"].half_width == pytest.approx(0.02)
+
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def test_prices(varied: Mechanism) -> None:
+    """In the order of the file, in SI; without that of a number that varies as measured."""
+    found = {one.path: one for one in varied.prices()}
+    assert list(found) == [f"dimensions.{name}" for name in ("AB", "BC", "CD", "AD")] + ["joints.A.clearance"]
+    assert found["dimensions.AB"] == Price(
+        "dimensions.AB",
+        model="power",
+        parameters={"A": 0.0, "B": 1.0, "k": 0.45, "unit": 1e-3},
+        least=5e-6,
+        most=1e-4,
+        group="bores",
+    )
+    assert found["dimensions.BC"].parameters == {"A": 1.0, "B": 20.0, "k": 30.0, "unit": 1e-3}
+    assert (found["dimensions.BC"].least, found["dimensions.BC"].most) == (0.0, np.inf)
+    play = found["joints.A.clearance"]
+    assert (play.play, play.model, play.parameters["unit"]) == (True, "power", 1.0)
+
+
+def test_choices_are_from_the_cheapest_on(varied: Mechanism) -> None:
+    found = {one.path: one.choices for one in varied.prices()}
+    grades = [(one.name, one.tolerance, one.cost) for one in found["dimensions.CD"]]
+    assert grades == [("IT8", 23e-6, 6.0), ("IT7", 15e-6, 9.0)]  # of 70 mm: IT7 30 µm, IT8 46 µm
+    ways = [(one.name, one.tolerance, one.cost) for one in found["dimensions.AD"]]
+    assert ways == [("milled", 5e-5, 3.0), ("ground", 1e-5, 9.0)]
+
+
+def test_a_price_of_the_defaults_is_one_of_each_joint(varied: Mechanism) -> None:
+    data = varied.data()
+    data["costs"] = {"joint_defaults.friction.coefficient": {"model": "power", "B": 1, "k": 1}}
+    found = [one.path for one in Mechanism(**data).prices()]
+    assert found == [f"joints.{name}.friction.coefficient" for name in "BCD"]
+
+
+def test_bought_by_the_grade() -> None:
+    mechanism = Mechanism.read(EXAMPLES / "fourbar-by-grades.yaml")
+    prices = {one.path: one for one in mechanism.prices()}
+    assert [one.name for one in prices["dimensions.l1"].choices] == ["IT11", "IT10", "IT9", "IT8", "IT7", "IT6"]
+    assert {one.group for one in prices.values() if one.play} == {"pins"}
+    chosen = mechanism.with_tolerances({one.path: one.choices[0].tolerance for one in prices.values()})
+    assert chosen.parameters()["joints.B.pin.clearance"] == 20e-6
+    assert {one.path: one.upper for one in chosen.tolerated()}["dimensions.l1"] == pytest.approx(110e-6)
+
+
+def test_the_keys_of_a_formula_are_those_of_its_model() -> None:
+    costs = pytest.importorskip("trunnion.statistics.costs")
+    assert set(costs.COST_MODELS) == set(COST_MODELS)
+    for one in costs.COST_MODELS.values():
+        assert set(one.parameters) == {*FORMULA, "unit"}
+
+
+def test_a_cost_of_what_varies_as_measured_is_doubted(varied: Mechanism, tmp_path: Path) -> None:
+    path = tmp_path / "sample.csv"
+    path.write_text("0.01\n0.02\n", encoding="utf-8")
+    changed = varied.with_samples("AB", path)
+    assert "dimensions.AB" not in {one.path for one in changed.prices()}
+    found = [one for one in check_model(changed) if one.where == "costs.AB"]
+    assert [one.severity for one in found] == [Severity.WARNING]
+
+
+def test_a_play_of_a_radius_is_not_for_sale() -> None:
+    data = Mechanism.read(EXAMPLES / "fourbar-by-grades.yaml").data()
+    data["joints"]["B"]["pin"] = {"radius": "6 mm", "hole_radius": "6.01 mm"}
+    with pytest.raises(MechanismError, match=r"'B.clearance' cannot have a cost: its play is derived from the radii"):
+        Mechanism(**data)

@@ -38,7 +38,6 @@ def close(a: Any, b: Any, tolerance: float = 1e-9) -> None:
     np.testing.assert_allclose(x, y, rtol=tolerance, atol=tolerance * max(1e-6, *map(abs, x), *map(abs, y)))
 
 
-@pytest.mark.slow
 @given(anything, anything, anything)
 def test_ring_identities(x: Any, y: Any, z: Any) -> None:
     close((x + y) + z, x + (y + z))
@@ -59,14 +58,6 @@ def test_division_undoes_multiplication(x: Any, y: Any) -> None:
     close(x / y, x * y**-1, tolerance)
 
 
-@given(parts, parts, parts, parts)
-def test_product_rule_written_out(a: float, b: float, c: float, d: float) -> None:
-    product, quotient = Dual(a, b) * Dual(c, d), Dual(a, b) / Dual(c, d)
-    assert (product.real, product.dual) == (a * c, a * d + b * c)
-    assert float(quotient.real) == pytest.approx(a / c)
-    assert float(quotient.dual) == pytest.approx((b * c - a * d) / c**2, abs=1e-9 * abs(a / c) * 1e3)
-
-
 def test_epsilon_squared_is_zero_at_each_depth() -> None:
     eps = Dual(0.0, 1.0)
     assert flat(eps * eps) == [0.0] * 4
@@ -75,21 +66,13 @@ def test_epsilon_squared_is_zero_at_each_depth() -> None:
     assert flat(eps * outer) == [0.0, 0.0, 0.0, 1.0], "the two epsilons are different and their product is not 0"
 
 
+RANGES = {
+    "sin": (-5, 5), "cos": (-5, 5), "tan": (-1.3, 1.3), "arcsin": (-0.9, 0.9), "arccos": (-0.9, 0.9), "arctan": (-5, 5),
+    "sinh": (-3, 3), "cosh": (-3, 3), "tanh": (-2, 2), "exp": (-3, 3), "log": (0.3, 9), "sqrt": (0.3, 9),
+    "square": (-5, 5), "abs": (0.2, 5),
+}  # fmt: skip
 FUNCTIONS: dict[str, tuple[Callable[[Any, Any], Any], float, float]] = {
-    "sin": (lambda xp, x: xp.sin(x), -5, 5),
-    "cos": (lambda xp, x: xp.cos(x), -5, 5),
-    "tan": (lambda xp, x: xp.tan(x), -1.3, 1.3),
-    "arcsin": (lambda xp, x: xp.arcsin(x), -0.9, 0.9),
-    "arccos": (lambda xp, x: xp.arccos(x), -0.9, 0.9),
-    "arctan": (lambda xp, x: xp.arctan(x), -5, 5),
-    "sinh": (lambda xp, x: xp.sinh(x), -3, 3),
-    "cosh": (lambda xp, x: xp.cosh(x), -3, 3),
-    "tanh": (lambda xp, x: xp.tanh(x), -2, 2),
-    "exp": (lambda xp, x: xp.exp(x), -3, 3),
-    "log": (lambda xp, x: xp.log(x), 0.3, 9),
-    "sqrt": (lambda xp, x: xp.sqrt(x), 0.3, 9),
-    "square": (lambda xp, x: xp.square(x), -5, 5),
-    "abs": (lambda xp, x: xp.abs(x), 0.2, 5),
+    **{name: (lambda xp, x, name=name: getattr(xp, name)(x), *ends) for name, ends in RANGES.items()},
     "abs, negative": (lambda xp, x: xp.abs(x), -5, -0.2),
     "arctan2 by y": (lambda xp, x: xp.arctan2(x, -0.7), 0.2, 3),
     "arctan2 by x": (lambda xp, x: xp.arctan2(0.7, x), -3, 3),
@@ -250,30 +233,14 @@ def test_where_takes_both_parts_lane_by_lane() -> None:
     np.testing.assert_array_equal(mixed.dual, [0.0, 2.0])
 
 
-def test_indexing_takes_the_same_lane_of_both_parts() -> None:
-    """The parts may have different shapes that broadcast; an index means a place in their common shape."""
-    x = Dual(np.ones((3, 4)), np.arange(4.0))
-    assert x.shape == (3, 4)
-    np.testing.assert_array_equal(np.broadcast_to(x[0].dual, (4,)), np.arange(4.0))
-    y = Dual(2.0, np.arange(5.0))
-    assert (float(y[3].real), float(y[3].dual)) == (2.0, 3.0)
-
-
-def test_namespace_picks_the_most_general_kind() -> None:
-    assert namespace(1.0, np.ones(2)) is np
-    assert namespace(1.0, Dual(1.0)) is functions
-    assert namespace(np.ones(2), Dual(1.0)) is functions
-    assert namespace() is np
-
-
 def test_tests_and_constants_are_plain() -> None:
     x = Dual(np.array([1.0, np.nan, np.inf]), 1.0)
     np.testing.assert_array_equal(functions.isnan(x), [False, True, False])
     np.testing.assert_array_equal(functions.isfinite(x), [True, False, False])
     np.testing.assert_array_equal(functions.sign(Dual(np.array([-2.0, 3.0]), 1.0)), [-1.0, 1.0])
     np.testing.assert_array_equal(functions.zeros_like(x), [0.0, 0.0, 0.0])
-
-
-def test_derivative_of_a_constant_is_zero() -> None:
     np.testing.assert_array_equal(derivative(np.ones(3)), np.zeros(3))
-    assert derivative(4.0) == 0.0
+    assert namespace(1.0, np.ones(2)) is np
+    assert namespace(np.ones(2), Dual(1.0)) is functions
+    broad = Dual(np.ones((3, 4)), np.arange(4.0))  # an index means a place in the common shape of both parts
+    np.testing.assert_array_equal(np.broadcast_to(broad[0].dual, (4,)), np.arange(4.0))

@@ -116,18 +116,7 @@ def test_singular_is_data_not_an_exception(name: str) -> None:
     assert not np.all(np.isfinite([np.ravel(primal(v))[0] for row in linalg.inverse(SINGULAR[name]) for v in row]))
 
 
-def test_condition_of_what_has_none() -> None:
-    assert linalg.condition([[1.0, 0.0], [0.0, 0.0]]) == np.inf
-    assert np.isnan(linalg.condition([[1.0, np.nan], [0.0, 1.0]]))
-
-
 def test_a_large_entry_does_not_hide_a_small_pivot() -> None:
     """Without row pivoting the first unknown would come out 0."""
     (x,) = linalg.solve([[1e-20, 1.0], [1.0, 1.0]], [1.0, 2.0])
     np.testing.assert_allclose([float(v) for v in x], [1.0, 1.0], rtol=1e-12)
-
-
-def test_planar_products() -> None:
-    a, b = (3.0, -1.0), (2.0, 5.0)
-    assert linalg.dot(a, b) == 1.0
-    assert linalg.cross(a, b) == 17.0

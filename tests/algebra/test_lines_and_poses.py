@@ -36,12 +36,6 @@ def same(a: Any, b: Any, tolerance: float = 1e-13) -> None:
 # ---- equations of [P] -----------------------------------------------------------------------------------------
 
 
-def test_p1_a_line_is_a_vector_and_its_moment() -> None:
-    v, w = apart(FIRST)
-    same(v, U)
-    same(w, np.cross(P, U))
-
-
 def test_p2_dual_angle_is_angle_and_distance() -> None:
     """E₁ turned by θ counterclockwise about E₁₂ and moved by s along it lies on E₂."""
     theta, s = RNG.uniform(-np.pi, np.pi, COUNT), RNG.normal(size=COUNT)
@@ -71,10 +65,6 @@ def test_p3_to_p7_dual_frame() -> None:
         same(part, expected)
     for part, expected in zip(apart(found), apart(poses.pose(rows(rotation), vector(P))), strict=True):
         same(part, expected)
-
-
-def test_p6_skew_matrix_is_the_cross_product() -> None:
-    same(stacked(apply(skew(vector(P)), vector(Q))), np.cross(P, Q))
 
 
 # ---- lines ----------------------------------------------------------------------------------------------------
@@ -113,26 +103,12 @@ def test_parallel_lines(sense: int) -> None:
     same(apart(found.line)[0], step / np.linalg.norm(step, axis=-1, keepdims=True), 1e-10)
 
 
-def test_parallel_and_crossed_lines_in_one_batch() -> None:
-    mixed = np.where((np.arange(COUNT) % 2 == 0)[:, None], U, V)
-    found = lines.perpendicular(FIRST, lines.line(vector(Q), vector(mixed)))
-    crossed = lines.perpendicular(FIRST, SECOND)
-    same(found.angle.real[::2], np.zeros(COUNT // 2))
-    same(found.angle.dual[1::2], crossed.angle.dual[1::2])
-    same(stacked(found.feet[1])[1::2], stacked(crossed.feet[1])[1::2])
-
-
 def test_a_line_with_itself() -> None:
     x_axis = lines.line((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     found = lines.perpendicular(x_axis, x_axis)
     assert (found.angle.real, found.angle.dual) == (0.0, 0.0)
     assert all(np.isnan(primal(entry)) for entry in found.line)
     assert all(np.isnan(primal(entry)) for entry in lines.line((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-
-
-def test_directions_alone_have_a_plain_angle() -> None:
-    same(lines.dual_angle(vector(U), vector(V)), lines.dual_angle(FIRST, SECOND).real)
-    same(lines.dual_angle((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)), np.pi)
 
 
 def test_derivatives_of_angle_and_distance() -> None:
@@ -189,14 +165,6 @@ def test_adjoint() -> None:
     six = np.stack([stacked(row) for row in poses.adjoint(a)], axis=-2)
     screw = np.concatenate(apart(FIRST), axis=-1)
     same((six @ screw[..., None])[..., 0], np.concatenate(apart(poses.transform(a, FIRST)), axis=-1))
-
-
-def test_what_two_lines_have_in_common_does_not_depend_on_the_frame() -> None:
-    a = random_poses(5)
-    moved = [poses.transform(a, one) for one in (FIRST, SECOND)]
-    one, other = lines.dual_angle(FIRST, SECOND), lines.dual_angle(*moved)
-    same(other.real, one.real)
-    same(other.dual, one.dual, 1e-11)
 
 
 def test_the_space_epsilon_lies_below_those_of_derivatives() -> None:

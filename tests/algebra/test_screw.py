@@ -118,13 +118,6 @@ def test_derivatives(theta: float) -> None:
         np.testing.assert_allclose(part, expected, rtol=0, atol=2e-12)
 
 
-def test_plain_numbers_are_rotations() -> None:
-    w = vector(2.0 * U)
-    real, _ = apart(screws.exp(screw(np.full(COUNT, 2.0), 0.0)))
-    np.testing.assert_allclose(stacked(screws.exp(w)), real, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(stacked(screws.log(screws.exp(w))), 2.0 * U, rtol=0, atol=1e-14)
-
-
 def test_power_does_not_depend_on_the_origin() -> None:
     """F · v + M · ω, the same for every frame."""
     force, moment, omega, v = RNG.normal(size=(4, COUNT, 3))

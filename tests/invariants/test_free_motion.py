@@ -1,20 +1,30 @@
-"""What holds of every motion in time: machine code equals walks, rest and energy are kept, bad numbers are refused."""
+"""What holds of every motion in time: machine code equals walks, where it ends and why, bad numbers are refused."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.special import ellipk
 
 from brief import brief
-from playing import rattling
-from timed import LINEAR, slider_crank, wheel
-from trunnion import MechanismError, read, simulate
+from timed import (
+    ANTIPARALLELOGRAM,
+    DELTOID,
+    INERTIA,
+    LINEAR,
+    PARALLELOGRAM,
+    beside,
+    driven_four_bar,
+    slider_crank,
+    swinging,
+    two_wheels,
+    wheel,
+)  # fmt: skip
+from trunnion import MechanismError, Status, analyse, read, simulate
+from trunnion.dynamics import compiled_rates
 from trunnion.dynamics.compiled_rates import CompiledRates
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Walks
@@ -123,24 +133,6 @@ def test_it_stays_where_friction_holds_it() -> None:
     assert [one.code for one in result.trunnion.findings] == ["simulate.stays_at_rest"]
 
 
-def test_a_range_ends_the_motion() -> None:
-    motor = {"kind": "constant", "effort": 4}
-    driver = {"A": {"speed": 1, "range": [0, 2], "motor": motor}}
-    data = wheel(LINEAR, drag=0.0).data()
-    result = simulate(Mechanism(**{**data, "drivers": driver}), 1.0, 10, 1e-11)
-    (finding,) = [one for one in result.trunnion.findings if one.code == "simulate.range"]
-    assert finding.figures["time"] == pytest.approx(np.sqrt(2 * 2 * 0.05 / 4), rel=1e-9)
-    assert result["time"].values[-1] == finding.figures["time"]
-    assert result["drive_rate"].values[0, -1] == pytest.approx(np.sqrt(2 * 4 * 2 / 0.05), rel=1e-9)
-
-
-def test_at_rest_at_the_end_of_its_range_and_driven_out_of_it() -> None:
-    motor = {"kind": "constant", "effort": 3.0}
-    driver = {"free": True, "speed": 5, "range": [0.3, 1.0], "initial": {"coordinate": 1.0, "speed": 0}, "motor": motor}
-    result = simulate(slider_crank(0.0, drivers={"O": driver}), 0.5, 10)
-    assert [one.code for one in result.trunnion.findings] == ["simulate.range"]
-
-
 def rocker(friction: float) -> Mechanism:
     """A crank-rocker driven at its rocker, which turns round at cos φ = −0.78125, coupler and crank in line."""
     ends = {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"], "D": ["ground", "rocker"]}
@@ -170,27 +162,6 @@ def test_a_driven_joint_ends_at_its_dead_centre(friction: float, close: float) -
     assert found.ended.figures["coordinate"] == pytest.approx(np.arccos(-0.78125), abs=close)
     assert 0.0 < found.ended.time - found.end < 0.05 * found.end
     assert found.asked < 1000
-
-
-@pytest.mark.slow
-def test_a_driven_joint_in_space_ends_at_its_dead_centre() -> None:
-    """The rocker of an RSSR moves by itself up to the end of its swing, which a cycle driven by the crank tells."""
-    data = read(EXAMPLES / "rssr.yaml").data()
-    swing = brief(Mechanism(**data), 720)["joint_rotation"].sel(joint="D").values
-    end = float(_largest(swing))
-    start = {"coordinate": float(swing[0]), "speed": 30.0}
-    data["drivers"] = {"D": {"speed": 1, "free": True, "range": [float(swing[0]), end + 1], "initial": start}}
-    found = simulate(Mechanism(**data).with_friction("off"), 3.0, 3)
-    (ended,) = [one for one in found.trunnion.findings if one.code == "simulate.dead_centre"]
-    assert ended.figures["coordinate"] == pytest.approx(end, abs=3e-6)
-    assert [row[0] for row in attribute(found, "events")] == ["dead-centre"]
-
-
-def _largest(values: NDArray[np.float64]) -> float:
-    """The largest of a periodic course, by the parabola through the three values about it."""
-    k = int(np.argmax(values))
-    low, top, high = values[k - 1], values[k], values[(k + 1) % len(values)]
-    return float(top + (low - high) ** 2 / (8 * (2 * top - low - high)))
 
 
 @pytest.mark.parametrize(
@@ -225,59 +196,6 @@ def test_what_has_no_mass_has_no_acceleration() -> None:
     assert caught.value.findings[0].where == "drivers.A"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("friction", [0.0, 0.06])
-def test_a_start_where_no_mass_moves_is_refused(friction: float) -> None:
-    """A piston that is the only mass, at its dead centre; not with a rotor, nor beside the dead centre."""
-    data = read(EXAMPLES / "flywheel-press.yaml").data()
-    for link in ("crank", "rod"):
-        data["links"][link] = {"points": data["links"][link]["points"]}
-    data["joint_defaults"], data["loads"] = {"friction": friction}, {}
-    motor = {"kind": "constant", "effort": 50}
-
-    def begun(start: float, **more: float) -> None:
-        simulate(Mechanism(**{**data, "drivers": {"O": {"speed": 10, "start": start, "motor": motor | more}}}), 1e-4, 1)
-
-    with pytest.raises(MechanismError, match="nothing moves that has a mass"):
-        begun(np.pi / 2)
-    begun(np.pi / 2, inertia=0.02)
-    begun(np.pi / 2 + 0.3)
-
-
-def test_it_turns_round_before_the_end_of_its_range() -> None:
-    """A pendulum in a range that it nearly reaches: its period is that of the whole swing, by the elliptic integral."""
-    data: dict[str, Any] = {
-        "gravity": [0, -9.81],
-        "links": {
-            "ground": {"points": {"A": [0, 0]}},
-            "bob": {"points": {"A": [0, 0]}, "mass": 1, "centre": [1, 0]},
-        },
-        "joints": {"A": {"type": "revolute", "links": ["ground", "bob"]}},
-        "drivers": {"A": {
-            "speed": 1, "free": True, "range": [-np.pi / 2 - 0.501, -np.pi / 2 + 0.501],
-            "initial": {"coordinate": -np.pi / 2 + 0.5},
-        }},
-    }  # fmt: skip
-    period = 4 * ellipk(np.sin(0.25) ** 2) / np.sqrt(9.81)
-    result = simulate(Mechanism(**data), period, 1, 1e-10)
-    assert not result.trunnion.findings
-    assert float(result["drive_coordinate"].values[0, 1]) == pytest.approx(-np.pi / 2 + 0.5, abs=1e-7)
-
-
-def test_the_largest_values_of_the_summary_are_those_between_the_rows() -> None:
-    """Of a press, where its work begins; the same by a hundred thousand rows, of which none is there exactly."""
-    press = read(EXAMPLES / "flywheel-press.yaml")
-    few = {one.name: one for one in simulate(press, 1.0, 20).trunnion.summary}
-    many = simulate(press, 1.0, 100_000)
-    effort = many["drive_effort"].values[0]
-    most = int(np.argmax(np.abs(effort)))
-    assert few["O.effort_max"].value == pytest.approx(effort[most], rel=1e-4)
-    assert few["O.effort_max"].value >= effort[most]
-    assert float(few["O.effort_max"].place.split()[1]) == pytest.approx(many["time"].values[most], abs=1e-4)
-    for joint, size in zip("OPQS", np.sqrt(np.sum(many["reaction_force"].values ** 2, axis=1)), strict=True):
-        assert few[f"{joint}.reaction_max"].value == pytest.approx(np.max(size), rel=1e-4)
-
-
 def test_the_speed_of_a_pendulum_is_largest_between_the_rows() -> None:
     """ω² = 2 g (1 − cos 0.5) at the bottom, a quarter of a period from the start."""
     bob = {"points": {"A": [0, 0]}, "mass": 1, "centre": [1, 0]}
@@ -301,19 +219,6 @@ def test_numbers_without_sense_are_refused(options: dict[str, Any]) -> None:
         simulate(wheel(LINEAR), **options)
 
 
-@pytest.mark.slow
-def test_a_load_that_may_hold_a_joint_stands_beside_rigid_bodies_in_play() -> None:
-    """The slider rests until the pin strikes, and the load takes a force times the way."""
-    loads = {"drag": {"joint": "S", "resisting_force": 1}}
-    found = simulate(rattling({"law": "rigid", "restitution": 0.4}, loads=loads), 6e-4, 60)
-    slide, torn = found["joint_slide"].sel(joint="S").values, found["event_time"].values
-    kinds = [row[:2] for row in json.loads(found.attrs["events"])]
-    assert kinds[:3] == [["stick", "S"], ["impact", "Q"], ["break-away", "S"]]
-    assert torn[1] == torn[2] > 0.0
-    assert float(found["work_loads"][-1]) == pytest.approx(-abs(slide[-1] - slide[0]), rel=1e-9)
-    assert float(abs(found["energy_residual"]).max()) < 1e-8 * float(abs(found["work_drive"]).max())
-
-
 @pytest.mark.parametrize("name", MOTORS)
 def test_every_motor_takes_arrays(name: str) -> None:
     """Contract: an effort for every speed, finite, of the shape of the speeds."""
@@ -326,9 +231,128 @@ def test_every_motor_takes_arrays(name: str) -> None:
     assert np.all(np.isfinite(found))
 
 
-def test_the_digest_of_a_model_without_motors_is_what_it_was() -> None:
-    """What a driver may state for motion in time counts where it is stated alone."""
-    plain = wheel(LINEAR, drag=0.0).data()
-    other = {**plain, "drivers": {"A": {"speed": 100}}}
-    assert Mechanism(**plain).digest != Mechanism(**other).digest
-    assert Mechanism(**other).digest == Mechanism(**{**other, "drivers": {"A": {"speed": 100, "free": False}}}).digest
+def ended(result: Any, code: str) -> dict[str, Any]:
+    """The figures of the one finding that tells the end, which is the last row."""
+    (figures,) = [one.figures for one in result.trunnion.findings if one.code == f"simulate.{code}"]
+    assert result["time"].values[-1] == pytest.approx(figures["time"], rel=1e-12)
+    assert figures["time"] < result.attrs["duration"]
+    assert np.all(np.isfinite(result["drive_coordinate"].values))
+    assert not np.any(result["status"].values == Status.NOT_CONVERGED)
+    return dict(figures)
+
+
+def figures(mechanism: Mechanism, steps: int) -> dict[str, tuple[Any, str]]:
+    result = simulate(mechanism, 1.0, steps)
+    return {one.name: (one.value, one.place) for one in result.trunnion.summary}
+
+
+def test_the_figures_at_the_end_are_of_the_end() -> None:
+    """A wheel under a constant torque: ω = √(2 T θ / J) at the end of its range."""
+    data = wheel(LINEAR, drag=0.0).data()
+    data["drivers"] = {"A": {"speed": 1, "range": [0, 2], "motor": {"kind": "constant", "effort": 4}}}
+    found = figures(Mechanism(**data), 1)
+    assert found["A.speed_end"][0] == pytest.approx(np.sqrt(2 * 4 * 2 / 0.05), rel=1e-8)
+    assert found["work_drive"][0] == pytest.approx(8.0, rel=1e-8)
+
+
+# ---- ranges -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("space", "first", "compiled"), [("planar", True, True), ("planar", False, False), ("spatial", False, True)]
+)
+def test_a_range_ends_the_motion_of_several_drivers(
+    space: str, first: bool, compiled: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """θ = θ₀ + T t²/(2 J), of the one that gets there first, driven either way."""
+    if not compiled:
+        monkeypatch.setattr(compiled_rates, "compilable", lambda motion: False)
+    flat = space == "planar"
+    kind = PARALLELOGRAM[0], [0.875, -0.273]  # at the start of the range
+    data = beside(driven_four_bar(space, *kind, range=[-2.0, 1.7 if first else 2.9])).data()
+    data["drivers"]["W"] |= {"range": [-1.0, 2.0], "speed": 1, "initial": {"coordinate": 0.0, "speed": -3}}
+    result = simulate(Mechanism(**data), 1.0, 40)
+    figures = ended(result, "range")
+    assert figures["driver"] == ("A" if first else "W")
+    assert figures["coordinate"] == pytest.approx(1.7 if first else -1.0, abs=1e-12)
+    time = np.sqrt(2 * 0.7 * INERTIA / 2.0)
+    assert figures["time"] == pytest.approx(time if first else 1 / 3, rel=1e-8), flat
+
+
+def test_a_range_that_is_left_and_entered_within_a_step_ends_the_motion() -> None:
+    """The swing of a spring goes beyond the range by a millionth of itself."""
+    data = two_wheels({"kind": "constant", "effort": 0.0}).data()
+    for joint in data["joints"].values():
+        del joint["losses"]
+    data["springs"] = {"hold": {"joint": "W", "stiffness": 0.05, "free_angle": 0}}
+    data["drivers"]["W"] |= {"range": [-2.0, 1.0 - 1e-6], "initial": {"coordinate": 0.0, "speed": 1.0}}
+    figures = ended(simulate(Mechanism(**data), 3.0, 30), "range")
+    assert figures["time"] == pytest.approx(np.arcsin(1.0 - 1e-6), abs=1e-6)
+
+
+# ---- change points ----------------------------------------------------------------------------------------------
+
+
+def folding(mechanism: Mechanism) -> Mechanism:
+    """The same, to fold over at its change points."""
+    data = mechanism.data()
+    data["assembly"]["rocker"] = "folds"
+    return Mechanism(**data)
+
+
+@pytest.mark.parametrize("several", [False, True])
+@pytest.mark.parametrize("space", ["planar", pytest.param("spatial", marks=pytest.mark.slow)])
+def test_a_motion_ends_at_a_change_point(space: str, several: bool) -> None:
+    """Where links that fold over would jump: θ = 1 + T t²/(2 J) up to all links in line."""
+    mechanism = folding(driven_four_bar(space, *PARALLELOGRAM))
+    assert "assembly.change_point" in {one.code for one in analyse(mechanism, 12).trunnion.findings}
+    result = simulate(beside(mechanism) if several else mechanism, 1.0, 40)
+    figures = ended(result, "change_point")
+    assert figures["coordinate"] == pytest.approx(np.pi, abs=1e-7)
+    assert figures["time"] == pytest.approx(np.sqrt(2 * (np.pi - 1) * INERTIA / 2.0), rel=1e-7)
+    assert figures["links"] == ["coupler", "rocker"]
+    assert not any("reaction" in one.name for one in result.trunnion.summary)
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+@pytest.mark.parametrize(("kind", "places"), [(ANTIPARALLELOGRAM, (np.pi, 0.0)), (DELTOID, (2 * np.pi, 0.0))])
+def test_other_linkages_end_at_theirs(kind: Any, places: tuple[float, float], sense: float) -> None:
+    moved = driven_four_bar("planar", *kind, motor={"kind": "constant", "effort": sense * 2.0})
+    figures = ended(simulate(folding(moved), 3.0, 60), "change_point")
+    assert figures["coordinate"] == pytest.approx(places[0 if sense > 0 else 1], abs=1e-7)
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_no_motion_begins_at_a_change_point(several: bool) -> None:
+    mechanism = driven_four_bar("planar", *PARALLELOGRAM, start=np.pi)
+    with pytest.raises(MechanismError, match=r"drivers\.A\.initial: begins at a change point"):
+        simulate(beside(mechanism) if several else mechanism, 1.0)
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_change_points_are_passed(several: bool) -> None:
+    mechanism = driven_four_bar("planar", *PARALLELOGRAM)
+    result = simulate(beside(mechanism) if several else mechanism, 1.0, 2)
+    (figures,) = [one.figures for one in result.trunnion.findings if one.code == "simulate.passed"]
+    assert figures["time"] == pytest.approx(np.sqrt(2 * (np.pi - 1) * INERTIA / 2.0), rel=1e-6)
+    assert figures["times"] == [row[0] for row in attribute(result, "events")].count("change-point")
+    assert result["drive_coordinate"].values[0, -1] == pytest.approx(1.0 + 2.0 / INERTIA / 2.0, rel=1e-6)
+    assert not any("reaction" in one.name for one in result.trunnion.summary)
+
+
+# ---- evaluations ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("space", ["planar", pytest.param("spatial", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("spring", "constant", "name"),
+    [({"stiffness": 1e12}, np.sqrt(INERTIA / 1e12), "stiffness"), ({"damping": 1e9}, INERTIA / 1e9, "damping")],
+)
+def test_what_makes_a_motion_stiff_is_named(space: str, spring: dict[str, float], constant: float, name: str) -> None:
+    """√(J/k) of a spring and J/c of a damper; the motion until then is there."""
+    result = simulate(swinging(space, **spring), 1.0, 20, evaluations=2000)
+    figures = ended(result, "evaluations")
+    assert figures["count"] == 2000
+    assert figures["constant"] == pytest.approx(constant, rel=0.02)
+    assert any(f"springs.stop.{name} = {spring[name]:.4g}" in cause for cause in figures["causes"])

@@ -1,4 +1,4 @@
-"""What holds of the figures of measures whatever the mechanism."""
+"""What holds of the figures of measures whatever the mechanism, and of extremes on panels."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from hypothesis import strategies as st
 import mechanisms
 import mechanisms_space
 from measured import figures, many
-from mechanisms import build, four_bar, slider_crank
+from mechanisms import build, four_bar
+from trunnion.algebra.course import Courses
+from trunnion.algebra.dual import Dual
+from trunnion.algebra.panels import FIT, ON_GAUSS, POINTS, above, extreme, spread_out, weighted
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import path_of, plan
 from trunnion.solve.forward import forward
@@ -76,47 +79,6 @@ def test_statistics_hold_together_in_space(name: str) -> None:
     _hold_together(prepare(mechanisms.Mechanism(**mechanisms.model(copy.deepcopy(drawn.data)))))
 
 
-def started(data: Any, start: float) -> Run:
-    data = copy.deepcopy(data)
-    data["drivers"]["A"]["start"] = start
-    crank, ground = data["links"]["crank"]["points"]["B"][0], data["links"]["ground"]["points"]
-    if "D" in ground:
-        pin = crank * np.exp(1j * start)
-        along = ground["D"][0] - pin
-        c, d = (data["links"][link]["points"]["C"][0] for link in ("coupler", "rocker"))
-        share = (c**2 - d**2 + abs(along) ** 2) / (2 * abs(along))
-        corner = pin + along / abs(along) * (share + 1j * np.sqrt(c**2 - share**2))
-        data["assembly"] = {"C": [float(corner.real), float(corner.imag)]}
-    return prepare(build(data))
-
-
-@pytest.mark.slow
-@settings(max_examples=15)
-@given(st.floats(0, 6.283))
-def test_figures_do_not_depend_on_where_the_cycle_starts(start: float) -> None:
-    """Of a four-bar and a slider-crank: extremes, means, dead centres, a window that runs over the end."""
-    window = (np.radians(250), np.radians(400))
-    for data, joint in ((four_bar(), "D"), (slider_crank(), "C")):
-        data["assembly"] = {"C": [0.6, 0.6]} if joint == "D" else {"P": [1.2, 0.1]}
-        kind = "rotation" if joint == "D" else "slide"
-        measures = [
-            Measure("stroke", "stroke", joint),
-            Measure("dead", "dead_centre", joint),
-            Measure("rms", kind, joint, statistic="peak-to-peak", over=window),
-            Measure("mean", "effort", "A", statistic="mean"),
-            Measure("effort", "efficiency", "cycle"),
-            Measure("at", kind, joint, at=1.0),
-        ]
-        one, other = (figures(started(data, place), measures, 120) for place in (0.0, start))
-        turn = 2 * np.pi
-        for name, number in one.items():
-            change = other[name] - number
-            change = change - turn * np.rint(change / turn) if name in ("dead", "at") and joint == "D" else change
-            change = change - turn * np.rint(change / turn) if name == "dead" else change
-            scale = max(1.0, abs(number)) if np.isfinite(number) else 1.0
-            assert abs(change) < 2e-4 * scale or (np.isnan(number) and np.isnan(other[name])), (name, number, change)
-
-
 @given(st.floats(0.05, 6.2), st.floats(0.05, 3.0))
 @settings(max_examples=20)
 def test_windows_are_part_of_the_cycle(first: float, wide: float) -> None:
@@ -156,3 +118,118 @@ def test_no_figure_of_a_mechanism_that_does_not_go_together_somewhere() -> None:
         gone = np.isnan(read.figure)
         assert np.all(gone[open_])
         assert np.count_nonzero(gone & ~open_) < 3  # where the gap is shorter than a step
+
+
+TURN = 2 * np.pi
+EDGES = np.linspace(0.0, TURN, 9)
+
+
+def series(seed: int, orders: int = 4) -> Any:
+    """A periodic function with a few harmonics."""
+    rng = np.random.default_rng(seed)
+    a, phase = rng.normal(size=orders) / np.arange(1, orders + 1) ** 2, rng.uniform(0, TURN, orders)
+    k = np.arange(1, orders + 1)
+    return lambda x: np.sum(a * np.cos(k * np.asarray(x)[..., None] + phase), axis=-1)
+
+
+def fitted(*functions: Any, edges: Any = EDGES) -> Any:
+    """Coefficients of courses on the same panels, (lane, panel, coefficient)."""
+    time = edges[:-1, None] + np.diff(edges)[:, None] / 2 * (1 + POINTS)
+    return np.array([function(time) for function in functions]) @ FIT.T
+
+
+def place_of(found: Any, lane: int = 0, edges: Any = EDGES) -> float:
+    panel = found.panel[lane]
+    return float(edges[panel] + (edges[panel + 1] - edges[panel]) / 2 * (np.ravel(found.spot)[lane] + 1))
+
+
+def first(rows: Any) -> Any:
+    return rows[0]
+
+
+@given(st.integers(0, 10_000), st.sampled_from([1.0, -1.0]))
+def test_extremes_of_many_courses(seed: int, sign: float) -> None:
+    """No lower than any of many places, level there, and those of `Courses` of each by itself."""
+    functions = [series(seed + k) for k in range(3)]
+    found, x = extreme(fitted(*functions)[None], first, sign), np.linspace(0, TURN, 20_001)
+    for lane, function in enumerate(functions):
+        assert sign * found.value[lane] >= np.max(sign * function(x)) - 1e-9
+        assert function(place_of(found, lane)) == pytest.approx(found.value[lane], abs=1e-8)
+        alone = Courses.of(lambda t, f=function: (f(t)[None], np.zeros(len(t), int)), EDGES[[0, -1]])
+        assert alone.extreme(first, sign).value == pytest.approx(found.value[lane], abs=1e-7)  # type: ignore[union-attr]
+
+
+@given(st.integers(0, 10_000), st.floats(-0.6, 0.6))
+def test_shares_above_a_level(seed: int, level: float) -> None:
+    function = series(seed)
+    x = (np.arange(40_000) + 0.5) / 40_000 * TURN
+    share = np.sum(above(fitted(function), level)) / 2 / (len(EDGES) - 1)
+    assert share == pytest.approx(np.mean(function(x) > level), abs=2e-4)
+
+
+@given(st.integers(0, 10_000))
+def test_derivatives(seed: int) -> None:
+    """Of an extreme, its place, a mean square and a share, against differences."""
+    function, change = series(seed), series(seed + 1)
+    own, other, step = fitted(function), fitted(change), 1e-6
+    dual = Dual(own, other)
+    both = [own + way * step * other for way in (1.0, -1.0)]
+    found, ends = extreme(Dual(own[None], other[None]), first), [extreme(one[None], first) for one in both]
+    if ends[0].panel[0] == ends[1].panel[0] == found.panel[0]:
+        slope = (ends[0].value - ends[1].value) / (2 * step)
+        np.testing.assert_allclose(found.value.dual, slope, rtol=1e-5, atol=1e-7)
+        moved = (ends[0].spot - ends[1].spot) / (2 * step)
+        np.testing.assert_allclose(found.spot.dual, moved, rtol=1e-4, atol=1e-5)
+    half = np.full((1, len(EDGES) - 1, 1), TURN / 16)
+
+    def square(coefficients: Any) -> Any:
+        values = (
+            Dual(coefficients.real @ ON_GAUSS, coefficients.dual @ ON_GAUSS)
+            if isinstance(coefficients, Dual)
+            else coefficients @ ON_GAUSS
+        )
+        return weighted(values * values, half)
+
+    np.testing.assert_allclose(
+        square(dual).dual, (square(both[0]) - square(both[1])) / (2 * step), rtol=1e-6, atol=1e-9
+    )
+    shares = [np.sum(above(one, 0.1)) for one in both]
+    slopes = np.abs(np.diff(function(np.linspace(0, TURN, 20_001)))) * 20_000 / TURN
+    if (
+        np.min(slopes + 10 * np.abs(function(np.linspace(0, TURN, 20_001))[1:] - 0.1)) > 0.1
+    ):  # it touches the level nowhere
+        assert np.sum(above(dual, 0.1).dual) == pytest.approx((shares[0] - shares[1]) / (2 * step), rel=1e-3, abs=1e-4)
+
+
+def test_an_extreme_at_an_edge_moves_with_it() -> None:
+    """A course 1 + (t − p) up to a jump at p: its largest value changes as the edge does, its place by 1."""
+    edges = np.array([0.0, 1.0, 2.0])
+    time = edges[:-1, None] + np.diff(edges)[:, None] / 2 * (1 + POINTS)
+    moves = np.array([(1 + POINTS) / 2, (1 - POINTS) / 2])  # of the nodes, the edge between both panels moving by 1
+    values = np.where(time < 1, time**2, 0.0)
+    total = np.where(time < 1, 2 * time * moves, 0.0)
+    found = extreme(Dual((values @ FIT.T)[None, None], (total @ FIT.T)[None, None]), first)
+    assert float(found.value.real[0]) == pytest.approx(1.0)
+    assert float(found.value.dual[0]) == pytest.approx(2.0)
+    assert place_of(extreme((values @ FIT.T)[None, None], first), 0, edges) == pytest.approx(1.0)
+
+
+def test_gaps_and_constants() -> None:
+    """A panel without values is left out, a course without any has no extreme, one that does not change no place."""
+    own = fitted(np.cos, lambda x: 0 * x + 3.0, np.cos)
+    own[0, 0] = own[0, -1] = np.nan
+    own[2] = np.nan
+    found = extreme(own[None], first)
+    assert found.value[0] == pytest.approx(np.cos(TURN / 8))
+    assert found.constant.tolist() == [False, True, False]
+    assert np.isnan(found.value[2])
+
+
+@given(st.integers(0, 10_000))
+def test_rows_at_times_of_panels_of_their_own(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    edges = np.sort(np.append(rng.uniform(0, TURN, (2, 3)), [EDGES] * 2, axis=1), axis=1)
+    function, low, half = series(seed), edges[:, :-1], np.diff(edges) / 2
+    own = function(low[..., None] + half[..., None] * (1 + POINTS)) @ FIT.T
+    time = np.linspace(0, TURN, 91)
+    np.testing.assert_allclose(spread_out(own[None], low, half, time)[0], np.array([function(time)] * 2), atol=1e-6)

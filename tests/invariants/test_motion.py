@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from brief import brief
-from mechanisms import Data, analyse, build, class_three, elliptic_bar, five_bar, model, slider_crank
+from mechanisms import Data, analyse, build, class_three, five_bar, model, slider_crank
 from trunnion import Mechanism
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.spline import spline
@@ -48,25 +47,6 @@ def driven(driver: Data, data: Data | None = None, name: str = "A", **options: A
 
 
 # ---- the laws -------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", MOTION_LAWS)
-def test_a_law_states_where_it_comes_from(name: str) -> None:
-    law = MOTION_LAWS[name]
-    assert law.source
-    assert law.validity
-    assert law.needs
-    assert not set(law.needs) & set(law.takes)
-
-
-@pytest.mark.parametrize("name", PROFILES)
-def test_a_profile_starts_and_ends_at_rest(name: str) -> None:
-    profile = PROFILES[name].profile
-    assert profile is not None
-    np.testing.assert_allclose(profile(0.0), 0.0, atol=1e-15)
-    np.testing.assert_allclose(profile(1.0), (1.0, 0.0, 0.0), atol=2e-14)
-    u = np.linspace(0, 1, 101)
-    np.testing.assert_allclose(profile(u).value + profile(1 - u).value, 1.0, atol=1e-14)  # as far as it has come
 
 
 @pytest.mark.parametrize(
@@ -157,23 +137,6 @@ def test_a_return_of_its_own_duration(name: str) -> None:
         np.testing.assert_array_equal(one, other)
 
 
-def test_a_single_rise_stays_and_a_delay_shifts_it() -> None:
-    run = prepare(driven(DRIVERS["late rise"]))
-    assert (run.cycle.duration, run.cycle.periodic) == (pytest.approx(0.35), False)
-    q, rate, _ = run.system.drive(run.values, "A", np.array([0.0, 0.05, 0.15, 0.25, 0.35, 2.0]))
-    np.testing.assert_allclose(q, [0.2, 0.2, 1.05, 1.9, 1.9, 1.9], rtol=1e-14)
-    np.testing.assert_allclose(rate, [0, 0, 2 * 1.7 / 0.2, 0, 0, 0], atol=1e-12)
-
-
-def test_a_periodic_table_may_gain_whole_turns() -> None:
-    run = prepare(driven(DRIVERS["whole turns"]))
-    time = np.linspace(0, 0.5, 40)
-    here, there = (np.array(run.system.drive(run.values, "A", t)) for t in (time, time + 1.0))
-    np.testing.assert_allclose(there[0] - here[0], 4 * np.pi, rtol=1e-12)
-    np.testing.assert_allclose(there[1:], here[1:], rtol=1e-9, atol=1e-9)
-    assert run.system.dial(run.values, time).unit == "°"  # it runs one way
-
-
 # ---- parameters -----------------------------------------------------------------------------------------------
 
 NUMBERS = [
@@ -203,26 +166,6 @@ def test_every_number_has_a_path_samples_and_a_derivative(law: str, key: str) ->
     np.testing.assert_allclose(np.broadcast_to(slope, (31,)), (high - low) / (2 * h), rtol=1e-4, atol=1e-5)
 
 
-def test_values_set_by_path_are_kept_in_the_model() -> None:
-    mechanism = driven(DRIVERS["cycloidal"]).with_values({"drivers.A.duration": "0.3 s", "A.range.to": 1.5})
-    assert mechanism.parameters()["drivers.A.duration"] == 0.3
-    assert mechanism.data()["drivers"]["A"]["range"] == [0.2, 1.5]
-    table = driven(DRIVERS["periodic table"]).with_values({"drivers.A.points.1.coordinate": "30 deg"})
-    assert table.data()["drivers"]["A"]["points"][1] == [0.1, "30 deg"]
-    assert driven(DRIVERS["one rise"]).with_values({"drivers.A.dwell": 0.2}).data()["drivers"]["A"]["dwell"] == 0.2
-
-
-@pytest.mark.parametrize("name", DRIVERS)
-@pytest.mark.parametrize("extension", ["yaml", "json"])
-def test_written_and_read_again_it_is_the_same(name: str, extension: str, tmp_path: Path) -> None:
-    mechanism = driven(DRIVERS[name])
-    mechanism.write(tmp_path / f"model.{extension}")
-    again = Mechanism.read(tmp_path / f"model.{extension}")
-    assert again == mechanism
-    assert again.digest == mechanism.digest
-    assert again.parameters() == mechanism.parameters()
-
-
 # ---- the analysis ---------------------------------------------------------------------------------------------
 
 
@@ -243,22 +186,6 @@ def test_power_balances_and_the_motion_is_the_prescribed_one(name: str) -> None:
     np.testing.assert_allclose(result.drive_power[0], result.drive_effort[0] * rate, rtol=1e-12, atol=1e-12)
 
 
-@pytest.mark.spread(3)
-@pytest.mark.parametrize("name", ["harmonic", "cycloidal", "modified-sine", "periodic table", "late rise"])
-def test_the_work_of_the_drive_is_that_of_friction_over_a_cycle_without_loads(name: str) -> None:
-    """Between two rests, or over a period, nothing else takes or gives: velocity and power belong together."""
-    data = slider_crank()
-    del data["loads"]
-    data["gravity"] = [0, 0]
-    run = prepare(driven(DRIVERS[name], data))
-    result = brief(driven(DRIVERS[name], data), 2000)
-    drive = float(result.drive_power.sum("driver").mean())
-    lost = float(result.friction_power.sum("joint").mean())
-    assert lost > 0
-    assert drive == pytest.approx(lost, rel=2e-3)
-    assert run.cycle.periodic == (name != "late rise")
-
-
 def test_in_a_dwell_every_joint_rests_and_the_effort_is_an_interval() -> None:
     result = analyse({**slider_crank(), "drivers": {"A": DRIVERS["cycloidal"]}}, 60)
     resting = result.joint_rotation_velocity.sel(joint="A").values == 0
@@ -271,27 +198,6 @@ def test_in_a_dwell_every_joint_rests_and_the_effort_is_an_interval() -> None:
     assert np.all(upper[resting] - lower[resting] > 1e-3)
     told = [row for row in json.loads(result.attrs["findings"]) if row["code"] == "friction.interval"]
     assert any(row["where"] == "joints.A, B, P, C" for row in told)  # once for all
-
-
-def test_positions_of_a_drive_that_turns_back_are_told_by_time() -> None:
-    for name, unit in (("constant", "°"), ("one rise", "°"), ("harmonic", " s"), ("late rise", " s")):
-        run = prepare(driven(DRIVERS[name]))
-        assert run.system.dial(run.values, run.cycle.times(5)).unit == unit
-
-
-@pytest.mark.spread(2)
-@pytest.mark.parametrize("law", ["harmonic", *PROFILES])
-def test_a_prismatic_driver(law: str) -> None:
-    ends = {"mean": "0.25 m", "amplitude": "200 mm", "period": 2.0}
-    driver = ends if law == "harmonic" else {"range": ["50 mm", 0.5], "duration": 1.0, "dwell": 0.2}
-    mechanism = driven({"law": law, **driver}, elliptic_bar(), "X")
-    result = brief(mechanism, 90)
-    assert result.status.values.max() <= Status.ZERO_SLIP
-    slide = result.joint_slide.sel(joint="X").values
-    longest = 0.45 if law == "harmonic" else 0.5
-    np.testing.assert_allclose((slide.min(), slide.max()), (0.05, longest), atol=1e-3)
-    assert float(np.abs(result.power_residual).max()) < 1e-10 * float(np.abs(result.drive_power).max())
-    assert mechanism.parameter_kinds()["drivers.X.period" if law == "harmonic" else "drivers.X.duration"].unit == "s"
 
 
 def test_two_drivers_one_later_than_the_other() -> None:
@@ -341,20 +247,6 @@ def test_a_general_group_follows_any_law(name: str) -> None:
 TIMES = {f"drivers.A.{key}" for key in ("period", "duration", "return_duration", "dwell", "delay")}
 
 
-@pytest.mark.slow
-def test_a_fast_rise_between_long_dwells_is_followed() -> None:
-    """The grid of a general group's track is as fine as the peak of the drive needs."""
-    driver = {"law": "cycloidal", "range": [0.0, 6.0], "duration": 0.01, "dwell": 1.0}
-    mechanism = driven(driver, class_three())
-    run = prepare(mechanism)
-    time = np.linspace(0, 0.01, 40)
-    back = run.solve(time)
-    steady = prepare(driven({"speed": 1.0, "range": [0.0, 6.0]}, class_three()))
-    q = run.system.drive(run.values, "A", time)[0]
-    same = steady.solve(q)
-    np.testing.assert_allclose(back.walk.motions["plate"].frame.x, same.walk.motions["plate"].frame.x, atol=1e-10)
-
-
 # ---- bad input ------------------------------------------------------------------------------------------------
 
 RISE = {"law": "cycloidal", "range": [0.2, 1.0], "duration": 0.2}
@@ -392,14 +284,3 @@ def test_bad_input_is_told(driver: Data, where: str, what: str) -> None:
     found: list[Finding] = [one for one in raised.value.findings if one.where == where and what in one.what]
     assert found, [f"{one.where}: {one.what}" for one in raised.value.findings]
     assert found[0].remedy
-
-
-def test_a_bad_point_of_a_table_has_its_line(tmp_path: Path) -> None:
-    driven(DRIVERS["clamped table"]).write(tmp_path / "model.yaml")
-    text = (tmp_path / "model.yaml").read_text("utf-8").replace("[0.25, 0.9]", "[0.05, 0.9]")
-    (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
-    with pytest.raises(MechanismError) as raised:
-        Mechanism.read(tmp_path / "model.yaml")
-    line = raised.value.findings[0].line
-    assert line is not None
-    assert "0.05" in text.splitlines()[line - 1]

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 import trunnion
 from brief import brief
-from mechanisms import build, inverted_slider_crank, model, slider_crank, transformed
+from mechanisms import inverted_slider_crank, model, slider_crank, transformed
 from mechanisms_space import rssr
 from trunnion import Mechanism
 from trunnion.results.quantities import parts
-from trunnion.results.scales import Scales, extreme_place, scales_in, without_noise
+from trunnion.results.scales import Scales, without_noise
 
 Data = dict[str, Any]
 SIZES = [(1.0, 1.0), (1e-6, 1e-6), (1e6, 1e6), (1e-6, 1e6), (1e6, 1e-6)]
@@ -167,17 +167,6 @@ def test_what_moves_keeps_its_place() -> None:
     assert all(place.startswith("at ") for place in places)
 
 
-def test_play_and_tolerances_that_do_nothing() -> None:
-    """The length of a parallelogram's cranks does not tilt its coupler while both are alike."""
-    data = parallel()
-    data["dimensions"] = {"crank": "30 mm"}
-    for link, pin in (("crank", "B"), ("rocker", "C")):
-        data["links"][link]["points"][pin] = ["crank", 0]
-    data["tolerances"] = {"crank": "±0.1 mm"}
-    study = trunnion.tolerance(Mechanism(**data), ["angle:coupler"], methods=("linear",), steps=12)
-    assert {one.value for one in study.trunnion.summary if one.unit == "rad"} == {0}
-
-
 def test_a_sweep_tells_its_scales() -> None:
     swept = trunnion.sweep(Mechanism(**balanced()), {"joint_defaults.friction.coefficient": [0.1, 0.2]}, steps=12)
     assert np.all(without_noise(swept)["drive_effort_max"].values == 0)
@@ -193,56 +182,3 @@ def test_a_floor_follows_the_dimension_of_its_unit(length: float, rate: float, f
         if name != "1/s":
             assert floor(name) == pytest.approx(unit * size, rel=1e-9)
     assert np.isnan(floor("of its RMS"))
-
-
-def test_an_unloaded_mechanism_has_no_floor_of_forces_and_a_bare_dataset_none() -> None:
-    assert Scales(1.0, 1.0, 0.0).floor("rad/(N s)") == Scales(1.0, 1.0, 0.0).floor("N m") == 0
-    result = trunnion.analyse(Mechanism(**model(slider_crank())), 6)
-    bare = result.assign_attrs(dict.fromkeys(result.attrs, ""))
-    bare.attrs = {}
-    assert np.isnan(scales_in(bare).length)
-    assert without_noise(bare).identical(bare)
-    assert extreme_place(np.array([np.nan, 2.0, 2.0]), "at 4°") == "everywhere"
-    assert extreme_place(np.array([2.0]), "at 4°") == "at 4°"
-    assert extreme_place(np.array([2.0, np.inf]), "at 4°") == "at 4°"
-
-
-def test_a_dead_centre_does_not_make_the_rest_rounding() -> None:
-    """Forces and rates have no bound there, so they are no scale of what friction takes elsewhere."""
-    data = {
-        "space": "planar",
-        "links": {
-            "frame": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
-            "crank": {"points": {"O": [0, 0], "P": [0.1, 0]}},
-            "rod": {"points": {"P": [0, 0], "Q": [0.1, 0]}},
-            "piston": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
-        },
-        "joints": {
-            "O": {"type": "revolute", "links": ["frame", "crank"]},
-            "P": {"type": "revolute", "links": ["crank", "rod"]},
-            "Q": {"type": "revolute", "links": ["rod", "piston"]},
-            "S": {"type": "prismatic", "links": ["frame", "piston"], "guide": {"length": 0.03}},
-        },
-        "joint_defaults": {"friction": 1e-4, "pin": {"radius": 0.006}},
-        "loads": {"t": {"joint": "O", "resisting_torque": 10.0, "useful": True}},
-        "assembly": {"P": [0.05, 0.086]},
-    }
-    means = []
-    for gap in (1e-9, 1e-6):  # of the end of the stroke from the dead centre, m
-        drivers = {"S": {"speed": 0.01, "range": [0.1, 0.2 - gap]}}
-        result = trunnion.analyse(Mechanism.model_validate({**data, "drivers": drivers}), steps=100)
-        means.append({one.name: one.value for one in result.trunnion.summary}["friction_power_mean"])
-    assert 0 < means[1] <= means[0]
-    assert means[0] == pytest.approx(means[1], rel=0.5)
-
-
-def test_what_does_nothing_is_no_scale() -> None:
-    """A load on the ground and a point at which nothing acts leave all figures as they are."""
-    data = model(slider_crank(offset=0.0), friction=0.1)
-    plain = trunnion.analyse(build(data), steps=24)
-    more = copy.deepcopy(data)
-    more.setdefault("loads", {})["huge"] = {"link": "ground", "at": "A", "force": [1e15, 0.0]}
-    changed = trunnion.analyse(build(more), steps=24)
-    values = [[one.value for one in result.trunnion.summary if not one.numerical] for result in (plain, changed)]
-    assert values[0] == values[1]
-    assert any(values[0])

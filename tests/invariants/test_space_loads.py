@@ -1,8 +1,7 @@
-"""Loads, springs, hints and forms of spatial models mean what the reference says: by virtual work and closed forms."""
+"""Loads of spatial models and losses of joints: by virtual work, closed forms, and the same as loads and dampers."""
 
 from __future__ import annotations
 
-import copy
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,9 @@ from scipy.spatial.transform import Rotation
 import trunnion
 from brief import brief
 from mechanisms_space import floating
-from trunnion import Mechanism
+from timed import LINEAR, slider_crank, wheel
+from trunnion import MechanismError, read, simulate, sweep
+from trunnion.model.mechanism import Mechanism
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 STEPS = 12
@@ -74,16 +75,6 @@ def test_a_spring_and_a_damper_in_a_cylindrical_joint_are_torsional(name: str) -
     np.testing.assert_allclose(drive(result), taken, rtol=0, atol=1e-12 * np.abs(taken).max())
 
 
-def test_a_spring_between_joints_of_a_loop() -> None:
-    spring = {"between": ["ground.A", "rocker.C"], "stiffness": 40.0, "free_length": 1.0}
-    result = brief(massless(springs={"spring": spring}), STEPS)
-    ends = [result["point_position"].sel(point=name).transpose("axis", "position").values for name in spring["between"]]  # type: ignore[attr-defined]
-    speed = result["point_velocity"].sel(point="rocker.C").transpose("axis", "position").values
-    length = np.linalg.norm(ends[1] - ends[0], axis=0)
-    taken = 40.0 * (length - 1.0) * np.sum((ends[1] - ends[0]) * speed, axis=0) / length
-    np.testing.assert_allclose(drive(result), taken, rtol=0, atol=1e-12 * np.abs(taken).max())
-
-
 # ---- a screw --------------------------------------------------------------------------------------------------
 
 
@@ -139,41 +130,6 @@ def test_a_thread_with_friction() -> None:
 # ---- hints and forms ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("hint", "sign"),
-    [
-        ({"D": "100 deg"}, 1),
-        ({"D": "-100 deg"}, -1),
-        ({"coupler": "way-1"}, -1),
-        ({"rocker": "way-2"}, 1),
-        ({"C": [1, 1, 0]}, 1),
-        ({"coupler.C": [-1, -1, 0]}, -1),
-    ],
-)
-def test_hints_choose_the_assembly(hint: dict[str, Any], sign: int) -> None:
-    """The two ways to close an RCCC differ by the sign of its angles; a place is that of the nearest."""
-    found = brief(massless(assembly=hint, loads={}), STEPS)
-    assert np.sign(joint(found, "joint_rotation", "D")[0]) == sign
-    if any(isinstance(one, list) for one in hint.values()):
-        other = brief(massless(assembly={"D": f"{-sign * 100} deg"}, loads={}), STEPS)
-        place = np.array(next(iter(hint.values())))
-        apart = [np.linalg.norm(one["point_position"].sel(point="coupler.C").values[:, 0] - place)
-                 for one in (found, other)]  # fmt: skip
-        assert apart[0] < apart[1]
-
-
-def test_a_loop_may_begin_anywhere() -> None:
-    """Its first row only says where the file begins; the frame of the ground is that of its own row's end."""
-    data = massless(loads={"load": {"joint": "D", "resisting_torque": 1.0}}).data()
-    other = copy.deepcopy(data)
-    other["loop"] = other["loop"][2:] + other["loop"][:2]
-    one, two = (brief(Mechanism(**each), STEPS) for each in (data, other))
-    for quantity in ("drive_effort", "joint_slide", "joint_rotation"):
-        np.testing.assert_allclose(
-            two[quantity].sel({one[quantity].dims[0]: one[quantity][one[quantity].dims[0]]}), one[quantity], atol=1e-12
-        )
-
-
 def test_a_loop_is_the_same_as_its_links() -> None:
     """The table of an RCCC written out as links with points: the element of a joint behind X(twist + ε distance)."""
     loop = massless(loads={"load": {"joint": "D", "resisting_torque": 1.0}})
@@ -199,31 +155,100 @@ def test_a_loop_is_the_same_as_its_links() -> None:
             np.testing.assert_allclose(two[quantity].values, expected.values, atol=1e-11)
 
 
-def test_points_are_those_of_the_model() -> None:
-    mechanism = massless(links={"coupler": {"points": {"tip": [0, 0, 1]}}}, loads={})
-    result = brief(mechanism, 3)
-    named = {f"{link}.{point}" for link, points in mechanism.points.items() for point in points}
-    assert set(result["point"].values) == named
-
-
 # ---- the plane in space ---------------------------------------------------------------------------------------
 
 
-def test_a_planar_linkage_in_space_is_the_planar_one() -> None:
-    """With the smallest reactions: the forces of the plane, and nothing across it without a load there."""
-    data = trunnion.read(EXAMPLES / "fourbar-in-space.yaml").data()
-    data |= {"over_constraint": "minimum-norm", "gravity": [0, -9.81, 0]}
-    flat = copy.deepcopy(data)
-    del flat["over_constraint"]
-    flat |= {"space": "planar", "gravity": [0, -9.81]}
-    for link in flat["links"].values():
-        link["points"] = {name: point["at"][:2] for name, point in link["points"].items()}
-        if "centre" in link:
-            link |= {"centre": link["centre"][:2], "inertia": link["inertia"]["zz"]}
-    space, plane = (brief(Mechanism(**each), STEPS) for each in (data, flat))
-    np.testing.assert_allclose(space["drive_effort"], plane["drive_effort"], rtol=0, atol=1e-11)
-    np.testing.assert_allclose(space["joint_rotation"], plane["joint_rotation"], rtol=0, atol=1e-11)
-    forces = space["reaction_force"]
-    np.testing.assert_allclose(forces.sel(axis=["x", "y"]), plane["reaction_force"], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(forces.sel(axis="z"), 0, atol=1e-11)
-    np.testing.assert_allclose(space["reaction_moment"], 0, atol=1e-11)
+LOSSES: dict[str, dict[str, Any]] = {
+    "S": {"constant": 20, "viscous": 3},
+    "Q": {"constant": "20 N mm", "viscous": "1e-3 N m s/rad"},
+}
+
+
+def lossy(mechanism: Mechanism, losses: dict[str, dict[str, Any]]) -> Mechanism:
+    data = mechanism.data()
+    for joint, one in losses.items():
+        data["joints"][joint]["losses"] = one
+    return Mechanism(**data)
+
+
+def loaded(mechanism: Mechanism, losses: dict[str, dict[str, Any]]) -> Mechanism:
+    """The same as loads and dampers."""
+    data = mechanism.data()
+    loads, springs = dict(data.get("loads", {})), dict(data.get("springs", {}))
+    for name in mechanism.loads:
+        loads[name] = {**loads[name], "useful": True}
+    for joint, one in losses.items():
+        turns = data["joints"][joint]["type"] == "revolute"
+        loads[f"of_{joint}"] = {"joint": joint, f"resisting_{'torque' if turns else 'force'}": one["constant"]}
+        springs[f"of_{joint}"] = {"joint": joint, "damping": one["viscous"]}
+    return Mechanism(**{**data, "loads": loads, "springs": springs})
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_they_resist_as_loads_and_dampers_do(friction: float) -> None:
+    """All forces are equal, the intervals at rest too; their power is lost in the joint and is no load's."""
+    base = slider_crank(friction)
+    one, other = brief(lossy(base, LOSSES), 72), brief(loaded(base, LOSSES), 72)
+    same = ("drive_effort", "reaction_force", "drive_effort_lower", "drive_effort_upper", "useful_power", "status")
+    for name in same:
+        largest = float(np.abs(other[name]).max())
+        assert one[name].values == pytest.approx(other[name].values, abs=1e-12 * largest), name
+    lost = one["friction_power"] - other["friction_power"]
+    speed = one["joint_slide_velocity"].sel(joint="S").values
+    assert lost.sel(joint="S").values == pytest.approx(20 * np.abs(speed) + 3 * speed**2, abs=1e-9)
+    force = one["friction_force"] - other["friction_force"]
+    wanted = -20 * np.sign(speed) * (np.abs(speed) > 1e-9) - 3 * speed
+    assert force.sel(joint="S").values == pytest.approx(wanted, abs=1e-9)
+    assert np.abs(one["power_residual"].values).max() < 1e-10 * float(np.abs(one["drive_power"]).max())
+
+
+def test_they_resist_in_space() -> None:
+    base = read(EXAMPLES / "rssr.yaml")
+    joint = next(name for name, one in base.joints.items() if one.type == "revolute" and name not in base.drivers)
+    losses = {joint: {"constant": 2, "viscous": 0.3}}
+    one, other = brief(lossy(base, losses), 36), brief(loaded(base, losses), 36)
+    largest = float(np.abs(other["drive_effort"]).max())
+    assert one["drive_effort"].values == pytest.approx(other["drive_effort"].values, abs=1e-12 * largest)
+    lost = (one["friction_power"] - other["friction_power"]).sel(joint=joint).values
+    speed = one["joint_rotation_velocity"].sel(joint=joint).values
+    assert lost == pytest.approx(2 * np.abs(speed) + 0.3 * speed**2, abs=1e-9)
+    assert np.abs(one["power_residual"].values).max() < 1e-10 * float(np.abs(one["drive_power"]).max())
+
+
+def test_a_motion_in_time_has_them() -> None:
+    """From the tables, which equal the walks; their work is friction's, and energy is kept."""
+    one, other = (simulate(make(slider_crank(0.1), LOSSES), 0.1, 10) for make in (lossy, loaded))
+    assert one["drive_rate"].values == pytest.approx(other["drive_rate"].values, rel=1e-7)
+    for result in (one, other):
+        assert np.abs(result["energy_residual"]).max() < 1e-8 * np.abs(result["work_drive"]).max()
+    assert float(one["work_friction"][-1]) > float(other["work_friction"][-1]) + 0.5
+
+
+def test_a_constant_loss_holds_a_wheel_at_rest() -> None:
+    result = simulate(lossy(wheel({**LINEAR, "stall_effort": 0.5}, drag=0.0), {"A": {"constant": 0.6}}), 1.0, 2)
+    (finding,) = result.trunnion.findings
+    assert finding.code == "simulate.stays_at_rest"
+    assert finding.figures["needed"] == pytest.approx(0.6)
+
+
+def test_the_compiled_engine_has_them() -> None:
+    base, over = lossy(slider_crank(0.1), LOSSES), {"S.losses.constant": [0.0, 20.0], "Q.losses.viscous": [0.0, 1e-3]}
+    one, other = (sweep(base, over, steps=36, engine=engine) for engine in ("numpy", "compiled"))
+    for name in ("drive_effort_max", "friction_power_mean", "reaction_max"):
+        assert other[name].values == pytest.approx(one[name].values, rel=1e-9), name
+
+
+@pytest.mark.parametrize(
+    ("joint", "losses", "where"),
+    [
+        ("O", {}, "joints.O.losses"),
+        ("O", {"constant": "2 N"}, "joints.O.losses.constant"),
+        ("S", {"viscous": "0.1 N m s/rad"}, "joints.S.losses.viscous"),
+        ("O", {"constant": -1}, "joints.O.losses.constant"),
+        ("O", {"drag": 1}, "joints.O.losses.drag"),
+    ],
+)
+def test_losses_that_make_no_sense_are_findings(joint: str, losses: dict[str, Any], where: str) -> None:
+    with pytest.raises(MechanismError) as caught:
+        lossy(slider_crank(), {joint: losses})
+    assert where in [one.where for one in caught.value.findings]

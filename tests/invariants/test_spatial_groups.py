@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from brief import brief
@@ -35,20 +33,6 @@ def random_frame(rng: np.random.Generator, lanes: int = 1, reach: float = 1.0) -
 
 def numbers(value: Any) -> Array:
     return np.array(np.broadcast_arrays(*flat(value)), float)
-
-
-@pytest.mark.parametrize("kind", MOTIONS)
-@given(seed_=st.integers(0, 10**6))
-@settings(max_examples=25, deadline=None)
-def test_a_pair_placed_and_taken_back_is_where_it_was(kind: str, seed_: int) -> None:
-    rng = np.random.default_rng(seed_)
-    motion, first = MOTIONS[kind], random_frame(rng)
-    q = list(rng.uniform(-3, 3, len(motion.kinds)))
-    second = motion.place(first, q, LEAD)
-    axes = np.array([second.x, second.y, second.z])
-    assert np.allclose(axes @ axes.T, np.eye(3), atol=1e-14)
-    assert np.linalg.det(axes) == pytest.approx(1.0)
-    assert np.allclose(numbers(motion.unplace(second, q, LEAD)), numbers(first), atol=1e-13)
 
 
 @pytest.mark.parametrize("kind", MOTIONS)
@@ -268,28 +252,6 @@ def test_dual_parts_are_derivatives_by_a_dimension(kinds: tuple[str, ...]) -> No
     assert np.allclose(np.array(exact, float), differences, rtol=1e-6, atol=1e-6 * np.max(np.abs(differences)))
 
 
-@given(seed_=st.integers(0, 10**6), size=st.floats(1e-6, 1e4))
-@settings(max_examples=20, deadline=None)
-def test_a_loop_of_any_size_anywhere_turns_alike(seed_: int, size: float) -> None:
-    """The same loop scaled and moved as a whole: the same angles, condition, and forces; moments scaled."""
-    rng = np.random.default_rng(seed_)
-    group, elements, start, drive = loop(LOOPS["RSSR"], np.zeros(()))
-    whole = random_frame(rng, reach=0.3)
-
-    def changed(frame: Frame, outer: bool) -> Frame:
-        frame = compose(whole, frame) if outer else frame
-        return frame._replace(place=tuple(size * n for n in frame.place))
-
-    moved = [
-        Element(*(changed(one[i], joint.sides[i] == OUTER) for i in (0, 1)), size * one.lead)
-        for one, joint in zip(elements, group.joints, strict=True)
-    ]
-    here, there = group.position(elements, start, [drive]), group.position(moved, start, [drive])
-    assert float(there.gap) < 1e-12 * size
-    assert np.allclose(np.array(there.q, float), np.array(here.q, float), atol=1e-9)
-    assert float(there.condition) == pytest.approx(float(here.condition), rel=1e-8)
-
-
 def test_lanes_that_do_not_close_are_nan() -> None:
     """A rod too short for its ends has no pose, in its lanes alone."""
     group, elements, start, drive = loop(LOOPS["RSSR"], np.zeros(4))
@@ -300,22 +262,6 @@ def test_lanes_that_do_not_close_are_nan() -> None:
     changed = [*elements[:2], elements[2]._replace(first=far._replace(place=shorter)), elements[3]]
     pose = group.position(changed, start, [drive])
     assert list(np.isfinite(pose.gap)) == [True, True, False, True]
-
-
-def test_redundant_loops_give_the_smallest_reactions() -> None:
-    """A bar on two coaxial hinges, pushed in the middle: half on each, no moments that the push does not need."""
-    x = (1.0, 0.0, 0.0)
-    ends = [element((0.0, 0.0, z), (0.0, 0.0, 1.0), x) for z in (-1.0, 1.0)]
-    joints = tuple(GroupJoint("revolute", (OUTER, 0)) for _ in ends)
-    group = SpatialGroup(1, joints, (0,), redundant=True)
-    pose = group.position([Element(end, end) for end in ends], [np.zeros(1)], [np.zeros(1)])
-    push = Screw((0.0, -6.0, 0.0), (0.0, 0.0, 0.0))
-    first, second = group.reactions(pose, [push])
-    assert np.allclose(numbers(first.u)[:, 0], (0.0, 3.0, 0.0))
-    assert np.allclose(numbers(second.u)[:, 0], (0.0, 3.0, 0.0))
-    for wrench, one in zip((first, second), pose.elements, strict=True):
-        assert np.max(np.abs(numbers(moment_at(wrench, one.second.place)))) < 1e-12
-    assert np.max(np.abs(numbers(added(added(first, second), push)))) < 1e-12
 
 
 @pytest.mark.spread(1)

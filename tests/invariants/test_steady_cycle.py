@@ -1,17 +1,23 @@
-"""The steady cycle of motions in time: closed forms, limits, energy, and the motion that goes on from it."""
+"""Steady cycles, motions of many samples, and loads by place and speed, in time and over a cycle."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import trunnion
+from brief import brief
 from timed import LINEAR, mass_on_a_belt, slider_crank, wheel
+from trunnion import MechanismError, analyse, read, simulate, sweep
+from trunnion.dynamics.measured import figures_in_time
+from trunnion.dynamics.started import FIGURES
 from trunnion.dynamics.steady_cycle import UnsteadyError
-
-AWAY = [*range(1, 60), *range(61, 120)]
+from trunnion.errors import Status
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.run import prepare
 
 
 def figures(result: Any) -> dict[str, float]:
@@ -97,37 +103,6 @@ def test_the_motion_goes_on_as_it_is(friction: float) -> None:
     assert told["efficiency"] == pytest.approx(-works["loads"] / works["drive"], rel=1e-7)
 
 
-def test_a_heavy_flywheel_gives_the_analysis_at_constant_speed() -> None:
-    """The difference to `analyse` at the mean speed falls as 1/J."""
-    misses = []
-    for inertia in (20.0, 200.0):
-        crank = slider_crank(friction=0.0)
-        data = crank.data()
-        data["links"]["crank"]["inertia"] = inertia
-        data["drivers"]["O"]["initial"] = {"speed": 140.0}
-        cycle = trunnion.simulate(trunnion.Mechanism(**data), steps=120, steady=True)
-        even = trunnion.analyse(crank.with_values({"O.speed": figures(cycle)["O.speed_mean"]}), steps=120)
-        # not where the slider turns round, and its load with it
-        pins = [
-            one["reaction_force"].sel(joint=["P", "Q"]).transpose(..., "position").values[..., AWAY]
-            for one in (cycle, even)
-        ]
-        misses.append(float(np.max(np.abs(pins[0] - pins[1])) / np.max(np.abs(pins[1]))))
-    assert misses[0] < 0.01
-    assert misses[1] == pytest.approx(misses[0] / 10, rel=0.05)
-
-
-def test_the_cycle_goes_to_every_view(tmp_path: Any) -> None:
-    """It is a cycle like another: tables, figures and report."""
-    result = trunnion.simulate(wheel(LINEAR), steps=24, steady=True)
-    assert result.trunnion.kind == "cycle"
-    assert set(trunnion.analyse(wheel(LINEAR), 24).variables) == set(result.variables)
-    assert trunnion.report(result).startswith("<!doctype html>")
-    assert trunnion.plot(result, "polar") is not None
-    trunnion.save(result, tmp_path / "cycle.csv")
-    assert len((tmp_path / "cycle.csv").read_text().splitlines()) == 25
-
-
 @pytest.mark.parametrize(
     ("made", "code"),
     [
@@ -155,3 +130,241 @@ def test_what_cannot_be_a_cycle_is_refused(made: trunnion.Mechanism, where: str)
     with pytest.raises(trunnion.MechanismError) as told:
         trunnion.simulate(made, steady=True)
     assert told.value.findings[0].where == where
+
+
+TURN = 2 * np.pi
+AGREED = 1e-6  # relative
+
+
+def spread(mechanism: Mechanism, count: int, **numbers: float) -> dict[str, Any]:
+    """Numbers that scatter by a share of themselves, (sample, 1)."""
+    draw, nominal = np.random.default_rng(1), mechanism.parameters()
+    shares = {name.replace("__", "."): share for name, share in numbers.items()}
+    moved = {path: nominal[path] * (1 + share * draw.uniform(-1, 1, (count, 1))) for path, share in shares.items()}
+    return dict(mechanism.parameters(moved))
+
+
+def of_sample(values: dict[str, Any], i: int) -> dict[str, Any]:
+    return {path: float(value[i, 0]) if np.ndim(value) else value for path, value in values.items()}
+
+
+# ---- closed forms ---------------------------------------------------------------------------------------------
+
+
+def test_flywheels_with_inertias_of_their_own() -> None:
+    """J ω̇ = 4 (1 − ω/150) − 0.6: ω = 127.5 (1 − e^(−t/τ)), τ = J 150/4, of every sample."""
+    mechanism, count, duration = wheel(LINEAR), 5, 12.0
+    inertia = 0.05 * np.linspace(0.5, 2.0, count)[:, None]
+    values = dict(mechanism.parameters({"links.wheel.inertia": inertia}))
+    tau = inertia[:, 0] * 150 / 4
+
+    def gone(time: Any) -> Any:
+        return 127.5 * (time - tau * (1 - np.exp(-time / tau)))
+
+    def when(angle: Any) -> Any:
+        time = np.ones_like(angle)
+        for _ in range(50):
+            time = time - (gone(time) - angle) / (127.5 * (1 - np.exp(-time / tau)))
+        return time
+
+    figures = figures_in_time(prepare(mechanism), "A", values, count, duration)
+    np.testing.assert_allclose(figures["peak_effort"], 4.0, rtol=1e-7)  # as it starts
+    steady = TURN / (duration - when(gone(duration) - TURN))
+    np.testing.assert_allclose(figures["steady_speed"], steady, rtol=1e-7)
+    time = figures["starting_time"]
+    np.testing.assert_allclose(TURN / (time - when(gone(time) - TURN)), 0.95 * steady, rtol=1e-7)
+
+
+@pytest.mark.parametrize(("effort", "starts"), [(0.5, False), (0.7, True)])
+def test_what_is_larger_at_rest_holds_every_one(effort: float, starts: bool) -> None:
+    """A pin with 0.2 N m of sliding and 0.6 N m at rest: φ = ½ α t² under the rest of the torque."""
+    data, duration = wheel({"kind": "constant", "effort": effort}, drag=0.0).data(), 12.0
+    data["gravity"], data["links"]["wheel"]["mass"] = [0, -10], 10
+    law = {"law": "stiction", "coefficient": 0.1, "static": 0.3}
+    data["joints"]["A"].update(pin={"radius": 0.02}, friction=law)
+    mechanism, count = Mechanism(**data), 3
+    values = spread(mechanism, count, links__wheel__inertia=0.2)
+    speed = figures_in_time(prepare(mechanism), "A", values, count, duration)["steady_speed"]
+    pull = (effort - 0.2) / values["links.wheel.inertia"][:, 0]
+    last = duration - np.sqrt(duration**2 - 2 * TURN / pull)
+    np.testing.assert_allclose(speed, TURN / last if starts else np.full(count, np.nan), rtol=1e-8)
+
+
+# ---- against each by itself -----------------------------------------------------------------------------------
+
+MOTORS: dict[str, dict[str, Any]] = {
+    "linear": {"kind": "linear", "stall_effort": 8, "no_load_speed": 157, "inertia": 1e-3},
+    "geared": {
+        "kind": "induction", "breakdown_effort": 5, "breakdown_slip": 0.3, "synchronous_speed": 300, "ratio": 2,
+        "efficiency": 0.9, "inertia": 5e-4,
+    },
+    "controlled": {"kind": "speed-control", "target": 90, "proportional": 0.3, "integral": 0.5, "limit": 8},
+    "table": {"kind": "table", "points": [[0, 9], [80, 7], [160, 0]]},
+    "switched off": {"kind": "constant", "effort": 6, "off_from": 0.2, "brake": 2, "brake_from": 0.25},
+    "clutched": {"kind": "linear", "stall_effort": 9, "no_load_speed": 150, "inertia": 0.01, "clutch": 6},
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MOTORS)
+def test_together_as_each_by_itself(name: str) -> None:
+    """Every kind of motor, with its own numbers varied, on a slider-crank with friction and a load that resists."""
+    mechanism = slider_crank(0.05, drivers={"O": {"speed": 100, "start": 0.3, "motor": MOTORS[name]}})
+    motor = [path for path in mechanism.parameters() if ".motor." in path and not path.endswith(("_from", "until"))]
+    values = spread(mechanism, 2, links__piston__mass=0.05, **dict.fromkeys(motor, 0.03))
+    together = figures_in_time(prepare(mechanism), "O", values, 2, 0.3, 1e-10)
+    for i in range(2):
+        own = of_sample(values, i)
+        alone = figures_in_time(prepare(mechanism), "O", own, 1, 0.3, 1e-10)
+        for key in FIGURES:
+            near = AGREED if key == "fluctuation" else 0.0  # a difference of speeds, by their mean
+            np.testing.assert_allclose(together[key][i], alone[key][0], AGREED, near, err_msg=f"{key} of {i}")
+    assert np.all(np.isfinite(together["peak_effort"]))
+
+
+def test_numbers_that_were_nothing_or_one_are_looked_at_anew() -> None:
+    """Machine code has some 0 and 1 built in; motions with other numbers do not take it."""
+    mechanism = slider_crank(0.05)
+    run, values = prepare(mechanism), mechanism.parameters()
+    paths = [path for path in ("links.crank.mass", "links.rod.centre.y", "links.crank.centre.y") if path in values]
+    assert {values[path] for path in paths} <= {0.0, 1.0}
+    first, second = (
+        figures_in_time(run, "O", {**values, **dict.fromkeys(paths, size)}, 1, 0.1)["peak_effort"][0]
+        for size in (0.0, 0.03)
+    )
+    changed = mechanism.parameters({path: np.array([[0.03]]) for path in paths})
+    alone = figures_in_time(prepare(mechanism), "O", changed, 1, 0.1)["peak_effort"][0]
+    assert second == pytest.approx(alone, rel=1e-9)
+    assert abs(second - first) > 1e-6 * second
+
+
+def test_a_gear_without_loss_is_no_model_for_others() -> None:
+    """Without friction efforts are affine in the accelerations where no gear loses: which is the first sample alone."""
+    motor = {"kind": "linear", "stall_effort": 4, "no_load_speed": 150, "ratio": 2, "inertia": 0.01, "efficiency": 1}
+    mechanism = wheel(motor, drag=0.0)
+    run, efficiency = prepare(mechanism), np.array([[1.0], [0.8]])
+    values = dict(mechanism.parameters({"drivers.A.motor.efficiency": efficiency}))
+    speed = figures_in_time(run, "A", values, 2, 1.0)["steady_speed"]
+    alone = [figures_in_time(prepare(mechanism), "A", of_sample(values, i), 1, 1.0)["steady_speed"] for i in range(2)]
+    np.testing.assert_allclose(speed, np.ravel(alone), rtol=1e-9)
+
+
+def test_how_many_are_together_changes_nothing() -> None:
+    mechanism = slider_crank(0.1)
+    run, values = prepare(mechanism), spread(mechanism, 5, links__crank__points__P__x=0.01)
+    every = figures_in_time(run, "O", values, 5, 0.2)
+    last = {path: value[3:] if np.ndim(value) else value for path, value in values.items()}
+    part = figures_in_time(prepare(mechanism), "O", last, 2, 0.2)
+    for name in FIGURES:
+        np.testing.assert_array_equal(part[name], every[name][3:], err_msg=name)
+
+
+# ---- courses --------------------------------------------------------------------------------------------------
+
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+# the height of the ram by the crank angle, and by name
+HEIGHTS = {
+    "drive": "(0.035 m * cos(drive) + sqrt((0.12 m)^2 - (0.035 m * sin(drive))^2))",
+    "slide": "S.slide",
+    "point": "piston.Q.x",
+    "named slide": "way",
+    "named point": "height",
+    "distance": "hypot(rod.Q.x - frame.O.x, rod.Q.y - frame.O.y)",
+}
+NAMED = {
+    "measures": {
+        "way": {"slide": "S"}, "height": {"point": "piston.Q", "axis": "x"},
+        "pace": {"rate": "S"}, "rise": {"velocity": "piston.Q", "axis": "x"},
+    }
+}  # fmt: skip
+PRESS = "-30 N - 4000 N/m * ({0} - 0.11 m) - 500 N/m * abs({0} - 0.13 m) - 100 N * between({0}, 0.1 m, 0.12 m)"
+
+
+def pressed(force: str, **more: Any) -> Mechanism:
+    return slider_crank(0.1, loads={"work": {"link": "piston", "at": "Q", "force": [force, 0]}}, **NAMED, **more)
+
+
+@pytest.mark.parametrize("name", ["slide", "distance", "named point"])
+def test_a_press_force_over_the_height_of_the_ram(name: str) -> None:
+    """It equals the same force stated over the crank angle, at every position and in the means."""
+    one, other = (analyse(pressed(PRESS.format(HEIGHTS[key])), 90) for key in (name, "drive"))
+    bare = analyse(slider_crank(0.1, loads={}), 90)
+    largest = float(np.abs(other["drive_effort"]).max())
+    assert float(np.abs(other["drive_effort"] - bare["drive_effort"]).max()) > 0.1 * largest
+    for key in ("drive_effort", "reaction_force", "useful_power", "drive_effort_rms"):
+        size = float(np.abs(other[key]).max())
+        assert one[key].values == pytest.approx(other[key].values, rel=0, abs=1e-12 * size), key
+
+
+def test_it_is_the_same_in_time() -> None:
+    """Tabulated, with the places found at which the force jumps or bends."""
+    one, other = (simulate(pressed(PRESS.format(HEIGHTS[key])), 0.1, 5) for key in ("named slide", "drive"))
+    assert one["drive_rate"].values == pytest.approx(other["drive_rate"].values, rel=1e-9)
+    assert np.abs(one["energy_residual"]).max() < 1e-8 * np.abs(one["work_drive"]).max()
+
+
+def test_a_driven_joint_turns_as_the_drive_does() -> None:
+    """In time its turns begin again, so that a wave over the angle is one at every turn."""
+    one, other = (brief(pressed(f"-50 N * sin({name})"), 24) for name in ("O.rotation", "drive"))
+    assert one["drive_effort"].values == pytest.approx(other["drive_effort"].values, rel=1e-12)
+    data = wheel({"kind": "constant", "effort": 1.0}, drag=0.0).data()
+    data["loads"] = {"wave": {"link": "wheel", "moment": "-0.5 N m * sin(A.rotation)"}}
+    result = simulate(Mechanism(**data), 2.0, 4, 1e-10)
+    turned, rate = result["drive_coordinate"].values[0], result["drive_rate"].values[0]
+    assert 0.5 * 0.05 * rate**2 == pytest.approx(turned + 0.5 * (np.cos(turned) - 1), abs=1e-7)
+
+
+def test_in_space() -> None:
+    """A torque that resists by the rate of its joint is a damper's."""
+    data = read(EXAMPLES / "rssr.yaml").data()
+    last = [name for name, one in data["joints"].items() if one["type"] == "revolute"][-1]
+    resisted = {"joint": last, "resisting_torque": f"0.3 N m s/rad * abs({last}.rotation_velocity)"}
+    one = brief(Mechanism(**{**data, "loads": {"oil": resisted}}), 24)
+    other = brief(Mechanism(**{**data, "loads": {}, "springs": {"oil": {"joint": last, "damping": 0.3}}}), 24)
+    largest = float(np.abs(other["drive_effort"]).max())
+    assert one["drive_effort"].values == pytest.approx(other["drive_effort"].values, abs=1e-12 * largest)
+
+
+def test_the_compiled_engine_has_them() -> None:
+    model = pressed(PRESS.format("S.slide"))
+    one, other = (sweep(model, {"rod.mass": [0.4, 0.5]}, steps=36, engine=engine) for engine in ("numpy", "compiled"))
+    assert other["drive_effort_max"].values == pytest.approx(one["drive_effort_max"].values, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("force", "remedy"),
+    [
+        ("-50 N/m * S.slied", "S.slide"),
+        ("-50 N * S.rotation", "Q.rotation"),
+        ("-50 N/m * pistn.Q.x", "piston.Q.x"),
+        ("-50 N * S.slide", "force"),
+    ],
+)
+def test_a_name_that_means_nothing_is_one_finding(force: str, remedy: str) -> None:
+    with pytest.raises(MechanismError) as caught:
+        pressed(force)
+    (finding,) = caught.value.findings
+    assert finding.where == "loads.work.force.x"
+    assert remedy in finding.remedy
+
+
+@pytest.mark.parametrize(("free_length", "rows"), [(0.0, 0), (0.01, 1)])
+def test_a_spring_whose_ends_meet_at_the_start(free_length: float, rows: int) -> None:
+    """Without a free length x = v/w sin w t; with one there is no direction at 0 s, which is said and marked."""
+    slide = {"at": [0, 0], "axis": [1, 0]}
+    block = Mechanism(
+        links={
+            "ground": {"points": {"S": slide, "F": [0, 0]}},
+            "block": {"points": {"S": slide, "P": [0, 0]}, "mass": 1},
+        },
+        joints={"S": {"type": "prismatic", "links": ["ground", "block"]}},
+        drivers={"S": {"range": [-1, 1], "speed": 1, "free": True, "initial": {"coordinate": 0, "speed": 0.5}}},
+        springs={"k": {"between": ["ground.F", "block.P"], "stiffness": 100, "free_length": free_length}},
+    )
+    result = simulate(block, 0.2, 4)
+    assert np.sum(result["status"] == Status.LOAD_UNDEFINED) == rows
+    assert [one.code for one in result.trunnion.findings] == ["simulate.undefined"] * rows
+    if not rows:
+        wanted = 0.05 * np.sin(10 * result["time"].values)
+        assert result["drive_coordinate"].values[0] == pytest.approx(wanted, abs=1e-9)

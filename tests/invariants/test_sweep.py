@@ -1,4 +1,4 @@
-"""A sweep is so many analyses: every point equals one, and what has no answer has no figures."""
+"""A sweep is so many analyses: every point equals one, measures too, and what has no answer has no figures."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import xarray as xr
 
 import trunnion
 from brief import brief
+from manual.conftest import Run, program  # noqa: F401
 from trunnion import Mechanism, MechanismError, Status
 from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import FrictionMethod
@@ -89,32 +90,6 @@ def test_a_point_equals_the_analysis_to_the_bit(model: str, name: str, text: str
         assert swept[f"drive_effort_{end}"].attrs["units"] == one["drive_effort"].attrs["units"]
 
 
-def test_points_of_a_range_are_the_floats_of_their_texts() -> None:
-    """0, 1, … 30 deg by a range are the same numbers as the texts in a file, each rounded once."""
-    mechanism = read("pezzuti-cardan").with_friction("off")
-    by_range = trunnion.sweep(mechanism, {"misalignment": ("0 deg", "30 deg", 11)}, 1)
-    texts = [f"{angle} deg" for angle in range(0, 31, 3)]
-    by_list = trunnion.sweep(mechanism, {"misalignment": texts}, 1)
-    assert np.array_equal(by_range["misalignment"], by_list["misalignment"])
-    stated = [
-        float(mechanism.with_values({"misalignment": text}).parameters()["dimensions.misalignment"]) for text in texts
-    ]
-    assert by_range["misalignment"].values.tolist() == stated
-    told = by_range["misalignment"].attrs
-    assert (told["units"], told["written_unit"], told["long_name"]) == ("rad", "deg", "dimensions.misalignment")
-    assert told["written_factor"] == math.pi / 180
-
-
-def test_plain_numbers_are_si() -> None:
-    mechanism = read("slider-crank")
-    swept = trunnion.sweep(mechanism, {"O.speed": (50, 100, 3)}, 4)
-    assert swept["O.speed"].values.tolist() == [50.0, 75.0, 100.0]
-    assert swept["O.speed"].attrs["units"] == "rad/s"
-    also = trunnion.sweep(mechanism, {"O.speed": np.array([50, 75, 100])}, 4)
-    assert also["O.speed"].equals(swept["O.speed"])
-    assert trunnion.sweep(mechanism, {"r": [0.05]}, 4)["r"].attrs["units"] == "m"
-
-
 def test_two_names_are_a_grid() -> None:
     """Dimensions in the order of the names, last; every point is that of the two values."""
     mechanism = read("durango-fourbar")
@@ -166,16 +141,6 @@ def test_points_solved_together_equal_points_solved_alone(model: str, monkeypatc
         np.testing.assert_allclose(both[name].values, values.values, rtol=1e-9, atol=power, err_msg=str(name))
 
 
-@pytest.mark.slow
-def test_errors_of_followed_groups_are_those_of_analyse() -> None:
-    """Whatever point comes first: what spherical joints are turned by an error is told from each point's own start."""
-    mechanism = read("rssr").with_values({"joints.D.misalignment.tilt": 0.00125})
-    both = trunnion.sweep(mechanism, {"a": ["30 mm", "14 mm"]}, STEPS)
-    alone = trunnion.sweep(mechanism, {"a": ["14 mm"]}, STEPS)
-    found, expected = (one["transmission_error_max"].values[:, -1] for one in (both, alone))
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
-
-
 def test_errors_of_points_solved_together() -> None:
     """Errors without seats go through one pass as well: beside the ideal mechanism, point by point as `analyse`."""
     data = read("slider-crank").data()
@@ -192,76 +157,7 @@ def test_errors_of_points_solved_together() -> None:
     np.testing.assert_allclose(float(swept["transmission_error_max"].sel(joint="S")[1, 1]), error, rtol=1e-9)
 
 
-@pytest.mark.slow
-def test_a_point_with_another_assembly_is_looked_at_by_itself() -> None:
-    """The hint lies still, the joint moves past it: nearest is the other assembly then, as it is for `analyse`."""
-    data = read("durango-fourbar").data()
-    data["assembly"] = {"C": [4.0, 0.3]}
-    mechanism = Mechanism(**data)
-    over = {"CD": ["2.8 m", "3.0 m", "3.6 m", "4.2 m", "5 m"], "BC": ["5 m", "5.5 m", "6 m"]}
-    swept = trunnion.sweep(mechanism, over, STEPS)
-    for (i, cd), (k, bc) in itertools.product(enumerate(over["CD"]), enumerate(over["BC"])):
-        one = trunnion.analyse(mechanism.with_values({"CD": cd, "BC": bc}), STEPS)
-        assert int(swept["status"][i, k]) == int(one["status"].max())
-        if one["status"].max() < Status.NOT_CONVERGED:
-            np.testing.assert_allclose(
-                swept["drive_effort_rms"].values[0, i, k], one["drive_effort_rms"].values[0], rtol=1e-9
-            )
-
-
-def test_six_names() -> None:
-    mechanism = read("durango-fourbar")
-    over = {
-        "AB": ["1.6 m", "2 m"], "CD": ["3 m"], "A.speed": [5.0], "B.friction.coefficient": [0.1, 0.2],
-        "C.friction.coefficient": [0.1], "D.friction.coefficient": [0.1, 0.3],
-    }  # fmt: skip
-    swept = trunnion.sweep(mechanism, over, STEPS)
-    assert swept["efficiency"].dims == tuple(over)
-    at = {"AB": "2 m", "CD": "3 m", "A.speed": 5.0} | {
-        f"{j}.friction.coefficient": c for j, c in zip("BCD", (0.2, 0.1, 0.3), strict=True)
-    }
-    one = trunnion.analyse(mechanism.with_values(at), STEPS)
-    np.testing.assert_allclose(
-        swept["drive_power_mean"].values[1, 0, 0, 1, 0, 1], float(one["drive_power_mean"]), rtol=1e-9
-    )
-    columns = figures_of(swept)
-    assert columns["B.friction.coefficient"][1].tolist() == [0.1, 0.1, 0.2, 0.2] * 2
-
-
 # ---- the Cardan joint -----------------------------------------------------------------------------------------
-
-
-def test_efficiency_falls_with_misalignment() -> None:
-    """As in Fig. 9, left, of Pezzuti et al. (2006), where rotation prevails over the slide that the errors make."""
-    swept = trunnion.sweep(trunnion.read(CARDAN), {"misalignment": ("1 deg", "31 deg", 5)}, STEPS)
-    assert np.all(np.diff(swept["efficiency"]) < -0.01)
-    assert np.all(np.diff(swept["friction_power_mean"]) > 0)
-    ratio = swept["useful_power_mean"] / swept["drive_power_mean"]
-    assert np.allclose(ratio, swept["efficiency"], rtol=1e-14)
-
-
-@pytest.mark.slow
-def test_efficiency_falls_with_misalignment_by_their_own_friction(tmp_path: Path) -> None:
-    """From no misalignment on; and beyond 21° the joint locks, which is told and no number."""
-    text = CARDAN.read_text("utf-8")
-    changed = text.replace("coefficient: 0.42}", "coefficient: 0.42, model: pezzuti}")
-    assert changed != text
-    (tmp_path / "own.yaml").write_text(changed, "utf-8")
-    swept = trunnion.sweep(
-        trunnion.read(tmp_path / "own.yaml"), {"misalignment": [f"{a} deg" for a in (0, 1, 15, 30)]}, STEPS, margin=True
-    )
-    assert np.all(np.diff(swept["efficiency"][:-1]) < 0)
-    assert int(swept["status"][-1]) == Status.LOCKED
-    for key in set(swept.data_vars) - {"locking_margin", "status", "without_answer"}:
-        assert np.all(np.isnan(swept[key].values[..., -1])), key
-        assert np.all(np.isfinite(swept[key].values[..., :-1])), key
-    assert int(swept["without_answer"][-1]) > 0
-    assert float(swept["locking_margin"][-1]) < 1 < float(swept["locking_margin"][-2])
-    said = json.loads(swept.attrs["findings"])[0]
-    assert said["severity"] == "error"
-    assert (said["code"], said["figures"]["points"], said["figures"]["of"]) == ("sweep.no_answer", 1, 4)
-    assert "misalignment = 30 deg" in said["what"]
-    assert "locked" in said["what"]
 
 
 def test_efficiency_falls_with_speed() -> None:
@@ -275,16 +171,6 @@ def test_efficiency_falls_with_speed() -> None:
     massless |= {"input-shaft.inertia.yz": 0.0}
     light = trunnion.sweep(mechanism.with_values(massless), {"input.speed": ("50 rpm", "1500 rpm", 3)}, STEPS)
     assert np.allclose(light["efficiency"], light["efficiency"][0], rtol=1e-12)  # without masses speed does nothing
-
-
-def test_without_friction_nothing_is_lost() -> None:
-    mechanism = trunnion.read(CARDAN).with_friction("off")
-    grid = trunnion.sweep(
-        mechanism, {"misalignment": ("0 deg", "40 deg", 5), "input.speed": (5, 150, 2)}, 72, margin=True
-    )
-    assert np.allclose(grid["efficiency"], 1, rtol=0, atol=1e-12)
-    assert np.all(grid["friction_power_mean"] == 0)
-    assert np.all(np.isinf(grid["locking_margin"]))
 
 
 # ---- what cannot be answered, what cannot be asked --------------------------------------------------------------
@@ -338,15 +224,6 @@ def test_what_cannot_be_swept_is_said_with_a_remedy(case: str) -> None:
     assert all(finding.remedy for finding in caught.value.findings)
 
 
-def test_a_name_of_the_result_needs_its_path() -> None:
-    data = read("slider-crank").data()
-    data["dimensions"]["efficiency"] = "1"
-    mechanism = Mechanism(**data)
-    with pytest.raises(MechanismError, match=r"dimensions\.efficiency"):
-        trunnion.sweep(mechanism, {"efficiency": [1, 2]}, 4)
-    assert "dimensions.efficiency" in trunnion.sweep(mechanism, {"dimensions.efficiency": [1, 2]}, 4).dims
-
-
 def test_what_is_wrong_at_a_point_says_at_which() -> None:
     """Two values that are sound each by itself and impossible together."""
     inertia = {"cross.inertia.xx": [6.0e-6, 4.5e-6], "cross.inertia.zz": [2.0e-6, 5.0e-6]}
@@ -356,25 +233,6 @@ def test_what_is_wrong_at_a_point_says_at_which() -> None:
 
 
 # ---- files ----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.spread(2)
-@pytest.mark.parametrize("suffix", [".nc", ".zarr", ".json"])
-def test_a_grid_is_kept_whole(suffix: str, tmp_path: Path) -> None:
-    grid = trunnion.sweep(read("durango-fourbar"), {"AB": ["2.1 m", "2.6 m"], "C.friction.coefficient": [0.1, 0.2]}, 36)
-    path = tmp_path / f"grid{suffix}"
-    trunnion.save(grid, path)
-    if suffix == ".json":
-        told = json.loads(path.read_text("utf-8"))
-        assert told["data_vars"]["friction_power_mean"]["data"][1] == [None, None]
-        assert told["data_vars"]["friction_power_mean"]["data"][0] == grid["friction_power_mean"].values[0].tolist()
-        return
-    again = xr.load_dataset(path) if suffix == ".nc" else xr.open_zarr(path).load()
-    for name, values in grid.variables.items():
-        assert np.array_equal(again[name].values, values.values, equal_nan=values.dtype.kind == "f"), name
-        assert again[name].attrs.get("units") == values.attrs.get("units")
-    assert again.attrs["findings"] == grid.attrs["findings"]
-    assert [path.name for path in tmp_path.iterdir()] == [f"grid{suffix}"]
 
 
 @pytest.mark.slow
@@ -393,19 +251,67 @@ def test_a_mechanism_with_errors_stands_beside_the_ideal_one() -> None:
     assert unit == "rad"
 
 
-def test_the_transmission_error_of_a_slide_is_a_length() -> None:
-    mechanism = trunnion.read(CARDAN.with_name("toleranced-slider-crank.yaml"))
-    mechanism = mechanism.with_values({"joint_defaults.seat": "loaded"})
-    swept = trunnion.sweep(mechanism, {"Q.pin.clearance": ["10 um", "20 um"]}, STEPS)
-    found = figures_of(swept)
-    assert [found[f"{joint}.transmission_error_max"][0] for joint in "PS"] == ["rad", "m"]
-    assert found["S.transmission_error_max"][1][1] > found["S.transmission_error_max"][1][0] > 1e-5
+def model(name: str, measures: dict[str, object]) -> Mechanism:
+    data = trunnion.read(EXAMPLES / f"{name}.yaml").data()
+    return Mechanism(**{**data, "measures": {**data.get("measures", {}), **measures}})
 
 
 @pytest.mark.slow
-def test_points_without_errors_stand_beside_those_with() -> None:
-    mechanism = trunnion.read(CARDAN).with_values({"joint_defaults.seat": "loaded"})
-    swept = trunnion.sweep(mechanism, {"joint_defaults.pin.clearance": ["0 mm", "0.01 mm"]}, STEPS)
-    assert float(swept["efficiency"][0]) == float(swept["efficiency_ideal"][0])
-    assert float(swept["transmission_error_max"].max("joint")[0]) == 0
-    assert float(swept["efficiency"][1]) < float(swept["efficiency_ideal"][1])
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_each_point_is_an_analysis_of_its_own(space: str) -> None:
+    """Extremes, a place, a root mean square, a stroke, the efficiency: of each point what an analysis of it has."""
+    name, out, over = {
+        "planar": ("durango-fourbar", "D", {"AB": ["1.9 m", "2 m", "2.1 m"]}),
+        "spatial": ("rssr", "D", {"joint_defaults.friction.coefficient": [0.05, 0.1]}),
+    }[space]
+    stated = {
+        "there": {"rotation": out, "at": "60 deg"}, "swing": {"stroke": out}, "power": {"efficiency": "cycle"},
+        "torque": {"effort": "A", "as": "rms"}, "least": {"effort": "A", "as": "minimum"},
+    }  # fmt: skip
+    mechanism = model(name, stated)
+    start = {"drivers.A.start": 0}
+    result = trunnion.sweep(mechanism.with_values(start), over, 72, measures=[*stated, "mean:effort:A"])
+    (swept,) = over
+    for k, value in enumerate(over[swept]):
+        one = trunnion.analyse(mechanism.with_values({**start, swept: value}), 72)
+        effort, turned = one["drive_effort"].sel(driver="A"), one["joint_rotation"].sel(joint=out).values
+        speed = float(one["joint_rotation_velocity"].sel(joint="A").mean())
+        rms = float(one["drive_effort_rms"].item())
+        assert float(result["torque"][k]) == pytest.approx(rms, rel=1e-5)
+        mean = float(one["drive_power_mean"]) / speed
+        assert float(result["mean:effort:A"][k]) == pytest.approx(mean, abs=1e-5 * rms)
+        assert float(result["least"][k]) <= float(effort.min())
+        many = brief(mechanism.with_values({**start, swept: value}), 500 * 72)["drive_effort"]
+        assert float(result["least"][k]) == pytest.approx(float(many.min()), rel=2e-3, abs=2e-4 * float(many.max()))
+        apart = float(result["there"][k]) - turned[72 // 6]
+        assert np.sin(apart / 2) == pytest.approx(0, abs=1e-9)
+        assert float(result["swing"][k]) == pytest.approx(np.ptp(np.unwrap(turned)), rel=1e-2)
+        if np.isfinite(one.attrs.get("efficiency", np.nan)):
+            assert float(result["power"][k]) == pytest.approx(float(one.attrs["efficiency"]), rel=1e-6)
+    assert result["swing"].attrs["units"] == "rad"
+    assert "not in this sweep" not in result.attrs["findings"]
+
+
+def test_a_point_without_an_answer_has_no_figure() -> None:
+    mechanism = model("durango-fourbar", {"torque": {"effort": "A", "as": "rms"}})
+    result = trunnion.sweep(mechanism, {"AB": ["2 m", "9 m"]}, 24, measures=["torque"])
+    assert np.isfinite(result["torque"].values).tolist() == [True, False]
+
+
+def test_what_cannot_be_swept_says_why() -> None:
+    mechanism = model("durango-fourbar", {
+        "angle": {"rotation": "D"}, "error": {"transmission_error": "D"}, "status": {"stroke": "D"},
+    })  # fmt: skip
+    with pytest.raises(MechanismError) as caught:
+        trunnion.sweep(mechanism, {"AB": [2, 2.1]}, 24, measures=["angle", "error", "status"])
+    assert [one.where for one in caught.value.findings] == ["measures.angle", "measures.error", "measures.status"]
+    texts = [one.what for one in caught.value.findings]
+    assert "every position and none of the cycle" in texts[0]
+    assert "a deviation from the nominal mechanism" in texts[1]
+    assert "name of a figure of the sweep" in texts[2]
+
+
+def test_measures_that_are_left_out_are_named() -> None:
+    result = trunnion.sweep(model("durango-fourbar", {"swing": {"stroke": "D"}}), {"AB": [2, 2.1]}, 24)
+    (row,) = [row for row in json.loads(result.attrs["findings"]) if "not in this sweep" in str(row)]
+    assert "swing" in str(row)

@@ -237,6 +237,8 @@ MISTAKES = {
             ("over: [1 deg, 1 deg]", "swing.over", "begins and ends")],
     },
     RSSP: {
+        "bearing: 40 mm": [("bearing: 0", "joints.A.pin.bearing", "is 0, where friction needs it")],
+        "width: 40 mm": [("width: 0", "joint_defaults.guide.width", "is 0, where friction needs it")],
         "A: {at: [0, 0, 0], axis: [0, 0, 1]}, B": [
             ("A: [0, 0, 0], B", "links.crank.points.A", "has no axis, a revolute joint needs one"),
             ("A: {at: [0, 0, 0], axis: [0, 0, 0]}, B", "links.crank.points.A.axis", "no direction")],

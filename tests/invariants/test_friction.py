@@ -1,4 +1,4 @@
-"""Every friction is what its law says for the load that is found, wherever the status says solved."""
+"""Every friction is what its law says for its load wherever the status says solved; following it from none to all."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from trunnion import FrictionMethod, Mechanism, Status
 from trunnion.algebra.dual import derivative, primal, seed
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PlanarContactLoad, Reaction
+from trunnion.solve import continuation
 from trunnion.solve.friction import Contact, Settled, settle
 from trunnion.solve.run import prepare
 
@@ -112,23 +113,6 @@ def test_converged_lanes_obey_their_laws(case: tuple[Array, Array, list[tuple[Pl
     assert np.allclose(np.array(newton.forces)[:, both], np.array(named.forces)[:, both], rtol=1e-7, atol=0)
 
 
-@pytest.mark.slow
-@settings(max_examples=10, deadline=None)
-@given(modules())
-def test_a_lane_does_not_depend_on_the_lanes_beside_it(
-    case: tuple[Array, Array, list[tuple[PlanarContactLoad, Any]]],
-) -> None:
-    """To the bit where a certificate says that no continuation is needed."""
-    start, influence, contacts = case
-    for method in (NEWTON, FrictionMethod("successive-approximation", limit=2000)):
-        whole = settled(start, influence, contacts, method)
-        for lane in np.flatnonzero(np.broadcast_to(whole.certain, (40,)))[:3]:
-            part = slice(lane, lane + 1)
-            own = [(load.mapped(lambda n: n[part] if np.ndim(n) else n), f[part]) for load, f in contacts]  # noqa: B023
-            alone = settled(start[..., part], influence[..., part], own, method)
-            assert np.array_equal(np.array(alone.forces)[:, 0], np.array(whole.forces)[:, lane], equal_nan=True)
-
-
 def test_derivatives_are_those_of_the_side_of_the_kink() -> None:
     """A guide beside its kink, friction from its couple alone: no derivative by the force that another end carries."""
     for force, expected in ((0.5, 0.0), (2.0, 0.49 / (1 + 0.5 * 0.49))):
@@ -171,3 +155,65 @@ def test_single_positions_of_an_eccentric_press() -> None:
         sides.add(force > couple)
         assert abs(friction) == pytest.approx(0.49 * max(force, couple), rel=1e-10)
     assert sides == {True, False}
+
+
+def _pins(x, share, start, gain, signs):
+    """Residual and Jacobian of pins in a loop of influence: φ_k = f_k |R_k0 + Σ G_kl φ_l|."""
+    reactions = [[start[k][i] + sum(gain[k][j][i] * x[j] for j in range(3)) for i in range(2)] for k in range(3)]
+    sizes = [np.hypot(*r) for r in reactions]
+    residual = [x[k] - share * signs[k] * sizes[k] for k in range(3)]
+    jacobian = [
+        [
+            (1.0 if k == j else 0.0)
+            - share * signs[k] * sum(a * b for a, b in zip(reactions[k], gain[k][j], strict=True)) / sizes[k]
+            for j in range(3)
+        ]
+        for k in range(3)
+    ]
+    return residual, jacobian
+
+
+def _drawn(rng: np.random.Generator, lanes: int):
+    """Random pins with strong friction: reactions without it, influences, senses, lane last."""
+    start, gain = rng.normal(size=(3, 2, lanes)), rng.normal(size=(3, 3, 2, lanes)) * 0.6
+    return start, gain, rng.choice([-1.0, 1.0], size=(3, lanes))
+
+
+@pytest.mark.parametrize(("seed", "lanes"), [(0, 400), pytest.param(2, 2000, marks=pytest.mark.slow)])
+def test_lanes_lock_at_the_share_to_which_small_steps_lead(
+    seed: int, lanes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Folds, solutions that run to infinity and kinks, at up to six times the friction."""
+    drawn, start = _drawn(np.random.default_rng(seed), lanes), [np.zeros(lanes)] * 3
+    shares = continuation.follow(lambda x, s: _pins(x, s, *drawn), start, 6.0)[1]
+    for name, value in {"FIRST_STEP": 0.004, "LONGEST_STEP": 0.004, "STRAIGHT": 0.0, "MOST_TRIALS": 3000}.items():
+        monkeypatch.setattr(continuation, name, value)
+    finely = continuation.follow(lambda x, s: _pins(x, s, *drawn), start, 6.0)[1]
+    assert np.count_nonzero(shares < 6.0) > 0.95 * lanes
+    assert np.allclose(shares, finely, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_compiled_steps_lead_as_far(seed: int) -> None:
+    """The same way, recorded and compiled: a lane stops at the same fold, or goes on where the other does."""
+    from trunnion.engines.graph import POSITION, Graph
+    from trunnion.engines.machine_code import MachineCode, vector_width
+    from trunnion.engines.program import program
+    from trunnion.engines.recorded import Recorded, number_of
+
+    lanes, rng = 800, np.random.default_rng(seed)
+    drawn = _drawn(rng, lanes)
+    _, expected = continuation.follow(lambda x, s: _pins(x, s, *drawn), [np.zeros(lanes)] * 3)
+    graph, inputs = Graph(), {}
+    recorded = []
+    for name, numbers in zip(("start", "gain", "signs"), drawn, strict=True):
+        cells = np.empty(numbers.shape[:-1], object)
+        for place in np.ndindex(cells.shape):
+            inputs[f"{name}{place}"] = np.ascontiguousarray(numbers[place])
+            cells[place] = Recorded(graph, graph.input(f"{name}{place}", POSITION))
+        recorded.append(cells.tolist())
+    _, share = continuation.follow(lambda x, s: _pins(x, s, *recorded), [0.0] * 3)
+    found = np.empty((1, lanes))
+    MachineCode(program(graph, [number_of(graph, share)], vector_width())).run(inputs, [found], (0, 1), (0, lanes))
+    assert 100 < np.count_nonzero(expected < 1.0) < lanes - 100
+    assert np.max(np.abs(found[0] - expected)) < 1e-9

@@ -1,4 +1,4 @@
-"""What holds of every allocation by yield: a wider limit costs no more, what is known to do is not refused, luck is."""
+"""An allocation does not depend on units or order; a wider limit costs no more, what is known to do is not refused."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from allocations import bought, random_costs, random_options, rows
+from allocations import bought, random_costs, rows
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -15,13 +15,72 @@ from numpy.typing import NDArray
 from trunnion.errors import Severity
 from trunnion.model.tolerances import ProcessChoice
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation.problem import AllocationProblem, Answer, Contribution, SampledYield
+from trunnion.studies.allocation.problem import AllocationProblem, Answer, Contribution, Criterion, SampledYield
 from trunnion.studies.allocation.solve import Choice, solve
 from trunnion.studies.allocation.yields import Verify, normal_yield
 
+COST, HALF_WIDTH = 1e-6, 1e-3  # the gap that is claimed, and its root: the cost is flat at its least
+SEEDS = st.integers(0, 10**6)
+CRITERIA = st.sampled_from(["worst-case", "rss", "yield"])
+
+
+def case(seed: int, criterion: Criterion) -> AllocationProblem:
+    """Six rows, four tolerances."""
+    rng = np.random.default_rng(seed)
+    return AllocationProblem(
+        bought(random_costs(rng, 4), most=0.3), rows(rng.normal(size=(6, 4)), rng.uniform(0.1, 0.5, 6)), criterion
+    )
+
+
+@settings(max_examples=15, deadline=None)
+@given(SEEDS, CRITERIA, st.floats(-4, 4), st.floats(-4, 4))
+def test_units(seed: int, criterion: Criterion, length: float, money: float) -> None:
+    """Half widths in another unit, costs in another currency, rows each in their own unit."""
+    problem, a, c = case(seed, criterion), 10.0**length, 10.0**money
+    first, rng = solve(problem), np.random.default_rng(seed + 1)
+    own = rng.uniform(0.01, 100, (6, 1))
+    parts = []
+    for one in problem.contributions:
+        assert one.cost is not None
+        given = one.cost.parameters
+        cost = Cost(one.cost.model, {**given, "A": c * given["A"], "B": c * given["B"], "unit": a * given["unit"]})
+        parts.append(replace(one, cost=cost, most=a * one.most))
+    assert problem.effects.half is not None
+    effects = rows(own * problem.effects.half / a, own[:, 0] * problem.effects.upper)
+    second = solve(replace(problem, contributions=tuple(parts), effects=effects))
+    assert second.tolerances == pytest.approx(a * first.tolerances, rel=HALF_WIDTH)
+    assert second.cost == pytest.approx(c * first.cost, rel=COST)
+    assert second.proven
+
+
+@settings(max_examples=15, deadline=None)
+@given(SEEDS, CRITERIA)
+def test_order_and_rows_that_do_not_bind(seed: int, criterion: Criterion) -> None:
+    problem, rng = case(seed, criterion), np.random.default_rng(seed + 1)
+    first, order, lines = solve(problem), rng.permutation(4), rng.permutation(6)
+    assert problem.effects.half is not None
+    effect, limit = problem.effects.half[lines][:, order], problem.effects.upper[lines]
+    more = rows(np.concatenate([effect, effect, 0.5 * effect]), np.tile(limit, 3))
+    parts = tuple(problem.contributions[i] for i in order)
+    second = solve(replace(problem, contributions=parts, effects=more))
+    assert second.tolerances == pytest.approx(first.tolerances[order], rel=HALF_WIDTH)
+    assert second.cost == pytest.approx(first.cost, rel=COST)
+    assert first.proven
+    assert second.proven
+
+
+@settings(max_examples=15, deadline=None)
+@given(SEEDS)
+def test_the_criteria_are_in_order(seed: int) -> None:
+    """Worst case costs most; a yield at z = 3 of independent deviations without shift is RSS."""
+    worst, rss, share = (solve(case(seed, criterion)) for criterion in ("worst-case", "rss", "yield"))
+    assert worst.cost >= rss.cost * (1 - COST)
+    assert share.cost == pytest.approx(rss.cost, rel=COST)
+    assert share.tolerances == pytest.approx(rss.tolerances, rel=HALF_WIDTH)
+
+
 Array = NDArray[np.float64]
 TARGET = 0.995
-SEEDS = st.integers(0, 10**6)
 
 
 def press(room: float, discrete: bool = False) -> AllocationProblem:
@@ -118,25 +177,6 @@ def test_what_is_known_to_do_is_not_refused(correlated: bool, seed: int) -> None
     assert answer.expected >= target - 1e-9
     cost = sum(one.cost.value(float(t)) for one, t in zip(parts, known, strict=True) if one.cost)
     assert answer.cost <= 1.01 * cost
-
-
-@pytest.mark.slow
-@settings(max_examples=10, deadline=None)
-@given(seed=SEEDS)
-def test_a_choice_that_is_known_to_do_is_not_refused(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    options = [random_options(rng, 3) for _ in range(3)]
-    parts = (*(Contribution(f"p{i}", options=one) for i, one in enumerate(options)), Contribution("fixed", 1.0))
-    effect = rng.normal(size=(3, 4))
-    effect[:, 3] *= rng.choice([0.0, 0.05], 3)
-    effects = replace(rows(effect, rng.uniform(0.08, 0.2, 3)), labels=("a", "b", "c"))
-    problem = AllocationProblem(parts, effects, "yield")
-    known = np.array([*(rng.choice([one.tolerance for one in each]) for each in options), 1.0])
-    target = normal_yield(problem, known) - 1e-4
-    if 0.9 < target < 0.9999:
-        answer = solve(problem, "discrete", target)
-        assert not refused(answer)
-        assert answer.expected >= target
 
 
 @pytest.mark.parametrize("discrete", [False, True])

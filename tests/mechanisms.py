@@ -13,15 +13,7 @@ from numpy.typing import NDArray
 
 import trunnion
 from brief import brief
-from geared import (
-    geared_five_bar,
-    geared_loop,
-    planet_drive,
-    rack_in_loop,
-    rack_on_rocker,
-    rocker_train,
-    screwed_strut,
-)
+from geared import geared_five_bar, geared_loop, planet_drive, rack_in_loop, rack_on_rocker, rocker_train, screwed_strut
 from mechanisms_parts import Data, body, prismatic, revolute, slide
 from trunnion import Mechanism
 from trunnion.groups.general import General
@@ -173,10 +165,7 @@ def class_three() -> Data:
             "H": revolute("rod3", "ground"),
         },
         "drivers": {"A": {"speed": 5.0}},
-        "loads": {
-            "push": {"link": "plate", "at": "R", "force": [7.0, -20.0]},
-            "turn": {"link": "rod3", "moment": 3.0},
-        },
+        "loads": {"push": {"link": "plate", "at": "R", "force": [7.0, -20.0]}, "turn": {"link": "rod3", "moment": 3.0}},
         "assembly": {"P": [0.7, 0.6], "Q": [1.3, 0.6], "R": [0.95, 1.1]},
     }
 
@@ -235,11 +224,7 @@ def serial_arm() -> Data:
             "ram": body({"P": slide(-0.2, 0.05, -0.4), "W": [0.6, 0.1]}, 2),
             "hand": body({"W": [0.05, 0.02], "T": [0.4, 0]}, 3, 0.3),
         },
-        "joints": {
-            "A": revolute("ground", "arm"),
-            "P": prismatic("arm", "ram"),
-            "W": revolute("hand", "ram"),
-        },
+        "joints": {"A": revolute("ground", "arm"), "P": prismatic("arm", "ram"), "W": revolute("hand", "ram")},
         "drivers": {
             "A": {"speed": 1.0, "range": [0.0, 2.0]},
             "P": {"speed": -0.25, "range": [0.5, 0.0]},

@@ -12,10 +12,7 @@ from trunnion.model.mechanism import Mechanism
 def wheel(motor: dict[str, Any] | None = None, drag: float = 0.6, grease: float = 0.0, **driver: Any) -> Mechanism:
     """A flywheel of 0.05 kg m² on a shaft, with a constant and a viscous loss."""
     return Mechanism(
-        links={
-            "ground": {"points": {"A": [0, 0]}},
-            "wheel": {"points": {"A": [0, 0]}, "inertia": 0.05},
-        },
+        links={"ground": {"points": {"A": [0, 0]}}, "wheel": {"points": {"A": [0, 0]}, "inertia": 0.05}},
         joints={"A": {"type": "revolute", "links": ["ground", "wheel"]}},
         drivers={"A": {"speed": 100, **({"motor": motor} if motor else {"free": True}), **driver}},
         loads={"drag": {"joint": "A", "resisting_torque": drag}} if drag else {},
@@ -80,10 +77,7 @@ def slider_crank(friction: float | dict[str, Any] = 0.1, **more: Any) -> Mechani
         },
         "joint_defaults": {"pin": {"radius": 0.01}, **({"friction": friction} if friction else {})},
         "drivers": {
-            "O": {
-                "speed": 100,
-                "motor": {"kind": "linear", "stall_effort": 8, "no_load_speed": 157, "inertia": 1e-3},
-            }
+            "O": {"speed": 100, "motor": {"kind": "linear", "stall_effort": 8, "no_load_speed": 157, "inertia": 1e-3}}
         },
         "loads": {"work": {"joint": "S", "resisting_force": 40}},
         "assembly": {"Q": [0.155, 0]},

@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import fsolve
 
-import trunnion
 from gallery.entry import Entry, Outcome
+from gallery.four_bars import torque_at_60
 from gallery.plane import bend, corner, slope
 from trunnion.solve.run import prepare
 
@@ -95,37 +95,20 @@ def butterfly_torque(turn: float = np.pi / 3) -> float:
     return float(torque)
 
 
-def torque_at_60(one: Outcome) -> float:
-    ideal = trunnion.analyse(one.mechanism.with_friction("off"), 6)
-    return float(ideal["drive_effort"].sel(driver="A")[1])
-
-
 ENTRIES = {
     "five-bar-robot": Entry(
-        says="Torque that the process force asks of the motor A after 0.1 s",
-        unit="N m",
-        found=share,
-        expected=share_by_hand,
+        says="Torque that the process force asks of the motor A after 0.1 s", unit="N m", tolerance=1e-9,
+        figures=("mechanism", "torque"), found=share, expected=share_by_hand,
         source="virtual work, −Jᵀ F, on a tool found by intersecting circles",
-        tolerance=1e-9,
-        figures=("mechanism", "torque"),
     ),
     "double-butterfly": Entry(
-        says="Drive torque without friction at 60° of the crank",
-        unit="N m",
-        found=torque_at_60,
-        expected=butterfly_torque,
+        says="Drive torque without friction at 60° of the crank", unit="N m", tolerance=1e-5,
+        figures=("mechanism", "torque"), found=torque_at_60, expected=butterfly_torque,
         source="virtual work, on a closure for three angles (SciPy)",
-        tolerance=1e-5,
-        figures=("mechanism", "torque"),
     ),
     "andrews-squeezer": Entry(
-        says="Drive torque at the start",
-        unit="N m",
-        found=lambda one: float(one.result["drive_effort"].sel(driver="O")[0]),
-        expected=lambda: 0.033,
+        says="Drive torque at the start", unit="N m", tolerance=1e-13, figures=("mechanism", "torque"),
+        found=lambda one: float(one.result["drive_effort"].sel(driver="O")[0]), expected=lambda: 0.033,
         source="the torque that gives the published acceleration there (E. Hairer, G. Wanner)",
-        tolerance=1e-13,
-        figures=("mechanism", "torque"),
     ),
-}
+}  # fmt: skip

@@ -69,29 +69,18 @@ def klann_foot(turn: Any) -> Any:
 
 ENTRIES = {
     "peaucellier": Entry(
-        says="Farthest that the pen strays from a straight line",
-        unit="m",
-        found=stray,
-        expected=lambda: 0.0,
-        source="Peaucellier's x = (L² − m²) / (2 r)",
-        tolerance=2e-13,
+        says="Farthest that the pen strays from a straight line", unit="m", tolerance=2e-13, found=stray,
+        expected=lambda: 0.0, source="Peaucellier's x = (L² − m²) / (2 r)",
     ),
     "jansen": Entry(
-        says="Length of the foot's step, by positions 5° apart",
-        unit="m",
-        found=stride,
-        expected=lambda: float(np.ptp(jansen_foot(turns(np.pi)).real)),
+        says="Length of the foot's step, by positions 5° apart", unit="m", tolerance=1e-12,
+        figures=("mechanism", "torque"), found=stride, expected=lambda: float(np.ptp(jansen_foot(turns(np.pi)).real)),
         source="intersecting circles, from the crank to the foot",
-        tolerance=1e-12,
-        figures=("mechanism", "torque"),
     ),
     "klann": Entry(
-        says="Height to which the foot is lifted, by positions 5° apart",
-        unit="m",
-        found=lambda one: float(np.ptp(one.track("leg.foot")[1])),
+        says="Height to which the foot is lifted, by positions 5° apart", unit="m", tolerance=1e-10,
+        figures=("mechanism", "motion"), found=lambda one: float(np.ptp(one.track("leg.foot")[1])),
         expected=lambda: float(np.ptp(klann_foot(turns(np.pi)).imag)),
         source="solving for the places of three pins such that all lengths keep (SciPy)",
-        tolerance=1e-10,
-        figures=("mechanism", "motion"),
     ),
-}
+}  # fmt: skip

@@ -9,19 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from gallery import (
-    benchmarks,
-    drawing,
-    four_bars,
-    geared,
-    in_time,
-    presses,
-    several_loops,
-    sliders,
-    spatial,
-    toleranced,
-    with_errors,
-)
+from gallery import benchmarks, drawing, four_bars, in_time, presses, several_loops, sliders, spatial, toleranced
 from gallery.entry import Entry
 
 __all__ = ["ENTRIES", "REFUSED", "SECTIONS"]
@@ -31,12 +19,12 @@ SECTIONS: Mapping[str, Mapping[str, Entry]] = {
     "Linkages with slides": sliders.ENTRIES,
     "Several loops": several_loops.ENTRIES,
     "Straight lines and walking legs": drawing.ENTRIES,
-    "Gears": geared.ENTRIES,
+    "Gears": several_loops.GEARED,
     "Presses": presses.ENTRIES,
     "Moved by motors and weights": in_time.ENTRIES,
     "Two drives, a large group, a benchmark": benchmarks.ENTRIES,
     "In space": spatial.ENTRIES,
-    "With play and misaligned axes": with_errors.ENTRIES,
+    "With play and misaligned axes": toleranced.PLAYED,
     "With tolerances": toleranced.ENTRIES,
 }
 ENTRIES: Mapping[str, Entry] = {name: entry for section in SECTIONS.values() for name, entry in section.items()}

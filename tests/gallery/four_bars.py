@@ -82,37 +82,24 @@ def height_of_chebyshev_by_hand() -> float:
 
 ENTRIES = {
     "durango-fourbar": Entry(
-        says="Drive torque without friction at 60° of the crank",
-        unit="N m",
-        found=torque_at_60,
-        expected=torque_by_virtual_work,
+        says="Drive torque without friction at 60° of the crank", unit="N m", tolerance=1e-4,
+        figures=("mechanism", "torque"), found=torque_at_60, expected=torque_by_virtual_work,
         source="virtual work on pins found by intersecting circles",
-        tolerance=1e-4,
-        figures=("mechanism", "torque"),
     ),
     "spring-balanced-lamp": Entry(
-        says="Largest torque at the pivot without friction",
-        unit="N m",
-        found=hold,
+        says="Largest torque at the pivot without friction", unit="N m", tolerance=1e-12, found=hold,
         expected=lambda: 0.0,
         source="the balance k a b = Σ m g r of a spring of free length zero (M. J. French, M. B. Widden, Proc. IMechE "
-        "C 214 (2000) 501–508)",
-        tolerance=1e-12,
+               "C 214 (2000) 501–508)",
     ),
     "hoecken": Entry(
-        says="Height of the path of P over half a turn of the crank, 90° to 270°",
-        unit="m",
-        found=height_of_hoecken,
-        expected=height_of_hoecken_by_hand,
+        says="Height of the path of P over half a turn of the crank, 90° to 270°", unit="m", tolerance=1e-13,
+        found=height_of_hoecken, expected=height_of_hoecken_by_hand,
         source="intersecting circles at every half degree",
-        tolerance=1e-13,
     ),
     "chebyshev-line": Entry(
-        says="Height of the path of P from 60° to 180° of the coupler",
-        unit="m",
-        found=height_of_chebyshev,
-        expected=height_of_chebyshev_by_hand,
+        says="Height of the path of P from 60° to 180° of the coupler", unit="m", tolerance=1e-12,
+        found=height_of_chebyshev, expected=height_of_chebyshev_by_hand,
         source="intersecting circles at every half degree",
-        tolerance=1e-12,
     ),
-}
+}  # fmt: skip

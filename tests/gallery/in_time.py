@@ -73,21 +73,13 @@ def turn_of(one: Outcome) -> float:
 
 ENTRIES = {
     "landing-gear": Entry(
-        says="Time of the fall to the stop, without friction",
-        unit="s",
-        found=fall,
-        expected=fall_by_hand,
+        says="Time of the fall to the stop, without friction", unit="s", tolerance=1e-6,
+        figures=("mechanism", "motion"), found=fall, expected=fall_by_hand,
         source="the equation of motion of the brace written out, by SciPy",
-        tolerance=1e-6,
-        figures=("mechanism", "motion"),
     ),
     "andrews-squeezer-in-time": Entry(
-        says="Angle of K1 after 0.03 s under 0.033 N m",
-        unit="rad",
-        found=turn_of,
-        expected=lambda: 15.81077119629904,
+        says="Angle of K1 after 0.03 s under 0.033 N m", unit="rad", tolerance=1e-8, figures=("mechanism", "torque"),
+        found=turn_of, expected=lambda: 15.81077119629904,
         source="the published solution of the benchmark (F. Mazzia, C. Magherini)",
-        tolerance=1e-8,
-        figures=("mechanism", "torque"),
     ),
-}
+}  # fmt: skip

@@ -97,39 +97,22 @@ def start_by_hand() -> float:
 
 ENTRIES = {
     "flywheel-press": Entry(
-        says="Acceleration of the crank as the motor starts it, without friction",
-        unit="rad/s^2",
-        found=start_of,
-        expected=start_by_hand,
+        says="Acceleration of the crank as the motor starts it, without friction", unit="rad/s^2", tolerance=1e-9,
+        figures=("mechanism", "torque"), found=start_of, expected=start_by_hand,
         source="Kloss's torque at standstill over the inertias at the dead centre",
-        tolerance=1e-9,
-        figures=("mechanism", "torque"),
     ),
     "toggle-press": Entry(
-        says="Distance of the knee from its dead centre below which the press holds by itself",
-        unit="m",
-        found=holds_from,
-        expected=lambda: 2 * 0.1 * 0.02,
+        says="Distance of the knee from its dead centre below which the press holds by itself", unit="m",
+        tolerance=1e-10, figures=("mechanism", "torque"), found=holds_from, expected=lambda: 2 * 0.1 * 0.02,
         source="the friction circles of the three pins, 2 f ρ",
-        tolerance=1e-10,
-        figures=("mechanism", "torque"),
     ),
     "drawing-press": Entry(
-        says="Friction coefficient of the guide from which the press locks, with frictionless pins",
-        unit="1",
-        found=guide_locks_from,
-        expected=guide_locks_by_hand,
+        says="Friction coefficient of the guide from which the press locks, with frictionless pins", unit="1",
+        tolerance=1e-8, figures=("mechanism", "torque"), found=guide_locks_from, expected=guide_locks_by_hand,
         source="the equilibrium of the ram by hand, slide / (2 neck tan α)",
-        tolerance=1e-8,
-        figures=("mechanism", "torque"),
     ),
     "jaw-crusher": Entry(
-        says="Stroke of the jaw at its lip",
-        unit="m",
-        found=stroke,
-        expected=stroke_by_hand,
-        source="intersecting circles and looking for the extremes (SciPy)",
-        tolerance=1e-12,
-        figures=("mechanism", "torque"),
+        says="Stroke of the jaw at its lip", unit="m", tolerance=1e-12, figures=("mechanism", "torque"), found=stroke,
+        expected=stroke_by_hand, source="intersecting circles and looking for the extremes (SciPy)",
     ),
-}
+}  # fmt: skip

@@ -1,4 +1,4 @@
-"""Linkages of several loops of the gallery."""
+"""Linkages of several loops of the gallery, and linkages with gears."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import fsolve
 
-from gallery.entry import Entry, Outcome
+from gallery.entry import STEPS, Entry, Outcome
 from gallery.plane import corner
 
 # ---- indexing-press: lift of the punch ----------------------------------------------------------------------------
@@ -90,30 +90,46 @@ def rest_of_stephenson() -> float:
 
 ENTRIES = {
     "indexing-press": Entry(
-        says="Lift of the punch",
-        unit="m",
-        found=lift,
-        expected=lift_by_hand,
-        source="intersecting circles at both ends of the ram",
-        tolerance=1e-12,
-        figures=("mechanism", "motion"),
+        says="Lift of the punch", unit="m", tolerance=1e-12, figures=("mechanism", "motion"), found=lift,
+        expected=lift_by_hand, source="intersecting circles at both ends of the ram",
     ),
     "watt-six-bar": Entry(
-        says="Swing of the agitator",
-        unit="rad",
-        found=swing_of_agitator,
-        expected=swing_of_watt,
-        source="closing both loops with scipy's fsolve",
-        tolerance=1e-10,
-        figures=("mechanism", "motion"),
+        says="Swing of the agitator", unit="rad", tolerance=1e-10, figures=("mechanism", "motion"),
+        found=swing_of_agitator, expected=swing_of_watt, source="closing both loops with scipy's fsolve",
     ),
     "stephenson-six-bar": Entry(
-        says="Turn of the output from 120° to 240° of the crank",
-        unit="rad",
-        found=rest,
-        expected=rest_of_stephenson,
+        says="Turn of the output from 120° to 240° of the crank", unit="rad", tolerance=1e-10,
+        figures=("mechanism", "motion"), found=rest, expected=rest_of_stephenson,
         source="closing both loops with scipy's fsolve",
-        tolerance=1e-10,
-        figures=("mechanism", "motion"),
     ),
-}
+}  # fmt: skip
+
+
+def tool_height(one: Outcome) -> float:
+    return float(np.ptp(one.track("left.tool")[1]))
+
+
+def expected_height() -> float:
+    """Height of the tool's path over two turns, its place by the circle intersection of the two rods."""
+    turn = 4 * np.pi * np.arange(STEPS) / STEPS
+    b, d = 0.035 * np.exp(1j * turn), 0.120 + 0.045 * np.exp(1j * (np.radians(40) - turn / 2))
+    c = corner(b, d, 0.130, 0.120, 1)
+    tool = b + (0.150 + 0.045j) * (c - b) / 0.130
+    return float(np.ptp(tool.imag))
+
+
+def off_the_line(one: Outcome) -> float:
+    return float(np.abs(one.track("pinion.rod")[1]).max())
+
+
+GEARED = {
+    "geared-five-bar": Entry(
+        says="Height of the tool's path, by positions 10° of the crank apart", unit="m", tolerance=1e-12,
+        found=tool_height, expected=expected_height,
+        source="circle intersection for half the angle at the second crank",
+    ),
+    "cardan-gears": Entry(
+        says="Farthest that the rod's pin strays from the diameter", unit="m", tolerance=1e-15, found=off_the_line,
+        expected=lambda: 0.0, source="La Hire's theorem: a hypocycloid of two cusps is a diameter",
+    ),
+}  # fmt: skip

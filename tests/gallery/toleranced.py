@@ -1,4 +1,4 @@
-"""Linkages with tolerances of the gallery."""
+"""Linkages of the gallery with tolerances, with play and misaligned axes."""
 
 from __future__ import annotations
 
@@ -8,15 +8,13 @@ from itertools import product
 import numpy as np
 
 import trunnion
-from gallery.entry import Entry, Outcome
+from gallery.entry import STEPS, Entry, Outcome
 from gallery.plane import corner, slope
 from gallery.spatial import rocker_of_rssr
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.measures.curves import value
 from trunnion.measures.measures import named
 from trunnion.solve.run import prepare
-
-__all__ = ["ENTRIES"]
 
 
 def corners(one: Outcome) -> float:
@@ -95,45 +93,88 @@ def least_cost_by_hand() -> float:
 
 ENTRIES = {
     "one-way-clutch": Entry(
-        says="Largest wedge angle that the limits of its dimensions allow",
-        unit="rad",
-        found=corners,
-        expected=steepest,
-        source="the closed form cos φ = (a + c)/(e − c) at the corner",
-        tolerance=1e-12,
+        says="Largest wedge angle that the limits of its dimensions allow", unit="rad", tolerance=1e-12, found=corners,
+        expected=steepest, source="the closed form cos φ = (a + c)/(e − c) at the corner",
     ),
     "toleranced-fourbar": Entry(
-        says="Most that the tolerances turn the rocker at 60° of the crank, to first order",
-        unit="rad",
-        found=worst("rotation:D"),
+        says="Most that the tolerances turn the rocker at 60° of the crank, to first order", unit="rad",
+        tolerance=1e-11, figures=("mechanism", "torque"), found=worst("rotation:D"),
         expected=lambda: sum(by_corner((0.03, 0.02, 0.03, 0.03))),
         source="the triangle of coupler and rocker, its derivatives by differences",
-        tolerance=1e-11,
-        figures=("mechanism", "torque"),
     ),
     "fourbar-by-grades": Entry(
-        says="Root of the sum of squares of what the tolerances turn the rocker at 60° of the crank",
-        unit="rad",
-        found=squares("rotation:D"),
+        says="Root of the sum of squares of what the tolerances turn the rocker at 60° of the crank", unit="rad",
+        tolerance=1e-11, found=squares("rotation:D"),
         expected=lambda: float(np.linalg.norm(by_corner((0.027, 0.02, 0.027, 0.023)))),
         source="the triangle of coupler and rocker, its derivatives by differences",
-        tolerance=1e-11,
     ),
     "piston-by-cost": Entry(
-        says="Least cost of tolerances and pins with which the piston keeps its stop",
-        unit="1",
-        found=least_cost,
-        expected=least_cost_by_hand,
+        says="Least cost of tolerances and pins with which the piston keeps its stop", unit="1", tolerance=1e-9,
+        figures=("mechanism", "torque"), found=least_cost, expected=least_cost_by_hand,
         source="the closed form of one limit, t ∝ (B/|S|)^(2/3)",
-        tolerance=1e-9,
-        figures=("mechanism", "torque"),
     ),
     "toleranced-rssr": Entry(
-        says="Most that the tolerances turn the rocker at 60° of the crank, to first order",
-        unit="rad",
-        found=worst("rotation:D"),
-        expected=swing_of_rssr,
+        says="Most that the tolerances turn the rocker at 60° of the crank, to first order", unit="rad",
+        tolerance=1e-10, found=worst("rotation:D"), expected=swing_of_rssr,
         source="the one equation that the length of the rod leaves, its derivatives by differences",
-        tolerance=1e-10,
     ),
-}
+}  # fmt: skip
+
+
+def by_one_play(one: Outcome) -> float:
+    """The most that the play of C does to the angle of the rocker, at 60° of the crank."""
+    found = trunnion.play(one.mechanism, ["rotation:D"], steps=6)
+    return float(found["worst_case"].sel(joint="C", measure="rotation:D")[1])
+
+
+def ideal_output(one: Outcome) -> float:
+    """The same of the spatial linkage."""
+    result = trunnion.analyse(one.mechanism.with_values({"joints.D.seat": "free"}), 6)
+    return float(result["joint_rotation"].sel(joint="D")[1])
+
+
+def smallest(one: Outcome) -> float:
+    """The clearance, the same in every pin, that lets it turn all the way, m."""
+    return float(trunnion.assemble(one.mechanism, 36)["smallest_clearance"])
+
+
+def play_along_the_coupler() -> float:
+    """ϱ/(c sin μ): the coupler is longer by ϱ, c the 70 mm rocker and μ its angle with the coupler of 90 mm."""
+    b = 0.03 * np.exp(1j * np.pi / 3)
+    c = corner(b, 0.1, 0.09, 0.07, 1)
+    return float(2e-5 / (0.07 * abs(np.sin(np.angle((c - b) / (c - 0.1))))))
+
+
+def leaned_hinges() -> float:
+    """ρ = δ H (2 D + H − f)/(4 (D + H)): pins of 80 mm, 1 m apart, one hole leaned by 0.1°, end float of 1 mm.
+
+    The line of the pins goes through the middle of the leaned hole; with the float it is half of it off, where the
+    hole's axis has come nearer to the other by δ f/2.
+    """
+    lean, pin, apart, play = np.radians(0.1), 0.08, 1.0, 1e-3
+    return float(lean * pin * (2 * apart + pin - play) / (4 * (apart + pin)))
+
+
+PLAYED = {
+    "fourbar-with-play": Entry(
+        says="Most that the play of C turns the rocker at 60° of the crank", unit="rad", tolerance=1e-12,
+        figures=("mechanism", "error"), found=by_one_play, expected=play_along_the_coupler,
+        source="the closed form ϱ/(c sin μ), a coupler longer by the play",
+    ),
+    "rssr-with-play": Entry(
+        says="Angle of the rocker at 60° of the crank with its shaft centred", unit="rad", tolerance=1e-12,
+        figures=("mechanism", "seat"), found=ideal_output, expected=lambda: rocker_of_rssr(np.pi / 3),
+        source="the one equation that the length of the rod leaves",
+    ),
+    "misaligned-fourbar": Entry(
+        says="Smallest clearance, the same in all four pins, with which it turns", unit="m", tolerance=1e-11,
+        figures=("assemble",), lost=STEPS, errors=("cannot be assembled",), found=smallest,
+        expected=lambda: float(0.01 * np.tan(np.radians(0.2) / 4)),
+        source="the closed form ½ H tan(δ/4), four pins that take up a quarter of the error each",
+    ),
+    "misaligned-hinges": Entry(
+        says="Smallest clearance, the same in both pins, with which it swings", unit="m", tolerance=1e-10,
+        figures=("assemble",), lost=STEPS, errors=("cannot be assembled",), found=smallest, expected=leaned_hinges,
+        source="the closed form δ H (2 D + H − f)/(4 (D + H)) of the line through two holes, f the end float",
+    ),
+}  # fmt: skip

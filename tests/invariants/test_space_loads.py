@@ -13,8 +13,7 @@ import trunnion
 from brief import brief
 from mechanisms_space import floating
 from timed import LINEAR, slider_crank, wheel
-from trunnion import MechanismError, read, simulate, sweep
-from trunnion.model.mechanism import Mechanism
+from trunnion import Mechanism, MechanismError, read, simulate, sweep
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 STEPS = 12

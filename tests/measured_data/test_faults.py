@@ -214,11 +214,7 @@ def test_what_comes_back_every_turn_is_the_signals_own(run: Columns, tmp_path: P
 @pytest.mark.parametrize(
     ("column", "channel", "told"),
     [
-        (
-            "T1",
-            "torque-in",
-            "turns (-1257 W): the sign of torque-in is wrong, unless the load drives the motor",
-        ),
+        ("T1", "torque-in", "turns (-1257 W): the sign of torque-in is wrong, unless the load drives the motor"),
         ("n1", "speed-in", "sign: the angle turns at 600 rpm, 'speed-in' reads -600 rpm"),
         ("T2", "brake", "power delivered to brake is negative in all 19 turns"),
     ],

@@ -115,10 +115,7 @@ def test_time_stamps_of_parquet_and_tdms(columns: Columns, tmp_path: Path) -> No
 
 @pytest.mark.parametrize(
     ("form", "what"),
-    [
-        (lambda t: "later", "has texts, such as 'later'"),
-        (lambda t: "40:00,5", "has texts, such as '40:00,5'"),
-    ],
+    [(lambda t: "later", "has texts, such as 'later'"), (lambda t: "40:00,5", "has texts, such as '40:00,5'")],
 )
 def test_times_that_cannot_be_told(columns: Columns, tmp_path: Path, form: Callable[[float], str], what: str) -> None:
     (finding,) = _refused(lambda: _read(_stamps(columns, form), tmp_path, {}))

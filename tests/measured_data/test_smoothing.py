@@ -35,8 +35,7 @@ def test_steady_pulses_in_step_with_the_sampling(per_turn: int, rate: float) -> 
 
 
 @pytest.mark.parametrize(
-    ("count", "width", "order"),
-    [(5, 5, 3), (200, 21, 3), (3000, 721, 3), (721, 721, 3), (50, 7, 0)],
+    ("count", "width", "order"), [(5, 5, 3), (200, 21, 3), (3000, 721, 3), (721, 721, 3), (50, 7, 0)]
 )
 def test_local_polynomials_are_those_of_scipy(count: int, width: int, order: int) -> None:
     from scipy.signal import savgol_filter

@@ -134,12 +134,7 @@ def _unit_load(joint: Joint, part: str) -> tuple[Vector, float]:
 
 
 def _add_pair(
-    target: Vector,
-    bodies: Mapping[str, Body],
-    rows: Mapping[str, int],
-    joint: Joint,
-    force: Vector,
-    moment: float,
+    target: Vector, bodies: Mapping[str, Body], rows: Mapping[str, int], joint: Joint, force: Vector, moment: float
 ) -> None:
     """Add a load at the joint's point to the equations of the second body, and its opposite to the first."""
     for name, sign in ((joint.second, 1.0), (joint.first, -1.0)):

@@ -131,9 +131,7 @@ class Oracle(Linkage):
             long, width = float(guide["length"]), float(guide.get("width", np.inf))
             return [
                 against(
-                    name,
-                    lambda F, M: f * (ends(F, M, z, long) + 2 * abs(M @ z) / width),
-                    slide=np.sign(slip.slide) * z,
+                    name, lambda F, M: f * (ends(F, M, z, long) + 2 * abs(M @ z) / width), slide=np.sign(slip.slide) * z
                 )
             ]
         if kind == "helical":

@@ -21,12 +21,7 @@ from trunnion.solve.run import prepare
 from trunnion.solve.walk_kernel import WalkKernel
 
 EXAMPLES = DURANGO.parent
-OF_THE_ITERATION = {
-    "friction_iterations",
-    "friction_change",
-    "friction_residual",
-    "friction_contraction",
-}
+OF_THE_ITERATION = {"friction_iterations", "friction_change", "friction_residual", "friction_contraction"}
 ROUNDING = {"power_residual", "closure_residual"}
 AGREE = 1e-9  # of the peak
 RATIOS = 1e-6  # no sharper where the drive turns round

@@ -30,8 +30,7 @@ def at(result: Any, degrees: int, variable: str, **where: str) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("case", "least", "most"),
-    [("ideal", -18747.140121, 9177.173578), ("friction", -18552.874991, 9288.302313)],
+    ("case", "least", "most"), [("ideal", -18747.140121, 9177.173578), ("friction", -18552.874991, 9288.302313)]
 )
 def test_extremes_of_the_torque(results: dict[str, Any], case: str, least: float, most: float) -> None:
     found = torque(results[case])

@@ -60,10 +60,7 @@ def test_agrees_with_mujoco(name: str, friction: float) -> None:
     Reached: 8e-14, and 1e-9 with friction, whose iteration ends where no normal load changes by more than 1e-8.
     """
     options: Data = {"friction": friction, "radius": RADIUS, "guide": GUIDE}
-    run, engine = (
-        prepare(build(MODELS[name](), **options)),
-        Engine(model(MODELS[name](), **options), RADIUS, GUIDE),
-    )
+    run, engine = (prepare(build(MODELS[name](), **options)), Engine(model(MODELS[name](), **options), RADIUS, GUIDE))
     time = (np.arange(STEPS) + 0.37) / STEPS * run.cycle.duration
     back = run.solve(time)
     drives = [run.system.drive(run.values, driver, time) for driver in engine.drivers]

@@ -78,8 +78,7 @@ def test_effort_is_that_of_two_runs() -> None:
 
 
 @pytest.mark.parametrize(
-    ("example", "driver", "moved"),
-    [("watt-six-bar", "", ""), ("stephenson-six-bar", "", ""), ("four-bar", "A", "D")],
+    ("example", "driver", "moved"), [("watt-six-bar", "", ""), ("stephenson-six-bar", "", ""), ("four-bar", "A", "D")]
 )
 def test_power_is_the_same_at_whatever_joint_it_enters(example: str, driver: str, moved: str) -> None:
     """Without friction the effort times the rate of the driver is that of a driver at the joint that moves."""

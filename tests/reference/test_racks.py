@@ -106,8 +106,7 @@ def test_driven_rack_turns_the_pinion() -> None:
 
 
 @pytest.mark.parametrize(
-    ("joint", "ends"),
-    [("P", (0.0, 1000.0)), ("S", (200.0, 210.0)), ("P", (-900.0, -1000.0)), ("S", (-900.0, -1000.0))],
+    ("joint", "ends"), [("P", (0.0, 1000.0)), ("S", (200.0, 210.0)), ("P", (-900.0, -1000.0)), ("S", (-900.0, -1000.0))]
 )
 def test_many_turns_away(joint: str, ends: tuple[float, float]) -> None:
     """Thousands of radii from where the rack is drawn, and turns by hundreds from one position to the next."""

@@ -30,10 +30,7 @@ def lift(driver: dict[str, Any], direct: bool = False) -> trunnion.Mechanism:
     if direct:
         return trunnion.Mechanism(
             **data,
-            links={
-                "ground": {"points": {"H": axis}},
-                "table": {"points": {"H": axis}, **table, "inertia": ROUND},
-            },
+            links={"ground": {"points": {"H": axis}}, "table": {"points": {"H": axis}, **table, "inertia": ROUND}},
             joints={"H": {**helix, "links": ["ground", "table"]}},
             drivers={"H": driver},
         )

@@ -16,8 +16,7 @@ def put(text, path, value):
 
 
 @pytest.mark.parametrize(
-    ("typed", "rod"),
-    [("rod", "100 mm"), ("rod = 120 mm", "120 mm"), ("rod=120 mm ± 0.05", "120 mm ± 0.05")],
+    ("typed", "rod"), [("rod", "100 mm"), ("rod = 120 mm", "120 mm"), ("rod=120 mm ± 0.05", "120 mm ± 0.05")]
 )
 def test_a_name_typed_for_a_number_makes_a_dimension(typed, rod):
     text = put(TEXT, PIN, [typed, "0"])

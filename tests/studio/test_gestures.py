@@ -81,10 +81,7 @@ def test_a_pin_on_a_link_becomes_a_pin_in_its_slot():
     )  # fmt: skip
     assert entries_of(text)[0]["joints"]["D"]["links"] == ["link1", "link2"]
     text, _ = edited(
-        text,
-        places,
-        {"do": "slide", "joint": "D", "along": "link1", "near": 0.0},
-        {"do": "driver", "joint": "C"},
+        text, places, {"do": "slide", "joint": "D", "along": "link1", "near": 0.0}, {"do": "driver", "joint": "C"}
     )
     entries = entries_of(text)[0]
     assert entries["joints"]["D"]["links"] == ["link2", "block1"]

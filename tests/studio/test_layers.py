@@ -358,8 +358,7 @@ def test_the_margin_is_there_for_one_position():
 
 
 @pytest.mark.parametrize(
-    ("example", "friction", "why"),
-    [(FOURBAR, "off", "no friction"), ("andrews-squeezer", "stated", "no friction")],
+    ("example", "friction", "why"), [(FOURBAR, "off", "no friction"), ("andrews-squeezer", "stated", "no friction")]
 )
 def test_why_there_is_no_margin(example, friction, why):
     found = ask("model", EXAMPLES[example], friction=friction)

@@ -386,8 +386,7 @@ def test_every_question_is_answered_over_the_same_socket(served):
 
 
 @pytest.mark.parametrize(
-    "how",
-    [{"origin": "http://evil.example"}, {"origin": None}, {"token": "x"}, {"token": "x" * 4000}],
+    "how", [{"origin": "http://evil.example"}, {"origin": None}, {"token": "x"}, {"token": "x" * 4000}]
 )
 def test_nobody_else_may_ask(served, how):
     how = {"origin": f"http://127.0.0.1:{served.port}", "Cookie": f"trunnion_studio_{served.port}={served.token}"} | how

@@ -126,9 +126,7 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         hand.tool("v", "Select")
         user.until("s.solved.value")
         rubbing = {"do": "set", "path": ["joint_defaults"], "value": RUBBING}
-        pivot = user.state(
-            "Object.keys(s.answer.value.entries.links.ground.points)[2]",
-        )
+        pivot = user.state("Object.keys(s.answer.value.entries.links.ground.points)[2]")
         load = {"do": "load", "against": pivot, "size": "6 N m"}
         user.of("actions", "m.edit(given)", [load, rubbing])
         drawn, typed = effort(user.state("s.text.value")), effort(TYPED)

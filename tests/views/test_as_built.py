@@ -11,13 +11,7 @@ from matplotlib.patches import Circle
 import trunnion
 from trunnion.errors import MechanismError, Status
 from trunnion.views.cycle import plots
-from trunnion.views.cycle.deviations import (
-    broken,
-    continued,
-    losses,
-    seated,
-    with_worst_case,
-)
+from trunnion.views.cycle.deviations import broken, continued, losses, seated, with_worst_case
 from trunnion.views.cycle.plots import READY, drawable, save
 from trunnion.views.cycle.seats import PIN
 from trunnion.views.sweep import figure as sweep_figure

@@ -24,17 +24,7 @@ from trunnion.views.allocation import PriceCurve, tolerance_cost, trade_off
 from trunnion.views.charts import check_kind
 from trunnion.views.common.figures import PALETTE
 from trunnion.views.readings import limits_text, readings, share, share_interval
-from trunnion.views.tolerance import (
-    KINDS,
-    MOST_PANELS,
-    corners,
-    figure,
-    indices,
-    inputs,
-    overview,
-    sheet,
-    tables,
-)
+from trunnion.views.tolerance import KINDS, MOST_PANELS, corners, figure, indices, inputs, overview, sheet, tables
 
 
 @pytest.fixture(scope="module", params=CASES)

@@ -26,7 +26,7 @@ _STATISTICS = (
         "statistics/moments.py",
         "np.sqrt(second * number / (number - 1))",
         "np.sqrt(second)",
-        ("tests/statistics/test_moments.py",),
+        ("tests/statistics/test_intervals.py",),
     ),
     Fault(
         "damaged-block-is-taken",

@@ -26,7 +26,7 @@ _ALGEBRA = (
         "algebra/screw.py",
         "versine = xp.where(obtuse, 1 - cosine, 1.0)",
         "versine = xp.where(obtuse, 1 + cosine, 1.0)",
-        ("tests/algebra/test_screw.py",),
+        ("tests/algebra/test_space.py",),
     ),
     Fault(
         "course-mean-of-even-panels",

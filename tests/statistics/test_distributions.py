@@ -47,31 +47,6 @@ def test_as_in_scipy(name: str, options: dict[str, Any], known: Any) -> None:
     assert kind.variance(LOW, HIGH, options) == pytest.approx(known.var(), rel=1e-9)
 
 
-@pytest.mark.parametrize(("name", "options", "known"), [*CASES, ("sample", {"values": SAMPLE}, None)])
-def test_moments_are_those_of_the_quantile(name: str, options: dict[str, Any], known: Any) -> None:
-    """∫ x(u) du and ∫ x² du by the trapezoidal rule in y, u = Φ(y) of the normal distribution (smooth at both ends)."""
-    kind = DISTRIBUTIONS[name]
-    y = np.linspace(-8.2, 8.2, 8001)
-    u, weights = stats.norm.cdf(y), stats.norm.pdf(y) * (y[1] - y[0])
-    x = kind.quantile(u, LOW, HIGH, options)
-    mean = weights @ x
-    rough = {"sample": 1e-3, "triangular": 1e-6}.get(name, 1e-9)
-    assert kind.mean(LOW, HIGH, options) == pytest.approx(mean, abs=rough * np.sqrt(kind.variance(LOW, HIGH, options)))
-    assert kind.variance(LOW, HIGH, options) == pytest.approx(weights @ (x - mean) ** 2, rel=5 * rough)
-
-
-@pytest.mark.parametrize(("name", "options", "known"), CASES, ids=IDS)
-def test_finite_rising_and_bounded(name: str, options: dict[str, Any], known: Any) -> None:
-    kind = DISTRIBUTIONS[name]
-    u = np.sort(np.concatenate([GRID, [5e-324, 1e-300, 1e-100]]))
-    x = kind.quantile(u, LOW, HIGH, options)
-    assert np.isfinite(x).all()
-    assert (np.diff(x) >= 0).all()
-    if kind.bounded and name != "direction":
-        assert x.min() >= LOW
-        assert x.max() <= HIGH
-
-
 MIRRORED = {"normal": "shift", "truncated": "shift", "triangular": "mode"}
 
 
@@ -114,19 +89,6 @@ def test_cut_off_far_from_the_mean(shift: float) -> None:
         assert kind.variance(LOW, HIGH, options) == pytest.approx(1 / rate**2, rel=1e-4)
 
 
-def test_narrow_cut_is_uniform() -> None:
-    options = {"cp": 1e-4}
-    assert DISTRIBUTIONS["truncated"].variance(LOW, HIGH, options) == pytest.approx((HIGH - LOW) ** 2 / 12, rel=1e-6)
-
-
-@pytest.mark.parametrize("name", ["normal", "uniform", "triangular", "truncated", "beta"])
-def test_no_tolerance_no_spread(name: str) -> None:
-    kind = DISTRIBUTIONS[name]
-    assert set(kind.quantile(GRID, 1e-5, 1e-5, {})) == {1e-5}
-    assert kind.mean(1e-5, 1e-5, {}) == 1e-5
-    assert kind.variance(1e-5, 1e-5, {}) == 0
-
-
 @given(st.lists(st.floats(-1, 1), min_size=1, max_size=30))
 def test_sample_is_the_empirical_distribution(values: list[float]) -> None:
     """Every value is drawn by an equal part of (0, 1), in order of size."""
@@ -145,11 +107,3 @@ def test_quantile_of_a_sample_at_its_steps() -> None:
     np.testing.assert_array_equal(kind.quantile(steps, 0, 0, {"values": values}), [-2, 1, 5, 7])
     np.testing.assert_array_equal(kind.quantile(steps[:-1] + 1e-12, 0, 0, {"values": values}), [1, 5, 7])
     np.testing.assert_array_equal(kind.quantile(np.array([0.0, 1.0]), 0, 0, {"values": values}), [-2, 7])
-
-
-def test_table_says_what_it_has() -> None:
-    for name, kind in DISTRIBUTIONS.items():
-        assert kind.name == name
-        assert kind.long_name
-    assert set(DISTRIBUTIONS) == {"normal", "uniform", "triangular", "truncated", "beta", "sample", "direction"}
-    assert not DISTRIBUTIONS["normal"].bounded

@@ -1,4 +1,4 @@
-"""Random numbers by place: Philox worked out here, Sobol nets, any order and any part the same bits."""
+"""Random numbers by place: Philox worked out here, Sobol nets, correlated numbers; any part the same bits."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from trunnion.statistics.population import Marginal, Population
 from trunnion.statistics.streams import MOST_POINTS, SobolStream, correlated, direction_numbers, factor, uniforms
 
 MASK = (1 << 64) - 1
@@ -35,21 +36,6 @@ def test_uniforms_are_philox(seed: int, block: int) -> None:
     words = [w for n in range(1, 4) for w in philox([n, 0, block, 0], [seed & MASK, seed >> 64])]
     expected = (np.array([w >> 12 for w in words], dtype=np.float64) + 0.5) / 2**52
     np.testing.assert_array_equal(uniforms(seed, block, 4, 3), expected.reshape(3, 4).T)
-
-
-@given(st.integers(0, 2**63), st.integers(0, 2**40), st.integers(1, 12), st.integers(1, 60), st.integers(1, 60))
-def test_a_shorter_block_begins_a_longer_one(seed: int, block: int, dims: int, short: int, more: int) -> None:
-    whole = uniforms(seed, block, dims, short + more)
-    np.testing.assert_array_equal(uniforms(seed, block, dims, short), whole[:, :short])
-    assert whole.flags.c_contiguous
-    assert (whole > 0).all() and (whole < 1).all()  # noqa: PT018
-
-
-def test_uniforms_are_uniform_and_independent() -> None:
-    u = np.concatenate([uniforms(11, block, 5, 200) for block in range(500)], axis=1)
-    assert all(stats.kstest(row, "uniform").pvalue > 1e-3 for row in u)
-    correlation = np.corrcoef(np.concatenate([u, uniforms(12, 0, 1, 100_000)]))
-    assert np.abs(correlation - np.eye(6)).max() < 4 / np.sqrt(100_000)
 
 
 def test_seed_out_of_range() -> None:
@@ -107,29 +93,6 @@ def test_far_points_without_those_before() -> None:
         stream.points(MOST_POINTS - 1, 2)
 
 
-def test_replicates_are_uniform_and_independent() -> None:
-    """One point of many replicates: uniform, and points of it not related to each other."""
-    points = np.stack(
-        [SobolStream(9, replicate, 4).points(5, 2) for replicate in range(4000)]
-    )  # (replicate, dim, point)
-    flat = points.reshape(4000, -1)
-    assert all(stats.kstest(column, "uniform").pvalue > 1e-3 for column in flat.T)
-    across = np.corrcoef(np.concatenate([points[:, :, 0].T]))
-    assert np.abs(across - np.eye(4)).max() < 4 / np.sqrt(4000)
-
-
-def test_error_falls_faster_than_that_of_plain_samples() -> None:
-    """Mean of a smooth function of 4 numbers: standard error over replicates about n^-1.5, against n^-0.5."""
-
-    def error(count: int) -> float:
-        means = [np.prod(SobolStream(2, r, 4).points(0, count) ** 2 * 3, axis=0).mean() for r in range(32)]
-        assert np.mean(means) == pytest.approx(1, abs=4 * np.std(means) / np.sqrt(31))
-        return float(np.std(means, ddof=1))
-
-    assert np.log2(error(1 << 6) / error(1 << 12)) / 6 > 1.1
-    assert error(1 << 12) < 0.01 * np.sqrt(1.8**4 - 1) / np.sqrt(1 << 12) * 3
-
-
 # ---- correlation ----------------------------------------------------------------------------------------------
 
 
@@ -163,3 +126,50 @@ def test_correlated_stays_inside() -> None:
     assert (correlated(u, factor([[1, 0.9], [0.9, 1]])) < 1).all()
     u = np.full((2, 1), 2.0**-53)
     assert (correlated(u, factor([[1, 0.9], [0.9, 1]])) > 0).all()
+
+
+MARGINALS = [
+    Marginal("normal", -1e-5, 3e-5, {"cp": 1.33}),
+    Marginal("uniform", -1.0, 1.0),
+    Marginal("normal", -2.0, 2.0),
+    Marginal("sample", options={"values": (0.3, -0.1, 0.2)}),
+    Marginal("beta", 0.0, 5.0, {"alpha": 2.0, "beta": 5.0}),
+    Marginal("direction"),
+    Marginal("triangular", -1.0, 2.0),
+]
+MATRIX = np.eye(7)
+for i, j, r in ((0, 2, 0.6), (0, 1, -0.4), (2, 4, 0.3)):
+    MATRIX[i, j] = MATRIX[j, i] = r
+U = uniforms(2, 5, 7, 200_000)
+
+
+def test_correlated_as_by_the_copula() -> None:
+    population = Population(MARGINALS, MATRIX)
+    drawn, u = population.draw(U), correlated(U, factor(MATRIX))
+    for row, marginal in enumerate(MARGINALS):
+        expected = marginal.quantile(u[row] if row in (0, 1, 2, 4) else U[row])
+        np.testing.assert_allclose(drawn[row], expected, rtol=1e-9, atol=1e-11 * marginal.deviation)
+    np.testing.assert_allclose(drawn.mean(axis=1), population.means, atol=0.01 * population.deviations.max())
+    scale = np.outer(population.deviations, population.deviations)
+    np.testing.assert_allclose(np.cov(drawn) / scale, population.covariance() / scale, atol=0.012)
+    one, two = ((drawn[row] - population.means[row]) / population.deviations[row] for row in (0, 2))
+    assert stats.kstest(one - two, "norm", (0, np.sqrt(2 - 2 * 0.6))).pvalue > 1e-3
+
+
+def test_covariance_in_closed_form() -> None:
+    """Normal: ρ σ σ. Uniform with uniform: (6/π) asin(ρ/2) times the variances; with normal: ρ √(3/π)."""
+    marginals = [
+        Marginal("normal", -3, 3),
+        Marginal("uniform", -1, 1),
+        Marginal("uniform", -1, 1),
+        Marginal("normal", 0, 1),
+    ]
+    matrix = np.array([[1, 0.5, 0.2, 1.0], [0.5, 1, 0.8, 0.5], [0.2, 0.8, 1, 0.2], [1.0, 0.5, 0.2, 1]])
+    population = Population(marginals, matrix)
+    s, covariance = population.deviations, population.covariance()
+    assert covariance[1, 2] == pytest.approx(6 / np.pi * np.arcsin(0.4) * s[1] * s[2], rel=1e-6)
+    assert covariance[0, 1] == pytest.approx(0.5 * np.sqrt(3 / np.pi) * s[0] * s[1], rel=1e-6)
+    assert covariance[0, 3] == pytest.approx(s[0] * s[3], rel=1e-9)
+    np.testing.assert_array_equal(Population(marginals).covariance(), np.diag(s**2))
+    drawn = population.draw(uniforms(1, 1, 4, 50))
+    np.testing.assert_allclose(drawn[3], 0.5 + drawn[0] / 6, rtol=1e-12)

@@ -1,15 +1,20 @@
-"""The same bits from one process and from several, whatever dies or stops."""
+"""The same bits from one process, from several and from a Dask cluster, whatever dies or stops."""
 
 from __future__ import annotations
 
+import json
+import logging
 import multiprocessing
 import os
-import pickle
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -19,73 +24,69 @@ from trunnion import MechanismError
 from trunnion.errors import Finding
 from trunnion.studies.batch import run
 
+DASK = pytest.mark.skipif(not find_spec("distributed"), reason="the extra cluster is not installed")
 EXPECTED = bits([ToyJob()(block) for block in range(37)])
 
 
-@pytest.mark.parametrize("jobs", [1, 2, pytest.param(3, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("threads", [False, True])
-def test_same_bits_for_any_workers(jobs: int, threads: bool) -> None:
-    parts, trouble = run(ToyJob(), jobs=jobs, threads=threads)
+CLUSTER = pytest.param({"jobs": 2, "cluster": "local"}, marks=[pytest.mark.slow, DASK])
+WAYS = [{"jobs": 1}, {"jobs": 2}, CLUSTER]
+
+
+@pytest.mark.parametrize("way", [*WAYS, {"jobs": 1, "threads": True}, {"jobs": 2, "threads": True}])
+def test_the_same_bits_in_every_way(way: dict[str, Any], capfd: pytest.CaptureFixture[str]) -> None:
+    if "cluster" in way:
+        pytest.importorskip("distributed")  # which sets its level as it is imported
+    level, shares = logging.getLogger("distributed").level, list[float]()
+    parts, trouble = run(ToyJob(), progress=shares.append, **way)
     assert bits(parts) == EXPECTED
     assert not trouble
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1]) == (0, 1)
+    assert capfd.readouterr() == ("", "")
+    assert logging.getLogger("distributed").level == level
 
 
 @POSIX
-@pytest.mark.parametrize("fault", ["", "deaf"])
-def test_a_killed_worker_costs_time_only(tmp_path: Path, fault: str) -> None:
+@pytest.mark.parametrize(("way", "fault"), [({"jobs": 2}, ""), ({"jobs": 2}, "deaf"), *([*CLUSTER.values, ""],)])
+def test_a_killed_worker_costs_time_only(way: dict[str, Any], fault: str, tmp_path: Path) -> None:
     """Also where others do not hear that they are to end."""
-    assert bits(run(ToyJob(fatal=17, folder=tmp_path, fault=fault), jobs=2)[0]) == EXPECTED
+    assert bits(run(ToyJob(fatal=17, folder=tmp_path, fault=fault), **way)[0]) == EXPECTED
     assert (tmp_path / "perished").exists()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("at", [0.01, 0.5])
-def test_workers_killed_from_outside(at: float) -> None:
-    killed = []
+@POSIX
+@pytest.mark.parametrize(
+    ("way", "what"),
+    [({"jobs": 2}, r"3 workers died in turn, the next block being 17"),
+     pytest.param({"jobs": 1, "cluster": "local"}, "a block ended 3 workers of the cluster in turn", marks=DASK)],
+)  # fmt: skip
+def test_a_block_that_kills_every_worker_is_an_error(way: dict[str, Any], what: str) -> None:
+    with pytest.raises(MechanismError, match=what):
+        run(ToyJob(fatal=17), **way)
+    assert not multiprocessing.active_children()
 
-    def kill(share: float) -> None:
-        if share >= at and len(killed) < 2:
-            victim = multiprocessing.active_children()[0]
-            killed.append(victim.pid)
-            victim.kill()
 
-    assert bits(run(ToyJob(pause=0.005), jobs=2, progress=kill)[0]) == EXPECTED
-    assert len(killed) == 2
+@pytest.mark.parametrize("way", WAYS)
+def test_what_a_job_raises_arrives(way: dict[str, Any], tmp_path: Path) -> None:
+    with pytest.raises(MechanismError) as caught:
+        run(ToyJob(fault="prepare"), **way)
+    assert caught.value.findings == (Finding("no such link", "links.x", "name one"),)
+    with pytest.raises(ZeroDivisionError, match="block 5"):
+        run(ToyJob(fault="evaluate"), checkpoint=tmp_path / "run.trn", **way)
+    assert bits(run(ToyJob(), checkpoint=tmp_path / "run.trn")[0]) == EXPECTED
+    assert not multiprocessing.active_children()
 
 
 @pytest.mark.slow
 @POSIX
-def test_a_block_that_kills_every_worker_is_named() -> None:
-    with pytest.raises(MechanismError, match=r"3 workers died in turn, the next block being 17"):
-        run(ToyJob(fatal=17), jobs=2)
-    assert not multiprocessing.active_children()
-
-
-@pytest.mark.spread(1)
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_what_a_job_raises_arrives(jobs: int) -> None:
-    with pytest.raises(MechanismError) as caught:
-        run(ToyJob(fault="prepare"), jobs=jobs)
-    assert caught.value.findings == (Finding("no such link", "links.x", "name one"),)
-    with pytest.raises(ZeroDivisionError, match="block 5"):
-        run(ToyJob(fault="evaluate"), jobs=jobs)
-    assert not multiprocessing.active_children()
-
-
-def test_findings_survive_pickling() -> None:
-    error = MechanismError([Finding("one", "a"), Finding("two", "b", "c")])
-    again = pickle.loads(pickle.dumps(error))
-    assert again.findings == error.findings
-    assert str(again) == str(error)
-
-
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_progress_rises_to_the_end(jobs: int) -> None:
-    shares: list[float] = []
-    run(ToyJob(), jobs=jobs, progress=shares.append)
-    assert shares[0] == 0
-    assert shares[-1] == 1
-    assert shares == sorted(shares)
+@pytest.mark.parametrize(("jobs", "cluster"), [(1, ""), (2, ""), pytest.param(2, "local", marks=DASK)])
+def test_ctrl_c_from_the_terminal_is_quiet(jobs: int, cluster: str, tmp_path: Path) -> None:
+    lines, complaints = interrupted(tmp_path, jobs, cluster)
+    assert lines[-1] == "stopped"
+    assert complaints == ""
+    job = ToyJob(blocks=400)
+    assert bits(run(job, checkpoint=tmp_path / "run.trn")[0]) == bits(run(job)[0])
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -102,17 +103,6 @@ def test_ctrl_c_keeps_what_is_done(jobs: int, tmp_path: Path) -> None:
     shares: list[float] = []
     assert bits(run(ToyJob(), jobs=3 - jobs, checkpoint=path, progress=shares.append)[0]) == EXPECTED
     assert 0.3 < shares[0] < 1.0
-
-
-@pytest.mark.slow
-@POSIX
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_ctrl_c_from_the_terminal_is_quiet(jobs: int, tmp_path: Path) -> None:
-    lines, complaints = interrupted(tmp_path, jobs, "")
-    assert lines[-1] == "stopped"
-    assert complaints == ""
-    job = ToyJob(blocks=400)
-    assert bits(run(job, checkpoint=tmp_path / "run.trn")[0]) == bits(run(job)[0])
 
 
 @POSIX
@@ -153,6 +143,83 @@ def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
     assert "a script calls this under `if __name__ == '__main__':`" in ended.stderr
 
 
-def test_no_jobs_are_a_finding() -> None:
-    with pytest.raises(MechanismError, match="0 jobs"):
-        run(ToyJob(), jobs=0)
+@contextmanager
+def program(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """A Dask program in a process of its own."""
+    command = [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]]
+    null = subprocess.DEVNULL
+    with subprocess.Popen(command, stdout=null, stderr=null, text=True, env=ENVIRONMENT) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+@contextmanager
+def cluster(folder: Path, threads: int) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """The address and the process of a scheduler with one worker of so many threads."""
+    told = folder / "scheduler.json"
+    here = ("--scheduler-file", str(told))
+    with (
+        program("dask_scheduler", *here, "--host", "127.0.0.1", "--port", "0", "--no-dashboard") as scheduler,
+        program("dask_worker", *here, "--nthreads", str(threads), "--no-dashboard", "--nworkers", "1"),
+    ):
+        while not told.exists() or not told.read_text():
+            time.sleep(0.05)
+        yield json.loads(told.read_text())["address"], scheduler
+
+
+@DASK
+@pytest.mark.slow
+def test_a_cluster_by_its_address(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    with cluster(tmp_path, 2) as (address, _):
+        assert bits(run(ToyJob(), cluster=address)[0]) == EXPECTED
+    assert capfd.readouterr() == ("", "")
+
+
+@DASK
+@pytest.mark.slow
+def test_a_scheduler_that_goes_away_is_an_error_and_nothing_is_lost(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.trn"
+    with cluster(tmp_path, 1) as (address, scheduler):
+
+        def kill(share: float) -> None:
+            if share > 0.3:
+                scheduler.kill()
+
+        with pytest.raises(MechanismError, match="connection with the scheduler"):
+            run(ToyJob(pause=0.01), cluster=address, checkpoint=path, progress=kill)
+    shares: list[float] = []
+    assert bits(run(ToyJob(), checkpoint=path, progress=shares.append)[0]) == EXPECTED
+    assert shares[0] > 0.3
+    assert capfd.readouterr() == ("", "")
+
+
+@DASK
+def test_no_scheduler_is_one_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+    from trunnion.studies import cluster as module
+
+    monkeypatch.setattr(module, "CONNECT", 0.5)
+    with pytest.raises(MechanismError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9") as caught:
+        run(ToyJob(), cluster="tcp://127.0.0.1:9")
+    assert len(caught.value.findings) == 1
+
+
+def test_without_dask_the_remedy_is_told() -> None:
+    script = (
+        "import sys; sys.modules['distributed'] = None\n"
+        "from toy_job import ToyJob\nfrom trunnion.studies.batch import run\n"
+        "run(ToyJob(), cluster='local')"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENVIRONMENT, check=False)
+    assert ended.stderr.splitlines()[-1].endswith(
+        "error: cluster: a cluster needs the package distributed — pip install 'trunnion[cluster]'"
+    )
+
+
+def test_dask_is_not_imported_unasked() -> None:
+    script = "import sys, trunnion.studies.batch; print('distributed' in sys.modules)"
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENVIRONMENT, check=True)
+    assert ended.stdout == "False\n"

@@ -1,18 +1,25 @@
-"""A checkpoint is used for its own job, or refused in one sentence."""
+"""A checkpoint is used for its own job, or refused in one sentence; a stopped study goes on to the last bit."""
 
 from __future__ import annotations
 
 import random
+import signal
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
+import trunnion
+from toleranced import fourbar
 from toy_job import ToyJob, bits
-from trunnion import MechanismError
+from trunnion import Mechanism, MechanismError
 from trunnion.studies import checkpoint as module
 from trunnion.studies.batch import run
 from trunnion.studies.checkpoint import Checkpoint, settings
+from trunnion.studies.tolerance.first_order import study
 
 EXPECTED = bits([ToyJob()(block) for block in range(37)])
 
@@ -118,3 +125,78 @@ def test_the_settings_are_of_the_job_alone() -> None:
     arrays = [ToyJob(model={"a": np.linspace(0.0, last, 2000)}) for last in (1.0, 1.0, 1.0 + 1e-12)]
     assert settings(arrays[0]) == settings(arrays[1]) != settings(arrays[2])
     assert settings(ToyJob(model={"a": 1.0, "b": 2.0})) == settings(ToyJob(model={"b": 2.0, "a": 1.0}))
+
+
+SAMPLES, STEPS = 3000, 120
+
+
+def mechanism() -> Mechanism:
+    """A four-bar with friction, a play, correlated lengths, other distributions, and some that do not go together."""
+    joints = fourbar().data()["joints"]
+    joints["B"]["pin"] = {"radius": "5 mm", "clearance": "0.03 mm ± 0.01 mm"}
+    return fourbar(
+        loaded=True,
+        joints=joints,
+        tolerances={
+            "l1": "±0.3 mm", "l2": "±40 mm", "l3": {"limits": "±1 mm", "distribution": "beta", "alpha": 2, "beta": 3},
+            "l4": {"limits": "+2/-1 mm", "distribution": "triangular"}, "joints.D.friction.coefficient": "±0.02",
+            "links.coupler.mass": {"limits": "±0.05 kg", "distribution": "truncated"}, "drivers.A.speed": "±0.1 rad/s",
+        },
+        correlations=[{"of": ["l1", "l3"], "coefficient": 0.4}],
+        measures={
+            "angle": {"angle": "rocker", "limit": "±6 deg"},
+            "peak": {"effort": "A", "as": "maximum", "limit": "+1/-0.5 N m"},
+            "stroke": {"stroke": "D"},
+            "at": {"reaction": "C", "at": "70 deg"},
+        },
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_stopped_and_resumed(tmp_path: Path) -> None:
+    """Ctrl-C after some blocks, the rest by two workers: the same Dataset as in one go, to the last bit."""
+    path = tmp_path / "run.trn"
+
+    def stop(samples: int) -> None:
+        if samples > 900:
+            signal.raise_signal(signal.SIGINT)
+
+    asked: Any = {"samples": SAMPLES, "steps": STEPS, "methods": ("linear", "monte-carlo")}
+    with pytest.raises(KeyboardInterrupt, match=r"run\.trn: the same command goes on"):
+        trunnion.tolerance(mechanism(), seed=5, checkpoint=path, progress=stop, **asked)
+    rest = trunnion.tolerance(mechanism(), seed=5, jobs=2, checkpoint=path, **asked)
+    xr.testing.assert_identical(rest, trunnion.tolerance(mechanism(), seed=5, **asked))
+    assert rest["samples"].item() == SAMPLES
+    with pytest.raises(MechanismError, match="another job"):
+        trunnion.tolerance(mechanism(), seed=6, checkpoint=path, **asked)
+
+
+def test_seed_and_only_the_seed_changes_samples() -> None:
+    """Fewer samples are the first ones; other measures see the same mechanisms."""
+    assert study(fourbar()).sampling("monte-carlo", 16384, 1).block_size == 2048
+    found = [
+        trunnion.tolerance(fourbar(), names, methods=["monte-carlo"], samples=samples, seed=seed)
+        for names, samples, seed in (
+            (["angle"], 8192, 1), (["angle"], 8192, 1), (["angle"], 16384, 1), (["angle"], 8192, 2),
+        )
+    ]  # fmt: skip
+    xr.testing.assert_identical(found[0], found[1])
+    (half,) = np.flatnonzero(found[2]["convergence_samples"].values == 8192)
+    assert found[2]["convergence_mean"].values[0, half] == pytest.approx(found[0]["mean"].values[0], rel=1e-14)
+    assert found[3]["mean"].item() != found[0]["mean"].item()
+
+
+LIMITED = {"angle": {"angle": "rocker", "at": "60 deg", "limit": "±1 deg"}}
+
+
+def interrupt(_: int) -> None:
+    signal.raise_signal(signal.SIGINT)
+
+
+def test_an_allocation_whose_samples_are_stopped_decides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    from trunnion.studies.allocation import allocate
+
+    monkeypatch.setattr(allocate, "tolerance", partial(allocate.tolerance, progress=interrupt))
+    costs = {"l2": {"model": "power", "B": 1, "k": 1, "unit": "mm"}}
+    with pytest.raises(KeyboardInterrupt):
+        allocate.allocate(fourbar(measures=LIMITED, costs=costs), criterion="yield")

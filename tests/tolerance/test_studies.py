@@ -1,9 +1,9 @@
-"""Studies at the edge: samples without an answer, nothing that varies, one of everything, odd names, sizes, limits."""
+"""Studies of tolerances: at the edge, of pins in seats, and what they say beside their figures."""
 
 from __future__ import annotations
 
 import json
-import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,17 +12,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-import mechanisms
 import trunnion
 from mechanisms import Array
-from toleranced import FOURBAR, alone, fourbar, fourbar_angle, many, sampler
-from trunnion import MechanismError, Status
+from toleranced import FOURBAR, fourbar, fourbar_angle, many
+from trunnion import Mechanism, MechanismError, Status
+from trunnion.results.attributes import findings_of
 from trunnion.statistics.streams import uniforms
 from trunnion.studies.tolerance.first_order import study
+from trunnion.views.tolerance import tables
 
 LIMIT = {"angle": {"angle": "rocker", "at": "60 deg", "limit": "±0.1 deg"}}
 ALL = ("linear", "worst-case", "monte-carlo")
-CAUSES = [code.text for code in Status]
 
 
 def findings(result: Any) -> list[str]:
@@ -91,64 +91,6 @@ def test_samples_that_do_not_go_together_everywhere() -> None:
     assert result["mean"].sel(measure="place").item() == pytest.approx(np.mean(turn[4][~away]), abs=1e-12)
 
 
-def test_corner_that_does_not_go_together_is_told() -> None:
-    mechanism = fourbar("±40 mm", measures={"angle": {"angle": "rocker", "at": "60 deg"}})
-    result = trunnion.tolerance(mechanism, methods=["linear", "worst-case"])
-    found = findings(result)
-    assert any("cannot be solved at the tolerance limits that give the least deviation" in text for text in found)
-    # what is found all the same is a mechanism that goes together
-    corner = result["corner_lower"].values[0]
-    change = np.remainder(fourbar_angle(*corner) - fourbar_angle(**FOURBAR) + np.pi, 2 * np.pi) - np.pi
-    assert result["searched_lower"].item() == pytest.approx(change, rel=1e-9)
-
-
-@pytest.mark.slow
-def test_samples_that_lock() -> None:
-    """By the gravest status of each mechanism analysed alone; an effort has no figure, a motion has."""
-    data = mechanisms.model(mechanisms.slider_crank(offset=0.0), friction=0.35)
-    data["tolerances"] = {"joints.C.friction.coefficient": "+4/+2"}
-    data["measures"] = {"peak": {"effort": "A", "as": "maximum", "at_most": "1e6 N m"}, "way": {"stroke": "C"}}
-    mechanism = trunnion.Mechanism(**data)
-    found, batch = many(mechanism, steps=12)
-    u = uniforms(1, 0, batch.inputs.dims, 12)
-    part = batch.figures(u)
-    figures, passed, status = part["figure"], part["passed"], part["status"]
-    values = batch.inputs.values(u)
-    for i in (0, 4, 9):
-        single = trunnion.analyse(alone(mechanism, values, i), 360)["status"].values
-        assert np.max(single[single != Status.ZERO_SLIP]) == status[i]  # an instant at a break is no place of a course
-    locked = status == Status.LOCKED
-    assert 0 < np.sum(locked) < 12
-    np.testing.assert_array_equal(np.isnan(figures[0]), locked)
-    np.testing.assert_array_equal(passed[0] == 0, locked)
-    assert np.all(np.isfinite(figures[1]))
-    result = trunnion.tolerance(mechanism, methods=["monte-carlo"], samples=32, steps=12)
-    lost = int(result["failed"].sel(cause=Status.LOCKED.text))
-    assert 0 < lost < 32
-    assert result["yield"].sel(measure="peak").item() == 1 - lost / 32
-    assert result["yield"].sel(measure="way").item() == 1
-    assert result["yield_all"].item() == 1 - lost / 32
-    assert any(Status.LOCKED.text in text for text in findings(result))
-    assert found.linear.measures[0].reference.figure > 0
-
-
-def test_figure_that_does_not_exist() -> None:
-    """The dead centre of a rocker within a range that some samples leave: no status, but counted."""
-    measures = {"turn": {"dead_centre": "D", "over": ["180 deg", "217 deg"], "at_least": "200 deg"}}
-    result = trunnion.tolerance(fourbar("±2 mm", measures=measures), methods=["monte-carlo"], samples=500, steps=180)
-    lost = result["failed"].values
-    assert lost[-1] > 0
-    assert np.sum(lost[:-1]) == 0
-    assert result["yield"].item() <= 1 - lost[-1] / 500
-
-
-def test_nothing_goes_together() -> None:
-    result = trunnion.tolerance(fourbar(dimensions=FOURBAR | {"l1": 0.5}, measures=LIMIT), methods=ALL, samples=50)
-    assert np.isnan(result["mean"].item())
-    assert result["yield"].item() == 0
-    assert int(result["failed"].sel(cause=Status.NOT_ASSEMBLED.text)) == 50
-
-
 # ---- nothing, and one of everything ---------------------------------------------------------------------------
 
 
@@ -158,13 +100,6 @@ def test_no_width() -> None:
         assert result[name].item() == pytest.approx(0, abs=1e-15), name
     assert result["yield"].item() == 1
     assert result["mean"].item() == pytest.approx(result["nominal"].item(), abs=1e-15)
-
-
-def test_indices_of_what_does_not_vary() -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        result = trunnion.tolerance(fourbar("±0 mm", measures=LIMIT), methods=["sobol"], samples=300)
-    assert not np.any(result["first_order"].values > 0)
 
 
 @pytest.mark.parametrize("method", ["monte-carlo", "quasi-monte-carlo"])
@@ -177,30 +112,6 @@ def test_few_samples(method: str, samples: int) -> None:
     assert np.isnan(result["deviation"].item()) == (done == 1)
     assert result["yield"].item() == 1
     assert 0 < result["yield_low"].item() < result["yield_high"].item() == 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("steps", [1, 3])
-def test_few_positions(steps: int) -> None:
-    measures = {
-        "angle": {"angle": "rocker"}, "stroke": {"stroke": "D"}, "line": {"straightness": "coupler.C"},
-        "path": {"path_error": "coupler.C"}, "peak": {"effort": "A", "as": "maximum"},
-        "rms": {"effort": "A", "as": "rms"},
-    }  # fmt: skip
-    result = trunnion.tolerance(fourbar(loaded=True, measures=measures), methods=ALL, samples=40, steps=steps)
-    assert result.sizes["position"] >= steps  # the places of the mean square come on top
-    assert np.all(np.isfinite(result["mean"].values))
-    del measures["rms"]
-    result = trunnion.tolerance(fourbar(loaded=True, measures=measures), methods=ALL, samples=40, steps=steps)
-    assert result.sizes["position"] == steps
-
-
-def test_many_samples_at_one_place() -> None:
-    result = trunnion.tolerance(fourbar(measures=LIMIT), methods=["linear", "monte-carlo"], samples=100_000)
-    assert result.nbytes < 2e6  # what is kept does not grow with the samples
-    sigma = result["deviation_linear"].item()
-    assert result["mean"].item() == pytest.approx(result["nominal"].item(), abs=5 * sigma / np.sqrt(1e5))
-    assert result["deviation"].item() == pytest.approx(sigma, rel=0.012)
 
 
 # ---- names, sizes, limits -------------------------------------------------------------------------------------
@@ -302,12 +213,6 @@ def test_refused_with_a_finding(name: str) -> None:
         trunnion.tolerance(fourbar(**model), **{"samples": 10, **options})
 
 
-@pytest.mark.parametrize("place", ["bogus", "3 mm"])
-def test_place_that_is_none(place: str) -> None:
-    with pytest.raises(MechanismError):
-        trunnion.tolerance(fourbar(measures={"angle": {"angle": "rocker"}}), methods=["linear"], at=place)
-
-
 # ---- variance-based indices -----------------------------------------------------------------------------------
 
 
@@ -335,9 +240,145 @@ def test_indices_of_a_play_and_its_size() -> None:
     np.testing.assert_allclose(total, [1 - known, 1], rtol=0, atol=0.02)
 
 
-def test_draws_of_a_study_are_those_of_its_sampler() -> None:
-    """The helper of these tests draws what a run does."""
-    found = study(fourbar(measures=LIMIT))
-    job = found.sampling("monte-carlo", 300, 7)
-    own = sampler(found, 300, seed=7)
-    np.testing.assert_array_equal(job.prepare().drawn(0), own.drawn(0))
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+SLIDER = {
+    "dimensions": {"r": "60 mm ± 0.1 mm", "k": "200 mm ± 0.15 mm"},
+    "links": {
+        "ground": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+        "crank": {"points": {"O": [0, 0], "P": ["r", 0]}},
+        "rod": {"points": {"P": [0, 0], "Q": ["k", 0]}},
+        "ram": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}, "T": ["k", 0]}},
+    },
+    "joints": {
+        "O": {"type": "revolute", "links": ["ground", "crank"]},
+        "P": {"type": "revolute", "links": ["crank", "rod"]},
+        "Q": {"type": "revolute", "links": ["rod", "ram"]},
+        "S": {"type": "prismatic", "links": ["ground", "ram"]},
+    },
+    "joint_defaults": {"pin": {"radius": "15 mm", "clearance": "20 um"}},
+    "drivers": {"O": {"speed": "60 rpm"}},
+    "assembly": {"Q": ["260 mm", 0]},
+    "measures": {"tip": {"point": "ram.T", "axis": "x", "limit": "±0.6 mm"}},
+    "tolerances": {"O.pin.clearance": "+0.01/0 mm"},
+    "costs": {
+        "k": {"model": "power", "B": 1, "k": 0.5, "unit": "mm", "least": "0.01 mm", "most": "0.3 mm"},
+        "O.clearance": {"model": "power", "B": 0.3, "k": 0.5, "unit": "mm", "least": "0.01 mm", "most": "0.05 mm"},
+    },
+}  # fmt: skip
+
+
+def slider(**more: Any) -> Mechanism:
+    return Mechanism(**{"trunnion": 1, **SLIDER, **more})
+
+
+def coded(result: Any, code: str) -> list[Any]:
+    found = findings_of(result) if "findings" in getattr(result, "attrs", {}) else result.findings
+    return [one for one in found if one.code == code]
+
+
+def test_a_dimension_of_two_links_is_named_by_check_and_by_tolerance() -> None:
+    """k is the length of the rod and that of the ram: one number for two parts."""
+    for result in (trunnion.check(slider()), trunnion.tolerance(slider(), methods=["linear"], steps=12)):
+        (found,) = coded(result, "tolerance.shared_dimension")
+        assert found.where == "dimensions.k"
+        assert found.figures["links"] == ["rod", "ram"]
+        assert "rod.Q.x" in found.what
+        assert "ram.T.x" in found.what
+
+
+def test_an_allocated_clearance_keeps_its_stated_tolerance_and_that_is_said() -> None:
+    """Both are in the worst case: 0.05 mm allocated and 0.01 mm stated make a play of 0.06 mm."""
+    result = trunnion.allocate(slider(), steps=12, samples=0)
+    (found,) = coded(result, "allocation.play_tolerance")
+    assert found.where == "costs.O.clearance"
+    assert (found.figures["lower_um"], found.figures["upper_um"]) == pytest.approx((0.0, 10.0))
+    play = result.sel(parameter="joints.O.clearance")
+    size = float(play["tolerance"]) + 10e-6
+    assert float(play["parameter_upper"]) == pytest.approx(size)
+    worst = float(play["contribution_worst_case"].sel(measure="tip"))
+    assert worst == pytest.approx(size * abs(float(play["sensitivity"].sel(measure="tip"))), rel=1e-6)
+
+
+def test_the_largest_part_is_named_and_a_play_is_within_its_radius() -> None:
+    """At 0° the rod and the ram have 30 µm, three pins 20 µm each, the crank 10 µm."""
+    tip = {"point": "ram.T", "axis": "x", "at": "0 deg", "limit": "±0.05 mm"}
+    dimensions = {"r": "60 mm ± 0.01 mm", "k": "200 mm ± 0.015 mm"}
+    model = slider(dimensions=dimensions, tolerances={}, measures={"tip": tip})
+    result = trunnion.tolerance(model, methods=["linear"], steps=12)
+    (found,) = coded(result, "limit.missed")
+    assert "'dimensions.k', 30 % of" in found.remedy
+    rows = next(one.rows for one in tables(result) if one.title.startswith("contributions"))
+    told = {row[0]: row[1].replace("\u00a0", " ") for row in rows}
+    assert (told["k"], told["O.clearance"]) == ("±0.015 mm", "within 0.02 mm")
+
+
+def test_a_sensitivity_is_by_the_unit_of_the_tolerance() -> None:
+    dimensions = {**SLIDER["dimensions"], "F": "250 kN ± 5 kN"}
+    loads = {"work": {"joint": "S", "resisting_force": "F"}}
+    more = {"tolerances": {}, "measures": {"torque": {"effort": "O", "at": "60 deg"}}}
+    result = trunnion.tolerance(slider(dimensions=dimensions, loads=loads, **more), methods=["linear"], steps=12)
+    rows = next(one.rows for one in tables(result) if one.title.startswith("contributions"))
+    (row,) = [[cell.replace("\u00a0", " ") for cell in one] for one in rows if one[0] == "F"]
+    torque, half = float(result["nominal"][0]), 5 / 250
+    assert row[1] == "±5 kN"
+    assert row[2].endswith("/kN")
+    assert float(row[3].split()[0]) == pytest.approx(abs(torque) * half * 1e-3, abs=1e-4)  # kN m
+    assert float(row[2].split()[0].replace("−", "-")) == pytest.approx(torque / 250e3, rel=1e-3)
+
+
+PLAYS = ("O", "A", "P", "K")
+ALPHA = np.arcsin(1.02 / 200)  # of both toggle links to the line: 1 mm from it, and the play of the cylinder's pin
+
+
+def press(seat: str | None = "loaded") -> Mechanism:
+    """The toggle press without friction, 0.02 ± 0.01 mm of play in its pins; it dwells from 1.5 to 2 s."""
+    data = trunnion.read(EXAMPLES / "toggle-press.yaml").data()
+    data["joint_defaults"] = {"pin": {"radius": "20 mm"}}
+    for name in PLAYS:
+        data["joints"][name]["pin"] = {"radius": "20 mm", "clearance": "0.02 mm"}
+    data["tolerances"] = {f"{name}.pin.clearance": "±0.01 mm" for name in PLAYS}
+    data["measures"] = {"height": {"point": "punch.P", "axis": "y", "at": "1.7 s", "at_least": "50.06 mm"}}
+    mechanism = Mechanism(**data)
+    return mechanism if seat is None else mechanism.with_seats(seat)
+
+
+def test_the_plays_of_a_press_add_up_by_virtual_work() -> None:
+    """By Σ Q·c = F δ each pin moves the punch by ρ |Q|/F: 1/cos α of a toggle's pins, 2 tan α of the cylinder's."""
+    found = trunnion.tolerance(press(), methods=["linear", "worst-case", "monte-carlo"], samples=24, jobs=1)
+    closed = np.array([1 / np.cos(ALPHA)] * 3 + [2 * np.tan(ALPHA)])
+    names = [f"joints.{name}.pin.clearance" for name in PLAYS]
+    sensitivity = found.sensitivity.sel(parameter=names).values[0]
+    assert sensitivity == pytest.approx(closed, abs=5e-6)
+    worst = 1e-5 * np.sum(closed)
+    assert found.worst_case_upper.values[0] == pytest.approx(worst, rel=1e-3)
+    assert found.searched_upper.values[0] == pytest.approx(worst, rel=1e-3)
+    free = trunnion.tolerance(press("free"), methods=["linear"], samples=0)
+    assert found.nominal.values[0] - free.nominal.values[0] == pytest.approx(2e-5 * np.sum(closed), rel=1e-3)
+
+
+def test_samples_are_what_analyse_has_of_each() -> None:
+    """Figures of a loaded four-bar, at a place, over the turn, and against the nominal one, sample by sample."""
+    data = trunnion.read(EXAMPLES / "fourbar-with-play.yaml").data()
+    data["tolerances"] = {"crank": "±0.02 mm", "rocker": "±0.03 mm", "B.pin.clearance": "±0.005 mm"}
+    data["measures"] = {
+        "torque": {"effort": "A", "as": "maximum"}, "lean": {"rotation": "D", "at": "60 deg"},
+        "fast": {"rate": "D", "as": "maximum"}, "off": {"rotation": "D", "over": ["60 deg", "150 deg"]},
+    }  # fmt: skip
+    mechanism = Mechanism(**data)
+    sampler = study(mechanism).sampling("monte-carlo", 3, 1).prepare()
+    u = sampler.drawn(0)
+    values, part = sampler.inputs.values(u), sampler.figures(u)
+    nominal = trunnion.analyse(mechanism, steps=720)
+    for k in range(3):  # no pin changes sides between 60° and 150°
+        numbers: dict[str, Any] = {path: float(np.ravel(values[path])[k]) for path in sampler.inputs.names}
+        alone = trunnion.analyse(mechanism.with_values(numbers), steps=720)
+        assert part["figure"][:3, k] == pytest.approx(alone.measure_figure.values[:3], rel=1e-7)
+        turned = [one.joint_rotation.sel(joint="D").values[120:301] for one in (alone, nominal)]
+        assert part["figure"][3, k] == pytest.approx(np.max(np.abs(turned[0] - turned[1])), rel=1e-4)
+
+
+def test_play_alone_is_about_the_middle_of_the_holes() -> None:
+    """The worst case over all positions of the pins does not depend on where loads press them."""
+    mechanism = trunnion.read(EXAMPLES / "fourbar-with-play.yaml")
+    loaded, free = (trunnion.play(mechanism.with_seats(seat), steps=36) for seat in ("loaded", "free"))
+    assert loaded.worst_case.values == pytest.approx(free.worst_case.values, rel=1e-9)

@@ -69,19 +69,8 @@ def test_units_are_converted_exactly_and_kept(tmp_path: Path) -> None:
     assert Mechanism(**mechanism.data()) == mechanism
 
 
-def test_points_of_a_table(tmp_path: Path) -> None:
-    """The example's own points in a file give its own results; their unit is still that of a pressure."""
-    own = [[str(q.source) for q in row] for row in MODEL.tables["pressure"].points]
-    rows = [f"{place.removesuffix('deg')};{value.removesuffix('bar')}" for place, value in own]
-    changed = MODEL.with_table("pressure", csv(tmp_path, "\n".join(["angle [deg];pressure [bar]", *rows])))
-    assert changed.tables["pressure"].periodic
-    one, two = (trunnion.analyse(each, 24) for each in (MODEL, changed))
-    np.testing.assert_array_equal(one["drive_effort"], two["drive_effort"])
-    wrong = "\n".join(["angle [deg];pressure [mm]", *rows])
-    assert any("pressure" in line and "bar" not in line for line in refused(tmp_path, wrong, "pressure"))
-
-
 def test_a_model_may_leave_the_points_to_the_file(tmp_path: Path) -> None:
+    """And a file given beside a model goes before the one that it names."""
     text = SLIDER_CRANK.read_text("utf-8")
     path = tmp_path / "model.yaml"
     path.write_text(text.replace("O: {speed: 1450 rpm}", "O: {law: table, ends: natural}"), encoding="utf-8")
@@ -90,6 +79,9 @@ def test_a_model_may_leave_the_points_to_the_file(tmp_path: Path) -> None:
     mechanism = read_mechanism(path, {"O": csv(tmp_path, "0,0\n1,2\n")})
     assert mechanism.drivers["O"].ends == "natural"
     assert len(points(mechanism)) == 2
+    other = csv(tmp_path, CSV.replace("2.5", "2.6"), "other.csv")
+    named = read_mechanism(written(tmp_path, points=None), {"pressure": str(other)})
+    assert named.parameters()["tables.pressure.points.1.value"] == pytest.approx(2.6e5)
 
 
 def test_names_of_a_driver_and_a_table_alike_are_told_apart(tmp_path: Path) -> None:
@@ -195,15 +187,6 @@ def test_the_model_is_the_one_with_the_points_in_it(tmp_path: Path) -> None:
     assert read_mechanism(tmp_path / "model.yaml").digest != meant.digest
 
 
-def test_a_driver_and_a_folder_below(tmp_path: Path) -> None:
-    (tmp_path / "data").mkdir()
-    (tmp_path / "data" / "motion.csv").write_text("t [ms];q [deg]\n0;0\n50;12,5\n100;90\n", encoding="utf-8")
-    path = written(tmp_path)
-    text = path.read_text("utf-8").replace("O: {speed: 1450 rpm}", "O: {law: table, file: data/motion.csv}")
-    path.write_text(text, encoding="utf-8")
-    assert read_mechanism(path).parameters()["drivers.O.points.1.time"] == 0.05
-
-
 def test_the_folder_is_that_of_the_model_wherever_one_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
@@ -216,15 +199,6 @@ def test_the_folder_is_that_of_the_model_wherever_one_stands(tmp_path: Path, mon
     (tmp_path / "a" / "model.json").write_text(json.dumps(data), encoding="utf-8")
     for path in ("../a/model.yaml", "linked.yaml", "../a/other.yaml", "../a/model.json"):
         assert read_mechanism(path).tables["pressure"].points == POINTS
-
-
-def test_the_command_line_goes_before_the_model(tmp_path: Path) -> None:
-    """A file by --table replaces the one that the model names, which need not be there then."""
-    path = written(tmp_path, points=None)
-    other = tmp_path / "other.csv"
-    other.write_text(CSV.replace("2.5", "2.6"), encoding="utf-8")
-    found = read_mechanism(path, {"pressure": str(other)})
-    assert found.parameters()["tables.pressure.points.1.value"] == pytest.approx(2.6e5)
 
 
 def test_what_is_made_of_the_model_needs_the_file_no_more(tmp_path: Path) -> None:
@@ -333,30 +307,6 @@ def test_sizes_are_bounded(tmp_path: Path) -> None:
     assert f"more than {MOST_FILES} files" in refused_model(path)[-1]
 
 
-def test_content_is_told_with_its_own_file_and_line(tmp_path: Path) -> None:
-    assert refused_model(written(tmp_path, points="0;1\n1;x\n"))[0].startswith(
-        "gas.csv:2: error: 'x' is not a finite number"
-    )
-    assert refused_model(written(tmp_path, points="0;1\n2;1\n1;1\n"))[0].startswith(
-        "gas.csv:3: error: tables.pressure.points.2"
-    )
-
-
-def test_both_or_neither(tmp_path: Path) -> None:
-    (only,) = refused_model(written(tmp_path, "file: gas.csv, points: [[0 deg, 1 bar], [360 deg, 1 bar]]"))
-    assert "states both points and a file" in only
-    path = written(tmp_path, "interpolation: linear")
-    (only,) = refused_model(path)
-    assert "tables.pressure: has no points" in only
-    assert read_mechanism(path, {"pressure": str(tmp_path / "gas.csv")}).tables["pressure"].points == POINTS
-    data = read_mechanism(SLIDER_CRANK).data()
-    data["drivers"]["O"] = {"law": "constant", "speed": "10 rpm", "file": "motion.csv"}
-    with pytest.raises(
-        MechanismError, match="has no effect on the motion law constant — remove it, or state law: table"
-    ):
-        Mechanism(**data)
-
-
 @pytest.mark.parametrize("part", ["tables", "drivers"])
 def test_a_model_that_is_no_file_has_no_folder(part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a mapping in Python: a finding with what to do, and nothing is read from where one happens to stand."""
@@ -379,16 +329,6 @@ MEASURED = "angle [deg];pressure [bar]\n" + "".join(f"{10 * k};{4 + np.cos(k * n
 CLOSED = MEASURED + "360;5.000000\n"
 
 
-def test_a_table_that_ends_before_the_turn_is_refused(tmp_path: Path) -> None:
-    """At 350° with another value, and with the same: it would run ahead of the crank by 10° each turn."""
-    (only,) = refused_model(written(tmp_path, points=MEASURED))
-    assert "ends at" in only
-    assert "or state period: 360 deg" in only
-    (only,) = refused_model(written(tmp_path, points=MEASURED.replace(f"{4 + np.cos(np.pi / 18):.6f}", "5.000000")))
-    assert "it repeats after 350 deg" in only
-    assert "state period: 360 deg" in only
-
-
 def test_a_period_closes_a_table(tmp_path: Path) -> None:
     for interpolation in ("linear", "spline"):
         stated = f"file: gas.csv, interpolation: {interpolation}"
@@ -397,23 +337,6 @@ def test_a_period_closes_a_table(tmp_path: Path) -> None:
         short = trunnion.analyse(found, 72)
         np.testing.assert_allclose(short["drive_effort"], whole["drive_effort"], rtol=1e-9, atol=1e-9)
         assert found.with_values({"tables.pressure.period": "365 deg"}).digest != found.digest
-
-
-@pytest.mark.parametrize("end", [120, 360, 720])
-def test_parts_and_multiples_of_a_turn_need_no_period(end: int, tmp_path: Path) -> None:
-    assert read_mechanism(written(tmp_path, points=f"a [deg]; p [bar]\n0;1\n{end / 2};2\n{end};1\n"))
-
-
-def test_a_period_that_cannot_be(tmp_path: Path) -> None:
-    (only,) = refused_model(written(tmp_path, "file: gas.csv, period: 340 deg", MEASURED))
-    assert "tables.pressure.period: is 5.93" in only
-    assert (
-        "is a time where an angle is needed"
-        in refused_model(written(tmp_path, "file: gas.csv, period: 2 s", MEASURED))[0]
-    )
-    path = written(tmp_path, "file: gas.csv, period: 360 deg", MEASURED)
-    path.write_text(path.read_text("utf-8").replace("periodic: true", "periodic: false"), encoding="utf-8")
-    assert "has no effect on a table without a period" in refused_model(path)[0]
 
 
 def test_a_table_over_time_by_the_time_of_a_turn(tmp_path: Path) -> None:
@@ -452,19 +375,6 @@ def test_two_columns_of_more_are_named_by_their_headers(names: str, tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    ("stated", "text", "words"),
-    [
-        ("file: gas.csv, columns: [angle, pressur]", CSV, "gas.csv:1: error: has no column 'pressur'"),
-        ("file: gas.csv, columns: [a, p]", "a;p;p\n0;1;1\n1;2;2\n", "has 2 columns 'p'"),
-        ("file: gas.csv, columns: [angle]", CSV, "tables.pressure.columns"),
-        ("points: [[0 deg, 1 bar], [90 deg, 2 bar]], columns: [angle, pressure]", None, "has no effect without file"),
-    ],
-)
-def test_columns_that_are_not_there(stated: str, text: str | None, words: str, tmp_path: Path) -> None:
-    assert words in "\n".join(refused_model(written(tmp_path, stated, text)))
-
-
-@pytest.mark.parametrize(
     ("text", "points"),
     [
         ("time,turn [deg],p\ns,deg,Pa\n0,0,8\n1,180,5\n2,360,8\n", [(0.0, 8.0), (np.pi, 5.0), (2 * np.pi, 8.0)]),
@@ -485,15 +395,26 @@ def test_units_below_the_headers_and_numbers_of_si(
 
 
 @pytest.mark.parametrize(
-    ("names", "text", "words"),
+    ("stated", "text", "words"),
     [
-        ("[time, p]", "time,x,p\n0,5,1,2\n1,5,2,3\n", "gas.csv:2: error: has 4 cells, the header has 3"),
-        ('["0", "20"]', f"0,10,20\n0,11,8\n1,12,7\n{2 * np.pi!r},13,8\n", ""),
+        ("file: gas.csv, columns: [angle, pressur]", CSV, "gas.csv:1: error: has no column 'pressur'"),
+        ("file: gas.csv, columns: [a, p]", "a;p;p\n0;1;1\n1;2;2\n", "has 2 columns 'p'"),
+        ("file: gas.csv, columns: [angle]", CSV, "tables.pressure.columns"),
+        ("points: [[0 deg, 1 bar], [90 deg, 2 bar]], columns: [angle, pressure]", None, "has no effect without file"),
+        (
+            "file: gas.csv, columns: [time, p]",
+            "time,x,p\n0,5,1,2\n1,5,2,3\n",
+            "gas.csv:2: error: has 4 cells, the header",
+        ),
+        ("file: gas.csv", "0;1\n1;x\n", "gas.csv:2: error: 'x' is not a finite number"),
+        ("file: gas.csv", "0;1\n2;1\n1;1\n", "gas.csv:3: error: tables.pressure.points.2"),
+        ("file: gas.csv", MEASURED, "or state period: 360 deg"),
+        ("file: gas.csv", MEASURED.replace(f"{4 + np.cos(np.pi / 18):.6f}", "5.000000"), "it repeats after 350 deg"),
+        ("file: gas.csv, period: 340 deg", MEASURED, "tables.pressure.period: is 5.93"),
+        ("file: gas.csv, period: 2 s", MEASURED, "is a time where an angle is needed"),
+        ("interpolation: linear", CSV, "tables.pressure: has no points"),
+        ("file: gas.csv, points: [[0 deg, 1 bar], [360 deg, 1 bar]]", CSV, "states both points and a file"),
     ],
 )
-def test_rows_are_those_of_the_headers(names: str, text: str, words: str, tmp_path: Path) -> None:
-    path = written(tmp_path, f"file: gas.csv, columns: {names}", text)
-    if words:
-        assert words in "\n".join(refused_model(path))
-    else:
-        assert len(read_mechanism(path).tables["pressure"].points) == 3
+def test_a_table_of_a_file_stated_wrongly(stated: str, text: str | None, words: str, tmp_path: Path) -> None:
+    assert words in "\n".join(refused_model(written(tmp_path, stated, text)))

@@ -102,21 +102,6 @@ def test_paths_of_what_is_not_stated_yet() -> None:
     assert [kinds[f"errors.dimensions.{name}"].unit for name in ("AB", "gamma")] == ["m", "rad"]
 
 
-def test_an_unknown_name_of_an_error_has_its_line(findings_of: FindingsOf) -> None:
-    text = (EXAMPLES / "durango-fourbar.yaml").read_text("utf-8")
-    (finding,) = findings_of(text + "\nerrors:\n  AB: 1 mm\n  links.cranck.mass: 1 g\n")
-    assert finding.where == "errors.links.cranck.mass"
-    assert finding.line == len(text.splitlines()) + 4
-    assert "links.crank.mass" in finding.remedy
-
-
-def test_a_load_that_follows_the_motion_has_no_error() -> None:
-    data = FOURBAR.data()
-    data["loads"]["brake"]["moment"] = "-250 N m * sin(drive)"
-    with pytest.raises(MechanismError, match="varies with the motion"):
-        Mechanism(**data, errors={"brake.moment": 1})
-
-
 # ---- misalignment ---------------------------------------------------------------------------------------------
 
 
@@ -226,14 +211,6 @@ def test_seats_of_joints_and_defaults() -> None:
     free = PLAYING.with_values({"joint_defaults.seat": "free"})
     assert (free.seated, free.has_errors) == ({}, False)
     assert SLIDER.seated == {}
-
-
-def test_given_seats_follow_the_default_one() -> None:
-    data = PLAYING.data()
-    data["joint_defaults"]["seat"] = {"xi": "30 deg"}
-    found = Mechanism(**data)
-    values = found.parameters({"joint_defaults.seat.xi": 0.1, "B.seat.xi": 0.2})
-    assert [values[f"joints.{name}.seat.xi"] for name in "ABC"] == [0.1, 0.2, 0.1]
 
 
 def test_a_default_seat_is_for_joints_with_play() -> None:

@@ -17,7 +17,6 @@ from model_samples import EXAMPLES
 
 from trunnion.algebra.dual import Dual
 from trunnion.errors import MechanismError
-from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw, LawParameter, coulomb
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Driver, Friction, Joint, Link, Load, Pin
 
@@ -144,18 +143,6 @@ def test_texts_are_set_with_the_kind_of_their_place() -> None:
         DURANGO.with_values({"crank.mass": "AB"})
 
 
-def test_friction_off_and_of_another_law(monkeypatch: pytest.MonkeyPatch) -> None:
-    off = SLIDER.with_friction("off")
-    assert not [path for path in off.parameters() if "friction" in path]
-    assert all(joint.friction is None for joint in DURANGO.with_friction("off").effective_joints.values())
-    sticky = FrictionLaw(coulomb, {"coefficient": LawParameter(), "speed": LawParameter("m/s", 0.01)})
-    monkeypatch.setitem(FRICTION_LAWS, "sticky", sticky)
-    # the schema's list of laws is made when the model is imported; laws are entries of a table in the source
-    with pytest.raises(MechanismError, match="'colomb' is not a friction law — did you mean 'coulomb'"):
-        DURANGO.with_friction("colomb")
-    assert DURANGO.with_friction("coulomb").parameters() == DURANGO.parameters()
-
-
 def test_friction_merges_defaults_and_own_values() -> None:
     data = DURANGO.data()
     data["joints"]["B"]["friction"] = {"pair_factor": "4/3"}
@@ -169,18 +156,6 @@ def test_friction_merges_defaults_and_own_values() -> None:
     }
     assert all(joints[name].friction.law == "coulomb" for name in "ABCD")  # type: ignore[union-attr]
     assert all(joints[name].friction.model == "two-contact" for name in "ABCD")  # type: ignore[union-attr]
-
-
-def test_a_fit_replaces_the_default_radius_and_the_other_way_round() -> None:
-    data = DURANGO.data()
-    data["joints"]["B"]["pin"] = {"fit": "20 mm H7/g6"}
-    values = Mechanism(**data).parameters({"joint_defaults.pin.radius": 1.0})
-    assert [values[f"joints.{name}.pin.radius"] for name in "AB"] == [1.0, 0.00999325]
-    data["joint_defaults"]["pin"] = {"fit": "20 mm H7/g6"}
-    data["joints"]["B"]["pin"] = {"radius": "7 mm"}
-    joints = Mechanism(**data).effective_joints
-    assert joints["B"].pin.fit is None  # type: ignore[union-attr]
-    assert joints["A"].pin.radius.evaluate() == 0.00999325  # type: ignore[union-attr]
 
 
 def test_building_from_classes_is_building_from_data() -> None:
@@ -208,13 +183,6 @@ def test_equal_mechanisms_have_equal_digests() -> None:
     assert (same == DURANGO, same.digest == DURANGO.digest) == (True, True)
     assert DURANGO.with_values({"AB": "2.01 m"}).digest != DURANGO.digest
     assert len(DURANGO.digest) == 16
-
-
-def test_a_mechanism_shows_its_own_names() -> None:
-    names = {name for name in dir(DURANGO) if not name.startswith("_")}
-    assert {"dimensions", "joints", "with_values", "parameters", "read", "digest"} <= names
-    assert not any(name.startswith(("model_", "parse_")) or name in ("json", "copy", "dict") for name in names)
-    assert DURANGO.model_copy() == DURANGO
 
 
 @pytest.mark.parametrize("name", ["durango-fourbar", "double-cardan", "piston-by-cost"])

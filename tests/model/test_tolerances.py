@@ -11,10 +11,8 @@ import pytest
 from model_samples import VARIED
 from pydantic_core import PydanticCustomError
 
-import trunnion
 from trunnion.algebra.dual import Dual, derivative
-from trunnion.errors import MechanismError, Severity
-from trunnion.model.checks.check import check_model
+from trunnion.errors import MechanismError
 from trunnion.model.limits import Limits, number_with
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
@@ -115,26 +113,6 @@ def test_limits_and_distribution(varied: Mechanism, path: str, expected: tuple[A
     for key, value in options.items():
         assert found.options[key] == pytest.approx(value, rel=1e-15)
     assert found.direction == ("joints.B.misalignment.offset_towards" if path.endswith("offset") else "")
-
-
-def test_a_tilt_has_a_direction_of_its_own() -> None:
-    mechanism = trunnion.read(Path(__file__).parents[2] / "examples" / "rssr.yaml").with_values(
-        {"tolerances.D.misalignment.tilt": "+0.1/0 deg", "tolerances.D.misalignment.tilt.direction": "uniform"}
-    )
-    (found,) = mechanism.tolerated()
-    assert (found.direction, found.upper) == ("joints.D.misalignment.towards", pytest.approx(0.1 * DEG))
-
-
-def test_limits_follow_the_dimensions(varied: Mechanism) -> None:
-    changed = varied.with_values({"t": "0.1 mm"})
-    assert of(changed)["dimensions.AB"].upper == pytest.approx(1e-4)
-    assert changed.parameters()["measures.swing.limit.upper"] == pytest.approx(1e-4 / 0.03)
-
-
-def test_numbers_stated_with_a_tolerance_alone_vary_as_the_defaults_say() -> None:
-    mechanism = Mechanism.read(Path(__file__).parents[2] / "examples" / "toleranced-slider-crank.yaml")
-    assert {one.path: (one.lower, one.upper) for one in mechanism.tolerated()} == mechanism.tolerances()
-    assert {one.distribution for one in mechanism.tolerated()} == {"normal"}
 
 
 def test_the_table_of_distributions_is_that_of_the_statistics() -> None:
@@ -445,15 +423,6 @@ def test_the_keys_of_a_formula_are_those_of_its_model() -> None:
     assert set(costs.COST_MODELS) == set(COST_MODELS)
     for one in costs.COST_MODELS.values():
         assert set(one.parameters) == {*FORMULA, "unit"}
-
-
-def test_a_cost_of_what_varies_as_measured_is_doubted(varied: Mechanism, tmp_path: Path) -> None:
-    path = tmp_path / "sample.csv"
-    path.write_text("0.01\n0.02\n", encoding="utf-8")
-    changed = varied.with_samples("AB", path)
-    assert "dimensions.AB" not in {one.path for one in changed.prices()}
-    found = [one for one in check_model(changed) if one.where == "costs.AB"]
-    assert [one.severity for one in found] == [Severity.WARNING]
 
 
 def test_a_play_of_a_radius_is_not_for_sale() -> None:

@@ -94,13 +94,6 @@ def test_one_state_at_an_instant_is_none() -> None:
     assert top(found).value == pytest.approx(1.0)
 
 
-def test_rounding_of_a_small_row_is_not_resolved() -> None:
-    noise = np.random.default_rng(1)
-    rows = (lambda t: np.cos(t), lambda t: 1e-14 * noise.normal(size=np.shape(t)))
-    assert course(*rows, like=lambda sizes: 0 * sizes + 1).asked == course(rows[0]).asked
-    assert top(course(*rows, like=lambda sizes: 0 * sizes + 1), 1, floor=1e-10).everywhere
-
-
 def test_noise_takes_bounded_work() -> None:
     noise = np.random.default_rng(1)
     found = course(lambda t: np.cos(t) + 1e-7 * noise.normal(size=np.shape(t)), accuracy=Accuracy(widest=1 / 60))

@@ -214,25 +214,6 @@ def test_arrays_on_the_left() -> None:
         )
 
 
-def test_comparisons_look_at_the_real_part() -> None:
-    x = Dual(np.array([1.0, 2.0, 3.0]), 9.0)
-    np.testing.assert_array_equal(x > 2, [False, False, True])
-    np.testing.assert_array_equal(x >= Dual(2.0, -5.0), [False, True, True])
-    np.testing.assert_array_equal(x < 2.0, [True, False, False])
-    np.testing.assert_array_equal(x == 2, [False, True, False])
-    np.testing.assert_array_equal(x != 2, [True, False, True])
-    np.testing.assert_array_equal(np.array([1.0, 5.0, 3.0]) <= x, [True, False, True])
-
-
-def test_where_takes_both_parts_lane_by_lane() -> None:
-    x = functions.where(np.array([True, False, True]), Dual(np.arange(3.0), 1.0), Dual(9.0, np.arange(3.0)))
-    np.testing.assert_array_equal(x.real, [0.0, 9.0, 2.0])
-    np.testing.assert_array_equal(x.dual, [1.0, 1.0, 1.0])
-    mixed = functions.where(np.array([True, False]), 5.0, Dual(1.0, 2.0))
-    np.testing.assert_array_equal(mixed.real, [5.0, 1.0])
-    np.testing.assert_array_equal(mixed.dual, [0.0, 2.0])
-
-
 def test_tests_and_constants_are_plain() -> None:
     x = Dual(np.array([1.0, np.nan, np.inf]), 1.0)
     np.testing.assert_array_equal(functions.isnan(x), [False, True, False])

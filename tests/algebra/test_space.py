@@ -15,7 +15,7 @@ from trunnion.algebra import pose as poses
 from trunnion.algebra import screw as screws
 from trunnion.algebra.dual import Dual, derivative, parts, primal, seed, spatial
 from trunnion.algebra.line import line
-from trunnion.algebra.vector import apply, cross, dot, product, scaled, skew, spatial_vector, vector_parts
+from trunnion.algebra.vector import apply, product, scaled, skew, spatial_vector, vector_parts
 
 COUNT = 500
 RNG = np.random.default_rng(7)
@@ -36,9 +36,7 @@ def same(a: Any, b: Any, tolerance: float = 1e-13) -> None:
     np.testing.assert_allclose(a, b, rtol=0, atol=tolerance * max(1.0, float(np.nanmax(np.abs(b)))))
 
 
-# ---- equations of [P] -----------------------------------------------------------------------------------------
-
-
+# equations of [P]
 def test_p2_dual_angle_is_angle_and_distance() -> None:
     """E₁ turned by θ counterclockwise about E₁₂ and moved by s along it lies on E₂."""
     theta, s = RNG.uniform(-np.pi, np.pi, COUNT), RNG.normal(size=COUNT)
@@ -70,9 +68,7 @@ def test_p3_to_p7_dual_frame() -> None:
         same(part, expected)
 
 
-# ---- lines ----------------------------------------------------------------------------------------------------
-
-
+# lines
 def test_common_perpendicular() -> None:
     found = lines.perpendicular(FIRST, SECOND)
     a, b = (stacked(one) for one in found.feet)
@@ -114,27 +110,7 @@ def test_a_line_with_itself() -> None:
     assert all(np.isnan(primal(entry)) for entry in lines.line((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
 
 
-def test_derivatives_of_angle_and_distance() -> None:
-    """By a shift of the second line; NaN where the lines are parallel, the value itself being there."""
-
-    def found(x: Any, direction: Array) -> Any:
-        return lines.perpendicular(FIRST, lines.line((Q[:, 0] + x, Q[:, 1], Q[:, 2]), vector(direction)))
-
-    h = 1e-5
-    exact, near, far = found(seed(0.0), V), found(-h, V), found(h, V)
-    slope = derivative(exact.angle).dual
-    difference = (far.angle.dual - near.angle.dual) / (2 * h)
-    same(slope, difference, 1e-8)
-    same(derivative(exact.feet[0][1]), (far.feet[0][1] - near.feet[0][1]) / (2 * h), 1e-6)
-    beside = found(seed(0.0), U)
-    same(beside.angle.real.dual, found(0.0, U).angle.dual)
-    assert np.isnan(primal(derivative(beside.angle))).all()
-    assert np.isnan(primal(derivative(beside.feet[0][0]))).all()
-
-
-# ---- poses ----------------------------------------------------------------------------------------------------
-
-
+# poses
 def random_poses(seed_number: int) -> Any:
     rng = np.random.default_rng(seed_number)
     return poses.pose(rows(random_rotations(rng, COUNT)), vector(rng.normal(size=(COUNT, 3))))
@@ -168,15 +144,6 @@ def test_adjoint() -> None:
     six = np.stack([stacked(row) for row in poses.adjoint(a)], axis=-2)
     screw = np.concatenate(apart(FIRST), axis=-1)
     same((six @ screw[..., None])[..., 0], np.concatenate(apart(poses.transform(a, FIRST)), axis=-1))
-
-
-def test_the_space_epsilon_lies_below_those_of_derivatives() -> None:
-    number = spatial(Dual(1.0, 2.0), 3.0)
-    assert (number.depth, number.real.real, number.real.dual) == (2, 1.0, 3.0)
-    real, dual = parts(number)
-    assert (real.real, real.dual, dual.real, dual.dual) == (1.0, 2.0, 3.0, 0.0)
-    assert parts(2.5) == (2.5, 0.0)
-    same(dot(cross(vector(U), vector(V)), vector(U)), np.zeros(COUNT))
 
 
 def test_the_public_modules_of_dual_vectors_and_screws_go_together() -> None:
@@ -272,17 +239,6 @@ def test_derivatives(theta: float) -> None:
         np.testing.assert_allclose(part, expected, rtol=0, atol=2e-12)
 
 
-def test_power_does_not_depend_on_the_origin() -> None:
-    """F · v + M · ω, the same for every frame."""
-    force, moment, omega, v = RNG.normal(size=(4, COUNT, 3))
-    wrench, twist = spatial_vector(vector(force), vector(moment)), spatial_vector(vector(omega), vector(v))
-    expected = np.sum(force * v + moment * omega, axis=-1)
-    np.testing.assert_allclose(screws.power(wrench, twist), expected, rtol=0, atol=1e-14)
-    pose = poses.pose(rows(random_rotations(RNG, COUNT)), vector(P))
-    moved = [poses.transform(pose, one) for one in (wrench, twist)]
-    np.testing.assert_allclose(screws.power(*moved), expected, rtol=0, atol=1e-12)
-
-
 def test_bracket_is_the_rate_of_a_carried_screw() -> None:
     carrier, carried = line((0.1, 0.2, 0.3), (1.0, 0.0, 1.0)), line((1.0, -1.0, 0.0), (0.0, 2.0, 1.0))
     pose = screws.exp(scaled(seed(Dual(0.0, 0.0)), carrier))
@@ -296,3 +252,26 @@ def test_a_pose_that_is_not_a_number_stays_so() -> None:
     found = np.stack([np.broadcast_to(primal(entry), 2) for entry in screws.log(pose)])
     assert np.isfinite(found[:, 0]).all()
     assert np.isnan(found[:, 1]).any()
+
+
+def test_plain_numbers_are_rotations() -> None:
+    w = vector(2.0 * U)
+    real, _ = apart(screws.exp(screw(np.full(COUNT, 2.0), 0.0)))
+    np.testing.assert_allclose(stacked(screws.exp(w)), real, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(stacked(screws.log(screws.exp(w))), 2.0 * U, rtol=0, atol=1e-14)
+
+
+def test_power_does_not_depend_on_the_origin() -> None:
+    """F · v + M · ω, the same for every frame."""
+    force, moment, omega, v = RNG.normal(size=(4, COUNT, 3))
+    wrench, twist = spatial_vector(vector(force), vector(moment)), spatial_vector(vector(omega), vector(v))
+    expected = np.sum(force * v + moment * omega, axis=-1)
+    np.testing.assert_allclose(screws.power(wrench, twist), expected, rtol=0, atol=1e-14)
+    pose = poses.pose(rows(random_rotations(RNG, COUNT)), vector(P))
+    moved = [poses.transform(pose, one) for one in (wrench, twist)]
+    np.testing.assert_allclose(screws.power(*moved), expected, rtol=0, atol=1e-12)
+
+
+def test_directions_alone_have_a_plain_angle() -> None:
+    same(lines.dual_angle(vector(U), vector(V)), lines.dual_angle(FIRST, SECOND).real)
+    same(lines.dual_angle((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)), np.pi)

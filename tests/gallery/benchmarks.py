@@ -13,8 +13,7 @@ from gallery.four_bars import torque_at_60
 from gallery.plane import bend, corner, slope
 from trunnion.solve.run import prepare
 
-# ---- five-bar-robot: what the process force asks of the left motor ---------------------------------------------------
-
+# five-bar-robot: what the process force asks of the left motor
 MOMENT = 0.1  # s
 
 
@@ -41,8 +40,7 @@ def share_by_hand(motor: str = "A") -> float:
     return float(-(-15.0 * column.real - 25.0 * column.imag))
 
 
-# ---- double-butterfly: virtual work at 60° ---------------------------------------------------------------------------
-
+# double-butterfly: virtual work at 60°
 # mass kg, inertia kg m², mass centre: pin and offset from it in the link's frame m, of each link but the crank
 BODIES: Mapping[str, tuple[float, float, str, complex]] = {
     "left": (1.6, 2.4e-2, "B", 0.049 + 0.165j),

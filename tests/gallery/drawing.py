@@ -10,17 +10,14 @@ from scipy.optimize import fsolve
 from gallery.entry import STEPS, Entry, Outcome
 from gallery.plane import corner
 
-# ---- peaucellier: the pen stays on x = (L² − m²)/(2r) --------------------------------------------------------------
 
-
+# peaucellier: the pen stays on x = (L² − m²)/(2r)
 def stray(one: Outcome) -> float:
     x, _ = one.track("side-CE.pen")
     return float(np.abs(x - (0.25**2 - 0.1**2) / (2 * 0.16)).max())
 
 
-# ---- jansen: the foot by seven triangles ---------------------------------------------------------------------------
-
-
+# jansen: the foot by seven triangles
 def jansen_foot(turn: Any) -> Any:
     """Place of the foot with the crank's bearing at 0; each pin is the third corner over two known ones."""
     crank, hip = 0.15 * np.exp(1j * turn), -0.38 - 0.078j
@@ -40,8 +37,7 @@ def stride(one: Outcome) -> float:
     return float(np.ptp(one.track("shank.foot")[0]))
 
 
-# ---- klann: the foot by the lengths between pins --------------------------------------------------------------------
-
+# klann: the foot by the lengths between pins
 KLANN = {  # coordinates of the patent for the extended position
     "A": (1.366, 1.366), "B": (1.009, 0.574), "O": (1.599, 0.750), "P": (1.331, 0.750), "E": (0.741, 0.750),
     "K": (0.232, 0.866), "H": (0.866, 1.500), "foot": (0.0, 0.0),

@@ -8,9 +8,8 @@ import trunnion
 from gallery.entry import Entry, Outcome
 from gallery.plane import bend, corner, slope
 
-# ---- durango-fourbar: the crank's torque without friction at 60°, by virtual work ---------------------------------
 
-
+# durango-fourbar: the crank's torque without friction at 60°, by virtual work
 def torque_at_60(one: Outcome) -> float:
     ideal = trunnion.analyse(one.mechanism.with_friction("off"), 6)
     return float(ideal["drive_effort"].sel(driver="A")[1])
@@ -42,17 +41,14 @@ def torque_by_virtual_work() -> float:
     return float(torque - (-1000.0) * tip.imag - (-250.0) * slope(rocker, q).real)
 
 
-# ---- spring-balanced-lamp -----------------------------------------------------------------------------------------
-
-
+# spring-balanced-lamp
 def hold(one: Outcome) -> float:
     """Largest torque at the pivot without friction."""
     ideal = trunnion.analyse(one.mechanism.with_friction("off"), 36)
     return float(np.abs(ideal["drive_effort"]).max())
 
 
-# ---- straight lines: largest less least height of the point, at every half degree ---------------------------------
-
+# straight lines: largest less least height of the point, at every half degree
 FINE = 720
 
 

@@ -12,8 +12,7 @@ from gallery.entry import Entry, Outcome
 from gallery.plane import corner
 from trunnion.results.attributes import attribute
 
-# ---- landing-gear: how long it falls --------------------------------------------------------------------------------
-
+# landing-gear: how long it falls
 FROM, STOP = np.radians([96.0, 226.0])  # of the brace
 UPPER, LOWER, ARM = 0.45, 0.505, 0.6
 
@@ -63,9 +62,7 @@ def fall_by_hand() -> float:
     return float(done.t_events[0][0])
 
 
-# ---- andrews-squeezer-in-time: where it is at the end of the benchmark ---------------------------------------------
-
-
+# andrews-squeezer-in-time: where it is at the end of the benchmark
 def turn_of(one: Outcome) -> float:
     """Angle of K1 after 0.03 s, rad."""
     return float(trunnion.simulate(one.mechanism, 0.03, 1, 1e-11)["drive_coordinate"].sel(driver="O")[-1])

@@ -13,9 +13,8 @@ from gallery.plane import corner
 from trunnion.solve.run import prepare
 from trunnion.studies import design
 
-# ---- toggle-press: where it begins to hold by itself ----------------------------------------------------------------
 
-
+# toggle-press: where it begins to hold by itself
 def holds_from(one: Outcome) -> float:
     """Offset of the knee on the way back at which the cylinder's force changes its sign, m."""
     run = prepare(one.mechanism)
@@ -27,9 +26,7 @@ def holds_from(one: Outcome) -> float:
     return -float(np.ravel(run.solve(np.array([time])).walk.point("upper", "A").place[0])[0])
 
 
-# ---- drawing-press: the friction of the guide at which it locks ------------------------------------------------------
-
-
+# drawing-press: the friction of the guide at which it locks
 def guide_locks_from(one: Outcome) -> float:
     """Coefficient of the guide at which the start of the stroke locks, the pins being free of friction."""
     smooth = one.mechanism.with_values({f"{pin}.friction.coefficient": 0 for pin in "OKPCR"})
@@ -42,9 +39,7 @@ def guide_locks_by_hand() -> float:
     return float(0.08 / (2 * 0.12 * abs(knee.real / knee.imag)))
 
 
-# ---- jaw-crusher: stroke of the jaw's lip ----------------------------------------------------------------------------
-
-
+# jaw-crusher: stroke of the jaw's lip
 def jaw_angle(turn: Any) -> Any:
     """Rotation of the jaw, rad: pitman and rear toggle over the eccentric, front toggle and jaw over the pitman."""
     eccentric = 0.75 + 0.02 * np.exp(1j * turn)
@@ -79,9 +74,7 @@ def stroke_by_hand() -> float:
     return float(2 * np.hypot(0.06, 1.26) * np.sin((high - low) / 2))
 
 
-# ---- flywheel-press: how the motor starts it ------------------------------------------------------------------------
-
-
+# flywheel-press: how the motor starts it
 def start_of(one: Outcome) -> float:
     """Acceleration of the crank at the start, without friction."""
     smooth = trunnion.simulate(one.mechanism.with_friction("off"), 1e-3, 1)

@@ -11,9 +11,8 @@ from scipy.optimize import fsolve
 from gallery.entry import STEPS, Entry, Outcome
 from gallery.plane import corner
 
-# ---- indexing-press: lift of the punch ----------------------------------------------------------------------------
 
-
+# indexing-press: lift of the punch
 def lift(one: Outcome) -> float:
     """Over the whole cycle: the ram is at rest at both its ends, so that the grid has them."""
     y = one.track("punch.P")[1]
@@ -30,8 +29,7 @@ def lift_by_hand() -> float:
     return abs(punch(0.08) - punch(0.0))
 
 
-# ---- six-bars: both loops closed by a root finder, all four angles at once ----------------------------------------
-
+# six-bars: both loops closed by a root finder, all four angles at once
 Loops = Callable[[complex, Any], tuple[complex, complex]]
 
 

@@ -14,9 +14,8 @@ from trunnion.results.attributes import attribute
 from trunnion.solve.run import prepare
 from trunnion.studies.design import design
 
-# ---- toleranced-slider-crank: ∂x/∂r of the piston at 60° ----------------------------------------------------------
 
-
+# toleranced-slider-crank: ∂x/∂r of the piston at 60°
 def sensitivity(one: Outcome) -> float:
     run = prepare(one.mechanism)
     sixth = run.cycle.times(6)[1:2]
@@ -30,9 +29,7 @@ def sensitivity_by_hand() -> float:
     return float(np.cos(q) - r * np.sin(q) ** 2 / np.sqrt(length**2 - (r * np.sin(q)) ** 2))
 
 
-# ---- slider-crank: acceleration at the top dead centre ------------------------------------------------------------
-
-
+# slider-crank: acceleration at the top dead centre
 def at_top(one: Outcome) -> float:
     return float(one.result["point_acceleration"].sel(point="piston.Q", axis="x")[0])
 
@@ -42,9 +39,7 @@ def at_top_by_hand() -> float:
     return -r * speed**2 * (1 + r / length)
 
 
-# ---- quick returns: time of the stroke outwards over that of the return -------------------------------------------
-
-
+# quick returns: time of the stroke outwards over that of the return
 def time_ratio(slide: str) -> Callable[[Outcome], float]:
     """From the two places at which the slide turns back; over half of the positions move the slow way."""
 
@@ -71,9 +66,7 @@ def ratio_of_whitworth() -> float:
     return float((2 * np.pi - fast) / fast)
 
 
-# ---- worn-gudgeon-pin: how fast the pin first strikes its hole ----------------------------------------------------
-
-
+# worn-gudgeon-pin: how fast the pin first strikes its hole
 def strikes_at(one: Outcome) -> float:
     return float(trunnion.simulate(one.mechanism, 5e-4, 1)["impact_approach"][0])
 
@@ -102,9 +95,7 @@ def strikes_at_by_hand() -> float:
     return float((cx * ux + cy * uy) / np.hypot(cx, cy))
 
 
-# ---- scotch-yoke, elliptic-trammel: exact curves ------------------------------------------------------------------
-
-
+# scotch-yoke, elliptic-trammel: exact curves
 def off_the_cosine(one: Outcome) -> float:
     """x − r cos θ, m."""
     x, _ = one.track("yoke.S")
@@ -117,9 +108,7 @@ def off_the_ellipse(one: Outcome) -> float:
     return float(np.abs((x / 0.15) ** 2 + (y / 0.09) ** 2 - 1).max())
 
 
-# ---- inverted-slider-crank: the boom's swing by the law of cosines ------------------------------------------------
-
-
+# inverted-slider-crank: the boom's swing by the law of cosines
 def swing(one: Outcome) -> float:
     return float(np.ptp(one.angle("boom")))
 
@@ -131,9 +120,7 @@ def swing_by_hand() -> float:
     return at_pivot(0.95 + 0.75) - at_pivot(0.95)
 
 
-# ---- stick-slip-drive: how long it slips ----------------------------------------------------------------------------
-
-
+# stick-slip-drive: how long it slips
 def slip_of(one: Outcome) -> float:
     """From the first break-away to the rest after it, s."""
     result = trunnion.simulate(one.mechanism, 0.45, 1)

@@ -62,8 +62,7 @@ def elliptic(a: float, b: float, c: float, sign: int) -> float:
     return float(np.arctan2(b, a) + sign * np.arccos(c / np.hypot(a, b)))
 
 
-# ---- pezzuti-cardan: what its errors do ----------------------------------------------------------------------------
-
+# pezzuti-cardan: what its errors do
 CARDAN: list[Row] = [("R", 89.9, 1e-5, 0.0), ("C", 89.9, 1e-5, 0.0), ("C", 89.9, 2e-5, 0.0)]
 
 
@@ -88,8 +87,7 @@ def lead(output: Any) -> float:
     return float(np.ptp(np.unwrap(output) - np.arange(STEPS) * 2 * np.pi / STEPS))
 
 
-# ---- rccc, seven-r: the loop closed by a root finder -----------------------------------------------------------------
-
+# rccc, seven-r: the loop closed by a root finder
 RCCC: list[Row] = [("R", 25, 1.0, 0.6), ("C", 70, 3.0, 0.0), ("C", 55, 2.5, 0.0), ("C", 60, 2.8, 0.0)]
 SEVEN: list[Row] = [
     ("R", 20, 0.030, -0.172),
@@ -110,9 +108,7 @@ def seven_half_way() -> float:
     return float(angles[-1])
 
 
-# ---- rssr, spherical-four-bar: one equation a cos ψ + b sin ψ = c ----------------------------------------------------
-
-
+# rssr, spherical-four-bar: one equation a cos ψ + b sin ψ = c
 def rocker_of_rssr(crank: float, *, a: float = 30e-3, b: float = 120e-3, c: float = 70e-3, d: float = 100e-3,
                    s1: float = 10e-3, s4: float = 20e-3, alpha: float = np.pi / 3) -> float:  # fmt: skip
     """ψ from |A − B|² = b², A the ball of the crank, B that of the rocker."""
@@ -131,9 +127,7 @@ def rocker_on_the_sphere(crank: float) -> float:
     return elliptic(a, b, c2 + s1 * np.cos(crank) * s4 * c3 - c1 * c4 * c3, -1)
 
 
-# ---- rssp, swash-plate-pump, sarrus: strokes -------------------------------------------------------------------------
-
-
+# rssp, swash-plate-pump, sarrus: strokes
 def stroke_by_pythagoras() -> float:
     r, rod, d = 0.04, 0.26, 0.12
     return float(np.sqrt(rod**2 - (d - r) ** 2) - np.sqrt(rod**2 - (d + r) ** 2))
@@ -147,17 +141,13 @@ def off_the_straight_line(one: Outcome) -> float:
     return float(np.abs(place - [0 * height, 0 * height, height]).max())
 
 
-# ---- bennett -----------------------------------------------------------------------------------------------------
-
-
+# bennett
 def bennett_tangents(one: Outcome) -> float:
     """tan(θ_A/2) tan(θ_B/2) at 60°."""
     return float(np.prod([np.tan(at(one, "joint_rotation", name, 60) / 2) for name in "AB"]))
 
 
-# ---- tilting-gudgeon-pin: when its first end strikes ----------------------------------------------------------------
-
-
+# tilting-gudgeon-pin: when its first end strikes
 def strikes(one: Outcome) -> float:
     """s."""
     return float(trunnion.simulate(one.mechanism, 3e-4, 1)["impact_begin"][0])

@@ -255,9 +255,7 @@ def test_the_figures_at_the_end_are_of_the_end() -> None:
     assert found["work_drive"][0] == pytest.approx(8.0, rel=1e-8)
 
 
-# ---- ranges -----------------------------------------------------------------------------------------------------
-
-
+# ranges
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("space", "first", "compiled"), [("planar", True, True), ("planar", False, False), ("spatial", False, True)]
@@ -291,9 +289,7 @@ def test_a_range_that_is_left_and_entered_within_a_step_ends_the_motion() -> Non
     assert figures["time"] == pytest.approx(np.arcsin(1.0 - 1e-6), abs=1e-6)
 
 
-# ---- change points ----------------------------------------------------------------------------------------------
-
-
+# change points
 def folding(mechanism: Mechanism) -> Mechanism:
     """The same, to fold over at its change points."""
     data = mechanism.data()
@@ -341,9 +337,7 @@ def test_change_points_are_passed(several: bool) -> None:
     assert not any("reaction" in one.name for one in result.trunnion.summary)
 
 
-# ---- evaluations ------------------------------------------------------------------------------------------------
-
-
+# evaluations
 @pytest.mark.parametrize("space", ["planar", pytest.param("spatial", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("spring", "constant", "name"),

@@ -191,29 +191,3 @@ def test_lanes_lock_at_the_share_to_which_small_steps_lead(
     finely = continuation.follow(lambda x, s: _pins(x, s, *drawn), start, 6.0)[1]
     assert np.count_nonzero(shares < 6.0) > 0.95 * lanes
     assert np.allclose(shares, finely, rtol=1e-8, atol=1e-8)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_compiled_steps_lead_as_far(seed: int) -> None:
-    """The same way, recorded and compiled: a lane stops at the same fold, or goes on where the other does."""
-    from trunnion.engines.graph import POSITION, Graph
-    from trunnion.engines.machine_code import MachineCode, vector_width
-    from trunnion.engines.program import program
-    from trunnion.engines.recorded import Recorded, number_of
-
-    lanes, rng = 800, np.random.default_rng(seed)
-    drawn = _drawn(rng, lanes)
-    _, expected = continuation.follow(lambda x, s: _pins(x, s, *drawn), [np.zeros(lanes)] * 3)
-    graph, inputs = Graph(), {}
-    recorded = []
-    for name, numbers in zip(("start", "gain", "signs"), drawn, strict=True):
-        cells = np.empty(numbers.shape[:-1], object)
-        for place in np.ndindex(cells.shape):
-            inputs[f"{name}{place}"] = np.ascontiguousarray(numbers[place])
-            cells[place] = Recorded(graph, graph.input(f"{name}{place}", POSITION))
-        recorded.append(cells.tolist())
-    _, share = continuation.follow(lambda x, s: _pins(x, s, *recorded), [0.0] * 3)
-    found = np.empty((1, lanes))
-    MachineCode(program(graph, [number_of(graph, share)], vector_width())).run(inputs, [found], (0, 1), (0, lanes))
-    assert 100 < np.count_nonzero(expected < 1.0) < lanes - 100
-    assert np.max(np.abs(found[0] - expected)) < 1e-9

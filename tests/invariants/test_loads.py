@@ -59,9 +59,7 @@ def refused(**data: Any) -> str:
     return str(caught.value)
 
 
-# ---- expressions of the motion --------------------------------------------------------------------------------
-
-
+# expressions of the motion
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("friction", [None, 0.1])
 def test_expression_equals_the_constant_force_of_each_position(friction: float | None) -> None:
@@ -110,9 +108,7 @@ def test_expressions_of_loads_take_samples_and_duals() -> None:
     np.testing.assert_allclose(one, fixed * (1 + np.cos(data["drivers"]["A"]["speed"] * time)), atol=1e-9)
 
 
-# ---- following forces, one-way resistance ---------------------------------------------------------------------
-
-
+# following forces, one-way resistance
 def test_following_force_equals_the_force_turned_by_hand() -> None:
     data = four_bar()
     data["loads"] = {"push": {"link": "coupler", "at": "E", "force": [12.0, -30.0], "frame": "link"}}
@@ -160,8 +156,7 @@ def test_a_resistance_in_space_that_only_touches_0_does_not_drive() -> None:
         ) == count
 
 
-# ---- tables ---------------------------------------------------------------------------------------------------
-
+# tables
 KNOTS = [0.0, 0.4, 1.1, 2.5, 4.0, TURN]
 VALUES = [3.0, -1.0, 2.0, 7.0, 1.0, 3.0]
 
@@ -226,9 +221,7 @@ def test_outside_its_table_a_load_has_no_value() -> None:
     assert "periodic" in row["remedy"]
 
 
-# ---- springs --------------------------------------------------------------------------------------------------
-
-
+# springs
 def spring_four_bar(**spring: Any) -> Data:
     data = bare(four_bar())
     data["links"]["ground"]["points"]["S"] = [0.2, 1.1]
@@ -329,8 +322,7 @@ def test_where_the_ends_of_a_spring_meet_it_has_no_value() -> None:
     assert np.all(np.isfinite(effort(result)[1:]))
 
 
-# ---- refusals -------------------------------------------------------------------------------------------------
-
+# refusals
 STIFF = {"stiffness": 5.0, "free_length": 0.1}
 STILL = {"drivers": {}, "loads": {"push": {"link": "coupler", "at": "E", "force": ["1 N * drive/1 rad", 0]}}}
 TWO = {"points": [[0, "1 N"], [1, "2 N"]]}
@@ -496,3 +488,30 @@ def test_a_spring_whose_ends_pass_each_other_is_told(end: float, spring: Data, t
         force = result["drive_effort"].values[0]
         assert force[9] * force[11] < 0
         assert abs(force[9]) > 100
+
+
+def test_torsional_spring_in_the_driven_joint() -> None:
+    """Closed form: the drive turns against k (θ − θ₀) + c ω, whole turns counted."""
+    data = bare(four_bar())
+    data["springs"] = {
+        "S": {"joint": "A", "stiffness": "3 N m/rad", "free_angle": "20 deg", "damping": "0.1 N m s/rad"}
+    }
+    data["drivers"]["A"] = {"speed": 4.0, "range": ["-30 deg", "500 deg"]}
+    result = run(data)
+    angle = np.radians(np.linspace(-30, 500, STEPS))
+    np.testing.assert_allclose(effort(result), 3 * (angle - np.radians(20)) + 0.1 * 4.0, rtol=1e-12)
+    np.testing.assert_allclose(result["damping_power"].values[0], 0.1 * 16.0)
+    balanced(result)
+
+
+def test_a_slide_has_springs_bumpers_and_loads_by_its_way() -> None:
+    """2 N/mm beyond −10 mm with 50 N s/m at 0.1 m/s; a bumper over the first 50 mm; 2 N/mm by the drive itself."""
+    way = np.linspace(0.0, 0.25, 6)
+    springs: Data = {"S": {"joint": "X", "stiffness": "2 N/mm", "free_length": "-10 mm", "damping": "50 N s/m"}}
+    np.testing.assert_allclose(effort(run(cart(springs=springs), 6)), 2000 * (way + 0.01) + 50 * 0.1, rtol=1e-12)
+    springs = {"S": {"joint": "X", "stiffness": 2000.0, "free_length": 0.05, "only": "push"}}
+    np.testing.assert_allclose(effort(run(cart(springs=springs), 6)), np.minimum(2000 * (way - 0.05), 0), atol=1e-12)
+    loads: Data = {"back": {"link": "cart", "at": "X", "force": ["-2 N/mm * drive", 0]}}
+    np.testing.assert_allclose(effort(run(cart(loads=loads), 6)), 2000 * way, rtol=1e-12, atol=1e-12)
+    loads["back"]["force"] = ["-2 N * cos(drive)", 0]
+    assert "cos is given a length" in refused(**cart(loads=loads))

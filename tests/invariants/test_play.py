@@ -10,89 +10,26 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mechanisms
 import trunnion
-from played import by_duals, plays, with_play
+from played import with_play
 from trunnion import Mechanism, analyse, read
-from trunnion.algebra.dual import Dual, derivative
-from trunnion.algebra.space import ORIGIN, Frame, compose, relative
 from trunnion.cycle.findings import listed
-from trunnion.joints.clearance import (
-    CLEARANCE_MODELS,
-    described,
-    describing,
-    leaning,
-    pin_transform,
-    pressed,
-    turned_by_friction,
-    worst_case,
-)
-from trunnion.measures.measures import named
-from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.run import prepare
+from trunnion.joints.clearance import CLEARANCE_MODELS, pressed, worst_case
 
-angles = st.floats(-3.1, 3.1)
 radii = st.floats(1e-7, 1e-2)
-lengths = st.floats(5e-3, 1.0)
 components = st.floats(-1e4, 1e4).filter(lambda n: n == 0 or abs(n) > 1e-6)
-frictions = st.floats(0, 2)
-rates = st.floats(-50, 50).filter(lambda n: n == 0 or abs(n) > 1e-9)
-MODELS = [model for models in CLEARANCE_MODELS.values() for model in models.values()]
 PINS = [CLEARANCE_MODELS["spatial"][kind] for kind in ("revolute", "cylindrical")]
-
-
-def entries(frame: Frame) -> Any:
-    return np.array([[float(n) for n in vector] for vector in frame])
 
 
 def vectors(count: int) -> Any:
     return st.tuples(*[components] * count)
 
 
-def spun(vector: Any, angle: float) -> tuple[float, ...]:
-    """A vector in x and y turned about z."""
-    x, y = np.cos(angle) * vector[0] - np.sin(angle) * vector[1], np.sin(angle) * vector[0] + np.cos(angle) * vector[1]
-    return (float(x), float(y), *vector[2:])
-
-
-# ---- the shift ------------------------------------------------------------------------------------------------
-
-
-@given(radii, lengths, angles, angles)
-def test_shift_of_the_described_ends(rho: float, length: float, beta: float, xi: float) -> None:
-    """[P]'s description and its end offsets are one pin; the offsets come back as β and ξ."""
-    ends = described(rho, beta, xi)
-    for play in PINS:
-        found = entries(play.shift(ends, length))
-        np.testing.assert_allclose(found, entries(pin_transform(rho, length, beta, xi)), rtol=0, atol=1e-15)
-    found_beta, found_xi = describing(*ends)
-    assert float(found_beta) == pytest.approx(beta, abs=1e-14)
-    assert np.cos(float(found_xi) - xi) == pytest.approx(1, abs=1e-14)
-    assert [np.hypot(*end) for end in ends] == pytest.approx([rho, rho])
-
-
-@given(st.tuples(angles, angles), st.tuples(angles, angles))
-def test_leaning_is_the_shortest_turn(across: tuple[float, float], place: tuple[float, float]) -> None:
-    """A rotation whose axis is in x, y: R_xy = R_yx, trace 1 + 2 cos of the lean, and back again by −R's lean."""
-    frame = entries(leaning(across, 0.3, place))
-    axes = frame[:3]
-    np.testing.assert_allclose(axes @ axes.T, np.eye(3), rtol=0, atol=1e-15)
-    assert np.linalg.det(axes) == pytest.approx(1, abs=1e-15)
-    assert axes[0, 1] == axes[1, 0]
-    assert np.trace(axes) == pytest.approx(1 + 2 / np.sqrt(1 + across[0] ** 2 + across[1] ** 2), abs=1e-15)
-    assert axes[2] / axes[2, 2] == pytest.approx([*across, 1.0], abs=1e-13)
-    there = compose(leaning(across), leaning((-across[0], -across[1])))
-    np.testing.assert_allclose(entries(there)[:3], np.eye(3), rtol=0, atol=1e-15)
-    back = relative(ORIGIN, leaning(across))
-    np.testing.assert_allclose(entries(back)[:3], axes.T, rtol=0, atol=1e-15)
-
-
-# ---- seats ----------------------------------------------------------------------------------------------------
-
-
+# seats
 @given(st.integers(1, 3).flatmap(vectors), radii, st.floats(1e-3, 1e3))
 def test_a_seat_depends_on_the_direction_of_the_load(load: tuple[float, ...], rho: float, factor: float) -> None:
     """Odd, the same for any size of load, on the wall; in the middle without load."""
@@ -108,58 +45,7 @@ def test_a_seat_depends_on_the_direction_of_the_load(load: tuple[float, ...], rh
     assert pressed(tuple(float(n) for n in seat), rho) == pytest.approx(seat, rel=1e-14)
 
 
-@given(vectors(2), radii, angles)
-def test_derivative_of_the_worst_case_is_the_seat(load: tuple[float, float], rho: float, way: float) -> None:
-    """∂(ρ |Q|)/∂Q = c: what a little more load adds to the worst case is where the pin lies."""
-    assume(np.hypot(*load) > 0)
-    direction = (np.cos(way), np.sin(way))
-    lifted = tuple(Dual(q, d) for q, d in zip(load, direction, strict=True))
-    slope = float(derivative(worst_case([lifted], [rho])))
-    assert slope == pytest.approx(float(np.dot(pressed(load, rho), direction)), rel=1e-12, abs=1e-15 * rho)
-
-
-# ---- friction -------------------------------------------------------------------------------------------------
-
-
-@given(vectors(2), frictions, rates)
-def test_friction_turns_without_changing_the_size(load: tuple[float, float], mu: float, rate: float) -> None:
-    """|n| = |Q|; slip the other way turns the other way; the mirror image is turned back; odd in the load."""
-    found = np.array(turned_by_friction(load, mu, (rate,)))
-    assert np.hypot(*found) == pytest.approx(np.hypot(*load), rel=1e-14)
-    other = np.array(turned_by_friction(load, mu, (-rate,)))
-    mirrored = np.array(turned_by_friction((load[0], -load[1]), mu, (-rate,)))
-    np.testing.assert_allclose(mirrored, found * [1, -1], rtol=1e-14)
-    np.testing.assert_allclose(turned_by_friction((-load[0], -load[1]), mu, (rate,)), -found, rtol=1e-14)
-    cosine = 1 / np.hypot(1, mu) if rate else 1.0
-    np.testing.assert_allclose(found + other, 2 * cosine * np.array(load), rtol=0, atol=1e-14 * np.hypot(*load))
-
-
-@given(vectors(3), frictions, st.tuples(rates, rates, rates), angles, st.floats(1e-3, 1e3))
-def test_friction_of_a_ball_has_no_axes_of_its_own(
-    load: tuple[float, ...], mu: float, spin: tuple[float, ...], turn: float, factor: float
-) -> None:
-    """Turned about z and mirrored with load and spin; any size of spin; |n| = |Q|."""
-    size, rate = np.linalg.norm(load), np.linalg.norm(spin)
-    assume(size > 0 and rate > 0)
-    # near the cone where the ball gets on its pole the contact moves as a square root
-    cosine = abs(np.dot(load, spin)) / (size * rate)
-    assume(abs(cosine - 1 / np.hypot(1, mu)) > 1e-3)
-    found = np.array(turned_by_friction(load, mu, spin), float)
-    assert np.linalg.norm(found) == pytest.approx(size, rel=1e-12)
-    near = {"rtol": 0.0, "atol": 1e-10 * size}
-    np.testing.assert_allclose(turned_by_friction(load, mu, tuple(factor * n for n in spin)), found, **near)
-    np.testing.assert_allclose(turned_by_friction(spun(load, turn), mu, spun(spin, turn)), spun(found, turn), **near)
-    cycled = turned_by_friction((load[2], load[0], load[1]), mu, (spin[2], spin[0], spin[1]))
-    np.testing.assert_allclose(cycled, [found[2], found[0], found[1]], **near)
-    # a spin is an axial vector: in the mirror x → −x its other components change sign
-    mirrored = turned_by_friction((-load[0], load[1], load[2]), mu, (spin[0], -spin[1], -spin[2]))
-    np.testing.assert_allclose(mirrored, [-found[0], found[1], found[2]], **near)
-    flat = turned_by_friction((load[0], load[1], 0.0), mu, (0.0, 0.0, spin[2]))
-    expected = turned_by_friction((load[0], load[1]), mu, (spin[2],))
-    np.testing.assert_allclose(flat[:2], expected, **near)
-    assert flat[2] == 0
-
-
+# friction
 @pytest.mark.parametrize("model", PINS)
 def test_a_force_at_one_end_of_a_pin_presses_there_alone(model: Any) -> None:
     """A force at z = ±H/2 has the moment r × F about mid-length; the other end feels nothing of it."""
@@ -199,13 +85,6 @@ def test_joints_add_up(found: list[float]) -> None:
     np.testing.assert_allclose(together["deviation_total"] ** 2, scatter, rtol=1e-12)
 
 
-def test_no_clearance_no_effect() -> None:
-    result = played(with_play(mechanisms.model(mechanisms.slider_crank()), 0.0), "slide:C", "effort:A")
-    assert np.all(result["worst_case"].values == 0)
-    assert np.all(result["deviation"].values == 0)
-    assert np.any(result["sensitivity"].values != 0)
-
-
 @pytest.mark.parametrize("name", ["slider-crank", "class III"])
 def test_which_link_has_the_hole_does_not_matter(name: str) -> None:
     """To first order: pins and holes changed over have the same worst case; a turn has the other sign."""
@@ -219,17 +98,6 @@ def test_which_link_has_the_hole_does_not_matter(name: str) -> None:
     names = [f"{other}.{next(iter(data['links'][other]['points']))}.x" for other in data["links"] if other != "ground"]
     one, other = (played(with_play(case), *names, f"{link}.{first}.y") for case in (data, turned))
     np.testing.assert_allclose(other["worst_case"], one["worst_case"], rtol=1e-9, atol=1e-18)
-
-
-def test_parts_are_the_norms_of_the_gradient() -> None:
-    """With the same radius everywhere, Σ ρ²|Q|² over joints is ρ² times the squared length of the whole gradient."""
-    run = prepare(with_play(mechanisms.MODELS["Watt six-bar"](), 1e-5))
-    known, time = plays(run.system, run.values), run.cycle.times(STEPS)
-    (measure,) = named(run.system.mechanism, ["rotation:G"], run.values)
-    slopes = by_duals(run, measure, known, time, FrictionMethod())
-    square = sum(part**2 for ends in slopes.values() for end in ends for part in end)
-    result = played(with_play(mechanisms.MODELS["Watt six-bar"](), 1e-5), "rotation:G")
-    np.testing.assert_allclose(result["rss"].values[0], 1e-5 * np.sqrt(square), rtol=1e-9)
 
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -79,9 +79,7 @@ def test_micrometres_and_kilometres(symbols: str, length: float) -> None:
     same(one, two, ("status", "drive_effort", "reaction_force", "reaction_moment", "friction_power", "condition"))
 
 
-# ---- welds ----------------------------------------------------------------------------------------------------
-
-
+# welds
 def arm(*welds: tuple[str, float], **more: Any) -> Mechanism:
     """A driven arm; what it carries is welded on at places along it, each with a height by which they do not meet."""
     held = {"A": {"at": [0, 0, 0], "axis": [0, 0, 1]}, **{name: [0.1 * k, 0, 0] for k, (name, _) in enumerate(welds)}}
@@ -126,9 +124,7 @@ def test_welds_that_do_not_meet_are_not_assembled() -> None:
     assert np.isnan(result["reaction_force"]).all()
 
 
-# ---- slides alone, whose screws are the same at every position ------------------------------------------------
-
-
+# slides alone, whose screws are the same at every position
 def test_a_wedge() -> None:
     """Three slides at an angle β: held four times more than needed, F = −W tan β whatever the position."""
     beta = 0.4
@@ -155,9 +151,7 @@ def test_a_wedge() -> None:
     np.testing.assert_allclose(result["drive_effort"].values[0], -weight * np.tan(beta), rtol=1e-12)
 
 
-# ---- free spins, gaps of a track ------------------------------------------------------------------------------
-
-
+# free spins, gaps of a track
 @pytest.mark.slow
 def test_a_driven_turn_is_no_free_spin() -> None:
     """A crank whose ball lies on its axis spins alone, but its driver holds that: the rocker stands still."""

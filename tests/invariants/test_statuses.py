@@ -40,9 +40,7 @@ def texts(result: Any) -> str:
     return "\n".join(f"{row['severity']} {row['where']} {row['what']}" for row in findings(result))
 
 
-# ---- cannot be assembled --------------------------------------------------------------------------------------
-
-
+# cannot be assembled
 def test_not_assembled_over_part_of_the_turn() -> None:
     """|BD| = √(1 + 0.64 − 1.6 cos q) reaches BC + CD = 1.15 at one angle: values before it, NaN beyond."""
     data = four_bar(0.8, 0.65, 0.5, 1.0)
@@ -114,9 +112,7 @@ def test_general_group_not_assembled_over_part_of_the_turn() -> None:
     assert "cannot be assembled" in texts(result)
 
 
-# ---- dead centres ---------------------------------------------------------------------------------------------
-
-
+# dead centres
 @pytest.mark.parametrize("kind", ["RRR", "general"])
 def test_exactly_at_a_dead_centre(kind: str) -> None:
     """Crank and coupler (or rod) in line, the other end driven: SINGULAR or open there, no numbers for forces."""
@@ -139,9 +135,7 @@ def test_exactly_at_a_dead_centre(kind: str) -> None:
     assert np.all(np.isfinite(result["drive_effort"].values[:, 1:]))
 
 
-# ---- number of positions --------------------------------------------------------------------------------------
-
-
+# number of positions
 @pytest.mark.parametrize("name", ["four-bar", "class III", "excavator"])
 def test_one_position(name: str) -> None:
     whole, one = positions_of(MODELS[name](), 12), positions_of(MODELS[name](), 1)
@@ -178,9 +172,7 @@ def test_a_number_of_positions_that_memory_cannot_hold(steps: int) -> None:
     assert finding.remedy == "give a whole number from 1 to 10,000,000, for all positions are held in memory"
 
 
-# ---- ordinary extremes ----------------------------------------------------------------------------------------
-
-
+# ordinary extremes
 def test_massless_and_unloaded() -> None:
     """Nothing acts: all forces are 0, not NaN, and nothing is said to be locked."""
     data = model(four_bar())
@@ -208,38 +200,7 @@ def test_range_includes_both_ends() -> None:
     assert "range" in str(error.value)
 
 
-# ---- assembly hints -------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["slider-crank", "four-bar", "class III"])
-def test_assembly_by_the_angle_of_a_joint(name: str) -> None:
-    """The rotation of a joint at the start says which way as well as a point does, on moving links too."""
-    expected = positions_of(MODELS[name](), 12)
-    data = MODELS[name]()
-    joint = {"slider-crank": "B", "four-bar": "B", "class III": "P"}[name]
-    data["assembly"] = {joint: float(expected["joint_rotation"].sel(joint=joint)[0]) + 0.05}
-    if name == "class III":
-        data["assembly"]["Q"] = float(expected["joint_rotation"].sel(joint="Q")[0])
-        data["assembly"]["R"] = float(expected["joint_rotation"].sel(joint="R")[0])
-        data["assembly"]["B"] = float(expected["joint_rotation"].sel(joint="B")[0])
-    result = positions_of(data, 12)
-    np.testing.assert_allclose(result["point_position"], expected["point_position"], atol=1e-10)
-
-
-def test_both_assemblies_are_found_and_the_choice_is_reported() -> None:
-    data = slider_crank()
-    del data["assembly"]
-    result = analyse(data, 12)
-    assert "2 assembly modes" in texts(result)
-    data["assembly"] = {"P": [-0.7, 0.1]}
-    left = analyse(data, 12)
-    assert np.all(left["point_position"].sel(point="piston.P", axis="x") < 0)
-    assert "ways" not in texts(left)
-
-
-# ---- loads that resist ----------------------------------------------------------------------------------------
-
-
+# loads that resist
 def test_resisting_loads_take_power() -> None:
     """A brake torque on a pin and a brake force in a guide oppose the motion: useful power = Σ |M ω| + |F v|."""
     data = slider_crank()

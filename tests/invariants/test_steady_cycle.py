@@ -148,9 +148,7 @@ def of_sample(values: dict[str, Any], i: int) -> dict[str, Any]:
     return {path: float(value[i, 0]) if np.ndim(value) else value for path, value in values.items()}
 
 
-# ---- closed forms ---------------------------------------------------------------------------------------------
-
-
+# closed forms
 def test_flywheels_with_inertias_of_their_own() -> None:
     """J ω̇ = 4 (1 − ω/150) − 0.6: ω = 127.5 (1 − e^(−t/τ)), τ = J 150/4, of every sample."""
     mechanism, count, duration = wheel(LINEAR), 5, 12.0
@@ -190,8 +188,7 @@ def test_what_is_larger_at_rest_holds_every_one(effort: float, starts: bool) -> 
     np.testing.assert_allclose(speed, TURN / last if starts else np.full(count, np.nan), rtol=1e-8)
 
 
-# ---- against each by itself -----------------------------------------------------------------------------------
-
+# against each by itself
 MOTORS: dict[str, dict[str, Any]] = {
     "linear": {"kind": "linear", "stall_effort": 8, "no_load_speed": 157, "inertia": 1e-3},
     "geared": {
@@ -238,30 +235,7 @@ def test_numbers_that_were_nothing_or_one_are_looked_at_anew() -> None:
     assert abs(second - first) > 1e-6 * second
 
 
-def test_a_gear_without_loss_is_no_model_for_others() -> None:
-    """Without friction efforts are affine in the accelerations where no gear loses: which is the first sample alone."""
-    motor = {"kind": "linear", "stall_effort": 4, "no_load_speed": 150, "ratio": 2, "inertia": 0.01, "efficiency": 1}
-    mechanism = wheel(motor, drag=0.0)
-    run, efficiency = prepare(mechanism), np.array([[1.0], [0.8]])
-    values = dict(mechanism.parameters({"drivers.A.motor.efficiency": efficiency}))
-    speed = figures_in_time(run, "A", values, 2, 1.0)["steady_speed"]
-    alone = [figures_in_time(prepare(mechanism), "A", of_sample(values, i), 1, 1.0)["steady_speed"] for i in range(2)]
-    np.testing.assert_allclose(speed, np.ravel(alone), rtol=1e-9)
-
-
-def test_how_many_are_together_changes_nothing() -> None:
-    mechanism = slider_crank(0.1)
-    run, values = prepare(mechanism), spread(mechanism, 5, links__crank__points__P__x=0.01)
-    every = figures_in_time(run, "O", values, 5, 0.2)
-    last = {path: value[3:] if np.ndim(value) else value for path, value in values.items()}
-    part = figures_in_time(prepare(mechanism), "O", last, 2, 0.2)
-    for name in FIGURES:
-        np.testing.assert_array_equal(part[name], every[name][3:], err_msg=name)
-
-
-# ---- courses --------------------------------------------------------------------------------------------------
-
-
+# courses
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # the height of the ram by the crank angle, and by name
 HEIGHTS = {

@@ -20,7 +20,7 @@ from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.sweep.grid import grid as grid_of
 from trunnion.studies.sweep.points import Points
-from trunnion.studies.sweep.study import FIGURES, MOST_POINTS
+from trunnion.studies.sweep.study import FIGURES
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CARDAN = EXAMPLES / "pezzuti-cardan.yaml"
@@ -157,9 +157,7 @@ def test_errors_of_points_solved_together() -> None:
     np.testing.assert_allclose(float(swept["transmission_error_max"].sel(joint="S")[1, 1]), error, rtol=1e-9)
 
 
-# ---- the Cardan joint -----------------------------------------------------------------------------------------
-
-
+# the Cardan joint
 def test_efficiency_falls_with_speed() -> None:
     """As in Fig. 9, right: forces of inertia grow with the square of the speed and load the bearings."""
     mechanism = trunnion.read(CARDAN)
@@ -173,9 +171,7 @@ def test_efficiency_falls_with_speed() -> None:
     assert np.allclose(light["efficiency"], light["efficiency"][0], rtol=1e-12)  # without masses speed does nothing
 
 
-# ---- what cannot be answered, what cannot be asked --------------------------------------------------------------
-
-
+# what cannot be answered, what cannot be asked
 def test_points_that_cannot_be_assembled_have_no_figures() -> None:
     swept = trunnion.sweep(read("durango-fourbar"), {"AB": ["2.1 m", "2.6 m", "2.2 m"]}, 72, margin=True)
     assert swept["status"].values.tolist()[1] == Status.NOT_ASSEMBLED
@@ -196,19 +192,11 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "not one number": ({"joints.B.pin": [0.1]}, "set one of"),
     "the same twice": ({"AB": [2], "dimensions.AB": [2]}, "same number"),
     "wrong unit": ({"A.speed": ["1 kg", "2 kg"]}, "angular speed"),
-    "wrong unit of a dimension": ({"AB": ["1 deg", "2 deg"]}, "length"),
-    "wrong unit of an end": ({"A.speed": (1, "2 m", 3)}, "angular speed"),
     "one end without unit": ({"AB": (1, "2000 mm", 3)}, "1 has no unit"),
-    "no such unit": ({"AB": ["2 mn"]}, "unit"),
     "no values": ({"AB": []}, "no values"),
     "a text": ({"AB": "2 m"}, "no list"),
-    "a number": ({"AB": 2}, "no list"),
     "no count": ({"AB": (1, 2)}, "from, to and count"),
-    "a broken count": ({"AB": (1, 2, 2.5)}, "from, to and count"),
     "zero count": ({"AB": (1, 2, 0)}, "range of 0 values"),
-    "one of a range": ({"AB": (1, 2, 1)}, "range of 1 value "),
-    "negative count": ({"AB": (1, 2, -3)}, "range of -3 values"),
-    "too many": ({"AB": (1, 2, MOST_POINTS + 1)}, "100,001 points"),
     "too many together": ({"AB": (1, 2, 1000), "BC": (5, 6, 1000)}, "1,000 × 1,000 points"),
     "not finite": ({"AB": [math.nan]}, "finite"),
     "impossible": ({"crank.mass": [1.0, -1.0]}, "links.crank.mass"),
@@ -232,9 +220,7 @@ def test_what_is_wrong_at_a_point_says_at_which() -> None:
         trunnion.sweep(mechanism, inertia, 4)
 
 
-# ---- files ----------------------------------------------------------------------------------------------------
-
-
+# files
 @pytest.mark.slow
 def test_a_mechanism_with_errors_stands_beside_the_ideal_one() -> None:
     """Table II's errors and loaded seats: each point as `analyse` has it, the ideal joint more efficient throughout."""

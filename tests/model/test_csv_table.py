@@ -41,8 +41,7 @@ def refused(tmp_path: Path, text: str, name: str = "O") -> list[str]:
     return [str(finding).replace(f"{tmp_path}/", "") for finding in caught.value.findings]
 
 
-# ---- what is read ---------------------------------------------------------------------------------------------
-
+# what is read
 DEGREE = np.pi / 180
 
 
@@ -94,8 +93,7 @@ def test_names_of_a_driver_and_a_table_alike_are_told_apart(tmp_path: Path) -> N
     assert mechanism.with_table("drivers.O", path).drivers["O"].law == "table"
 
 
-# ---- what is refused ------------------------------------------------------------------------------------------
-
+# what is refused
 BAD = [
     ("", ["points.csv:1: error: is empty — write a row for each point"]),
     ("# only\n\n", ["points.csv:1: error: has only comments"]),
@@ -172,9 +170,7 @@ def refused_model(path: Path, *, tables: dict[str, str] | None = None) -> list[s
     return [str(one).replace(f"{path.parent}{os.sep}", "") for one in caught.value.findings]
 
 
-# ---- what is read ---------------------------------------------------------------------------------------------
-
-
+# what is read
 def test_the_model_is_the_one_with_the_points_in_it(tmp_path: Path) -> None:
     """Equal, with the same hash and the same results; another content is another model."""
     found, meant = read_mechanism(written(tmp_path)), read_mechanism(SLIDER_CRANK)
@@ -237,8 +233,7 @@ def test_a_rewritten_model_goes_on_to_name_its_file(tmp_path: Path) -> None:
     assert text.startswith("# A small air compressor")
 
 
-# ---- what is refused_model ------------------------------------------------------------------------------------------
-
+# what is refused_model
 OUTSIDE = ["../gas.csv", "a/../../gas.csv", "/etc/gas.csv", "C:/gas.csv", "c:gas.csv", "..\\\\gas.csv",
            "\\\\\\\\server\\\\gas.csv"]  # fmt: skip
 
@@ -323,8 +318,7 @@ def test_a_model_that_is_no_file_has_no_folder(part: str, tmp_path: Path, monkey
     assert Mechanism(**data)
 
 
-# ---- periods --------------------------------------------------------------------------------------------------
-
+# periods
 MEASURED = "angle [deg];pressure [bar]\n" + "".join(f"{10 * k};{4 + np.cos(k * np.pi / 18):.6f}\n" for k in range(36))
 CLOSED = MEASURED + "360;5.000000\n"
 
@@ -354,9 +348,7 @@ def test_a_table_over_time_by_the_time_of_a_turn(tmp_path: Path) -> None:
     assert read_mechanism(path)
 
 
-# ---- files with more columns ------------------------------------------------------------------------------------
-
-
+# files with more columns
 @pytest.mark.parametrize("names", ["[pressure, turn]", "[turn, pressure]", "['turn [deg]', pressure]"])
 def test_two_columns_of_more_are_named_by_their_headers(names: str, tmp_path: Path) -> None:
     """In any order of the file, with and without the unit; a text in a third column does not matter."""

@@ -37,9 +37,7 @@ def doubts(mechanism: Mechanism) -> list[str]:
     return [str(one) for one in check_model(mechanism) if one.severity is Severity.WARNING]
 
 
-# ---- errors of named numbers ----------------------------------------------------------------------------------
-
-
+# errors of named numbers
 def test_an_error_shifts_its_number_and_what_depends_on_it() -> None:
     off = FOURBAR.with_values({"errors.BE": "0.5 mm", "errors.rocker.points.C.x": -2e-3, "errors.crank.mass": 0.1})
     built, ideal, nominal = off.parameters(), off.ideal_parameters(), FOURBAR.parameters()
@@ -102,9 +100,7 @@ def test_paths_of_what_is_not_stated_yet() -> None:
     assert [kinds[f"errors.dimensions.{name}"].unit for name in ("AB", "gamma")] == ["m", "rad"]
 
 
-# ---- misalignment ---------------------------------------------------------------------------------------------
-
-
+# misalignment
 def test_every_turning_axis_can_be_misaligned() -> None:
     values = RSSR.parameters()
     assert {path for path in values if "misalignment" in path} == {
@@ -137,9 +133,7 @@ def test_a_row_of_a_loop_has_misalignment_and_seat() -> None:
     assert Mechanism(**off.data()) == off
 
 
-# ---- plays and seats ------------------------------------------------------------------------------------------
-
-
+# plays and seats
 def test_play_by_clearance_radii_and_fit() -> None:
     found = FOURBAR.with_values(
         {"A.pin.clearance": "20 um", "B.pin.hole_radius": "7.51 mm", "C.pin.cylindricity": 1e-6}
@@ -339,9 +333,7 @@ def test_joints_with_seats_stated_wrongly(mechanism: Mechanism, joint: str, keys
     assert what in str(error.value)
 
 
-# ---- what is doubtful -----------------------------------------------------------------------------------------
-
-
+# what is doubtful
 def with_fit(text: str, **joint: Any) -> Mechanism:
     data = FOURBAR.data()
     data["joints"]["B"] |= {"pin": {"fit": text}, **joint}

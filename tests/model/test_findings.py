@@ -417,8 +417,7 @@ def test_a_name_that_advice_puts_into_a_file_is_a_key_of_it(name: str) -> None:
     assert list(load(f"{{{as_key(name)}: 1}}")) == list(load(f"{as_key(name)}: 1")) == [name]
 
 
-# ---- loops ----------------------------------------------------------------------------------------------------
-
+# loops
 LOOP: dict[str, Any] = {
     "space": "spatial",
     "loop": [

@@ -29,9 +29,7 @@ def of(mechanism: Mechanism) -> dict[str, Tolerance]:
     return {one.path: one for one in mechanism.tolerated()}
 
 
-# ---- limits ---------------------------------------------------------------------------------------------------
-
-
+# limits
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -65,9 +63,7 @@ def test_what_are_no_limits(text: object, what: str) -> None:
     assert what in str(error.value)
 
 
-# ---- what varies ----------------------------------------------------------------------------------------------
-
-
+# what varies
 def test_every_number_that_varies_in_the_order_of_the_parameters(varied: Mechanism) -> None:
     found = of(varied)
     names = list(varied.parameters())
@@ -122,9 +118,7 @@ def test_the_table_of_distributions_is_that_of_the_statistics() -> None:
     assert {key for keys in DISTRIBUTIONS.values() for key in keys} == set(OPTIONS) <= Variation.model_fields.keys()
 
 
-# ---- correlation ----------------------------------------------------------------------------------------------
-
-
+# correlation
 def test_correlation(varied: Mechanism) -> None:
     matrix, paths = varied.correlation(), list(of(varied))
     expected = np.eye(len(paths))
@@ -137,9 +131,7 @@ def test_correlation(varied: Mechanism) -> None:
     np.testing.assert_array_equal(matrix, expected)
 
 
-# ---- deviations -----------------------------------------------------------------------------------------------
-
-
+# deviations
 def test_a_deviation_is_added_and_passed_on() -> None:
     """A number that follows from another goes on to do so, unlike one that is replaced."""
     mechanism = Mechanism(
@@ -166,9 +158,7 @@ def test_a_deviation_of_a_default_is_of_every_joint(varied: Mechanism) -> None:
     assert found == pytest.approx([0.1, 0.25, 0.26, 0.25], rel=1e-14)
 
 
-# ---- another model --------------------------------------------------------------------------------------------
-
-
+# another model
 def test_other_tolerances_are_written(varied: Mechanism, tmp_path: Path) -> None:
     changed = varied.with_tolerances(
         {
@@ -226,9 +216,7 @@ def test_without_friction_nothing_varies_that_is_not_there(varied: Mechanism) ->
     assert not varied.with_values({"errors.A.friction.coefficient": 0.01}).with_friction("off").errors
 
 
-# ---- measured samples -----------------------------------------------------------------------------------------
-
-
+# measured samples
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -301,9 +289,7 @@ def test_a_sample_that_cannot_be_read(
     assert line is None or (finding.file, finding.line) == (str(path), line)
 
 
-# ---- limits that stand with the number ------------------------------------------------------------------------
-
-
+# limits that stand with the number
 @pytest.mark.parametrize(
     ("text", "half", "digits", "expected"),
     [

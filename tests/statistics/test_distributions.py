@@ -60,7 +60,10 @@ def test_mirrored_to_the_last_bits(name: str, options: dict[str, Any], known: An
         mean, _ = normal_parameters(LOW, HIGH, options)
         value = mean - (LOW + HIGH) / 2 if key == "shift" else options.get(key, (LOW + HIGH) / 2)
         mirrored[key] = -value
+    assert np.isfinite(kind.quantile(np.array([5e-324, 1e-300]), LOW, HIGH, options)).all()
     one, other = kind.quantile(GRID, LOW, HIGH, options), -kind.quantile(1 - GRID, -HIGH, -LOW, mirrored)
+    assert np.isfinite(one).all()
+    assert (np.diff(one[np.argsort(GRID)]) >= 0).all()
     np.testing.assert_allclose(one, other, rtol=0, atol=2e-15 if name == "direction" else 1e-17)
 
 

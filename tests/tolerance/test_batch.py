@@ -134,15 +134,6 @@ def _lives(process: int) -> bool:
     return not (state.exists() and state.read_text().rpartition(")")[2].split()[0] == "Z")
 
 
-@pytest.mark.slow
-def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
-    script = tmp_path / "bare.py"
-    script.write_text("from toy_job import ToyJob\nfrom trunnion.studies.batch import run\nrun(ToyJob(), jobs=2)\n")
-    ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=ENVIRONMENT, check=False)
-    assert ended.returncode == 1
-    assert "a script calls this under `if __name__ == '__main__':`" in ended.stderr
-
-
 @contextmanager
 def program(*arguments: str) -> Iterator[subprocess.Popen[str]]:
     """A Dask program in a process of its own."""

@@ -41,9 +41,7 @@ def own_samples(seed: int, count: int, sigma: float) -> list[Any]:
     return [value + sigma * row for value, row in zip(FOURBAR.values(), z, strict=True)]
 
 
-# ---- samples without an answer --------------------------------------------------------------------------------
-
-
+# samples without an answer
 def test_samples_that_do_not_go_together_at_a_place() -> None:
     """Counted by cause and as outside every limit; moments, quantiles and extremes are of the others."""
     widths = {"l1": 0.028, "l2": 0.028, "l3": 0.04, "l4": 0.04}
@@ -91,17 +89,6 @@ def test_samples_that_do_not_go_together_everywhere() -> None:
     assert result["mean"].sel(measure="place").item() == pytest.approx(np.mean(turn[4][~away]), abs=1e-12)
 
 
-# ---- nothing, and one of everything ---------------------------------------------------------------------------
-
-
-def test_no_width() -> None:
-    result = trunnion.tolerance(fourbar("±0 mm", measures=LIMIT), methods=ALL, samples=300)
-    for name in ("worst_case_upper", "rss", "deviation_linear", "deviation", "searched_lower", "searched_upper"):
-        assert result[name].item() == pytest.approx(0, abs=1e-15), name
-    assert result["yield"].item() == 1
-    assert result["mean"].item() == pytest.approx(result["nominal"].item(), abs=1e-15)
-
-
 @pytest.mark.parametrize("method", ["monte-carlo", "quasi-monte-carlo"])
 @pytest.mark.parametrize("samples", [1, 2, 7, 8])
 def test_few_samples(method: str, samples: int) -> None:
@@ -112,23 +99,6 @@ def test_few_samples(method: str, samples: int) -> None:
     assert np.isnan(result["deviation"].item()) == (done == 1)
     assert result["yield"].item() == 1
     assert 0 < result["yield_low"].item() < result["yield_high"].item() == 1
-
-
-# ---- names, sizes, limits -------------------------------------------------------------------------------------
-
-
-def test_names_of_any_script() -> None:
-    measures = {
-        "Winkel φ, ±": {"angle": "rocker", "at": "60 deg", "at_least": "95.19 deg"},
-        "角度": {"angle": "rocker", "at": "60 deg", "at_most": "95.19 deg"},
-    }
-    result = trunnion.tolerance(fourbar(measures=measures), methods=["monte-carlo"], samples=2000)
-    assert [str(name) for name in result["measure"].values] == list(measures)
-    assert float(result["yield"].sum()) == 1  # one or the other
-    assert 0.3 < result["yield"].values[0] < 0.7
-    assert result["yield_all"].item() == 0
-    assert np.all(np.isnan(result["cp"].values))  # of one limit there is C_pk alone
-    assert np.all(np.isfinite(result["cpk"].values))
 
 
 @pytest.mark.slow
@@ -213,33 +183,6 @@ def test_refused_with_a_finding(name: str) -> None:
         trunnion.tolerance(fourbar(**model), **{"samples": 10, **options})
 
 
-# ---- variance-based indices -----------------------------------------------------------------------------------
-
-
-def test_indices_of_a_nearly_linear_measure() -> None:
-    """First and total order are the shares of the variance, S² σ²/Σ; a run-out and a play count once."""
-    tolerances = {"l1": "±0.05 mm", "l2": "±0.02 mm", "l3": "±0.08 mm", "l4": "±0.05 mm"}
-    result = trunnion.tolerance(fourbar(tolerances=tolerances), methods=["linear", "sobol"], samples=12_000)
-    share = result["contribution_variance"].values
-    np.testing.assert_allclose(result["first_order"].values, share, rtol=0, atol=0.02)
-    np.testing.assert_allclose(result["total_order"].values, share, rtol=0, atol=0.02)
-    for order in ("first", "total"):
-        low, high = result[f"{order}_order_low"].values, result[f"{order}_order_high"].values
-        assert np.all((low - 0.01 <= share) & (share <= high + 0.01))
-
-
-def test_indices_of_a_play_and_its_size() -> None:
-    """The angle by a pin anywhere in a hole: the size of the hole does nothing alone, the place in it nearly all."""
-    joints = fourbar().data()["joints"]
-    joints["C"]["pin"] = {"radius": "5 mm", "clearance": "0.2 mm ± 0.1 mm"}
-    result = trunnion.tolerance(fourbar(tolerances={}, joints=joints), methods=["linear", "sobol"], samples=16_000)
-    first, total = result["first_order"].values[0], result["total_order"].values[0]
-    # y = ρ c: V(E(y|ρ)) = 0, V(E(y|c)) = E(ρ)² E(c²); all V = E(ρ²) E(c²)
-    known = 0.2**2 / (0.2**2 + (0.1 / 3) ** 2)
-    np.testing.assert_allclose(first, [0, known], rtol=0, atol=0.02)
-    np.testing.assert_allclose(total, [1 - known, 1], rtol=0, atol=0.02)
-
-
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SLIDER = {
     "dimensions": {"r": "60 mm ± 0.1 mm", "k": "200 mm ± 0.15 mm"},
@@ -312,20 +255,6 @@ def test_the_largest_part_is_named_and_a_play_is_within_its_radius() -> None:
     assert (told["k"], told["O.clearance"]) == ("±0.015 mm", "within 0.02 mm")
 
 
-def test_a_sensitivity_is_by_the_unit_of_the_tolerance() -> None:
-    dimensions = {**SLIDER["dimensions"], "F": "250 kN ± 5 kN"}
-    loads = {"work": {"joint": "S", "resisting_force": "F"}}
-    more = {"tolerances": {}, "measures": {"torque": {"effort": "O", "at": "60 deg"}}}
-    result = trunnion.tolerance(slider(dimensions=dimensions, loads=loads, **more), methods=["linear"], steps=12)
-    rows = next(one.rows for one in tables(result) if one.title.startswith("contributions"))
-    (row,) = [[cell.replace("\u00a0", " ") for cell in one] for one in rows if one[0] == "F"]
-    torque, half = float(result["nominal"][0]), 5 / 250
-    assert row[1] == "±5 kN"
-    assert row[2].endswith("/kN")
-    assert float(row[3].split()[0]) == pytest.approx(abs(torque) * half * 1e-3, abs=1e-4)  # kN m
-    assert float(row[2].split()[0].replace("−", "-")) == pytest.approx(torque / 250e3, rel=1e-3)
-
-
 PLAYS = ("O", "A", "P", "K")
 ALPHA = np.arcsin(1.02 / 200)  # of both toggle links to the line: 1 mm from it, and the play of the cylinder's pin
 
@@ -382,3 +311,15 @@ def test_play_alone_is_about_the_middle_of_the_holes() -> None:
     mechanism = trunnion.read(EXAMPLES / "fourbar-with-play.yaml")
     loaded, free = (trunnion.play(mechanism.with_seats(seat), steps=36) for seat in ("loaded", "free"))
     assert loaded.worst_case.values == pytest.approx(free.worst_case.values, rel=1e-9)
+
+
+def test_indices_of_a_play_and_its_size() -> None:
+    """The angle by a pin anywhere in a hole: the size of the hole does nothing alone, the place in it nearly all."""
+    joints = fourbar().data()["joints"]
+    joints["C"]["pin"] = {"radius": "5 mm", "clearance": "0.2 mm ± 0.1 mm"}
+    result = trunnion.tolerance(fourbar(tolerances={}, joints=joints), methods=["linear", "sobol"], samples=16_000)
+    first, total = result["first_order"].values[0], result["total_order"].values[0]
+    # y = ρ c: V(E(y|ρ)) = 0, V(E(y|c)) = E(ρ)² E(c²); all V = E(ρ²) E(c²)
+    known = 0.2**2 / (0.2**2 + (0.1 / 3) ** 2)
+    np.testing.assert_allclose(first, [0, known], rtol=0, atol=0.02)
+    np.testing.assert_allclose(total, [1 - known, 1], rtol=0, atol=0.02)

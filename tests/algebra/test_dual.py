@@ -73,24 +73,18 @@ RANGES = {
 }  # fmt: skip
 FUNCTIONS: dict[str, tuple[Callable[[Any, Any], Any], float, float]] = {
     **{name: (lambda xp, x, name=name: getattr(xp, name)(x), *ends) for name, ends in RANGES.items()},
-    "abs, negative": (lambda xp, x: xp.abs(x), -5, -0.2),
-    "arctan2 by y": (lambda xp, x: xp.arctan2(x, -0.7), 0.2, 3),
+    "abs, negative": (lambda xp, x: xp.abs(x), -5, -0.2), "arctan2 by y": (lambda xp, x: xp.arctan2(x, -0.7), 0.2, 3),
     "arctan2 by x": (lambda xp, x: xp.arctan2(0.7, x), -3, 3),
     "arctan2 of both": (lambda xp, x: xp.arctan2(x * x + 1, x), -3, 3),
-    "hypot": (lambda xp, x: xp.hypot(x, 1.3), -3, 3),
-    "hypot, second": (lambda xp, x: xp.hypot(0.4, x), 0.2, 3),
+    "hypot": (lambda xp, x: xp.hypot(x, 1.3), -3, 3), "hypot, second": (lambda xp, x: xp.hypot(0.4, x), 0.2, 3),
     "where": (lambda xp, x: xp.where(x > 0, x * x, -x), 0.1, 3),
     "where, other": (lambda xp, x: xp.where(x > 0, x * x, -x), -3, -0.1),
     "minimum": (lambda xp, x: xp.minimum(x * x, 4.0), 0.1, 1.9),
-    "maximum": (lambda xp, x: xp.maximum(4.0, x * x), 2.1, 3),
-    "power 3": (lambda _, x: x**3, -3, 3),
-    "power -2": (lambda _, x: x**-2, 0.4, 3),
-    "power 2.5": (lambda _, x: x**2.5, 0.4, 3),
-    "power of 2": (lambda _, x: 2.0**x, -3, 3),
-    "power of itself": (lambda _, x: x**x, 0.4, 3),
-    "power 0": (lambda _, x: x**0, 0.4, 3),
-    "nested": (lambda xp, x: xp.exp(xp.sin(x) / (1 + x * x)), -3, 3),
-}
+    "maximum": (lambda xp, x: xp.maximum(4.0, x * x), 2.1, 3), "power 3": (lambda _, x: x**3, -3, 3),
+    "power -2": (lambda _, x: x**-2, 0.4, 3), "power 2.5": (lambda _, x: x**2.5, 0.4, 3),
+    "power of 2": (lambda _, x: 2.0**x, -3, 3), "power of itself": (lambda _, x: x**x, 0.4, 3),
+    "power 0": (lambda _, x: x**0, 0.4, 3), "nested": (lambda xp, x: xp.exp(xp.sin(x) / (1 + x * x)), -3, 3),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -153,17 +147,13 @@ def test_a_quantity_of_two_levels_is_a_differentiable_screw() -> None:
 NOT_THERE: dict[str, Callable[[Any], Any]] = {
     "division by zero": lambda zero: 1.0 / zero,
     "division by dual zero of a dual": lambda zero: Dual(1.0, 2.0) / zero,
-    "sqrt of 0": lambda zero: functions.sqrt(zero),
-    "sqrt below 0": lambda zero: functions.sqrt(zero - 1.0),
-    "log of 0": lambda zero: functions.log(zero),
-    "log below 0": lambda zero: functions.log(zero - 1.0),
-    "hypot of 0, 0": lambda zero: functions.hypot(zero, zero),
-    "power −1 of 0": lambda zero: zero**-1,
-    "power 1/2 of 0": lambda zero: zero**0.5,
-    "power 1/2 below 0": lambda zero: (zero - 1.0) ** 0.5,
+    "sqrt of 0": lambda zero: functions.sqrt(zero), "sqrt below 0": lambda zero: functions.sqrt(zero - 1.0),
+    "log of 0": lambda zero: functions.log(zero), "log below 0": lambda zero: functions.log(zero - 1.0),
+    "hypot of 0, 0": lambda zero: functions.hypot(zero, zero), "power −1 of 0": lambda zero: zero**-1,
+    "power 1/2 of 0": lambda zero: zero**0.5, "power 1/2 below 0": lambda zero: (zero - 1.0) ** 0.5,
     "arcsin at 1": lambda zero: functions.arcsin(zero + 1.0),
     "arccos beyond 1": lambda zero: functions.arccos(zero + 1.5),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("shape", ["float", "array", "nested"])

@@ -43,13 +43,10 @@ def share_by_hand(motor: str = "A") -> float:
 # double-butterfly: virtual work at 60°
 # mass kg, inertia kg m², mass centre: pin and offset from it in the link's frame m, of each link but the crank
 BODIES: Mapping[str, tuple[float, float, str, complex]] = {
-    "left": (1.6, 2.4e-2, "B", 0.049 + 0.165j),
-    "right": (1.5, 2.1e-2, "C", 0.152 + 0.065j),
-    "wing": (0.8, 4.5e-3, "G", -0.031 + 0.048j),
-    "rocker": (0.6, 3.5e-3, "D", 0.130),
-    "tie": (0.7, 5.7e-3, "E", 0.155),
-    "strut": (0.7, 5.5e-3, "F", 0.152),
-}
+    "left": (1.6, 2.4e-2, "B", 0.049 + 0.165j), "right": (1.5, 2.1e-2, "C", 0.152 + 0.065j),
+    "wing": (0.8, 4.5e-3, "G", -0.031 + 0.048j), "rocker": (0.6, 3.5e-3, "D", 0.130),
+    "tie": (0.7, 5.7e-3, "E", 0.155), "strut": (0.7, 5.5e-3, "F", 0.152),
+}  # fmt: skip
 
 
 @lru_cache(maxsize=64)

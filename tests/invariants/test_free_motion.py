@@ -30,9 +30,7 @@ from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Walks
 from trunnion.dynamics.start import initial_row
 from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.joints.motors import MOTORS
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import attribute
 from trunnion.solve.run import prepare
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -88,17 +86,12 @@ def test_near_locking_machine_code_is_what_walks_find() -> None:
 DRIVES: dict[str, dict[str, Any]] = {
     "constant": {"kind": "constant", "effort": 5.0},
     "geared": {
-        "kind": "linear",
-        "stall_effort": 5,
-        "no_load_speed": 90,
-        "ratio": 3,
-        "efficiency": 0.9,
-        "inertia": 1e-3,
+        "kind": "linear", "stall_effort": 5, "no_load_speed": 90, "ratio": 3, "efficiency": 0.9, "inertia": 1e-3,
     },
     "controlled": {"kind": "speed-control", "target": 9, "proportional": 0.3, "integral": 0.5, "limit": 8},
     "table": {"kind": "table", "points": [[0, 9], [8, 7], [16, 0]]},
     "braked": {"kind": "constant", "effort": 6, "off_from": 0.05, "brake": 2, "brake_from": 0.06},
-}
+}  # fmt: skip
 
 
 @pytest.mark.spread(5)
@@ -219,18 +212,6 @@ def test_numbers_without_sense_are_refused(options: dict[str, Any]) -> None:
         simulate(wheel(LINEAR), **options)
 
 
-@pytest.mark.parametrize("name", MOTORS)
-def test_every_motor_takes_arrays(name: str) -> None:
-    """Contract: an effort for every speed, finite, of the shape of the speeds."""
-    parameters = dict.fromkeys((*MOTORS[name].needs, *MOTORS[name].takes), 2.0)
-    places_, efforts = np.array([0.0, 1.0]), np.array([1.0, 2.0])
-    parameters |= {"points.place": places_, "points.effort": efforts, "over": "speed", "integral": 0.0}
-    speed = np.linspace(-3, 3, 7)
-    found = MOTORS[name].function(speed, np.zeros(7), parameters, np.zeros(7))
-    assert np.shape(found) == (7,)
-    assert np.all(np.isfinite(found))
-
-
 def ended(result: Any, code: str) -> dict[str, Any]:
     """The figures of the one finding that tells the end, which is the last row."""
     (figures,) = [one.figures for one in result.trunnion.findings if one.code == f"simulate.{code}"]
@@ -324,17 +305,6 @@ def test_no_motion_begins_at_a_change_point(several: bool) -> None:
     mechanism = driven_four_bar("planar", *PARALLELOGRAM, start=np.pi)
     with pytest.raises(MechanismError, match=r"drivers\.A\.initial: begins at a change point"):
         simulate(beside(mechanism) if several else mechanism, 1.0)
-
-
-@pytest.mark.parametrize("several", [False, True])
-def test_change_points_are_passed(several: bool) -> None:
-    mechanism = driven_four_bar("planar", *PARALLELOGRAM)
-    result = simulate(beside(mechanism) if several else mechanism, 1.0, 2)
-    (figures,) = [one.figures for one in result.trunnion.findings if one.code == "simulate.passed"]
-    assert figures["time"] == pytest.approx(np.sqrt(2 * (np.pi - 1) * INERTIA / 2.0), rel=1e-6)
-    assert figures["times"] == [row[0] for row in attribute(result, "events")].count("change-point")
-    assert result["drive_coordinate"].values[0, -1] == pytest.approx(1.0 + 2.0 / INERTIA / 2.0, rel=1e-6)
-    assert not any("reaction" in one.name for one in result.trunnion.summary)
 
 
 # evaluations

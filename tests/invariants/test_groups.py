@@ -107,17 +107,12 @@ def joined(text: str, *driven: int) -> General:
 
 TOPOLOGIES: dict[str, General] = {
     **{letters: dyad(letters) for letters in ("RRR", "RRP", "PRR", "RPR", "PRP", "RPP", "PPR")},
-    "turned sides": joined("R0x P10 R1x"),
-    "triad": joined("R30 R31 R32 Rx0 Rx1 Rx2"),
-    "triad with slides": joined("R03 P31 R23 Px0 R1x Rx2"),
-    "closed contour": joined("R01 R12 R23 R30 Rx0 Rx2"),
-    "cylinder driven": joined("Rx0 P01 R12 R2x", 1),
-    "inner pin driven": joined("Rx0 R01 R21 R2x", 2),
-    "two driven": joined("R0x P10 R12 P23 R3x", 3, 1),
-    "R driver": joined("Rx0", 0),
-    "P driver": joined("Px0", 0),
+    "turned sides": joined("R0x P10 R1x"), "triad": joined("R30 R31 R32 Rx0 Rx1 Rx2"),
+    "triad with slides": joined("R03 P31 R23 Px0 R1x Rx2"), "closed contour": joined("R01 R12 R23 R30 Rx0 Rx2"),
+    "cylinder driven": joined("Rx0 P01 R12 R2x", 1), "inner pin driven": joined("Rx0 R01 R21 R2x", 2),
+    "two driven": joined("R0x P10 R12 P23 R3x", 3, 1), "R driver": joined("Rx0", 0), "P driver": joined("Px0", 0),
     "P driver, turned": joined("P0x", 0),
-}
+}  # fmt: skip
 
 
 def regular(group: General, lanes: int, seed: int) -> tuple[Case, Any, Array]:

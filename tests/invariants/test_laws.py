@@ -23,28 +23,15 @@ from trunnion.joints.spatial_load import BearingLoad
 
 N, V = 50.0, 0.02  # N, m/s
 NUMBERS = {
-    "coefficient": 0.12,
-    "static": 0.2,
-    "stribeck_speed": 0.01,
-    "transition_speed": 0.01,
-    "viscous": 0.5,
-    "stiffness": 2e4,
-    "damping": 30.0,
-    "pair_factor": 4 / 3,
-    "arm": 5e-4,
-}
+    "coefficient": 0.12, "static": 0.2, "stribeck_speed": 0.01, "transition_speed": 0.01, "viscous": 0.5,
+    "stiffness": 2e4, "damping": 30.0, "pair_factor": 4 / 3, "arm": 5e-4,
+}  # fmt: skip
 CURVE = 0.12 + 0.08 * exp(-4.0)  # f + (f_s − f) exp(−(v/v_s)²), v = 2 v_s
 FORCES = {
-    "coulomb": -4 / 3 * 0.12 * N,
-    "viscous": -(4 / 3 * 0.12 + 0.5 * V) * N,
-    "stiction": -0.12 * N,
-    "stribeck": -(CURVE + 0.5 * V) * N,
-    "brown-mcphee": -(0.12 * tanh(8.0) + 0.08 * 2 / 1.75**2 + 0.5 * V) * N,
-    "dahl": -0.12 * N,
-    "lugre": -(CURVE + 0.5 * V) * N,
-    "rolling-bearing": -0.12 * N,
-    "rolling": -N,
-}
+    "coulomb": -4 / 3 * 0.12 * N, "viscous": -(4 / 3 * 0.12 + 0.5 * V) * N, "stiction": -0.12 * N,
+    "stribeck": -(CURVE + 0.5 * V) * N, "brown-mcphee": -(0.12 * tanh(8.0) + 0.08 * 2 / 1.75**2 + 0.5 * V) * N,
+    "dahl": -0.12 * N, "lugre": -(CURVE + 0.5 * V) * N, "rolling-bearing": -0.12 * N, "rolling": -N,
+}  # fmt: skip
 
 
 def force(law: str, slip: float, **more: float) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from typing import Any
 
 import numpy as np
@@ -10,9 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import mechanisms
-import mechanisms_space
-from measured import figures, many
+from measured import many
 from mechanisms import build, four_bar
 from trunnion.algebra.course import Courses
 from trunnion.algebra.dual import Dual
@@ -20,63 +17,7 @@ from trunnion.algebra.panels import FIT, ON_GAUSS, POINTS, above, extreme, sprea
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import path_of, plan
 from trunnion.solve.forward import forward
-from trunnion.solve.run import Run, prepare
-
-STATISTICS = ("maximum", "minimum", "peak-to-peak", "mean", "rms", "largest")
-
-
-def of_mechanism(run: Run) -> list[tuple[str, str, str]]:
-    """Kind, subject and axis of a few measures that every mechanism has."""
-    link, point = run.system.points[-1]
-    joint = next(name for name, (kind, _) in run.system.joints.items() if kind in ("revolute", "prismatic"))
-    driver = next(iter(run.system.mechanism.drivers))
-    spatial = run.system.mechanism.space == "spatial"
-    return [
-        ("point", f"{link}.{point}", "x"),
-        ("angle", link, "z" if spatial else ""),
-        ("rotation" if run.system.turns(joint) else "slide", joint, ""),
-        ("effort", driver, ""),
-        ("reaction", joint, ""),
-    ]
-
-
-def _hold_together(run: Run, steps: int = 24) -> None:
-    """Order of the statistics; a sample that is the nominal mechanism has its figures and no deviation."""
-    made = {
-        (kind, statistic): Measure(f"{kind} {statistic}", kind, subject, axis, statistic=statistic)
-        for kind, subject, axis in of_mechanism(run)
-        for statistic in ("", *STATISTICS)
-    }
-    nominal = figures(run, list(made.values()), steps)
-    same = figures(run, list(made.values()), steps, {})
-    for kind, _, _ in of_mechanism(run):
-        number = {statistic: nominal[made[kind, statistic].name] for statistic in ("", *STATISTICS)}
-        if np.isnan(number["largest"]):  # not every position has an answer
-            assert all(np.isnan(number[statistic]) for statistic in STATISTICS)
-            continue
-        scale = max(1e-9, abs(number["largest"]))
-        slack = 1e-3 * scale  # of the search between positions
-        assert number[""] == 0
-        assert number["minimum"] <= number["mean"] + slack <= number["maximum"] + 2 * slack
-        assert number["peak-to-peak"] == pytest.approx(number["maximum"] - number["minimum"], abs=1e-12 * scale)
-        assert number["largest"] == pytest.approx(max(number["maximum"], -number["minimum"]), abs=1e-12 * scale)
-        assert abs(number["mean"]) - slack <= number["rms"] <= number["largest"] + slack
-        for statistic in STATISTICS:
-            own = float(np.ravel(same[made[kind, statistic].name])[0])
-            assert own == pytest.approx(number[statistic], rel=1e-12, abs=1e-12 * scale)
-
-
-@pytest.mark.spread(1)
-@pytest.mark.parametrize("name", mechanisms.MODELS)
-def test_statistics_hold_together_in_the_plane(name: str) -> None:
-    _hold_together(prepare(build(mechanisms.MODELS[name]())))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["RSSR", "RCCC", "HUSR", "RUSP", "two RSSR in series"])
-def test_statistics_hold_together_in_space(name: str) -> None:
-    drawn = mechanisms_space.MODELS[name]()
-    _hold_together(prepare(mechanisms.Mechanism(**mechanisms.model(copy.deepcopy(drawn.data)))))
+from trunnion.solve.run import prepare
 
 
 @given(st.floats(0.05, 6.2), st.floats(0.05, 3.0))

@@ -72,56 +72,6 @@ def test_a_spring_and_a_damper_in_a_cylindrical_joint_are_torsional(name: str) -
     np.testing.assert_allclose(drive(result), taken, rtol=0, atol=1e-12 * np.abs(taken).max())
 
 
-# a screw
-def jack(friction: float, **load: Any) -> Mechanism:
-    """A driven screw of 6 mm pitch and 10 mm mean radius lifts a floating nut that is kept from turning."""
-    line, across = {"at": [0, 0, 0], "axis": [0, 0, 1]}, {"at": [0, 0, 0], "axis": [0, 1, 0]}
-    links, joints = floating("nut")
-    return Mechanism(
-        space="spatial",
-        gravity=[0, 0, 0],
-        links={
-            "ground": {"points": {"A": line, "P": line}},
-            "screw": {"points": {"A": line, "H": line}},
-            "nut": {"points": {"H": line, "U": across}},
-            **links,
-        },
-        joints={
-            **joints,
-            "A": {"type": "revolute", "links": ["ground", "screw"]},
-            "H": {"type": "helical", "links": ["screw", "nut"], "pitch": "6 mm", "friction": friction,
-                  "pin": {"radius": "10 mm", "bearing": "50 mm"}},
-        },
-        drivers={"A": {"speed": 2.0}},
-        loads={"load": load},
-    )  # fmt: skip
-
-
-LEAD = 6e-3 / (2 * np.pi)
-
-
-@pytest.mark.parametrize(
-    ("load", "torque"),
-    [
-        ({"joint": "P", "resisting_force": 1000.0}, 1000 * LEAD),
-        ({"joint": "H", "resisting_force": 1000.0}, 1000 * LEAD),
-        ({"joint": "H", "resisting_torque": 3.0}, 3.0),
-    ],
-)
-def test_a_thread_without_friction(load: dict[str, Any], torque: float) -> None:
-    result = brief(jack(0.0, **load), STEPS)
-    np.testing.assert_allclose(result["drive_effort"].values[0], torque, rtol=1e-12)
-    slide, rotation = (joint(result, f"joint_{motion}_velocity", "H") for motion in ("slide", "rotation"))
-    np.testing.assert_allclose(slide, LEAD * rotation, rtol=1e-12)
-
-
-def test_a_thread_with_friction() -> None:
-    """M = F r tan(λ + φ), the square thread of the textbooks."""
-    result = brief(jack(0.1, joint="P", resisting_force=1000.0), STEPS)
-    expected = 1000 * 0.01 * np.tan(np.arctan(LEAD / 0.01) + np.arctan(0.1))
-    np.testing.assert_allclose(result["drive_effort"].values[0], expected, rtol=1e-9)
-
-
 # hints and forms
 def test_a_loop_is_the_same_as_its_links() -> None:
     """The table of an RCCC written out as links with points: the element of a joint behind X(twist + ε distance)."""
@@ -243,3 +193,45 @@ def test_losses_that_make_no_sense_are_findings(joint: str, losses: dict[str, An
     with pytest.raises(MechanismError) as caught:
         lossy(slider_crank(), {joint: losses})
     assert where in [one.where for one in caught.value.findings]
+
+
+LEAD = 6e-3 / (2 * np.pi)
+
+
+def jack(**load: Any) -> Mechanism:
+    """A driven screw of 6 mm pitch and 10 mm mean radius lifts a floating nut."""
+    line, across = {"at": [0, 0, 0], "axis": [0, 0, 1]}, {"at": [0, 0, 0], "axis": [0, 1, 0]}
+    links, joints = floating("nut")
+    return Mechanism(
+        space="spatial",
+        gravity=[0, 0, 0],
+        links={
+            "ground": {"points": {"A": line, "P": line}},
+            "screw": {"points": {"A": line, "H": line}},
+            "nut": {"points": {"H": line, "U": across}},
+            **links,
+        },
+        joints={
+            **joints,
+            "A": {"type": "revolute", "links": ["ground", "screw"]},
+            "H": {"type": "helical", "links": ["screw", "nut"], "pitch": "6 mm", "friction": 0,
+                  "pin": {"radius": "10 mm", "bearing": "50 mm"}},
+        },
+        drivers={"A": {"speed": 2.0}},
+        loads={"load": load},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("load", "torque"),
+    [
+        ({"joint": "P", "resisting_force": 1000.0}, 1000 * LEAD),
+        ({"joint": "H", "resisting_force": 1000.0}, 1000 * LEAD),
+        ({"joint": "H", "resisting_torque": 3.0}, 3.0),
+    ],
+)
+def test_a_thread_without_friction(load: dict[str, Any], torque: float) -> None:
+    result = brief(jack(**load), STEPS)
+    np.testing.assert_allclose(result["drive_effort"].values[0], torque, rtol=1e-12)
+    slide, rotation = (joint(result, f"joint_{motion}_velocity", "H") for motion in ("slide", "rotation"))
+    np.testing.assert_allclose(slide, LEAD * rotation, rtol=1e-12)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
 
 import trunnion
 from brief import brief
@@ -135,17 +134,6 @@ def test_exactly_at_a_dead_centre(kind: str) -> None:
     assert np.all(np.isfinite(result["drive_effort"].values[:, 1:]))
 
 
-# number of positions
-@pytest.mark.parametrize("name", ["four-bar", "class III", "excavator"])
-def test_one_position(name: str) -> None:
-    whole, one = positions_of(MODELS[name](), 12), positions_of(MODELS[name](), 1)
-    assert one.sizes["position"] == 1
-    for variable in ("point_position", "reaction_force", "drive_effort", "status"):
-        np.testing.assert_allclose(
-            one[variable].values[..., 0], whole[variable].values[..., 0], rtol=1e-9, atol=1e-9, err_msg=variable
-        )
-
-
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("method", [None, FrictionMethod("successive-approximation", 1e-9)])
 @pytest.mark.parametrize("name", ["slider-crank", "Stephenson six-bar", "inverted slider-crank"])
@@ -200,22 +188,6 @@ def test_range_includes_both_ends() -> None:
     assert "range" in str(error.value)
 
 
-# loads that resist
-def test_resisting_loads_take_power() -> None:
-    """A brake torque on a pin and a brake force in a guide oppose the motion: useful power = Σ |M ω| + |F v|."""
-    data = slider_crank()
-    data["loads"] = {"pump": {"joint": "C", "resisting_force": 30.0}, "brake": {"joint": "B", "resisting_torque": 2.0}}
-    result = analyse(data, 40)
-    v = np.abs(result["joint_slide_velocity"].sel(joint="C").values)
-    w = np.abs(result["joint_rotation_velocity"].sel(joint="B").values)
-    np.testing.assert_allclose(result["useful_power"], 30.0 * v + 2.0 * w, rtol=1e-12, atol=1e-12)
-    assert np.abs(result["power_residual"]).max() < 1e-12 * np.abs(result["drive_power"]).max()
-    lost = float(result["friction_power"].sum("joint").mean())
-    gained = float(result["useful_power"].mean())
-    assert float(result["efficiency"]) == pytest.approx(gained / (gained + lost), rel=1e-3)
-    assert 0 < float(result["efficiency"]) < 1
-
-
 def test_inertia_about_the_origin() -> None:
     """The same body stated about its own origin: J_O = J_S + m r²."""
     data, other = four_bar(), four_bar()
@@ -258,40 +230,6 @@ def test_assemblies_that_coincide_over_a_range_are_told_by_its_ends() -> None:
     assert told["figures"]["places"] == ["between 0° and 360°"]
 
 
-CLAMP = """
-trunnion: 1
-gravity: [0, 0]
-links:
-  ground: {points: {A: [0, 0], D: [-25 mm, -35 mm], G: [-600 mm, 128 mm]}}
-  arm: {points: {A: [0, 0], B: [-25 mm, 8 mm]}}
-  handle: {points: {B: [0, 0], C: [22 mm, 0], H: [-120 mm, 0]}}
-  link: {points: {C: [0, 0], D: [21 mm, 0]}}
-  barrel: {points: {G: [0, 0], Z: {at: [400 mm, 0], axis: [1, 0]}}}
-  rod: {points: {Z: {at: [-175 mm, 0], axis: [1, 0]}, H: [0, 0]}}
-joints:
-  A: {type: revolute, links: [ground, arm]}
-  B: {type: revolute, links: [arm, handle]}
-  C: {type: revolute, links: [handle, link]}
-  D: {type: revolute, links: [ground, link]}
-  G: {type: revolute, links: [ground, barrel]}
-  H: {type: revolute, links: [handle, rod]}
-  Z: {type: prismatic, links: [barrel, rod]}
-assembly: {C: [-15 mm, -16 mm], B: [-26 mm, 3 mm]}
-"""
-
-
-@pytest.mark.parametrize(("low", "high", "start"), [(-90, 0, True), (0, -90, False)])
-def test_positions_without_an_assembly_are_told_whether_the_start_is_among_them(
-    low: int, high: int, start: bool
-) -> None:
-    """They are not said to be out of reach from a start that does not close itself."""
-    driver = {"range": [f"{low} mm", f"{high} mm"], "speed": f"{100 if high > low else -100} mm/s"}
-    model = trunnion.Mechanism.model_validate(YAML(typ="safe").load(CLAMP) | {"drivers": {"Z": driver}})
-    (told,) = [row for row in findings(trunnion.analyse(model, 60)) if row["code"] == "assembly.open"]
-    assert told["figures"]["start"] is start
-    assert ("from the start" in told["what"]) != start
-
-
 @pytest.mark.parametrize("branch", [1, -1])
 def test_a_hint_on_a_joint_of_a_later_group_counts(branch: int) -> None:
     """F joins the rocker to a later dyad: its place tells the assemblies of the rocker's own dyad apart."""
@@ -329,17 +267,6 @@ def example(name: str) -> trunnion.Mechanism:
     return trunnion.read(EXAMPLES / f"{name}.yaml")
 
 
-def test_a_mechanism_is_prepared_once_and_a_copy_of_it_by_itself() -> None:
-    mechanism = example("toleranced-fourbar")
-    run = prepare(mechanism)
-    assert prepare(mechanism) is run
-    for other in (copy.copy(mechanism), copy.deepcopy(mechanism), mechanism.with_values({"gravity.y": 0.0})):
-        assert prepare(other) is not run
-        assert prepare(other).system.mechanism is other
-    assert copy.deepcopy(mechanism) == mechanism
-    assert not copy.deepcopy(mechanism).worked_out
-
-
 @pytest.mark.parametrize("name", ["durango-fourbar", "fourbar-with-play", "rssr"])
 def test_an_analysis_again_is_that_of_a_mechanism_read_anew(name: str) -> None:
     mechanism = example(name)
@@ -349,14 +276,11 @@ def test_an_analysis_again_is_that_of_a_mechanism_read_anew(name: str) -> None:
 
 
 WRONG: list[dict[str, Any]] = [
-    {"links.crank.mass": -1.0},
-    {"joints.B.pin.radius": 0.0},
-    {"joints.B.friction.coefficient": -0.1, "links.coupler.mass": -2.0},
-    {"drivers.A.speed": 0.0},
-    {"links.coupler.inertia": -1.0},
-    {"links.coupler.points.C.x": 0.0, "links.coupler.points.C.y": 0.0},
+    {"links.crank.mass": -1.0}, {"joints.B.pin.radius": 0.0},
+    {"joints.B.friction.coefficient": -0.1, "links.coupler.mass": -2.0}, {"drivers.A.speed": 0.0},
+    {"links.coupler.inertia": -1.0}, {"links.coupler.points.C.x": 0.0, "links.coupler.points.C.y": 0.0},
     {"AB": float("inf"), "joint_defaults.friction.coefficient": 7.0},
-]
+]  # fmt: skip
 SOUND: list[dict[str, Any]] = [{"AB": 1.9}, {"AB": float("nan")}]
 
 

@@ -239,13 +239,10 @@ def test_numbers_that_were_nothing_or_one_are_looked_at_anew() -> None:
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # the height of the ram by the crank angle, and by name
 HEIGHTS = {
-    "drive": "(0.035 m * cos(drive) + sqrt((0.12 m)^2 - (0.035 m * sin(drive))^2))",
-    "slide": "S.slide",
-    "point": "piston.Q.x",
-    "named slide": "way",
-    "named point": "height",
+    "drive": "(0.035 m * cos(drive) + sqrt((0.12 m)^2 - (0.035 m * sin(drive))^2))", "slide": "S.slide",
+    "point": "piston.Q.x", "named slide": "way", "named point": "height",
     "distance": "hypot(rod.Q.x - frame.O.x, rod.Q.y - frame.O.y)",
-}
+}  # fmt: skip
 NAMED = {
     "measures": {
         "way": {"slide": "S"}, "height": {"point": "piston.Q", "axis": "x"},

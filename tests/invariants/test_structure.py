@@ -18,27 +18,18 @@ from trunnion.structure.decompose import Plan, decompose, mobility_by_rank
 from trunnion.structure.graph import components, longest_loop, matching
 
 FORMULAS = {
-    "four-bar": "I(0,1)R → II(2,3)RRR",
-    "four-bar, other branch": "I(0,1)R → II(2,3)RRR",
-    "slider-crank": "I(0,1)R → II(2,3)RRP",
-    "inverted slider-crank": "I(0,1)R → II(2,3)RPR",
-    "Watt six-bar": "I(0,1)R → II(2,3)RRR → II(4,5)RRR",
-    "Stephenson six-bar": "I(0,1)R → II(2,3)RRR → II(4,5)RRR",
-    "class III": "I(0,1)R → III(2,3,4,5)RRRRRR",
-    "five-bar": "I(0,1)R → I(0,2)R → II(3,4)RRR",
-    "excavator": "II(1,2,3)RRR[P] → I(1,4)R",
-    "serial arm": "I(0,1)R → I(1,2)P → I(2,3)R",
-    "Scotch yoke": "I(0,1)R → II(2,3)RPP",
-    "elliptic bar": "I(0,1)P → II(2,3)RRP",
-    "tangent drive": "I(0,1)R → II(2,3)PRP",
-    "geared five-bar": "I(0,1)R → II(4)RG → II(2,3)RRR",
-    "planet drive": "I(0,1)R → II(2)RG → II(3,4)RRP",
-    "geared loop": "I(0,1)R → II(2,3,4)RRRRG",
+    "four-bar": "I(0,1)R → II(2,3)RRR", "four-bar, other branch": "I(0,1)R → II(2,3)RRR",
+    "slider-crank": "I(0,1)R → II(2,3)RRP", "inverted slider-crank": "I(0,1)R → II(2,3)RPR",
+    "Watt six-bar": "I(0,1)R → II(2,3)RRR → II(4,5)RRR", "Stephenson six-bar": "I(0,1)R → II(2,3)RRR → II(4,5)RRR",
+    "class III": "I(0,1)R → III(2,3,4,5)RRRRRR", "five-bar": "I(0,1)R → I(0,2)R → II(3,4)RRR",
+    "excavator": "II(1,2,3)RRR[P] → I(1,4)R", "serial arm": "I(0,1)R → I(1,2)P → I(2,3)R",
+    "Scotch yoke": "I(0,1)R → II(2,3)RPP", "elliptic bar": "I(0,1)P → II(2,3)RRP",
+    "tangent drive": "I(0,1)R → II(2,3)PRP", "geared five-bar": "I(0,1)R → II(4)RG → II(2,3)RRR",
+    "planet drive": "I(0,1)R → II(2)RG → II(3,4)RRP", "geared loop": "I(0,1)R → II(2,3,4)RRRRG",
     "rocker train": "I(0,1)R → II(2,3)RRR → II(4)RG → II(5,6)RRP",
-    "rack on a rocker": "I(0,1)R → II(2,3)RPR → II(4)RG",
-    "rack in a loop": "I(0,1)R → III(2,3,4,5,6)RRRRPRRG",
+    "rack on a rocker": "I(0,1)R → II(2,3)RPR → II(4)RG", "rack in a loop": "I(0,1)R → III(2,3,4,5,6)RRRRPRRG",
     "screwed strut": "III(1,2,3,4)RRRP[R]G",
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -151,14 +142,8 @@ def parallelogram(third: float) -> Data:
 
 
 HELD_TWICE = [
-    ("ground", "crank"),
-    ("ground", "a"),
-    ("a", "b"),
-    ("b", "ground"),
-    ("a", "ground"),
-    ("crank", "c"),
-    ("c", "d"),
-]
+    ("ground", "crank"), ("ground", "a"), ("a", "b"), ("b", "ground"), ("a", "ground"), ("crank", "c"), ("c", "d"),
+]  # fmt: skip
 WRONG = {  # and what is said
     "a five-bar with one driver": (
         model(MODELS["five-bar"]() | {"drivers": {"A": {"speed": 2.0}}}), ("mobility is 2", "one driver")

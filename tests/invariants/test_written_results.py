@@ -236,19 +236,6 @@ def test_numbers_of_half_the_size() -> None:
         np.testing.assert_array_equal(single[name], expected.astype(single[name].dtype), err_msg=name)
 
 
-def test_tables_have_the_columns_of_what_is_kept(tmp_path: Path) -> None:
-    result = trunnion.analyse(trunnion.read(DURANGO), STEPS, variables=["drive_effort", "reaction_force"])
-    (frame,) = result.trunnion.tables().values()
-    assert {"A.effort", "B.reaction_x"} <= {*frame}
-    assert not {"B.rotation", "power_in"} & {*frame}
-    for name in ("some.csv", "some.json", "some.nc"):
-        trunnion.save(result, tmp_path / name)
-        assert (tmp_path / name).stat().st_size > 1000
-    with pytest.raises(MechanismError) as caught:
-        trunnion.save(result, tmp_path / "other.csv", columns=["B.rotation"])
-    assert "there is no column 'B.rotation'" in str(caught.value)
-
-
 @pytest.mark.parametrize(
     ("asked", "where"), [({"variables": ["reaction_forces"]}, "variables"), ({"dtype": "float16"}, "dtype")]
 )

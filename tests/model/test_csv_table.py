@@ -252,21 +252,15 @@ def test_a_name_that_leads_out(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("none.csv", "is not in the folder of the model"),
-        ("folder.csv", "is not a file"),
+        ("none.csv", "is not in the folder of the model"), ("folder.csv", "is not a file"),
         ("out.csv", "leads out of the folder of the model by a link"),
-        ("way/gas.csv", "leads out of the folder of the model by a link"),
-        ("loop.csv", "cannot be reached"),
-        ("pipe.csv", "is not a file"),
-        ("con.csv", "is a device on some systems"),
-        ("gas.txt", "is no CSV file by its name"),
-        (".env", "is no CSV file by its name"),
-        ("a\\\\gas.csv", "has a backslash — write a/gas.csv"),
-        ("gas.csv\\0", "is no name of a file"),
-        ("", "is no name of a file"),
-        ("x" * 300 + ".csv", "is no name of a file"),
+        ("way/gas.csv", "leads out of the folder of the model by a link"), ("loop.csv", "cannot be reached"),
+        ("pipe.csv", "is not a file"), ("con.csv", "is a device on some systems"),
+        ("gas.txt", "is no CSV file by its name"), (".env", "is no CSV file by its name"),
+        ("a\\\\gas.csv", "has a backslash — write a/gas.csv"), ("gas.csv\\0", "is no name of a file"),
+        ("", "is no name of a file"), ("x" * 300 + ".csv", "is no name of a file"),
     ],
-)
+)  # fmt: skip
 def test_what_is_no_plain_file_in_the_folder(name: str, said: str, tmp_path: Path) -> None:
     folder, other = tmp_path / "folder", tmp_path / "other"
     folder.mkdir()

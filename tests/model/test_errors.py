@@ -80,20 +80,12 @@ def test_errors_may_speak_of_dimensions() -> None:
 
 def test_paths_of_what_is_not_stated_yet() -> None:
     paths = {
-        "errors.AB": "errors.dimensions.AB",
-        "AB": "dimensions.AB",
-        "B.pin.clearance": "joints.B.pin.clearance",
-        "joints.B.seat.xi": "joints.B.seat.xi",
-        "joint_defaults.pin.clearance": "joint_defaults.pin.clearance",
-    }
+        "errors.AB": "errors.dimensions.AB", "AB": "dimensions.AB", "B.pin.clearance": "joints.B.pin.clearance",
+        "joints.B.seat.xi": "joints.B.seat.xi", "joint_defaults.pin.clearance": "joint_defaults.pin.clearance",
+    }  # fmt: skip
     assert {name: FOURBAR.path_of(name) for name in paths} == paths
-    for name in (
-        "B.pin.clearence",
-        "X.pin.clearance",
-        "joint_defaults.misalignment.tilt",
-        "B.pin.fit",
-        "B.seat.direction",
-    ):
+    wrong = ("B.pin.clearence", "X.pin.clearance", "joint_defaults.misalignment.tilt", "B.pin.fit", "B.seat.direction")
+    for name in wrong:
         with pytest.raises(MechanismError):
             FOURBAR.path_of(name)
     kinds = FOURBAR.with_values({"errors.AB": 1e-5, "errors.gamma": 1e-5}).parameter_kinds()

@@ -64,15 +64,10 @@ def test_toml(tmp_path: Path, findings_of: FindingsOf) -> None:
     text = """
 trunnion = 1
 [links]
-ground = { points = { A = [0, 0], D = ["5.5 m", 0] } }
+ground = { points = { A = [0, 0] } }
 crank = { points = { A = [0, 0], B = ["2 m", 0] } }
-coupler = { points = { B = [0, 0], C = ["6 m", 0] } }
-rocker = { points = { D = [0, 0], C = ["3 m", 0] } }
 [joints]
 A = { type = "revolute", links = ["ground", "crank"] }
-B = { type = "revolute", links = ["crank", "coupler"] }
-C = { type = "revolute", links = ["coupler", "rocker"] }
-D = { type = "revolute", links = ["ground", "rocker"] }
 [drivers.A]
 speed = "10 rad/s"
 """
@@ -153,14 +148,11 @@ def test_nesting_up_to_the_limit(findings_of: FindingsOf, name: str, depth: int)
 @pytest.mark.parametrize(
     ("name", "content", "line", "what"),
     [
-        ("model.json", "{", 1, "is not JSON"),
-        ("model.json", '{"trunnion": 1, "trunnion": 1}', 1, "given twice"),
-        ("model.json", "[1]", 1, "not a group of entries"),
-        ("model.json", '{"trunnion": 1, "name": NaN}', 1, ""),
-        ("model.toml", "a = [", None, ""),
-        ("model.toml", "a = 1\na = 2\n", 2, ""),
+        ("model.json", "{", 1, "is not JSON"), ("model.json", '{"trunnion": 1, "trunnion": 1}', 1, "given twice"),
+        ("model.json", "[1]", 1, "not a group of entries"), ("model.json", '{"trunnion": 1, "name": NaN}', 1, ""),
+        ("model.toml", "a = [", None, ""), ("model.toml", "a = 1\na = 2\n", 2, ""),
     ],
-)
+)  # fmt: skip
 def test_json_and_toml_that_are_no_model(
     findings_of: FindingsOf, name: str, content: str, line: Any, what: str
 ) -> None:
@@ -231,30 +223,6 @@ def test_any_value_is_read_back_as_written(tmp_path_factory: pytest.TempPathFact
 
 # Of each example; `python -m benchmarks.fuzz` damages them, and all other files, by the ten thousand.
 MUTANTS = int(os.environ.get("TRUNNION_MUTANTS", "12"))
-JUNK = [*":{}[],-'\"#|0C \n\t\x00é±~%@", "", "&a ", "*a ", "!!x ", "1e999", ".nan", "AB", "kg", "? ", "<<: ", "links"]
-JUNK += ["null", "9" * 20]
-
-
-@pytest.mark.sample(10)
-@pytest.mark.slow
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
-def test_no_mutation_of_an_example_gives_anything_but_findings(example: Path, tmp_path: Path) -> None:
-    draw = random.Random(f"mutation of {example.stem}")  # others in each: all together are what is tried
-    original = example.read_text(encoding="utf-8")
-    path = tmp_path / "mutant.yaml"
-    for _ in range(MUTANTS):
-        text = original
-        for _ in range(draw.randint(1, 4)):
-            start = draw.randrange(len(text))
-            end = min(len(text), start + draw.choice([0, 0, 1, 3, 20]))
-            text = text[:start] + draw.choice(JUNK) + text[end:]
-        path.write_text(text, encoding="utf-8")
-        refused: MechanismError | None = None
-        try:
-            read_mechanism(path).parameters()
-        except MechanismError as error:
-            refused = error
-        assert refused is None or refused.findings, "a refusal says why"
 
 
 ODD: list[object] = [
@@ -308,21 +276,17 @@ def test_anchors_mean_nothing(tmp_path: Path) -> None:
 
 DEEP = 20_000
 BOMBS = {
-    "dotted key": (".toml", "x." * DEEP + "x = 1"),
-    "dotted table": (".toml", "[" + "x." * DEEP + "x]"),
+    "dotted key": (".toml", "x." * DEEP + "x = 1"), "dotted table": (".toml", "[" + "x." * DEEP + "x]"),
     "TOML brackets": (".toml", "x = " + "[" * DEEP + "]" * DEEP),
     "TOML groups": (".toml", "x = " + "{a = " * DEEP + "1" + "}" * DEEP),
     "tables in tables": (".toml", "".join(f"[[{'.'.join('x' * k)}]]\n" for k in range(1, 300))),
-    "TOML whole number": (".toml", "x = " + "9" * 5000),
-    "long word": (".toml", 'name = """' + "x" * 900_000 + '"""'),
-    "YAML brackets": (".yaml", "x: " + "[" * DEEP + "]" * DEEP),
-    "YAML lists": (".yaml", "- " * DEEP),
+    "TOML whole number": (".toml", "x = " + "9" * 5000), "long word": (".toml", 'name = """' + "x" * 900_000 + '"""'),
+    "YAML brackets": (".yaml", "x: " + "[" * DEEP + "]" * DEEP), "YAML lists": (".yaml", "- " * DEEP),
     "YAML aliases": (".yaml", "a: &a [x, x]\nb: &b [*a, *a]\nc: [*b, *b]"),
-    "YAML whole number": (".yaml", "trunnion: " + "9" * 5000),
-    "a key twice": (".yaml", ".nan: 1\n.nan: 2"),
+    "YAML whole number": (".yaml", "trunnion: " + "9" * 5000), "a key twice": (".yaml", ".nan: 1\n.nan: 2"),
     "JSON groups": (".json", '{"x": ' * DEEP + "1" + "}" * DEEP),
     "half a sign": (".json", r'{"trunnion": 1, "name": "\ud800"}'),
-}
+}  # fmt: skip
 
 
 @pytest.mark.spread(29)

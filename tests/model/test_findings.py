@@ -27,9 +27,7 @@ MISTAKES = {
             ("mas: 4.8 kg", "links.crank.mas", "the key 'mas' is unknown"),
             ("centre: 3", "links.crank.centre", "takes [x, y] or {distance"),
             ("inertia_about: center", "links.crank.inertia_about", "not one of 'centre' or 'origin'"),
-            ("mass: [4.8 kg]", "links.crank.mass", "is a list, not a number"),
             ("mass: true", "links.crank.mass", "a yes/no value"),
-            ("mass: 4.8 m", "links.crank.mass", "a length where a mass"),
             ("mass: '4.8'", "links.crank.mass", "'4.8' has no unit where a mass"),
             ("mass: AB", "links.crank.mass", "'AB' is a length where a mass"),
             ("mass: .nan", "links.crank.mass", "nan is not a finite number"),
@@ -43,7 +41,7 @@ MISTAKES = {
             ("{}", "drivers.A", "'speed' is missing"), ("10 rad/s", "drivers.A", "not a group of entries"),
             ("", "drivers.A", "is empty"), ("{speed: 10,5 rad/s}", "drivers.A.5 rad/s", "has no value")],
         "[ground, crank]": [
-            ("[ground]", "joints.A.links", "'"), ("ground", "joints.A.links", "not a list"),
+            ("ground", "joints.A.links", "not a list"),
             ("[ground, crank, rocker]", "joints.A.links", "more than the 2"),
             ("[ground, 3]", "joints.A.links.1", "not a text"),
             ("[ground, cranc]", "joints.A.links", "there is no link 'cranc'"),
@@ -54,9 +52,7 @@ MISTAKES = {
             ("'=B': [AB, 0]", "links.crank.points.=B", "begins with '=', which makes a formula"),
             ("Bx: [AB, 0]", "joints.B", "the link 'crank' has no point 'B'", 9),
             ("B: [0, 0]", "links.crank.points", "'A' and 'B' of the link 'crank' are at one")],
-        "space: planar": [
-            ("space: flat", "space", "not one of 'planar' or 'spatial'"),
-            ("ground: base", "ground", "there is no link 'base'")],
+        "space: planar": [("ground: base", "ground", "there is no link 'base'")],
         "trunnion: 1": [
             ("trunnion: 2", "trunnion", "version 2, this program reads 1"),
             ("trunnion: 1\nreferences: [A book, 3]", "references.1", "is not a text", 1)],
@@ -65,20 +61,16 @@ MISTAKES = {
         "AB: 2 m": [
             ("-AB: 2 m", "dimensions.-AB", "begins with '-'"),
             ("AB: 2 m + BC", "dimensions.AB", "'BC', which is not one"),
-            ("AB: 2 * AB", "dimensions.AB", "is defined by itself: AB → AB"),
             ("AB: 2 m\n  a-b: 2 m", "dimensions.a-b", "cannot be used in an expression", 1),
             ("AB: 2 m\n  sin: 2 m", "dimensions.sin", "reserved name of expressions", 1),
             ("AB: ±2 mm", "dimensions.AB", "a tolerance without a value")],
-        "[AB, 0]": [
-            ("[ABC, 0]", "links.crank.points.B.x", "'ABC' is not one of the dim"),
-            ("[AB + 3, 0]", "links.crank.points.B.x", "a length and a number are added")],
+        "[AB, 0]": [("[ABC, 0]", "links.crank.points.B.x", "'ABC' is not one of the dim")],
         "AB: 2 m\n  AD: 5.5 m": [("AB: AD\n  AD: AB", "dimensions.A", "is defined by itself: A")],
         "10 rad/s": [
             ("10 m/s", "drivers.A.speed", "a speed where an angular speed is needed"),
             ("10 Hz", "drivers.A.speed", "'Hz' may count turns"),
             ("0", "drivers.A.speed", "is 0: the driver does not move"),
             ("10 rad/s, start: 3 deg ± 1 deg", "drivers.A.start", "does not vary"),
-            ("10 rad/s, range: [1, 1]", "drivers.A.range", "begins and ends at 1"),
             ("10 rad/s, motor: {kind: induction, breakdown_effort: 9, power: 5 kW}",
              "drivers.A.motor.power", "the key 'power' is unknown")],
         "C: [7.6, 2.1]": [
@@ -99,7 +91,6 @@ MISTAKES = {
             ("{point: coupler.C}", "measures.tip", "along an axis")],
         "axis: x": [("axis: z", "measures.tip.axis", "no z in the plane")],
         "type: revolute, links: [ground, crank]": [
-            ("type: revolut, links: [ground, crank]", "joints.A.type", "'revolut' is not a joint type"),
             ("type: spherical, links: [ground, crank]", "joints.A", "a spherical joint does not exist in the plane")],
         "  rocker:\n": [("  idle: {}\n  rocker:\n", "links.idle", "no joint connects the link 'idle'")],
         "type: revolute, links: [ground, rocker]": [
@@ -114,9 +105,8 @@ MISTAKES = {
             ("moment: [0, 0, 1 N m]", "loads.work.moment", "one number"),
             ("resisting_torque: 1 N m", "loads.work", "acts on a joint")],
         "link: coupler, at: C, force: [0, -1 kN]": [
-            ("joint: X, resisting_torque: 1 N m", "loads.work.joint", "there is no joint 'X'"),
-            ("joint: A, resisting_force: 1 N", "loads.work.resisting_force", "a revolute joint has no slide to resist"),
-            ("joint: A", "loads.work", "this load is empty"),
+            ("joint: A, resisting_force: 1 N",
+             "loads.work.resisting_force", "a revolute joint has no slide to resist"),
             ("joint: A, at: C, force: [0, 1]", "loads.work", "are for a load on a link")],
         "{radius: 7.5 mm}": [
             ("{length: 7.5 mm}", "joints.A", "friction without the radius of the pin", -5),
@@ -126,22 +116,18 @@ MISTAKES = {
             ("friction: -0.1", "friction.coefficient", "is -0.1, which is negative"),
             ("friction: {coefficient: 0.1, pair_factor: 0}", "pair_factor", "is 0"),
             ("friction: {coeficient: 0.1}", "joint_defaults.friction.coeficient", "unknown to the"),
-            ("friction: {pair_factor: 1}", "friction", "needs 'coefficient'"),
-            ("friction: {law: colomb}", "joint_defaults.friction.law", "not a friction law"),
-            ("friction: {coefficient: 0.1, model: one}", "friction.model", "not a friction model")],
+            ("friction: {pair_factor: 1}", "friction", "needs 'coefficient'")],
         "links: [ground, crank]}": [
-            ("links: [ground, crank], guide: {length: 1}}", "joints.A.guide", "has a pin, not a guide"),
             ("links: [ground, crank], pin: {fit: 20 mm}}", "joints.A.pin.fit", "'20 mm' is not a fit"),
             ("links: [ground, crank], pin: {fit: H7/g6}}", "joints.A.pin.fit", "'H7/g6' has no diameter"),
             ("links: [ground, crank], pin: {fit: 20H7/g6}}", "joints.A.pin.fit", "'20' has no unit"),
-            ("links: [ground, crank], pin: {fit: 20 mm H7/g6, radius: 1}}", "joints.A.pin", "states radius and clear")],
+            ("links: [ground, crank], pin: {fit: 20 mm H7/g6, radius: 1}}",
+             "joints.A.pin", "states radius and clear")],
     },
     VARIED: {
         "model: power, B: 1, k: 0.45": [
             ("B: 1, k: 0.45", "costs.AB", "states no cost"),
             ("model: power, process: boring, B: 1, k: 1", "costs.AB", "model and process"),
-            ("model: powr, B: 1, k: 0.45", "costs.AB.model", "'powr' is not a cost"),
-            ("model: power, k: 0.45", "costs.AB", "'B' is missing"),
             ("model: power, B: -1, k: 0.45", "costs.AB.B", "wider tolerance would cost"),
             ("model: power, B: 1, k: 0", "costs.AB.k", "is 0")],
         "k: 0.45, unit: mm": [
@@ -149,9 +135,7 @@ MISTAKES = {
             ("k: 0.45, unit: kg", "costs.AB.unit", "'kg' is the unit of a mass")],
         "least: 5 um": [
             ("least: 1 mm", "costs.AB.least", "above the most"), ("least: -1 mm", "costs.AB.least", "not negative")],
-        "  AB: {model": [
-            ("  XY: {model", "costs.XY", "no number named 'XY'"),
-            ("  t: {model", "costs.t", "'dimensions.t' has no tolerance")],
+        "  AB: {model": [("  t: {model", "costs.t", "'dimensions.t' has no tolerance")],
         "  A.clearance: {model": [
             ("  D.clearance: {model", "costs.D.clearance", "states no clearance"),
             ("  C.clearance: {model", "costs.C.clearance", "the fit 12 mm H7/g6"),
@@ -159,24 +143,18 @@ MISTAKES = {
             ("  dimensions.AB: {model", "costs.dimensions.AB", "are the same")],
         "model: power, B: 1, k: 1": [("process: boring", "costs.A.clearance.process", "a play has no IT")],
         "{process: boring}": [
-            ("{process: borring}", "costs.CD.process", "no process 'borring'"),
             ("{process: boring, B: 1}", "costs.CD.B", "no effect on a choice"),
             ("{process: boring, group: bores}", "costs.AB.group", "has formulas and choices", -2)],
         "IT7: 9": [("IT17: 9", "processes.boring", "'IT17' is no IT grade")],
-        "tolerance: t, cost: 3": [
-            ("tolerance: 0, cost: 3", "options.milled.tolerance", "has a tolerance of 0"),
-            ("cost: 3", "costs.AD.options.milled", "'tolerance' is missing")],
+        "tolerance: t, cost: 3": [("tolerance: 0, cost: 3", "options.milled.tolerance", "has a tolerance of 0")],
         "CD: 70 mm ±": [("CD: 700 mm ±", "costs.CD.process", "the size 700 mm is not in the tables", 32)],
         "  AB: ±t": [
             ("  XY: ±t", "tolerances.XY", "no number named 'XY'"),
-            ("  AB: ±tt", "tolerances.AB", "'tt', which is not one of the dim"),
-            ("  AB: ±0.1", "tolerances.AB", "'±0.1' has no unit where a length"),
             ("  AB: -0.1 mm", "tolerances.AB", "a sign on one side only"),
             ("  AB: ±(t - 1 mm)", "tolerances.AB", "is above the upper one"),
             ("  AB: {limits: ±t, distribution: gaussian}", "tolerances.AB", "'gaussian' is not a distr"),
             ("  AB: {limits: ±t, mode: 1 um}", "tolerances.AB.mode", "no effect on the distribution"),
             ("  AB: {limits: ±t, cp: 0}", "tolerances.AB.cp", "cp is 0"),
-            ("  AB: {limits: ±t, cp: 1, cpk: 1.1}", "tolerances.AB.cpk", "cpk 1.1 is above cp 1"),
             ("  AB: {limits: ±t, cpk: 1.3}", "tolerances.AB.cpk", "cpk 1.3 is above cp 1.2"),
             ("  AB: {distribution: uniform}", "tolerances.AB", "limits of 'dimensions.AB' are missing"),
             ("  AB: {limits: ±t, direction: uniform}", "tolerances.AB.direction", "no direction"),
@@ -201,40 +179,27 @@ MISTAKES = {
             ("distribution: sample", "tolerance_defaults.distribution", "of one"),
             ("alpha: 1.2", "tolerance_defaults.alpha", "no effect on the"), ("cp: 1, cpk: 2", "cpk", "is above cp")],
         "of: [AB, BC], coefficient: 0.5": [
-            ("of: [AB, XY], coefficient: 0.5", "correlations.0.of.1", "'XY'"),
             ("of: [AB, t], coefficient: 0.5", "correlations.0", "no tolerance"),
             ("of: [AB], coefficient: 0.5", "correlations.0", "two parameters"),
             ("of: [AB, AB], coefficient: 0.5", "correlations.0", "twice"),
-            ("of: [AB, BC], coefficient: 1.5", "correlations.0.coefficient", "1.5"),
-            ("of: [AB, BC]", "correlations.0", "'coefficient' is missing")],
+            ("of: [AB, BC], coefficient: 1.5", "correlations.0.coefficient", "1.5")],
         "coefficient: 0.5}": [
             ("coefficient: 0.5}\n  - {of: [BC, AB], coefficient: 0.4}", "correlations.1", "entry 1", 1)],
         "{angle: rocker, limit: ±0.1 deg}": [
             ("{angle: rocker, rotation: D}", "measures.error", "angle and rotation"),
             ("{path_error: rocker.X}", "error.path_error", "no point 'rocker.X'"),
-            ("{straightness: C}", "error.straightness", "no point 'C'"),
-            ("{reaction: E}", "measures.error.reaction", "no joint 'E'"),
-            ("{stroke: E}", "measures.error.stroke", "no joint 'E'"),
-            ("{efficiency: total}", "measures.error.efficiency", "not one"),
-            ("{reaction: A, axis: z}", "measures.error.axis", "no z"),
             ("{stroke: D, axis: x}", "measures.error.axis", "axis of a coord"),
             ("{stroke: D, at: 1 deg}", "measures.error.at", "of a range"),
             ("{stroke: D, as: rms}", "measures.error.as", "one number of a range"),
-            ("{dead_centre: D, as: rms}", "measures.error.as", "one number"),
             ("{efficiency: cycle, over: [0 deg, 9 deg]}", "error.over", "all of it"),
             ("{angle: rocker, as: value}", "measures.error.as", "a position"),
-            ("{angle: rocker, as: most}", "measures.error.as", "not one of 'value'"),
-            ("{angle: rocker, limits: 1 deg}", "error.limits", "is unknown"),
-            ("{angle: rocker, limit: +1 deg}", "error.limit", "one side only"),
             ("{angle: rocker, limit: ±(AB - BC)/AB}", "error.limit", "above the"),
             ("{angle: rocker, at_least: 2, at_most: 1}", "at_least", "at least 2"),
             ("{locking_margin: mechanism, at_least: 12}", "at_least", "up to 10")],
         "{angle: rocker, at: 60 deg,": [
             ("{angle: rocker, at: 60 deg, over: [0, 1],", "theta", "both a position"),
             ("{angle: rocker, at: 60 deg, as: rms,", "theta.as", "of a range")],
-        "over: [0 deg, 180 deg]": [
-            ("over: [0 deg, 1 s]", "swing.over", "from angle to time"),
-            ("over: [1 deg, 1 deg]", "swing.over", "begins and ends")],
+        "over: [0 deg, 180 deg]": [("over: [0 deg, 1 s]", "swing.over", "from angle to time")],
     },
     RSSP: {
         "bearing: 40 mm": [("bearing: 0", "joints.A.pin.bearing", "is 0, where friction needs it")],
@@ -255,7 +220,8 @@ MISTAKES = {
         ", pin: {bearing: 40 mm}": [("", "joints.A", "without the length of the bearing")],
         "type: revolute, links: [ground, crank], pin: {bearing: 40 mm}": [
             ("type: universal, links: [ground, crank]", "joints.A", "without the length of the bearing"),
-            ("type: planar, links: [ground, crank]", "joints.A.friction", "friction of a planar joint is not modelled"),
+            ("type: planar, links: [ground, crank]",
+             "joints.A.friction", "friction of a planar joint is not modelled"),
             ("type: fixed, links: [ground, crank], friction: 0.1", "joints.A.friction", "friction of a fixed")],
         "  pin: {radius: 6 mm}\n": [("", "joints.B", "without the radius of the ball", -4)],
         "length: 50 mm, ": [("", "joints.D", "without the length of the guide", -3)],
@@ -264,10 +230,12 @@ MISTAKES = {
             ("type: spherical, pin: {offset: 1 mm}, links: [rod", "joints.C.pin.offset", "a ball has no axis")],
         "{joint: D, resisting_force: 100 N}": [
             ("{joint: D, resisting_torque: 1 N m}", "loads.work.resisting_torque", "has no rotation to resist"),
-            ("{joint: B, resisting_torque: 1 N m}", "loads.work.resisting_torque", "a spherical joint has no one axis"),
+            ("{joint: B, resisting_torque: 1 N m}",
+             "loads.work.resisting_torque", "a spherical joint has no one axis"),
             ("{link: slider, moment: 3}", "loads.work.moment", "is [x, y, z]")],
         "between: [ground.D, slider.C], stiffness: 2 N/mm, free_length: 60 mm": [
-            ("joint: C, damping: 1 N m s/rad", "springs.back.joint", "a spherical joint has no one axis for a spring")],
+            ("joint: C, damping: 1 N m s/rad",
+             "springs.back.joint", "a spherical joint has no one axis for a spring")],
         "C: [100 mm, 60 mm, 20 mm]": [
             ("C: 30 deg", "assembly.C", "one number does not state how far a spherical joint"),
             ("rod.C: 30 deg", "assembly.rod.C", "not an angle")],
@@ -276,7 +244,8 @@ MISTAKES = {
             ("inertia: 9.6e-4", "links.rod.inertia", "of a spatial link is {xx")],
         "yy: 9.6e-4, zz": [("yy: 1.9e-3, zz", "links.rod.inertia", "no body has the principal moments")],
         "inertia_about: origin": [
-            ("centre: [60 mm, 0, 30 mm]\n    inertia_about: origin", "links.rod.inertia", "no body has the princ", -1)],
+            ("centre: [60 mm, 0, 30 mm]\n    inertia_about: origin",
+             "links.rod.inertia", "no body has the princ", -1)],
         "mass: 0.4 kg": [("centre: {distance: 15 mm, angle: 0}", "links.crank.centre", "in the plane only")],
         "drivers:": [("gears:\n  mesh: {joints: [A, D], ratio: 2}\ndrivers:", "gears.mesh", "planar", 1)],
     },

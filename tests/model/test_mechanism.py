@@ -77,19 +77,6 @@ def test_a_dimension_carries_what_depends_on_it() -> None:
     assert DURANGO.parameters()["dimensions.BE"] == 2.5  # and the mechanism is as it was
 
 
-def test_dimensions_may_depend_on_dimensions_in_any_order() -> None:
-    data = DURANGO.data()
-    data["dimensions"] = {
-        "BE": "half * 2",
-        "half": "AB - 0.75 m",
-        **{k: v for k, v in data["dimensions"].items() if k != "BE"},
-    }
-    mechanism = Mechanism(**data)
-    assert mechanism.parameters()["dimensions.BE"] == 2.5
-    assert mechanism.parameters({"AB": 3.0})["links.coupler.points.E.y"] == pytest.approx(2.25)
-    assert mechanism.parameters({"half": 1.0, "AB": 3.0})["dimensions.BE"] == 2.0
-
-
 def test_defaults_are_followed_until_a_joint_has_its_own_value() -> None:
     values = DURANGO.parameters({"joint_defaults.friction.coefficient": 0.2, "B.friction.coefficient": 0.3})
     found = [values[f"joints.{name}.friction.coefficient"] for name in "ABCD"]

@@ -171,16 +171,9 @@ def _text(tree: object) -> str:
 
 
 OPERATIONS = {
-    "+": lambda a, b: a + b,
-    "-": lambda a, b: a - b,
-    "*": lambda a, b: a * b,
-    "sin": math.sin,
-    "cos": math.cos,
-    "abs": abs,
-    "min": min,
-    "max": max,
-    "hypot": math.hypot,
-}
+    "+": lambda a, b: a + b, "-": lambda a, b: a - b, "*": lambda a, b: a * b, "sin": math.sin, "cos": math.cos,
+    "abs": abs, "min": min, "max": max, "hypot": math.hypot,
+}  # fmt: skip
 TREES = st.recursive(
     st.sampled_from(["AB", "γ"]) | st.floats(0, 100).map(lambda x: round(x, 3)),
     lambda inner: (

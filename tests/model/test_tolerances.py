@@ -244,21 +244,16 @@ def test_a_sample_from_a_file(varied: Mechanism, tmp_path: Path, text: str, expe
 @pytest.mark.parametrize(
     ("name", "half", "what"),
     [
-        ("t", 1e-5, "'t' has no tolerance"),
-        ("A.pin.clearance", 1e-5, "varies as measured"),
-        ("B.seat.xi", 1e-5, "varies as measured or over a full turn"),
-        ("nothing", 1e-5, "no number named 'nothing'"),
-        ("AB", -1e-5, "half width of -1e-05"),
-        ("AB", float("nan"), "half width of nan"),
-        ("AB", "0.02", "has no unit"),
-        ("AB", "0.02 deg", "is an angle where a length is needed"),
+        ("t", 1e-5, "'t' has no tolerance"), ("A.pin.clearance", 1e-5, "varies as measured"),
+        ("B.seat.xi", 1e-5, "varies as measured or over a full turn"), ("nothing", 1e-5, "no number named 'nothing'"),
+        ("AB", -1e-5, "half width of -1e-05"), ("AB", float("nan"), "half width of nan"),
+        ("AB", "0.02", "has no unit"), ("AB", "0.02 deg", "is an angle where a length is needed"),
         ("joints.A.clearance", "+0.02/-0.01 mm", "half width of"),
         ("joints.A.clearance", "-0.02 mm", "half width of '-0.02 mm'"),
-        ("joints.A.clearance", "AB / 1000", "is no number with a unit"),
-        ("AB", None, "is empty"),
+        ("joints.A.clearance", "AB / 1000", "is no number with a unit"), ("AB", None, "is empty"),
         ("AB", [1e-5], "is a list"),
     ],
-)
+)  # fmt: skip
 def test_tolerances_that_cannot_be_replaced(varied: Mechanism, name: str, half: Any, what: str) -> None:
     with pytest.raises(MechanismError, match=re.escape(what)):
         varied.with_tolerances({name: half})
@@ -268,14 +263,11 @@ def test_tolerances_that_cannot_be_replaced(varied: Mechanism, name: str, half: 
     ("text", "line", "what"),
     [
         ("d [kg]\n1\n2\n", 1, "its unit is that of a mass"),
-        ("d [mm]\n1\nthree\n", 3, "'three' is not a finite number"),
-        ("d [mm]\n1\n", 2, "has 1 row"),
-        ("1; 2\n3; 4\n", 1, "has 2 columns, a sample has 1"),
-        ("# nothing\n", 1, "only comments"),
-        ("", 1, "is empty"),
-        ("0.01\n-0.02\n1e308\n", None, "finite"),
+        ("d [mm]\n1\nthree\n", 3, "'three' is not a finite number"), ("d [mm]\n1\n", 2, "has 1 row"),
+        ("1; 2\n3; 4\n", 1, "has 2 columns, a sample has 1"), ("# nothing\n", 1, "only comments"),
+        ("", 1, "is empty"), ("0.01\n-0.02\n1e308\n", None, "finite"),
     ],
-)
+)  # fmt: skip
 def test_a_sample_that_cannot_be_read(
     varied: Mechanism, tmp_path: Path, text: str, line: int | None, what: str
 ) -> None:
@@ -385,13 +377,6 @@ def test_choices_are_from_the_cheapest_on(varied: Mechanism) -> None:
     assert grades == [("IT8", 23e-6, 6.0), ("IT7", 15e-6, 9.0)]  # of 70 mm: IT7 30 µm, IT8 46 µm
     ways = [(one.name, one.tolerance, one.cost) for one in found["dimensions.AD"]]
     assert ways == [("milled", 5e-5, 3.0), ("ground", 1e-5, 9.0)]
-
-
-def test_a_price_of_the_defaults_is_one_of_each_joint(varied: Mechanism) -> None:
-    data = varied.data()
-    data["costs"] = {"joint_defaults.friction.coefficient": {"model": "power", "B": 1, "k": 1}}
-    found = [one.path for one in Mechanism(**data).prices()]
-    assert found == [f"joints.{name}.friction.coefficient" for name in "BCD"]
 
 
 def test_bought_by_the_grade() -> None:

@@ -102,14 +102,11 @@ def test_binomial_quantiles_as_in_scipy() -> None:
 @pytest.mark.parametrize(
     ("limits", "mean", "sigma", "expected"),
     [
-        ((-3.0, 3.0), 0.0, 1.0, (1, 1)),
-        ((-3.0, 3.0), 1.0, 1.0, (1, 2 / 3)),
-        ((-3.0, 3.0), -2.0, 0.5, (2, 2 / 3)),
-        ((-3.0, 3.0), 0.0, 0.0, (np.nan, np.nan)),
-        ((-np.inf, 3.0), 1.0, 1.0, (np.nan, 2 / 3)),
+        ((-3.0, 3.0), 0.0, 1.0, (1, 1)), ((-3.0, 3.0), 1.0, 1.0, (1, 2 / 3)), ((-3.0, 3.0), -2.0, 0.5, (2, 2 / 3)),
+        ((-3.0, 3.0), 0.0, 0.0, (np.nan, np.nan)), ((-np.inf, 3.0), 1.0, 1.0, (np.nan, 2 / 3)),
         ((-np.inf, np.inf), 1.0, 1.0, (np.nan, np.nan)),
     ],
-)
+)  # fmt: skip
 def test_capability(limits: tuple[float, float], mean: float, sigma: float, expected: tuple[float, float]) -> None:
     np.testing.assert_allclose(capability(*limits, mean, sigma), expected)
 

@@ -118,14 +118,10 @@ def test_correlated_normal_scores() -> None:
 
 
 MARGINALS = [
-    Marginal("normal", -1e-5, 3e-5, {"cp": 1.33}),
-    Marginal("uniform", -1.0, 1.0),
-    Marginal("normal", -2.0, 2.0),
-    Marginal("sample", options={"values": (0.3, -0.1, 0.2)}),
-    Marginal("beta", 0.0, 5.0, {"alpha": 2.0, "beta": 5.0}),
-    Marginal("direction"),
-    Marginal("triangular", -1.0, 2.0),
-]
+    Marginal("normal", -1e-5, 3e-5, {"cp": 1.33}), Marginal("uniform", -1.0, 1.0), Marginal("normal", -2.0, 2.0),
+    Marginal("sample", options={"values": (0.3, -0.1, 0.2)}), Marginal("beta", 0.0, 5.0, {"alpha": 2.0, "beta": 5.0}),
+    Marginal("direction"), Marginal("triangular", -1.0, 2.0),
+]  # fmt: skip
 MATRIX = np.eye(7)
 for i, j, r in ((0, 2, 0.6), (0, 1, -0.4), (2, 4, 0.3)):
     MATRIX[i, j] = MATRIX[j, i] = r
@@ -148,11 +144,8 @@ def test_correlated_as_by_the_copula() -> None:
 def test_covariance_in_closed_form() -> None:
     """Normal: ρ σ σ. Uniform with uniform: (6/π) asin(ρ/2) times the variances; with normal: ρ √(3/π)."""
     marginals = [
-        Marginal("normal", -3, 3),
-        Marginal("uniform", -1, 1),
-        Marginal("uniform", -1, 1),
-        Marginal("normal", 0, 1),
-    ]
+        Marginal("normal", -3, 3), Marginal("uniform", -1, 1), Marginal("uniform", -1, 1), Marginal("normal", 0, 1),
+    ]  # fmt: skip
     matrix = np.array([[1, 0.5, 0.2, 1.0], [0.5, 1, 0.8, 0.5], [0.2, 0.8, 1, 0.2], [1.0, 0.5, 0.2, 1]])
     population = Population(marginals, matrix)
     s, covariance = population.deviations, population.covariance()

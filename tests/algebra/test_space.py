@@ -270,8 +270,3 @@ def test_power_does_not_depend_on_the_origin() -> None:
     pose = poses.pose(rows(random_rotations(RNG, COUNT)), vector(P))
     moved = [poses.transform(pose, one) for one in (wrench, twist)]
     np.testing.assert_allclose(screws.power(*moved), expected, rtol=0, atol=1e-12)
-
-
-def test_directions_alone_have_a_plain_angle() -> None:
-    same(lines.dual_angle(vector(U), vector(V)), lines.dual_angle(FIRST, SECOND).real)
-    same(lines.dual_angle((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)), np.pi)

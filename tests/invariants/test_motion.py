@@ -195,20 +195,6 @@ def test_in_a_dwell_every_joint_rests_and_the_effort_is_an_interval() -> None:
     assert any(row["where"] == "joints.A, B, P, C" for row in told)  # once for all
 
 
-def test_two_drivers_one_later_than_the_other() -> None:
-    data = five_bar()
-    rise = {"law": "cycloidal", "range": [0.2, 1.2], "duration": 0.2, "dwell": 0.3}
-    data["drivers"] = {"A": rise, "E": {**rise, "range": [0.4, -0.3], "delay": 0.25}}
-    result = analyse(data, 100)
-    assert bool(result.attrs["periodic"])
-    assert float(result.time[1]) == pytest.approx(0.01)
-    assert result.status.values.max() <= Status.ZERO_SLIP
-    first = (result.joint_rotation.sel(joint="A").values - 0.2) / 1.0
-    later = (result.joint_rotation.sel(joint="E").values - 0.4) / -0.7
-    np.testing.assert_allclose(np.roll(first, 25), later, atol=1e-12)
-    assert float(np.abs(result.power_residual).max()) < 1e-9 * float(np.abs(result.drive_power).max())
-
-
 def test_periods_and_ranges_that_do_not_fit() -> None:
     data = five_bar()
     data["drivers"] = {"A": {"speed": 2 * np.pi}, "E": DRIVERS["harmonic"]}

@@ -188,19 +188,6 @@ def test_range_includes_both_ends() -> None:
     assert "range" in str(error.value)
 
 
-def test_inertia_about_the_origin() -> None:
-    """The same body stated about its own origin: J_O = J_S + m r²."""
-    data, other = four_bar(), four_bar()
-    for link in other["links"].values():
-        if "mass" in link:
-            x, y = link["centre"]
-            link["inertia"] += link["mass"] * (x * x + y * y)
-            link["inertia_about"] = "origin"
-    np.testing.assert_allclose(
-        positions_of(other, 12)["drive_effort"], positions_of(data, 12)["drive_effort"], rtol=1e-10
-    )
-
-
 def test_too_few_rounds_is_said() -> None:
     """Three rounds at a criterion they cannot meet: NOT_CONVERGED and NaN, not the third guess."""
     result = analyse(four_bar(), 12, FrictionMethod("successive-approximation", 1e-9, 3))
@@ -317,3 +304,16 @@ def test_wide_steps_along_a_branch_come_to_what_narrow_ones_do(name: str, monkey
         assert one.coordinates == pytest.approx(other.coordinates, abs=1e-12, nan_ok=True)
         assert one.orientation == other.orientation
         assert np.array_equal(one.again, other.again)
+
+
+def test_inertia_about_the_origin() -> None:
+    """The same body stated about its own origin: J_O = J_S + m r²."""
+    data, other = four_bar(), four_bar()
+    for link in other["links"].values():
+        if "mass" in link:
+            x, y = link["centre"]
+            link["inertia"] += link["mass"] * (x * x + y * y)
+            link["inertia_about"] = "origin"
+    np.testing.assert_allclose(
+        positions_of(other, 12)["drive_effort"], positions_of(data, 12)["drive_effort"], rtol=1e-10
+    )

@@ -283,3 +283,13 @@ def test_measures_that_are_left_out_are_named() -> None:
     result = trunnion.sweep(model("durango-fourbar", {"swing": {"stroke": "D"}}), {"AB": [2, 2.1]}, 24)
     (row,) = [row for row in json.loads(result.attrs["findings"]) if "not in this sweep" in str(row)]
     assert "swing" in str(row)
+
+
+def test_plain_numbers_are_si() -> None:
+    mechanism = read("slider-crank")
+    swept = trunnion.sweep(mechanism, {"O.speed": (50, 100, 3)}, 4)
+    assert swept["O.speed"].values.tolist() == [50.0, 75.0, 100.0]
+    assert swept["O.speed"].attrs["units"] == "rad/s"
+    also = trunnion.sweep(mechanism, {"O.speed": np.array([50, 75, 100])}, 4)
+    assert also["O.speed"].equals(swept["O.speed"])
+    assert trunnion.sweep(mechanism, {"r": [0.05]}, 4)["r"].attrs["units"] == "m"

@@ -245,3 +245,18 @@ def test_what_there_is_not_is_said(asked: dict[str, object], where: str) -> None
     assert caught.value.findings[0].where == where
     if where == "variables":
         assert "reaction_force" in caught.value.findings[0].remedy
+
+
+def test_csv_columns_of_a_slide(sliding: Any, tmp_path: Path) -> None:
+    trunnion.save(sliding, tmp_path / "r.csv")
+    header, _ = table(tmp_path / "r.csv")
+    assert {"C.slide", "C.slide_velocity", "C.reaction_moment", "C.friction_force", "C.friction_power"} <= set(header)
+    assert "C.friction_torque" not in header
+    assert "A.slide" not in header
+
+
+def test_infinite_numbers_do_not_reach_json(result: Any, tmp_path: Path) -> None:
+    odd = result.copy(deep=True)
+    odd["drive_effort"].values[0, 0] = math.inf
+    trunnion.save(odd, tmp_path / "r.json")
+    assert "Infinity" not in (tmp_path / "r.json").read_text("utf-8")

@@ -83,16 +83,6 @@ def test_a_model_may_leave_the_points_to_the_file(tmp_path: Path) -> None:
     assert named.parameters()["tables.pressure.points.1.value"] == pytest.approx(2.6e5)
 
 
-def test_names_of_a_driver_and_a_table_alike_are_told_apart(tmp_path: Path) -> None:
-    table = {"over": "time", "points": [[0, 1], [1, 2]]}
-    mechanism = Mechanism(**{**MODEL.data(), "tables": {**MODEL.data()["tables"], "O": table}})
-    path = csv(tmp_path, "0,0\n1,5\n")
-    with pytest.raises(MechanismError, match=r"'O' is a driver and a table — say drivers\.O or tables\.O"):
-        mechanism.with_table("O", path)
-    assert mechanism.with_table("tables.O", path).parameters()["tables.O.points.1.value"] == 5
-    assert mechanism.with_table("drivers.O", path).drivers["O"].law == "table"
-
-
 # what is refused
 BAD = [
     ("", ["points.csv:1: error: is empty — write a row for each point"]),
@@ -195,23 +185,6 @@ def test_the_folder_is_that_of_the_model_wherever_one_stands(tmp_path: Path, mon
     (tmp_path / "a" / "model.json").write_text(json.dumps(data), encoding="utf-8")
     for path in ("../a/model.yaml", "linked.yaml", "../a/other.yaml", "../a/model.json"):
         assert read_mechanism(path).tables["pressure"].points == POINTS
-
-
-def test_what_is_made_of_the_model_needs_the_file_no_more(tmp_path: Path) -> None:
-    """Settings, sweeps, another process, a written copy: the points are part of the model."""
-    mechanism = read_mechanism(written(tmp_path, "file: gas.csv", CSV))
-    (tmp_path / "gas.csv").unlink()
-    changed = mechanism.with_values({"tables.pressure.points.1.value": "3 bar", "r": "36 mm"})
-    assert changed.parameters()["tables.pressure.points.1.value"] == pytest.approx(3e5)
-    swept = trunnion.sweep(mechanism, {"tables.pressure.points.1.value": ["2 bar", "4 bar"]}, 24)
-    assert np.ptp(swept["drive_effort_rms"].values) > 0
-    assert Mechanism(**mechanism.data()) == mechanism
-    varied = Mechanism(**{**mechanism.data(), "tolerances": {"r": "±0.1 mm"}})
-    options = {"methods": ("monte-carlo",), "samples": 40, "steps": 12}
-    one, two = (trunnion.tolerance(varied, ["maximum:effort:O"], jobs=jobs, **options) for jobs in (1, 2))
-    np.testing.assert_array_equal(one["mean"], two["mean"])
-    mechanism.write(tmp_path / "copy.yaml")
-    assert read_mechanism(tmp_path / "copy.yaml") == mechanism
 
 
 def test_a_rewritten_model_goes_on_to_name_its_file(tmp_path: Path) -> None:

@@ -164,3 +164,11 @@ def test_mean_and_deviation_are_covered(law: str) -> None:
     assert np.mean((low <= mean) & (mean <= high)) == pytest.approx(0.95, abs=0.015)
     low, high = of_deviation(s, kurtosis, n)
     assert np.mean((low <= sigma) & (sigma <= high)) == pytest.approx(0.95, abs=0.015)
+
+
+@pytest.mark.slow
+def test_hardly_any_failure() -> None:
+    """One failure expected in all: the counts of replicates are 0 or 1, and t alone would cover in 2 of 3 studies."""
+    counts, true = counts_of(4.0, 1024), yield_of(4.0)
+    assert coverage(*by_replicates(counts / 1024), true) < 0.75
+    assert coverage(*share_by_replicates(counts, 1024), true) > 0.95

@@ -320,3 +320,29 @@ def test_what_makes_a_motion_stiff_is_named(space: str, spring: dict[str, float]
     assert figures["count"] == 2000
     assert figures["constant"] == pytest.approx(constant, rel=0.02)
     assert any(f"springs.stop.{name} = {spring[name]:.4g}" in cause for cause in figures["causes"])
+
+
+def test_at_rest_at_the_end_of_its_range_and_driven_out_of_it() -> None:
+    motor = {"kind": "constant", "effort": 3.0}
+    driver = {"free": True, "speed": 5, "range": [0.3, 1.0], "initial": {"coordinate": 1.0, "speed": 0}, "motor": motor}
+    result = simulate(slider_crank(0.0, drivers={"O": driver}), 0.5, 10)
+    assert [one.code for one in result.trunnion.findings] == ["simulate.range"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", [0.0, 0.06])
+def test_a_start_where_no_mass_moves_is_refused(friction: float) -> None:
+    """A piston that is the only mass, at its dead centre; not with a rotor, nor beside the dead centre."""
+    data = read(EXAMPLES / "flywheel-press.yaml").data()
+    for link in ("crank", "rod"):
+        data["links"][link] = {"points": data["links"][link]["points"]}
+    data["joint_defaults"], data["loads"] = {"friction": friction}, {}
+    motor = {"kind": "constant", "effort": 50}
+
+    def begun(start: float, **more: float) -> None:
+        simulate(Mechanism(**{**data, "drivers": {"O": {"speed": 10, "start": start, "motor": motor | more}}}), 1e-4, 1)
+
+    with pytest.raises(MechanismError, match="nothing moves that has a mass"):
+        begun(np.pi / 2)
+    begun(np.pi / 2, inertia=0.02)
+    begun(np.pi / 2 + 0.3)

@@ -257,6 +257,6 @@ def test_csv_columns_of_a_slide(sliding: Any, tmp_path: Path) -> None:
 
 def test_infinite_numbers_do_not_reach_json(result: Any, tmp_path: Path) -> None:
     odd = result.copy(deep=True)
-    odd["drive_effort"].values[0, 0] = math.inf
+    odd["drive_effort"].values[0, 0] = np.inf
     trunnion.save(odd, tmp_path / "r.json")
     assert "Infinity" not in (tmp_path / "r.json").read_text("utf-8")

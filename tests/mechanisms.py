@@ -401,17 +401,6 @@ def _coupled(data: Data, gear: Data) -> tuple[list[str], str]:
     ), key
 
 
-def reverse_links(data: Data, joints: Sequence[str]) -> None:
-    """List the links of some joints the other way round: their rotations change sign."""
-    for joint in joints:
-        data["joints"][joint]["links"].reverse()
-    for gear in data.get("gears", {}).values():
-        coupled, key = _coupled(data, gear)
-        first, second = (-1.0 if joint in joints else 1.0 for joint in coupled)
-        gear[key] *= first * second
-        gear["phase"] *= second
-
-
 def _offset(links: Sequence[str], turn: float) -> float:
     """What a turned frame adds to the rotation of a joint of the ground."""
     return {0: turn, 1: -turn}[list(links).index("ground")] if "ground" in links else 0.0

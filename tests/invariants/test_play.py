@@ -29,7 +29,6 @@ def vectors(count: int) -> Any:
     return st.tuples(*[components] * count)
 
 
-# seats
 @given(st.integers(1, 3).flatmap(vectors), radii, st.floats(1e-3, 1e3))
 def test_a_seat_depends_on_the_direction_of_the_load(load: tuple[float, ...], rho: float, factor: float) -> None:
     """Odd, the same for any size of load, on the wall; in the middle without load."""
@@ -45,7 +44,6 @@ def test_a_seat_depends_on_the_direction_of_the_load(load: tuple[float, ...], rh
     assert pressed(tuple(float(n) for n in seat), rho) == pytest.approx(seat, rel=1e-14)
 
 
-# friction
 @pytest.mark.parametrize("model", PINS)
 def test_a_force_at_one_end_of_a_pin_presses_there_alone(model: Any) -> None:
     """A force at z = ±H/2 has the moment r × F about mid-length; the other end feels nothing of it."""

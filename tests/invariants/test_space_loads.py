@@ -35,7 +35,6 @@ def drive(result: Any) -> Any:
     return result["drive_power"].values[0]
 
 
-# loads
 @pytest.mark.parametrize("frame", ["global", "link"])
 @pytest.mark.parametrize("key", ["force", "moment"])
 def test_a_load_on_a_link_of_a_loop(frame: str, key: str) -> None:
@@ -72,7 +71,6 @@ def test_a_spring_and_a_damper_in_a_cylindrical_joint_are_torsional(name: str) -
     np.testing.assert_allclose(drive(result), taken, rtol=0, atol=1e-12 * np.abs(taken).max())
 
 
-# hints and forms
 def test_a_loop_is_the_same_as_its_links() -> None:
     """The table of an RCCC written out as links with points: the element of a joint behind X(twist + ε distance)."""
     loop = massless(loads={"load": {"joint": "D", "resisting_torque": 1.0}})
@@ -98,7 +96,6 @@ def test_a_loop_is_the_same_as_its_links() -> None:
             np.testing.assert_allclose(two[quantity].values, expected.values, atol=1e-11)
 
 
-# the plane in space
 LOSSES: dict[str, dict[str, Any]] = {
     "S": {"constant": 20, "viscous": 3},
     "Q": {"constant": "20 N mm", "viscous": "1e-3 N m s/rad"},

@@ -151,7 +151,7 @@ def test_a_wedge() -> None:
     np.testing.assert_allclose(result["drive_effort"].values[0], -weight * np.tan(beta), rtol=1e-12)
 
 
-# free spins, gaps of a track
+# free spins
 @pytest.mark.slow
 def test_a_driven_turn_is_no_free_spin() -> None:
     """A crank whose ball lies on its axis spins alone, but its driver holds that: the rocker stands still."""

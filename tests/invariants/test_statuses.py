@@ -160,7 +160,6 @@ def test_a_number_of_positions_that_memory_cannot_hold(steps: int) -> None:
     assert finding.remedy == "give a whole number from 1 to 10,000,000, for all positions are held in memory"
 
 
-# ordinary extremes
 def test_massless_and_unloaded() -> None:
     """Nothing acts: all forces are 0, not NaN, and nothing is said to be locked."""
     data = model(four_bar())

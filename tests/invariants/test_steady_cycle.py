@@ -148,7 +148,6 @@ def of_sample(values: dict[str, Any], i: int) -> dict[str, Any]:
     return {path: float(value[i, 0]) if np.ndim(value) else value for path, value in values.items()}
 
 
-# closed forms
 def test_flywheels_with_inertias_of_their_own() -> None:
     """J ω̇ = 4 (1 − ω/150) − 0.6: ω = 127.5 (1 − e^(−t/τ)), τ = J 150/4, of every sample."""
     mechanism, count, duration = wheel(LINEAR), 5, 12.0
@@ -235,7 +234,6 @@ def test_numbers_that_were_nothing_or_one_are_looked_at_anew() -> None:
     assert abs(second - first) > 1e-6 * second
 
 
-# courses
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # the height of the ram by the crank angle, and by name
 HEIGHTS = {

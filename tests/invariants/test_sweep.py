@@ -202,7 +202,6 @@ def test_what_is_wrong_at_a_point_says_at_which() -> None:
         trunnion.sweep(mechanism, inertia, 4)
 
 
-# files
 @pytest.mark.slow
 def test_a_mechanism_with_errors_stands_beside_the_ideal_one() -> None:
     """Table II's errors and loaded seats: each point as `analyse` has it, the ideal joint more efficient throughout."""

@@ -238,9 +238,9 @@ def dataset(
     """The result of a cycle.
 
     along: the coordinates of its positions, see `results.dataset.driven`; means, ideal: what has the names of CYCLE as
-    attributes, of the mechanism and of that without errors; units: those of drivers and springs; names_kept: the variables
-    of every position that it has, all if not given; dtype: of their floats. Where that is another than theirs, arrays are
-    taken out of their dict one by one, so that both need not be in memory. more: what it has beside.
+    attributes, of the mechanism and of that without errors; units: those of drivers and springs; names_kept: those of
+    its variables at every position that it has, all if not given; dtype: of their floats. Where that is another than
+    theirs, arrays are taken out of their dict one by one, so that both need not be in memory. more: what it has beside.
     """
     vocabulary = _along_positions(_space(labels))
     names = [name for name in arrays if names_kept is None or name in names_kept]

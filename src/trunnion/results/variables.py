@@ -246,6 +246,7 @@ def dataset(
     names = [name for name in arrays if names_kept is None or name in names_kept]
     other = {name for name in names if arrays[name].dtype == np.float64 and dtype != "float64"}
     numbers = {name: arrays.pop(name).astype(dtype) if name in other else arrays[name] for name in names}
+    numbers |= {name: numbers[name].copy() for name in SAME_AS.keys() & numbers.keys()}  # each may be written to
     described_arrays = described(numbers, vocabulary, units)
     described_arrays |= described({name: getattr(means, name) for name in CYCLE}, CYCLE, units)
     if ideal is not None:

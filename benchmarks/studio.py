@@ -176,9 +176,11 @@ def main() -> None:
                     if runs and name == next(iter(DRAGGED)):
                         _run_again(page, runs, process.pid)
                     if dyads and name == next(iter(DRAGGED)):
+                        page.click("role=tab[name=Properties]")
                         drawn, whole = page.evaluate(ANSWER, chain(dyads))
                         print(f"  {2 * dyads + 2} links: drawn with forces {drawn:.1f} s, ", end="")
                         page.keyboard.press("0")
+                        page.wait_for_timeout(1500)
                         rate = page.evaluate(DRAG, ["B0", SECONDS, NEAR])  # farther the chain cannot be assembled
                         page.wait_for_timeout(1500)
                         frames = page.evaluate(PLAY, SECONDS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 from scipy.special import ellipk
 
 from brief import brief
+from playing import rattling
 from timed import (
     ANTIPARALLELOGRAM,
     DELTOID,
@@ -346,3 +348,32 @@ def test_a_start_where_no_mass_moves_is_refused(friction: float) -> None:
         begun(np.pi / 2)
     begun(np.pi / 2, inertia=0.02)
     begun(np.pi / 2 + 0.3)
+
+
+@pytest.mark.slow
+def test_a_driven_joint_in_space_ends_at_its_dead_centre() -> None:
+    """The rocker of an RSSR moves by itself up to the end of its swing, which a cycle driven by the crank tells."""
+    data = read(EXAMPLES / "rssr.yaml").data()
+    swing = brief(Mechanism(**data), 720)["joint_rotation"].sel(joint="D").values
+    k = int(np.argmax(swing))
+    low, top, high = swing[k - 1], swing[k], swing[(k + 1) % len(swing)]
+    end = float(top + (low - high) ** 2 / (8 * (2 * top - low - high)))  # of the parabola through them
+    start = {"coordinate": float(swing[0]), "speed": 30.0}
+    data["drivers"] = {"D": {"speed": 1, "free": True, "range": [float(swing[0]), end + 1], "initial": start}}
+    found = simulate(Mechanism(**data).with_friction("off"), 3.0, 3)
+    (ended,) = [one for one in found.trunnion.findings if one.code == "simulate.dead_centre"]
+    assert ended.figures["coordinate"] == pytest.approx(end, abs=3e-6)
+    assert [row[0] for row in json.loads(found.attrs["events"])] == ["dead-centre"]
+
+
+@pytest.mark.slow
+def test_a_load_that_may_hold_a_joint_stands_beside_rigid_bodies_in_play() -> None:
+    """The slider rests until the pin strikes, and the load takes a force times the way."""
+    loads = {"drag": {"joint": "S", "resisting_force": 1}}
+    found = simulate(rattling({"law": "rigid", "restitution": 0.4}, loads=loads), 6e-4, 60)
+    slide, torn = found["joint_slide"].sel(joint="S").values, found["event_time"].values
+    kinds = [row[:2] for row in json.loads(found.attrs["events"])]
+    assert kinds[:3] == [["stick", "S"], ["impact", "Q"], ["break-away", "S"]]
+    assert torn[1] == torn[2] > 0.0
+    assert float(found["work_loads"][-1]) == pytest.approx(-abs(slide[-1] - slide[0]), rel=1e-9)
+    assert float(abs(found["energy_residual"]).max()) < 1e-8 * float(abs(found["work_drive"]).max())

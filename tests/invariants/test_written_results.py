@@ -260,3 +260,15 @@ def test_infinite_numbers_do_not_reach_json(result: Any, tmp_path: Path) -> None
     odd["drive_effort"].values[0, 0] = np.inf
     trunnion.save(odd, tmp_path / "r.json")
     assert "Infinity" not in (tmp_path / "r.json").read_text("utf-8")
+
+
+def test_no_two_variables_of_a_result_share_their_numbers() -> None:
+    """Who changes one of them in place changes that alone."""
+    result = analyse(four_bar(0.8, 0.65, 0.5, 1.0), 6)
+    shared = [
+        (first, second)
+        for first in result.data_vars
+        for second in result.data_vars
+        if first < second and np.shares_memory(result[first].values, result[second].values)
+    ]
+    assert not shared

@@ -343,7 +343,7 @@ SUBJECTS = {
 }  # fmt: skip
 
 
-# the others: `test_measures_in_time`, `test_expressions_of_measures`
+# the others are in `test_kinematic_measures`
 OF_CYCLES = [kind for kind, one in MEASURES.items() if not one.in_time and kind != "expression"]
 
 

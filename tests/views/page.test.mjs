@@ -12,6 +12,9 @@ class Element {
     assert.ok(!/NaN|undefined|Infinity/.test(value), `${this.name} ${name}="${value}"`);
     this.attributes[name] = value;
   }
+  getAttribute(name) {
+    return this.attributes[name] ?? null;
+  }
   removeAttribute(name) {
     delete this.attributes[name];
   }

@@ -124,7 +124,7 @@ def main() -> None:
     debug = "--debug" in words[:end]  # before or behind the verb
     words = [word for place, word in enumerate(words) if word != "--debug" or place > end]
     sys.argv[1:] = words
-    named = [one for one in VERBS if one.callback and one.name in words[:1]]
+    named = [command for command in VERBS if command.callback and command.name in words[:1]]
     app.registered_commands = named or VERBS  # Typer reads the options of all: those of one verb are a twentieth
     try:
         status = status_of(app, debug)

@@ -213,15 +213,15 @@ def allocate(
         line(f"{result.attrs.get('name', '')}\nno allocation meets the limits".lstrip())
 
     parts = tables(result)
-    shown = Shown(result, model, files, f"{SECTIONS} costs", drawn={"kind": kind}, tables=parts,
+    output = Shown(result, model, files, f"{SECTIONS} costs", drawn={"kind": kind}, tables=parts,
                   show=None if parts else nothing)  # fmt: skip
-    shown.write()
+    output.write()
     if write is not None and allocated and not exit_status(findings):
-        shown.write_model(_bought(mechanism, result), write, force)
+        output.write_model(_bought(mechanism, result), write, force)
     elif write is not None:
         why = "the tolerances found do not meet the limits" if allocated else "there is no allocation"
         findings.append(Finding(f"'{write}' is not written: {why}", "--write"))
-    shown.end(findings)
+    output.end(findings)
 
 
 def _bought(mechanism: "Mechanism", result: "xr.Dataset") -> "Mechanism":

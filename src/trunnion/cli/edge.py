@@ -72,7 +72,7 @@ def _unforeseen(error: BaseException) -> int:
         return FAULT
     what = " ".join(str(error).split())[:LONGEST]
     place = traceback.extract_tb(error.__traceback__)[-1:]
-    where = "".join(f", {os.path.basename(one.filename)}:{one.lineno}" for one in place)
+    where = "".join(f", {os.path.basename(frame.filename)}:{frame.lineno}" for frame in place)
     _say(
         f"error: a fault of Trunnion {__version__} itself ({type(error).__name__}{where}){': ' * bool(what)}{what} — "
         "please report this line with the command and its files; --debug shows where it arose"

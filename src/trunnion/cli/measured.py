@@ -63,16 +63,16 @@ def rig(
             Finding("is a rig file", remedy="name the model first, then the rig", file=str(model.file))
         )
     mechanism = model.read()
-    stated = Rig.read(rig_file)
+    rig_model = Rig.read(rig_file)
     if out and not format_:
-        check_form(stated.format)
-    count = len(stated.schedule.rows())
+        check_form(rig_model.format)
+    count = len(rig_model.schedule.rows())
     with model.lines():
         try:
             if out:
-                check_folder(stated, out, format_)
+                check_folder(rig_model, out, format_)
             with bar("conditions", count, least=FEWEST) as progress:
-                observation = observe(mechanism, stated, seed, progress)
+                observation = observe(mechanism, rig_model, seed, progress)
         except MechanismError as error:  # findings about the rig bear the line of its file
             raise MechanismError(placed_in_rig(error.findings, rig_file)) from None
     _about(observation)
@@ -223,18 +223,18 @@ def identify(
     others = gathered(  # of the notes those that tell what was set, and why intervals may be too narrow
         finding for finding in measurement.findings if finding.severity is not Severity.NOTE or finding.where == "files"
     )
-    shown = Shown(result, model, files, "assembly measures", drawn={"kind": kind}, tables=tables(result),
+    output = Shown(result, model, files, "assembly measures", drawn={"kind": kind}, tables=tables(result),
                   most=MOST_IDENTIFIED, rest="FILE.residuals.csv", others=others)  # fmt: skip
-    shown.write()
+    output.write()
     findings = findings_of(result)
     if write is not None:
         identified, remarks = estimated(mechanism, result, write)
         findings += remarks
         if identified:
-            shown.write_model(identified, write, force)
+            output.write_model(identified, write, force)
     if write_mapping is not None:
-        findings += _write_mapping(result, mapping, write_mapping, shown.written)
-    shown.end(findings)
+        findings += _write_mapping(result, mapping, write_mapping, output.written)
+    output.end(findings)
 
 
 def parameters(texts: list[str]) -> dict[str, list[str]]:
@@ -277,8 +277,8 @@ def estimated(mechanism: "Mechanism", result: "xr.Dataset", write: Path) -> "tup
         correct = "correct what explains the misfit, and identify again"
         search = "find the cause first: `trunnion compare` shows each channel and names errors of sensors and angle"
         return None, [Finding(what, "--write", correct if explained else search)]
-    told = zip(result["parameter"].values, result["told"].values, strict=True)
-    lost = [str(name) for name, identifiable in told if not identifiable]
+    estimates = zip(result["parameter"].values, result["told"].values, strict=True)
+    lost = [str(name) for name, identifiable in estimates if not identifiable]
     if len(lost) == result.sizes["parameter"] or not result.attrs["converged"]:
         why = "no parameter is identifiable" if result.attrs["converged"] else "the search did not converge"
         return None, [Finding(f"'{write}' is not written: {why}", "--write")]

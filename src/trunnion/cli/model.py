@@ -143,14 +143,14 @@ def studio(
         raise MechanismError(Finding("does not exist", str(file), "name a model file or a folder"))
     folder, opened = (path, None) if path.is_dir() else (path.parent, path.name)
     bound = _usual() if port is None else _bound(port)
-    own = Studio(folder, opened, bound.getsockname()[1], forms=forms())
-    line(f"studio: {own.address}")
+    server = Studio(folder, opened, bound.getsockname()[1], forms=forms())
+    line(f"studio: {server.address}")
     line("It answers this machine alone. Ctrl-C ends it.")
     if open_:
         import webbrowser
 
-        webbrowser.open(own.entrance())
-    own.server().run(sockets=[bound])
+        webbrowser.open(server.entrance())
+    server.server().run(sockets=[bound])
 
 
 def _usual() -> socket.socket:
@@ -163,18 +163,18 @@ def _usual() -> socket.socket:
 
 def _bound(port: int) -> socket.socket:
     """A socket on the loopback; MechanismError if the port is taken."""
-    found = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        found.bind(("127.0.0.1", port))
-        found.listen(128)  # a browser that comes before the server runs waits instead of being refused
+        listener.bind(("127.0.0.1", port))
+        listener.listen(128)  # a browser that comes before the server runs waits instead of being refused
     except (OSError, OverflowError) as error:
-        found.close()
+        listener.close()
         reason = getattr(error, "strerror", None) or str(error)
         raise MechanismError(
             Finding(f"port {port} cannot be had: {reason}", "--port", "choose another, or 0")
         ) from None
-    return found
+    return listener
 
 
 # ---- examples and schema ------------------------------------------------------------------------------------------

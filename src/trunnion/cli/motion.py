@@ -53,15 +53,15 @@ def analyse(
     from trunnion.cycle.positions import Kept
 
     check_files(files, drawn=False, instead=f"trunnion plot {model.file}")
-    kept = Kept.read(variables, dtype)  # type: ignore[arg-type]  # it checks them
-    if files.report and kept.variables is not None:
+    selection = Kept.read(variables, dtype)  # type: ignore[arg-type]  # it checks them
+    if files.report and selection.variables is not None:
         raise MechanismError(Finding("a report is made of all variables", "--variables", "leave one of both out"))
     if files.report and at:
         raise MechanismError(Finding("a report is of the whole cycle", "--at", "leave one of both out"))
     mechanism = model.read()
     saved = {"units_row": files.units_row, "columns": files.columns, "units": files.units}
     with model.lines():
-        result = _analysed(mechanism, steps, settled.checked(), engine, kept, files.out or [], saved, at)
+        result = _analysed(mechanism, steps, settled.checked(), engine, selection, files.out or [], saved, at)
 
     def show_position() -> None:
         """Every number of one position, with its unit."""
@@ -70,15 +70,15 @@ def analyse(
 
         rows = []
         for name, unit, values in columns(result.dataset):
-            text, shown = (values[0], "") if isinstance(values[0], str) else parts(float(values[0]), unit)
-            rows.append([name, text, "" if shown == "1" else shown])
+            text, output = (values[0], "") if isinstance(values[0], str) else parts(float(values[0]), unit)
+            rows.append([name, text, "" if output == "1" else output])
         show_rows(f"{result.attrs['name'] or model.file} at {at}", ["", "value", "unit"], rows)
 
-    shown = Shown(result, model, Files(), "assembly", show=show_position if at else None, written=files.out or [])
+    output = Shown(result, model, Files(), "assembly", show=show_position if at else None, written=files.out or [])
     if files.report is not None:
         write_text(_page(mechanism, result, uncut), files.report)
-        shown.written.append(files.report)
-    shown.end()
+        output.written.append(files.report)
+    output.end()
 
 
 @verb(lacks="seat")
@@ -128,8 +128,8 @@ def plot(
     ideal = _ideal(mechanism, steps)
     if not single:
         folder(out)
-    shown = whole_peaks(with_worst_case(result, mechanism) if "error" in (kind or PLOTS) else result, uncut)
-    for name, picture in [(name, figure(shown, name, ideal, at)) for name in kind or drawable(result)]:
+    drawn = whole_peaks(with_worst_case(result, mechanism) if "error" in (kind or PLOTS) else result, uncut)
+    for name, picture in [(name, figure(drawn, name, ideal, at)) for name in kind or drawable(result)]:
         path = out if single else out / f"{name}.{image.lstrip('.')}"
         save(picture, path)
         wrote(path)
@@ -174,8 +174,8 @@ def _page(mechanism: "Mechanism", analysed: "Result", uncut: bool) -> str:
     from trunnion.views.cycle.report import report as page
 
     result = analysed.dataset
-    shown = whole_peaks(with_worst_case(result, mechanism), uncut)
-    return page(shown, _ideal(mechanism, result.sizes["position"]))
+    drawn = whole_peaks(with_worst_case(result, mechanism), uncut)
+    return page(drawn, _ideal(mechanism, result.sizes["position"]))
 
 
 # ---- simulate --------------------------------------------------------------------------------------------------------

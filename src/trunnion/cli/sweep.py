@@ -55,27 +55,27 @@ def sweep(
     grid = over(over_)
     measures = list(dict.fromkeys(measure or ["efficiency"]))
     _check_figures(grid, x, family, kind)
-    asked = list(files.out or ())
+    outputs = list(files.out or ())
     drawn = _figures(files, measures, image)
     check_files(files)
     mechanism = model.read({name: values[0] for name, values in grid.items()})
-    own = check_measure(measures, mechanism)
+    measures_read = check_measure(measures, mechanism)
     with model.lines(), bar("points", points(grid)) as progress:
         result = run(
-            mechanism, grid, steps, progress=progress, margin=margin or "locking_margin" in measures, measures=own,
-            engine=engine,  # type: ignore[arg-type]  # it checks it
+            mechanism, grid, steps, progress=progress, margin=margin or "locking_margin" in measures,
+            measures=measures_read, engine=engine,  # type: ignore[arg-type]  # it checks it
         )  # fmt: skip
     pictured = whole_peaks(result, uncut)
 
     def draw(path: Path) -> Any:
-        if path not in asked:
+        if path not in outputs:
             folder(path.parent)
         return figure(pictured, drawn[path], x, family, kind)
 
     def show() -> None:
-        shown = tables(result, measures, x, family, console().width)
-        show_tables(mechanism.name or str(model.file), shown, apart=False)
-        left_out = sum(table.left_out for table in shown) // (len(measures) if len(shown) > 1 else 1)
+        parts = tables(result, measures, x, family, console().width)
+        show_tables(mechanism.name or str(model.file), parts, apart=False)
+        left_out = sum(table.left_out for table in parts) // (len(measures) if len(parts) > 1 else 1)
         if left_out:
             line(f"{counted(left_out, 'point')} more; --out FILE.csv has all")
 

@@ -48,10 +48,10 @@ def show_figures(title: str, figures: Sequence[Figure]) -> None:
     table.add_column("")
     table.add_column("value", justify="right")
     table.add_column("unit")
-    for one in figures:
-        value = "undefined" if one.value is None else one.value
-        text, unit = (value, one.unit) if isinstance(value, str) else parts(value, one.unit)
-        table.add_row(one.label, text, "" if unit == "1" else unit)
+    for figure in figures:
+        value = "undefined" if figure.value is None else figure.value
+        text, unit = (value, figure.unit) if isinstance(value, str) else parts(value, figure.unit)
+        table.add_row(figure.label, text, "" if unit == "1" else unit)
     console().print(table, markup=False, highlight=False)
 
 
@@ -177,7 +177,7 @@ def bar(what: str, total: int | None, least: int = 0) -> Iterator[Callable[[int]
     from rich.console import Console
     from rich.progress import MofNCompleteColumn, Progress
 
-    shown = (*Progress.get_default_columns(), MofNCompleteColumn())
-    with Progress(*shown, console=Console(stderr=True), transient=True) as progress:
+    columns = (*Progress.get_default_columns(), MofNCompleteColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(what, total=total)
         yield lambda done: progress.update(task, completed=done)

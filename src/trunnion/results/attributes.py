@@ -84,10 +84,10 @@ def _written(value: Any) -> Any:
 
 def whole(result: Described, what: str) -> None:
     """MechanismError for something that is made of all variables of a result, of one that has not kept them."""
-    kept = next((result.attrs[name] for name in (KEPT, f"kept_{KEPT}") if name in result.attrs), None)
-    if kept is not None:  # the other name is that of a NetCDF 3 file
-        told = f"this result has kept {len(json.loads(kept))} of its variables: {what} is made of all"
-        raise MechanismError(Finding(told, KEPT, "analyse without naming variables"))
+    marker = next((result.attrs[name] for name in (KEPT, f"kept_{KEPT}") if name in result.attrs), None)
+    if marker is not None:  # the other name is that of a NetCDF 3 file
+        message = f"this result has kept {len(json.loads(marker))} of its variables: {what} is made of all"
+        raise MechanismError(Finding(message, KEPT, "analyse without naming variables"))
 
 
 def encoded(attributes: Mapping[str, Any]) -> dict[str, Any]:

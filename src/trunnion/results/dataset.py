@@ -57,8 +57,8 @@ class Variable:
 
     def blank(self, sizes: Mapping[str, int]) -> NDArray[Any]:
         """An array to be filled: NaN, or 0 of whole numbers."""
-        whole = self.dtype is not np.float64
-        return np.full([sizes[dim] for dim in self.dims], 0 if whole else np.nan, self.dtype)
+        floating = self.dtype is not np.float64
+        return np.full([sizes[dim] for dim in self.dims], 0 if floating else np.nan, self.dtype)
 
 
 TIME = Variable(("position",), "s", "time from the start of the cycle")
@@ -79,7 +79,7 @@ class MemberUnits(NamedTuple):
 
 def described(
     arrays: Mapping[str, ArrayLike],
-    known: Mapping[str, Variable],
+    variables_of: Mapping[str, Variable],
     units: Mapping[str, str | MemberUnits] | None = None,
 ) -> dict[str, xr.Variable]:
     """Describe arrays by their dimensions, units and long names.
@@ -104,7 +104,7 @@ def described(
 
     variables: dict[str, xr.Variable] = {}
     for name, array in arrays.items():
-        variable = known[name]
+        variable = variables_of[name]
         unit = (units or {}).get(variable.units, variable.units)
         attributes = {"units": unit, "long_name": variable.long_name}
         if isinstance(unit, MemberUnits):
@@ -197,7 +197,7 @@ def dataset_of(
         names["position"] = drive
     # those without an index go in at once: to add them afterwards takes as long as all else
     others = (along or {}).items()
-    plain = {name: one for name, one in others if isinstance(one, xr.Variable) and name not in one.dims}
+    plain = {name: item for name, item in others if isinstance(item, xr.Variable) and name not in item.dims}
     units = {name: variables[name] for name in _unit_coordinates(variables)}
     coordinates = xr.Coordinates(names | plain | units, indexes)
     rest = {name: variable for name, variable in variables.items() if name not in units}
@@ -212,5 +212,5 @@ def with_variables(result: xr.Dataset, variables: Mapping[str, xr.Variable]) -> 
 
 
 def _unit_coordinates(variables: Mapping[str, xr.Variable]) -> list[str]:
-    stated = (variable.attrs.get(UNITS_OF_EACH) for variable in variables.values())
-    return list(dict.fromkeys(name for name in stated if name is not None))
+    units = (variable.attrs.get(UNITS_OF_EACH) for variable in variables.values())
+    return list(dict.fromkeys(name for name in units if name is not None))

@@ -178,8 +178,8 @@ def check_format(path: str | os.PathLike[str], others: tuple[str, ...] = ()) -> 
     """
     suffix = Path(path).suffix.lower()
     if suffix not in FORMATS:
-        known = ", ".join((*FORMATS, *others))
-        raise MechanismError(Finding(f"cannot write a result as '{suffix}'", str(path), f"use one of {known}"))
+        formats = ", ".join((*FORMATS, *others))
+        raise MechanismError(Finding(f"cannot write a result as '{suffix}'", str(path), f"use one of {formats}"))
     _, package, extra = FORMATS[suffix]
     if package and importlib.util.find_spec(package) is None:
         raise MechanismError(Finding(f"{suffix} needs {package}", str(path), f"pip install 'trunnion[{extra}]'"))

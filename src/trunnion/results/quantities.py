@@ -88,15 +88,15 @@ def quantity(value: object, unit: str = "", units: Units | None = None) -> str:
         return number(value, 1)
     if math.isnan(value):
         return number(value)
-    factor, shown = (units or {}).get(unit, (0.0, ""))
+    factor, unit_shown = (units or {}).get(unit, (0.0, ""))
     if not SMALLEST <= abs(value) * factor < LARGEST:
-        factor, shown = prefixed(value, unit)
-    return joined(number(value * factor), shown)
+        factor, unit_shown = prefixed(value, unit)
+    return joined(number(value * factor), unit_shown)
 
 
-def joined(text: str, shown: str) -> str:
+def joined(text: str, unit: str) -> str:
     """A number with its unit, which stays on its line: "18.75 kN", "0.5°"."""
-    return f"{text}{shown}" if shown in ("°", "") else f"{text}\u00a0{shown}"
+    return f"{text}{unit}" if unit in ("°", "") else f"{text}\u00a0{unit}"
 
 
 def parts(value: float, unit: str, digits: int = 6) -> tuple[str, str]:
@@ -106,17 +106,17 @@ def parts(value: float, unit: str, digits: int = 6) -> tuple[str, str]:
     """
     if unit == "mm" and (abs(value) < 0.01 or "m" in in_use()):
         value, unit = value * 1e-3, "m"
-    factor, shown = prefixed(value, unit)
+    factor, unit_shown = prefixed(value, unit)
     text = number(value * factor, digits).replace("\u202f", "")
     if "." in text and "×" not in text:
         text = text.rstrip("0").rstrip(".")
-    return text, {"1": "", "deg": "°"}.get(shown, shown)
+    return text, {"1": "", "deg": "°"}.get(unit_shown, unit_shown)
 
 
 def readable(value: float, unit: str = "", digits: int = 4) -> str:
     """A quantity within a sentence: "18.75 kN m", "−0.5°", "3.10×10⁻¹²"."""
-    text, shown = parts(value, unit, digits)
-    return f"{text}{'' if shown in ('°', '') else ' '}{shown}"
+    text, unit_shown = parts(value, unit, digits)
+    return f"{text}{'' if unit_shown in ('°', '') else ' '}{unit_shown}"
 
 
 def drawn_in(peak: float, unit: str) -> tuple[float, str]:
@@ -159,8 +159,8 @@ def decimals(uncertainty: float) -> int:
 
 def with_uncertainty(value: float, half: float | None, unit: str) -> str:
     """A value ± U, if there is one, as `read_in` has it: "0.3012 ± 0.0034", "15.02 ± 0.05 °"."""
-    factor, shown = read_in(unit)
-    tail = f" {shown}" if shown else ""
+    factor, unit_shown = read_in(unit)
+    tail = f" {unit_shown}" if unit_shown else ""
     value, half = value * factor + 0.0, (half or math.nan) * factor
     places = decimals(half)
     if not half > 0:
@@ -172,10 +172,10 @@ def with_uncertainty(value: float, half: float | None, unit: str) -> str:
     return f"{round(value, places):.{max(places, 0)}f} ± {round(half, places):.{max(places, 0)}f}{tail}"
 
 
-def signed(value: float, factor: float, shown: str, sign: str = "+", digits: int = 4) -> str:
+def signed(value: float, factor: float, unit: str, sign: str = "+", digits: int = 4) -> str:
     """A deviation in a unit of `drawn_in`: "+0.4831°", "−0.8014 mm"; sign: "" for a plus that is not written."""
     text = format(value * factor + 0.0, f"{sign}.{digits}g").replace("-", "−")
-    return f"{text}{'' if shown in ('°', '') else ' '}{shown}"
+    return f"{text}{'' if unit in ('°', '') else ' '}{unit}"
 
 
 def between(low: float, high: float, unit: str) -> str:
@@ -183,9 +183,9 @@ def between(low: float, high: float, unit: str) -> str:
     "between −10.6059 and −10.6055 kN m"."""
     size, width = max(abs(low), abs(high)), abs(high - low)
     digits = 4 if not 0 < width < size else min(max(4, 2 + math.ceil(math.log10(size / width))), 9)
-    factor, shown = prefixed(size, unit)
+    factor, unit_shown = prefixed(size, unit)
     ends = [parts(end * factor, "", digits)[0] for end in (low, high)]
-    return f"between {ends[0]} and {ends[1]}{'' if shown in ('°', '') else ' '}{shown}"
+    return f"between {ends[0]} and {ends[1]}{'' if unit_shown in ('°', '') else ' '}{unit_shown}"
 
 
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

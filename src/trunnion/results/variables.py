@@ -231,21 +231,22 @@ def dataset(
     attributes: Mapping[str, Any],
     units: Mapping[str, MemberUnits],
     ideal: object = None,
-    kept: Collection[str] | None = None,
+    names_kept: Collection[str] | None = None,
     dtype: str = "float64",
     more: Mapping[str, xr.Variable] | None = None,
 ) -> xr.Dataset:
     """The result of a cycle.
 
     along: the coordinates of its positions, see `results.dataset.driven`; means, ideal: what has the names of CYCLE as
-    attributes, of the mechanism and of that without errors; units: those of drivers and springs; kept: variables of
-    every position that it has, all if not given; dtype: of their floats. Where that is another than theirs, arrays are
-    taken out of their dict one by one, so that both need not be in memory. more: what it has beside.
+    attributes, of the mechanism and of that without errors; units: those of drivers and springs; names_kept: those of
+    its variables at every position that it has, all if not given; dtype: of their floats. Where that is another than
+    theirs, arrays are taken out of their dict one by one, so that both need not be in memory. more: what it has beside.
     """
     vocabulary = _along_positions(_space(labels))
-    names = [name for name in arrays if kept is None or name in kept]
+    names = [name for name in arrays if names_kept is None or name in names_kept]
     other = {name for name in names if arrays[name].dtype == np.float64 and dtype != "float64"}
     numbers = {name: arrays.pop(name).astype(dtype) if name in other else arrays[name] for name in names}
+    numbers |= {name: numbers[name].copy() for name in SAME_AS.keys() & numbers.keys()}  # each may be written to
     described_arrays = described(numbers, vocabulary, units)
     described_arrays |= described({name: getattr(means, name) for name in CYCLE}, CYCLE, units)
     if ideal is not None:

@@ -38,8 +38,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'trunnion.rig' has no attribute '{name}'")
     if name in ("compare", "identify"):
         import_module("trunnion.accessor")  # result.trunnion
-    module, own = _PLACES[name]
-    return getattr(import_module(module), own)
+    module, attribute = _PLACES[name]
+    return getattr(import_module(module), attribute)
 
 
 def __dir__() -> list[str]:

@@ -249,10 +249,10 @@ def _frictionless(
     mechanism: Mechanism, condition: Condition, channels: Mapping[str, str], method: FrictionMethod
 ) -> Mapping[str, Array]:
     """Courses of the model without its friction; none where it has no friction, or has no answer without it."""
-    stated = in_condition(mechanism, condition)
+    model_stated = in_condition(mechanism, condition)
     with suppress(MechanismError):
-        free = stated.with_friction("off")
-        if free.data() != stated.data():
+        free = model_stated.with_friction("off")
+        if free.data() != model_stated.data():
             return modelled(free, replace(condition, values={}, units={}), channels, method).courses
     return {}
 
@@ -312,7 +312,7 @@ def _attributes(
 ) -> dict[str, Any]:  # fmt: skip
     first, entries = rows[0].model, {row["path"]: row for row in inputs(mechanism)}
     signals = {name: next(row.signals[name] for row in rows if name in row.signals) for name in measures}
-    stated = [entries.get(mechanism.path_of(name), {"unit": "", "text": ""}) for name in sets]
+    entries_of = [entries.get(mechanism.path_of(name), {"unit": "", "text": ""}) for name in sets]
     figures = [figures for row in rows for figures in row.figures.values()]
     agreed = [item["verdict"] is Verdict.WITHIN for item in figures if "verdict" in item]
     agreed += [item["efficiency_within"] == 1 for item in figures if "efficiency_within" in item]
@@ -329,8 +329,8 @@ def _attributes(
         "channel_units": [signal.unit for signal in signals.values()],
         "channel_read_in": [signal.read_in for signal in signals.values()],
         "channel_measures": list(measures.values()),
-        "set_units": [entry["unit"] for entry in stated],
-        "set_written": [written_unit(entry["text"], entry["unit"]) for entry in stated],
+        "set_units": [entry["unit"] for entry in entries_of],
+        "set_written": [written_unit(entry["text"], entry["unit"]) for entry in entries_of],
         "findings": finding_rows(_findings(mechanism, list(measures), rows)),
         "data_findings": data_findings(measurement),
         "done": list(measurement.done),
@@ -388,20 +388,22 @@ def _findings(mechanism: Mechanism, channels: Sequence[str], rows: Sequence[Cond
             findings.append(Finding.error("compare.no_answer", "", what, remedy, **figures))
     for name in channels:
         findings += _of_channel(name, [row for row in rows if name in row.signals])
-    cases, own = [row for row in rows if "efficiency" in row.figures[""]], "efficiency"
+    cases, shown_name = [row for row in rows if "efficiency" in row.figures[""]], "efficiency"
     if off := [row for row in cases if row.figures[""]["efficiency_within"] == 0]:
-        most = max(off, key=lambda row: abs(row.figures[""][own] - row.figures[""]["efficiency_model"]))
-        measured, half, model = (most.figures[""][f"{own}{key}"] for key in ("", "_expanded", "_model"))
+        most = max(off, key=lambda row: abs(row.figures[""][shown_name] - row.figures[""]["efficiency_model"]))
+        measured, half, model = (most.figures[""][f"{shown_name}{key}"] for key in ("", "_expanded", "_model"))
         what = f"does not agree within U {_in_which(off, cases)}; the most in {most.condition.name}: measured "
         what += f"{measured:.4f} ± {half:.2g}, model {model:.4f}"
         remedy = "check the channels; `trunnion identify` fits the friction of the model to them"
         figures = {"measured": measured, "expanded": half, "model": model}
-        findings.append(Finding.error("compare.efficiency", own, what, remedy, **figures))
+        findings.append(Finding.error("compare.efficiency", shown_name, what, remedy, **figures))
     for what, remedy in dict.fromkeys(row.doubt for row in rows if row.doubt[0]):
         where = _in_which([row for row in rows if row.doubt == (what, remedy)], rows)
-        findings.append(Finding.warning("compare.efficiency_unknown", own, f"not known {where}: {what}", remedy))
+        findings.append(Finding.warning("compare.efficiency_unknown", shown_name, f"not known {where}: {what}", remedy))
     accuracies = [(name, signal.accuracy) for row in rows for name, signal in row.signals.items()]
-    if bare := [name for name in channels if not any(a.zero or a.gain for own, a in accuracies if own == name)]:
+    if bare := [
+        name for name in channels if not any(a.zero or a.gain for shown_name, a in accuracies if shown_name == name)
+    ]:
         what = f"no accuracy of zero and gain is stated for {', '.join(bare)}: U includes only the scatter between "
         remedy = "state accuracy: {gain: …, zero: …} in the mapping"
         findings.append(Finding.note("compare.no_accuracy", "channels", f"{what}turns", remedy, channels=bare))
@@ -416,8 +418,10 @@ def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Find
     if off := [*by_verdict.get(Verdict.NOT, []), *by_verdict.get(Verdict.OFFSET, [])]:
         rms = max(row.figures[name]["rms"] for row in off)
         within = 100 * min(row.figures[name]["within"] for row in off)
-        own, size = off[0].signals[name].shown
-        rms_text = f"{rms / size:.3g} {own}" if own not in ("rad", "1") else readable(rms, own, 3)
+        display_unit, size = off[0].signals[name].shown
+        rms_text = (
+            f"{rms / size:.3g} {display_unit}" if display_unit not in ("rad", "1") else readable(rms, display_unit, 3)
+        )
         offset = " apart from a constant offset" * (Verdict.NOT not in by_verdict)
         what = f"does not agree within U {_in_which(off, rows)}{offset}: at worst {within:.0f} % of the positions "
         what += f"agree, and the RMS of the residual is {rms_text}"
@@ -447,10 +451,10 @@ def other_speed(driver: str, rows: Sequence[tuple[Condition, float]]) -> Iterato
         return
     signals = {signal.measures: signal for condition, _ in rows for signal in condition.courses.values()}
     sensor = signals.get(f"rate:{driver}")
-    own, size = sensor.shown if sensor is not None and sensor.read_in[0] else ("rpm", np.pi / 30)
+    display_unit, size = sensor.shown if sensor is not None and sensor.read_in[0] else ("rpm", np.pi / 30)
     (first, speed), which = off[0], _in_which([condition for condition, _ in off], rows)
-    what = f"the measured speed of the driver differs from that of the model {which}: {first.speed / size:.4g} {own} "
-    what += f"measured, {speed / size:.4g} {own} in the model in {first.name}"
+    what = f"the measured speed of the driver differs from that of the model {which}: {first.speed / size:.4g} "
+    what += f"{display_unit} measured, {speed / size:.4g} {display_unit} in the model in {first.name}"
     mean = f"{{mean: {sensor.channel if sensor is not None else 'angle'}}}"
     remedy = f"state set: {{{as_key(f'{driver}.speed')}: {mean}}} in the mapping: the model then runs at this speed"
     severity = Severity.ERROR if any(apart(condition.speed, model) for condition, model in off) else Severity.WARNING

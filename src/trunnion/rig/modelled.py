@@ -155,12 +155,12 @@ def over_pulses(speed: Array, phase: Array, duration: float, per_turn: int) -> A
 
 def in_condition(mechanism: Mechanism, condition: Condition) -> Mechanism:
     """The mechanism with the values of a condition, each in the unit it was stated in."""
-    stated: dict[str, float | str] = dict(condition.values)
+    settings: dict[str, float | str] = dict(condition.values)
     for name, unit in condition.units.items():
         if unit != "1" and np.isfinite(condition.values.get(name, np.nan)):
-            stated[name] = f"{condition.values[name]} {unit}"
+            settings[name] = f"{condition.values[name]} {unit}"
     with _of_condition(condition):
-        return mechanism.with_values(stated)
+        return mechanism.with_values(settings)
 
 
 @contextmanager
@@ -235,6 +235,6 @@ def same_cycle(run: Run, condition: Condition, duration: float, begin: float, sp
         raise MechanismError(findings)
 
 
-def apart(measured: float, stated: float, share: float = FAR) -> bool:
+def apart(measured: float, nominal: float, share: float = FAR) -> bool:
     """Whether a measured speed is off that of the model by more than a share of it; not where one is unknown."""
-    return bool(abs(measured - stated) > share * abs(stated))
+    return bool(abs(measured - nominal) > share * abs(nominal))

@@ -188,12 +188,12 @@ class AssemblyStudy:
     @classmethod
     def of(cls, system: System, values: Values, ideal: Values, cycle: Cycle, uniform: Uniform) -> AssemblyStudy:
         """A mechanism with the numbers as built and those without errors."""
-        stated = tuple(ends_of(system, values, every_pin=False))
-        every = not any(end.pin for end in stated) and not (uniform == "all" and stated)
+        ends = tuple(ends_of(system, values, every_pin=False))
+        every = not any(end.pin for end in ends) and not (uniform == "all" and ends)
         pins = tuple(ends_of(system, values, every_pin=every))
         evened = tuple(end.pin or uniform == "all" for end in pins)
         start, findings = start_of(system, values, ideal, cycle)
-        return cls(system, values, cycle, start, stated, pins, evened, tuple(findings))
+        return cls(system, values, cycle, start, ends, pins, evened, tuple(findings))
 
     def solve(self, time: Array, stated: bool) -> LeastPlay:
         """The least share of the stated plays, or the smallest clearance, at times; ∞ where no play is there."""
@@ -209,10 +209,15 @@ class AssemblyStudy:
             if not ends or np.all(fits | np.isnan(gap)):
                 least = np.where(np.isnan(gap), np.nan, np.where(fits, 0.0, np.inf))
                 return LeastPlay(least, least, q, none, np.zeros((len(time), len(ends))), gap, 0)
-            found = least_play(loops, q, none, ask)
+            least_plays = least_play(loops, q, none, ask)
         # what is found where it closes as it is is rounding
-        found.least[fits], found.bound[fits], found.offsets[fits], found.weights[fits] = 0.0, 0.0, 0.0, 0.0
-        return found
+        least_plays.least[fits], least_plays.bound[fits], least_plays.offsets[fits], least_plays.weights[fits] = (
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        )
+        return least_plays
 
     def answer(self, time: Array) -> Answer:
         """Needs, openings, offsets and statuses at times, and the largest needs of the cycle."""
@@ -221,9 +226,13 @@ class AssemblyStudy:
         if np.any(opened):
             _check_lengths(self.system, self.values, self.pins)
             shares, needs = self.solve(time, stated=True), self.solve(time, stated=False)
-            arrays["closure_residual"] = _worst(shares, needs, lambda one: one.opening)
+            arrays["closure_residual"] = _worst(shares, needs, lambda play_found: play_found.opening)
             arrays["certificate"] = _worst(
-                shares, needs, lambda one: (one.least - one.bound) / np.where(one.least > 0, one.least, 1.0)
+                shares,
+                needs,
+                lambda play_found: (
+                    (play_found.least - play_found.bound) / np.where(play_found.least > 0, play_found.least, 1.0)
+                ),
             )
         else:  # the loops close without any play
             zero, none = np.where(exists, 0.0, np.nan), np.zeros((len(time), 0))
@@ -280,7 +289,7 @@ class AssemblyStudy:
                 offsets[joint, end.number, "xyz".index(axis)] = np.where(solved, search.offsets[:, column], np.nan)
                 column += 1
 
-    def _largest(self, time: Array, needs: Array, stated: bool) -> tuple[float, float]:
+    def _largest(self, time: Array, needs: Array, every_end_stated: bool) -> tuple[float, float]:
         """The largest need of the cycle and its time: between the positions too, beside the largest of them."""
         heights = np.where(np.isnan(needs), -np.inf, needs)
         top = int(np.argmax(heights))
@@ -293,7 +302,9 @@ class AssemblyStudy:
         for _ in range(NARROWED):
             near = best[:, None] + reach * np.linspace(-1, 1, BETWEEN)
             near = near if self.cycle.periodic else np.clip(near, 0.0, self.cycle.duration)
-            heights_near = np.nan_to_num(self.solve(near.ravel(), stated).least.reshape(near.shape), nan=-np.inf)
+            heights_near = np.nan_to_num(
+                self.solve(near.ravel(), every_end_stated).least.reshape(near.shape), nan=-np.inf
+            )
             place = np.argmax(heights_near, axis=1)[:, None]
             better = np.take_along_axis(heights_near, place, 1)[:, 0]
             best = np.where(better > most, np.take_along_axis(near, place, 1)[:, 0], best)

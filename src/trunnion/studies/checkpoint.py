@@ -130,8 +130,8 @@ def _begun(file: FileIO) -> bool:
 def settings(job: Job) -> dict[str, Any]:
     """All that the answer depends on, by name; what is not a single value stands by its SHA-256, hexadecimal."""
     single = (str, int, float, bool, type(None))
-    own = {"version": __version__, **job.identity()}
-    return {key: value if isinstance(value, single) else _hash(value) for key, value in own.items()}
+    identity = {"version": __version__, **job.identity()}
+    return {key: value if isinstance(value, single) else _hash(value) for key, value in identity.items()}
 
 
 def _hash(value: object) -> str:

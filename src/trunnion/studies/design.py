@@ -240,16 +240,16 @@ def instant_centres(walk: Forward, count: int, most: int) -> list[Centre]:
     """
     mechanism = walk.system.mechanism
     links = sorted(mechanism.links, key=lambda link: link != mechanism.fixed_link)
-    held = {frozenset(ends): name for name, (kind, ends) in walk.system.joints.items() if kind == "revolute"}
+    pivots = {frozenset(ends): name for name, (kind, ends) in walk.system.joints.items() if kind == "revolute"}
     pairs = [(a, b) for i, a in enumerate(links) for b in links[i + 1 :] if i == 0 or len(links) <= most]
-    return [_centre(walk, pair, held.get(frozenset(pair)), count) for pair in pairs]
+    return [_centre(walk, pair, pivots.get(frozenset(pair)), count) for pair in pairs]
 
 
 def _centre(walk: Forward, pair: tuple[str, str], joint: str | None, count: int) -> Centre:
-    one, two = (walk.motions[link] for link in pair)
+    first, two = (walk.motions[link] for link in pair)
     # velocity of the second against the first at the second's origin; the centre lies across it
-    speeds = plane.velocity_at(plane.minus(two.twist, one.twist), two.frame[:2])
-    numbers = (*instant_centre(walk, *pair), *speeds, two.twist.w - one.twist.w, walk.size, walk.pace)
+    speeds = plane.velocity_at(plane.minus(two.twist, first.twist), two.frame[:2])
+    numbers = (*instant_centre(walk, *pair), *speeds, two.twist.w - first.twist.w, walk.size, walk.pace)
     x, y, vx, vy, turn, size, pace = (np.broadcast_to(np.asarray(primal(part), float), (count,)) for part in numbers)
     speed = np.hypot(vx, vy)
     still = (np.abs(turn) <= AT_REST * pace) & (speed <= AT_REST * pace * size)
@@ -292,8 +292,8 @@ def grashof(mechanism: Mechanism, run: Run | None = None) -> str:
     coupler = next(link for link in run.system.joints[b][1] if link != crank)
     rocker = next(link for link in run.system.joints[d][1] if link != ground)
 
-    def span(link: str, one: str, two: str) -> float:
-        p, q = local[link, one], local[link, two]
+    def span(link: str, first: str, two: str) -> float:
+        p, q = local[link, first], local[link, two]
         return float(np.hypot(p.x - q.x, p.y - q.y))
 
     sides = {  # by the type of a four-bar of which that side is the shortest

@@ -181,29 +181,29 @@ def play(
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    stated, notes = _measures(run, measures)
+    chosen_measures, notes = _measures(run, measures)
     plays = _plays(run)
     value, timed = (None, False) if at is None else place_of(mechanism, at)
-    courses = [replace(measure, at=value, timed=timed, over=None, statistic="") for measure in stated]
+    courses = [replace(measure, at=value, timed=timed, over=None, statistic="") for measure in chosen_measures]
     if run.cycle.duration <= 0:  # there is one position
         courses = [replace(measure, statistic="value") for measure in courses]
     over_cycle = figures = ToleranceStudy(run, plays, tuple(courses), steps, FrictionMethod())
     if at is not None or run.cycle.duration <= 0:
-        stated = courses
+        chosen_measures = courses
     else:
         largest = [of.time for of in over_cycle.linear.measures]
         placed = [
             replace(measure, at=time, timed=True) if measure.rule == "deviation" and np.isfinite(time) else measure
-            for measure, time in zip(stated, largest, strict=True)
+            for measure, time in zip(chosen_measures, largest, strict=True)
         ]
         figures = replace(over_cycle, measures=tuple(placed))
-    return _dataset(played := Played(run, stated, over_cycle, figures), [*_findings(played), *notes])
+    return _dataset(played := Played(run, chosen_measures, over_cycle, figures), [*_findings(played), *notes])
 
 
 def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], list[Finding]]:
     """The measures asked for; notes where they are chosen because none is stated, or some are left out."""
-    stated = chosen(run.system.mechanism, names, run.values)
-    others = [measure.name for measure in stated if not _covered(run, measure)]
+    chosen_measures = chosen(run.system.mechanism, names, run.values)
+    others = [measure.name for measure in chosen_measures if not _covered(run, measure)]
     remedy, notes = "use `trunnion tolerance` for other measures", []
     if others and names is not None:
         what = f"this study covers measures with one value at every position, which {', '.join(others)} has not"
@@ -211,8 +211,10 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
     if others:
         what = f"left out: {', '.join(others)}, which have no one value at every position"
         notes = [Finding.note("play.measures_left_out", "measures", what, remedy, measures=others)]
-    measures, taken = stated_or_outputs(run, [measure for measure in stated if measure.name not in others])
-    return measures, [*taken, *notes]
+    measures, outputs_taken = stated_or_outputs(
+        run, [measure for measure in chosen_measures if measure.name not in others]
+    )
+    return measures, [*outputs_taken, *notes]
 
 
 def _covered(run: Run, measure: Measure) -> bool:
@@ -262,9 +264,9 @@ def _findings(played: Played) -> Iterator[Finding]:
     yield from _spinning(run, played.measures)
     if run.seats:
         what = "play is relative to the middle of the holes: the worst case is over all positions of the pins and "
-        what += f"does not use the seats of {', '.join(one.joint for one in run.seats)}"
+        what += f"does not use the seats of {', '.join(seat.joint for seat in run.seats)}"
         remedy = "`trunnion analyse` has the deviation with these seats"
-        yield Finding.note("play.seats_not_taken", "joints", what, remedy, joints=[one.joint for one in run.seats])
+        yield Finding.note("play.seats_not_taken", "joints", what, remedy, joints=[seat.joint for seat in run.seats])
     yield from _fits(run, played.inputs.loose)
     for i in range(len(played.measures)):
         yield from _limit(played, i)
@@ -289,16 +291,16 @@ def _left_out(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
     """Joints whose play has no model, or does more than the model of the mechanism knows."""
     mechanism = run.system.mechanism
     models = CLEARANCE_MODELS[mechanism.space]
-    stated = [
+    seats_stated = [
         name
         for name, (kind, _) in run.system.joints.items()
         if kind not in models and clearance(name, run.values) is not None
     ]
-    if stated:
-        kinds = [f"{name} is {run.system.joints[name][0]}" for name in stated]
-        what = f"the play of {', '.join(stated)} is left out ({', '.join(kinds)} joints)"
+    if seats_stated:
+        kinds = [f"{name} is {run.system.joints[name][0]}" for name in seats_stated]
+        what = f"the play of {', '.join(seats_stated)} is left out ({', '.join(kinds)} joints)"
         remedy = f"play is modelled in {', '.join(models)} joints"
-        yield Finding.warning("play.left_out", "joints", what, remedy, joints=stated)
+        yield Finding.warning("play.left_out", "joints", what, remedy, joints=seats_stated)
     toothed = sorted({
         joint for gear in mechanism.gears.values() if gear.touches for joint in gear.joints if joint in loose
     })  # fmt: skip
@@ -316,8 +318,8 @@ def _fits(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
         hole, pin = (f"joints.{name}.pin.{key}" for key in ("hole_radius", "radius"))
         joint = mechanism.effective_joints[name]
         if joint.pin is not None and joint.pin.fit is not None and {hole, pin} <= limits.keys():
-            own = run.values[hole] + limits[hole][1] - run.values[pin] - limits[pin][0]
-            largest[name] = float(np.ravel(primal(own))[0])
+            least_clearance = run.values[hole] + limits[hole][1] - run.values[pin] - limits[pin][0]
+            largest[name] = float(np.ravel(primal(least_clearance))[0])
     if largest:
         most = max(largest, key=largest.__getitem__)
         what = f"the play of {', '.join(largest)} is the mean of their fits; the largest is "
@@ -353,10 +355,10 @@ def _limit(played: Played, i: int) -> Iterator[Finding]:
     if limit is None or not np.isfinite(worst):
         return
     unit, where = measure.unit(played.run.system), f"measures.{measure.name}.limit"
-    factor, shown = (180 / np.pi, "deg") if unit == "rad" else (1e3, "mm") if unit == "m" else (1.0, unit)
-    figures = {"worst": factor * worst, "limit": factor * limit, "unit": shown, "at": played.place(i)}
-    reaches = f"the worst case to first order, {readable(factor * worst, shown)} at {played.place(i)}"
-    allowed = f"the limit of {readable(factor * limit, shown)}"
+    factor, display_unit = (180 / np.pi, "deg") if unit == "rad" else (1e3, "mm") if unit == "m" else (1.0, unit)
+    figures = {"worst": factor * worst, "limit": factor * limit, "unit": display_unit, "at": played.place(i)}
+    reaches = f"the worst case to first order, {readable(factor * worst, display_unit)} at {played.place(i)}"
+    allowed = f"the limit of {readable(factor * limit, display_unit)}"
     if worst <= limit:
         yield Finding.note("limit.kept", where, f"{reaches}, is within {allowed}", **figures)
     else:
@@ -427,12 +429,12 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
         "sensitivity": loads,
         "radius": _radii(played.inputs, loads.shape[2]),
         "status": played.course.status,
-        "extreme_worst_case": np.array([one.worst_case for one in places]),
-        "extreme_deviation": np.array([one.deviation for one in places]),
+        "extreme_worst_case": np.array([place.worst_case for place in places]),
+        "extreme_deviation": np.array([place.deviation for place in places]),
         "extreme_time": np.array([of.time for of in played.figures.linear.measures]),
     }
     units = [measure.unit(system) for measure in played.measures]
-    own, per_length = MemberUnits("measure", units), MemberUnits("measure", [f"{unit}/m" for unit in units])
+    units_of, per_length = MemberUnits("measure", units), MemberUnits("measure", [f"{unit}/m" for unit in units])
     labels = {
         "measure": [measure.name for measure in played.measures],
         "joint": list(played.inputs.loose),
@@ -451,9 +453,9 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
         "places": [[_kind_of_place(played, i), played.place(i)] for i in range(len(units))],
         **scales_of(run).summary(_summary(played, units)),
         "findings": finding_rows(findings),
-        "missed": [f"{one.where}: {one.what}" for one in findings if one.code == "limit.exceeded"],
+        "missed": [f"{place.where}: {place.what}" for place in findings if place.code == "limit.exceeded"],
     }
-    variables = described(arrays, VARIABLES, {"measure": own, "sensitivity": per_length})
+    variables = described(arrays, VARIABLES, {"measure": units_of, "sensitivity": per_length})
     return dataset_of("play", variables, labels, attributes, driven(played.time, *dial))
 
 
@@ -464,34 +466,34 @@ def _nominal(of: Of) -> Array:
 
 
 def _radii(inputs: Inputs, ends: int) -> Array:
-    found = np.full((len(inputs.loose), ends), np.nan)
-    for row, joint in zip(found, inputs.loose, strict=True):
+    radii = np.full((len(inputs.loose), ends), np.nan)
+    for row, joint in zip(radii, inputs.loose, strict=True):
         play = inputs.play(joint, inputs.run.values)
         assert play is not None  # else it would not be loose
         row[: len(play.radii)] = [max(float(np.ravel(primal(radius))[0]), 0.0) for radius in play.radii]
-    return found
+    return radii
 
 
 def _kind_of_place(played: Played, i: int) -> str:
     """What the place of a measure is, for tables: empty where it is stated."""
     measure = played.measures[i]
-    stated = measure.at is not None or len(played.time) == 1
-    return "" if stated else f"the {measure.rule}" if measure.rule in EXTREMES else "largest"
+    is_place = measure.at is not None or len(played.time) == 1
+    return "" if is_place else f"the {measure.rule}" if measure.rule in EXTREMES else "largest"
 
 
 def _summary(played: Played, units: Sequence[str]) -> Iterator[Figure]:
     """Of each measure the worst case at its place: what each joint has in it, RSS and deviation."""
     for i, (measure, unit) in enumerate(zip(played.measures, units, strict=True)):
-        name, there, kind = measure.name, played.at_places[i], _kind_of_place(played, i)
-        total = float(np.sum(there.worst_case))
+        name, at_place, kind = measure.name, played.at_places[i], _kind_of_place(played, i)
+        total = float(np.sum(at_place.worst_case))
         if not np.isfinite(total):
             yield Figure(f"{name}.worst_case", f"{name}, worst case to first order", None, unit)
             continue
         aspect = "maximum" if kind == "largest" else f"of {kind}" if kind else ""
         at = f"at {played.place(i)}"
         yield Figure(f"{name}.worst_case", f"{name}, worst case to first order", total, unit, aspect, at)
-        rss, deviation = (float(np.sqrt(np.sum(part**2))) for part in (there.worst_case, there.deviation))
+        rss, deviation = (float(np.sqrt(np.sum(part**2))) for part in (at_place.worst_case, at_place.deviation))
         yield Figure(f"{name}.rss", f"{name}, RSS there", rss, unit)
         yield Figure(f"{name}.deviation", f"{name}, standard deviation there", deviation, unit)
-        for joint, own in zip(played.inputs.loose, there.worst_case, strict=True):
-            yield Figure(f"{name}.{joint}.worst_case", f"{name}, of which {joint}", float(own), unit)
+        for joint, effect in zip(played.inputs.loose, at_place.worst_case, strict=True):
+            yield Figure(f"{name}.{joint}.worst_case", f"{name}, of which {joint}", float(effect), unit)

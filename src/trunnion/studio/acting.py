@@ -18,56 +18,56 @@ Given = Mapping[str, Any]
 RATIO = re.compile(r"\s*([-+]?)\s*(\d+\.?\d*|\.\d+)\s*(?:([:/])\s*(\d+\.?\d*|\.\d+)\s*)?")
 
 
-def driver(sketch: Sketch, given: Given) -> str:
+def driver(sketch: Sketch, gesture: Given) -> str:
     """A joint is driven, from where it is shown."""
-    joint = str(given["joint"])
+    joint = str(gesture["joint"])
     if not sketch.kind(joint):
         raise refused("is not a joint", joint, "choose a joint")
-    if not given.get("add"):
+    if not gesture.get("add"):
         for other in list(sketch.section("drivers")):
             del sketch.section("drivers")[other]
     if sketch.kind(joint) == "prismatic":
-        entry = {"speed": given.get("speed") or "10 mm/s", "range": [0, sketch.length(0.2 * sketch.size)]}
+        entry = {"speed": gesture.get("speed") or "10 mm/s", "range": [0, sketch.length(0.2 * sketch.size)]}
     else:
         start = _turned(sketch, joint) if joint in sketch.joints else 0.0
-        entry = {"speed": given.get("speed") or "60 rpm"} | ({"start": f"{start:g} deg"} if start else {})
+        entry = {"speed": gesture.get("speed") or "60 rpm"} | ({"start": f"{start:g} deg"} if start else {})
     sketch.section("drivers")[joint], sketch.made = entry, ("joints", joint)
     return f"Drive {joint}"
 
 
 def _turned(sketch: Sketch, joint: str) -> float:
     """The rotation of a joint as it is shown, degrees from 0 to 360."""
-    first, second = (sketch.frame(one) for one in sketch.joints[joint]["links"])
+    first, second = (sketch.frame(end) for end in sketch.joints[joint]["links"])
     turn = degrees(atan2(second.s, second.c) - atan2(first.s, first.c))
     return round(turn % 360.0, 4) % 360.0
 
 
-def load(sketch: Sketch, given: Given) -> str:
+def load(sketch: Sketch, gesture: Given) -> str:
     """A force at a joint, a point or a place of a moving link; or what opposes the motion of the joint `against`.
 
     size: of that, N or N m, as it was typed; instead: the load that it takes the place of, with its size.
     """
-    before = str(given.get("instead") or "")
+    before = str(gesture.get("instead") or "")
     name = before if before in sketch.of("loads") else numbered(sketch, "loads", "load")
-    if "against" in given:
-        entry = _resisting(sketch, given, name)
+    if "against" in gesture:
+        entry = _resisting(sketch, gesture, name)
     else:
-        link, point = point_of(sketch, given["at"])
+        link, point = point_of(sketch, gesture["at"])
         if link == sketch.ground:
             raise refused("would act on the ground", "the force", "choose a point of a moving link")
-        entry = {"link": link, "at": point, "force": list(given["force"])}
+        entry = {"link": link, "at": point, "force": list(gesture["force"])}
     sketch.section("loads")[name] = entry
     sketch.made = ("loads", name)
     return f"Change {name}" if name == before else f"Add {name}"
 
 
-def _resisting(sketch: Sketch, given: Given, name: str) -> dict[str, Any]:
-    joint = str(given["against"])
+def _resisting(sketch: Sketch, gesture: Given, name: str) -> dict[str, Any]:
+    joint = str(gesture["against"])
     kind = sketch.kind(joint)
     if kind not in ("revolute", "prismatic", "cylindrical"):
         raise refused("does not turn or slide", joint, "choose a pin or a slide")
     turns = kind != "prismatic"
-    size = given.get("size") or ("10 N m" if turns else "100 N")
+    size = gesture.get("size") or ("10 N m" if turns else "100 N")
     parts = [sketch.numbers.get(f"loads.{name}.force.{axis}") for axis in "xy"]
     if not turns and None not in parts:
         size = f"{hypot(*map(float, parts)):.6g} N"  # type: ignore[arg-type]  # none of them is None
@@ -75,30 +75,30 @@ def _resisting(sketch: Sketch, given: Given, name: str) -> dict[str, Any]:
     return {"joint": joint, "resisting_torque" if turns else "resisting_force": size, **marked}
 
 
-def spring(sketch: Sketch, given: Given) -> str:
+def spring(sketch: Sketch, gesture: Given) -> str:
     """A spring between two ends, without force as it is drawn; an end on nothing is fastened to the ground."""
-    ends = [".".join(point_of(sketch, end)) for end in given["between"]]
+    ends = [".".join(point_of(sketch, end)) for end in gesture["between"]]
     (x, y), (a, b) = (sketch.places[end] for end in ends)
     if ends[0].partition(".")[0] == ends[1].partition(".")[0]:
         raise refused("would have both ends on one link", "the spring", "choose points of two links")
     name = numbered(sketch, "springs", "spring")
-    entry = {"between": ends, "stiffness": given.get("stiffness") or "1 N/mm"}
+    entry = {"between": ends, "stiffness": gesture.get("stiffness") or "1 N/mm"}
     sketch.made = ("springs", name)
     sketch.section("springs")[name] = entry | {"free_length": sketch.length(hypot(a - x, b - y))}
     return f"Add {name}"
 
 
-def bar_mass(sketch: Sketch, given: Given) -> str:
+def bar_mass(sketch: Sketch, gesture: Given) -> str:
     """Mass, mass centre and inertia of a link that is a flat bar between its two points that are farthest apart.
 
     width, thickness, density: as they were typed. With length l and width b: J = m (l² + b²) / 12 about the middle.
     """
-    link = str(given["link"])
+    link = str(gesture["link"])
     if len(sketch.points(link)) < 2 or link == sketch.ground or sketch.entries.get("space") == "spatial":
         raise refused("is no bar in the plane", f"links.{link}", "choose a moving link with two points")
     length, (x, y) = _bar(sketch, link)
     kinds = {"width": "length", "thickness": "length", "density": "density"}
-    width, thickness, density = (_above_zero(given.get(key), key, kind) for key, kind in kinds.items())
+    width, thickness, density = (_above_zero(gesture.get(key), key, kind) for key, kind in kinds.items())
     mass = density * length * width * thickness
     sketch.section("links")[link].pop("inertia_about", None)
     sketch.section("links")[link] |= {
@@ -109,12 +109,12 @@ def bar_mass(sketch: Sketch, given: Given) -> str:
     return f"Mass of {link}"
 
 
-def centre(sketch: Sketch, given: Given) -> str:
+def centre(sketch: Sketch, gesture: Given) -> str:
     """The mass centre of a link goes to the place `at`; without that to the middle of the bar between its points."""
-    link = str(given["link"])
+    link = str(gesture["link"])
     if link == sketch.ground or link not in sketch.of("links") or sketch.entries.get("space") == "spatial":
         raise refused("has no mass centre in the plane", f"links.{link}", "choose a link that moves")
-    x, y = sketch.frame(link).into(vector(given["at"])) if given.get("at") else _bar(sketch, link)[1]
+    x, y = sketch.frame(link).into(vector(gesture["at"])) if gesture.get("at") else _bar(sketch, link)[1]
     sketch.section("links")[link]["centre"] = [sketch.length(x), sketch.length(y)]
     return f"Mass centre of {link}"
 
@@ -138,14 +138,14 @@ def _above_zero(text: Any, key: str, kind: str) -> float:
 # ---- gears ----------------------------------------------------------------------------------------------------
 
 
-def gear(sketch: Sketch, given: Given) -> str:
+def gear(sketch: Sketch, gesture: Given) -> str:
     """A gear pair between two links, by their pivots or by themselves, meshing as they are drawn.
 
     ratio: turns of the second for one of the first, against it, such as "1/2"; or their teeth, "20:40"; with a + they
     turn the same way (an internal gear). They are equal if it is not given.
     """
     begin(sketch)
-    one, two = (_pivot(sketch, end) for end in given["joints"])
+    one, two = (_pivot(sketch, end) for end in gesture["joints"])
     if one == two:
         raise refused("would mesh with itself", f"joints.{one}", "choose two pivots")
     first, second = (sketch.joints[joint]["links"] for joint in (one, two))
@@ -155,7 +155,7 @@ def gear(sketch: Sketch, given: Given) -> str:
         )
     if any({*pair.get("joints", ())} == {one, two} for pair in sketch.of("gears").values()):
         raise refused(f"and {two} are geared already", one, "change the ratio of that gear pair")
-    written, ratio = _ratio(str(given.get("ratio") or "1"))
+    written, ratio = _ratio(str(gesture.get("ratio") or "1"))
     name = numbered(sketch, "gears", "gear")
     phase = (_turned(sketch, two) - ratio * _turned(sketch, one)) % 360.0
     entry: dict[str, Any] = {"joints": [one, two], "ratio": written}
@@ -167,10 +167,10 @@ def gear(sketch: Sketch, given: Given) -> str:
 def _pivot(sketch: Sketch, end: Any) -> str:
     """The joint that a gear turns in: a pin, or that of a link on the ground."""
     if isinstance(end, Mapping):
-        own = str(end.get("on"))
-        pins = [name for name, joint in sketch.joints.items() if {*joint["links"]} == {own, sketch.ground}]
+        link = str(end.get("on"))
+        pins = [name for name, joint in sketch.joints.items() if {*joint["links"]} == {link, sketch.ground}]
         if len(pins) != 1:
-            raise refused("has no pivot on the ground", f"links.{own}", "pin one of its ends to the ground first")
+            raise refused("has no pivot on the ground", f"links.{link}", "pin one of its ends to the ground first")
         end = pins[0]
     if end not in sketch.joints or sketch.joints[end].get("type", "revolute") != "revolute":
         raise refused("is no pin that turns", str(end), "choose the pivot of a link")
@@ -179,11 +179,11 @@ def _pivot(sketch: Sketch, end: Any) -> str:
 
 def _ratio(text: str) -> tuple[float | int | str, float]:
     """A ratio as it is written, and its value."""
-    found = RATIO.fullmatch(text)
-    if not found or float(found[2]) == 0.0 or (found[4] and float(found[4]) == 0.0):
+    match = RATIO.fullmatch(text)
+    if not match or float(match[2]) == 0.0 or (match[4] and float(match[4]) == 0.0):
         raise refused(f"'{text}' is no ratio of gears", "", "type the teeth as 20:40, or a number")
-    sign = "" if found[1] == "+" else "-"
-    value = float(f"{sign}{found[2]}") / float(found[4] or 1.0)
-    if found[4]:
-        return f"{sign}{found[2]}/{found[4]}", value
+    sign = "" if match[1] == "+" else "-"
+    value = float(f"{sign}{match[2]}") / float(match[4] or 1.0)
+    if match[4]:
+        return f"{sign}{match[2]}/{match[4]}", value
     return (int(value) if value.is_integer() else value), value

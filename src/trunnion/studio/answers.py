@@ -82,16 +82,16 @@ def answer(request: bytes, turn: AbstractContextManager[object] | None = None) -
         question = json.loads(request)
         if not isinstance(question, dict):
             raise ValueError("not a group of entries")
-        asked = Asked(question)
-        kind, revision = asked.get("ask"), asked.get("revision")
+        question_asked = Asked(question)
+        kind, revision = question_asked.get("ask"), question_asked.get("revision")
         head = {"ask": str(kind)[:40], "revision": revision if isinstance(revision, int) else None}
         about = ANSWERS.get(str(kind))
         if about is None:
             raise ValueError(f"nothing is known of '{head['ask']}'")
         with nullcontext() if turn is None or about in BESIDE else turn:
-            return packed(head | about(asked))
+            return packed(head | about(question_asked))
     except MechanismError as error:
-        return packed(head | {"error": "; ".join(sentence(one) for one in error.findings[:3])})
+        return packed(head | {"error": "; ".join(sentence(finding) for finding in error.findings[:3])})
     except Exception as error:  # whatever it is: whoever asked gets a sentence, and can go on asking
         why = f"{type(error).__name__}: {str(error)[:300]}"
         return packed(head | {"error": f"The question cannot be answered ({why})"})
@@ -100,7 +100,7 @@ def answer(request: bytes, turn: AbstractContextManager[object] | None = None) -
 # ---- what there is to begin with --------------------------------------------------------------------------------
 
 
-def _start(asked: Asked) -> dict[str, Any]:
+def _start(question: Asked) -> dict[str, Any]:
     rows = [{"name": name, "title": _stated(text, "name"), "space": _stated(text, "space") or "planar"}
             for name, text in examples().items()]  # fmt: skip
     return {"version": __version__, "examples": rows, "laws": list(FRICTION_LAWS)}
@@ -117,13 +117,15 @@ def examples() -> dict[str, str]:
     shipped = files("trunnion") / "examples"
     if not shipped.is_dir():  # a working tree
         shipped = files("trunnion") / ".." / ".." / "examples"
-    found = {one.name[:-5]: one.read_text(encoding="utf-8") for one in shipped.iterdir() if one.name.endswith(".yaml")}
-    alone = {name: text for name, text in found.items() if "\nlinks:" in text or "\nloop:" in text}
+    texts = {
+        path.name[:-5]: path.read_text(encoding="utf-8") for path in shipped.iterdir() if path.name.endswith(".yaml")
+    }
+    alone = {name: text for name, text in texts.items() if "\nlinks:" in text or "\nloop:" in text}
     return dict(sorted(alone.items()))
 
 
-def _example(asked: Asked) -> dict[str, Any]:
-    name = str(asked["name"])
+def _example(question: Asked) -> dict[str, Any]:
+    name = str(question["name"])
     if name not in examples():
         raise MechanismError(Finding(f"there is no example '{name}'", remedy="choose one of the list"))
     return {"text": examples()[name]}
@@ -132,15 +134,15 @@ def _example(asked: Asked) -> dict[str, Any]:
 # ---- a model ------------------------------------------------------------------------------------------------------
 
 
-def _model(asked: Asked) -> dict[str, Any]:
+def _model(question: Asked) -> dict[str, Any]:
     """Findings, numbers, motion and forces of a text; the figures of its cycle are asked for by `cycle`."""
-    state = asked.state
-    result, told = _solved(asked, lambda: asked.motion)
+    state = question.state
+    result, answer_so_far = _solved(question, lambda: question.motion)
     numbers: Mapping[str, Any] = {}
     with suppress(MechanismError):  # of what is half drawn those that can be read
-        numbers = state.mechanism.parameters() if state.mechanism else _sketch(asked).numbers
+        numbers = state.mechanism.parameters() if state.mechanism else _sketch(question).numbers
     head = {
-        **told,
+        **answer_so_far,
         "entries": state.entries,
         "numbers": plain(numbers),
         "solved": result is not None,
@@ -149,42 +151,42 @@ def _model(asked: Asked) -> dict[str, Any]:
     }
     if result is None:
         return head
-    shown = scene(result, max_positions=MOST_STEPS)
+    drawn_scene = scene(result, max_positions=MOST_STEPS)
     return head | {
-        "scene": shown,
-        "places": {key: [track[axis][0] for axis in "xy"] for key, track in shown["points"].items()},
-        **margin_of(result, asked.rubs),
+        "scene": drawn_scene,
+        "places": {key: [track[axis][0] for axis in "xy"] for key, track in drawn_scene["points"].items()},
+        **margin_of(result, question.rubs),
         "locks": locks_of(state.run, result["time"].values, result["status"].values),
-        **({"margin_why": "friction lacks something"} if state.bare and asked.friction else {}),
+        **({"margin_why": "friction lacks something"} if state.bare and question.friction else {}),
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
         **measured(state.run),
     }
 
 
-def _sketch(asked: Asked, places: dict[str, Vector] | None = None) -> Sketch:
+def _sketch(question: Asked, places: dict[str, Vector] | None = None) -> Sketch:
     """A drawing of a model's entries that may be changed."""
-    locked, fine = _hand(asked)
-    return Sketch(copy.deepcopy(dict(asked.state.entries or {})), places or {}, locked, fine=fine)
+    locked, fine = _hand(question)
+    return Sketch(copy.deepcopy(dict(question.state.entries or {})), places or {}, locked, fine=fine)
 
 
-def _hand(asked: Asked) -> tuple[set[str], float]:
+def _hand(question: Asked) -> tuple[set[str], float]:
     """What is locked, and what the hand can tell apart, m."""
-    return set(map(str, asked.get("locked") or ())), float(asked.get("fine") or 0.0)
+    return set(map(str, question.get("locked") or ())), float(question.get("fine") or 0.0)
 
 
-def _cycle(asked: Asked) -> dict[str, Any]:
+def _cycle(question: Asked) -> dict[str, Any]:
     """Findings and figures of the whole cycle of a text, which take longer than its motion."""
-    result, told = _solved(asked, lambda: asked.result)
+    result, answer_so_far = _solved(question, lambda: question.result)
     if result is None:
-        return told
-    rows = [[one["label"], one["text"]] for one in figures(asked)]
-    least = margin_of(result, asked.rubs)["margin_least"]
-    return told | {"figures": rows, "margin_least": least}
+        return answer_so_far
+    rows = [[figure["label"], figure["text"]] for figure in figures(question)]
+    least = margin_of(result, question.rubs)["margin_least"]
+    return answer_so_far | {"figures": rows, "margin_least": least}
 
 
-def _solved(asked: Asked, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset | None, dict[str, Any]]:
+def _solved(question: Asked, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset | None, dict[str, Any]]:
     """The result of a text, None where it has none, and what there is to say of it."""
-    state, findings, result = asked.state, list(asked.state.findings), None
+    state, findings, result = question.state, list(question.state.findings), None
     if state.mechanism is not None:
         try:
             result = solve()
@@ -192,25 +194,31 @@ def _solved(asked: Asked, solve: Callable[[], xr.Dataset]) -> tuple[xr.Dataset |
             findings = [*findings, *more] if state.bare else more or findings
         except MechanismError as error:
             findings += state.placed(error.findings)
-    lacks = missing(_sketch(asked), findings)
+    lacks = missing(_sketch(question), findings)
     ready = readiness(state.mechanism, result, findings, lacks)
-    return result, {"findings": [_row(state, one, result) for one in findings], "missing": lacks, "ready": ready}
+    return result, {
+        "findings": [_row(state, finding, result) for finding in findings],
+        "missing": lacks,
+        "ready": ready,
+    }
 
 
-def _row(state: Loaded, one: Finding, result: xr.Dataset | None) -> dict[str, Any]:
+def _row(state: Loaded, finding: Finding, result: xr.Dataset | None) -> dict[str, Any]:
     """A finding as the page has it: with the part that it is about, its line, and a position at which it holds."""
-    section, _, names = one.where.replace(" ", ".", 1).partition(".")  # "links coupler, rocker"
-    joint = one.figures.get("decides") or next(iter(one.figures.get("joints") or ()), None)
-    part = f"joints.{joint}" if joint else f"{section}.{names.split(', ')[0]}" if names else one.where
+    section, _, names = finding.where.replace(" ", ".", 1).partition(".")  # "links coupler, rocker"
+    joint = finding.figures.get("decides") or next(iter(finding.figures.get("joints") or ()), None)
+    part = f"joints.{joint}" if joint else f"{section}.{names.split(', ')[0]}" if names else finding.where
     return {
-        "severity": one.severity.value,
-        "place": one.kind_of_part or spoken(one.where),
-        "remedy": remedied(one.remedy),
+        "severity": finding.severity.value,
+        "place": finding.kind_of_part or spoken(finding.where),
+        "remedy": remedied(finding.remedy),
         "part": part,
-        "line": (one if one.where.startswith(part) else state.placed((replace(one, where=part, line=None),))[0]).line,
-        "index": None if result is None else reached(one, result),
-        "cures": [] if result is None else cures(state, one),
-    } | {key: getattr(one, key) for key in ("code", "what", "where")}
+        "line": (
+            finding if finding.where.startswith(part) else state.placed((replace(finding, where=part, line=None),))[0]
+        ).line,
+        "index": None if result is None else reached(finding, result),
+        "cures": [] if result is None else cures(state, finding),
+    } | {key: getattr(finding, key) for key in ("code", "what", "where")}
 
 
 # ---- dragging -----------------------------------------------------------------------------------------------------
@@ -226,23 +234,23 @@ class _Still(Sketch):
 
 
 @uncollected()
-def _drag(asked: Asked) -> dict[str, Any]:
+def _drag(question: Asked) -> dict[str, Any]:
     """The cycle with a joint or point dragged `to` a place, a pin on the ground with `keep` by its links; in space
     `by` metres along the axes.
     """
-    if asked.get("by") is not None:
-        sketch, by = _sketch(asked), [float(part) for part in asked["by"]]
-        sketch.numbers = asked.run.system.mechanism.parameter_set.nominal
-        shifts = sketch.shifted(str(asked["point"]), by, _turns(asked.state, asked.index))
-        return _live(asked, {change.path: change.value for change in shifts}, asked.index)
-    index, to, point = asked.index, vector(asked["to"]), str(asked["point"])
-    locked, fine = _hand(asked)
-    sketch = _Still(dict(asked.state.entries or {}), places_at(asked), locked, fine=fine)
-    if asked.state.mechanism is not None:
-        sketch.numbers = asked.state.mechanism.parameter_set.nominal
-    changes = {change.path: change for change in sketch.moved(point, to, bool(asked.get("keep")))}  # a number once
+    if question.get("by") is not None:
+        sketch, by = _sketch(question), [float(part) for part in question["by"]]
+        sketch.numbers = question.run.system.mechanism.parameter_set.nominal
+        shifts = sketch.shifted(str(question["point"]), by, _turns(question.state, question.index))
+        return _live(question, {change.path: change.value for change in shifts}, question.index)
+    index, to, point = question.index, vector(question["to"]), str(question["point"])
+    locked, fine = _hand(question)
+    sketch = _Still(dict(question.state.entries or {}), places_at(question), locked, fine=fine)
+    if question.state.mechanism is not None:
+        sketch.numbers = question.state.mechanism.parameter_set.nominal
+    changes = {change.path: change for change in sketch.moved(point, to, bool(question.get("keep")))}  # a number once
     values = {path: change.value for path, change in changes.items()}
-    live = Live(asked.run, values, asked.steps)
+    live = Live(question.run, values, question.steps)
     far = np.hypot(*(live.tracks[".".join(held(sketch, point))] - np.array(to)[:, None]))
     near = index if not np.any(np.isfinite(far)) else int(np.nanargmin(far))
     if np.isfinite(far[index]) and far[index] <= far[near] + 1e-6 * sketch.size:
@@ -257,23 +265,23 @@ def _drag(asked: Asked) -> dict[str, Any]:
         section, name, *inner = path.split(".")
         name = f"{inner[2]} of {inner[1]} on {name}" if section == "links" else name
         rows.append([name, sketch.length(float(sketch.numbers[path])), sketch.length(value)])
-    return {"changes": rows} | _live(asked, values, near, live)
+    return {"changes": rows} | _live(question, values, near, live)
 
 
 @uncollected()
-def _try(asked: Asked) -> dict[str, Any]:
+def _try(question: Asked) -> dict[str, Any]:
     """The cycle with some numbers replaced, `values` in SI by path, and the margin at the position `index`."""
-    values = {str(path): float(value) for path, value in dict(asked["values"]).items()}
-    return _live(asked, values, asked.index)
+    values = {str(path): float(value) for path, value in dict(question["values"]).items()}
+    return _live(question, values, question.index)
 
 
-def _live(asked: Asked, values: Mapping[str, float], index: int, live: Live | None = None) -> dict[str, Any]:
+def _live(question: Asked, values: Mapping[str, float], index: int, live: Live | None = None) -> dict[str, Any]:
     """Columns of a mechanism that is being changed, with its margin and what locks at the position that is shown."""
-    run, locked = asked.state.run, {}
+    run, locked = question.state.run, {}
     if run.system.spatial:
-        columns = live_in_space(asked.run, values, asked.steps, index)
+        columns = live_in_space(question.run, values, question.steps, index)
     else:
-        columns = (live or Live(asked.run, values, asked.steps)).told(index)
+        columns = (live or Live(question.run, values, question.steps)).told(index)
     status = columns["status"]
     if status[index] == Status.LOCKED:
         numbers = run.system.mechanism.parameters(values)
@@ -285,19 +293,19 @@ def _live(asked: Asked, values: Mapping[str, float], index: int, live: Live | No
 # ---- editing ------------------------------------------------------------------------------------------------------
 
 
-def _edit(asked: Asked) -> dict[str, Any]:
+def _edit(question: Asked) -> dict[str, Any]:
     """The text of the model after some gestures, and where its points are shown."""
-    text, state = str(asked["text"]), asked.state
+    text, state = str(question["text"]), question.state
     if state.entries is None:
         raise MechanismError(state.findings)
-    places = {str(key): (float(x), float(y)) for key, (x, y) in dict(asked.get("places") or {}).items()}
-    sketch = _sketch(asked, places)
+    places = {str(key): (float(x), float(y)) for key, (x, y) in dict(question.get("places") or {}).items()}
+    sketch = _sketch(question, places)
     if not text.strip():
         sketch.entries = {"trunnion": 1, "name": "New mechanism", "space": "planar"}
     sketch.turns = partial(_turns, state)
-    says = [_done(sketch, given) for given in asked["gestures"]]
+    says = [_done(sketch, gesture) for gesture in question["gestures"]]
     empty = ("links", "drivers", "loads", "springs", "gears", "assembly", "dimensions", "joints")
-    after = {key: one for key, one in sketch.entries.items() if one or key not in empty}
+    after = {key: entry for key, entry in sketch.entries.items() if entry or key not in empty}
     changed = changed_text(text, after) if text.strip() else text_of(after)
     points = {f"{link}.{point}" for link in sketch.of("links") for point in sketch.points(link)}
     return {
@@ -316,20 +324,20 @@ GESTURES: dict[str, Callable[[Sketch, Mapping[str, Any]], str]] = {
 }  # fmt: skip
 
 
-def _done(sketch: Sketch, given: Mapping[str, Any]) -> str:
+def _done(sketch: Sketch, request: Mapping[str, Any]) -> str:
     """Do a gesture; what it is called. MechanismError if it cannot be done."""
-    gesture = GESTURES.get(str(given.get("do")))
+    gesture = GESTURES.get(str(request.get("do")))
     if gesture is None:
-        raise MechanismError(Finding(f"'{given.get('do')}' is no gesture", "studio", f"use {', '.join(GESTURES)}"))
+        raise MechanismError(Finding(f"'{request.get('do')}' is no gesture", "studio", f"use {', '.join(GESTURES)}"))
     try:
-        said = gesture(sketch, given)
+        words = gesture(sketch, request)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         if isinstance(error, MechanismError):
             raise
-        what = f"the gesture '{given['do']}' does not fit the model ({error})"
+        what = f"the gesture '{request['do']}' does not fit the model ({error})"
         raise MechanismError(Finding(what, "studio", "undo, or correct the text of the model")) from error
     sketch.forget()
-    return said
+    return words
 
 
 def _turns(state: Loaded, index: int) -> dict[str, Array]:
@@ -342,25 +350,27 @@ def _turns(state: Loaded, index: int) -> dict[str, Array]:
     return turns
 
 
-def _assemblies(asked: Asked) -> dict[str, Any]:
+def _assemblies(question: Asked) -> dict[str, Any]:
     """The other assemblies of a model in the plane, a few at most, with the gestures that take them.
 
     Each is that of one group, named in place of the hints inside it; the groups after it follow by their own hints.
     """
-    entries, rows = dict(asked.state.entries or {}), list[dict[str, Any]]()
-    if asked.state.run.system.mechanism.space != "planar":
+    entries, rows = dict(question.state.entries or {}), list[dict[str, Any]]()
+    if question.state.run.system.mechanism.space != "planar":
         return {"others": rows}
     stated = dict(entries.get("assembly") or {})
-    ways = [(modes, way) for modes in choices(asked.state.run) for way in modes.ways if not way.taken]
-    for modes, way in ways[:MOST_OTHERS]:
-        changes = {name: None for name in stated if name in way.joints or name in modes.links} | {modes.link: way.name}
+    ways = [(modes, mode) for modes in choices(question.state.run) for mode in modes.ways if not mode.taken]
+    for modes, mode in ways[:MOST_OTHERS]:
+        changes = {name: None for name in stated if name in mode.joints or name in modes.links} | {
+            modes.link: mode.name
+        }
         hints = {name: hint for name, hint in (stated | changes).items() if hint is not None}
         with suppress(MechanismError):  # what is stated elsewhere in the model may forbid this one
             run = prepare(Mechanism(**{**entries, "assembly": hints}))
             gestures = [{"do": "set", "path": ["assembly", name], "value": hint} for name, hint in changes.items()]
             with np.errstate(all="ignore"):
-                points = tracks(run.walk(run.cycle.times(asked.steps)), asked.steps)
-            name = f"{' and '.join(modes.links)} assembled the other way ({way.name})"
+                points = tracks(run.walk(run.cycle.times(question.steps)), question.steps)
+            name = f"{' and '.join(modes.links)} assembled the other way ({mode.name})"
             rows.append({"name": name, "gestures": gestures, "points": points})
     return {"others": rows}
 
@@ -368,20 +378,20 @@ def _assemblies(asked: Asked) -> dict[str, Any]:
 # ---- what is laid over ---------------------------------------------------------------------------------------------
 
 
-def _layers(asked: Asked) -> dict[str, Any]:
+def _layers(question: Asked) -> dict[str, Any]:
     """What the sheet shows over the mechanism, of what is wanted: columns of the table by their names, and in the plane
     instant centres, transmission angles, pins in their holes.
     """
-    result, run, wanted = asked.motion, asked.state.run, set(asked.get("wanted") or ())
-    layers: dict[str, Any] = _columns(result, asked)
+    result, run, layers_wanted = question.motion, question.state.run, set(question.get("wanted") or ())
+    layers: dict[str, Any] = _columns(result, question)
     if run.system.mechanism.space == "planar":
-        if "seats" in wanted:
+        if "seats" in layers_wanted:
             layers["seats"] = _seats(result)
-        if wanted & {"centres", "transmission"}:
+        if layers_wanted & {"centres", "transmission"}:
             with np.errstate(all="ignore"):
-                walk = run.walk(run.cycle.times(asked.steps))
-            shown = {"centres": _centres, "transmission": _transmission}
-            layers |= {name: tell(walk, asked.steps) for name, tell in shown.items() if name in wanted}
+                walk = run.walk(run.cycle.times(question.steps))
+            layer_of = {"centres": _centres, "transmission": _transmission}
+            layers |= {name: tell(walk, question.steps) for name, tell in layer_of.items() if name in layers_wanted}
     return layers
 
 
@@ -389,8 +399,12 @@ def _centres(walk: Forward, steps: int) -> list[dict[str, Any]]:
     """Instant centres of the pairs of links; `ground`: whether one of them is it."""
     ground = walk.system.mechanism.fixed_link
     return [
-        {**vars(one), "ground": ground in one.pair, "far": one.far and dict(zip("xy", one.far, strict=True))}
-        for one in instant_centres(walk, steps, MOST_LINKS)
+        {
+            **vars(instant_centre),
+            "ground": ground in instant_centre.pair,
+            "far": instant_centre.far and dict(zip("xy", instant_centre.far, strict=True)),
+        }
+        for instant_centre in instant_centres(walk, steps, MOST_LINKS)
     ]
 
 
@@ -400,12 +414,12 @@ def _seats(result: xr.Dataset) -> list[dict[str, Any]]:
     """
     return [
         {
-            "joint": one.joint, "kind": one.kind, "clearance": one.clearance, "length": one.length,
+            "joint": seat.joint, "kind": seat.kind, "clearance": seat.clearance, "length": seat.length,
             "ends": [{what: {axis: Exact(row) for axis, row in zip("xy", rows, strict=True)}
                       for what, rows in (("offset", offset), ("force", force))}
-                     for offset, force in zip(one.offsets, one.forces, strict=True)],
+                     for offset, force in zip(seat.offsets, seat.forces, strict=True)],
         }
-        for one in seated(result)
+        for seat in seated(result)
     ]  # fmt: skip
 
 
@@ -418,42 +432,42 @@ def _transmission(walk: Forward, steps: int) -> list[dict[str, Any]]:
             for name, angle in angles.items() for joint in middle[name]]  # fmt: skip
 
 
-def _blocks(asked: Asked) -> dict[str, Any]:
+def _blocks(question: Asked) -> dict[str, Any]:
     """The mechanism as blocks wired by their pins, with what passes the wires at each position."""
-    return blocks_of(asked.state.run.system, without_noise(asked.motion))
+    return blocks_of(question.state.run.system, without_noise(question.motion))
 
 
-def _margins(asked: Asked) -> dict[str, Any]:
+def _margins(question: Asked) -> dict[str, Any]:
     """For each block, the ground but not, the locking margin without its friction; none without friction."""
-    run = asked.state.run
-    if not asked.friction or len(run.system.plan.modules) > MOST_BLOCKS:
-        return {"without": [None] * len(run.system.plan.modules) if asked.friction else []}
-    return {"without": margins_without(run, asked.steps)}
+    run = question.state.run
+    if not question.friction or len(run.system.plan.modules) > MOST_BLOCKS:
+        return {"without": [None] * len(run.system.plan.modules) if question.friction else []}
+    return {"without": margins_without(run, question.steps)}
 
 
-def _curves(asked: Asked) -> dict[str, Any]:
+def _curves(question: Asked) -> dict[str, Any]:
     """Names and units of all columns of the table of a cycle, and those that are wanted."""
-    return _columns(asked.result, asked)
+    return _columns(question.result, question)
 
 
-def _columns(result: xr.Dataset, asked: Asked) -> dict[str, Any]:
+def _columns(result: xr.Dataset, question: Asked) -> dict[str, Any]:
     """Names and units of the columns of numbers of a result, and those of the `names` that are asked for, in SI."""
     table = selected(without_noise(result), ["all"])
     columns = {column.name: column for column in table if column.values.dtype.kind == "f"}
-    wanted = [str(name) for name in asked.get("names") or () if str(name) in columns]
+    names = [str(name) for name in question.get("names") or () if str(name) in columns]
     return {
         "names": [[column.name, column.unit] for column in columns.values()],
-        "columns": {name: {"unit": columns[name].unit, "values": columns[name].values} for name in wanted},
+        "columns": {name: {"unit": columns[name].unit, "values": columns[name].values} for name in names},
     }
 
 
-def _compare(asked: Asked) -> dict[str, Any]:
+def _compare(question: Asked) -> dict[str, Any]:
     """Figures of the present result, and other variants, `{text, friction}` each, to lay over it: with their figures,
     or why they have none.
     """
     others = list[dict[str, Any]]()
-    for other in asked["others"]:
-        variant = Asked({**other, "steps": asked.steps})
+    for other in question["others"]:
+        variant = Asked({**other, "steps": question.steps})
         try:
             result = variant.result
         except MechanismError as error:
@@ -461,21 +475,21 @@ def _compare(asked: Asked) -> dict[str, Any]:
             continue
         others.append({
             "scene": scene(result, max_positions=MOST_STEPS), "why": None, "figures": figures(variant),
-            "margin": margin_of(result, variant.rubs)["margin"], "columns": _columns(result, asked)["columns"],
+            "margin": margin_of(result, variant.rubs)["margin"], "columns": _columns(result, question)["columns"],
         })  # fmt: skip
-    return {"figures": figures(asked), "others": others}
+    return {"figures": figures(question), "others": others}
 
 
-def _export(asked: Asked) -> dict[str, Any]:
+def _export(question: Asked) -> dict[str, Any]:
     """A file of the solved cycle; a picture of the position `index`."""
-    if asked.state.bare:  # its file would be one without friction
-        raise MechanismError(asked.state.findings)
-    return exported(asked.state, str(asked["what"]), asked.steps, asked.index)
+    if question.state.bare:  # its file would be one without friction
+        raise MechanismError(question.state.findings)
+    return exported(question.state, str(question["what"]), question.steps, question.index)
 
 
-def _corner(asked: Asked) -> dict[str, Any]:
+def _corner(question: Asked) -> dict[str, Any]:
     """The worst corner of the tolerances and plays for a measure, on the stated side or the worse of both."""
-    return corner_of(asked.run.system.mechanism, str(asked["measure"]), asked.get("side"), asked.steps)
+    return corner_of(question.run.system.mechanism, str(question["measure"]), question.get("side"), question.steps)
 
 
 ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {

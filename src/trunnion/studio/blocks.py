@@ -83,6 +83,6 @@ def _passing(system: System, result: xr.Dataset, joint: str, earlier: str, later
 def _share(result: xr.Dataset, joints: tuple[str, ...]) -> np.ndarray:
     """The share of some joints in the power that friction takes, at every position; NaN where there is none."""
     power = np.abs(result["friction_power"].values)
-    own = np.abs(result["friction_power"].sel(joint=list(joints)).values).sum(axis=0)
+    joint_loss = np.abs(result["friction_power"].sel(joint=list(joints)).values).sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(own / power.sum(axis=0))
+        return np.asarray(joint_loss / power.sum(axis=0))

@@ -22,30 +22,30 @@ SIDES = ("links", "joints")  # of "link.point"
 DEFINED = re.compile(r"\s*([^\W\d]\w*)\s*=(.+)")  # crank = 30 mm
 
 
-def put_value(sketch: Sketch, given: Given) -> str:
+def put_value(sketch: Sketch, gesture: Given) -> str:
     """An entry gets a value; without one it goes."""
-    *way, last = given["path"]
-    _refuse_missing(sketch, given["path"])
+    *parents, last = gesture["path"]
+    _refuse_missing(sketch, gesture["path"])
     group: Any = sketch.entries
-    for key in way:
+    for key in parents:
         group = group[key] if isinstance(group, list) else group.setdefault(key, {})
         if not isinstance(group, (dict, list)):
-            raise refused("is a single value", ".".join(map(str, way)), "change it in the text of the model")
-    in_loop = way[:1] == ["loop"] and len(way) > 1
-    way_told = [way[0], sketch.rows[way[1]].get("joint"), *way[2:]] if in_loop else way
-    path, value = ".".join(map(str, [*way_told, last])), given.get("value")
-    stated = spoken(path)
+            raise refused("is a single value", ".".join(map(str, parents)), "change it in the text of the model")
+    in_loop = parents[:1] == ["loop"] and len(parents) > 1
+    way_told = [parents[0], sketch.rows[parents[1]].get("joint"), *parents[2:]] if in_loop else parents
+    path, value = ".".join(map(str, [*way_told, last])), gesture.get("value")
+    words = spoken(path)
     if value is not None:
-        if path not in ("name", "notes") and way != ["dimensions"]:
+        if path not in ("name", "notes") and parents != ["dimensions"]:
             value = _defined(sketch, value)
         group[last] = _typed(value)
-        told = ("no", "yes")[value] if isinstance(value, bool) else value
-        return f"Set {stated} to {', '.join(map(str, value)) if isinstance(value, list) else told}"
-    if way[:1] == ["gears"] and last in ("ratio", "radius", "lead"):
+        text_of_value = ("no", "yes")[value] if isinstance(value, bool) else value
+        return f"Set {words} to {', '.join(map(str, value)) if isinstance(value, list) else text_of_value}"
+    if parents[:1] == ["gears"] and last in ("ratio", "radius", "lead"):
         raise refused("is what makes a gear pair", path, "type another, or delete the gear pair")
     if isinstance(group, dict):
         group.pop(last, None)
-    return f"Remove {stated}"
+    return f"Remove {words}"
 
 
 def _refuse_missing(sketch: Sketch, path: list[Any]) -> None:
@@ -64,11 +64,11 @@ def _defined(sketch: Sketch, value: Any) -> Any:
     """The name of a dimension that "crank = 30 mm" makes."""
     if isinstance(value, list):
         return [_defined(sketch, part) for part in value]
-    found = DEFINED.fullmatch(value) if isinstance(value, str) else None
-    if not found:
+    match = DEFINED.fullmatch(value) if isinstance(value, str) else None
+    if not match:
         return value
-    sketch.section("dimensions")[found[1]] = _typed(found[2].strip())
-    return found[1]
+    sketch.section("dimensions")[match[1]] = _typed(match[2].strip())
+    return match[1]
 
 
 def _typed(value: Any) -> Any:
@@ -81,9 +81,9 @@ def _typed(value: Any) -> Any:
     return value
 
 
-def delete(sketch: Sketch, given: Given) -> str:
+def delete(sketch: Sketch, gesture: Given) -> str:
     """An entry goes, and what cannot be without it."""
-    section, name = map(str, given["what"])
+    section, name = map(str, gesture["what"])
     if section == "points":
         link, point = free(sketch, name)
         del sketch.section("links")[link]["points"][point]
@@ -96,24 +96,24 @@ def delete(sketch: Sketch, given: Given) -> str:
         raise refused("is not there", f"{section}.{name}", "choose what is drawn")
     if section == "links" and name == sketch.ground:
         raise refused("is the ground", name, "delete its joints")
-    blocks = [one for one in sketch.of("links") if one != sketch.ground and _block(sketch, one)]
+    blocks = [item for item in sketch.of("links") if item != sketch.ground and _block(sketch, item)]
     del sketch.section(section)[name]
     gone = [name] if section == "joints" else []
     if section == "links":
-        gone = [joint for joint, one in sketch.joints.items() if name in one["links"]]
+        gone = [joint for joint, item in sketch.joints.items() if name in item["links"]]
         _drop(sketch, "joints", lambda joint: name in (joint.get("links") or ()))
         _drop(sketch, "loads", lambda load: load.get("link") == name)
         _drop(sketch, "springs", lambda spring: any(end.startswith(f"{name}.") for end in spring.get("between") or ()))
     for joint in gone:
         _without_joint(sketch, joint)
     for block in blocks:
-        types = {one.get("type", "revolute") for one in sketch.joints.values() if block in one["links"]}
+        types = {item.get("type", "revolute") for item in sketch.joints.values() if block in item["links"]}
         if len(types) < 2 and block in sketch.of("links"):  # slides no longer, or nothing is pinned to it
             delete(sketch, {"what": ["links", block]})
     return f"Delete {SECTIONS[section]} {name}"
 
 
-def add_row(sketch: Sketch, given: Given) -> str:
+def add_row(sketch: Sketch, gesture: Given) -> str:
     """A row of the table of a loop, before that of the ground: a revolute joint, a link without twist or distance."""
     joint, link = letter(sketch), numbered(sketch, "links", "link")
     sketch.entries["loop"].insert(-1, {"joint": joint, "type": "revolute", "link": link, "twist": 0, "distance": 0})
@@ -138,8 +138,8 @@ def _delete_row(sketch: Sketch, key: str, name: str) -> str:
 def _block(sketch: Sketch, link: str) -> bool:
     """Whether a link is a block of a guide: all its points on one spot, one of them with the axis of the guide."""
     points = sketch.points(link)
-    axes = [one for one in points.values() if isinstance(one, dict) and "axis" in one]
-    spots = [one.get("at") if isinstance(one, dict) else one for one in points.values()]
+    axes = [point for point in points.values() if isinstance(point, dict) and "axis" in point]
+    spots = [point.get("at") if isinstance(point, dict) else point for point in points.values()]
     return len(points) > 1 and bool(axes) and all(spot == [0, 0] for spot in spots)
 
 
@@ -153,8 +153,8 @@ def _without_joint(sketch: Sketch, joint: str) -> None:
     if f"{sketch.ground}.{joint}" not in used:
         ground.get("points", {}).pop(joint, None)
     for link in sketch.of("links"):  # the guide of a slot
-        stated = sketch.points(link).get(joint)
-        if isinstance(stated, dict) and "axis" in stated:
+        entry = sketch.points(link).get(joint)
+        if isinstance(entry, dict) and "axis" in entry:
             del sketch.section("links")[link]["points"][joint]
     _drop(sketch, "gears", lambda gear: joint in (gear.get("joints") or ()))
     _drop(sketch, "loads", lambda load: load.get("joint") == joint)
@@ -162,24 +162,24 @@ def _without_joint(sketch: Sketch, joint: str) -> None:
 
 
 def _drop(sketch: Sketch, section: str, gone: Callable[[Mapping[str, Any]], bool]) -> None:
-    for name, one in sketch.of(section).items():
-        if gone(one):
+    for name, item in sketch.of(section).items():
+        if gone(item):
             del sketch.section(section)[name]
 
 
 # ---- renamed --------------------------------------------------------------------------------------------------------
 
 
-def rename(sketch: Sketch, given: Given) -> str:
+def rename(sketch: Sketch, gesture: Given) -> str:
     """A part gets another name wherever it is spoken of; a driver has that of its joint."""
-    (section, old), new = map(str, given["what"]), str(given["to"]).strip()
+    (section, old), new = map(str, gesture["what"]), str(gesture["to"]).strip()
     section = "joints" if section == "drivers" else section
     in_rows = section in SIDES and any(row.get(section[:-1]) == old for row in sketch.rows)
-    known = section == "points" or in_rows or (section in NAMED and old in sketch.section(section))
-    if not known:
+    exists = section == "points" or in_rows or (section in NAMED and old in sketch.section(section))
+    if not exists:
         raise refused("is not there", f"{section}.{old}", "choose what is drawn")
-    beside = sketch.section(section) if section != "points" else {}
-    if not new or "." in new or new in taken(sketch) or new in beside:
+    siblings = sketch.section(section) if section != "points" else {}
+    if not new or "." in new or new in taken(sketch) or new in siblings:
         raise refused(f"'{new}' is not a free name", f"{section}.{old}", "choose another")
     if section == "points":
         rename_point(sketch, old, new)

@@ -59,12 +59,12 @@ def _animation(state: Loaded, steps: int, _: int) -> bytes:
     result = state.result(steps, True)
     if result.sizes["axis"] > 2:
         raise MechanismError(Finding("is not drawn as GIF in space", remedy="write the report, whose drawing moves"))
-    shown, figure, images = picture(result), Figure((6, 6), layout="constrained"), list[Image.Image]()
-    low, high = np.array(shown.box[:2]) - ROOM * shown.size, np.array(shown.box[2:]) + ROOM * shown.size
+    drawing, figure, images = picture(result), Figure((6, 6), layout="constrained"), list[Image.Image]()
+    low, high = np.array(drawing.box[:2]) - ROOM * drawing.size, np.array(drawing.box[2:]) + ROOM * drawing.size
     for index in range(0, steps, -(-steps // IMAGES)):
         figure.clear()
         axes = bare(figure.subplots(), low, high, facts(result, index))
-        sketch(axes, shown, index)
+        sketch(axes, drawing, index)
         stream = io.BytesIO()
         figure.savefig(stream, format="png")
         images.append(Image.open(stream).convert("P"))

@@ -55,7 +55,7 @@ REACHED = {
 # ---- figures and margin --------------------------------------------------------------------------------------------
 
 
-def figures(asked: Asked) -> list[dict[str, Any]]:
+def figures(question: Asked) -> list[dict[str, Any]]:
     """The figures one looks at first, without those of the solution: of the result, and time ratios.
 
     Returns
@@ -64,19 +64,21 @@ def figures(asked: Asked) -> list[dict[str, Any]]:
         name: by which that of another model is found; label; title: without its place; text: with its unit; value: SI,
         None where there is none, or nothing but a bound.
     """
-    units = units_of(asked.result)
-    found = [one for one in summary_of(asked.result) if not one.numerical]
-    ratios = [Figure(f"{joint}.time_ratio", f"time ratio of {joint}", ratio) for joint, ratio in _ratios(asked.state)]
+    units = units_of(question.result)
+    found = [row for row in summary_of(question.result) if not row.numerical]
+    ratios = [
+        Figure(f"{joint}.time_ratio", f"time ratio of {joint}", ratio) for joint, ratio in _ratios(question.state)
+    ]
     rows = []
-    for one in (*found, *ratios):
-        bound = one.aspect == MORE_THAN
-        text = one.value if isinstance(one.value, str) else quantity(one.value, one.unit, units) or "—"
+    for row in (*found, *ratios):
+        bound = row.aspect == MORE_THAN
+        text = row.value if isinstance(row.value, str) else quantity(row.value, row.unit, units) or "—"
         rows.append({
-            "name": one.name,
-            "label": one.label,
-            "title": ", ".join(part for part in (one.subject, "minimum" if bound else one.aspect) if part),
+            "name": row.name,
+            "label": row.label,
+            "title": ", ".join(part for part in (row.subject, "minimum" if bound else row.aspect) if part),
             "text": f"> {text}" if bound else text,
-            "value": None if bound or isinstance(one.value, str) else one.value,
+            "value": None if bound or isinstance(row.value, str) else row.value,
         })  # fmt: skip
     return rows
 
@@ -85,9 +87,9 @@ def figures(asked: Asked) -> list[dict[str, Any]]:
 def _ratios(state: Loaded) -> tuple[tuple[str, float], ...]:
     """Time ratios of what slides on the ground, or where nothing does of what turns back on it."""
     run = state.run
-    found = [] if run.seats or run.cycle.duration <= 0 else outputs(run.system)
-    found = [one for one in found if one.kind == "slide"] or found
-    measures = [Measure(one.subject, "time_ratio", one.subject) for one in found]
+    outputs_of = [] if run.seats or run.cycle.duration <= 0 else outputs(run.system)
+    outputs_of = [output for output in outputs_of if output.kind == "slide"] or outputs_of
+    measures = [Measure(output.subject, "time_ratio", output.subject) for output in outputs_of]
     ratios = figures_of(run, measures, FrictionMethod()) if measures else {}
     return tuple((joint, float(ratio)) for joint, ratio in ratios.items() if np.isfinite(ratio))
 
@@ -113,12 +115,12 @@ def margin_of(result: xr.Dataset, rubs: bool) -> dict[str, Any]:
     if why is not None:
         return {"margin": None, "margin_least": None, "margin_why": why}
     index = int(np.flatnonzero(margin == np.nanmin(margin))[0])  # `nanargmin` takes a nan for inf
-    beyond, shown = bool(margin[index] > MARGIN), np.minimum(margin, MARGIN)
-    least = {"value": float(shown[index]), "beyond": beyond, "at": abscissa(result).say(index)}
-    figure = next((one for one in summary_of(result) if one.name == "locking_margin" and one.value is not None), None)
+    unbounded, margins = bool(margin[index] > MARGIN), np.minimum(margin, MARGIN)
+    least = {"value": float(margins[index]), "beyond": unbounded, "at": abscissa(result).say(index)}
+    figure = next((row for row in summary_of(result) if row.name == "locking_margin" and row.value is not None), None)
     if figure is not None and figure.aspect != MORE_THAN:
         least = {"value": figure.value, "beyond": False, "at": figure.place.removeprefix("at ")}
-    return {"margin": shown, "margin_least": least, "margin_why": None}
+    return {"margin": margins, "margin_least": least, "margin_why": None}
 
 
 # ---- in words -----------------------------------------------------------------------------------------------------
@@ -190,9 +192,9 @@ def cures(state: Loaded, finding: Finding) -> list[dict[str, Any]]:
         if times > 0 and all(joint in coefficients and isinstance(joints.get(joint), Mapping) for joint in chosen):
             befores = [float(np.ravel(numbers[coefficients[joint]])[0]) for joint in chosen]
             values = [float(f"{ENOUGH * times * before:.3g}") for before in befores]
-            stated = [isinstance(joints[joint].get("friction", {}), Mapping) for joint in chosen]
+            stated_groups = [isinstance(joints[joint].get("friction", {}), Mapping) for joint in chosen]
             gestures = [{"do": "set", "path": ["joints", joint, "friction", *["coefficient"] * inside], "value": value}
-                        for joint, inside, value in zip(chosen, stated, values, strict=True)]  # fmt: skip
+                        for joint, inside, value in zip(chosen, stated_groups, values, strict=True)]  # fmt: skip
             change = f"{befores[0]:.3g} → {values[0]:.3g}" if len(chosen) == 1 else f"× {ENOUGH * times:.3g}"
             what = f"friction coefficient{'s' * (len(chosen) > 1)} of {', '.join(chosen)}"
             listed.append({"label": f"{what} {change}", "gestures": gestures})
@@ -265,7 +267,7 @@ def _acts(mechanism: Mechanism) -> Iterator[tuple[bool, str]]:
 
 def missing(sketch: Sketch, findings: Sequence[Finding]) -> list[str]:
     """The next step of the hand, where nothing but steps of drawing is missing; none where something is wrong."""
-    errors = [one for one in findings if one.severity is Severity.ERROR]
+    errors = [finding for finding in findings if finding.severity is Severity.ERROR]
     if not errors and sketch.joints and not sketch.of("drivers"):
         return ["It stands still: its joints let no link move. Take one away, or let an end slide."]
     unfinished = [

@@ -35,31 +35,31 @@ SIDED = (
 DIRECTED = {"seat", "seat_on", "misalignment", "only", "backward"}  # keys that do
 
 
-def group(sketch: Sketch, given: Given) -> str:
+def group(sketch: Sketch, gesture: Given) -> str:
     """Links are changed together, `what`: "shift" by `by`, m; "mirror" over a line through `at`, upright or `level`;
     "copy", which is shifted by `by` or, with `at`, mirrored; "delete". start: whether the sketch has the places of the
     start, by which a mirrored mechanism without hints is assembled.
     """
-    links, what = list(dict.fromkeys(str(one) for one in given["links"])), str(given["what"])
-    if not links or any(one not in sketch.of("links") or one == sketch.ground for one in links):
+    links, what = list(dict.fromkeys(str(name) for name in gesture["links"])), str(gesture["what"])
+    if not links or any(name not in sketch.of("links") or name == sketch.ground for name in links):
         raise refused("is no link that moves", ", ".join(links), "choose links that are drawn")
     if sketch.entries.get("space") == "spatial":
         raise refused("is of a mechanism in space", ", ".join(links), "change it in the table or the text")
     title = links[0] if len(links) == 1 else f"{len(links)} links"
     if what == "delete":
-        for one in links:
-            if one in sketch.of("links"):  # a block goes with what it slides on
-                delete(sketch, {"what": ["links", one]})
+        for name in links:
+            if name in sketch.of("links"):  # a block goes with what it slides on
+                delete(sketch, {"what": ["links", name]})
         return f"Delete {title}"
     if what == "copy":
         links = _copied(sketch, links)
         sketch.made = ("group", " ".join(links))
-    if given.get("at") is None:
-        _Moving(sketch, links, (1, 1), vector(given["by"])).do()
+    if gesture.get("at") is None:
+        _Moving(sketch, links, (1, 1), vector(gesture["by"])).do()
     else:
-        x, y = vector(given["at"])
-        signs, offset = ((1, -1), (0.0, 2 * y)) if given.get("level") else ((-1, 1), (2 * x, 0.0))
-        if given.get("start"):
+        x, y = vector(gesture["at"])
+        signs, offset = ((1, -1), (0.0, 2 * y)) if gesture.get("level") else ((-1, 1), (2 * x, 0.0))
+        if gesture.get("start"):
             _assembled(sketch, links)
         _Moving(sketch, links, signs, offset).do()
     return f"{ {'shift': 'Move', 'mirror': 'Mirror'}.get(what, 'Copy') } {title}"
@@ -77,17 +77,17 @@ class _Moving:
     def do(self) -> None:
         """Change what the file states of them."""
         sketch, ground = self.sketch, self.sketch.ground
-        mine = {name: one for name, one in sketch.joints.items() if set(one["links"]) & set(self.links)}
-        outside = [name for name, one in mine.items() if not set(one["links"]) <= {*self.links, ground}]
-        if held := [name for name in mine if name in sketch.locked]:
-            raise refused("is locked where it is", ", ".join(held), "unlock it first (K)")
+        mine = {name: item for name, item in sketch.joints.items() if set(item["links"]) & set(self.links)}
+        outside = [name for name, item in mine.items() if not set(item["links"]) <= {*self.links, ground}]
+        if locked := [name for name in mine if name in sketch.locked]:
+            raise refused("is locked where it is", ", ".join(locked), "unlock it first (K)")
         for name in outside:
             if sketch.kind(name) != "revolute":
                 raise refused("slides along a link that is not chosen", f"joints.{name}", "choose both links")
         if self.signs != (1, 1):
             self._refuse(mine, outside)
             self._flip(mine)
-        pinned = {name for name, one in mine.items() if ground in one["links"]} | _fastened(sketch, self.links)
+        pinned = {name for name, item in mine.items() if ground in item["links"]} | _fastened(sketch, self.links)
         fixed, hints = sketch.points(ground), sketch.section("assembly")
         for point in pinned & set(fixed):
             sketch.section("links")[ground]["points"][point] = self._placed(fixed[point])
@@ -140,9 +140,9 @@ class _Moving:
             return 0.0
         return pi if self.sketch.joints[joint]["links"][0] == self.sketch.ground else -pi
 
-    def _angle(self, joint: str, stated: Any) -> Any:
-        turned = degrees(self._half(joint) - self._value(stated, "angle"))
-        return f"{round(turned, 12) + 0.0:.15g} deg{_limits(stated)}"
+    def _angle(self, joint: str, value: Any) -> Any:
+        turned = degrees(self._half(joint) - self._value(value, "angle"))
+        return f"{round(turned, 12) + 0.0:.15g} deg{_limits(value)}"
 
     # ---- mirrored --------------------------------------------------------------------------------------------
 
@@ -155,10 +155,10 @@ class _Moving:
         if "at" in sketch.section("assembly"):
             raise refused("says where the driver is", "assembly.at", "mirror it in the text")
         for section in ("joint_defaults", "joints", "drivers", "springs", "loads", *SIDED):
-            for name, one in (sketch.entries.get(section) or {}).items():
-                words = set(re.findall(r"\w+", f"{name} {one}"))
-                sided = (section in SIDED and "±" not in str(one)) or (section == "drivers" and set(one) - DRIVEN)
-                turning = section == "springs" and sketch.kind(str(one.get("joint"))) == "revolute"
+            for name, item in (sketch.entries.get(section) or {}).items():
+                words = set(re.findall(r"\w+", f"{name} {item}"))
+                sided = (section in SIDED and "±" not in str(item)) or (section == "drivers" and set(item) - DRIVEN)
+                turning = section == "springs" and sketch.kind(str(item.get("joint"))) == "revolute"
                 touched = words & names or section == "joint_defaults"
                 if touched and (sided or turning or words & DIRECTED):
                     raise refused("is not mirrored", f"{section}.{name}", "mirror it in the text")
@@ -168,7 +168,7 @@ class _Moving:
         sketch = self.sketch
         for link in self.links:
             entry = sketch.section("links")[link]
-            entry["points"] = {point: _mirrored(one) for point, one in sketch.points(link).items()}
+            entry["points"] = {point: _mirrored(place) for point, place in sketch.points(link).items()}
             entry |= {"centre": _mirrored(entry["centre"])} if "centre" in entry else {}
         for name in joints.keys() & sketch.of("drivers").keys():
             driver = sketch.section("drivers")[name]
@@ -196,12 +196,12 @@ def _signed(parts: list[Any], signs: tuple[int, int]) -> list[Any]:
     return [part if sign > 0 else _negated(part) for part, sign in zip(parts, signs, strict=True)]
 
 
-def _mirrored(stated: Any) -> Any:
+def _mirrored(value: Any) -> Any:
     """A place in the frame of a link, perhaps with an axis: its x stays."""
-    if isinstance(stated, list):
-        return _signed(stated, (1, -1))
-    angle = {"angle": _negated(stated["angle"])} if "angle" in stated else {}
-    return {**stated, **{key: _mirrored(stated[key]) for key in ("at", "axis") if key in stated}, **angle}
+    if isinstance(value, list):
+        return _signed(value, (1, -1))
+    angle = {"angle": _negated(value["angle"])} if "angle" in value else {}
+    return {**value, **{key: _mirrored(value[key]) for key in ("at", "axis") if key in value}, **angle}
 
 
 def _negated(stated: Any) -> Any:
@@ -215,25 +215,25 @@ def _negated(stated: Any) -> Any:
     return f"-{value}{limits}" if PLAIN.fullmatch(value) else f"-({value}){limits}"
 
 
-def _limits(stated: Any) -> str:
+def _limits(value: Any) -> str:
     """The limits of a text of the file; refused where they differ, for they would be on other sides."""
-    limits = LIMITS.search(stated) if isinstance(stated, str) else None
+    limits = LIMITS.search(value) if isinstance(value, str) else None
     if limits and "±" not in limits[0]:
-        raise refused(f"'{stated}' has limits that differ", "a number", "change it in the text")
+        raise refused(f"'{value}' has limits that differ", "a number", "change it in the text")
     return limits[0] if limits else ""
 
 
 def _assembled(sketch: Sketch, links: list[str]) -> None:
     """Hints of where the joints between some links are at the start: without them the other assembly may be taken."""
     hints = sketch.section("assembly")
-    for name, one in sketch.joints.items():
-        if set(one["links"]) <= set(links) and name not in hints and f"{one['links'][1]}.{name}" in sketch.places:
-            hints[name] = [sketch.length(part) for part in sketch.places[f"{one['links'][1]}.{name}"]]
+    for name, item in sketch.joints.items():
+        if set(item["links"]) <= set(links) and name not in hints and f"{item['links'][1]}.{name}" in sketch.places:
+            hints[name] = [sketch.length(part) for part in sketch.places[f"{item['links'][1]}.{name}"]]
 
 
 def _fastened(sketch: Sketch, links: list[str]) -> set[str]:
     """Points of the ground that springs of some links are fastened to."""
-    ends = [[str(end).split(".") for end in one.get("between") or ()] for one in sketch.of("springs").values()]
+    ends = [[str(end).split(".") for end in item.get("between") or ()] for item in sketch.of("springs").values()]
     used = [pair for pair in ends if any(link in links for link, *_ in pair)]
     return {point for pair in used for link, point in pair if link == sketch.ground}
 
@@ -247,8 +247,8 @@ def _copied(sketch: Sketch, links: list[str]) -> list[str]:
     All entries are copied with the links and their points renamed; what is new in that copy is added.
     """
     ground, part = sketch.ground, copy.deepcopy(sketch.entries)
-    inner = [name for name, one in sketch.joints.items()
-             if set(one["links"]) <= {*links, ground} and set(one["links"]) & set(links)]  # fmt: skip
+    inner = [name for name, item in sketch.joints.items()
+             if set(item["links"]) <= {*links, ground} and set(item["links"]) & set(links)]  # fmt: skip
     names: dict[str, str] = {}
     for link in links:
         names[link] = _again(sketch, "links", link)
@@ -272,16 +272,18 @@ def _copied(sketch: Sketch, links: list[str]) -> list[str]:
 def _add(sketch: Sketch, part: Mapping[str, Any], names: Mapping[str, str], points: Mapping[str, str]) -> None:
     """Add what has new names in a copy of the entries, and what acts between those."""
     ground, links, joints = sketch.ground, set(names.values()), set(points.values())
-    for section, own in (("links", links), ("joints", joints), ("drivers", joints), ("assembly", joints)):
-        sketch.section(section).update({name: one for name, one in (part.get(section) or {}).items() if name in own})
+    for section, names_of in (("links", links), ("joints", joints), ("drivers", joints), ("assembly", joints)):
+        sketch.section(section).update(
+            {name: item for name, item in (part.get(section) or {}).items() if name in names_of}
+        )
     fixed = part["links"].get(ground, {}).get("points", {})
     sketch.section("links")[ground]["points"] |= {name: at for name, at in fixed.items() if name in joints}
     for section in ("loads", "springs", "gears"):
-        for name, one in (part.get(section) or {}).items():
-            ends = [str(end).partition(".")[0] for end in one.get("between", ())]
-            parts = {*ends, one.get("link"), one.get("joint"), *one.get("joints", ())} - {None}
-            if parts <= {*links, *joints, ground} and one != sketch.section(section)[name]:
-                sketch.section(section)[_again(sketch, section, name)] = one
+        for name, item in (part.get(section) or {}).items():
+            ends = [str(end).partition(".")[0] for end in item.get("between", ())]
+            parts = {*ends, item.get("link"), item.get("joint"), *item.get("joints", ())} - {None}
+            if parts <= {*links, *joints, ground} and item != sketch.section(section)[name]:
+                sketch.section(section)[_again(sketch, section, name)] = item
 
 
 def _again(sketch: Sketch, section: str, name: str) -> str:

@@ -77,22 +77,22 @@ class Jobs:
         self.jobs: dict[str, _Job] = {}
         self._place = tempfile.TemporaryDirectory(prefix="trunnion-studies-", ignore_cleanup_errors=True)
 
-    def start(self, asked: Mapping[str, Any], name: str, mapping: Path | None) -> str:
+    def start(self, options_asked: Mapping[str, Any], name: str, mapping: Path | None) -> str:
         """Start a study of the text of a model; its number.
 
-        asked: {text, verb, options: {flag: text or list of texts, true for one without a value}}. name: of the model
-        in the command that is shown. ValueError in words if it is none of the forms.
+        options_asked: {text, verb, options: {flag: text or list of texts, true for one without a value}}. name: of the
+        model in the command that is shown. ValueError in words if it is none of the forms.
         """
-        form = self.forms.get(str(asked.get("verb")))
+        form = self.forms.get(str(options_asked.get("verb")))
         if form is None:
-            raise ValueError(f"there is no study '{str(asked.get('verb'))[:40]}'")
+            raise ValueError(f"there is no study '{str(options_asked.get('verb'))[:40]}'")
         if sum(job.process.poll() is None for job in self.jobs.values()) >= MOST_RUNNING:
             raise ValueError(f"{MOST_RUNNING} studies run already: wait for one, or stop it")
         if form["mapping"] and mapping is None:
             raise ValueError("name the mapping of the measured data, a file of the opened folder")
-        options = _options(form, dict(asked.get("options") or {}))
+        options = _options(form, dict(options_asked.get("options") or {}))
         folder = Path(tempfile.mkdtemp(dir=self._place.name))
-        (folder / MODEL).write_text(str(asked["text"]), encoding="utf-8", newline="\n")
+        (folder / MODEL).write_text(str(options_asked["text"]), encoding="utf-8", newline="\n")
         files = [str(mapping)] if form["mapping"] else []
         command = [sys.executable, "-m", "trunnion", form["verb"], MODEL, *files, *options, "--report", REPORT]
         shown = ["trunnion", form["verb"], name, *([mapping.name] if mapping and form["mapping"] else []), *options]
@@ -146,16 +146,16 @@ def _end(process: subprocess.Popen[bytes], how: str) -> None:
         process.terminate()
 
 
-def _options(form: Mapping[str, Any], given: Mapping[str, Any]) -> list[str]:
+def _options(form: Mapping[str, Any], options_asked: Mapping[str, Any]) -> list[str]:
     """The words of the command line: each value is one word with its flag, and so can be no other option."""
-    fields, words = {str(one["flag"]): one for one in form["fields"]}, []
-    for flag, value in given.items():
+    fields, words = {str(item["flag"]): item for item in form["fields"]}, []
+    for flag, value in options_asked.items():
         if flag not in fields:
             raise ValueError(f"{form['verb']} has no option {json.dumps(flag)[:40]}")
         if fields[flag]["kind"] == "flag":
             words += [flag] if value is True else []
             continue
-        texts = [str(one).strip() for one in (value if isinstance(value, list) else [value])]
+        texts = [str(item).strip() for item in (value if isinstance(value, list) else [value])]
         texts = [text for text in texts if text]
         if len(texts) > 1 and not fields[flag]["several"]:
             raise ValueError(f"{flag} is given once")

@@ -50,10 +50,10 @@ def uncollected() -> Iterator[None]:
             gc.enable()
 
 
-def places_at(asked: Asked) -> dict[str, tuple[float, float]]:
+def places_at(question: Asked) -> dict[str, tuple[float, float]]:
     """Where the points of a model are at the position that is shown, m; MechanismError where it has no answer."""
-    _refuse_space(asked.state.run)
-    paths, index = tracked(asked.state, asked.steps), asked.index
+    _refuse_space(question.state.run)
+    paths, index = tracked(question.state, question.steps), question.index
     places = {key: (float(track["x"][index]), float(track["y"][index])) for key, track in paths.items()}
     if not np.all(np.isfinite(list(places.values()))):
         what = "cannot be assembled at the position that is shown"

@@ -77,9 +77,9 @@ class Loaded:
         """The positions as a result that has no figures of the cycle yet, which may take many times as long."""
         from trunnion.cycle.summary import result_of
 
-        found = self.positions(steps, friction)
+        positions = self.positions(steps, friction)
         with np.errstate(all="ignore"):
-            return result_of(self.run if friction else self.frictionless_run, found).dataset
+            return result_of(self.run if friction else self.frictionless_run, positions).dataset
 
     @lru_cache(maxsize=2)  # noqa: B019
     def result(self, steps: int, friction: bool) -> xr.Dataset:
@@ -87,9 +87,9 @@ class Loaded:
         from trunnion.cycle.positions import over_cycle
         from trunnion.cycle.summary import result_of
 
-        found, run = self.positions(steps, friction), self.run if friction else self.frictionless_run
+        positions, run = self.positions(steps, friction), self.run if friction else self.frictionless_run
         with np.errstate(all="ignore"):
-            return result_of(run, over_cycle(run, found)).dataset
+            return result_of(run, over_cycle(run, positions)).dataset
 
 
 @lru_cache(maxsize=8)
@@ -104,17 +104,17 @@ def loaded(text: str) -> Loaded:
         return Loaded(text, None, {}, None, error.findings)
     if not entries:
         return Loaded(text, {}, {}, None, ())
-    mechanism, found = None, version_findings(entries)
+    mechanism, findings = None, version_findings(entries)
     try:
-        found += _refusals(entries)
-        if not found:
+        findings += _refusals(entries)
+        if not findings:
             mechanism = Mechanism(**entries)
-            found = [one for one in mechanism.checked if one.severity is not Severity.ERROR]
+            findings = [finding for finding in mechanism.checked if finding.severity is not Severity.ERROR]
     except MechanismError as error:
-        found += error.findings
+        findings += error.findings
         mechanism = _without_friction(entries)
-    bare = mechanism is not None and any(one.severity is Severity.ERROR for one in found)
-    return Loaded(text, entries, lines, mechanism, tuple(place(found, "", lines, entries)), bare)
+    bare = mechanism is not None and any(finding.severity is Severity.ERROR for finding in findings)
+    return Loaded(text, entries, lines, mechanism, tuple(place(findings, "", lines, entries)), bare)
 
 
 class Asked(dict[str, Any]):
@@ -171,7 +171,7 @@ def _without_friction(entries: Mapping[str, Any]) -> Mechanism | None:
 
 def _refusals(entries: Mapping[str, Any]) -> list[Finding]:
     """What the studio does not do: read other files, solve masses of links."""
-    found = [
+    refusals = [
         Finding(f"names the file '{name[:60]}', which the studio does not read", f"{section}.{key}.file",
                 "write its points into the model, or analyse it on the command line")
         for section, key, name in stated_files(entries)
@@ -179,5 +179,5 @@ def _refusals(entries: Mapping[str, Any]) -> list[Finding]:
     links = entries.get("links")
     if isinstance(links, dict) and len(links) > MOST_LINKS:
         what = f"are {len(links):,}; the studio solves {MOST_LINKS} at most"
-        found.append(Finding(what, "links", "analyse it on the command line"))
-    return found
+        refusals.append(Finding(what, "links", "analyse it on the command line"))
+    return refusals

@@ -43,7 +43,7 @@ def packed(header: Mapping[str, Any]) -> bytes:
 
     def plain(value: Any) -> Any:
         if isinstance(value, Mapping):
-            return {str(key): plain(one) for key, one in value.items()}
+            return {str(key): plain(item) for key, item in value.items()}
         if isinstance(value, np.ndarray):
             return column(np.ravel(value))
         if isinstance(value, Exact):
@@ -55,9 +55,9 @@ def packed(header: Mapping[str, Any]) -> bytes:
             places.append({"bytes": [0, len(value)]})
             return places[-1]
         if isinstance(value, (list, tuple)):
-            if len(value) >= SHORTEST and all(one is None or type(one) in (int, float) for one in value):
+            if len(value) >= SHORTEST and all(item is None or type(item) in (int, float) for item in value):
                 return column(np.array(value, float))
-            return [plain(one) for one in value]
+            return [plain(item) for item in value]
         if isinstance(value, float) and not np.isfinite(value):
             return None
         return value.item() if isinstance(value, np.generic) else value

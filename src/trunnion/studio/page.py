@@ -23,12 +23,12 @@ def found(place: str, name: str) -> Traversable:
     if place not in PLACES or not name or any(part in ("", ".", "..") for part in name.split("/")) or "\\" in name:
         raise LookupError(name)
     package, folder = PLACES[place]
-    one = files(package) / folder
+    path = files(package) / folder
     for part in name.split("/"):
-        one = one / part
-    if not one.is_file():
+        path = path / part
+    if not path.is_file():
         raise LookupError(name)
-    return one
+    return path
 
 
 def document(nonce: str, token: str) -> str:
@@ -40,19 +40,19 @@ def document(nonce: str, token: str) -> str:
 @lru_cache(maxsize=1)
 def script() -> str:
     """All modules of the page as one; the libraries that the document names stay files of their own."""
-    known = json.loads(IMPORT_MAP.search(_text("studio/index.html"))[1])["imports"]  # type: ignore[index]  # it has one
-    return module("studio/main.js", _text, known)
+    imports = json.loads(IMPORT_MAP.search(_text("studio/index.html"))[1])["imports"]  # type: ignore[index]  # it has one
+    return module("studio/main.js", _text, imports)
 
 
 @lru_cache(maxsize=1)
 def one_file() -> str:
     """The page in one file, for a frame in a notebook: style, modules and libraries inside it, nothing fetched."""
-    known: dict[str, str] = json.loads(IMPORT_MAP.search(_text("studio/index.html"))[1])["imports"]  # type: ignore[index]
+    imports: dict[str, str] = json.loads(IMPORT_MAP.search(_text("studio/index.html"))[1])["imports"]  # type: ignore[index]
     libraries: dict[str, str] = {}
-    while len(libraries) < len(known):  # a library comes after those that it imports
-        for name, path in known.items():
+    while len(libraries) < len(imports):  # a library comes after those that it imports
+        for name, path in imports.items():
             text = _text(path.removeprefix("/"))
-            needs = [other for other in known if re.search(rf'from *"{re.escape(other)}"', text)]
+            needs = [other for other in imports if re.search(rf'from *"{re.escape(other)}"', text)]
             if name not in libraries and all(other in libraries for other in needs):
                 libraries[name] = _as_data(text, libraries)
     style = "".join(_text(path) for path in ("web/report.css", "studio/studio.css", "studio/panels.css"))

@@ -39,9 +39,11 @@ def column(number: Any, steps: int) -> Array:
 
 def tracks(walk: Forward, steps: int) -> dict[str, dict[str, Array]]:
     """Where the points of the links are over the cycle, m."""
-    whole = partial(column, steps=steps)
+    sampled = partial(column, steps=steps)
     return {
-        f"{link}.{name}": dict(zip("xyz", map(whole, walk.placed(walk.motions[link].frame, link, name)), strict=False))
+        f"{link}.{name}": dict(
+            zip("xyz", map(sampled, walk.placed(walk.motions[link].frame, link, name)), strict=False)
+        )
         for link, name in walk.system.points
     }
 
@@ -65,14 +67,14 @@ def thumbnail(text: str) -> bytes:
         places = {key: _projected(list(track.values())) for key, track in tracked(state, SMALL_STEPS).items()}
     except MechanismError:
         places = {}
-    whole = np.all([np.isfinite(track).all(axis=0) for track in places.values()], axis=0) if places else [False]
-    if not np.any(whole):
+    complete = np.all([np.isfinite(track).all(axis=0) for track in places.values()], axis=0) if places else [False]
+    if not np.any(complete):
         return packed({"links": [], "paths": []})
-    reached, ground = np.flatnonzero(whole), state.run.system.mechanism.fixed_link
-    shown = reached[min(SHOWN, len(reached) - 1)]
+    reached, ground = np.flatnonzero(complete), state.run.system.mechanism.fixed_link
+    index = reached[min(SHOWN, len(reached) - 1)]
     links: dict[str, list[list[float]]] = {}
     for key, track in places.items():
-        links.setdefault(key.rpartition(".")[0], []).append([float(part) for part in track[:, shown]])
+        links.setdefault(key.rpartition(".")[0], []).append([float(part) for part in track[:, index]])
     moved = [track[:, reached] for key, track in places.items() if key.rpartition(".")[0] != ground]
     return packed({
         "links": [{"ground": link == ground, "points": points} for link, points in links.items()],

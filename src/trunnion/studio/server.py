@@ -344,10 +344,12 @@ def _import(name: str, content: bytes) -> tuple[str, list[str]]:
         try:
             draft = import_file(path)
         except MechanismError as error:
-            why = "; ".join(f"{one.what}{f' ({one.remedy})' if one.remedy else ''}" for one in error.findings[:3])
+            why = "; ".join(
+                f"{finding.what}{f' ({finding.remedy})' if finding.remedy else ''}" for finding in error.findings[:3]
+            )
             raise ValueError(f"{name[:80]} {why}") from None
     draft.source, draft.name = name, Path(name).stem if draft.name == "dropped" else draft.name
-    return model_text(draft), [f"{one.where}: {one.what}" for one in draft.findings]
+    return model_text(draft), [f"{finding.where}: {finding.what}" for finding in draft.findings]
 
 
 async def _thumbnail(request: Request) -> Response:

@@ -86,16 +86,16 @@ class Sketch:
 
     def section(self, name: str) -> Entries:
         """A group of entries, made if it is missing."""
-        found = self.entries.setdefault(name, {})
-        if not isinstance(found, dict):
+        entries = self.entries.setdefault(name, {})
+        if not isinstance(entries, dict):
             raise MechanismError(Finding("is not a group of entries", name, "correct it in the text of the model"))
-        return found
+        return entries
 
     def of(self, section: str) -> Mapping[str, Any]:
         """The groups of a section, as far as it is sound."""
-        found = self.entries.get(section)
-        sound = found.items() if isinstance(found, dict) else ()
-        return {name: one for name, one in sound if isinstance(one, dict)}
+        entries = self.entries.get(section)
+        sound = entries.items() if isinstance(entries, dict) else ()
+        return {name: item for name, item in sound if isinstance(item, dict)}
 
     @property
     def ground(self) -> str:
@@ -107,26 +107,28 @@ class Sketch:
     @property
     def joints(self) -> Mapping[str, Any]:
         """Joints with their two links."""
-        return {name: one for name, one in self.of("joints").items() if _pair(one.get("links"))}
+        return {name: item for name, item in self.of("joints").items() if _pair(item.get("links"))}
 
     def kind(self, joint: str) -> str:
         """The type of a joint, of the table of a loop too; nothing where there is none."""
-        stated = self.entries.get("joints")
-        one = stated.get(joint) if isinstance(stated, dict) else None  # not of `joints`: that goes through them all
-        sound = one if isinstance(one, dict) and _pair(one.get("links")) else None
+        joints = self.entries.get("joints")
+        joint_entry = (
+            joints.get(joint) if isinstance(joints, dict) else None
+        )  # not of `joints`: that goes through them all
+        sound = joint_entry if isinstance(joint_entry, dict) and _pair(joint_entry.get("links")) else None
         row = next((row for row in self.rows if row.get("joint") == joint), sound)
         return "" if row is None else str(row.get("type", "revolute"))
 
     @property
     def rows(self) -> list[dict[str, Any]]:
         """The table of a loop in space, each row a joint and the link after it; none of other models."""
-        found = self.entries.get("loop")
-        return [row for row in found if isinstance(row, dict)] if isinstance(found, list) else []
+        rows = self.entries.get("loop")
+        return [row for row in rows if isinstance(row, dict)] if isinstance(rows, list) else []
 
     def points(self, link: str) -> Mapping[str, Any]:
         """Points of a link, as stated."""
-        found = self.of("links").get(link, {}).get("points")
-        return found if isinstance(found, dict) else {}
+        points = self.of("links").get(link, {}).get("points")
+        return points if isinstance(points, dict) else {}
 
     @cached_property
     def numbers(self) -> Mapping[str, Any]:
@@ -163,11 +165,11 @@ class Sketch:
         """The frame of a link that fits its points best to where they are shown."""
         if link == self.ground:
             return GROUND
-        shown = [point for point in self.points(link) if f"{link}.{point}" in self.places]
-        if not shown:
+        placed = [point for point in self.points(link) if f"{link}.{point}" in self.places]
+        if not placed:
             return GROUND
-        local = np.array([complex(*self.local(link, point)) for point in shown])
-        places = np.array([complex(*self.places[f"{link}.{point}"]) for point in shown])
+        local = np.array([complex(*self.local(link, point)) for point in placed])
+        places = np.array([complex(*self.places[f"{link}.{point}"]) for point in placed])
         turn = np.sum((local - local.mean()).conj() * (places - places.mean()))
         turn = turn / abs(turn) if turn else 1.0 + 0.0j
         origin = places.mean() - turn * local.mean()
@@ -198,11 +200,11 @@ class Sketch:
             moved = self._in_space(link, name) + columns @ np.asarray(by, float)
             other = self._rod_end(link, name)
             if other is None:
-                found = self._at(link, name, moved)
+                moved_to = self._at(link, name, moved)
             else:  # it keeps its form: from its origin along its x
                 far = max((name, other), key=lambda point: float(np.linalg.norm(self._in_space(link, point))))
-                found = self._at(link, far, (float(np.linalg.norm(moved - self._in_space(link, other))), 0.0, 0.0))
-            changes |= {change.path: change for change in found}
+                moved_to = self._at(link, far, (float(np.linalg.norm(moved - self._in_space(link, other))), 0.0, 0.0))
+            changes |= {change.path: change for change in moved_to}
         return list(changes.values())
 
     def _in_space(self, link: str, point: str) -> NDArray[np.float64]:
@@ -211,11 +213,12 @@ class Sketch:
 
     def _rod_end(self, link: str, point: str) -> str | None:
         """The other end of a rod with two balls: a link of two points without axes, its origin and one on its x."""
-        others = [one for one in self.points(link) if one != point]
-        if len(others) != 1 or not all(isinstance(stated, list) for stated in self.points(link).values()):
+        others = [other_point for other_point in self.points(link) if other_point != point]
+        if len(others) != 1 or not all(isinstance(entry, list) for entry in self.points(link).values()):
             return None
         ends = sorted(
-            (self._in_space(link, one) for one in self.points(link)), key=lambda end: float(np.abs(end).sum())
+            (self._in_space(link, other_point) for other_point in self.points(link)),
+            key=lambda end: float(np.abs(end).sum()),
         )
         return others[0] if not ends[0].any() and ends[1][0] > 0 and not ends[1][1:].any() else None
 
@@ -227,27 +230,27 @@ class Sketch:
         keep: the links at a pin on the ground keep their lengths, unless other joints are locked where they are.
         """
         joints = self._together(point) if point in self.joints else []
-        if held := sorted(self.locked & {point, *joints}):
-            raise MechanismError(Finding("is locked where it is", held[0], "unlock it first (key K)"))
+        if locked := sorted(self.locked & {point, *joints}):
+            raise MechanismError(Finding("is locked where it is", locked[0], "unlock it first (key K)"))
         if not joints:
             (link,), name = self.links_at(point)
             if name not in self.points(link):
                 raise MechanismError(Finding("is not a joint or a point", point, "drag one that is drawn"))
             local = {one: self.local(link, one) for one in self.points(link)}
-            there = self.frame(link).into(to)
-            self._apart(link, local, local | {name: there})
-            return list(self._at(link, name, there))
-        found: list[Change] = []
+            local_aim = self.frame(link).into(to)
+            self._apart(link, local, local | {name: local_aim})
+            return list(self._at(link, name, local_aim))
+        changes: list[Change] = []
         pins = [one for one in joints if self.ground in self.joints[one]["links"] and self._turns(one)]
         if keep and pins and not self.locked:
             return [change for pin in pins for change in self._at(self.ground, pin, to)]
         for link in dict.fromkeys(link for joint in joints for link in self.joints[joint]["links"]):
             mine = [joint for joint in joints if link in self.joints[joint]["links"] and self._turns(joint)]
             if link == self.ground:
-                found += [change for joint in mine for change in self._at(link, joint, to)]
+                changes += [change for joint in mine for change in self._at(link, joint, to)]
             else:
-                found += self.followed(link, mine, to)
-        return found
+                changes += self.followed(link, mine, to)
+        return changes
 
     def followed(self, link: str, pins: list[str], to: Vector) -> Iterator[Change]:
         """What changes of a moving link whose pins, or block if it has none, go to a place; its others stay."""
@@ -263,19 +266,19 @@ class Sketch:
 
     def _together(self, joint: str) -> list[str]:
         """The joints on the spot of a joint that are connected with it by links."""
-        found, links = [joint], set(self.joints[joint]["links"])
+        together, links = [joint], set(self.joints[joint]["links"])
         spot = self.places.get(f"{self.joints[joint]['links'][1]}.{joint}")
-        for name, one in self.joints.items():
-            other = self.places.get(f"{one['links'][1]}.{name}")
+        for name, item in self.joints.items():
+            other = self.places.get(f"{item['links'][1]}.{name}")
             near = spot and other and hypot(spot[0] - other[0], spot[1] - other[1]) <= TOGETHER * self.size
-            if name != joint and near and links & set(one["links"]):
-                found.append(name)
-                links |= set(one["links"])
-        return found
+            if name != joint and near and links & set(item["links"]):
+                together.append(name)
+                links |= set(item["links"])
+        return together
 
     def _joints_of(self, link: str, turning: bool) -> list[str]:
         """The joints of a link that turn, or those that slide."""
-        return [name for name, one in self.joints.items() if link in one["links"] and self._turns(name) == turning]
+        return [name for name, item in self.joints.items() if link in item["links"] and self._turns(name) == turning]
 
     def _guide(self, link: str) -> str | None:
         """The sliding joint of a block: a link with one of them that has a pin on the same spot or none at all."""
@@ -300,12 +303,12 @@ class Sketch:
         A link whose frame begins at one joint and has its x through another keeps that form, unless it has a slot.
         """
         old = self.frame(link)
-        own = [one for one in self.points(link) if one in self.joints and self._turns(one)]
-        local = {point: self.local(link, point) for point in own}
-        places = {point: to if point in moving else old.out(local[point]) for point in own}
+        pins = [name for name in self.points(link) if name in self.joints and self._turns(name)]
+        local = {point: self.local(link, point) for point in pins}
+        places = {point: to if point in moving else old.out(local[point]) for point in pins}
         self._apart(link, local, places)
-        origin = next((point for point in own if local[point] == (0.0, 0.0)), None)
-        ahead = next((point for point in own if local[point][1] == 0.0 and local[point][0] != 0.0), None)
+        origin = next((point for point in pins if local[point] == (0.0, 0.0)), None)
+        ahead = next((point for point in pins if local[point][1] == 0.0 and local[point][0] != 0.0), None)
         slot, frame = self._slot(link), old
         if slot:
             ahead = None
@@ -317,17 +320,17 @@ class Sketch:
             frame = Frame(x, y, sign * (a - x) / length, sign * (b - y) / length)
         elif origin in moving:
             frame = old._replace(x=to[0], y=to[1])
-        for point in own:
+        for point in pins:
             place = frame.into(places[point])
             fixed = (0.0, 0.0) if point == origin and frame is not old else place
             yield from self._at(link, point, (fixed[0], 0.0) if point == ahead and frame is not old else fixed)
 
     def _apart(self, link: str, local: Mapping[str, Vector], places: Mapping[str, Vector]) -> None:
         """Refuse to bring points of a link together that are apart."""
-        for one, two in combinations(local, 2):
-            before, after = (dist(spots[one], spots[two]) for spots in (local, places))
+        for first, two in combinations(local, 2):
+            before, after = (dist(spots[first], spots[two]) for spots in (local, places))
             if after <= SHORT * self.size < before:
-                what = f"would have no length: {one} would lie on {two}"
+                what = f"would have no length: {first} would lie on {two}"
                 raise MechanismError(Finding(what, f"links.{link}", "keep them apart"))
 
     def _slot(self, link: str) -> str | None:
@@ -361,21 +364,21 @@ class Sketch:
         (x, y), (a, b) = self.local(link, pivot), self.local(link, slot)
         c, s = self.vector(f"links.{link}.points.{slot}.axis")
         turn, (u, v) = atan2(s, c), self.frame(link).into(here)
-        beside = cos(turn) * (y - b) - sin(turn) * (x - a)
+        offset = cos(turn) * (y - b) - sin(turn) * (x - a)
         far = dist(centre, end)
-        if far <= abs(beside) + SHORT * self.size:
+        if far <= abs(offset) + SHORT * self.size:
             raise MechanismError(Finding("would not reach its block", f"links.{link}", "keep them apart"))
-        along = copysign(sqrt(far**2 - beside**2), cos(turn) * (u - x) + sin(turn) * (v - y))
-        angle = atan2(end[1] - centre[1], end[0] - centre[0]) - atan2(-beside, along) - turn
+        along = copysign(sqrt(far**2 - offset**2), cos(turn) * (u - x) + sin(turn) * (v - y))
+        angle = atan2(end[1] - centre[1], end[0] - centre[0]) - atan2(-offset, along) - turn
         turned = Frame(0.0, 0.0, cos(angle), sin(angle))
         p, q = turned.out((x, y))
         return turned._replace(x=centre[0] - p, y=centre[1] - q)
 
     def _at(self, link: str, point: str, local: Sequence[float]) -> Iterator[Change]:
         """The numbers to be changed so that a point has these coordinates: dimensions, where they are stated so."""
-        stated = self.points(link)[point]
-        where: tuple[str | int, ...] = ("links", link, "points", point, *(("at",) if isinstance(stated, dict) else ()))
-        parts = stated["at"] if isinstance(stated, dict) else stated
+        entry = self.points(link)[point]
+        where: tuple[str | int, ...] = ("links", link, "points", point, *(("at",) if isinstance(entry, dict) else ()))
+        parts = entry["at"] if isinstance(entry, dict) else entry
         numbers = self.vector(f"links.{link}.points.{point}", "xyz")
         for i, (axis, before, value) in enumerate(zip("xyz", numbers, local, strict=False)):
             if abs(value - before) <= TOGETHER * self.size:
@@ -405,9 +408,9 @@ class Sketch:
     def write(self, changes: list[Change]) -> None:
         """Put changed lengths into the entries; a tolerance that is stated stays."""
         for _, location, value in changes:
-            *way, last = location
+            *parents, last = location
             group: Any = self.entries
-            for key in way:
+            for key in parents:
                 group = group[key]
             limits = LIMITS.search(group[last]) if isinstance(group[last], str) else None
             group[last] = self.length(value) + (limits[0] if limits else "")
@@ -415,11 +418,11 @@ class Sketch:
 
 
 def _pair(links: Any) -> bool:
-    return isinstance(links, list) and len(links) == 2 and all(isinstance(one, str) for one in links)
+    return isinstance(links, list) and len(links) == 2 and all(isinstance(link, str) for link in links)
 
 
 def length_unit(entries: Entries) -> str:
     """The unit of lengths that a model states most often; nothing if it states none."""
     texts = str([entries.get("dimensions"), entries.get("links")])
-    found = LENGTH.findall(texts)
-    return max(set(found), key=found.count) if found else ""
+    units = LENGTH.findall(texts)
+    return max(set(units), key=units.count) if units else ""

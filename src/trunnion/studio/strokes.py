@@ -35,9 +35,9 @@ def refused(what: str, where: str, remedy: str) -> MechanismError:
     return MechanismError(Finding(what, where, remedy))
 
 
-def vector(given: Any) -> Vector:
+def vector(value: Any) -> Vector:
     """A place of the page, m."""
-    x, y = map(float, given)
+    x, y = map(float, value)
     if not (isfinite(x) and isfinite(y)):
         raise ValueError(f"({x}, {y}) is no place")
     return x, y
@@ -71,7 +71,7 @@ def taken(sketch: Sketch) -> set[str]:
 def letter(sketch: Sketch, also: Iterable[str] = ()) -> str:
     """The next free name of a point: A, B, …, Z, A2, …; also: names that are spoken for."""
     used = {*taken(sketch), *also}
-    names = (one + number for number in ("", *map(str, range(2, 1000))) for one in LETTERS)
+    names = (sign + number for number in ("", *map(str, range(2, 1000))) for sign in LETTERS)
     return next(name for name in names if name not in used)
 
 
@@ -154,8 +154,8 @@ def joined(sketch: Sketch, link: str, end: Any, place: Vector) -> str:
 
 def doubled(sketch: Sketch, link: str, point: str, name: str = "") -> str:
     """Another point of a link on the spot of one that is a joint already, for a second pin there: its name."""
-    stated, name = sketch.points(link)[point], name or letter(sketch)
-    sketch.section("links")[link]["points"][name] = list(stated["at"] if isinstance(stated, dict) else stated)
+    entry, name = sketch.points(link)[point], name or letter(sketch)
+    sketch.section("links")[link]["points"][name] = list(entry["at"] if isinstance(entry, dict) else entry)
     sketch.places[f"{link}.{name}"] = sketch.places[f"{link}.{point}"]
     sketch.forget()
     return name
@@ -166,20 +166,20 @@ def put(sketch: Sketch, link: str, point: str, place: Vector, axis: float | None
     frame = sketch.frame(link)
     least = max(SHORTEST, sketch.fine / 20.0)  # a smaller one is what rounding left
     at = [sketch.length(value) if abs(value) > least else 0 for value in frame.into(place)]
-    stated: Any = at
+    entry: Any = at
     if axis is not None:
         c, s = cos(axis), sin(axis)
         parts = (frame.c * c + frame.s * s, frame.c * s - frame.s * c)  # in the frame of the link
-        stated = {"at": at, "axis": [_short(part) for part in parts]}
-    sketch.section("links")[link]["points"][point] = stated
+        entry = {"at": at, "axis": [_short(part) for part in parts]}
+    sketch.section("links")[link]["points"][point] = entry
     sketch.places[f"{link}.{point}"] = place
     sketch.forget()
 
 
 def _short(part: float) -> float | int:
     """A component of a direction, without the noise of rounding."""
-    found = round(part, 12) + 0.0
-    return int(found) if found.is_integer() else found
+    rounded = round(part, 12) + 0.0
+    return int(rounded) if rounded.is_integer() else rounded
 
 
 def pin(sketch: Sketch, name: str, first: str, second: str, place: Vector) -> None:
@@ -201,27 +201,27 @@ class Line(NamedTuple):
 def line_near(sketch: Sketch, link: str, place: Vector) -> Line:
     """The line through two points of a link that passes nearest to a place; of several the longest."""
     spots = [sketch.places[key] for point in sketch.points(link) if (key := f"{link}.{point}") in sketch.places]
-    found: list[tuple[float, float, Line]] = []
+    lines: list[tuple[float, float, Line]] = []
     for (x, y), (a, b) in itertools.combinations(spots, 2):
         length = hypot(a - x, b - y)
         if length > TOGETHER * sketch.size:
             c, s = (a - x) / length, (b - y) / length
-            beside = c * (place[1] - y) - s * (place[0] - x)
-            found.append((round(abs(beside) / sketch.size, 6), -length, Line((x, y), (c, s), beside)))
-    if not found:
+            offset = c * (place[1] - y) - s * (place[0] - x)
+            lines.append((round(abs(offset) / sketch.size, 6), -length, Line((x, y), (c, s), offset)))
+    if not lines:
         raise refused("has no two points that a slot could go along", f"links.{link}", "add a point to it first")
-    return min(found, key=lambda row: row[:2])[2]
+    return min(lines, key=lambda row: row[:2])[2]
 
 
 # ---- gestures -----------------------------------------------------------------------------------------------------
 
 
-def link(sketch: Sketch, given: Given) -> str:
+def link(sketch: Sketch, gesture: Given) -> str:
     """A bar from one end to another; ends on joints, points and links are joined with them.
 
     length: as it was typed, if it was; it says the same as the places.
     """
-    return f"Draw {bar(sketch, given['from'], given['to'], length=given.get('length'))}"
+    return f"Draw {bar(sketch, gesture['from'], gesture['to'], length=gesture.get('length'))}"
 
 
 def bar(sketch: Sketch, *ends: Any, length: Any = None) -> str:
@@ -243,71 +243,71 @@ def bar(sketch: Sketch, *ends: Any, length: Any = None) -> str:
     return name
 
 
-def pinned(sketch: Sketch, given: Given) -> str:
+def pinned(sketch: Sketch, gesture: Given) -> str:
     """A free point becomes a pin on the ground; given {on: link, at: place} instead, a new point of that link."""
-    end = given["point"]
+    end = gesture["point"]
     if isinstance(end, Mapping) and end["on"] == sketch.ground:
         raise refused("is the ground", sketch.ground, "choose a link that moves")
-    own, point = point_of(sketch, end) if isinstance(end, Mapping) else free(sketch, end)
+    link_of, point = point_of(sketch, end) if isinstance(end, Mapping) else free(sketch, end)
     begin(sketch)
-    place = sketch.places[f"{own}.{point}"]
+    place = sketch.places[f"{link_of}.{point}"]
     put(sketch, sketch.ground, point, place)
-    pin(sketch, point, sketch.ground, own, place)
+    pin(sketch, point, sketch.ground, link_of, place)
     return f"Pin {point} to the ground"
 
 
-def add_point(sketch: Sketch, given: Given) -> str:
+def add_point(sketch: Sketch, gesture: Given) -> str:
     """A point on a link."""
     begin(sketch)
     point = letter(sketch)
-    put(sketch, str(given["link"]), point, vector(given["at"]))
-    sketch.made = ("points", f"{given['link']}.{point}")  # and so its velocity and acceleration are shown
+    put(sketch, str(gesture["link"]), point, vector(gesture["at"]))
+    sketch.made = ("points", f"{gesture['link']}.{point}")  # and so its velocity and acceleration are shown
     return f"Add point {point}"
 
 
 # ---- guides and slots -----------------------------------------------------------------------------------------
 
 
-def slide(sketch: Sketch, given: Given) -> str:
+def slide(sketch: Sketch, gesture: Given) -> str:
     """A point slides, by a block that is pinned to it; given {on: link, at: place} instead, that link itself.
 
     It slides along the ground in the direction of `angle`, rad, or in a slot of the link `along`: on the line through
     two of that link's points, and beside it by as much as it is drawn there, if that is more than `near`, m.
     """
     begin(sketch)
-    carrier, slid = str(given.get("along") or sketch.ground), given["joint"]
+    carrier, slid = str(gesture.get("along") or sketch.ground), gesture["joint"]
     if carrier != sketch.ground and carrier not in sketch.of("links"):
         raise refused("is not there", f"links.{carrier}", "choose a link that is drawn")
     place = place_of(sketch, slid)
     if isinstance(slid, Mapping):
-        own = str(slid["on"])
-        if own in (carrier, sketch.ground):
-            raise refused("cannot slide along itself", f"links.{own}", "choose two links")
-        name, angle = _guided(sketch, carrier, place, given)
-        sketch.section("joints")[name] = {"type": "prismatic", "links": [carrier, own]}
-        put(sketch, own, name, place, angle)
-        return f"Guide {own}" if carrier == sketch.ground else f"Slide {own} along {carrier}"
-    own, point = _end_to_slide(sketch, str(slid), carrier)
-    block, (name, angle) = numbered(sketch, "links", "block"), _guided(sketch, carrier, place, given)
+        slider = str(slid["on"])
+        if slider in (carrier, sketch.ground):
+            raise refused("cannot slide along itself", f"links.{slider}", "choose two links")
+        name, angle = _guided(sketch, carrier, place, gesture)
+        sketch.section("joints")[name] = {"type": "prismatic", "links": [carrier, slider]}
+        put(sketch, slider, name, place, angle)
+        return f"Guide {slider}" if carrier == sketch.ground else f"Slide {slider} along {carrier}"
+    slider, point = _end_to_slide(sketch, str(slid), carrier)
+    block, (name, angle) = numbered(sketch, "links", "block"), _guided(sketch, carrier, place, gesture)
     sketch.section("links")[block] = {"points": {point: [0, 0], name: {"at": [0, 0], "axis": [1, 0]}}}
     sketch.section("joints")[name] = {"type": "prismatic", "links": [carrier, block]}
     sketch.forget()
-    pin(sketch, point, own, block, place)
+    pin(sketch, point, slider, block, place)
     sketch.show(block, Frame(*place, cos(angle), sin(angle)))
     return f"Guide {point}" if carrier == sketch.ground else f"Slide {point} along {carrier}"
 
 
-def _guided(sketch: Sketch, carrier: str, place: Vector, given: Given) -> tuple[str, float]:
+def _guided(sketch: Sketch, carrier: str, place: Vector, gesture: Given) -> tuple[str, float]:
     """The guide of a new sliding joint on the link that carries it: name of the joint, and its angle, rad."""
     name = letter(sketch)
     if carrier == sketch.ground:
-        angle = float(given.get("angle", 0.0))
+        angle = float(gesture.get("angle", 0.0))
         put(sketch, carrier, name, place, angle)
         return name, angle
     line = line_near(sketch, carrier, place)
     (x, y), (c, s) = line.start, line.direction
-    beside = line.beside if abs(line.beside) > float(given.get("near", 0.0)) else 0.0
-    put(sketch, carrier, name, (x - s * beside, y + c * beside), atan2(s, c))
+    offset = line.beside if abs(line.beside) > float(gesture.get("near", 0.0)) else 0.0
+    put(sketch, carrier, name, (x - s * offset, y + c * offset), atan2(s, c))
     along = c * (place[0] - x) + s * (place[1] - y)
     sketch.section("assembly")[name] = sketch.length(along)  # on which side of the point the block is
     return name, atan2(s, c)
@@ -316,39 +316,39 @@ def _guided(sketch: Sketch, carrier: str, place: Vector, given: Given) -> tuple[
 def _end_to_slide(sketch: Sketch, name: str, carrier: str) -> tuple[str, str]:
     """Link and point that a block is pinned to. A pin on the carrier of the guide becomes the pin on the block."""
     if name not in sketch.joints:
-        own, point = free(sketch, name)
-        if own == carrier:
-            raise refused("cannot slide along itself", f"links.{own}", "choose two links")
-        return own, point
+        slider, point = free(sketch, name)
+        if slider == carrier:
+            raise refused("cannot slide along itself", f"links.{slider}", "choose two links")
+        return slider, point
     joint = sketch.joints[name]
     if joint.get("type", "revolute") != "revolute":
         raise refused("slides already", f"joints.{name}", "choose a pin, or the free end of a link")
     if carrier not in joint["links"]:
-        own, point = held(sketch, name)
-        return own, doubled(sketch, own, point)
-    own = next(one for one in joint["links"] if one != carrier)
+        slider, point = held(sketch, name)
+        return slider, doubled(sketch, slider, point)
+    slider = next(name_of for name_of in joint["links"] if name_of != carrier)
     for section, what in (("loads", "load"), ("springs", "spring")):
-        for one, entry in sketch.of(section).items():
+        for name_of, entry in sketch.of(section).items():
             if (entry.get("link"), entry.get("at")) == (carrier, name) or f"{carrier}.{name}" in entry.get(
                 "between", ()
             ):
-                raise refused(f"carries the {what} {one}", f"joints.{name}", f"delete that {what} first")
+                raise refused(f"carries the {what} {name_of}", f"joints.{name}", f"delete that {what} first")
     del sketch.section("joints")[name]
     for section in ("drivers", "assembly"):
         sketch.section(section).pop(name, None)
     sketch.section("links")[carrier]["points"].pop(name, None)
     sketch.places.pop(f"{carrier}.{name}", None)
     sketch.forget()
-    return own, name
+    return slider, name
 
 
 # ---- ends that are drawn already ------------------------------------------------------------------------------
 
 
-def join(sketch: Sketch, given: Given) -> str:
+def join(sketch: Sketch, gesture: Given) -> str:
     """Two ends are pinned together where the second is; the first goes there, unless it is a place on a link."""
     begin(sketch)
-    first, second = given["ends"]
+    first, second = gesture["ends"]
     place = place_of(sketch, second)
     owners = [_owners(sketch, end) for end in (first, second)]
     (*_, link), (*_, other) = owners  # of a joint its second, which moves
@@ -402,14 +402,14 @@ def _call(sketch: Sketch, link: str, end: Any, name: str, place: Vector) -> None
 # ---- what is drawn already ------------------------------------------------------------------------------------------
 
 
-def move(sketch: Sketch, given: Given) -> str:
+def move(sketch: Sketch, gesture: Given) -> str:
     """A joint or point goes to a place; in space by so much, as the links are turned at a position."""
-    if "by" in given:
-        return _move_in_space(sketch, given)
-    point, to = str(given["point"]), vector(given["to"])
-    sketch.write(sketch.moved(point, to, bool(given.get("keep"))))
+    if "by" in gesture:
+        return _move_in_space(sketch, gesture)
+    point, to = str(gesture["point"]), vector(gesture["to"])
+    sketch.write(sketch.moved(point, to, bool(gesture.get("keep"))))
     hints = sketch.entries.get("assembly") or {}
-    if isinstance(hints.get(point), list) and not given.get("index"):
+    if isinstance(hints.get(point), list) and not gesture.get("index"):
         hints[point] = [sketch.length(part) for part in to]
     links, name = sketch.links_at(point)
     for link in links:
@@ -419,11 +419,11 @@ def move(sketch: Sketch, given: Given) -> str:
     return f"Move {point}"
 
 
-def _move_in_space(sketch: Sketch, given: Given) -> str:
-    point, by, index = str(given["point"]), [float(part) for part in given["by"]], int(given.get("index") or 0)
+def _move_in_space(sketch: Sketch, gesture: Given) -> str:
+    point, by, index = str(gesture["point"]), [float(part) for part in gesture["by"]], int(gesture.get("index") or 0)
     if len(by) != 3 or not all(map(isfinite, by)):
         raise ValueError(f"{by} is no way")
-    sketch.size = float(given["size"])
+    sketch.size = float(gesture["size"])
     turns = sketch.turns(index)
     hint = (sketch.entries.get("assembly") or {}).get(point)
     if isinstance(hint, list) and index == 0:
@@ -433,9 +433,9 @@ def _move_in_space(sketch: Sketch, given: Given) -> str:
     return f"Move {point}"
 
 
-def lock(sketch: Sketch, given: Given) -> str:
+def lock(sketch: Sketch, gesture: Given) -> str:
     """A joint or point stays where it is while others are dragged; done again, it may be dragged itself."""
-    point = str(given["point"])
+    point = str(gesture["point"])
     held(sketch, point)
     sketch.locked ^= {point}
     return f"{'Lock' if point in sketch.locked else 'Unlock'} {point}"
@@ -445,7 +445,7 @@ def rename_point(sketch: Sketch, old: str, new: str) -> None:
     """A point of a link that is no joint, with the loads and springs at it."""
     link, point = free(sketch, old)
     entry = sketch.section("links")[link]
-    entry["points"] = {(new if one == point else one): at for one, at in entry["points"].items()}
+    entry["points"] = {(new if name == point else name): at for name, at in entry["points"].items()}
     for load in sketch.of("loads").values():
         if (load.get("link"), load.get("at")) == (link, point):
             load["at"] = new

@@ -50,13 +50,13 @@ def corner_of(mechanism: Mechanism, name: str, side: str | None, steps: int) -> 
 
     corner = worst_corner(mechanism, name, side, steps)
     run, time = corner.prepared.run, corner.time
-    whole = not np.isfinite(time)
+    over_cycle = not np.isfinite(time)
     return {
         "values": list(corner.deviations),
         "texts": [_signed(value, corner.unit) for value in corner.deviations],
         "side": corner.side,
-        "index": None if whole else int(np.argmin(np.abs(run.cycle.times(steps) - time))),
-        "at": None if whole else run.system.dial(run.values, np.array([time])).at(0),
+        "index": None if over_cycle else int(np.argmin(np.abs(run.cycle.times(steps) - time))),
+        "at": None if over_cycle else run.system.dial(run.values, np.array([time])).at(0),
         "rows": [[path, quantity(nominal, unit), _signed(there - nominal, unit)]
                  for path, unit, nominal, there in corner.rows],
         "scene": _scene(corner.prepared, corner.numbers, steps),
@@ -74,16 +74,18 @@ def _scene(prepared: ToleranceStudy, numbers: Mapping[str, float], steps: int) -
     inputs, bare = prepared.inputs, prepare(prepared.run.system.mechanism.with_friction("off"))
     run = replace(bare, values={**bare.values, **numbers})
     run.__dict__.update(ideal_values=inputs.nominal, erring=True, seats=[])  # its pins lie where the corner has them
-    shown = scene(result_of(run, positions(run, steps, margin=False, averaged=False)).dataset, max_positions=steps)
+    drawn_scene = scene(
+        result_of(run, positions(run, steps, margin=False, averaged=False)).dataset, max_positions=steps
+    )
     for joint in inputs.loose:
         play, links = inputs.play(joint, numbers), run.system.joints[joint][1]
         assert play is not None  # else it would not be loose
         guide = play.model.size is not None and play.model.size[0] == "guide"
-        shown["built"]["seats"].append({
+        drawn_scene["built"]["seats"].append({
             "joint": joint, "kind": "guide" if guide else "pin", "clearance": float(np.ravel(primal(play.radii[0]))[0]),
             "length": float(np.ravel(primal(play.length))[0]) if guide else None, "links": list(links), "ends": [],
         })  # fmt: skip
-    return shown
+    return drawn_scene
 
 
 def _signed(value: float, unit: str) -> str:

@@ -64,19 +64,19 @@ class StudioWidget(anywidget.AnyWidget):
 
     def _request(self, path: str, body: bytes) -> tuple[int, bytes]:
         kind, _, name = path.strip("/").partition("/")
-        known: dict[str, Callable[[], bytes]] = {
+        routes: dict[str, Callable[[], bytes]] = {
             "files": self._files,
             "file": lambda: self._saved(body) if body else json.dumps({"text": self.text}).encode(),
             "thumbnail": lambda: thumbnail(examples()[unquote(name)]),
             "jobs": lambda: json.dumps({"forms": [], "jobs": []}).encode(),
         }
-        if kind not in known:
+        if kind not in routes:
             return 404, json.dumps({"error": "A notebook does not do that: use the command line."}).encode()
-        return 200, known[kind]()
+        return 200, routes[kind]()
 
     def _files(self) -> bytes:
-        own = hashlib.sha256(self.model_id.encode()).hexdigest()[:16]
-        return json.dumps({"folder": "notebook", "id": own, "open": NAME, "files": [NAME]}).encode()
+        digest = hashlib.sha256(self.model_id.encode()).hexdigest()[:16]
+        return json.dumps({"folder": "notebook", "id": digest, "open": NAME, "files": [NAME]}).encode()
 
     def _saved(self, body: bytes) -> bytes:
         self.text = str(json.loads(body)["text"])

@@ -32,26 +32,26 @@ INNER, TURNED = (
 BEYOND = 1.5  # of the distance of its pins, how long the link of an RPR is
 
 
-def block(sketch: Sketch, given: Given) -> str:
+def block(sketch: Sketch, gesture: Given) -> str:
     """A block of the list BLOCKS.
 
     pins: joints, free points "link.P", or {ground: "x, y"} for a new pin on the ground. at: "x, y" of the inner pin,
     of a driver or RPR the end of its link, of a CCC the angle between the shafts; as it fits if empty. ratio: of gears.
     """
-    kind = str(given["kind"])
+    kind = str(gesture["kind"])
     if kind not in BLOCKS:
         raise refused(f"'{kind}' is no block", "the block", f"choose {', '.join(BLOCKS)}")
     begin(sketch)
-    if len(set(map(str, given["pins"]))) < len(given["pins"]):
+    if len(set(map(str, gesture["pins"]))) < len(gesture["pins"]):
         raise refused("has the same pin twice", "the block", "choose other pins")
     if kind == "CCC":
-        return _loop_in_space(sketch, given.get("at") or "30 deg")
+        return _loop_in_space(sketch, gesture.get("at") or "30 deg")
     if kind == "gear":
-        if not all(isinstance(pin, str) for pin in given["pins"]):
+        if not all(isinstance(pin, str) for pin in gesture["pins"]):
             raise refused("need two pivots that are drawn", "the gears", "choose two pins")
-        return gear(sketch, {"joints": given["pins"], "ratio": given.get("ratio")})
-    pins = [pin if isinstance(pin, str) else {"ground": _place(sketch, pin["ground"])} for pin in given["pins"]]
-    BLOCKS[kind](sketch, pins, _place(sketch, given["at"]) if str(given.get("at") or "").strip() else None)
+        return gear(sketch, {"joints": gesture["pins"], "ratio": gesture.get("ratio")})
+    pins = [pin if isinstance(pin, str) else {"ground": _place(sketch, pin["ground"])} for pin in gesture["pins"]]
+    BLOCKS[kind](sketch, pins, _place(sketch, gesture["at"]) if str(gesture.get("at") or "").strip() else None)
     return f"Add {kind if kind.isupper() else f'a {kind}'}"
 
 

@@ -122,12 +122,12 @@ def text(value: float, unit: str, digits: int = 3) -> str:
 
 def scale_of(result: xr.Dataset, channel: int, condition: int) -> tuple[float, str]:
     """Factor and unit that a channel is read in, in a condition; a speed in the unit of its file."""
-    own = str(attribute(result, "channel_units")[channel])
+    display_unit = str(attribute(result, "channel_units")[channel])
     unit, size = (attribute(result, "channel_read_in") or [["", 1.0]] * (channel + 1))[channel]
-    if unit and own == "rad/s":
+    if unit and display_unit == "rad/s":
         return 1 / size, str(unit)
     values = np.concatenate([result[name].values[channel, condition] for name in ("measured", "model")])
-    return prefixed(float(np.nanmax(np.abs(values[np.isfinite(values)]), initial=0.0)), own)
+    return prefixed(float(np.nanmax(np.abs(values[np.isfinite(values)]), initial=0.0)), display_unit)
 
 
 def drive(result: xr.Dataset, condition: int) -> Abscissa:
@@ -135,10 +135,10 @@ def drive(result: xr.Dataset, condition: int) -> Abscissa:
     values = np.asarray(result["drive"].values[condition], float)
     values = values[np.isfinite(values)]
     unit, name = str(result.attrs["drive_unit"]), str(result.attrs["drive_name"])
-    factor, shown = prefixed(float(np.abs(values).max(initial=0.0)), unit)
+    factor, display_unit = prefixed(float(np.abs(values).max(initial=0.0)), unit)
     title = {"rad": f"drive angle {name}", "m": f"drive slide {name}", "s": "time"}[unit]
     even = values.size > 2 and np.ptp(np.diff(values)) <= 1e-6 * abs(values[1] - values[0])
-    return over_turn(title, shown, values * factor, bool(even and int(result.attrs["periodic"])))
+    return over_turn(title, display_unit, values * factor, bool(even and int(result.attrs["periodic"])))
 
 
 # ---- tables -------------------------------------------------------------------------------------------------------
@@ -212,8 +212,8 @@ def _residual_cells(result: xr.Dataset, i: int, k: int) -> list[str]:
     rms, largest, bias = (text(value * factor, unit) if np.isfinite(value) else NONE for value in sizes)
     if np.isfinite(sizes[2] + wide):
         bias = with_uncertainty(sizes[2] * factor, wide * factor, unit).replace("-", "−").replace(" ", "\u00a0")
-    turned, shown = prefixed(at, str(result.attrs["drive_unit"]))
-    place = setting(at * turned, shown) if np.isfinite(at) else NONE
+    turned, display_unit = prefixed(at, str(result.attrs["drive_unit"]))
+    place = setting(at * turned, display_unit) if np.isfinite(at) else NONE
     shares = (f"{100 * part:.1f}\u00a0%" if np.isfinite(part) else NONE for part in (within, least))
     return [rms, largest, place, bias, *shares, _plain(alike), verdict(result, i, k)]
 
@@ -260,9 +260,11 @@ def sensors(result: xr.Dataset) -> Table:
             values = result[f"accuracy_{what}"].values[i]
             texts = []
             for end in (np.nanmin(values), np.nanmax(values)) if np.isfinite(values).any() else ():
-                factor, shown = (1 / size, read) if read and size != 1 else prefixed(float(end), unit)
-                told = text(end * factor, shown) if what == "zero" else f"{number(100 * float(end), 3)}\u00a0%"
-                texts.append(told if end else "0")
+                factor, display_unit = (1 / size, read) if read and size != 1 else prefixed(float(end), unit)
+                text_of = (
+                    text(end * factor, display_unit) if what == "zero" else f"{number(100 * float(end), 3)}\u00a0%"
+                )
+                texts.append(text_of if end else "0")
             cells.append(" to ".join(dict.fromkeys(texts)) or NONE)
         rows.append([name, measures[i], "" if (read or unit) == "1" else read or unit, *cells])
     return Table("sensors", ["channel", "measures", "unit", "u of the zero", "u of the gain"], rows)
@@ -324,12 +326,12 @@ def figure(
         chart = efficiency(result)
         over = "condition" if chart.x.title == "condition" else varied(result)[0].name
         return draw(f"Efficiency, measured and model, over {over}", result, [Panel("", [chart], 3.75)])
-    shown = panels(result, channel, condition)
-    if not shown:
+    panels_of = panels(result, channel, condition)
+    if not panels_of:
         remedy = "see the findings of `trunnion data`"
         raise MechanismError(Finding("there is no signal to draw", "--kind overlay", remedy))
-    more = f", {MOST_PANELS} of {len(shown)} signals" if len(shown) > MOST_PANELS else ""
-    courses = [course(result, i, k, 80) for i, k in shown[:MOST_PANELS]]
+    more = f", {MOST_PANELS} of {len(panels_of)} signals" if len(panels_of) > MOST_PANELS else ""
+    courses = [course(result, i, k, 80) for i, k in panels_of[:MOST_PANELS]]
     return draw(f"Measured and model{more}", result, courses, columns=2)
 
 
@@ -341,8 +343,10 @@ def panels(result: xr.Dataset, channel: str | None = None, condition: str | None
         if name is not None and name not in every:
             raise MechanismError(Finding(f"there is no {dim} '{name}'", f"--{dim}", nearest(name, every)))
         picked.append(range(len(every)) if name is None else [every.index(name)])
-    there = np.isfinite(result["measured"].values).any(axis=2) | np.isfinite(result["model"].values).any(axis=2)
-    return [(i, k) for k in picked[1] for i in picked[0] if there[i, k]]
+    measured_channels = np.isfinite(result["measured"].values).any(axis=2) | np.isfinite(result["model"].values).any(
+        axis=2
+    )
+    return [(i, k) for k in picked[1] for i in picked[0] if measured_channels[i, k]]
 
 
 def efficiency(result: xr.Dataset) -> Chart:
@@ -364,10 +368,10 @@ def efficiency(result: xr.Dataset) -> Chart:
     measured = f"measured, ±U ({coverage_of(result)})"
     marks += [Line(nothing, nothing, measured, dots.but(dash="none", mark="o")), Line(nothing, nothing, "model", line)]
     stripes, limits = _unanswered(result, over)
-    told = names(result, "condition")
-    named = over.name == "condition" and len(told) <= 24 and max(map(len, told)) <= 24
-    across = Axis(over.title, limits, [(k + 1, name) for k, name in enumerate(told)] if named else None,
-                  turned=60 if named and sum(map(len, told)) > 70 else 0)  # fmt: skip
+    conditions_of = names(result, "condition")
+    named = over.name == "condition" and len(conditions_of) <= 24 and max(map(len, conditions_of)) <= 24
+    across = Axis(over.title, limits, [(k + 1, name) for k, name in enumerate(conditions_of)] if named else None,
+                  turned=60 if named and sum(map(len, conditions_of)) > 70 else 0)  # fmt: skip
     return Chart(across, Axis("efficiency"), [*marks, *stripes], legend=Legend(least=1), colours=colours)
 
 
@@ -489,12 +493,12 @@ def report(result: xr.Dataset) -> str:
     parts += [Section("Verdicts", about, tables=[verdicts(result)])]
     parts += [Section(one.title.capitalize(), tables=[one]) for one in (conditions(result), sensors(result))]
     for i, name in enumerate(names(result, "channel")):
-        there = [k for _, k in panels(result, name)]
-        drawn = sorted(sorted(there, key=lambda k, i=i: -_severity(result, i, k))[:MOST_DRAWN])  # type: ignore[misc]
+        panels_of = [k for _, k in panels(result, name)]
+        drawn = sorted(sorted(panels_of, key=lambda k, i=i: -_severity(result, i, k))[:MOST_DRAWN])  # type: ignore[misc]
         unit = str(attribute(result, "channel_units")[i])
         about = f"measures {attribute(result, 'channel_measures')[i]}{f', {unit}' if unit != '1' else ''}"
-        if len(drawn) < len(there):
-            about += f"; {len(drawn)} of {len(there)} conditions are drawn, those with the largest residuals for " \
+        if len(drawn) < len(panels_of):
+            about += f"; {len(drawn)} of {len(panels_of)} conditions are drawn, those with the largest residuals for " \
                      "their uncertainty"  # fmt: skip
         pictures = [(f"{name}, {label(result, k)}", small(course(result, i, k, 62))) for k in drawn]
         why = explained(result, i)
@@ -531,8 +535,8 @@ def of_file(row: dict[str, str]) -> dict[str, str]:
 def _severity(result: xr.Dataset, channel: int, condition: int) -> float:
     """Root mean square of the residual in expanded uncertainties; of an unknown one in its own unit."""
     residual, wide = (result[key].values[channel, condition] for key in ("residual", "expanded"))
-    there = np.isfinite(residual)
-    if not there.any():
+    finite = np.isfinite(residual)
+    if not finite.any():
         return -1.0
     scale = np.where(np.isfinite(wide) & (wide > 0), wide, 1.0)
-    return float(np.sqrt(np.mean((residual / scale)[there] ** 2)))
+    return float(np.sqrt(np.mean((residual / scale)[finite] ** 2)))

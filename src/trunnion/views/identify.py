@@ -120,15 +120,15 @@ def estimates(result: xr.Dataset) -> list[Estimate]:
     rows = []
     units, paths = attribute(result, "parameter_units"), attribute(result, "parameter_paths")
     sources = names(result, "source")
-    errors = {one.code for one in findings_of(result) if one.severity is Severity.ERROR}
+    errors = {finding.code for finding in findings_of(result) if finding.severity is Severity.ERROR}
     lacking = "model does not fit" if errors & {"fit.misfit", "sensor.off"} else "not identifiable"
     for p, name in enumerate(names(result, "parameter")):
-        factor, shown = read_in(units[p])
+        factor, display_unit = read_in(units[p])
         keys = ("start", "estimate", "standard_uncertainty", "lower", "upper")
         start, value, deviation, lower, upper = (float(result[key].values[p]) * factor for key in keys)
         shares = dict(zip(sources, map(float, result["share"].values[p]), strict=True))
         rows.append(
-            Estimate(name, tuple(paths[p]), shown, start, value, deviation, lower, upper,
+            Estimate(name, tuple(paths[p]), display_unit, start, value, deviation, lower, upper,
                      float(result["degrees_of_freedom"].values[p]), int(result["limit"].values[p]),
                      bool(result["told"].values[p]), shares, lacking)
         )  # fmt: skip
@@ -196,11 +196,11 @@ def _residuals(result: xr.Dataset, title: str, turns_of: str, keys: tuple[str, .
         turns = result[turns_of].values[i]
         fitted = np.flatnonzero(turns > 0)
         values = np.array([result[key].values[i, fitted] for key in keys], float)
-        factor, shown = prefixed(float(np.max(np.nan_to_num(values[:2]), initial=0.0)), unit)
+        factor, display_unit = prefixed(float(np.max(np.nan_to_num(values[:2]), initial=0.0)), unit)
         for k, rms in zip(fitted, values.T, strict=True):
             cells = [f"{value * factor:.3g}" if math.isfinite(value) else NONE for value in rms]
             positions = [f"{int(result['used'].values[i, k]):,}"] if used else []
-            rows.append([name, short[k], *cells, shown, f"{int(turns[k])}", *positions])
+            rows.append([name, short[k], *cells, display_unit, f"{int(turns[k])}", *positions])
     columns = ["channel", head, "RMS before", "RMS after", "expected", "unit", "turns", *(["positions"] * used)]
     return Table(title, columns, rows) if rows else None
 
@@ -320,7 +320,7 @@ def _residual(
         for key in ("before", "after", "uncertainty")
     )
     sizes = np.concatenate([start, end] if before else [end, COVERED * spread])
-    factor, shown = prefixed(float(np.nanmax(np.abs(sizes), initial=0.0)), unit)
+    factor, display_unit = prefixed(float(np.nanmax(np.abs(sizes), initial=0.0)), unit)
     marks: list[Mark] = []
     if before:
         marks.append(Line(x, start * factor, "before", Look(BEFORE, 1.1, mark="o", size=2)))
@@ -328,7 +328,7 @@ def _residual(
         half = COVERED * spread * factor
         marks.append(Band(x, -half, half, f"±{COVERED:g} u of the mean, by scatter", Look("shade", order=1)))
     marks.append(Line(x, end * factor, "after", Look(AFTER, 1.1, mark="o", size=2)))
-    return Chart(across, Axis(f"{name} [{shown}]" if shown else name), marks, True, legend)
+    return Chart(across, Axis(f"{name} [{display_unit}]" if display_unit else name), marks, True, legend)
 
 
 def _residual_figures(result: xr.Dataset) -> list[Panel]:
@@ -342,7 +342,7 @@ def _residual_figures(result: xr.Dataset) -> list[Panel]:
             np.array([result[f"residual_{key}"].values[i, k, 0] for k in conditions], float)
             for key in ("before", "after", "uncertainty")
         )
-        factor, shown = prefixed(float(np.nanmax(np.abs([before, after]), initial=0.0)), unit)
+        factor, display_unit = prefixed(float(np.nanmax(np.abs([before, after]), initial=0.0)), unit)
         x, half = np.searchsorted(every, conditions).astype(float), COVERED * np.nan_to_num(spread) * factor
         marks: list[Mark] = [
             Line(x, before * factor, "before", Look(BEFORE, dash="none", mark="D", size=5, hollow=True)),
@@ -352,7 +352,11 @@ def _residual_figures(result: xr.Dataset) -> list[Panel]:
         across = Axis(title, places=[(n, short[k]) for n, k in enumerate(every)], turned=90 if len(every) > FEW else 0)
         legend = None if panels else Legend(least=1)
         panels.append(
-            Panel("", [Chart(across, Axis(f"{name} [{shown}]" if shown else name), marks, True, legend)], 2.8)
+            Panel(
+                "",
+                [Chart(across, Axis(f"{name} [{display_unit}]" if display_unit else name), marks, True, legend)],
+                2.8,
+            )
         )
     return panels
 
@@ -362,7 +366,7 @@ def _residual_figures(result: xr.Dataset) -> list[Panel]:
 
 def report(result: xr.Dataset) -> str:
     """The whole report as HTML, to be filed."""
-    several, held = correlations(result), held_out(result)
+    several, holdout = correlations(result), held_out(result)
     members = sum(row.identifiable for row in estimates(result))
     numbers = [table for table in (estimated(result).titled(""), budget(result), sensors(result)) if table is not None]
     parts = [Section("Estimates", pictures=[("Estimates", figure(result, "intervals"))], after=numbers)]
@@ -373,9 +377,9 @@ def report(result: xr.Dataset) -> str:
     about = "Measured minus model over the cycle, before and after the fit."
     pictures = [("Residuals", figure(result, "residuals"))]
     parts.append(Section("Residuals", about, pictures, after=[fit] if fit else []))
-    if held:
+    if holdout:
         about = "Data not used in the fit, and the error of their prediction."
-        parts.append(Section("Held out", about, after=[held]))
+        parts.append(Section("Held out", about, after=[holdout]))
     end = [data_section(result, "data_files"), Section("Parameters", tables=[stated(result)])]
     model = str(result.attrs["name"]) or "model"
     sizes = [(result.sizes[dim], dim) for dim in ("parameter", "channel", "condition")]

@@ -30,43 +30,43 @@ def tables(measurement: Measurement) -> list[Table]:
     """The conditions with the mean of each channel, then the channels with scatter and uncertainty over all of them."""
     conditions = measurement.conditions
     channels = list(measurement.channels)
-    units = {name: one.shown for name, one in measurement.channels.items()}  # of all files, whatever a file is in
-    speeds = np.isfinite([one.speed for one in conditions]).any()
-    named, short = shortened([one.name for one in conditions])
+    units = {name: item.shown for name, item in measurement.channels.items()}  # of all files, whatever a file is in
+    speeds = np.isfinite([item.speed for item in conditions]).any()
+    named, short = shortened([item.name for item in conditions])
     settings = [named] if named == "condition" else named.split(", ")
     head = [*settings, "turns", *(["speed rpm"] if speeds else [])]
     head += [f"{name} {_unit(units[name][0])}".strip() for name in channels]
     rows = []
-    for one, name in list(zip(conditions, short, strict=True))[:MOST]:
-        turns = max(course.turns.shape[0] for course in one.courses.values())
-        speed = [f"{one.speed * 30 / np.pi:.5g}"] if speeds else []
-        own = [name] if named == "condition" else [part.replace(" ", "\u00a0") for part in name.split(", ")]
-        means = (_figure(_overall(one.courses[key], units[key][1])) if key in one.courses else "" for key in channels)
-        rows.append([*own, f"{turns:,}", *speed, *means])
+    for item, name in list(zip(conditions, short, strict=True))[:MOST]:
+        turns = max(course.turns.shape[0] for course in item.courses.values())
+        speed = [f"{item.speed * 30 / np.pi:.5g}"] if speeds else []
+        labels = [name] if named == "condition" else [part.replace(" ", "\u00a0") for part in name.split(", ")]
+        means = (_figure(_overall(item.courses[key], units[key][1])) if key in item.courses else "" for key in channels)
+        rows.append([*labels, f"{turns:,}", *speed, *means])
     if len(conditions) > MOST:
         rows.append([f"{len(conditions) - MOST} more", *[""] * (len(head) - 1)])
-    shown = [Table(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
+    tables_of = [Table(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
     head = ["channel", "measures", "unit", "least", "largest", "scatter", "uncertainty"]
-    rows = [[name, *_channel([one.courses[name] for one in conditions if name in one.courses])] for name in channels]
+    rows = [[name, *_channel([item.courses[name] for item in conditions if name in item.courses])] for name in channels]
     title = "channels: mean signal, scatter of turns, standard uncertainty of the mean"
-    return [*shown, Table(title, head, rows)]
+    return [*tables_of, Table(title, head, rows)]
 
 
 def _channel(courses: list[Signal]) -> list[str]:
     """Measure and unit of a channel; extremes of its mean courses; RMS of scatter and of uncertainty."""
     unit, factor = courses[0].shown
-    means = np.concatenate([one.mean for one in courses]) / factor
-    known = means[np.isfinite(means)]
-    extremes = [_figure(float(known.min())), _figure(float(known.max()))] if known.size else ["none", "none"]
-    spreads = [np.concatenate([getattr(one, figure) for one in courses]) for figure in ("scatter", "uncertainty")]
-    return [courses[0].measures, _unit(unit), *extremes, *(_figure(rms(one) / factor, 3) for one in spreads)]
+    means = np.concatenate([item.mean for item in courses]) / factor
+    finite = means[np.isfinite(means)]
+    extremes = [_figure(float(finite.min())), _figure(float(finite.max()))] if finite.size else ["none", "none"]
+    spreads = [np.concatenate([getattr(item, figure) for item in courses]) for figure in ("scatter", "uncertainty")]
+    return [courses[0].measures, _unit(unit), *extremes, *(_figure(rms(item) / factor, 3) for item in spreads)]
 
 
 def _overall(course: Signal, size: float) -> float:
     """Mean over the positions, in a unit of a size in SI."""
-    known = course.mean[np.isfinite(course.mean)]
+    finite = course.mean[np.isfinite(course.mean)]
     with np.errstate(over="ignore"):
-        return float(known.mean()) / size if known.size else np.nan
+        return float(finite.mean()) / size if finite.size else np.nan
 
 
 def _figure(value: float, digits: int = 5) -> str:

@@ -103,17 +103,17 @@ def _group(name: str, result: xr.Dataset, table: str) -> list[Column]:
     return OF_CYCLE[name](result) if name in OF_CYCLE and kind_of(result) == "cycle" else columns(result, table)
 
 
-def selected(result: xr.Dataset, wanted: Sequence[str] | None = None, table: str = "") -> list[Column]:
+def selected(result: xr.Dataset, names_asked: Sequence[str] | None = None, table: str = "") -> list[Column]:
     """The columns of a table of a result, in the order asked for and each once.
 
-    wanted: groups of GROUPS, names of columns, or patterns of them such as `crank.B.*`; the usual ones if not given.
+    names_asked: groups of GROUPS, names of columns, or patterns of them such as `crank.B.*`; the usual ones by default.
     The time is always there, if the table has it. Raises MechanismError for a name that no column has.
     """
-    if wanted is None:
+    if names_asked is None:
         return columns(result, table)
     every = _group("all", result, table)
     chosen = [column for column in every[:1] if column.name == "time"]
-    for name in wanted:
+    for name in names_asked:
         matching = [column for column in every if fnmatchcase(column.name, name)]
         matching = _group(name, result, table) if name in GROUPS else matching
         if not matching:
@@ -136,8 +136,8 @@ def in_model_units(result: xr.Dataset, every: Iterable[Column]) -> list[Column]:
     converted = []
     for name, si, values in every:
         model_unit = units.get(si, si)
-        shown = name if model_unit in ("", "1") else f"{name} [{model_unit}]"
+        heading = name if model_unit in ("", "1") else f"{name} [{model_unit}]"
         converted.append(
-            Column(shown, model_unit, values if model_unit == si else values * (1 / float(unit(model_unit)[0])))
+            Column(heading, model_unit, values if model_unit == si else values * (1 / float(unit(model_unit)[0])))
         )
     return converted

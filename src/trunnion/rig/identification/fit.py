@@ -150,8 +150,8 @@ def sensor_errors(model: Model, conditions: Sequence[Condition], blocks: Sequenc
         add(k, accuracy.gain, f"gain of {channel}", channel, "gain")
         for name, size in {f"{FILE_ZERO} of {channel}": accuracy.own, **block.effects}.items():
             group = name if name.startswith(FILE_ZERO) else ""
-            own = f"{name}: {' '.join(condition.files or (str(block.condition),))}" if group else name
-            add(k, size, own, name.partition(" of ")[2].removeprefix("each file of "), name.partition(" ")[0], group)
+            label = f"{name}: {' '.join(condition.files or (str(block.condition),))}" if group else name
+            add(k, size, label, name.partition(" of ")[2].removeprefix("each file of "), name.partition(" ")[0], group)
         duration, _, turn = model.cycles[block.condition]
         if block.signal.turns.shape[1] > 2:
             add(k, condition.lag / (duration or inf), f"{FILE_ANGLE}: {condition.name}", "", "angle", FILE_ANGLE)
@@ -245,8 +245,8 @@ class Fit:
     def reading(self, x: Array, k: int) -> tuple[Array, Array]:
         """What the sensor of a block would read, (position,), and its derivatives, (unknown and sensor, position)."""
         block = self.blocks[k]
-        said, size = self.courses(x).said[block.condition][block.channel], block.signal.turns.shape[1]
-        value, slope, datum = said.value[:size], said.slope[:, :size], block.signal.accuracy.datum
+        courses_of, size = self.courses(x).said[block.condition][block.channel], block.signal.turns.shape[1]
+        value, slope, datum = courses_of.value[:size], courses_of.slope[:, :size], block.signal.accuracy.datum
         # the errors behind a course that is computed are added to it
         acting = [(s, "zero" if block.effects else error.kind, error.sizes[k])
                   for s, error in enumerate(self.sensors, self.count) if error.sizes[k]]  # fmt: skip
@@ -304,10 +304,10 @@ class Fit:
                 u = np.sqrt(self.variances[k] / np.maximum(block.signal.count, 1) + block.unresolved**2)
                 phase, bends = self.model.phases[block.condition], self.model.bends[block.condition]
                 closed = self.model.run.cycle.periodic
-                beside = turned | corners(value, phase, bends, u, turned, closed=closed, guard=guard)
+                edges = turned | corners(value, phase, bends, u, turned, closed=closed, guard=guard)
                 for _ in range(guard - 1):
-                    beside = beside | np.roll(beside, 1) | np.roll(beside, -1)
-                good = (status == Status.SOLVED) & ~(beside & (guard > 0))
+                    edges = edges | np.roll(edges, 1) | np.roll(edges, -1)
+                good = (status == Status.SOLVED) & ~(edges & (guard > 0))
             masks.append(good & np.isfinite(block.data) & np.isfinite(value[:size]))
         return masks
 
@@ -358,7 +358,7 @@ MOST = 1 / 3  # of the positions, that are left out at corners: of a table of ve
 
 
 def corners(
-    value: Array, phase: Array, bends: Array, uncertainty: Array, taken: Mask, *, closed: bool, guard: int
+    value: Array, phase: Array, bends: Array, uncertainty: Array, excluded: Mask, *, closed: bool, guard: int
 ) -> Mask:
     """The positions before and after each corner or jump that resampling rounds off by more than the data hide.
 
@@ -370,7 +370,7 @@ def corners(
     value, phase, uncertainty : (position,), the course of the model, the share of the cycle, the standard uncertainty
         of the measured mean.
     bends : shares of the cycle at which the model may bend or jump.
-    taken : (position,), where it is known to jump already.
+    excluded : (position,), where it is known to jump already.
     closed : whether the cycle repeats.
     guard : positions that will be left out on each side.
     """
@@ -388,7 +388,7 @@ def corners(
     pairs = order[np.stack([before, before + 1]) % size]
     level, peak = np.min(usual[pairs], axis=0), np.max(bend[pairs], axis=0)
     off = ROUNDED * (peak - level) / np.maximum(np.min(uncertainty[pairs], axis=0), 1e-300)
-    off[(peak <= STANDS_OUT * level) | (off <= TOO_MUCH) | np.any(taken[pairs], axis=0)] = 0.0
+    off[(peak <= STANDS_OUT * level) | (off <= TOO_MUCH) | np.any(excluded[pairs], axis=0)] = 0.0
     largest = np.argsort(-off)[: max(1, int(MOST * size / (2 * max(guard, 1))))]
     marked[pairs[:, largest[off[largest] > 0]]] = True
     return marked

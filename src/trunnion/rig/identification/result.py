@@ -150,12 +150,12 @@ class Identified:
     @cached_property
     def beyond(self) -> dict[int, float]:
         """What errors of sensors at their limit come to with nothing stated of them, by place; no stated one is so."""
-        fit, beyond = self.fit, dict[int, float]()
+        fit, excess = self.fit, dict[int, float]()
         for s, (error, size) in enumerate(zip(fit.sensors, self.x[fit.count :], strict=True)):
             if error.stated and abs(size) > NEAR_LIMIT * error.most:
                 free = [*fit.sensors[:s], replace(error, stated=False), *fit.sensors[s + 1 :]]
-                beyond[s] = float(solved(replace(fit, sensors=free), self.x).x[fit.count + s])
-        return {s: size for s, size in beyond.items() if abs(size) >= FAR}
+                excess[s] = float(solved(replace(fit, sensors=free), self.x).x[fit.count + s])
+        return {s: size for s, size in excess.items() if abs(size) >= FAR}
 
     @property
     def refuted(self) -> bool:
@@ -212,8 +212,8 @@ class Identified:
                 columns = np.nan_to_num(fit.reading(self.x, k)[1][:, where])
                 predicted = np.einsum("pi,pq,qi->i", columns, self.spread.covariance, columns)
                 expected = np.sqrt(self._scatter(k) / np.maximum(block.held.count, 1)[where] + predicted)
-                held = {"before": before, "after": after, "expected": expected}
-                figures |= {f"held_out_{name}": rms(row) for name, row in held.items()}
+                at_blocks = {"before": before, "after": after, "expected": expected}
+                figures |= {f"held_out_{name}": rms(row) for name, row in at_blocks.items()}
             for name, row in rows.items():
                 arrays[name][at][: len(row)] = row
             for name, figure in figures.items():
@@ -390,20 +390,20 @@ def _sensors(identified: Identified) -> Iterator[Finding]:
     """Channels whose zero and gain count as exact; errors far from what is stated, where nothing explains a misfit."""
     fit, bare = identified.fit, dict[str, bool]()
     for block in (fit.blocks[k] for k in fit.fitted):
-        stated = bool(block.effects or shared_zero(block.signal.accuracy) or block.signal.accuracy.gain)
-        bare[block.channel] = bare.get(block.channel, True) and not stated
+        has_error = bool(block.effects or shared_zero(block.signal.accuracy) or block.signal.accuracy.gain)
+        bare[block.channel] = bare.get(block.channel, True) and not has_error
     if names := [name for name, is_bare in bare.items() if is_bare and not fit.model.measures[name].of_motion]:
         what = f"no accuracy is stated for {_joined(names)}: zero and gain count as exact, and the intervals are too "
         remedy = "state accuracy: {zero: …, gain: …} in the mapping"
         yield Finding.warning("sensor.no_accuracy", "sensors", f"{what}narrow", remedy)
     for s, sensor in enumerate(fit.sensors) if not (identified.causes or identified.spread.test.gross) else ():
-        beyond, times = s in identified.beyond, abs(identified.beyond.get(s, float(identified.x[fit.count + s])))
+        excess, times = s in identified.beyond, abs(identified.beyond.get(s, float(identified.x[fit.count + s])))
         if sensor.stated and times > OFF:
             what = f"differs from its stated value by {times:.1f} standard uncertainties"
-            what += ", which no stated error does: the estimates mean nothing" * beyond
+            what += ", which no stated error does: the estimates mean nothing" * excess
             remedy = "check the sensor, its unit, its stated accuracy, and lengths and loads of the model"
-            where, severity = "angle.zero" if sensor.angle else sensor.name, (Severity.WARNING, Severity.ERROR)[beyond]
-            yield Finding.weighed(severity, "sensor.off", where, what, remedy, times=times, beyond=beyond)
+            where, severity = "angle.zero" if sensor.angle else sensor.name, (Severity.WARNING, Severity.ERROR)[excess]
+            yield Finding.weighed(severity, "sensor.off", where, what, remedy, times=times, beyond=excess)
 
 
 def _parameters(identified: Identified) -> Iterator[Finding]:
@@ -484,7 +484,7 @@ def corrected_mapping(mapping: Mapping[str, Any], result: xr.Dataset) -> dict[st
     """
     entries = deepcopy(dict(mapping))
     path, paths = str(result.attrs["encoder"]), attribute(result, "parameter_paths")
-    p = next((p for p, own in enumerate(paths) if path in own and result["told"].values[p]), None)
+    p = next((p for p, place in enumerate(paths) if path in place and result["told"].values[p]), None)
     causes = (finding.figures for finding in findings_of(result) if finding.code == "fit.cause")
     cause: Mapping[str, Any] = next(causes, {"kind": ""})
     if p is not None:
@@ -516,8 +516,8 @@ def _shift(entries: dict[str, Any], name: str, size: float) -> None:
     """Another zero of a channel that reads too much by a size, SI."""
     channel, part = DataMapping.model_validate(entries).channels[name], entries["channels"][name]
     scale = channel.scale(channel.unit or "")
-    own = any("zero" in file.get("channels", {}).get(name, {}) for file in entries.get("files", ()))
-    if own or not isinstance(channel.zero, Amount):
+    has_zero = any("zero" in file.get("channels", {}).get(name, {}) for file in entries.get("files", ()))
+    if has_zero or not isinstance(channel.zero, Amount):
         what = f"the zero of an unloaded stretch, or of single files, is off by {size:.4g} {scale.unit}"
         raise MechanismError(Finding(what, f"channels.{name}.zero", "check what loads the sensor there"))
     zero = scale.factor * scale.reading(channel.zero, "zero") + channel.sign * size

@@ -158,13 +158,16 @@ def identify(
 
 
 def _blocks(
-    mechanism: Mechanism, measurement: Measurement, channels: Sequence[str] | None, held: tuple[frozenset[str], float]
+    mechanism: Mechanism,
+    measurement: Measurement,
+    channels: Sequence[str] | None,
+    held_conditions: tuple[frozenset[str], float],
 ) -> list[Block]:
     """One for each channel in each condition; all channels if none is named.
 
-    held: conditions by name, and the share of the turns of each, the last ones.
+    held_conditions: conditions by name, and the share of the turns of each, the last ones.
     """
-    conditions, joints, (names, share) = measurement.conditions, load_joints(mechanism), held
+    conditions, joints, (names, share) = measurement.conditions, load_joints(mechanism), held_conditions
     every = list(dict.fromkeys(name for condition in conditions for name in condition.courses))
     if not every:
         raise MechanismError(Finding("the measurement has no channels", measurement.name, "map one to a measure"))
@@ -234,8 +237,8 @@ def held_out(mechanism: Mechanism, measurement: Measurement, hold_out: HoldOut) 
                 number: float | str = value
                 with suppress(ValueError):  # with a unit
                     number = float(value)
-                stated = float(np.ravel(mechanism.with_values({path: number}).parameters()[path])[0])
-                if np.isclose(settings.get(path, np.nan), stated, rtol=SAME, atol=0):
+                value_stated = float(np.ravel(mechanism.with_values({path: number}).parameters()[path])[0])
+                if np.isclose(settings.get(path, np.nan), value_stated, rtol=SAME, atol=0):
                     exact.add(condition.name)
         if not exact | parts:
             names = "; ".join(condition.name for condition in conditions[:MOST_NAMED])
@@ -333,10 +336,10 @@ def _causes(fit: Fit, start: Array, reduced: float) -> list[MisfitCause]:
     """
     causes, channels = [], list(dict.fromkeys(fit.blocks[k].channel for k in fit.fitted))
     for kind, channel in (*product(("zero", "gain"), channels), ("angle", "")):
-        own, unit = [block for block in fit.blocks if block.channel == channel], 0.01
+        own_blocks, unit = [block for block in fit.blocks if block.channel == channel], 0.01
         sizes = np.array([unit * (block.channel == channel) for block in fit.blocks])
         if kind == "zero":
-            usual = rms(np.concatenate([block.signal.turns.ravel() for block in own])) or 1.0
+            usual = rms(np.concatenate([block.signal.turns.ravel() for block in own_blocks])) or 1.0
             sizes, unit = sizes * usual, unit * usual
         elif kind == "angle":
             sizes = np.array([-unit / fit.model.cycles[block.condition].turn for block in fit.blocks])
@@ -363,7 +366,7 @@ def _causes(fit: Fit, start: Array, reduced: float) -> list[MisfitCause]:
                 alike = [sensor for sensor in fit.sensors if (sensor.kind, sensor.channel) == (kind, channel)]
                 deviations = (sensor.angle if kind == "angle" else np.abs(sensor.sizes).max() for sensor in alike
                             if sensor.stated)  # fmt: skip
-                stated = max(map(float, deviations), default=0.0)
-                times, n = abs(size) / stated if stated else 0.0, fit.count
+                largest = max(map(float, deviations), default=0.0)
+                times, n = abs(size) / largest if largest else 0.0, fit.count
                 causes.append(MisfitCause(kind, channel, size, wide, min(share, 1.0), times, best.x[:n], half[:n]))
     return sorted(causes, key=lambda item: -round(item.explains, 2))  # of equal ones first the simplest

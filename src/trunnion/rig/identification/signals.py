@@ -123,9 +123,9 @@ class Model:
                 parts = {name: [np.broadcast_to(np.asarray(of(signal), float), shape) for of in (primal, derivative)]
                          for name, signal in courses.items()}  # fmt: skip
                 for i, k in enumerate(part):
-                    own = slice(i * many, (i + 1) * many)
-                    said = {name: Said(value[own][0], slope[own]) for name, (value, slope) in parts.items()}
-                    rows[k] = said, np.max(status[own], axis=0), np.any(turned[own], axis=0)
+                    lanes = slice(i * many, (i + 1) * many)
+                    courses_of = {name: Said(value[lanes][0], slope[lanes]) for name, (value, slope) in parts.items()}
+                    rows[k] = courses_of, np.max(status[lanes], axis=0), np.any(turned[lanes], axis=0)
         return Courses(*zip(*(rows[k] for k in range(len(self.phases))), strict=True))
 
     def _batch(
@@ -275,16 +275,16 @@ class Model:
 
 def described(mechanism: Mechanism, parameters: Parameters) -> dict[str, tuple[str, ...]]:
     """Paths by the name of the unknown; MechanismError for what means no number, or one that is named twice."""
-    stated = parameters if isinstance(parameters, Mapping) else {name: [name] for name in parameters}
-    if not stated:
+    groups = parameters if isinstance(parameters, Mapping) else {name: [name] for name in parameters}
+    if not groups:
         remedy = "name one, such as joint_defaults.friction.coefficient"
         raise MechanismError(Finding("no parameter to identify is given", "parameters", remedy))
     findings: list[Finding] = []
     paths: dict[str, tuple[str, ...]] = {}
     owners: dict[str, str] = {}
-    for name, given in stated.items():
+    for name, members in groups.items():
         paths[name] = ()
-        for number in [given] if isinstance(given, str) else list(given) or [name]:
+        for number in [members] if isinstance(members, str) else list(members) or [name]:
             try:
                 path = mechanism.path_of(number)
             except MechanismError as error:
@@ -325,8 +325,8 @@ def unknowns(
         lows, highs = zip(*(limits(mechanism, path) for path in paths), strict=True)
         first, lower, upper = float(np.mean(before)), max(lows), min(highs)
         if name in start:
-            stated = mechanism.with_values({paths[0]: start[name]}).parameters()
-            first = float(np.ravel(stated[paths[0]])[0])
+            numbers = mechanism.with_values({paths[0]: start[name]}).parameters()
+            first = float(np.ravel(numbers[paths[0]])[0])
         if not lower <= first <= upper:
             what = f"the start {first:g} is beyond its limits, {lower:g} to {upper:g} (SI)"
             findings.append(Finding(what, where, "give another start"))

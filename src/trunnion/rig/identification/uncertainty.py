@@ -118,8 +118,8 @@ def spread_of(fit: Fit, x: Array) -> Covariances:
         parts["misfit"], pieces = _left_over(fit, x, pulls, repeats=True)
         random.append((parts["misfit"], np.full(len(x), pieces)))
     more = np.diagonal(np.sum([part for part, _ in random], axis=0))[: fit.count]
-    own = np.diagonal(parts["scatter"])[: fit.count]
-    excess = float(np.mean(more[own > 0] / own[own > 0])) if np.any(own > 0) else 1.0
+    spread = np.diagonal(parts["scatter"])[: fit.count]
+    excess = float(np.mean(more[spread > 0] / spread[spread > 0])) if np.any(spread > 0) else 1.0
     for s, sensor in enumerate(fit.sensors, fit.count):
         if sensor.stated:
             source = sensor.group or sensor.name
@@ -160,12 +160,12 @@ def _between_turns(
     products, squares, pairs = 0.0, 0, 0
     by_condition: dict[int, tuple[Array, int]] = {}
     for condition in dict.fromkeys(block.condition for block in fit.blocks):
-        own = [k for k in pulls if fit.blocks[k].condition == condition and fit.blocks[k].repeats]
-        if not own:
+        own_blocks = [k for k in pulls if fit.blocks[k].condition == condition and fit.blocks[k].repeats]
+        if not own_blocks:
             continue
-        turns = max(len(fit.blocks[k].spread) for k in own)
+        turns = max(len(fit.blocks[k].spread) for k in own_blocks)
         moved = np.zeros((turns, size))
-        for k in own:  # the channels of a turn belong together
+        for k in own_blocks:  # the channels of a turn belong together
             spread, count = fit.blocks[k].spread, fit.blocks[k].signal.count
             moved[: len(spread)] += spread / np.sqrt(len(spread) * np.maximum(count, 1)) @ pulls[k].T
         covariance = moved.T @ moved * (turns / (turns - 1))
@@ -173,7 +173,7 @@ def _between_turns(
         fourth += np.diagonal(covariance) ** 2 / (turns - 1)
         by_condition[condition] = np.diagonal(covariance), turns
         length = np.sqrt(np.maximum(np.sum(moved**2, axis=0), 1e-300))[:n]
-        telling = length > np.sqrt(sum(np.diagonal(steps[k]) for k in own))[:n] + 1e-140  # else it is rounding
+        telling = length > np.sqrt(sum(np.diagonal(steps[k]) for k in own_blocks))[:n] + 1e-140  # else it is rounding
         unit = (moved[:, :n] / length)[:, telling]
         products += float(np.sum(unit[1:] * unit[:-1])) + unit.shape[1] / turns  # its bias is −1/turns
         squares += unit.shape[1]

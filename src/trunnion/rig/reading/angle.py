@@ -89,8 +89,8 @@ def coordinate(source: AngleSource, table: DataTable, line: Timeline, speed: Arr
 def _tied(values: Array, index: Array, seconds: Array, say: Say) -> tuple[Array, Array]:
     """An angle stretched between the pulses of an index so that these are a turn apart; not known beyond them."""
     at = np.interp(index, seconds, values)
-    way = np.sign(at[-1] - at[0]) or 1.0
-    turns = np.rint(np.diff(at) / TURN * way)
+    sense = np.sign(at[-1] - at[0]) or 1.0
+    turns = np.rint(np.diff(at) / TURN * sense)
     spoilt = np.column_stack([index[:-1], index[1:]])[turns != 1]
     if spoilt.size:
         what = f"{counted(len(spoilt), 'interval')} of the index, {at_times(spoilt[:, 0])}, are not one turn of the "
@@ -98,7 +98,7 @@ def _tied(values: Array, index: Array, seconds: Array, say: Say) -> tuple[Array,
     say("the angle is tied to the index pulse once a turn")
     exact = TURN * np.concatenate([[0.0], np.cumsum(np.maximum(turns, 1))])
     inside = (seconds >= index[0]) & (seconds <= index[-1])
-    return np.where(inside, way * np.interp(values * way, at * way, exact), np.nan), spoilt
+    return np.where(inside, sense * np.interp(values * sense, at * sense, exact), np.nan), spoilt
 
 
 # ---- pulses ---------------------------------------------------------------------------------------------------
@@ -216,13 +216,13 @@ def by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say)
     With few samples a pulse the count at an index is known to about one: then its median over nine turns is taken.
     """
     at = np.interp(index, pulses.times, pulses.counts)
-    way = np.sign(at[-1] - at[0]) or 1.0
-    between = np.diff(at) * way
+    sense = np.sign(at[-1] - at[0]) or 1.0
+    between = np.diff(at) * sense
     usual = float(np.median(between))
     if abs(usual - per_turn) >= max(0.75, 0.01 * per_turn):
         what = f"from one index pulse to the next the encoder counts {usual:.4g}, angle.per_turn is {per_turn:,}"
         say(warning("pulses.per_turn", "angle.per_turn", what, "correct per_turn, if the index comes once a turn"))
-    over = (at - at[0]) * way - per_turn * np.cumsum([0.0, *np.maximum(np.rint(between / per_turn), 1.0)])
+    over = (at - at[0]) * sense - per_turn * np.cumsum([0.0, *np.maximum(np.rint(between / per_turn), 1.0)])
     fraction = float(np.angle(np.mean(np.exp(2j * np.pi * over)))) / (2 * np.pi)
     level = over - fraction
     if pulses.slack(step) > 0.25 and level.size >= 9:
@@ -238,7 +238,7 @@ def by_index(pulses: Pulses, index: Array, per_turn: int, step: float, say: Say)
         say(warning("pulses.lost", "angle", f"{what}; corrected at the index, these turns are left out", remedy))
     turn = np.clip(np.searchsorted(index, pulses.times, side="right") - 1, 0, index.size - 1)
     spoilt = np.column_stack([index[:-1][wrong], index[1:][wrong]])
-    return pulses.counts - at[0] - way * fraction - way * level[turn], spoilt
+    return pulses.counts - at[0] - sense * fraction - sense * level[turn], spoilt
 
 
 def seen_edges(index: Array, turns: float, step: float) -> Array:
@@ -319,6 +319,6 @@ def unresolved(off: Array, step: float) -> float:
     if off.size < 2:
         return 0.0
     few = int(0.005 * off.size)
-    kept = np.sort(off)[few : off.size - few]
-    between = max(float(np.max(np.diff(kept), initial=0.0)), step - float(kept[-1] - kept[0]))
+    inner = np.sort(off)[few : off.size - few]
+    between = max(float(np.max(np.diff(inner), initial=0.0)), step - float(inner[-1] - inner[0]))
     return min(between, step) / math.sqrt(12.0)

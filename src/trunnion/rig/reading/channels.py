@@ -267,16 +267,16 @@ def clipped(where: str, readings: Array, limit: float, unit: str, seconds: Array
 
 
 def faults(
-    where: str, readings: Array, seconds: Array, turns: tuple[Array, Array], beside: int, moves: bool
+    where: str, readings: Array, seconds: Array, turns: tuple[Array, Array], width: int, moves: bool
 ) -> Iterator[Finding]:
     """Stuck readings and spikes while the drive runs, which become NaN; what most turns have is the signal's.
 
-    turns: when they begin and end, s; with fewer than `FEW` nothing tells a fault from the signal. beside: rows before
+    turns: when they begin and end, s; with fewer than `FEW` nothing tells a fault from the signal. width: rows before
     and after the turns that reach into them, by interpolation or a filter. moves: whether the readings are to change.
     """
     begin, end = turns
     first, last = int(np.searchsorted(seconds, begin[0])), int(np.searchsorted(seconds, end[-1], "right"))
-    running, near = slice(first, last), slice(max(first - beside, 0), last + beside)
+    running, near = slice(first, last), slice(max(first - width, 0), last + width)
     finite = readings[running][np.isfinite(readings[running])]
     if finite.size < 10:
         return

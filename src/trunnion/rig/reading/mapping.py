@@ -157,10 +157,10 @@ class AngleSource(Part):
     def _of_its_kind(self) -> AngleSource:
         needed, allowed = _KEYS[self.from_]
         keys = {key for parts in _KEYS.values() for part in parts for key in part}
-        stated = {key for key in keys if getattr(self, key) is not None}
-        if missing := [key for key in needed if key not in stated]:
+        keys_stated = {key for key in keys if getattr(self, key) is not None}
+        if missing := [key for key in needed if key not in keys_stated]:
             raise problem(f"from: {self.from_} needs {' and '.join(missing)}", "add it")
-        if extra := sorted(stated - {*needed, *allowed}):
+        if extra := sorted(keys_stated - {*needed, *allowed}):
             remedy = f"remove it; the keys of from: {self.from_} are {', '.join((*needed, *allowed))}"
             raise problem(f"from: {self.from_} does not use {', '.join(extra)}", remedy)
         if self.wrap is not None and self.kind == "level":
@@ -238,8 +238,8 @@ class Channel(FileChannel):
     def scale(self, unit: str) -> units.SensorScale:
         """How readings in a unit become the quantity; UnitError if they, or an amount of the channel, cannot."""
         of_unit = units.scale(self.measures, unit, self.gain)
-        stated = {"zero": self.zero, "range": self.range, "resolution": self.resolution}
-        for key, amount in {**stated, "accuracy.zero": self.accuracy.zero}.items():
+        entries = {"zero": self.zero, "range": self.range, "resolution": self.resolution}
+        for key, amount in {**entries, "accuracy.zero": self.accuracy.zero}.items():
             if isinstance(amount, units.Amount):
                 of_unit.reading(amount, key)
         return of_unit

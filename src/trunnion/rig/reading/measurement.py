@@ -133,8 +133,8 @@ class Signal:
         """
         repeated = self.scatter / np.sqrt(np.maximum(self.count, 1))
         with np.errstate(over="ignore"):  # of numbers near the end of the floats
-            known = np.square(self.accuracy.zero) + np.square(self.accuracy.cut) + np.square(self.unresolved)
-            return np.asarray(np.sqrt(repeated**2 + known + (self.accuracy.gain * self.read) ** 2))
+            variance = np.square(self.accuracy.zero) + np.square(self.accuracy.cut) + np.square(self.unresolved)
+            return np.asarray(np.sqrt(repeated**2 + variance + (self.accuracy.gain * self.read) ** 2))
 
 
 @dataclass(frozen=True)
@@ -202,7 +202,7 @@ class Measurement:
     @property
     def channels(self) -> dict[str, Signal]:
         """The first course of each channel."""
-        return {name: course for one in reversed(self.conditions) for name, course in one.courses.items()}
+        return {name: course for condition in reversed(self.conditions) for name, course in condition.courses.items()}
 
 
 def dataset(measurement: Measurement) -> xr.Dataset:
@@ -284,7 +284,9 @@ class Efficiency:
     @property
     def freedom(self) -> float:
         """Effective degrees of freedom: those of the scatter between turns by its share of u². GUM, G.4.1."""
-        scatter = sum(one.effect for one in self.contributions if one.source == "repeatability")
+        scatter = sum(
+            contribution.effect for contribution in self.contributions if contribution.source == "repeatability"
+        )
         share = self.uncertainty / scatter if scatter > 0 else float("inf")
         square = share * share  # not a power: near the end of the floats that is an error
         return (self.turns - 1) * square * square if scatter > 0 else float("inf")
@@ -372,9 +374,9 @@ def efficiency_of(condition: Condition, joints: Mapping[str, str] | None = None)
     dwell, timing = _dwell(pairs, condition)
     sides = (pairs.driven, pairs.loaded)
     powers = [np.sum([dwell * force.turns * speed.turns for force, speed in side], axis=0) for side in sides]
-    (powers_in, powers_out), whole = _filled(*powers)
-    if not np.any(whole):
-        what = f"no turn is whole in all channels of {len(whole)}"
+    (powers_in, powers_out), fillable = _filled(*powers)
+    if not np.any(fillable):
+        what = f"no turn is whole in all channels of {len(fillable)}"
         raise MechanismError(Finding(what, condition.name, "see the gaps reported by `trunnion data`"))
     power_in, power_out = float(np.mean(powers_in)), float(np.mean(powers_out))
     if not power_in:
@@ -388,9 +390,9 @@ def efficiency_of(condition: Condition, joints: Mapping[str, str] | None = None)
     for side, factor in zip(sides, (-value, 1.0), strict=True):
         for force, speed in side:
             by = factor / power_in * dwell
-            parts = [(force, by * speed.turns[whole]), (speed, by * force.turns[whole])]
+            parts = [(force, by * speed.turns[fillable]), (speed, by * force.turns[fillable])]
             if timing is not None:
-                parts.append((timing, -by * force.turns[whole] * speed.turns[whole] / timing.mean))
+                parts.append((timing, -by * force.turns[fillable] * speed.turns[fillable] / timing.mean))
             for course, weight in parts:  # a channel in several powers has the sum
                 before = weights.get(course.channel, (course, 0.0))[1]
                 weights[course.channel] = course, before + weight
@@ -398,15 +400,17 @@ def efficiency_of(condition: Condition, joints: Mapping[str, str] | None = None)
     contributions = [UncertaintyContribution("", "repeatability", scatter, 1.0)]
     for name, (course, weight) in weights.items():  # of what it reads, x → (1 + gain) x + zero
         accuracy, by_zero = course.accuracy, float(np.nanmean(weight))
-        by_gain = float(np.nanmean(weight * (course.turns[whole] - accuracy.datum)))
+        by_gain = float(np.nanmean(weight * (course.turns[fillable] - accuracy.datum)))
         contributions += [
             UncertaintyContribution(name, "gain", accuracy.gain, by_gain),
             UncertaintyContribution(name, "zero", accuracy.zero, by_zero),
-            UncertaintyContribution(name, "resolution", replace(course, turns=course.turns[whole]).unresolved, by_zero),
+            UncertaintyContribution(
+                name, "resolution", replace(course, turns=course.turns[fillable]).unresolved, by_zero
+            ),
         ]
-    contributions = [one for one in contributions if not one.input <= 0]  # NaN stays
-    uncertainty = float(np.sqrt(sum(one.effect * one.effect for one in contributions)))
-    left_out = int(np.count_nonzero(~whole))
+    contributions = [contribution for contribution in contributions if not contribution.input <= 0]  # NaN stays
+    uncertainty = float(np.sqrt(sum(contribution.effect * contribution.effect for contribution in contributions)))
+    left_out = int(np.count_nonzero(~fillable))
     return Efficiency(value, uncertainty, power_in, power_out, per_turn, tuple(contributions), left_out)
 
 
@@ -432,11 +436,11 @@ def _filled(*powers: Array) -> tuple[list[Array], NDArray[np.bool_]]:
     put the turn's mean off by what a course has of its own there. A turn that lacks more is left out.
     """
     finite = np.all(np.isfinite(powers), axis=0)
-    whole = np.mean(~finite, axis=1) <= LACKING
-    whole &= np.any(finite[whole], axis=0).all()  # else nothing is known of a position
-    finite = finite[whole]
+    fillable = np.mean(~finite, axis=1) <= LACKING
+    fillable &= np.any(finite[fillable], axis=0).all()  # else nothing is known of a position
+    finite = finite[fillable]
     count = np.maximum(np.sum(finite, axis=0), 1)
-    usual = [np.sum(power[whole], axis=0, where=finite) / count for power in powers]
+    usual = [np.sum(power[fillable], axis=0, where=finite) / count for power in powers]
     return [
-        np.mean(np.where(finite, power[whole], mean), axis=1) for power, mean in zip(powers, usual, strict=True)
-    ], whole
+        np.mean(np.where(finite, power[fillable], mean), axis=1) for power, mean in zip(powers, usual, strict=True)
+    ], fillable

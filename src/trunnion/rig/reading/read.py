@@ -80,7 +80,7 @@ def read_measured(
 
 def _done(conditions: Sequence[Condition], recordings: Sequence[_Recording]) -> tuple[str, ...]:
     """How many turns are used, and what was done to the data, each sentence once."""
-    counts = [len(next(iter(one.courses.values())).turns) for one in conditions]
+    counts = [len(next(iter(condition.courses.values())).turns) for condition in conditions]
     each = f"{min(counts):,}" if min(counts) == max(counts) else f"{min(counts):,} to {max(counts):,}"
     where = "" if len(counts) == 1 else f" in each of {len(counts):,} conditions"
     sentences = dict.fromkeys(sentence for recording in recordings for sentence in recording.done)
@@ -229,17 +229,17 @@ class _Recording:
         if not columns:
             return [_Part(texts, values, units, np.ones(size, dtype=np.bool_))]
         raw = np.column_stack([numbers for numbers, _, _ in columns.values()])
-        stated = np.isfinite(raw).all(axis=1)
-        if not stated.all():
-            what = f"{counted(int(np.count_nonzero(~stated)), 'row')} of {size:,} without a condition; left out"
+        constant = np.isfinite(raw).all(axis=1)
+        if not constant.all():
+            what = f"{counted(int(np.count_nonzero(~constant)), 'row')} of {size:,} without a condition; left out"
             self.say(warning("setting.missing", "set", what, "check the column"))
-        levels, which = np.unique(_rounded(raw[stated]), axis=0, return_inverse=True)
+        levels, which = np.unique(_rounded(raw[constant]), axis=0, return_inverse=True)
         if not 0 < len(levels) <= MOST_VALUES:
             what = f"the columns that state the condition have {len(levels):,} different values"
             remedy = "check the column; a measured value is not a setting: write {mean: channel}"
             raise MechanismError(Finding(what, "set", remedy))
         number, parts = np.full(size, -1), []
-        number[stated] = which.ravel()
+        number[constant] = which.ravel()
         for k in dict.fromkeys(which.ravel().tolist()):  # in the order of the file
             part = _Part(dict(texts), dict(values), dict(units), number == k)
             for (path, (_, unit, factor)), value in zip(columns.items(), levels[k].tolist(), strict=True):
@@ -280,10 +280,12 @@ class _Recording:
         self.running = slice(first, int(np.searchsorted(self.line.seconds, end[-1], "right")))
         reach = float(np.median(end - begin)) / self.mapping.positions
         reach += PERIODS / self.mapping.filter.cut_off.value if self.mapping.filter is not None else 0.0
-        beside = channels.WIDTH + int(reach / self.line.step)
+        reach_of_fault = channels.WIDTH + int(reach / self.line.step)
         for name, channel in self.mapping.channels.items():
             where, moves = f"channels.{name}", not channel.measures.startswith("rate:")
-            for finding in channels.faults(where, self.readings[name], self.line.seconds, (begin, end), beside, moves):
+            for finding in channels.faults(
+                where, self.readings[name], self.line.seconds, (begin, end), reach_of_fault, moves
+            ):
                 self.say(finding)
 
     def levels(self) -> Iterator[tuple[StepKey, Array]]:
@@ -327,7 +329,7 @@ class _Recording:
         for part in self.parts if coarse else ():
             course = part.courses[name] / (size * step)
             part.left[name] = left_in_turns(part.turns, course, readings / step, noise / step)
-        own = size * sensor.zero_uncertainty
+        zero_error = size * sensor.zero_uncertainty
         parts = [(part.turns, part.courses[name]) for part in self.parts]
         creeps = sensor.channel.measures.startswith("rate:")  # a speed may
         drift = None if creeps else channels.common_drift(parts)
@@ -340,11 +342,11 @@ class _Recording:
                 what += f"; a straight line is subtracted, zero at {since:.4g} s"
                 for part in self.parts:
                     part.courses[name] = resampled(part.turns, values - drift.slope * (line.seconds - since), angle)
-                own = float(np.hypot(own, drift.error * drift.span / 2))  # of the line at either end
+                zero_error = float(np.hypot(zero_error, drift.error * drift.span / 2))  # of the line at either end
             self.say(warning("zero.drift_files", f"channels.{name}", what, remedy))
         gain = float(sensor.channel.accuracy.gain.evaluate())
-        total = float(np.hypot(sensor.accuracy, own))
-        return Accuracy(total, gain, size * step * coarse, own, datum=sensor.datum)
+        total = float(np.hypot(sensor.accuracy, zero_error))
+        return Accuracy(total, gain, size * step * coarse, zero_error, datum=sensor.datum)
 
     def _speed(self, parts: Sequence[_Part]) -> float:
         """Of the driver, with its sign, rad/s."""

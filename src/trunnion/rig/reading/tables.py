@@ -124,10 +124,10 @@ def _places(path: Path, present: Sequence[str], names: Sequence[str], optional: 
         listed = ", ".join(f"'{name}'" for name in present[:NAMED]) + (", …" if len(present) > NAMED else "")
         what = f"there is no column {', '.join(map(repr, missing))}; the file has {listed or 'none'}"
         raise _failed(path, what, "name one of these in the mapping")
-    wanted = [name for name in (*names, *optional) if name in present]
-    if doubled := [name for name in wanted if present.count(name) > 1]:
+    columns = [name for name in (*names, *optional) if name in present]
+    if doubled := [name for name in columns if present.count(name) > 1]:
         raise _failed(path, f"the column '{doubled[0]}' stands there {present.count(doubled[0])} times", "rename one")
-    return {name: present.index(name) for name in wanted}
+    return {name: present.index(name) for name in columns}
 
 
 # ---- cells ----------------------------------------------------------------------------------------------------
@@ -243,26 +243,26 @@ def _first_lines(path: Path) -> tuple[list[tuple[int, str]], str]:
     if any("\0" in line or len(line) == LONGEST for line in lines):
         remedy = "check that it is CSV, with a row of the table in each line"
         raise _failed(path, f"is not a text file: a NUL, or no end of a line in {LONGEST >> 20} MiB", remedy, 1)
-    stated = [(place, line.rstrip("\n")) for place, line in enumerate(lines)
+    numbered = [(place, line.rstrip("\n")) for place, line in enumerate(lines)
               if line.strip() and not line.lstrip().startswith("#")]  # fmt: skip
-    if not stated:
+    if not numbered:
         raise _failed(path, "is empty but for comments", "check that the recording was saved", 1)
-    return stated, encoding
+    return numbered, encoding
 
 
-def _header(path: Path, lines: list[tuple[int, str]], wanted: set[str]) -> tuple[int, str, list[tuple[str, str]]]:
+def _header(path: Path, lines: list[tuple[int, str]], columns: set[str]) -> tuple[int, str, list[tuple[str, str]]]:
     """Place, separator, and names with units of the line that has the most of the columns; loggers write above it."""
     best: tuple[int, int, str, list[tuple[str, str]]] = (0, 0, "", [])
     for place, line in lines[:FIRST]:
         bare = re.sub(r'"[^"]*"', "", line)
         separator = next((sign for sign in ";\t" if sign in bare), ",")
-        heads = [_heading(cell, wanted) for cell in _cells(line, separator)]
-        hits = len({name for name, _ in heads} & wanted)
+        heads = [_heading(cell, columns) for cell in _cells(line, separator)]
+        hits = len({name for name, _ in heads} & columns)
         if hits > best[0]:
             best = hits, place, separator, heads
     if not best[0]:
         first = " / ".join(line.strip()[:60] for _, line in lines[:3])
-        what = f"no line has the columns {', '.join(map(repr, sorted(wanted)))}; the first lines are: {first}"
+        what = f"no line has the columns {', '.join(map(repr, sorted(columns)))}; the first lines are: {first}"
         remedy = "name the columns of the file in the mapping, or write their names above the numbers"
         raise _failed(path, what, remedy, 1)
     return best[1:]
@@ -281,7 +281,7 @@ def _bare(cell: str) -> str:
     return "" if text in _NO_UNIT else text
 
 
-def _heading(cell: str, wanted: set[str]) -> tuple[str, str]:
+def _heading(cell: str, columns: set[str]) -> tuple[str, str]:
     """Name and unit of a header's cell. A name that is wanted with its unit in it stays whole."""
     cell = unguarded(cell.strip().strip('"').strip())
     match = _HEADING.fullmatch(cell)
@@ -293,7 +293,7 @@ def _heading(cell: str, wanted: set[str]) -> tuple[str, str]:
             dimensions(unit.strip())
         except UnitError:
             return cell, ""
-    return cell if cell in wanted else match["name"] or match["before"] or "", _bare(unit)
+    return cell if cell in columns else match["name"] or match["before"] or "", _bare(unit)
 
 
 def _words(cells: Sequence[str]) -> bool:

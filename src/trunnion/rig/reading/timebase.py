@@ -72,19 +72,19 @@ def _rising(seconds: Array, say: Say) -> Timeline:
     """Times that rise, from a column: rows whose time does not rise are left out."""
     highest = np.fmax.accumulate(seconds)
     rises = np.isfinite(seconds) & (seconds > np.concatenate([[-np.inf], np.nan_to_num(highest[:-1], nan=-np.inf)]))
-    kept = np.flatnonzero(rises)
-    if kept.size < 3:
-        what = f"the time rises in {kept.size} of {counted(seconds.size, 'row')}"
+    rising = np.flatnonzero(rises)
+    if rising.size < 3:
+        what = f"the time rises in {rising.size} of {counted(seconds.size, 'row')}"
         raise MechanismError(Finding(what, "time", "check that time.column is the right one"))
-    stated = seconds[np.isfinite(seconds)]
-    back = np.diff(stated) < 0
-    if kept.size < seconds.size:
+    finite = seconds[np.isfinite(seconds)]
+    back = np.diff(finite) < 0
+    if rising.size < seconds.size:
         what = f"{counted(int(np.sum(~rises)), 'row')} of {seconds.size:,} left out: their time does not rise, "
         what += f"{at_times(highest[~rises])}, and runs backward {counted(int(back.sum()), 'time')} by up to "
-        what += f"{max(-np.diff(stated).min(), 0) + 0.0:.4g} s"
+        what += f"{max(-np.diff(finite).min(), 0) + 0.0:.4g} s"
         remedy = "check the logger's clock, split the file where a recording begins, or state time: {rate: …}"
         say(warning("time.backward", "time", what, remedy))
-    clean = seconds[kept]
+    clean = seconds[rising]
     steps = np.diff(clean)
     step = float(np.median(steps))
     wide = steps > GAP * step
@@ -94,16 +94,18 @@ def _rising(seconds: Array, say: Say) -> Timeline:
         what += f"{steps[longest]:.4g} s at {clean[longest]:.5g} s"
         say(warning("time.gaps", "time", what, "the positions in them have fewer turns; check the logger's buffer"))
     even = float(np.std(steps[~wide] / step)) < UNEVEN
-    return Timeline(clean, kept if kept.size < seconds.size else None, step, even, stated[:-1][back])
+    return Timeline(clean, rising if rising.size < seconds.size else None, step, even, finite[:-1][back])
 
 
-def unit_of(where: str, name: str, column: Column, stated: str | None, assumed: str, say: Say) -> tuple[str, float]:
+def unit_of(
+    where: str, name: str, column: Column, unit_stated: str | None, assumed: str, say: Say
+) -> tuple[str, float]:
     """Unit of a column, and its factor to SI: the mapping's, else the file's, else one that is assumed.
 
     where: the entry of the mapping that has the key `unit`. What the file states otherwise is a finding.
     """
-    unit = stated or column.unit or assumed
-    if not (stated or column.unit) and assumed:
+    unit = unit_stated or column.unit or assumed
+    if not (unit_stated or column.unit) and assumed:
         what = f"the column '{name}' has no unit; SI is assumed ({assumed})"
         say(note("unit.none", where, what, f"state {where}.unit"))
     try:
@@ -114,7 +116,7 @@ def unit_of(where: str, name: str, column: Column, stated: str | None, assumed: 
     if where in ("time", "angle") and not alike(kind, dimensions(assumed)[1]):
         what = f"the column '{name}' has the unit '{unit}', which is no {where}"
         raise MechanismError(Finding(what, where, "name another column"))
-    if stated and column.unit:
+    if unit_stated and column.unit:
         try:
             size, of_file = dimensions(column.unit)
         except UnitError:
@@ -123,7 +125,8 @@ def unit_of(where: str, name: str, column: Column, stated: str | None, assumed: 
         turns = turns and bool(np.isclose(factor / size, (1, 2 * np.pi)).any())
         if not turns and not (alike(of_file, kind) and size == factor):
             times = f": all values are {factor / size:.3g} times those of the file" if alike(of_file, kind) else ""
-            what = f"the file has the unit '{column.unit}' for '{name}', the mapping '{stated}', which is taken{times}"
+            what = f"the file has the unit '{column.unit}' for '{name}', the mapping '{unit_stated}', which is taken"
+            what += times
             say(warning("unit.differs", where, what, f"correct {where}.unit, or remove it"))
     return unit, factor
 
@@ -147,14 +150,22 @@ def gathered(findings: Iterable[Finding], same: bool = False) -> list[Finding]:
     same: only those that say the same; else the first speaks for all.
     """
     groups: dict[tuple[str, ...], list[Finding]] = {}
-    for one in findings:
-        key = one.severity, one.where.partition(" ")[0], one.code, one.remedy, one.what if same else ""
-        groups.setdefault(key, []).append(one)
+    for finding in findings:
+        key = (
+            finding.severity,
+            finding.where.partition(" ")[0],
+            finding.code,
+            finding.remedy,
+            finding.what if same else "",
+        )
+        groups.setdefault(key, []).append(finding)
     merged = []
     for group in groups.values():
-        first, files = group[0], list(dict.fromkeys(Path(one.file).name for one in group if one.file))
+        first, files = group[0], list(dict.fromkeys(Path(finding.file).name for finding in group if finding.file))
         if len(group) > 1:
-            where = first.where if len({one.where for one in group}) == 1 else f"{first.where.partition(' ')[0]}s"
+            where = (
+                first.where if len({finding.where for finding in group}) == 1 else f"{first.where.partition(' ')[0]}s"
+            )
             named = ", ".join(files[:4]) + (", …" if len(files) > 4 else "")
             what = f"{first.what} — {len(group)} such findings" + (f": {named}" if files else "")
             first = replace(first, what=what, where=where, file="", line=None)

@@ -161,8 +161,8 @@ def _averaged(turns: Turns, values: Array) -> Array:
         centre = np.bincount(number, weights=off, minlength=size) / count
     rise = np.diff(mean) / np.maximum(1.0 + np.diff(centre), 0.5)
     sides = np.stack([np.append(rise, np.nan), np.insert(rise, 0, np.nan)])
-    beside = np.isfinite(sides)
-    slope = np.where(beside, sides, 0.0).sum(axis=0) / np.maximum(beside.sum(axis=0), 1)
+    finite = np.isfinite(sides)
+    slope = np.where(finite, sides, 0.0).sum(axis=0) / np.maximum(finite.sum(axis=0), 1)
     return np.asarray((mean - slope * centre).reshape(-1, turns.positions)[turns.numbers - turns.numbers[0]])
 
 
@@ -292,7 +292,7 @@ def in_step(turns: Turns, course: Array) -> float:
     many = count > 1
     if not many.any():
         return 1.0
-    parts = (np.bincount(at, one, count.size) for one in (np.cos(angle), np.sin(angle)))
+    parts = (np.bincount(at, component, count.size) for component in (np.cos(angle), np.sin(angle)))
     alike = (sum(part[many] ** 2 for part in parts) / count[many] - 1) / (count[many] - 1)
     return float(np.clip(np.mean(alike), 0.0, 1.0))
 

@@ -111,8 +111,8 @@ class Case:
     def __str__(self) -> str:
         """Its number, and what is set."""
         texts = {name: value if isinstance(value, str) else f"{value:.6g}" for name, value in self.settings.items()}
-        stated = ", ".join(f"{name} = {text}" for name, text in texts.items()) or "as the model states"
-        return f"condition {self.number} ({stated})"
+        settings_text = ", ".join(f"{name} = {text}" for name, text in texts.items()) or "as the model states"
+        return f"condition {self.number} ({settings_text})"
 
 
 @strict_arguments
@@ -193,8 +193,8 @@ class Observation:
         idle = channel.noise / math.sqrt(longest.before) if channel.zeroed and longest.before else channel.offset
         zero = math.hypot(channel.zero, abs(channel.drift) * longest.rows / self.rate / math.sqrt(3), idle)
         rests = channel.at_rest and all(case.before for case in self.cases)  # else all files have one offset
-        own = math.sqrt(max(zero - channel.zero, 0.0) * (zero + channel.zero)) if rests else 0.0
-        return Accuracy(zero, channel.gain, channel.step, own)
+        zero_part = math.sqrt(max(zero - channel.zero, 0.0) * (zero + channel.zero)) if rests else 0.0
+        return Accuracy(zero, channel.gain, channel.step, zero_part)
 
     def measurement(self, positions: int = 360) -> Measurement:
         """The readings as a Measurement, without files in between: the angle is the true one."""
@@ -349,18 +349,18 @@ def _zero(observation: Observation, case: Case) -> float:
 
 def _channel(observation: Observation, name: str) -> dict[str, Any]:
     channel, case = observation.channels[name], observation.cases[0]
-    stated, zero = channel.stated, observation.accuracy(name).zero
+    channel_stated, zero = channel.stated, observation.accuracy(name).zero
     entry: dict[str, Any] = {"column": channel.column, "measures": channel.measures, "unit": channel.reading}
-    if stated.sensitivity:
-        entry["gain"] = stated.sensitivity.source
+    if channel_stated.sensitivity:
+        entry["gain"] = channel_stated.sensitivity.source
     if channel.zeroed and case.before > 1:
         rest = (-case.origin, AT_REST * case.before - case.origin)
         entry["zero"] = {"over": [f"{item / case.rate + 0.0:.6g} s" for item in rest]}
-    if stated.range:
-        entry["range"] = stated.range.source
+    if channel_stated.range:
+        entry["range"] = channel_stated.range.source
     if channel.per_turn:
         entry["per_turn"] = channel.per_turn
-    accuracy: dict[str, Any] = {"gain": stated.accuracy.gain.source} if channel.gain else {}
+    accuracy: dict[str, Any] = {"gain": channel_stated.accuracy.gain.source} if channel.gain else {}
     if channel.noise <= channel.step / 2:  # which does not carry readings over the steps of the converter
         zero = math.hypot(zero, channel.step / math.sqrt(12))  # GUM F.2.2.1
     if zero:
@@ -403,7 +403,9 @@ def solved(run: Run, measures: Sequence[Measure], time: Array) -> tuple[Array, N
             if not periodic:
                 before[0] = after[-1] = False
             row[gaps & (before | after)] = 0.0  # of more than one position; at the ends of a period too
-        known = np.isfinite(row)
-        if known.any() and not known.all():
-            row[~known] = np.interp(time[~known], time[known], row[known], period=run.cycle.duration * periodic or None)
+        finite = np.isfinite(row)
+        if finite.any() and not finite.all():
+            row[~finite] = np.interp(
+                time[~finite], time[finite], row[finite], period=run.cycle.duration * periodic or None
+            )
     return values, status

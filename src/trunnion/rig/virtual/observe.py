@@ -122,8 +122,8 @@ def _measures(rig: Rig, run: Run) -> list[Measure]:
 
 def _channels(rig: Rig, run: Run, measures: Sequence[Measure]) -> dict[str, SensorChannel]:
     """The sensors in the units of what they measure; MechanismError with all that does not fit."""
-    stated = zip(rig.sensors.items(), measures, strict=True)
-    every = each(stated, lambda item: resolved(*item[0], rig.column(item[0][0]), item[1].unit(run.system)))
+    channel_pairs = zip(rig.sensors.items(), measures, strict=True)
+    every = each(channel_pairs, lambda item: resolved(*item[0], rig.column(item[0][0]), item[1].unit(run.system)))
     findings: list[Finding] = []
     driver = next(iter(run.system.mechanism.drivers), None)
     if driver is None or run.cycle.duration <= 0:

@@ -77,8 +77,8 @@ class SensorChannel:
     def decimals(self) -> int:
         """Of a reading in its unit, so that what is left out is nothing beside step and noise."""
         least = min((item for item in (self.step, self.noise) if item > 0), default=0.0) * abs(self.per) * FINE
-        whole = self.limit * abs(self.per) * 1e-9 if math.isfinite(self.limit) else 1e-9
-        return int(np.clip(-math.floor(math.log10(least or whole)), 0, 15))
+        step = self.limit * abs(self.per) * 1e-9 if math.isfinite(self.limit) else 1e-9
+        return int(np.clip(-math.floor(math.log10(least or step)), 0, 15))
 
 
 @dataclass(frozen=True)
@@ -115,17 +115,22 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel
     except UnitError as error:
         where = f"sensors.{name}.{'sensitivity' if sensor.sensitivity else 'unit'}"
         raise MechanismError(Finding(error.what, where, error.remedy)) from None
-    stated = {"range": sensor.range, "span": sensor.span, "noise": sensor.noise, "accuracy.zero": sensor.accuracy.zero,
-              "offset": sensor.offset, "drift": sensor.drift}  # fmt: skip
-    sizes, findings = dict.fromkeys(stated, math.inf), list[Finding]()
-    for key, amount in stated.items():  # of what is measured or of the readings; a drift has a sign, others have none
+    quantities = {"range": sensor.range, "span": sensor.span, "noise": sensor.noise, "offset": sensor.offset,
+                  "accuracy.zero": sensor.accuracy.zero, "drift": sensor.drift}  # fmt: skip
+    sizes, findings = dict.fromkeys(quantities, math.inf), list[Finding]()
+    for (
+        key,
+        amount,
+    ) in quantities.items():  # of what is measured or of the readings; a drift has a sign, others have none
         over = "/s" * (key == "drift")
         if amount is None or amount.plain:
             sizes[key] = math.inf if amount is None else amount.value
             continue
-        own = replace(amount, dimensions=multiplied(amount.dimensions, {"s": Fraction(bool(over))}))
+        resolved_amount = replace(amount, dimensions=multiplied(amount.dimensions, {"s": Fraction(bool(over))}))
         try:
-            sizes[key] = (scale.factor if over else abs(scale.factor)) * scale.reading(own, "zero" if over else key)
+            sizes[key] = (scale.factor if over else abs(scale.factor)) * scale.reading(
+                resolved_amount, "zero" if over else key
+            )
         except UnitError:
             units = dict.fromkeys(f"{item}{over}" for item in (unit, reading))
             what = f"'{amount.source}' is not in {' or in '.join(units)}"
@@ -144,21 +149,25 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel
 
 def _scale(sensor: Sensor, unit: str) -> tuple[str, SensorScale]:
     """Unit of the reading, and how readings become what is measured."""
-    given = sensor.sensitivity
-    if sensor.unit or given is None:
+    sensitivity = sensor.sensitivity
+    if sensor.unit or sensitivity is None:
         readings = [sensor.unit or unit]
         dimensions(readings[0])
     else:  # `mV` of `mV/(N m)`, `V` of `N m/V`
-        readings = [given.unit.partition("/")[0].strip(), given.unit.rpartition("/")[2].strip("() "), *READINGS]
+        readings = [
+            sensitivity.unit.partition("/")[0].strip(),
+            sensitivity.unit.rpartition("/")[2].strip("() "),
+            *READINGS,
+        ]
     for reading in filter(None, readings):
         with suppress(UnitError):
-            of_sensor = scale_of(sensor.measures, reading, given)
+            of_sensor = scale_of(sensor.measures, reading, sensitivity)
             if alike(of_sensor.of_quantity, dimensions(unit)[1]):
                 return reading, of_sensor
-    if given is None:
+    if sensitivity is None:
         remedy = f"state a unit of {unit}, or the sensitivity: 100 mV/({unit})"
         raise UnitError(f"'{readings[0]}' does not measure a quantity in {unit}", remedy)
-    what = f"'{given.source}' does not turn {unit} into {sensor.unit or 'a reading in volt, ampere or hertz'}"
+    what = f"'{sensitivity.source}' does not turn {unit} into {sensor.unit or 'a reading in volt, ampere or hertz'}"
     raise UnitError(what, f"write a reading per {unit}, such as 100 mV/({unit}), and the `unit` of the reading")
 
 
@@ -172,10 +181,10 @@ def smoothed(true: Array, bandwidth: float | None, rate: float) -> Array:
     from scipy.signal import lfilter  # brings scipy.stats: longer to import than all the rest
 
     step = 2 * np.pi * bandwidth / rate  # h/τ
-    kept = math.exp(-step)
-    last = 1 - (1 - kept) / step
+    decay = math.exp(-step)
+    last = 1 - (1 - decay) / step
     start = np.array([(1 - last) * true[0]])  # as if it had always been at its first value
-    return np.asarray(lfilter([last, 1 - kept - last], [1.0, -kept], true, zi=start)[0])
+    return np.asarray(lfilter([last, 1 - decay - last], [1.0, -decay], true, zi=start)[0])
 
 
 def pulsed(true: Array, running: slice, per_turn: int, rate: float) -> Array:
@@ -185,15 +194,15 @@ def pulsed(true: Array, running: slice, per_turn: int, rate: float) -> Array:
     turned = np.concatenate([[0.0], np.cumsum((part[1:] + part[:-1]) / (2 * rate))])
     pitch = 2 * np.pi / per_turn
     count = int(turned[-1] / pitch) + 1
-    found = true.copy()
+    counts = true.copy()
     if count < 2:
-        found[running] = 0.0
-        return found
+        counts[running] = 0.0
+        return counts
     time = np.arange(len(part)) / rate
     passed = np.interp(pitch * np.arange(count), turned, time)
     speeds = np.interp(time, (passed[1:] + passed[:-1]) / 2, pitch / np.diff(passed))
-    found[running] = speeds * np.sign(true[running][len(part) // 2])
-    return found
+    counts[running] = speeds * np.sign(true[running][len(part) // 2])
+    return counts
 
 
 def readings(
@@ -218,9 +227,9 @@ def converted(channel: SensorChannel, value: Array) -> Array:
     """Clipped, in steps, in the unit of the reading, with the decimals that a file has."""
     value = np.clip(value, -channel.range, channel.range)
     if channel.step:
-        way = math.copysign(1.0, channel.per)
+        sense = math.copysign(1.0, channel.per)
         most = channel.span - channel.step  # the upper end of a converter is one step short
-        value = way * np.clip(np.rint(way * value / channel.step) * channel.step, -channel.span, most)
+        value = sense * np.clip(np.rint(sense * value / channel.step) * channel.step, -channel.span, most)
     return np.round(value * channel.per, channel.decimals) + 0.0  # + 0.0: no negative zero
 
 

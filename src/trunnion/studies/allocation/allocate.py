@@ -105,21 +105,21 @@ def allocate(
         raise MechanismError(Finding("only a yield can be sure", "sure", "leave it out, or use the criterion yield"))
     share = DEFAULT_YIELD if target is None else target
     _check(share, samples, curve)
-    asked = AllocationRequest(
+    request = AllocationRequest(
         mechanism, _limited(mechanism, measures), criterion, share, choice, steps, at, samples, seed, friction_method,
         jobs, curve, exact, sure,
     )  # fmt: skip
-    found = _found(asked)
-    with_them = mechanism.with_tolerances(found.bought) if found.answer.found else mechanism
-    names = [of.measure.name for of in found.study.linear.measures]
-    methods: list[Method] = ["linear", "worst-case"] if found.answer.found else ["linear"]
-    if samples and found.answer.found:
+    allocated = _found(request)
+    with_them = mechanism.with_tolerances(allocated.bought) if allocated.answer.found else mechanism
+    names = [of.measure.name for of in allocated.study.linear.measures]
+    methods: list[Method] = ["linear", "worst-case"] if allocated.answer.found else ["linear"]
+    if samples and allocated.answer.found:
         methods.append("monte-carlo")
-    known = tolerance(
+    nominal_study = tolerance(
         with_them, names, methods, max(samples, 1), seed, steps, at,
         friction_method=friction_method, jobs=jobs, progress=progress,
     )  # fmt: skip
-    return dataset(found, known)
+    return dataset(allocated, nominal_study)
 
 
 def half_widths(result: xr.Dataset) -> dict[str, float]:
@@ -127,7 +127,9 @@ def half_widths(result: xr.Dataset) -> dict[str, float]:
     if not result.attrs["found"]:
         return {}
     columns = (result[key].values.tolist() for key in ("parameter", "bought", "tolerance", "tolerance_before"))
-    return {name: t for name, there, t, was in zip(*columns, strict=True) if there and abs(t - was) > 1e-12 * t}
+    return {
+        name: t for name, toleranced, t, was in zip(*columns, strict=True) if toleranced and abs(t - was) > 1e-12 * t
+    }
 
 
 def _check(target: float, samples: int, curve: int) -> None:
@@ -148,35 +150,35 @@ def _limited(mechanism: Mechanism, measures: Sequence[str] | None) -> list[str]:
     names = list(mechanism.measures) if measures is None else list(measures)
     keys = ("limit", "at_least", "at_most")
     stated = mechanism.measures
-    found = [name for name in names if name in stated and any(getattr(stated[name], key) is not None for key in keys)]
-    if not found:
+    limited = [name for name in names if name in stated and any(getattr(stated[name], key) is not None for key in keys)]
+    if not limited:
         what = f"none of the measures {', '.join(names)} has a limit" if names else "no measure is stated"
         remedy = "state the measures with limits, as measures: {position: {angle: rocker, limit: ±0.1 deg}}"
         raise MechanismError(Finding(what, "measures", remedy))
-    return found
+    return limited
 
 
-def _found(asked: AllocationRequest) -> Allocated:
+def _found(request: AllocationRequest) -> Allocated:
     """The allocation, with effects that belong to the tolerances found."""
-    mechanism = asked.mechanism
+    mechanism = request.mechanism
     if not mechanism.costs:
         remedy = "state the costs of tolerances, as costs: {AB: {model: power, B: 1, k: 0.45, unit: mm}}"
         raise MechanismError(Finding("no tolerance has a cost", "costs", remedy))
     absent = {one.path: _start(one) for one in mechanism.prices() if one.play and not _clearance(mechanism, one.path)}
-    now = asked.studied(absent)
+    now = request.studied(absent)
     prices, notes = _prices(now)
     before = {**_stated(now, prices), **{path: 0.0 for path in absent if path in prices}}
     listed = next((path for path, price in prices.items() if price.choices), "")
-    if listed and asked.choice == "continuous":
+    if listed and request.choice == "continuous":
         what, remedy = "has a table of processes, which is no continuous choice", "choose discrete, or state a model"
         raise MechanismError(Finding(what, f"costs.{listed}", remedy))
-    search = _Search(asked, prices)
+    search = _Search(request, prices)
     answer, now, rows, more = search.run(now)
-    if asked.exact and asked.criterion == "worst-case" and answer.found:
+    if request.exact and request.criterion == "worst-case" and answer.found:
         answer, now, rows, more = search.tightened(answer, now, rows, more)
     offers: list[tuple[float, Answer]] = []
-    if asked.curve and answer.found:
-        factors: list[float] = np.geomspace(*RANGE, asked.curve).tolist()  # of a yield with the margin that it has
+    if request.curve and answer.found:
+        factors: list[float] = np.geomspace(*RANGE, request.curve).tolist()  # of a yield with the margin that it has
         wider = trade_off(answer.problem, factors)
         offers = [
             (factor, answer if abs(factor - 1) < SAME else one) for factor, one in zip(factors, wider, strict=True)
@@ -184,8 +186,10 @@ def _found(asked: AllocationRequest) -> Allocated:
     what = "the measure has no first-order result: its limits were ignored in the allocation"
     remedy = "check with the samples whether they are met"
     notes += [Finding.warning("allocation.unknown", f"measures.{name}", what, remedy) for name in rows.unknown]
-    way: Way = "discrete" if listed or asked.choice == "discrete" else "continuous"
-    return Allocated(asked, now, rows, answer, way, prices, before, (*notes, *more), search.tight, tuple(offers))
+    answer_kind: Way = "discrete" if listed or request.choice == "discrete" else "continuous"
+    return Allocated(
+        request, now, rows, answer, answer_kind, prices, before, (*notes, *more), search.tight, tuple(offers)
+    )
 
 
 # ---- what is bought -------------------------------------------------------------------------------------------
@@ -200,43 +204,43 @@ def _clearance(mechanism: Mechanism, path: str) -> float:
     )
 
 
-def _start(one: Price) -> float:
+def _start(price: Price) -> float:
     """A half width to begin with, where there is none."""
-    if one.choices:
-        return one.choices[0].tolerance
-    ends = [end for end in (one.least, one.most) if 0 < end < np.inf]
+    if price.choices:
+        return price.choices[0].tolerance
+    ends = [end for end in (price.least, price.most) if 0 < end < np.inf]
     return float(np.sqrt(np.prod(ends))) if len(ends) == 2 else (ends[0] if ends else START)
 
 
-def _prices(found: ToleranceStudy) -> tuple[dict[str, Price], list[Finding]]:
+def _prices(study: ToleranceStudy) -> tuple[dict[str, Price], list[Finding]]:
     """What can be bought of a study's numbers, by path, and what of the costs is of no use."""
-    mechanism, inputs = found.run.system.mechanism, found.inputs
-    known = {one.path: one for one in inputs.tolerances}
+    mechanism, inputs = study.run.system.mechanism, study.inputs
+    tolerances = {tolerance.path: tolerance for tolerance in inputs.tolerances}
     prices, findings = {}, []
-    for one in mechanism.prices():
+    for price in mechanism.prices():
         what = ""
-        if one.path not in inputs.names:
+        if price.path not in inputs.names:
             what = "its pin has a stated seat, so the play does not vary"
-        elif one.path in known and known[one.path].direction:
+        elif price.path in tolerances and tolerances[price.path].direction:
             what = "its direction is arbitrary, so the tolerance has no middle"
-        elif plays := _plays_of(found, one.path):
+        elif plays := _plays_of(study, price.path):
             instead = f"state pin.clearance and a cost of {plays[0]}.clearance instead"
             what = f"it changes the play of {', '.join(plays)}; {instead}"
         if what:
             what = f"this tolerance is not allocated: {what}"
             remedy = "remove the cost; the tolerance stays as stated"
-            findings.append(Finding.warning("allocation.not_for_sale", f"costs.{one.path}", what, remedy))
+            findings.append(Finding.warning("allocation.not_for_sale", f"costs.{price.path}", what, remedy))
         else:
-            prices[one.path] = one
+            prices[price.path] = price
     if not prices:
         raise MechanismError(findings or [Finding("no tolerance has a cost", "costs", "state the cost of a tolerance")])
     return prices, findings
 
 
-def _plays_of(found: ToleranceStudy, path: str) -> list[str]:
+def _plays_of(study: ToleranceStudy, path: str) -> list[str]:
     """Joints whose pins may lie anywhere in a play that the number changes."""
-    mechanism, inputs = found.run.system.mechanism, found.inputs
-    if not any(one.path == path for one in inputs.tolerances):
+    mechanism, inputs = study.run.system.mechanism, study.inputs
+    if not any(tolerance.path == path for tolerance in inputs.tolerances):
         return []
     values = mechanism.parameters(deviations={path: Dual(0.0, 1.0)})
     plays = {joint: inputs.play(joint, values) for joint in inputs.loose}
@@ -245,23 +249,25 @@ def _plays_of(found: ToleranceStudy, path: str) -> list[str]:
     ]
 
 
-def _stated(found: ToleranceStudy, prices: Mapping[str, Price]) -> dict[str, float]:
+def _stated(study: ToleranceStudy, prices: Mapping[str, Price]) -> dict[str, float]:
     """Half widths and clearances of a study, of what can be bought."""
-    mechanism = found.run.system.mechanism
-    known = {one.path: one.half_width for one in found.inputs.tolerances}
-    return {path: known[path] if path in known else _clearance(mechanism, path) for path in prices}
+    mechanism = study.run.system.mechanism
+    half_widths_stated = {tolerance.path: tolerance.half_width for tolerance in study.inputs.tolerances}
+    return {
+        path: half_widths_stated[path] if path in half_widths_stated else _clearance(mechanism, path) for path in prices
+    }
 
 
-def _contributions(found: ToleranceStudy, prices: Mapping[str, Price]) -> tuple[Contribution, ...]:
+def _contributions(study: ToleranceStudy, prices: Mapping[str, Price]) -> tuple[Contribution, ...]:
     """All that varies: what can be bought with its price, the others with their effects as they are."""
     return tuple(
-        _contribution(prices[name]) if name in prices else Contribution(name, 1.0) for name in found.inputs.names
+        _contribution(prices[name]) if name in prices else Contribution(name, 1.0) for name in study.inputs.names
     )
 
 
-def _contribution(one: Price) -> Contribution:
-    cost = Cost(one.model, one.parameters) if one.model else None
-    return Contribution(one.path, 0.0, cost, one.choices, one.group, one.least, one.most)
+def _contribution(price: Price) -> Contribution:
+    cost = Cost(price.model, price.parameters) if price.model else None
+    return Contribution(price.path, 0.0, cost, price.choices, price.group, price.least, price.most)
 
 
 # ---- rounds ---------------------------------------------------------------------------------------------------
@@ -279,11 +285,11 @@ class _Search:
 
     def run(self, now: ToleranceStudy) -> Found:
         """The answer with rows taken at its own tolerances, from those of a study."""
-        kept: Rows | None = None
+        rows_before: Rows | None = None
         rows = self._rows(now, _stated(now, self.prices))
         for count in range(1, ROUNDS + 1):
-            whole = rows if kept is None else joined(rows, kept)
-            problem = AllocationProblem(_contributions(now, self.prices), whole.effects, self.asked.criterion)
+            rows_joined = rows if rows_before is None else joined(rows, rows_before)
+            problem = AllocationProblem(_contributions(now, self.prices), rows_joined.effects, self.asked.criterion)
             off = _off(now)
             answer = none(problem, off) if off else self._solved(problem)
             if not answer.found:
@@ -292,30 +298,30 @@ class _Search:
             after = self.asked.studied(bought)
             ahead = self._rows(after, bought)
             if _same(answer.problem, answer.tolerances, rows, ahead):
-                return answer, after, whole, []
+                return answer, after, rows_joined, []
             if count < ROUNDS:
                 moving = part_of(rows, rows.moving)
-                kept = moving if kept is None else joined(moving, kept)
+                rows_before = moving if rows_before is None else joined(moving, rows_before)
                 rows, now = ahead, after
         else:
             what = f"the effects depend on the tolerances themselves and did not converge in {ROUNDS} iterations"
             doubt = Finding.warning("allocation.unsettled", "costs", what, "use the verification", rounds=ROUNDS)
-            return answer, now, whole, [doubt]
-        return answer, now, whole, []
+            return answer, now, rows_joined, [doubt]
+        return answer, now, rows_joined, []
 
-    def tightened(self, answer: Answer, now: ToleranceStudy, rows: Rows, found: list[Finding]) -> Found:
+    def tightened(self, answer: Answer, now: ToleranceStudy, rows: Rows, findings: list[Finding]) -> Found:
         """The same with limits narrowed until the worst case found on the mechanism keeps the stated ones."""
         for _ in range(ROUNDS):
-            beyond = {of.measure.name: share for of, share in zip(now.linear.measures, _beyond(now), strict=True)}
-            if max(beyond.values()) <= 1 + CLOSE:
+            excess = {of.measure.name: share for of, share in zip(now.linear.measures, _beyond(now), strict=True)}
+            if max(excess.values()) <= 1 + CLOSE:
                 break
-            for name, share in beyond.items():
+            for name, share in excess.items():
                 if share > 1:
                     self.tight[name] = self.tight.get(name, 1.0) / (share * (1 + CLOSE / 2))
-            answer, now, rows, found = self.run(now)
+            answer, now, rows, findings = self.run(now)
             if not answer.found:
                 break
-        return answer, now, rows, found
+        return answer, now, rows, findings
 
     def _rows(self, now: ToleranceStudy, bought: Mapping[str, float]) -> Rows:
         return rows_of(now, bought, self.asked.criterion, self.tight)
@@ -325,50 +331,51 @@ class _Search:
 
     def _solved(self, problem: AllocationProblem) -> Answer:
         """The answer of a problem; of a yield that of the samples."""
-        asked, names = self.asked, [one.name for one in problem.contributions]
+        request, names = self.asked, [contribution.name for contribution in problem.contributions]
 
         def verify(tolerances: Array, number: int) -> SampledYield:
             bought = {name: float(t) for name, t in zip(names, tolerances, strict=True) if name in self.prices}
             sampled = tolerance(
-                asked.mechanism.with_tolerances(bought), asked.measures, ["monte-carlo"], asked.samples,
-                asked.seed + FRESH * number, asked.steps, asked.at, friction_method=asked.friction, jobs=asked.jobs,
+                request.mechanism.with_tolerances(bought), request.measures, ["monte-carlo"], request.samples,
+                request.seed + FRESH * number, request.steps, request.at, friction_method=request.friction,
+                jobs=request.jobs,
             )  # fmt: skip
             return SampledYield(*(float(sampled[f"yield_all{end}"]) for end in ("", "_low", "_high")))
 
-        return solve(problem, asked.target, verify if asked.samples else None, asked.sure)
+        return solve(problem, request.target, verify if request.samples else None, request.sure)
 
 
 def _same(problem: AllocationProblem, tolerances: Array, rows: Rows, ahead: Rows) -> bool:
     """Whether the rows at the tolerances found take as much of their room as those they were found with."""
     if len(ahead.measure) != len(rows.measure):
         return False
-    before, after = (problem.with_effects(one.effects).used(tolerances) for one in (rows, ahead))
+    before, after = (problem.with_effects(rows_at.effects).used(tolerances) for rows_at in (rows, ahead))
     still = ~rows.moving
     return bool(np.all(np.abs(after - before)[still] <= SAME) and np.all(after[rows.moving] <= 1 + SAME))
 
 
 def _beyond(now: ToleranceStudy) -> list[float]:
     """The worst case that is found on the mechanism, as a share of the limit it is nearest to, of each measure."""
-    found = []
+    shares = []
     for of, (least, most) in zip(now.linear.measures, now.worst(), strict=True):
         lower, upper = limits(of)
-        found.append(max(share_of(least.value, lower), share_of(most.value, upper)))
-    return found
+        shares.append(max(share_of(least.value, lower), share_of(most.value, upper)))
+    return shares
 
 
 def _off(now: ToleranceStudy) -> list[Finding]:
     """Measures whose nominal figure is beyond their bounds, which no tolerance mends."""
-    found = []
+    findings = []
     for of in now.linear.measures:
         lower, upper = limits(of)
         if lower > 0 or upper < 0:
             measure, nominal = of.measure, of.reference.figure
             word, bound = ("at_least", nominal + lower) if lower > 0 else ("at_most", nominal + upper)
             unit = measure.figure_unit(now.run.system, now.run.values)
-            factor, shown = drawn_in(bound, unit)
-            told, limit = (signed(value, factor, shown, "", 6) for value in (nominal, bound))
-            what = f"the nominal value is {told}, {word} is {limit}: tolerances cannot correct that"
+            factor, display_unit = drawn_in(bound, unit)
+            texts, limit = (signed(value, factor, display_unit, "", 6) for value in (nominal, bound))
+            what = f"the nominal value is {texts}, {word} is {limit}: tolerances cannot correct that"
             where, remedy = f"measures.{measure.name}", "change the mechanism or the bound"
             figures = {"nominal": nominal, "bound": bound}
-            found.append(Finding.error("allocation.nominal_outside", where, what, remedy, **figures))
-    return found
+            findings.append(Finding.error("allocation.nominal_outside", where, what, remedy, **figures))
+    return findings

@@ -136,9 +136,9 @@ def _solved(task: Task, rows: Rows, relaxed: bool, rounds: int) -> Optimum | Non
     count, priced = len(task.unit), [] if relaxed else task.costs
     cones = _Cones(count + len(priced) + int(relaxed))
     bounds, right = np.concatenate([-np.eye(count), np.eye(count)]), np.concatenate([-task.low, task.high])
-    stated = np.isfinite(right)
-    if stated.any():
-        cones.add(clarabel.NonnegativeConeT(int(stated.sum())), bounds[stated], right[stated])
+    bounded = np.isfinite(right)
+    if bounded.any():
+        cones.add(clarabel.NonnegativeConeT(int(bounded.sum())), bounds[bounded], right[bounded])
     firsts = [_side(task, int(k), cones, relaxed) for k in rows]
     aim, scale = np.zeros(cones.columns), 1.0
     if relaxed:
@@ -153,16 +153,16 @@ def _solved(task: Task, rows: Rows, relaxed: bool, rounds: int) -> Optimum | Non
     settings.direct_solve_method = "faer"  # its factors leave half widths less open than those of the default
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
     square, matrix = sparse.csc_matrix((cones.columns, cones.columns)), sparse.csc_matrix(np.vstack(cones.blocks))
-    found = clarabel.DefaultSolver(square, aim, matrix, np.concatenate(cones.right), cones.cones, settings).solve()
-    if str(found.status) not in ACCEPTED or max(found.r_prim, found.r_dual) > RESIDUAL:
+    solution = clarabel.DefaultSolver(square, aim, matrix, np.concatenate(cones.right), cones.cones, settings).solve()
+    if str(solution.status) not in ACCEPTED or max(solution.r_prim, solution.r_dual) > RESIDUAL:
         return None
-    x, multipliers = np.asarray(found.x), scale * np.maximum(np.asarray(found.z)[firsts], 0.0)
+    x, multipliers = np.asarray(solution.x), scale * np.maximum(np.asarray(solution.z)[firsts], 0.0)
     active = multipliers > ACTIVE * np.max(multipliers, initial=0.0)
     u = np.clip(x[:count], task.low, task.high)
     if relaxed:
         return Optimum(u, rows[active], multipliers[active], np.nan, np.nan, float(x[-1]), rounds)
     u = _within(task, u, rows)
-    varying, bound = task.cost(u) - task.constant, scale * float(found.obj_val_dual)
+    varying, bound = task.cost(u) - task.constant, scale * float(solution.obj_val_dual)
     gap = max(varying - bound, 0.0) / (varying or 1.0)
     bound = task.constant + min(bound, varying)
     return Optimum(u, rows[active], multipliers[active], bound, gap, 0.0, rounds)

@@ -65,17 +65,17 @@ class _Search:
 
     def __init__(self, problem: AllocationProblem, groups: list[list[Contribution]]) -> None:
         self.problem = problem
-        place = {one.name: i for i, one in enumerate(problem.contributions)}
+        place = {contribution.name: i for i, contribution in enumerate(problem.contributions)}
         self.limits: Sides = sides(problem)
         self.task: Task = task_of(problem, self.limits)
         self.options = [common_options(members) for members in groups]
-        self.members = [[place[one.name] for one in members] for members in groups]
+        self.members = [[place[contribution.name] for contribution in members] for members in groups]
         ends = [0, *accumulate(map(len, self.options))]
         self.parts = [slice(*pair) for pair in pairwise(ends)]
         self.count = ends[-1]  # of 0/1 numbers
         self.table, self.prices = np.zeros((2, len(place), self.count))
-        for part, members, own in zip(self.parts, self.members, self.options, strict=True):
-            for k, each in enumerate(own.values(), part.start):
+        for part, members, options in zip(self.parts, self.members, self.options, strict=True):
+            for k, each in enumerate(options.values(), part.start):
                 self.table[members, k] = [option.tolerance for option in each]
                 self.prices[members, k] = [option.cost for option in each]
         self.scale = float(np.sum(np.abs(self.prices))) or 1.0
@@ -88,8 +88,8 @@ class _Search:
 
     def unmet(self) -> list[Finding]:
         """Why no choice keeps the limits: told only where the narrowest half widths are the best to be had."""
-        for own, members in zip(self.options, self.members, strict=True):
-            if not own:
+        for options, members in zip(self.options, self.members, strict=True):
+            if not options:
                 what = "no option of the group lies within the bounds of all its members"
                 return [Finding(what, f"costs.{self.problem.contributions[members[0]].name}", "widen the bounds")]
         if not self.limits.rising and np.all(self.limits.room > 0):
@@ -118,10 +118,10 @@ class _Search:
             unknowns, bound = solution
             if bound >= self.best[0] - PROVEN * self.scale:
                 break
-            taken = unknowns[: self.count] > 0.5
+            picked = unknowns[: self.count] > 0.5
             u = np.clip(unknowns[self.free], self.task.low, self.task.high)
-            self._break(taken, u)
-            self._complete(taken, u)
+            self._break(picked, u)
+            self._complete(picked, u)
         return self._answer(bound, rounds)
 
     def _linear(self) -> tuple[Array, float] | None:
@@ -140,18 +140,20 @@ class _Search:
             for ends in ([np.zeros(self.count), task.low, -costs], [np.ones(self.count), task.high, costs])
         )
         kinds = np.concatenate([np.ones(self.count), np.zeros(inner)])
-        found = milp(aim, integrality=kinds, bounds=Bounds(low, high), constraints=rules, options={"mip_rel_gap": 0.0})
-        if found.x is None:
+        optimum = milp(
+            aim, integrality=kinds, bounds=Bounds(low, high), constraints=rules, options={"mip_rel_gap": 0.0}
+        )
+        if optimum.x is None:
             return None
-        bound = found.fun if found.mip_dual_bound is None else min(found.fun, found.mip_dual_bound)
-        return np.asarray(found.x), float(bound) * self.scale
+        bound = optimum.fun if optimum.mip_dual_bound is None else min(optimum.fun, optimum.mip_dual_bound)
+        return np.asarray(optimum.x), float(bound) * self.scale
 
-    def _tolerances(self, taken: Flags, u: Array) -> Array:
-        return np.asarray(self.task.tolerances(u) + self.table @ taken, float)
+    def _tolerances(self, picked: Flags, u: Array) -> Array:
+        return np.asarray(self.task.tolerances(u) + self.table @ picked, float)
 
-    def _break(self, taken: Flags, u: Array) -> None:
+    def _break(self, picked: Flags, u: Array) -> None:
         """Add the rows that this answer breaks."""
-        t = self._tolerances(taken, u)
+        t = self._tolerances(picked, u)
         value = self.limits.value(t)
         broken = np.flatnonzero(value > 1 + ALLOWED)
         for k in broken[np.argsort(-value[broken], kind="stable")[:AT_ONCE]]:
@@ -193,18 +195,18 @@ class _Search:
         size = max(abs(slope), 1.0)
         self._add(row / size, (slope * u[g] - cost.value(t)) / size)
 
-    def _complete(self, taken: Flags, u: Array) -> None:
+    def _complete(self, picked: Flags, u: Array) -> None:
         """With these options: the best half widths of the others; the options are settled and not asked for again."""
-        price, point = float(np.sum(self.prices @ taken)), None
+        price, point = float(np.sum(self.prices @ picked)), None
         forbidden = np.zeros(self.columns)
-        forbidden[: self.count] = taken
+        forbidden[: self.count] = picked
         self._add(forbidden, len(self.parts) - 1.0)
         if len(self.task.unit):
-            part = replace(self.task, base=self.task.base + self.table @ taken)
+            part = replace(self.task, base=self.task.base + self.table @ picked)
             for place in range(len(self.task.costs)):
                 self._price_tangent(place, u)
             if self.limits.rising and np.any(self.limits.value(part.tolerances(part.low)) > 1 + ALLOWED):
-                self._break(taken, part.low)
+                self._break(picked, part.low)
                 return
             point = minimise(part)
             if point is None:
@@ -214,23 +216,23 @@ class _Search:
                 self._price_tangent(place, point.u)
             for k in point.rows:
                 self._limit(int(k), part.tolerances(point.u), point.u)
-        elif np.any(self.limits.value(self._tolerances(taken, u)) > 1 + ALLOWED):
+        elif np.any(self.limits.value(self._tolerances(picked, u)) > 1 + ALLOWED):
             return
         if price < self.best[0]:
-            self.best = price, taken, point
+            self.best = price, picked, point
 
     def _answer(self, bound: float, rounds: int) -> Answer:
-        problem, (cost, taken, point) = self.problem, self.best
+        problem, (cost, picked, point) = self.problem, self.best
         if not np.isfinite(cost):
             remedy = "widen a limit or add a finer process"
             doubt = Finding("no choice of processes meets the limits", "processes", remedy)
             return none(problem, shortfalls(problem, self.narrowest()) or [doubt])
         gap = max(cost - bound, 0.0) / self.scale + (point.gap if point else 0.0)
-        t = self._tolerances(taken, point.u if point else np.zeros(0))
+        t = self._tolerances(picked, point.u if point else np.zeros(0))
         choices = {
-            problem.contributions[i].name: list(options)[int(np.flatnonzero(taken[part])[0])]
+            problem.contributions[i].name: list(options)[int(np.flatnonzero(picked[part])[0])]
             for part, members, options in zip(self.parts, self.members, self.options, strict=True)
             for i in members
         }
         no_price = np.full(len(problem.effects.worst), np.nan)
-        return optimum(problem, t, self.prices @ taken + problem.costs(t), bound, gap, no_price, rounds, choices)
+        return optimum(problem, t, self.prices @ picked + problem.costs(t), bound, gap, no_price, rounds, choices)

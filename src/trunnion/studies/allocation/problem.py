@@ -141,8 +141,8 @@ class AllocationProblem:
         They are z, but where a row cannot have z, as what is not bought takes up most of its room, they stay below
         its cap: (z⁻ⁿ + cap⁻ⁿ)^(−1/n). However large z, there are half widths with such margins.
         """
-        asked = np.full(len(self.effects.worst), self.z)
-        return asked if self.caps is None else asked * (1 + (asked / self.caps) ** BENT) ** (-1 / BENT)
+        factors = np.full(len(self.effects.worst), self.z)
+        return factors if self.caps is None else factors * (1 + (factors / self.caps) ** BENT) ** (-1 / BENT)
 
     def with_effects(self, effects: RowEffects) -> AllocationProblem:
         """The same with other effects of its rows, or of the first ones of them alone."""
@@ -151,9 +151,9 @@ class AllocationProblem:
     def groups(self) -> dict[str, list[Contribution]]:
         """What is bought together, by the name of the group, or of the one contribution."""
         together: dict[str, list[Contribution]] = {}
-        for one in self.contributions:
-            if not one.fixed:
-                together.setdefault(one.group or f"={one.name}", []).append(one)
+        for contribution in self.contributions:
+            if not contribution.fixed:
+                together.setdefault(contribution.group or f"={contribution.name}", []).append(contribution)
         return together
 
     def costs(self, tolerances: Array) -> Array:
@@ -250,7 +250,7 @@ class Answer:
     @property
     def by_name(self) -> dict[str, float]:
         """Half widths by the names of the contributions."""
-        names = [one.name for one in self.problem.contributions]
+        names = [contribution.name for contribution in self.problem.contributions]
         return dict(zip(names, self.tolerances.tolist(), strict=True))
 
     def __str__(self) -> str:
@@ -262,9 +262,9 @@ class Answer:
 
 def common_options(members: Sequence[Contribution]) -> dict[str, list[ProcessChoice]]:
     """Options by name that all members of a group have within the bounds of all, one for each member."""
-    least, most = max(one.least for one in members), min(one.most for one in members)
-    fit = [{each.name: each for each in one.options if least <= each.tolerance <= most} for one in members]
-    return {name: [own[name] for own in fit] for name in fit[0] if all(name in own for own in fit)}
+    least, most = max(member.least for member in members), min(member.most for member in members)
+    fit = [{each.name: each for each in member.options if least <= each.tolerance <= most} for member in members]
+    return {name: [offer[name] for offer in fit] for name in fit[0] if all(name in offer for offer in fit)}
 
 
 def none(problem: AllocationProblem, findings: Sequence[Finding]) -> Answer:
@@ -298,24 +298,24 @@ def shortfalls(problem: AllocationProblem, least: Array) -> list[Finding]:
     least: the half widths, m or rad, that are the least to be had.
     """
     used, effects = problem.used(least), problem.effects
-    own: dict[str, list[int]] = {}
+    rows_of: dict[str, list[int]] = {}
     for row in range(len(used)):
-        own.setdefault(effects.label(row) if effects.labels else "", []).append(row)
-    found = []
-    for rows in own.values():
+        rows_of.setdefault(effects.label(row) if effects.labels else "", []).append(row)
+    findings = []
+    for rows in rows_of.values():
         over = [row for row in rows if used[row] > 1 + ALLOWED]
         if over:
-            places, broken = (len({effects.place(row) for row in some}) for some in (rows, over))
+            places, broken = (len({effects.place(row) for row in group}) for group in (rows, over))
             exceed = agreeing(broken, "exceeds its", "exceed their")
             more = f"; {broken} of {places} positions {exceed} limits" if places > 1 else ""
-            found.append(_shortfall(problem, least, max(over, key=lambda row: used[row]), more))
-    return found
+            findings.append(_shortfall(problem, least, max(over, key=lambda row: used[row]), more))
+    return findings
 
 
 def _shortfall(problem: AllocationProblem, least: Array, row: int, more: str) -> Finding:
     """That a row cannot keep its limit, and what has the largest part in that."""
     effects = problem.effects
-    low, high = (float(one[row]) for one in problem.at(least))
+    low, high = (float(side[row]) for side in problem.at(least))
     lower, upper = float(effects.lower[row]), float(effects.upper[row])
     over, limit = (high, upper) if high - upper >= lower - low else (low, lower)
     parts = effects.worst[row] * least

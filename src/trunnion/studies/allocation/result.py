@@ -145,36 +145,44 @@ def cost_of(price: Price, t: float) -> float:
     """Cost of a half width, SI; of options, of the cheapest that keeps it, NaN if none does."""
     if price.model:
         return Cost(price.model, price.parameters).value(t)
-    return min((one.cost for one in price.choices if one.tolerance <= t * (1 + 1e-9)), default=np.nan)
+    return min((choice.cost for choice in price.choices if choice.tolerance <= t * (1 + 1e-9)), default=np.nan)
 
 
-def stated_cost(found: Allocated) -> float:
+def stated_cost(allocated: Allocated) -> float:
     """What all costs as it is stated; NaN where a half width has no cost."""
-    return float(np.sum([cost_of(price, found.before[name]) for name, price in found.prices.items()]))
+    return float(np.sum([cost_of(price, allocated.before[name]) for name, price in allocated.prices.items()]))
 
 
-def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
-    """The result with the numbers of the allocation. known: `tolerance` of the mechanism with the tolerances found."""
-    arrays = {**_bought(found, known), **_rows(found, known), **_whole(found, known.sizes["measure"])}
-    parameters = MemberUnits("parameter", units_along(known["parameter_nominal"], "parameter"))
-    saving = MemberUnits("measure", [f"1/({unit})" for unit in units_along(known["nominal"], "measure")])
+def dataset(allocated: Allocated, toleranced: xr.Dataset) -> xr.Dataset:
+    """The result with the numbers of the allocation. toleranced: of the mechanism with these tolerances."""
+    arrays = {
+        **_bought(allocated, toleranced),
+        **_rows(allocated, toleranced),
+        **_whole(allocated, toleranced.sizes["measure"]),
+    }
+    parameters = MemberUnits("parameter", units_along(toleranced["parameter_nominal"], "parameter"))
+    saving = MemberUnits("measure", [f"1/({unit})" for unit in units_along(toleranced["nominal"], "measure")])
     variables = described(arrays, VARIABLES, {"parameter": parameters, "saving": saving})
     # the criterion says what is to be kept
-    kept = [one for one in findings_of(known) if not one.code.startswith("limit.missed")]
-    own = list(_findings(found, known))
+    findings_kept = [finding for finding in findings_of(toleranced) if not finding.code.startswith("limit.missed")]
+    findings = list(_findings(allocated, toleranced))
     attributes: dict[str, Any] = {
         "kind": "allocation",
-        "found": int(found.answer.found),
-        "criterion": found.asked.criterion,
-        "target": found.asked.target,
-        "choices": found.way,
-        "proven": int(found.answer.proven),
-        "prices": [_plain(price) for price in found.prices.values()],
-        **scales_in(known).summary([*_summary(found, known, arrays), *summary_of(known)]),
-        "findings": finding_rows([*own, *kept]),
-        "missed": [f"{one.where}: {one.what}".lstrip(": ") for one in own if one.severity is Severity.ERROR],
+        "found": int(allocated.answer.found),
+        "criterion": allocated.asked.criterion,
+        "target": allocated.asked.target,
+        "choices": allocated.way,
+        "proven": int(allocated.answer.proven),
+        "prices": [_plain(price) for price in allocated.prices.values()],
+        **scales_in(toleranced).summary([*_summary(allocated, toleranced, arrays), *summary_of(toleranced)]),
+        "findings": finding_rows([*findings, *findings_kept]),
+        "missed": [
+            f"{finding.where}: {finding.what}".lstrip(": ")
+            for finding in findings
+            if finding.severity is Severity.ERROR
+        ],
     }
-    return with_variables(known, variables).assign_attrs(encoded(attributes))
+    return with_variables(toleranced, variables).assign_attrs(encoded(attributes))
 
 
 def _plain(price: Price) -> dict[str, Any]:
@@ -182,23 +190,23 @@ def _plain(price: Price) -> dict[str, Any]:
     return {**asdict(price), "most": price.most if np.isfinite(price.most) else None}
 
 
-def _bought(found: Allocated, known: xr.Dataset) -> dict[str, Any]:
+def _bought(allocated: Allocated, toleranced: xr.Dataset) -> dict[str, Any]:
     """What is of each parameter."""
-    names = [str(name) for name in known["parameter"].values]
-    answer, prices = found.answer, found.prices
-    halves = (known["parameter_upper"].values - known["parameter_lower"].values) / 2
+    names = [str(name) for name in toleranced["parameter"].values]
+    answer, prices = allocated.answer, allocated.prices
+    halves = (toleranced["parameter_upper"].values - toleranced["parameter_lower"].values) / 2
     as_stated = [
-        float(known["parameter_nominal"].values[i]) if _is_play(found, name) else float(halves[i])
+        float(toleranced["parameter_nominal"].values[i]) if _is_play(allocated, name) else float(halves[i])
         for i, name in enumerate(names)
     ]
-    costs = dict(zip((one.name for one in answer.problem.contributions), answer.costs.tolist(), strict=True))
-    chosen, before = found.bought, found.before
+    costs = dict(zip((item.name for item in answer.problem.contributions), answer.costs.tolist(), strict=True))
+    chosen, before = allocated.bought, allocated.before
     cost = np.array([costs[name] if name in prices else np.nan for name in names])
-    width = max((len(one.choices) for one in prices.values()), default=0)
+    width = max((len(item.choices) for item in prices.values()), default=0)
     options = np.full((2, len(names), width), np.nan)
     for i, name in enumerate(names):
-        for k, one in enumerate(prices[name].choices if name in prices else ()):
-            options[:, i, k] = one.tolerance, one.cost
+        for k, item in enumerate(prices[name].choices if name in prices else ()):
+            options[:, i, k] = item.tolerance, item.cost
     arrays: dict[str, Any] = {
         "tolerance": np.array([chosen.get(name, half) for name, half in zip(names, as_stated, strict=True)]),
         "bought": np.array([int(name in prices) for name in names], np.int8),
@@ -212,148 +220,150 @@ def _bought(found: Allocated, known: xr.Dataset) -> dict[str, Any]:
     }
     if width:
         arrays |= {"option_tolerance": options[0], "option_cost": options[1]}
-    if found.offers:
-        offered = [answer.by_name for _, answer in found.offers]
-        arrays["trade_off_tolerance"] = np.array([[one[name] if name in prices else np.nan for name in names]
-                                                  for one in offered])  # fmt: skip
+    if allocated.offers:
+        offered = [answer.by_name for _, answer in allocated.offers]
+        arrays["trade_off_tolerance"] = np.array([[item[name] if name in prices else np.nan for name in names]
+                                                  for item in offered])  # fmt: skip
     return arrays
 
 
-def _is_play(found: Allocated, name: str) -> bool:
-    return name.endswith(".clearance") and name.split(".")[1] in found.study.inputs.loose and name.count(".") == 2
+def _is_play(allocated: Allocated, name: str) -> bool:
+    return name.endswith(".clearance") and name.split(".")[1] in allocated.study.inputs.loose and name.count(".") == 2
 
 
 def _most(price: Price) -> float:
     return price.most if np.isfinite(price.most) else np.nan
 
 
-def _rows(found: Allocated, known: xr.Dataset) -> dict[str, Any]:
+def _rows(allocated: Allocated, toleranced: xr.Dataset) -> dict[str, Any]:
     """How much of its room each measure takes, and what more of it would save."""
-    count, positions = known.sizes["measure"], known.sizes["position"]
+    count, positions = toleranced.sizes["measure"], toleranced.sizes["position"]
     used, curve, saving = np.full(count, np.nan), np.full((count, positions), np.nan), np.full(count, np.nan)
     margin = np.full(count, np.nan)
-    if found.answer.found:
-        shares = found.answer.used[: len(found.rows.measure)]
-        prices = found.answer.price[: len(found.rows.measure)]
-        margin = _margins(found, count)
+    if allocated.answer.found:
+        shares = allocated.answer.used[: len(allocated.rows.measure)]
+        prices = allocated.answer.price[: len(allocated.rows.measure)]
+        margin = _margins(allocated, count)
         for k in range(count):
-            own = found.rows.measure == k
-            if np.any(own):
-                used[k], saving[k] = float(np.max(shares[own])), float(np.sum(prices[own]))
-                placed = own & (found.rows.position >= 0)
-                curve[k, found.rows.position[placed]] = shares[placed]
+            rows_of_measure = allocated.rows.measure == k
+            if np.any(rows_of_measure):
+                used[k], saving[k] = float(np.max(shares[rows_of_measure])), float(np.sum(prices[rows_of_measure]))
+                placed = rows_of_measure & (allocated.rows.position >= 0)
+                curve[k, allocated.rows.position[placed]] = shares[placed]
     arrays = {"used": used, "used_curve": curve, "saving": saving}
-    return {**arrays, "yield_margin": margin} if found.asked.criterion == "yield" else arrays
+    return {**arrays, "yield_margin": margin} if allocated.asked.criterion == "yield" else arrays
 
 
-def _margins(found: Allocated, count: int, z: float | None = None) -> NDArray[np.float64]:
+def _margins(allocated: Allocated, count: int, z: float | None = None) -> NDArray[np.float64]:
     """The margin of each measure, NaN without limits: of the answer, or with another z."""
-    problem = found.answer.problem if z is None else replace(found.answer.problem, z=z)
+    problem = allocated.answer.problem if z is None else replace(allocated.answer.problem, z=z)
     margins = problem.margins()
-    first = {int(k): margins[np.flatnonzero(found.rows.measure == k)[0]] for k in np.unique(found.rows.measure)}
+    first = {int(k): margins[np.flatnonzero(allocated.rows.measure == k)[0]] for k in np.unique(allocated.rows.measure)}
     return np.array([first.get(k, np.nan) for k in range(count)])
 
 
-def _whole(found: Allocated, count: int) -> Mapping[str, Any]:
+def _whole(allocated: Allocated, count: int) -> Mapping[str, Any]:
     """What is of the whole."""
-    answer = found.answer
+    answer = allocated.answer
     arrays: dict[str, Any] = {
         "cost_total": np.array(answer.cost),
-        "cost_total_before": np.array(stated_cost(found)),
+        "cost_total_before": np.array(stated_cost(allocated)),
         "cost_bound": np.array(answer.bound),
         "gap": np.array(answer.gap),
     }
-    if found.asked.criterion == "yield":
+    if allocated.asked.criterion == "yield":
         arrays["yield_expected"] = np.array(answer.expected)
     if answer.checked is not None:
         ends = zip(("", "_low", "_high"), answer.checked, strict=True)
         arrays |= {f"yield_checked{end}": np.array(number) for end, number in ends}
     if answer.trials:
         arrays |= {
-            "trial_margin": np.array([np.nanmean(_margins(found, count, one.z)) for one in answer.trials]),
-            "trial_cost": np.array([one.cost for one in answer.trials]),
-            "trial_yield": np.array([one.sampled.share for one in answer.trials]),
-            "trial_yield_low": np.array([one.sampled.low for one in answer.trials]),
-            "trial_yield_high": np.array([one.sampled.high for one in answer.trials]),
+            "trial_margin": np.array([np.nanmean(_margins(allocated, count, trial.z)) for trial in answer.trials]),
+            "trial_cost": np.array([trial.cost for trial in answer.trials]),
+            "trial_yield": np.array([trial.sampled.share for trial in answer.trials]),
+            "trial_yield_low": np.array([trial.sampled.low for trial in answer.trials]),
+            "trial_yield_high": np.array([trial.sampled.high for trial in answer.trials]),
         }
-    if found.offers:
-        arrays["trade_off_factor"] = np.array([factor for factor, _ in found.offers])
-        arrays["trade_off_cost"] = np.array([answer.cost for _, answer in found.offers])
+    if allocated.offers:
+        arrays["trade_off_factor"] = np.array([factor for factor, _ in allocated.offers])
+        arrays["trade_off_cost"] = np.array([answer.cost for _, answer in allocated.offers])
     return arrays
 
 
 # ---- summary and findings --------------------------------------------------------------------------------------
 
 
-def _summary(found: Allocated, known: xr.Dataset, arrays: Mapping[str, Any]) -> Iterator[Figure]:
+def _summary(allocated: Allocated, toleranced: xr.Dataset, arrays: Mapping[str, Any]) -> Iterator[Figure]:
     """What all costs, and before; what of the room is taken."""
-    answer = found.answer
+    answer = allocated.answer
     yield Figure("cost", "cost", answer.cost if answer.found else None, aspect="least")
     if np.isfinite(arrays["cost_total_before"]):
         yield Figure("cost_before", "cost as stated", arrays["cost_total_before"])
     if answer.found:
         yield Figure("cost_bound", "lower bound of the cost", answer.bound)
     if answer.sampled is not None:
-        yield Figure("yield_asked", "required yield", found.asked.target)
+        yield Figure("yield_asked", "required yield", allocated.asked.target)
         yield Figure("yield", "yield of the samples", answer.sampled.share)
     if answer.checked is not None:
         yield Figure("yield_checked", "yield of fresh samples", answer.checked.share)
-    for name, used in zip(known["measure"].values.tolist(), arrays["used"].tolist(), strict=True):
+    for name, used in zip(toleranced["measure"].values.tolist(), arrays["used"].tolist(), strict=True):
         if answer.found and np.isfinite(used):
             yield Figure(f"{name}.used", f"{name}, share of the limits used", used)
 
 
-def _findings(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
+def _findings(allocated: Allocated, toleranced: xr.Dataset) -> Iterator[Finding]:
     """Why there is no allocation; limits that are not kept on the mechanism itself; what the criterion leaves out."""
-    answer, criterion = found.answer, found.asked.criterion
-    yield from found.findings
+    answer, criterion = allocated.answer, allocated.asked.criterion
+    yield from allocated.findings
     yield from answer.findings
     if not answer.found:
         return
-    yield from _plays(found)
-    for name, share in found.tight.items():
+    yield from _plays(allocated)
+    for name, share in allocated.tight.items():
         what = f"its limits were narrowed by {100 * (1 - share):.2g} % so that the mechanism meets them exactly, not "
         what += "to first order"
         yield Finding.note("allocation.narrowed", f"measures.{name}", what, percent=100 * (1 - share))
-    if criterion != "yield" and found.study.effects.correlated:
+    if criterion != "yield" and allocated.study.effects.correlated:
         what = f"the criterion {criterion} ignores the correlations"
         remedy = "use a yield, which includes them"
         yield Finding.warning("allocation.correlations_left_out", "correlations", what, remedy, criterion=criterion)
     if criterion == "worst-case":
-        yield from _searched(found, known)
-    if criterion == "rss" and "yield" in known:
-        yield from _promised(known)
-    kept = [factor for factor, offer in found.offers if offer.found]
-    if len(kept) < len(found.offers):
-        points, lost = len(found.offers), len(found.offers) - len(kept)
+        yield from _searched(allocated, toleranced)
+    if criterion == "rss" and "yield" in toleranced:
+        yield from _promised(toleranced)
+    factors_met = [factor for factor, offer in allocated.offers if offer.found]
+    if len(factors_met) < len(allocated.offers):
+        points, lost = len(allocated.offers), len(allocated.offers) - len(factors_met)
         what = f"{lost} of the {points} points of the curve {agreeing(lost, 'is', 'are')} infeasible"
-        remedy = f"limits of at least {min(kept):.3g} times the stated ones are feasible" if kept else ""
+        remedy = f"limits of at least {min(factors_met):.3g} times the stated ones are feasible" if factors_met else ""
         yield Finding.note("allocation.curve_short", "", what, remedy, points=points, lost=lost)
 
 
-def _plays(found: Allocated) -> Iterator[Finding]:
+def _plays(allocated: Allocated) -> Iterator[Finding]:
     """Allocated plays whose clearance has a tolerance of its own, which no cost is of."""
-    for path in found.prices:
+    for path in allocated.prices:
         joint = path.split(".")[1]
         sizes = [f"joints.{joint}.{part}.clearance" for part in ("pin", "guide")]
-        for one in found.study.inputs.tolerances:
-            if path == f"joints.{joint}.clearance" and one.path in sizes:
-                lower, upper = 1e6 * one.lower, 1e6 * one.upper
-                what = f"the clearance is allocated; the tolerance {lower:+g}/{upper:+g} µm of {one.path} stays as "
+        for tolerance in allocated.study.inputs.tolerances:
+            if path == f"joints.{joint}.clearance" and tolerance.path in sizes:
+                lower, upper = 1e6 * tolerance.lower, 1e6 * tolerance.upper
+                what = (
+                    f"the clearance is allocated; the tolerance {lower:+g}/{upper:+g} µm of {tolerance.path} stays as "
+                )
                 what += "stated, in addition to it, and the limits include it"
                 remedy = "remove this tolerance if the cost covers the largest clearance"
-                figures = {"number": one.path, "lower_um": lower, "upper_um": upper}
+                figures = {"number": tolerance.path, "lower_um": lower, "upper_um": upper}
                 yield Finding.note("allocation.play_tolerance", f"costs.{joint}.clearance", what, remedy, **figures)
 
 
-def _promised(known: xr.Dataset) -> Iterator[Finding]:
+def _promised(toleranced: xr.Dataset) -> Iterator[Finding]:
     """Measures of whose samples fewer keep the limits than three deviations of a normal one would.
 
     That is what RSS means where the tolerances are three deviations of theirs; other distributions, means off the
     middle, and correlations make it another.
     """
     for name, share, high in zip(
-        *(known[key].values.tolist() for key in ("measure", "yield", "yield_high")), strict=True
+        *(toleranced[key].values.tolist() for key in ("measure", "yield", "yield_high")), strict=True
     ):
         if not high < DEFAULT_YIELD:
             continue
@@ -369,30 +379,30 @@ def _promised(known: xr.Dataset) -> Iterator[Finding]:
         )
 
 
-def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
+def _searched(allocated: Allocated, toleranced: xr.Dataset) -> Iterator[Finding]:
     """Measures whose worst case, as found on the mechanism, is beyond a limit that first order keeps."""
-    units = units_along(known["nominal"], "measure")
-    for k, of in enumerate(found.study.linear.measures):
+    units = units_along(toleranced["nominal"], "measure")
+    for k, of in enumerate(allocated.study.linear.measures):
         lower, upper = limits(of)
-        low, high = float(known["searched_lower"][k]), float(known["searched_upper"][k])
+        low, high = float(toleranced["searched_lower"][k]), float(toleranced["searched_upper"][k])
         shares = share_of(low, lower), share_of(high, upper)
-        beyond = max(shares) - 1
-        if not beyond > CLOSE:
+        excess = max(shares) - 1
+        if not excess > CLOSE:
             continue
         factor, unit = SHOWN.get(units[k], (1.0, units[k]))
         value, limit = (high, upper) if shares[1] >= shares[0] else (low, lower)
-        severity = Severity.ERROR if beyond > ROUGH else Severity.WARNING if beyond > SLIGHT else Severity.NOTE
+        severity = Severity.ERROR if excess > ROUGH else Severity.WARNING if excess > SLIGHT else Severity.NOTE
         yield Finding.weighed(
             severity,
             "allocation.worst_case_beyond",
             f"measures.{of.measure.name}",
             f"the worst case of the mechanism, {readable(factor * value, unit)}, exceeds the "
-            f"limit {readable(factor * limit, unit)} by {100 * beyond:.2g} %; to first order it "
+            f"limit {readable(factor * limit, unit)} by {100 * excess:.2g} %; to first order it "
             f"is met (up to {100 * ROUGH:g} % beyond is accepted)",
             "use --exact (in Python exact=True), which narrows the tolerances",
             worst=factor * value,
             unit=unit,
-            percent=100 * beyond,
+            percent=100 * excess,
             limit=factor * limit,
             accepted=100 * ROUGH,
         )

@@ -85,12 +85,12 @@ def rows_of(
         if not np.any(np.isfinite(limits(of))):
             continue
         block = _block(of)
-        known = np.all(np.isfinite(block.spread.upper), axis=0)
-        if not np.any(known):
+        finite = np.all(np.isfinite(block.spread.upper), axis=0)
+        if not np.any(finite):
             unknown.append(of.measure.name)
             continue
         share = (tight or {}).get(of.measure.name, 1.0)
-        blocks.append(replace(_taken(block, known), lower=share * block.lower, upper=share * block.upper))
+        blocks.append(replace(_taken(block, finite), lower=share * block.lower, upper=share * block.upper))
         which.append(k)
     none = np.zeros(0, np.intp)
     if not blocks:
@@ -112,10 +112,10 @@ def rows_of(
     return Rows(effects, measure, position, np.repeat([block.moving for block in blocks], sizes), tuple(unknown))
 
 
-def _taken(block: _Block, known: NDArray[np.bool_]) -> _Block:
+def _taken(block: _Block, finite: NDArray[np.bool_]) -> _Block:
     """The rows that have an answer."""
-    spread = Spread(*(part[:, known] for part in block.spread))
-    return replace(block, sensitivity=block.sensitivity[:, known], spread=spread, position=block.position[known])
+    spread = Spread(*(part[:, finite] for part in block.spread))
+    return replace(block, sensitivity=block.sensitivity[:, finite], spread=spread, position=block.position[finite])
 
 
 def _parts(
@@ -129,16 +129,16 @@ def _parts(
     )
     offset, mean = np.zeros(slopes.shape[1]), np.zeros_like(slopes)
     for i, name in enumerate(study.inputs.names):
-        one = study.inputs.tolerances[i] if i < len(study.inputs.tolerances) else None
-        if one is None or one.direction or one.distribution == "direction":  # a zone
+        tolerance = study.inputs.tolerances[i] if i < len(study.inputs.tolerances) else None
+        if tolerance is None or tolerance.direction or tolerance.distribution == "direction":  # a zone
             size = bought.get(name, 1.0)
             offset += shift[i]  # of what turns about another place than its nominal one, and is not bought
             upper[i] = 0.5 * (upper[i] - lower[i]) / size
             half[i], deviation[i] = half[i] / size, deviation[i] / size
             continue
-        scatter, drift, constant = _rates(one)
-        size = 1.0 if name in bought else one.half_width
-        offset += slopes[i] * (one.lower + one.upper) / 2
+        scatter, drift, constant = _rates(tolerance)
+        size = 1.0 if name in bought else tolerance.half_width
+        offset += slopes[i] * (tolerance.lower + tolerance.upper) / 2
         if criterion == "yield":
             offset += slopes[i] * constant
         upper[i], half[i] = np.abs(slopes[i]) * size, slopes[i] * size
@@ -147,14 +147,15 @@ def _parts(
     return RowEffects(upper.T, nothing, nothing, half.T, deviation.T, mean.T, offset)
 
 
-def _rates(one: Tolerance) -> Rates:
+def _rates(tolerance: Tolerance) -> Rates:
     """Standard deviation and drift of the mean from the middle of the limits per half width, and drift without any."""
-    middle, half = (one.lower + one.upper) / 2, one.half_width or ANY
-    if "values" in one.options:  # as measured: there is nothing to choose
-        whole = Marginal(one.distribution, one.lower, one.upper, one.options)
-        return (whole.deviation / half if one.half_width else 0.0), 0.0, whole.mean - middle
+    middle, half = (tolerance.lower + tolerance.upper) / 2, tolerance.half_width or ANY
+    if "values" in tolerance.options:  # as measured: there is nothing to choose
+        marginal = Marginal(tolerance.distribution, tolerance.lower, tolerance.upper, tolerance.options)
+        return (marginal.deviation / half if tolerance.half_width else 0.0), 0.0, marginal.mean - middle
     wide, narrow = (
-        Marginal(one.distribution, middle - width, middle + width, one.options) for width in (half, half / 2)
+        Marginal(tolerance.distribution, middle - width, middle + width, tolerance.options)
+        for width in (half, half / 2)
     )
     drift = (wide.mean - narrow.mean) / (half / 2)
     return wide.deviation / half, drift, wide.mean - middle - drift * half
@@ -167,12 +168,12 @@ def _correlation(study: ToleranceStudy) -> Array | None:
     if not np.any(covariance - np.diag(np.diag(covariance))):
         return None
     count = len(study.inputs.names)
-    found = np.eye(count)
+    matrix = np.eye(count)
     size = np.outer(deviations, deviations)
     inner = np.divide(covariance, size, out=np.zeros_like(covariance), where=size > 0)
     np.fill_diagonal(inner, 1.0)
-    found[: len(inner), : len(inner)] = inner
-    return found
+    matrix[: len(inner), : len(inner)] = inner
+    return matrix
 
 
 def _texts(study: ToleranceStudy, measure: NDArray[np.intp], position: NDArray[np.intp]) -> tuple[Texts, Texts, Texts]:

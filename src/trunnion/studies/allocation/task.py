@@ -46,8 +46,8 @@ class Sides:
 
     def parts(self, t: Array, which: Rows | slice = slice(None)) -> Array:
         """K (spread ∘ t), (side, part)."""
-        own = self.spread[which] * t
-        return own if self.factor is None else own @ self.factor.T
+        deviation = self.spread[which] * t
+        return deviation if self.factor is None else deviation @ self.factor.T
 
     def gradient(self, t: Array, which: Rows | slice = slice(None)) -> Array:
         """∂g_k/∂t, (side, contribution); where ‖…‖ is 0 the derivative of its linear part alone, a subgradient."""
@@ -143,16 +143,16 @@ class Task:
 def task_of(problem: AllocationProblem, limits: Sides) -> Task:
     """The task of a problem's contributions with a cost; those with options are left at 0."""
     groups = {name: members for name, members in problem.groups().items() if not members[0].options}
-    place = {one.name: i for i, one in enumerate(problem.contributions)}
+    place = {item.name: i for i, item in enumerate(problem.contributions)}
     spans = np.zeros((len(place), len(groups)))
     least, most, costs, names = np.zeros(len(groups)), np.zeros(len(groups)), [], []
     for g, members in enumerate(groups.values()):
-        rows = [place[one.name] for one in members]
+        rows = [place[item.name] for item in members]
         spans[rows, g] = 1.0
-        least[g] = max(one.least for one in members)
-        most[g] = min(min(one.most for one in members), float(np.min(limits.most[rows])))
-        costs += [(g, one.cost) for one in members if one.cost]
+        least[g] = max(item.least for item in members)
+        most[g] = min(min(item.most for item in members), float(np.min(limits.most[rows])))
+        costs += [(g, item.cost) for item in members if item.cost]
         names.append(members[0].name)
-    base = np.array([one.value if one.fixed else 0.0 for one in problem.contributions])
+    base = np.array([item.value if item.fixed else 0.0 for item in problem.contributions])
     unit = np.where(np.isfinite(most) & (most > 0), np.maximum(most / max(len(groups), 1), least), 1.0)
     return Task(limits, base, spans, unit, least, most, costs, names)

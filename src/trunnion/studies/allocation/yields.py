@@ -131,11 +131,11 @@ class _Margins:
             low, high, step = high, min(high + step, MOST), 2 * step
         if excess(low) < 0 <= excess(high):
             brentq(excess, low, high, xtol=close)
-        found = [answer for answer in self.answers.values() if answer.found]
-        if not found:
+        feasible = [answer for answer in self.answers.values() if answer.found]
+        if not feasible:
             return self.at(low)
-        enough = [one for one in found if one.sampled and _score(self.level(one.sampled)) >= _score(goal) - ROUNDING]
-        best = max(found, key=lambda one: self.level(one.sampled) if one.sampled else 0.0)
+        enough = [one for one in feasible if one.sampled and _score(self.level(one.sampled)) >= _score(goal) - ROUNDING]
+        best = max(feasible, key=lambda one: self.level(one.sampled) if one.sampled else 0.0)
         answer = min(enough, key=lambda one: one.cost) if enough else best
         trials = [Trial(z, one.cost, one.sampled) for z, one in self.answers.items() if one.sampled]
         return replace(answer, trials=tuple(trials))
@@ -158,16 +158,19 @@ def _largest_margins(problem: AllocationProblem) -> Array:
     """The margin that each row can have at most, with the narrowest half widths, (row,): of a measure the least."""
     effects = problem.effects
     narrowest = np.array(
-        [0.0 if one.options else one.value if one.fixed else one.least for one in problem.contributions]
+        [
+            0.0 if contribution.options else contribution.value if contribution.fixed else contribution.least
+            for contribution in problem.contributions
+        ]
     )
-    place = {one.name: i for i, one in enumerate(problem.contributions)}
+    place = {contribution.name: i for i, contribution in enumerate(problem.contributions)}
     for members in problem.groups().values():
-        rows = [place[one.name] for one in members]
+        rows = [place[contribution.name] for contribution in members]
         options = list(common_options(members).values()) if members[0].options else []
         if options:
             narrowest[rows] = np.min([[option.tolerance for option in each] for each in options], axis=0)
         elif not members[0].options:
-            narrowest[rows] = max(one.least for one in members)
+            narrowest[rows] = max(contribution.least for contribution in members)
     sigma, room = _spread_and_room(problem, narrowest)
     deviation = np.sqrt(np.sum(sigma**2, axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):

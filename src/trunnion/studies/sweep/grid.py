@@ -104,8 +104,8 @@ class _Value:
     plain: bool
 
 
-def _swept(mechanism: Mechanism, name: str, path: str, given: Any) -> Swept:
-    ends = given[:2] if isinstance(given, tuple) else given
+def _swept(mechanism: Mechanism, name: str, path: str, sweep_values: Any) -> Swept:
+    ends = sweep_values[:2] if isinstance(sweep_values, tuple) else sweep_values
     read, measured = [], ""
     for value in ends:
         value = value.item() if isinstance(value, np.generic) else value
@@ -121,8 +121,8 @@ def _swept(mechanism: Mechanism, name: str, path: str, given: Any) -> Swept:
         )
     factor = unit(written)[0] if written else Fraction(1)
     values = [end.si for end in read]
-    if isinstance(given, tuple):
-        count = int(given[2])
+    if isinstance(sweep_values, tuple):
+        count = int(sweep_values[2])
         exact = all(end.unit == written or not end.number for end in read)
         low, high = (end.number if exact else Fraction(end.si) / factor for end in read)
         # exact until rounded once, so that a point is the same float as when its value is written in a file
@@ -152,8 +152,8 @@ def _unit_of(mechanism: Mechanism, path: str) -> str:
         if other.startswith("dimensions."):
             dimensions[other.removeprefix("dimensions.")] = entry.quantity.check(dimensions)
     name = path.removeprefix("dimensions.")
-    stated = name in dimensions and name != path
-    return si_unit(dimensions[name]) if stated else mechanism.parameter_set.entries[path].kind.unit
+    is_dimension = name in dimensions and name != path
+    return si_unit(dimensions[name]) if is_dimension else mechanism.parameter_set.entries[path].kind.unit
 
 
 def at(swept: Sequence[Swept], index: tuple[int, ...]) -> dict[str, float | str]:
@@ -171,4 +171,6 @@ def named(swept: Sequence[Swept], index: tuple[int, ...]) -> Iterator[None]:
         yield
     except MechanismError as error:
         where = say(swept, index)
-        raise MechanismError([replace(one, what=f"{one.what} (at {where})") for one in error.findings]) from None
+        raise MechanismError(
+            [replace(finding, what=f"{finding.what} (at {where})") for finding in error.findings]
+        ) from None

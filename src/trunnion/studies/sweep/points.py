@@ -177,20 +177,21 @@ class Points:
     def _like(self, index: Index) -> bool:
         """Whether a point by itself has the numbers that one pass would give it, and leaves as much open."""
         run = self._prepared(index) if any(index) else self.run
-        own, meant = run.values, self._values([index])
-        if own.keys() != meant.keys() or run.system.plan.formula != self.run.system.plan.formula:
+        nominal_values, meant = run.values, self._values([index])
+        if nominal_values.keys() != meant.keys() or run.system.plan.formula != self.run.system.plan.formula:
             return False
         same = all(
-            own[path] == value or np.array_equal(own[path], np.ravel(value)[0], True) for path, value in meant.items()
+            nominal_values[path] == value or np.array_equal(nominal_values[path], np.ravel(value)[0], True)
+            for path, value in meant.items()
         )
-        left_open = [[(one.where, one.what) for one in each.determinacy.findings()] if each.determinacy else []
-                     for each in (run, self.run)]  # fmt: skip
+        open_runs = [run.determinacy.findings() if run.determinacy else () for run in (run, self.run)]
+        left_open = [[(finding.where, finding.what) for finding in findings] for findings in open_runs]
         if not same or left_open[0] != left_open[1]:
             return False
         if not self._followed:
             return True
-        (found,) = self._together([index])
-        return found is None or _agree(found, self._alone(index, run))
+        (point,) = self._together([index])
+        return point is None or _agree(point, self._alone(index, run))
 
     def _values(self, points: Sequence[Index], ideal: bool = False) -> dict[str, Number]:
         """Every number of the mechanism, (point, 1) where it varies."""
@@ -242,15 +243,15 @@ class Points:
         values: Mapping[str, Number],
         ideal: Mapping[str, Number] | None,
         cycles: Sequence[Cycle],
-        wanted: NDArray[np.bool_],
+        lanes_asked: NDArray[np.bool_],
     ) -> dict[int, CycleCourse]:
         """The courses of those mechanisms of a batch that are wanted, by their number. ideal: see `Many.courses`."""
-        rows = np.flatnonzero(wanted)
+        rows = np.flatnonzero(lanes_asked)
         if not len(rows):
             return {}
         without = None if ideal is None else self._some(ideal, cycles, rows).values
-        found = self._many.courses(self._some(values, cycles, rows), without, self.method)
-        return dict(zip(rows.tolist(), found, strict=True))
+        courses = self._many.courses(self._some(values, cycles, rows), without, self.method)
+        return dict(zip(rows.tolist(), courses, strict=True))
 
     def _check(self, points: Sequence[Index], values: Mapping[str, Number]) -> None:
         """MechanismError where the numbers of a point are none that a mechanism can have."""

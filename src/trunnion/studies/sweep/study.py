@@ -102,18 +102,18 @@ def sweep(
     return _dataset(points, labels, arrays, findings, figures)
 
 
-def _with_bare(mechanism: Mechanism, swept: Iterable[Swept], found: list[Finding]) -> list[Finding]:
+def _with_bare(mechanism: Mechanism, swept: Iterable[Swept], findings: list[Finding]) -> list[Finding]:
     """The findings, with what the largest value of each number says of its unit in place of what every value does."""
     bare: list[Finding] = []
-    for one in swept:
-        value = float(max(one.values, key=abs))
-        if not one.written:
-            checked = mechanism.with_values({one.path: value}).checked
-            doubts = [doubt for doubt in checked if (doubt.where, doubt.severity) == (one.path, Severity.WARNING)]
-            doubts = [*bare_number(mechanism.parameter_set, one.path, value)] or doubts
-            more = f" (the largest of {len(one.values)} values)" if len(one.values) > 1 else ""
+    for item in swept:
+        value = float(max(item.values, key=abs))
+        if not item.written:
+            checked = mechanism.with_values({item.path: value}).checked
+            doubts = [doubt for doubt in checked if (doubt.where, doubt.severity) == (item.path, Severity.WARNING)]
+            doubts = [*bare_number(mechanism.parameter_set, item.path, value)] or doubts
+            more = f" (the largest of {len(item.values)} values)" if len(item.values) > 1 else ""
             bare += [replace(doubt, what=doubt.what + more) for doubt in doubts]
-    return [*(one for one in found if one.where not in {own.where for own in bare}), *bare]
+    return [*(item for item in findings if item.where not in {finding.where for finding in bare}), *bare]
 
 
 # ---- what there is to say -------------------------------------------------------------------------------------

@@ -54,9 +54,9 @@ def worst_corner(mechanism: Mechanism, name: str, side: str | None, steps: int) 
     least, largest = (corner.value for corner in ends)
     if not np.isfinite([least, largest]).all():
         raise MechanismError(Finding("has no worst corner: the figure is undefined", f"measures.{name}"))
-    shown = SIDES.index(side) if side in SIDES else int(abs(largest) >= abs(least))
-    there = replace(effects, rows=(EffectRow(NOBODY, 0, {}, ""),)).values(ends[shown].at)
-    numbers = {path: float(np.ravel(primal(number))[0]) for path, number in there.items()}
+    side_index = SIDES.index(side) if side in SIDES else int(abs(largest) >= abs(least))
+    values_there = replace(effects, rows=(EffectRow(NOBODY, 0, {}, ""),)).values(ends[side_index].at)
+    numbers = {path: float(np.ravel(primal(number))[0]) for path, number in values_there.items()}
     dimensions = {f"dimensions.{dimension}": kind for dimension, kind in dimension_kinds(mechanism).items()}
     kinds = {**mechanism.parameter_kinds(), **dimensions}
     rows = []
@@ -64,17 +64,17 @@ def worst_corner(mechanism: Mechanism, name: str, side: str | None, steps: int) 
         if of.figure.spread.half[i] != 0:  # else it does nothing to the measure
             kind = kinds.get(tolerance.path)
             rows.append((tolerance.path, kind.unit if kind else "m", effects.nominal(i), numbers[tolerance.path]))
-    unit, time = of.measure.figure_unit(run.system, run.values), _place(prepared, of, there, 2 * shown - 1)
-    return Corner(prepared, (least, largest), unit, shown, time, numbers, rows)
+    unit, time = of.measure.figure_unit(run.system, run.values), _place(prepared, of, values_there, 2 * side_index - 1)
+    return Corner(prepared, (least, largest), unit, side_index, time, numbers, rows)
 
 
-def _place(prepared: ToleranceStudy, of: Of, there: Mapping[str, Number], sign: int) -> float:
+def _place(prepared: ToleranceStudy, of: Of, values_there: Mapping[str, Number], sign: int) -> float:
     """Time, s, at which a figure stands at its corner; NaN of one of the whole cycle."""
     time = of.time
     if of.measure.rule == "deviation" and len(of.reference.parts) == 1:
         at = of.reference.window.time
         for _ in range(ROUNDS):
-            courses = (prepared.kernel.courses(numbers, at)[0] for numbers in (there, prepared.inputs.nominal))
+            courses = (prepared.kernel.courses(numbers, at)[0] for numbers in (values_there, prepared.inputs.nominal))
             moved, nominal = (np.ravel(primal(course[of.measure.name][0])) for course in courses)
             change = np.broadcast_to(moved - nominal, at.shape)
             if of.reference.turning:

@@ -132,7 +132,9 @@ def _missed(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
             figures |= {key: float(drawn[key][i]) for key in ("yield", "yield_low", "yield_high", "cpk")}
             share, least, most = (figures[key] for key in ("yield", "yield_low", "yield_high"))
             if share < 1 if target is None else most < target:
-                middle, *ends = (f"{100 * one:.{decimals_of(most - least)}f}" for one in (share, least, most))
+                middle, *ends = (
+                    f"{100 * share_end:.{decimals_of(most - least)}f}" for share_end in (share, least, most)
+                )
                 parts.append(f"yield {middle} % (95 % interval {ends[0]} to {ends[1]} %)")
             sure = np.isfinite(low) and np.isfinite(high) and not outside
             if figures["cpk"] < 1 and not sure and target is None:
@@ -254,29 +256,37 @@ def _of_tolerances(outcome: Outcome) -> Iterator[Finding]:
     refuse, or a length turn round, each name once."""
     study, mechanism = outcome.study, outcome.study.run.system.mechanism
     numbers, kinds = copy(mechanism.parameter_set), measured(mechanism, mechanism.parameter_set.entries.values())
-    names, seen = variations(mechanism, numbers), set()
+    names, paths_seen = variations(mechanism, numbers), set()
     far = TURNED * float(np.ravel(primal(study.run.system.size(study.run.values)))[0])
-    for one in study.inputs.tolerances:
-        values = np.atleast_1d(np.asarray(one.options.get("values", 0.0)))
-        outside = np.count_nonzero((values < one.lower) | (values > one.upper))
-        if one.distribution == "sample" and outside:
+    for tolerance in study.inputs.tolerances:
+        values = np.atleast_1d(np.asarray(tolerance.options.get("values", 0.0)))
+        outside = np.count_nonzero((values < tolerance.lower) | (values > tolerance.upper))
+        if tolerance.distribution == "sample" and outside:
             largest = float(values[np.argmax(np.abs(values))])
-            what = f"{outside:,} of {len(values):,} measured deviations are outside the tolerance {one.lower:g} to "
-            what += f"{one.upper:g}, the largest is {largest:g} (SI units)"
+            what = (
+                f"{outside:,} of {len(values):,} measured deviations are outside the tolerance {tolerance.lower:g} to "
+            )
+            what += f"{tolerance.upper:g}, the largest is {largest:g} (SI units)"
             figures: dict[str, Any] = {"count": outside, "of": len(values), "farthest": largest}
-            yield Finding.warning("tolerance.measured_outside", one.path, what, "check the unit of the data", **figures)
-    for one, end in product(study.inputs.tolerances, ("lower", "upper")):
-        where = f"tolerances.{names[one.path][0]}" if one.path in names else one.path
-        deviation, unit = getattr(one, end), kinds[one.path].unit
-        if (where, end) in seen or not np.isfinite(deviation):
+            yield Finding.warning(
+                "tolerance.measured_outside", tolerance.path, what, "check the unit of the data", **figures
+            )
+    for tolerance, end in product(study.inputs.tolerances, ("lower", "upper")):
+        where = f"tolerances.{names[tolerance.path][0]}" if tolerance.path in names else tolerance.path
+        deviation, unit = getattr(tolerance, end), kinds[tolerance.path].unit
+        if (where, end) in paths_seen or not np.isfinite(deviation):
             continue
-        seen.add((where, end))
-        numbers.nominal = mechanism.parameters(deviations={numbers.entries[one.path].alias or one.path: deviation})
+        paths_seen.add((where, end))
+        numbers.nominal = mechanism.parameters(
+            deviations={numbers.entries[tolerance.path].alias or tolerance.path: deviation}
+        )
         changed = [path for path, value in numbers.nominal.items() if value != mechanism.parameter_set.nominal[path]]
-        refused = [one for one in check_values(mechanism, numbers, changed) if one.severity is Severity.ERROR]
-        reached = one.nominal + deviation
-        length = one.path.startswith("dimensions.") and unit == "m" and one.nominal > far
-        if reached < 0 <= one.nominal and (refused or length):
+        refused = [
+            tolerance for tolerance in check_values(mechanism, numbers, changed) if tolerance.severity is Severity.ERROR
+        ]
+        reached = tolerance.nominal + deviation
+        length = tolerance.path.startswith("dimensions.") and unit == "m" and tolerance.nominal > far
+        if reached < 0 <= tolerance.nominal and (refused or length):
             what = f"its tolerance includes negative values, down to {readable(reached, unit)}"
             yield Finding.warning("tolerance.negative", where, what, "narrow the tolerance", least=reached)
         elif refused:

@@ -132,13 +132,13 @@ def stated_or_outputs(run: Run, measures: Sequence[Measure]) -> tuple[list[Measu
     """The measures, or outputs with a note if there are none; MechanismError if there is no output either."""
     if measures:
         return list(measures), []
-    remedy, taken = "state measures: in the model, or use --measure link.point.x", outputs(run.system)
-    if not taken:
+    remedy, outputs_taken = "state measures: in the model, or use --measure link.point.x", outputs(run.system)
+    if not outputs_taken:
         what = "no measure is stated, and no joint to the ground is an output"
         raise MechanismError(Finding(what, "measures", remedy))
-    names = [measure.name for measure in taken]
+    names = [measure.name for measure in outputs_taken]
     what = f"the model states no measure; {', '.join(names)} are used (joints to the ground without a driver)"
-    return taken, [Finding.note("measure.none_stated", "measures", what, remedy, measures=names)]
+    return outputs_taken, [Finding.note("measure.none_stated", "measures", what, remedy, measures=names)]
 
 
 def placed(mechanism: Mechanism, measure: Measure, at: float | str) -> Measure:

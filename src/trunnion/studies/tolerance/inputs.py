@@ -203,10 +203,10 @@ def inputs_of(run: Run) -> Inputs:
     """The random numbers of a mechanism. Raises MechanismError if nothing varies, or a play has no length."""
     mechanism = run.system.mechanism
     tolerances = tuple(mechanism.tolerated())
-    held = tuple(seat.joint for seat in run.seats if seat.given is not None)
+    seated = tuple(seat.joint for seat in run.seats if seat.given is not None)
     pressed = tuple(seat.joint for seat in run.seats if seat.given is None)
     plays = plays_of(run)
-    loose = tuple(name for name in plays if name not in (*held, *pressed))
+    loose = tuple(name for name in plays if name not in (*seated, *pressed))
     if not tolerances and not loose:
         remedy = "write `60 mm ± 0.05 mm`, an entry in `tolerances`, or a clearance of a joint without a seat"
         raise MechanismError(Finding("nothing has a tolerance or a clearance", "tolerances", remedy))
@@ -216,7 +216,7 @@ def inputs_of(run: Run) -> Inputs:
         Marginal(tolerance.distribution, tolerance.lower, tolerance.upper, tolerance.options)
         for tolerance in tolerances
     ]
-    return Inputs(run, tolerances, loose, held, pressed, Population(marginals, mechanism.correlation()))
+    return Inputs(run, tolerances, loose, seated, pressed, Population(marginals, mechanism.correlation()))
 
 
 def _uneven(mechanism: Mechanism, tolerances: Sequence[Tolerance]) -> Iterator[Finding]:

@@ -59,14 +59,14 @@ class LoadedKernel(MotionKernel):
     def _run(self, values: Mapping[str, Number], lane: int) -> Run:
         """One of the mechanisms, over its own cycle; the last few are kept with their seats."""
         numbers = {path: np.ravel(np.asarray(primal(number), float)) for path, number in values.items()}
-        own = {path: float(number[lane if len(number) > 1 else 0]) for path, number in numbers.items()}
-        key = np.array(list(own.values())).tobytes()
+        numbers_of_lane = {path: float(number[lane if len(number) > 1 else 0]) for path, number in numbers.items()}
+        key = np.array(list(numbers_of_lane.values())).tobytes()
         if key not in self._runs:
             while len(self._runs) >= MOST_RUNS:
                 self._runs.pop(next(iter(self._runs)))
-            end = moved(self.run, own, np.array([self.run.cycle.duration]))
+            end = moved(self.run, numbers_of_lane, np.array([self.run.cycle.duration]))
             cycle = replace(self.run.cycle, duration=float(np.ravel(primal(end))[0]))
-            self._runs[key] = replace(self.run, values=own, cycle=cycle)
+            self._runs[key] = replace(self.run, values=numbers_of_lane, cycle=cycle)
         return self._runs[key]
 
     def breaks(self, values: Mapping[str, Number]) -> list[NDArray[np.float64]]:

@@ -40,12 +40,12 @@ class Corner(NamedTuple):
     assembles: bool = True
 
 
-def search(effects: Effects, objective: Objective, start: Mapping[str, float], sign: float, known: bool) -> Corner:
+def search(effects: Effects, objective: Objective, start: Mapping[str, float], sign: float, is_finite: bool) -> Corner:
     """The corner with the largest figure (sign 1) or the least (−1), from that of first order.
 
-    known: whether the nominal mechanism has the figure. NaN if none is found.
+    is_finite: whether the nominal mechanism has the figure. NaN if none is found.
     """
-    among = known and all(tolerance.lower <= 0.0 <= tolerance.upper for tolerance in effects.inputs.tolerances)
+    among = is_finite and all(tolerance.lower <= 0.0 <= tolerance.upper for tolerance in effects.inputs.tolerances)
     at, best, assembles = dict(start), Corner(0.0 if among else np.nan, {}, 0), True  # the nominal mechanism
     for rounds in range(1, MOST_ROUNDS + 1):
         real, slope = objective(effects.values(at), effects)

@@ -16,7 +16,7 @@ from trunnion.errors import Severity
 from trunnion.model.tolerances import ProcessChoice
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import AllocationProblem, Answer, Contribution, Criterion, SampledYield
-from trunnion.studies.allocation.solve import Choice, solve
+from trunnion.studies.allocation.solve import solve
 from trunnion.studies.allocation.yields import Verify, normal_yield
 
 COST, HALF_WIDTH = 1e-6, 1e-3  # the gap that is claimed, and its root: the cost is flat at its least
@@ -116,11 +116,10 @@ def refused(answer: Answer) -> bool:
 @pytest.mark.parametrize("samples", [0, 100_000])
 def test_a_wider_limit_costs_no_more(discrete: bool, samples: int) -> None:
     """From a limit that what is not bought breaks in 0.494 % to one that it never does; samples scatter by 2 %."""
-    way: Choice = "discrete" if discrete else "continuous"
     costs = []
     for room in (2.58, 2.63, 2.7, 2.78, 2.8, 2.805, 2.83, 3.0, 4.0):
         problem = press(room, discrete)
-        answer = solve(problem, way, TARGET, sampled(problem, samples) if samples else None)
+        answer = solve(problem, TARGET, sampled(problem, samples) if samples else None)
         assert not refused(answer), room
         costs.append(answer.cost)
     allowed = 1.02 if samples else 1 + 1e-4
@@ -166,9 +165,9 @@ def test_what_is_known_to_do_is_not_refused(correlated: bool, seed: int) -> None
 @pytest.mark.parametrize("discrete", [False, True])
 def test_a_yield_that_no_half_widths_have_is_refused(discrete: bool) -> None:
     """What is not bought breaks a limit more often than all may, by normal deviations and by samples."""
-    problem, choice = press(2.5, discrete), "discrete" if discrete else "continuous"
+    problem = press(2.5, discrete)
     for verify in (None, sampled(problem)):
-        answer = solve(problem, choice, TARGET, verify)  # type: ignore[arg-type]
+        answer = solve(problem, TARGET, verify)
         (finding,) = answer.findings
         assert refused(answer)
         assert finding.code == "yield.missed"

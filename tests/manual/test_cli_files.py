@@ -176,6 +176,26 @@ VERBS = {
 }
 
 
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("analyse", "--out", "a.csv", "--out", "a.xyz"), "cannot write a result as '.xyz'"),
+        (("analyse", "--out", "a.svg"), "cannot write a result as '.svg'"),
+        (("tolerance", "--out", "a.svg", "--report", "a.txt"), "a report is HTML"),
+        (("tolerance", "--out", "a.contributions.csv"), "there is no table 'contributions'"),
+        (("tolerance", "--kind", "pie"), "there is no figure 'pie'"),
+    ],
+)
+def test_files_are_refused_before_anything_is_computed(
+    program: Run, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], text: str, tmp_path: Path
+) -> None:
+    monkeypatch.delattr(analysing, "analysed")
+    verb, *options = words
+    done = program(verb, TOLERANCED, *options)
+    assert (done.code, done.out, list(tmp_path.iterdir())) == (2, "", [])
+    assert text in done.err
+
+
 @pytest.fixture
 def model(tmp_path: Path) -> Path:
     """A model whose name ends as a result's may."""

@@ -145,6 +145,12 @@ MISTAKES = {
         "{process: boring}": [
             ("{process: boring, B: 1}", "costs.CD.B", "no effect on a choice"),
             ("{process: boring, group: bores}", "costs.AB.group", "has formulas and choices", -2)],
+        "{process: boring}\n  AD: {": [
+            ("{process: boring, group: g}\n  AD: {group: g, ",
+             "costs.CD.group", "'g' (CD, AD) has no choice in common")],
+        "k: 30, unit: mm": [
+            ("k: 30, unit: mm, least: 1 mm",
+             "costs.AB.group", "bounds of the group 'bores' (AB, BC) exclude one another", -1)],
         "IT7: 9": [("IT17: 9", "processes.boring", "'IT17' is no IT grade")],
         "tolerance: t, cost: 3": [("tolerance: 0, cost: 3", "options.milled.tolerance", "has a tolerance of 0")],
         "CD: 70 mm ±": [("CD: 700 mm ±", "costs.CD.process", "the size 700 mm is not in the tables", 32)],

@@ -12,7 +12,7 @@ from allocations import rocker_sensitivities
 from scipy.stats import multivariate_normal
 
 import trunnion
-from trunnion import Mechanism
+from trunnion import Mechanism, MechanismError
 from trunnion.studies.allocation.allocate import half_widths
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -235,3 +235,15 @@ def test_curve_of_cost_over_accuracy() -> None:
     # of a power model without a constant part the cost goes with the power of the limits
     assert result["trade_off_cost"].values == pytest.approx(float(result["cost_total"]) * np.array([2, 1, 0.5]) ** 0.45)
     assert result["trade_off_tolerance"].values[2, :4] == pytest.approx(2 * result["tolerance"].values[:4])
+
+
+def test_what_cannot_be_allocated() -> None:
+    grades = trunnion.read(EXAMPLES / "fourbar-by-grades.yaml")
+    for model, choice, text in (
+        (grades, "continuous", "a table of processes, which is no continuous choice"),
+        (fourbar(costs={}), "auto", "no tolerance has a cost"),
+        (fourbar(measures={}), "auto", "no measure is stated"),
+        (fourbar(measures={"θ": {"angle": "rocker"}}), "auto", "none of the measures θ has a limit"),
+    ):
+        with pytest.raises(MechanismError, match=text):
+            trunnion.allocate(model, choice=choice)

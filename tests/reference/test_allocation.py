@@ -185,7 +185,7 @@ def test_four_dimensions_by_six_processes_equal_exhaustive_search(criterion: Cri
         more["correlation"] = (more["correlation"] + more["correlation"].T) / 2
     parts = tuple(Contribution(f"p{i}", options=random_options(rng, 6)) for i in range(4))
     problem = AllocationProblem(parts, rows(effect, limit, **more), criterion)
-    answer, best = solve(problem, "discrete"), exhaustive(problem)
+    answer, best = solve(problem), exhaustive(problem)
     assert answer.found == np.isfinite(best)
     if answer.found:
         assert answer.cost == pytest.approx(best, abs=1e-9)
@@ -206,7 +206,7 @@ def test_a_mixture_equals_the_best_of_all_choices(criterion: Criterion, seed: in
     free = tuple(Contribution(f"q{i}", cost=cost, most=0.3) for i, cost in enumerate(random_costs(rng, 2)))
     chosen = tuple(Contribution(f"p{i}", options=random_options(rng, 4)) for i in range(2))
     problem = AllocationProblem(chosen + free, effects, criterion)
-    answer, best = solve(problem, "discrete"), np.inf
+    answer, best = solve(problem), np.inf
     for picked in itertools.product(*(one.options for one in chosen)):
         held = tuple(Contribution(one.name, value=each.tolerance) for one, each in zip(chosen, picked, strict=True))
         part = solve(replace(problem, contributions=held + free))
@@ -222,7 +222,7 @@ def test_a_group_takes_the_option_of_one_name() -> None:
     grades = (ProcessChoice("IT7", 0.01, 9.0), ProcessChoice("IT8", 0.02, 5.0), ProcessChoice("IT9", 0.03, 2.0))
     larger = tuple(ProcessChoice(one.name, 1.5 * one.tolerance, one.cost + 1) for one in grades)
     parts = (Contribution("a", options=grades, group="g"), Contribution("b", options=larger, group="g"))
-    answer = solve(AllocationProblem(parts, rows(np.ones((1, 2)), 0.05)), "discrete")
+    answer = solve(AllocationProblem(parts, rows(np.ones((1, 2)), 0.05)))
     assert answer.choices == {"a": "IT8", "b": "IT8"}
     assert answer.tolerances == pytest.approx([0.02, 0.03])
     assert answer.cost == 11

@@ -1,5 +1,5 @@
 // The whole page in a document that only remembers: every view is built, moved through all positions and printed.
-// Run by test_browser.py, with a scene as its argument.
+// Run by test_scene.py, with a scene as its argument.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 

@@ -66,12 +66,11 @@ def rig(
     stated = Rig.read(rig_file)
     if out and not format_:
         check_form(stated.format)
-    count = len(stated.schedule.rows())
     with model.lines():
         try:
             if out:
                 check_folder(stated, out, format_)
-            with bar("conditions", count, least=FEWEST) as progress:
+            with bar("conditions", len(stated.names), least=FEWEST) as progress:
                 observation = observe(mechanism, stated, seed, progress)
         except MechanismError as error:  # findings about the rig bear the line of its file
             raise MechanismError(placed_in_rig(error.findings, rig_file)) from None

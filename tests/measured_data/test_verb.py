@@ -38,7 +38,7 @@ def test_tables_and_files(program: Run, rig: Path, tmp_path: Path) -> None:
     )
     assert (code, err) == (0, "")
     for text in (
-        "15\u00a0deg",
+        "15 deg",
         "19",
         "600",
         "torque-in",

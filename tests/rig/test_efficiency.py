@@ -166,3 +166,16 @@ def test_scatter_of_the_efficiency_is_that_of_a_sample_of_turns() -> None:
     assert found.value == pytest.approx(ETA * 3.1 / 3, rel=1e-12)
     spread = (np.sum(shares**2) - 3.1**2 / 3) / 2
     assert found.uncertainty == pytest.approx(ETA * (spread / 3) ** 0.5, rel=1e-9)
+
+
+def test_contributions_count_what_a_speed_does_to_the_time() -> None:
+    """Where the driver's speed gives each position its time, small changes of it are those of the ratio too."""
+    turns = exact()
+    turns["n1"] = turns["n1"] * (1 + 0.2 * np.sin(2 * CYCLE + 0.4))
+    found = efficiency_of(replace(condition(turns), speed=-50.0))
+    for one in found.contributions:
+        changed = {**turns}
+        values = changed[one.channel]
+        changed[one.channel] = values * (1 + 1e-6) if one.source == "gain" else values + 1e-6
+        slope = (efficiency_of(replace(condition(changed), speed=-50.0)).value - found.value) / 1e-6
+        assert one.sensitivity == pytest.approx(slope, rel=1e-4, abs=1e-7), (one.channel, one.source)

@@ -66,12 +66,11 @@ def rig(
     rig_model = Rig.read(rig_file)
     if out and not format_:
         check_form(rig_model.format)
-    count = len(rig_model.schedule.rows())
     with model.lines():
         try:
             if out:
                 check_folder(rig_model, out, format_)
-            with bar("conditions", count, least=FEWEST) as progress:
+            with bar("conditions", len(rig_model.names), least=FEWEST) as progress:
                 observation = observe(mechanism, rig_model, seed, progress)
         except MechanismError as error:  # findings about the rig bear the line of its file
             raise MechanismError(placed_in_rig(error.findings, rig_file)) from None

@@ -198,3 +198,18 @@ def test_the_help_has_each_verb_once_under_a_question_with_examples_that_are_rea
     for name, command in commands.items():
         for example in cli.EXAMPLES[name]:
             command.make_context(name, example.split(), resilient_parsing=False)
+
+
+def test_tolerances_are_written_as_asked(program: Run, tmp_path: Path) -> None:
+    """Tables, the whole result, a figure and a page of one run; with a row of units where that is asked for."""
+    files = ["t.csv", "t.parameters.csv", "t.nc", "t.json", "t.svg"]
+    asked = ("--steps", 12, "--samples", 200, "--kind", "histogram", "--units-row", "--report", "t.html")
+    done = program("tolerance", EXAMPLES / "toleranced-fourbar.yaml", *asked, *(f"--out={name}" for name in files))
+    assert done.code == 0, done.err
+    assert {path.name for path in tmp_path.iterdir()} == {*files, "t.html"}
+    assert done.out.startswith("Four-bar with tolerances\nrocker-angle: angle of link rocker")
+    assert json.loads((tmp_path / "t.json").read_text("utf-8"))["attrs"]["seed"] == 1
+    table = pd.read_csv(tmp_path / "t.csv", header=[0, 1])
+    with xr.open_dataset(tmp_path / "t.nc") as whole:
+        assert float(table["yield"].iloc[0, 0]) == float(whole["yield"][0])
+    assert "Four-bar with tolerances" in (tmp_path / "t.html").read_text("utf-8")

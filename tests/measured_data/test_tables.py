@@ -247,6 +247,9 @@ def test_huge_numbers(tmp_path: Path) -> None:
     columns["T1"] *= 1e150
     found = read(columns, tmp_path)
     assert np.isfinite(found.conditions[0].courses["torque-in"].mean).all()
+    columns["t"][-1] = 1e308
+    with pytest.raises(MechanismError, match=r"from 0 s to 1e\+308 s in steps of 0.0002 s, too many to count"):
+        read(columns, tmp_path)
 
 
 @pytest.mark.parametrize("every", [1, 3])

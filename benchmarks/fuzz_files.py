@@ -326,6 +326,7 @@ def _data_files() -> dict[str, bytes]:
         "german.csv": german.to_csv(index=False, sep=";", decimal=",").encode("cp1252"),
         "run.parquet": parquet.getvalue(),
         "run.tdms": tdms.getvalue(),
+        **{f"{engine}.nc": bytes(frame.to_xarray().to_netcdf(engine=engine)) for engine in ("scipy", "h5netcdf")},
     }
 
 
@@ -380,7 +381,7 @@ MAKERS: dict[str, Callable[[], Iterator[Original]]] = {
 def damaged(original: Original, rng: Random) -> bytes:
     """The bytes of a file with something wrong in it, or now and then with nothing."""
     text = original.raw.decode("utf-8", "surrogateescape")
-    binary = original.suffix in (".parquet", ".tdms")
+    binary = original.suffix in (".parquet", ".tdms", ".nc")
     way = rng.random()
     if original.entries is not None and way < 0.6:
         stated = damaged_entries(original.entries, rng)

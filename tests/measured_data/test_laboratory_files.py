@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 from measured_data.recording import Columns, mapping, off, recorded, text_of
 from trunnion.errors import MechanismError
@@ -112,11 +113,14 @@ def test_units_of_a_german_laboratory(columns: Columns, tmp_path: Path, encoding
         read_measured(mapping({**changes, "channels/speed-in/unit": None}), [tmp_path / "run.csv"])
 
 
-@pytest.mark.parametrize("end", ["parquet", "tdms"])
-def test_time_stamps_of_parquet_and_tdms(columns: Columns, tmp_path: Path, end: str) -> None:
+@pytest.mark.parametrize("end", ["parquet", "tdms", "nc"])
+def test_time_stamps_of_binary_files(columns: Columns, tmp_path: Path, end: str) -> None:
     stamped, path = _stamps(columns, FORMS["date, decimal comma"]), tmp_path / f"run.{end}"
     if end == "parquet":
         pd.DataFrame(stamped).to_parquet(path)
+    elif end == "nc":
+        times = np.datetime64("2026-11-22T11:40:00") + np.rint(columns["t"] * 1e9).astype("timedelta64[ns]")
+        xr.Dataset({key: ("t", one) for key, one in stamped.items() if key != "t"}, {"t": times}).to_netcdf(path)
     else:
         with TdmsWriter(path) as writer:
             writer.write_segment([RootObject({}), *(ChannelObject("rig", key, one) for key, one in stamped.items())])

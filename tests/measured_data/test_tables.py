@@ -1,4 +1,4 @@
-"""Data files of every kind and shape: the same numbers from CSV, Parquet and TDMS; a finding for what is no data."""
+"""Data files of every kind and shape: the same numbers from each of them; a finding for what is no data."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 from measured_data.recording import codes, mapping, read, recorded
 from trunnion.errors import MechanismError
@@ -48,7 +49,10 @@ def test_formats_give_the_same_bits(tmp_path: Path) -> None:
     text = read(columns, tmp_path, changes)
     pd.DataFrame(columns).to_parquet(tmp_path / "run.parquet")
     _tdms(tmp_path / "run.tdms", columns)
-    for name in ("run.parquet", "run.tdms"):
+    whole = xr.Dataset({name: ("row", values) for name, values in columns.items()})
+    for engine in ("scipy", "h5netcdf"):
+        whole.to_netcdf(tmp_path / f"{engine}.nc", engine=engine)
+    for name in ("run.parquet", "run.tdms", "scipy.nc", "h5netcdf.nc"):
         found = read_measured(mapping(changes), [tmp_path / name])
         assert _same(text, found), name
         assert [one.what for one in found.findings] == [one.what for one in text.findings]
@@ -158,6 +162,36 @@ def test_kinds_of_parquet(tmp_path: Path) -> None:
     assert found["list"].texts == 2
 
 
+@pytest.mark.parametrize("engine", ["scipy", "h5netcdf"])
+def test_variables_of_netcdf(tmp_path: Path, engine: Any) -> None:
+    """Packed numbers, gaps, units and times are those that CF 1.11 makes of them; what is not named is not decoded."""
+    path = tmp_path / "a.nc"
+    packed = {"units": "N m", "scale_factor": 0.5, "_FillValue": np.int16(-99)}
+    variables = {
+        "T": ("row", np.array([3, -99, 5], np.int16), packed),
+        "since": ("row", [0.0, 250.0, 750.0], {"units": "milliseconds since 2026-11-22 11:40:00"}),
+        "t": ("row", [0.0, 1.0, 2.0], {"units": "ms"}),
+        "odd": ("row", [1.0, 2.0, 3.0], {"units": "days since never"}),
+        "map": (("row", "place"), np.zeros((3, 2))),
+        "level": ((), 1.0),
+        "other": ("far", [1.0, 2.0, 3.0]),
+    }
+    xr.Dataset(variables, {"row": [10, 20, 30]}).to_netcdf(path, engine=engine)
+    found = read_table(path, ["T", "since", "t", "row"], ["none"]).columns
+    np.testing.assert_array_equal(found["T"].values, [1.5, np.nan, 2.5])
+    assert found["since"].values.tolist() == [0.0, 0.25, 0.75]
+    assert found["t"].values.tolist() == [0.0, 1.0, 2.0]
+    assert found["row"].values.tolist() == [10.0, 20.0, 30.0]
+    assert {name: column.unit for name, column in found.items()} == {"T": "N m", "since": "s", "t": "ms", "row": ""}
+    for name, told in (("map", "'map' row 3 × place 2"), ("level", "'level' none"), ("other", "'other' far 3")):
+        with pytest.raises(MechanismError, match=rf"not all of one dimension.*'T' row 3, {told}"):
+            read_table(path, ["T", name])
+    with pytest.raises(MechanismError, match=r"is not NetCDF that can be read: .*never"):
+        read_table(path, ["odd"])
+    with pytest.raises(MechanismError, match=r"there is no column 'n'; the file has .*'level'"):
+        read_table(path, ["n"])
+
+
 BAD: dict[str, tuple[str, bytes, str]] = {
     "empty": ("a.csv", b"", "is empty but for comments"),
     "blank": ("a.csv", b"\n\n", "is empty but for comments"),
@@ -170,6 +204,8 @@ BAD: dict[str, tuple[str, bytes, str]] = {
     "no line end": ("a.csv", b"1;" * (1 << 24), "no end of a line in 16 MiB"),
     "not parquet": ("a.parquet", b"t,T1\n0,1\n", "is not Parquet"),
     "not tdms": ("a.tdms", b"t,T1\n0,1\n" * 20, "is not TDMS"),
+    "not netcdf": ("a.nc", b"t,T1\n0,1\n", "is not NetCDF that can be read"),
+    "no classic netcdf": ("a.nc", b"CDF,T1\n0,1\n", "is not NetCDF that can be read"),
     "extension": ("a.xlsx", b"PK", "the extension '.xlsx' is not one of a data file"),
     "twice": ("a.csv", b"t,T1,T1\n0,1,2\n", "the column 'T1' stands there 2 times"),
     "missing": ("a.csv", b"t,T2,n\n0,1,2\n", "there is no column 'T1'; the file has 't', 'T2', 'n'"),
@@ -190,8 +226,9 @@ def test_what_is_no_data(tmp_path: Path, kind: str) -> None:
     assert finding.remedy
 
 
-@pytest.mark.parametrize(("name", "extra"), [("a.tdms", "tdms"), ("a.parquet", "parquet")])
+@pytest.mark.parametrize(("name", "extra"), [("a.tdms", "tdms"), ("a.parquet", "parquet"), ("a.nc", "netcdf")])
 def test_package_not_installed(tmp_path: Path, name: str, extra: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / name).write_bytes(b"")
     monkeypatch.setattr(importlib.util, "find_spec", lambda package: None)
     with pytest.raises(MechanismError, match=rf"pip install 'trunnion\[{extra}\]'"):
         read_table(tmp_path / name, ["t"])
@@ -210,6 +247,9 @@ def test_huge_numbers(tmp_path: Path) -> None:
     columns["T1"] *= 1e150
     found = read(columns, tmp_path)
     assert np.isfinite(found.conditions[0].courses["torque-in"].mean).all()
+    columns["t"][-1] = 1e308
+    with pytest.raises(MechanismError, match=r"from 0 s to 1e\+308 s in steps of 0.0002 s, too many to count"):
+        read(columns, tmp_path)
 
 
 @pytest.mark.parametrize("every", [1, 3])

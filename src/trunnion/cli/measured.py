@@ -108,7 +108,7 @@ def data(
     mapping: Annotated[Path, typer.Argument(help="Mapping file: YAML, JSON or TOML.")],
     shared: Files,
     files: Annotated[
-        list[Path] | None, typer.Argument(help="Data files instead of those it names: .csv .parquet .tdms.")
+        list[Path] | None, typer.Argument(help="Data files instead of those it names: .csv .parquet .tdms .nc.")
     ] = None,
 ) -> None:
     """Read measured files: conditions, channels, scatter, faults."""

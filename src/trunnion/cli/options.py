@@ -51,7 +51,7 @@ Write = Annotated[Path | None, Option("--write", help="Write the model with the 
 Force = Annotated[bool, Option("--force", help="With --write: allow overwriting the input itself.")]
 MappingFile = Annotated[Path, Argument(help="Mapping of the data: YAML.")]
 DataFiles = Annotated[
-    list[Path] | None, Argument(help="Data files instead of those in the mapping: CSV, Parquet, TDMS.")
+    list[Path] | None, Argument(help="Data files instead of those in the mapping: CSV, Parquet, TDMS, NetCDF.")
 ]
 
 

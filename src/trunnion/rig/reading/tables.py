@@ -1,4 +1,4 @@
-"""Columns of data files as numbers: CSV, Parquet and TDMS by their extension, the same numbers whichever it is.
+"""Columns of data files as numbers: CSV, Parquet, TDMS and NetCDF by extension, the same numbers whichever it is.
 
 Only the columns that are asked for are read. What is no number in them is NaN and counted, never replaced.
 
@@ -10,6 +10,7 @@ that begin with # are passed over, and so is what a logger writes above the head
 from __future__ import annotations
 
 import csv
+import importlib
 import importlib.util
 import re
 import warnings
@@ -86,7 +87,7 @@ def read_table(path: Path, names: Iterable[str], optional: Iterable[str] = ()) -
 
     Parameters
     ----------
-    path : of a CSV, Parquet or TDMS file, told by its extension.
+    path : of a CSV, Parquet, TDMS or NetCDF file, told by its extension.
     names : of the columns.
     optional : columns that may be missing.
 
@@ -164,7 +165,7 @@ def _column(cells: Any, unit: str = "", decimal: str = ".") -> Column:
         dated = ~np.isnat(cells)
         ticks = cells.astype(f"{'timedelta' if cells.dtype.kind == 'm' else 'datetime'}64[ns]").astype(np.int64)
         since = ticks[dated][0] if cells.dtype.kind == "M" and dated.any() else 0
-        return Column(np.where(dated, (ticks - since) * 1e-9, np.nan), unit)
+        return Column(np.where(dated, (ticks - since) * 1e-9, np.nan), "s")
     rows = ["" if cell is None or (isinstance(cell, float) and np.isnan(cell)) else str(cell).strip() for cell in cells]
     between = {match[1]: "" for row in rows if (match := _GROUPED[decimal].fullmatch(row))}
     signs = str.maketrans({".": "?", ",": "?", "−": "-"} | between | {decimal: "."})
@@ -304,7 +305,7 @@ def _words(cells: Sequence[str]) -> bool:
     return any(re.search(r"[^\W\d_]|[°%‰]", text) and text.casefold() not in NOTHING for text in texts)
 
 
-# ---- Parquet and TDMS -----------------------------------------------------------------------------------------
+# ---- Parquet, TDMS and NetCDF ---------------------------------------------------------------------------------
 
 
 def _read_parquet(path: Path, names: Sequence[str], optional: Sequence[str]) -> DataTable:
@@ -358,6 +359,40 @@ def _read_tdms(path: Path, names: Sequence[str], optional: Sequence[str]) -> Dat
     return DataTable(str(path), columns, min((pair for pair in steps if pair[1] > 0), default=None))
 
 
+def _read_netcdf(path: Path, names: Sequence[str], optional: Sequence[str]) -> DataTable:
+    """Variables and coordinates of one dimension, with their attribute `units`; only those that are named are decoded.
+
+    SciPy reads the classic format, h5netcdf that of version 4.
+    """
+    import xarray as xr
+
+    with path.open("rb") as stream:
+        classic = stream.read(3) == b"CDF"
+    if not classic and not all(importlib.util.find_spec(package) for package in ("h5netcdf", "h5py")):
+        raise _failed(path, ".nc of version 4 needs h5netcdf", "pip install 'trunnion[netcdf]'")
+    try:
+        if not classic:  # where h5netcdf fails at the first attributes, it prints a traceback when it is cleared away
+            with importlib.import_module("h5py").File(path, "r") as whole:
+                whole.attrs.get("_nc3_strict")
+        with xr.open_dataset(path, engine="scipy" if classic else "h5netcdf", decode_cf=False) as file:
+            places = _places(path, [str(name) for name in file.variables], names, optional)
+            chosen = xr.decode_cf(file.drop_vars(file.variables.keys() - places.keys()), decode_timedelta=False)
+            sizes = {name: dict(chosen[name].sizes) for name in places}
+            if any(len(size) != 1 or size != next(iter(sizes.values())) for size in sizes.values()):
+                of_each = (f"'{name}' {' × '.join(f'{key} {count:,}' for key, count in size.items()) or 'none'}"
+                           for name, size in sizes.items())  # fmt: skip
+                what = f"its variables are not all of one dimension, the same for all: {', '.join(of_each)}"
+                raise _failed(path, what, "write each column as a variable of that dimension alone")
+            columns = {name: _column(chosen[name].values, _bare(str(chosen[name].attrs.get("units", ""))))
+                       for name in places}  # fmt: skip
+    except MechanismError:
+        raise
+    except Exception as error:  # what SciPy, HDF5 and the decoding of a broken file raise: Value-, Key-, OS-, TypeError
+        what = f"is not NetCDF that can be read: {str(error)[:120] or type(error).__name__}"
+        raise _failed(path, what, "check the file") from None
+    return DataTable(str(path), columns)
+
+
 Reader = Callable[[Path, Sequence[str], Sequence[str]], DataTable]
 
 # extension: reader, the package it needs and the extra that brings it
@@ -367,4 +402,5 @@ FORMATS: dict[str, tuple[Reader, str, str]] = {
     ".tsv": (_read_text, "", ""),
     ".parquet": (_read_parquet, "pyarrow", "parquet"),
     ".tdms": (_read_tdms, "nptdms", "tdms"),
+    ".nc": (_read_netcdf, "", ""),
 }

@@ -23,6 +23,7 @@ __all__ = [
 Array = NDArray[np.float64]
 Say = Callable[[Finding | str | None], None]  # takes a finding, or a sentence about what was done
 GAP = 1.5  # times the usual step
+COUNTED = 2.0**53  # steps from the first row to the last, beyond which a float is no count
 UNEVEN = 0.2  # of the usual step, standard deviation
 
 
@@ -87,6 +88,9 @@ def _rising(seconds: Array, say: Say) -> Timeline:
     clean = seconds[rising]
     steps = np.diff(clean)
     step = float(np.median(steps))
+    if float(clean[-1]) - float(clean[0]) >= COUNTED * step:
+        what = f"the time goes from {clean[0]:.4g} s to {clean[-1]:.4g} s in steps of {step:.4g} s, too many to count"
+        raise MechanismError(Finding(what, "time", "check that time.column is the right one"))
     wide = steps > GAP * step
     if (gaps := np.flatnonzero(wide)).size:
         samples, longest = int(np.sum(np.rint(steps[gaps] / step) - 1)), int(gaps[np.argmax(steps[gaps])])

@@ -252,7 +252,8 @@ def left_in_turns(turns: Turns, course: Array, readings: Array, noise: float) ->
     every = share > ALIKE
     if every:  # then what a reading differs by from that a turn later is noise
         rows = np.where(turns.rows, readings[turns.window], np.nan)
-        apart = rows[round(samples) :] - rows[: -round(samples)]
+        later = max(round(samples), 1)  # the next row, where a turn is shorter than half a row
+        apart = rows[later:] - rows[:-later]
         apart = apart[np.isfinite(apart)]
         noise = noise_before(float(np.sqrt(np.mean(apart**2) / 2))) if apart.size else 0.0
     else:

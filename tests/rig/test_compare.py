@@ -117,6 +117,19 @@ def test_positions_that_vary_together_count_as_one():
 # ---- what is found --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(("clip", "verdict"), [(13.2, Verdict.NOT), (12.99, Verdict.WITHIN)])
+def test_a_clipped_peak_is_not_within_though_most_positions_are(clip, verdict):
+    """An uncertain zero makes the positions one, so that two thirds of them suffice; a tenth that is 30 U off is not
+    chance. 13 is the height of the peak: what is clipped at 12.99 loses less than U."""
+    random, count = np.random.default_rng(4), 60
+    true = 10 + 3 * np.sin(2 * np.pi * np.arange(count) / count)
+    true[13:18] += 30 if verdict is Verdict.NOT else 0
+    turns = np.minimum(true + random.normal(0, 0.05, (12, count)), clip)
+    found = judge(course("torque", turns, Accuracy(0.3, 0.0)), true, np.ones(count, bool), np.arange(count))
+    assert found["within"] >= found["within_least"]
+    assert found["verdict"] is verdict
+
+
 def test_a_model_beside_itself_is_within():
     result = compare(measured(settings=({"A.speed": 4.0}, {"A.speed": 6.0}), channels=POWERS, noise=0.05, seed=5))
     assert codes(result) == {Verdict.WITHIN}

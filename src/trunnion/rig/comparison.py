@@ -26,7 +26,7 @@ from trunnion.model.names import as_key, nearest
 from trunnion.model.units import UnitError, normalise, unit
 from trunnion.results.attributes import cited, codes, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
-from trunnion.results.quantities import readable
+from trunnion.results.quantities import joined, number, readable
 from trunnion.rig.judge import Verdict, judge, probability
 from trunnion.rig.modelled import Modelled, apart, each, in_condition, modelled
 from trunnion.rig.reading.measurement import Condition, Measurement, Signal, efficiency_of, load_joints, pairs_of
@@ -420,7 +420,9 @@ def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Find
         within = 100 * min(row.figures[name]["within"] for row in off)
         display_unit, size = off[0].signals[name].shown
         rms_text = (
-            f"{rms / size:.3g} {display_unit}" if display_unit not in ("rad", "1") else readable(rms, display_unit, 3)
+            joined(number(rms / size, 3), display_unit)
+            if display_unit not in ("rad", "1")
+            else readable(rms, display_unit, 3)
         )
         offset = " apart from a constant offset" * (Verdict.NOT not in by_verdict)
         what = f"does not agree within U {_in_which(off, rows)}{offset}: at worst {within:.0f} % of the positions "

@@ -23,6 +23,7 @@ __all__ = ["Uncertainty", "Verdict", "expanded", "independent", "judge", "probab
 Array = NDArray[np.float64]
 SURE = 2.326  # standard deviations: the share of a true model falls below its least in 1 % of courses
 ROUNDING = 1e-9  # of the size of a course: differences below it are none
+FAR = 3.0  # times the RMS of U, beyond which the RMS of a residual is no chance even where all positions err alike
 
 
 class Verdict(Coded):
@@ -126,12 +127,12 @@ def judge(
     if min(np.max(np.abs(course - np.mean(course))) for course in (measured, modelled)) > ROUNDING * size:
         correlation = float(np.corrcoef(measured, modelled)[0, 1])  # Pearson's; of none that is flat
     worst = int(np.argmax(np.abs(residual)))
-    share, least = _share(residual, of, coverage, ROUNDING * size)
+    share, least, near = _share(residual, of, coverage, ROUNDING * size)
     # a constant is taken out: what is left is against the scatter and what the gain makes of the shape
     shape = replace(of, shared=(of.shared - np.mean(of.shared, axis=1, keepdims=True))[1:])
-    unbiased_share, unbiased_least = _share(residual - bias, shape, coverage, ROUNDING * size)
-    verdict = Verdict.OFFSET if unbiased_share >= unbiased_least else Verdict.NOT
-    verdict = Verdict.UNKNOWN if np.isnan(share) else Verdict.WITHIN if share >= least else verdict
+    unbiased_share, unbiased_least, alike = _share(residual - bias, shape, coverage, ROUNDING * size)
+    verdict = Verdict.OFFSET if alike and unbiased_share >= unbiased_least else Verdict.NOT
+    verdict = Verdict.UNKNOWN if np.isnan(share) else Verdict.WITHIN if near and share >= least else verdict
     return courses | {
         "rms": rms(residual), "largest": float(residual[worst]), "largest_at": float(drive[where][worst]),
         "bias": bias, "bias_expanded": bias_expanded, "rms_unbiased": rms(residual - bias), "within": share,
@@ -146,14 +147,18 @@ def difference(measured: Array, model: Array) -> Array:
     return np.where(np.abs(residual) <= ROUNDING * size, 0.0, residual)
 
 
-def _share(residual: Array, of: Uncertainty, coverage: float, rounding: float) -> tuple[float, float]:
-    """Share of the positions within ±U, and how small that of a true model may be; NaN if no uncertainty is known."""
+def _share(residual: Array, of: Uncertainty, coverage: float, rounding: float) -> tuple[float, float, bool]:
+    """Share of the positions within ±U, and how small that of a true model may be; NaN if no uncertainty is known.
+
+    And whether the residual as a whole is less than `FAR`: the share says nothing of how far off the others are.
+    """
     limit, p = expanded(of.total, of.freedom, coverage), probability(coverage)
     finite = np.isfinite(limit)
     if not np.any(finite):
-        return np.nan, np.nan
+        return np.nan, np.nan, False
     share = float(np.mean(np.abs(residual[finite]) <= limit[finite] + rounding))
-    return share, p - SURE * float(np.sqrt(p * (1 - p) / independent(of.at(finite))))
+    least = p - SURE * float(np.sqrt(p * (1 - p) / independent(of.at(finite))))
+    return share, least, rms(residual[finite]) <= FAR * rms(limit[finite] + rounding)
 
 
 def independent(of: Uncertainty) -> float:

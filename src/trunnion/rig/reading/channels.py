@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import comb
@@ -250,7 +251,11 @@ def missing(where: str, column: Column, readings: Array, seconds: Array) -> Find
     mask = np.isnan(readings)
     example = f" ({counted(column.texts, 'text')} such as '{column.example}')" if column.texts else ""
     what = lost(f"dropouts{example}", mask, seconds, "cell")
-    return warning("readings.missing", where, what, "check sensor, cable and logger") if mask.any() else None
+    remedy = "check sensor, cable and logger"
+    if re.fullmatch(r"[-+]?\d{1,3}([.,]\d{3})+", column.example):
+        sign = "," if "," in column.example else "."
+        remedy = f"'{sign}' may be decimal or stand between thousands: write these numbers without it, or with decimals"
+    return warning("readings.missing", where, what, remedy) if mask.any() else None
 
 
 def clipped(where: str, readings: Array, limit: float, unit: str, seconds: Array) -> Finding | None:

@@ -172,7 +172,8 @@ def _column(cells: Any, unit: str = "", decimal: str = ".") -> Column:
     values = np.array([_number(row.translate(signs)) for row in rows])
     texts = [row for row, value in zip(rows, values, strict=True) if np.isnan(value) and row.casefold() not in NOTHING]
     stamps = texts and _TIME.fullmatch(texts[0]) and not np.isfinite(values).any()
-    return Column(values, unit, len(texts), texts[0][:40] if texts else "", tuple(rows) if stamps else ())
+    example = re.sub(r"[\x00-\x1f\x7f-\x9f]+", "�", texts[0])[:40] if texts else ""  # NUL of a torn file
+    return Column(values, unit, len(texts), example, tuple(rows) if stamps else ())
 
 
 # ---- text -----------------------------------------------------------------------------------------------------
@@ -217,7 +218,9 @@ def _read_text(path: Path, names: Sequence[str], optional: Sequence[str]) -> Dat
     except pd.errors.EmptyDataError:
         frame = pd.DataFrame(columns=list(range(width)), dtype=float)
     except pd.errors.ParserError as error:  # "Expected 2 fields in line 502, saw 3"
-        raise _failed(path, f"is not CSV: {str(error).strip()[-120:]}", "correct that line") from None
+        cells = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", str(error))
+        what = f"has {cells[3]} cells instead of {cells[1]}" if cells else f"is not CSV: {str(error)[-120:]}"
+        raise _failed(path, what, "correct that line", int(cells[2]) if cells else None) from None
     more = [place for place in frame if place >= len(heads)]
     if (longer := np.flatnonzero(frame[more].notna().any(axis=1))).size:
         what = f"row {longer[0] + 1} below the header has more cells than its {len(heads)}"

@@ -80,9 +80,15 @@ def _rising(seconds: Array, say: Say) -> Timeline:
     finite = seconds[np.isfinite(seconds)]
     back = np.diff(finite) < 0
     if rising.size < seconds.size:
-        what = f"{counted(int(np.sum(~rises)), 'row')} of {seconds.size:,} left out: their time does not rise, "
-        what += f"{at_times(highest[~rises])}, and runs backward {counted(int(back.sum()), 'time')} by up to "
-        what += f"{max(-np.diff(finite).min(), 0) + 0.0:.4g} s"
+        bare, late = ~np.isfinite(seconds), np.isfinite(seconds) & ~rises
+        kinds = [f"{counted(int(bare.sum()), 'row')} of {seconds.size:,} left out: no time in them"] * bool(bare.any())
+        if late.any():
+            kinds.append(f"{counted(int(late.sum()), 'row')} of {seconds.size:,} left out: their time does not rise, ")
+            kinds[-1] += at_times(highest[late])
+        if back.any():
+            what = f"it runs backward {counted(int(back.sum()), 'time')} by up to {-np.diff(finite).min():.4g} s"
+            kinds.append(what)
+        what = "; ".join(kinds)
         remedy = "check the logger's clock, split the file where a recording begins, or state time: {rate: …}"
         say(warning("time.backward", "time", what, remedy))
     clean = seconds[rising]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,6 +38,7 @@ from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import status_of
 from trunnion.solve.walk_kernel import WalkKernel
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 ARM, GUIDE, LOAD = 0.15, 0.12, 40.0
 CRITICAL = GUIDE / (2 * ARM)
 
@@ -489,3 +492,28 @@ def test_locking_says_nothing_where_there_is_no_answer() -> None:
     for name in ("locking_margin", "critical_multiple"):
         assert np.all(np.isnan(found[name].values[..., gone]))
         assert not np.any(np.isnan(found[name].values[..., found["status"].values < Status.NOT_CONVERGED]))
+
+
+def test_the_joint_that_need_be_lowered_alone_is_one_with_which_it_runs() -> None:
+    """At 0° a pin of the cross is at rest for a moment: what locks there is what locks on either side of it.
+
+    Without the friction of any one joint it locks as printed; with an output that is smooth, pin-1 decides.
+    """
+    mechanism = trunnion.read(EXAMPLES / "pezzuti-cardan-10mm.yaml")
+
+    def locks(**coefficients: float) -> dict[str, Any] | None:
+        numbers = {f"joints.{joint}.friction.coefficient": value for joint, value in coefficients.items()}
+        result = trunnion.analyse(mechanism.with_values(numbers), steps=360)
+        rows = [row for row in json.loads(result.attrs["findings"]) if row["code"] == "friction.locked"]
+        return rows[0]["figures"] if rows else None
+
+    printed = locks()
+    assert printed is not None
+    assert printed["decides"] is None
+    assert locks(**{"pin-1": 0.0})
+    assert locks(output=0.0)
+    smooth = locks(output=0.01)
+    assert smooth is not None
+    assert smooth["decides"] == "pin-1"
+    assert locks(output=0.01, **{"pin-1": 1.001 * 0.42 * smooth["multiple"]})
+    assert locks(output=0.01, **{"pin-1": 0.999 * 0.42 * smooth["multiple"]}) is None

@@ -285,3 +285,13 @@ def test_indices_of_a_play_and_its_size() -> None:
     known = 0.2**2 / (0.2**2 + (0.1 / 3) ** 2)
     np.testing.assert_allclose(first, [0, known], rtol=0, atol=0.02)
     np.testing.assert_allclose(total, [1 - known, 1], rtol=0, atol=0.02)
+
+
+def test_the_only_number_has_the_whole_scatter_of_the_only_measure() -> None:
+    """scipy's estimators fail for one measure of one number."""
+    result = trunnion.tolerance(
+        fourbar(measures=LIMIT, tolerances={"l4": "±0.05 mm"}), methods=["linear", "sobol"], samples=16_000
+    )
+    for order in ("first_order", "total_order"):
+        assert result[order].values == pytest.approx(1.0, abs=0.02)
+        assert result[f"{order}_low"].values <= result[order].values <= result[f"{order}_high"].values

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import csv
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
 
+import trunnion
 from trunnion import Status, save
 from trunnion.views.scales import Scale, arrange, on_scale
 from trunnion.views.sweep import figure, tables
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 GRID = {"misalignment": ANGLE, "input.speed": SPEED}
 FEW = scale([50, 500, 1000, 1500], "rad/s", "rpm", RPM)
 FRICTION = scale([0.05, 0.1, 0.2])
@@ -241,6 +244,17 @@ def test_a_table_has_the_ends_of_an_effort_that_lie_beyond_zero(least, most, sho
         result[f"drive_effort_{end}"].attrs = given.attrs
     (table,) = tables(result)
     assert [one for one in table.head if one.startswith("input.effort")] == [f"input.effort {k} [N m]" for k in shown]
+
+
+def test_a_point_that_locks_leaves_the_others_their_numbers():
+    """Its effort and reactions have no bound, beside which all others would be rounding."""
+    name, head = "joint_defaults.friction.coefficient", "A.effort max [N m]"
+    mechanism = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
+    (table,) = tables(trunnion.sweep(mechanism, {name: [1.0, 4.0]}, steps=12))
+    alone = np.max(trunnion.analyse(mechanism.with_values({name: 1.0}), steps=3600)["drive_effort"].values)
+    first, second = (row[table.head.index(head)] for row in table.rows)
+    assert float(first) == pytest.approx(alone, rel=1e-4)
+    assert second == "∞"
 
 
 def test_the_file_has_a_row_a_point_of_any_number_of_names(tmp_path):

@@ -350,7 +350,7 @@ def _locked(cycle: Cycle) -> Iterator[Finding]:
                 also = "locks at some of these positions too" if LockingState.LOCKED in states else "locks there too"
                 what += f"; driven backward it {also} (jammed)"
                 figures["reverse"] = also
-            if responsible and responsible[0] in module.joints:
+            if responsible and responsible[0] in module.joints and responsible[1] < 1:
                 figures |= {"decides": responsible[0], "multiple": responsible[1]}
                 alone = f"lower the coefficient of {responsible[0]} alone below {responsible[1]:.3g} times its value"
                 remedy = f"{alone}; or {remedy}"

@@ -515,9 +515,8 @@ class LockingCourse:
         if least is None:
             return None
         time = np.array([margins.side(least, "locking_margin", -1.0)])
-        plain = replace(self.method, name="newton", margin_up_to=0.0)
         with np.errstate(all="ignore"):
-            multiples = critical_multiples(self.run.solve(time, method=plain), self.method.margin_up_to)
+            multiples = multiples_at(self.run, time, self.method.margin_up_to)
         finite = [(float(multiple[0]), joint) for joint, multiple in multiples.items() if np.isfinite(multiple[0])]
         locked = [pair for pair in finite if pair[0] < 1.0]
         choose, pairs = (max, locked) if locked else (min, finite)

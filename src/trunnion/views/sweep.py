@@ -85,7 +85,10 @@ def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> Tab
     status = [int(code) for code in statuses(result, plan)[:, 0]]
     words = [cause(code) if code >= Status.NOT_CONVERGED else MILDER.get(code, "") for code in status]
     picked = thinned(len(plan.x.values), MOST_ROWS)
-    rows = [[_number(plan.x.values[i]), *(_number(column[i]) for column in columns), words[i]] for i in picked]
+    figures = list(zip(columns, heads, strict=True))
+    rows = [
+        [_number(plan.x.values[i]), *(_number(column[i], head) for column, head in figures), words[i]] for i in picked
+    ]
     title = f"{', '.join(name.replace('_', ' ') for name in measures)} over {plan.x.name}"
     table = Table(_titled(title, plan.at()), [plan.x.title, *heads, "status"], rows, len(words) - len(picked))
     return table if any(words) else replace(table, head=table.head[:-1], rows=[row[:-1] for row in rows])
@@ -131,7 +134,7 @@ def _matrix(title: str, x: Scale, other: Scale, values: Array, status: NDArray[n
     columns = [[x.title, *(_number(x.values[i]) for i in down)]]
     for k in range(values.shape[1]):
         causes = [cause(code) if code >= Status.NOT_CONVERGED else "" for code in status[down, k].tolist()]
-        cells = [_number(value) or why for value, why in zip(values[down, k].tolist(), causes, strict=True)]
+        cells = [_number(value, title) or why for value, why in zip(values[down, k].tolist(), causes, strict=True)]
         columns.append([other.say(k), *cells])
     # the words of a cause may stand below each other
     widths = [3 + max(len(column[0]), *(len(w) for cell in column for w in cell.split())) for column in columns]
@@ -146,11 +149,16 @@ def _titled(title: str, at: str) -> str:
     return f"{title}, at {at}" if at else title
 
 
-def _number(value: float) -> str:
-    """Empty for what is not known; of a locking margin without end: as far as it is looked for."""
+def _number(value: float, head: str = "") -> str:
+    """Empty for what is not known; of a locking margin, which alone has no end and no unit, as far as it is looked for.
+
+    head: of its column, with the unit; the effort of a mechanism that locks is ∞.
+    """
     if np.isnan(value):
         return ""
-    return f"> {MARGIN:g}" if value == np.inf else f"{value + 0.0:.6g}"  # + 0.0: no negative zero
+    if value == np.inf and "[" not in head:
+        return f"> {MARGIN:g}"
+    return f"{value + 0.0:.6g}".replace("inf", "∞")  # + 0.0: no negative zero
 
 
 # ---- what is drawn ------------------------------------------------------------------------------------------------

@@ -185,7 +185,8 @@ def _not_steady(points: Points, watched: Iterable[Measure], arrays: Mapping[str,
 def _scales(run: Run, arrays: Mapping[str, NDArray[Any]]) -> Scales:
     """Those of the first point, with the largest reaction of all."""
     scales = scales_of(run)
-    return scales._replace(force=max(scales.force, peak(arrays["reaction_max"])))
+    reactions = arrays["reaction_max"]  # of a point that locks they are ∞, beside which every other would be rounding
+    return scales._replace(force=max(scales.force, peak(reactions[np.isfinite(reactions)])))
 
 
 # ---- the result -----------------------------------------------------------------------------------------------

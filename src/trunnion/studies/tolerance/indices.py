@@ -63,20 +63,24 @@ def indices(sampler: Sampler, samples: int, seed: int) -> Indices:
         points[rows] = two[rows]
         mixed[i] = analysed(points)
     lost = int(sum(np.count_nonzero(np.any(np.isnan(y), axis=0)) for y in (y_one, y_two, *mixed)))
-    return _indices(_filled(y_one), _filled(y_two), _filled(mixed), seed, lost)
+    shares_of = _indices(_filled(y_one), _filled(y_two), _filled(mixed), seed, lost)
+    for shares in shares_of.arrays.values():  # of a measure without a single answer
+        shares[np.all(np.isnan(y_one) & np.isnan(y_two), axis=1)] = np.nan
+    return shares_of
 
 
 def _indices(y_one: Array, y_two: Array, mixed: Array, seed: int, lost: int) -> Indices:
     """Both orders with percentile intervals: scipy's own bootstrap cannot be given a seed."""
     from scipy.stats import sobol_indices  # takes longer to import than the rest
 
-    base = y_one.shape[-1]
-    shape = len(y_one), len(mixed)  # of one measure scipy leaves out the axis
+    base, rows = y_one.shape[-1], [*range(len(y_one)), 0]  # scipy fails for one measure of one number: never one
+    y_one, y_two, mixed = y_one[rows], y_two[rows], mixed[:, rows]
+    shape = len(rows), len(mixed)
 
     def both(points: Any) -> Array:
         parts = {"f_A": y_one[..., points], "f_B": y_two[..., points], "f_AB": mixed[..., points]}
         orders = sobol_indices(func=parts, n=base)
-        return np.array([np.reshape(orders.first_order, shape), np.reshape(orders.total_order, shape)])
+        return np.array([np.reshape(order, shape)[:-1] for order in (orders.first_order, orders.total_order)])
 
     rng = np.random.Generator(np.random.Philox(seed))
     with np.errstate(all="ignore"), warnings.catch_warnings():
@@ -97,6 +101,5 @@ def _indices(y_one: Array, y_two: Array, mixed: Array, seed: int, lost: int) -> 
 
 def _filled(y: Array) -> Array:
     """Without gaps: the mean of the rest in their place."""
-    with np.errstate(all="ignore"):
-        mean = np.nan_to_num(np.nanmean(y, axis=-1, keepdims=True)) if np.any(np.isnan(y)) else 0.0
-    return np.where(np.isnan(y), mean, y)
+    count = np.sum(~np.isnan(y), axis=-1, keepdims=True)
+    return np.where(np.isnan(y), np.nansum(y, axis=-1, keepdims=True) / np.maximum(count, 1), y)

@@ -335,3 +335,15 @@ def test_the_schema_has_the_limits_and_files_of_tables() -> None:
     data = read_mechanism(next(path for path in EXAMPLES if path.stem == "slider-crank")).data()
     data["tables"]["pressure"] = {"file": "gas.csv", "period": "360 deg"}
     jsonschema.Draft202012Validator(json_schema()).validate(data)
+
+
+@pytest.mark.parametrize("verb", ["analyse", "data"])
+def test_a_file_of_another_kind_is_named_in_one_finding(tmp_path, verb):
+    """As where model and mapping stand in the wrong order; not every key that the other kind has."""
+    path = tmp_path / "rig.yaml"
+    path.write_text("trunnion-rig: 1\nsensors: {}\nschedule: {}\n", "utf-8")
+    with pytest.raises(MechanismError) as failure:
+        read(path) if verb == "analyse" else read_mapping(path)
+    (finding,) = failure.value.findings
+    assert "but a rig file" in finding.what
+    assert finding.line == 1

@@ -12,8 +12,9 @@ import pytest
 import yaml
 
 import trunnion
-from trunnion.errors import Finding
+from trunnion.errors import Finding, Severity
 from trunnion.rig.identification import corrected_mapping, with_estimates
+from trunnion.views.identify import estimates
 
 GUIDE = "S.friction.coefficient"
 MODEL = "examples/slider-crank.yaml"
@@ -66,6 +67,8 @@ def test_what_explains_a_misfit(folder: Path, name: str) -> None:
     assert found.figures["kind"] == kind
     assert found.figures["size"] == pytest.approx(size, abs=near)
     assert found.figures["explains_percent"] > 95
+    if "fit.misfit" in {finding.code for finding in result.trunnion.findings if finding.severity is Severity.ERROR}:
+        assert estimates(result)[0].cells()[:2] == ("model does not fit", "—")  # not a narrow interval elsewhere
 
 
 def corrected(folder: Path, result: Any) -> Any:

@@ -39,6 +39,7 @@ _DEEP_KEY = re.compile(rf"(?<![\w.\"'-])(?:[\w\"'-]++\s*+\.\s*+){{{MAX_DEPTH},}}
 _TAG = "tag:yaml.org,2002:"
 _PLAIN_TAGS = frozenset(_TAG + name for name in ("str", "int", "float", "bool", "null", "map", "seq"))
 
+KINDS = {"trunnion": "a model file", "trunnion-data": "a mapping file", "trunnion-rig": "a rig file"}
 Lines = dict[str, int]
 Model = TypeVar("Model")
 
@@ -77,7 +78,12 @@ def read_entries(
     """
     try:
         kind = _file_type(path)
-        return entries_of(read_text(path, noun, MAX_BYTES, start_from), kind)
+        data, lines = entries_of(read_text(path, noun, MAX_BYTES, start_from), kind)
+        other = next((own for key, own in KINDS.items() if key in data and own != noun), "")
+        for key in (key for key, own in KINDS.items() if own == noun and other and key not in data):
+            what = f"is no {noun.removeprefix('a ')} but {other}"
+            raise MechanismError(Finding(what, remedy=f"name {noun} here, which begins with {key}: 1", line=1))
+        return data, lines
     except MechanismError as error:
         raise MechanismError(finding.at(str(path), finding.line) for finding in error.findings) from None
 

@@ -121,7 +121,8 @@ def estimates(result: xr.Dataset) -> list[Estimate]:
     units, paths = attribute(result, "parameter_units"), attribute(result, "parameter_paths")
     sources = names(result, "source")
     errors = {finding.code for finding in findings_of(result) if finding.severity is Severity.ERROR}
-    lacking = "model does not fit" if errors & {"fit.misfit", "sensor.off"} else "not identifiable"
+    gross = bool(errors & {"fit.misfit", "sensor.off"})  # then an interval means nothing, however narrow
+    lacking = "model does not fit" if gross else "not identifiable"
     for p, name in enumerate(names(result, "parameter")):
         factor, display_unit = read_in(units[p])
         keys = ("start", "estimate", "standard_uncertainty", "lower", "upper")
@@ -130,7 +131,7 @@ def estimates(result: xr.Dataset) -> list[Estimate]:
         rows.append(
             Estimate(name, tuple(paths[p]), display_unit, start, value, deviation, lower, upper,
                      float(result["degrees_of_freedom"].values[p]), int(result["limit"].values[p]),
-                     bool(result["told"].values[p]), shares, lacking)
+                     bool(result["told"].values[p]) and not gross, shares, lacking)
         )  # fmt: skip
     return rows
 

@@ -51,17 +51,12 @@ def rig(
 
     Without --out the rig file is only checked.
     """
-    from trunnion.model.file import read_entries
     from trunnion.rig.reading.rig_file import Rig, placed_in_rig
     from trunnion.rig.virtual.files import check_folder, check_form
     from trunnion.rig.virtual.observe import observe
 
     if format_:
         check_form(format_)
-    if "trunnion-rig" in read_entries(model.file)[0]:
-        raise MechanismError(
-            Finding("is a rig file", remedy="name the model first, then the rig", file=str(model.file))
-        )
     mechanism = model.read()
     rig_model = Rig.read(rig_file)
     if out and not format_:

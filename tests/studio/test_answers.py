@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import trunnion
-from studio.asking import EXAMPLES, analysed, ask, column, edited, model_of, unpacked
+from studio.asking import EXAMPLES, analysed, ask, column, edited, model_of, solved, unpacked
 from trunnion.errors import Status
 from trunnion.model.file import entries_of, text_of
 from trunnion.solve.margin import margin_in
@@ -315,6 +315,14 @@ def test_the_least_margin_is_that_of_a_position_that_has_one():
     assert {one for one in found["margin"] if one is not None} == {10.0}
     (figure,) = [one for one in analysed(text).trunnion.summary if one.name == "locking_margin"]
     assert found["margin_least"] == {"value": figure.value, "beyond": False, "at": figure.place.removeprefix("at ")}
+
+
+def test_what_goes_nowhere_together_is_mended_by_a_gesture():
+    """Its answer has places of no point, and these are what the gesture starts from."""
+    found = solved(text := EXAMPLES[FOURBAR].replace("AD: 5.50 m", "AD: 55 m"))
+    assert found["places"] == {}
+    mended, _ = edited(text, found["places"], {"do": "set", "path": ["dimensions", "AD"], "value": "5.50 m"})
+    assert len(solved(mended)["places"]) == len(found["scene"]["points"])
 
 
 @pytest.mark.parametrize("name", [FOURBAR, "rssr"])

@@ -441,8 +441,8 @@ class Tree(ABC):
         moved: Coordinates = []
         for k, (values, step) in enumerate(zip(q, steps, strict=True)):
             motion = self.motion(k)
-            motion_along = [s * size if kind == "slide" else s for s, kind in zip(step, motion.steps, strict=True)]
-            moved.append(motion.advanced(values, motion_along) if values else [])
+            scaled_step = [s * size if kind == "slide" else s for s, kind in zip(step, motion.steps, strict=True)]
+            moved.append(motion.advanced(values, scaled_step) if values else [])
         return moved
 
     def jacobian(

@@ -525,11 +525,8 @@ class System:
             if gear.slides and (slide := self.mechanism.coupled(name)[1]) in ways:
                 around = 2 * np.pi * abs(float(np.ravel(primal(self.ratio(values, name)))[0]))
                 ways[slide] = min(ways[slide], around)
-        return Cycle(
-            duration,
-            periodic,
-            max(float(spans[name].peak * duration / duration_share) for name, duration_share in ways.items()),
-        )
+        turns_made = max(float(spans[name].peak * duration / travel) for name, travel in ways.items())
+        return Cycle(duration, periodic, turns_made)
 
     def _backward_ranges(self, nominal: Values, spans: Mapping[str, Span]) -> Iterator[Finding]:
         """Drivers whose range runs against their speed."""

@@ -211,12 +211,8 @@ class AssemblyStudy:
                 return LeastPlay(least, least, q, none, np.zeros((len(time), len(ends))), gap, 0)
             least_plays = least_play(loops, q, none, ask)
         # what is found where it closes as it is is rounding
-        least_plays.least[fits], least_plays.bound[fits], least_plays.offsets[fits], least_plays.weights[fits] = (
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        )
+        for array in (least_plays.least, least_plays.bound, least_plays.offsets, least_plays.weights):
+            array[fits] = 0.0
         return least_plays
 
     def answer(self, time: Array) -> Answer:
@@ -289,7 +285,7 @@ class AssemblyStudy:
                 offsets[joint, end.number, "xyz".index(axis)] = np.where(solved, search.offsets[:, column], np.nan)
                 column += 1
 
-    def _largest(self, time: Array, needs: Array, every_end_stated: bool) -> tuple[float, float]:
+    def _largest(self, time: Array, needs: Array, stated: bool) -> tuple[float, float]:
         """The largest need of the cycle and its time: between the positions too, beside the largest of them."""
         heights = np.where(np.isnan(needs), -np.inf, needs)
         top = int(np.argmax(heights))
@@ -302,9 +298,7 @@ class AssemblyStudy:
         for _ in range(NARROWED):
             near = best[:, None] + reach * np.linspace(-1, 1, BETWEEN)
             near = near if self.cycle.periodic else np.clip(near, 0.0, self.cycle.duration)
-            heights_near = np.nan_to_num(
-                self.solve(near.ravel(), every_end_stated).least.reshape(near.shape), nan=-np.inf
-            )
+            heights_near = np.nan_to_num(self.solve(near.ravel(), stated).least.reshape(near.shape), nan=-np.inf)
             place = np.argmax(heights_near, axis=1)[:, None]
             better = np.take_along_axis(heights_near, place, 1)[:, 0]
             best = np.where(better > most, np.take_along_axis(near, place, 1)[:, 0], best)

@@ -291,16 +291,16 @@ def _left_out(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
     """Joints whose play has no model, or does more than the model of the mechanism knows."""
     mechanism = run.system.mechanism
     models = CLEARANCE_MODELS[mechanism.space]
-    seats_stated = [
+    without_model = [
         name
         for name, (kind, _) in run.system.joints.items()
         if kind not in models and clearance(name, run.values) is not None
     ]
-    if seats_stated:
-        kinds = [f"{name} is {run.system.joints[name][0]}" for name in seats_stated]
-        what = f"the play of {', '.join(seats_stated)} is left out ({', '.join(kinds)} joints)"
+    if without_model:
+        kinds = [f"{name} is {run.system.joints[name][0]}" for name in without_model]
+        what = f"the play of {', '.join(without_model)} is left out ({', '.join(kinds)} joints)"
         remedy = f"play is modelled in {', '.join(models)} joints"
-        yield Finding.warning("play.left_out", "joints", what, remedy, joints=seats_stated)
+        yield Finding.warning("play.left_out", "joints", what, remedy, joints=without_model)
     toothed = sorted({
         joint for gear in mechanism.gears.values() if gear.touches for joint in gear.joints if joint in loose
     })  # fmt: skip
@@ -318,8 +318,8 @@ def _fits(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
         hole, pin = (f"joints.{name}.pin.{key}" for key in ("hole_radius", "radius"))
         joint = mechanism.effective_joints[name]
         if joint.pin is not None and joint.pin.fit is not None and {hole, pin} <= limits.keys():
-            least_clearance = run.values[hole] + limits[hole][1] - run.values[pin] - limits[pin][0]
-            largest[name] = float(np.ravel(primal(least_clearance))[0])
+            largest_clearance = run.values[hole] + limits[hole][1] - run.values[pin] - limits[pin][0]
+            largest[name] = float(np.ravel(primal(largest_clearance))[0])
     if largest:
         most = max(largest, key=largest.__getitem__)
         what = f"the play of {', '.join(largest)} is the mean of their fits; the largest is "
@@ -453,7 +453,7 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
         "places": [[_kind_of_place(played, i), played.place(i)] for i in range(len(units))],
         **scales_of(run).summary(_summary(played, units)),
         "findings": finding_rows(findings),
-        "missed": [f"{place.where}: {place.what}" for place in findings if place.code == "limit.exceeded"],
+        "missed": [f"{finding.where}: {finding.what}" for finding in findings if finding.code == "limit.exceeded"],
     }
     variables = described(arrays, VARIABLES, {"measure": units_of, "sensitivity": per_length})
     return dataset_of("play", variables, labels, attributes, driven(played.time, *dial))

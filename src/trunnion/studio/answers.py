@@ -154,13 +154,14 @@ def _model(question: Asked) -> dict[str, Any]:
     drawn_scene = scene(result, max_positions=MOST_STEPS)
     return head | {
         "scene": drawn_scene,
-        "places": {key: [track[axis][0] for axis in "xy"] for key, track in drawn_scene["points"].items()},
+        "places": {key: place for key, track in drawn_scene["points"].items()
+                   if None not in (place := [track[axis][0] for axis in "xy"])},
         **margin_of(result, question.rubs),
         "locks": locks_of(state.run, result["time"].values, result["status"].values),
         **({"margin_why": "friction lacks something"} if state.bare and question.friction else {}),
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
         **measured(state.run),
-    }
+    }  # fmt: skip
 
 
 def _sketch(question: Asked, places: dict[str, Vector] | None = None) -> Sketch:

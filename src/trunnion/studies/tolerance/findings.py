@@ -281,9 +281,8 @@ def _of_tolerances(outcome: Outcome) -> Iterator[Finding]:
             deviations={numbers.entries[tolerance.path].alias or tolerance.path: deviation}
         )
         changed = [path for path, value in numbers.nominal.items() if value != mechanism.parameter_set.nominal[path]]
-        refused = [
-            tolerance for tolerance in check_values(mechanism, numbers, changed) if tolerance.severity is Severity.ERROR
-        ]
+        checked = check_values(mechanism, numbers, changed)
+        refused = [finding for finding in checked if finding.severity is Severity.ERROR]
         reached = tolerance.nominal + deviation
         length = tolerance.path.startswith("dimensions.") and unit == "m" and tolerance.nominal > far
         if reached < 0 <= tolerance.nominal and (refused or length):

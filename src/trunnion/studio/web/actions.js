@@ -80,7 +80,6 @@ async function answered() {
   if (state.live.value?.text === null) state.live.value = null; // the dragged mechanism has its answer
   if (state.selection.value && !isPart(found, state.selection.value)) state.selection.value = null; // its name was undone, or it is gone
   if (found.scene && state.index.value >= found.scene.count) state.index.value = 0;
-  if (!state.solved.value) state.places.value = { ...found.places, ...state.places.value };
   if (found.solved) await (cycles = cycles.then(() => figured(asked)));
 }
 

@@ -517,3 +517,17 @@ def test_the_joint_that_need_be_lowered_alone_is_one_with_which_it_runs() -> Non
     assert smooth["decides"] == "pin-1"
     assert locks(output=0.01, **{"pin-1": 1.001 * 0.42 * smooth["multiple"]})
     assert locks(output=0.01, **{"pin-1": 0.999 * 0.42 * smooth["multiple"]}) is None
+
+
+@pytest.mark.slow
+def test_what_locks_between_the_positions_is_found() -> None:
+    """From about 151° to 180°, of which 12 positions have none: the range and the share are those of many positions."""
+    model = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
+    model = model.with_values({"joint_defaults.friction.coefficient": 4.0})
+    few, many = (trunnion.analyse(model, steps) for steps in (12, 360))
+    assert not np.any(few["status"] == Status.LOCKED)
+    found, expected = ([row for row in findings(result) if row["code"] == "friction.locked"] for result in (few, many))
+    assert [one["where"] for one in found] == [one["where"] for one in expected]
+    for key in ("share", "whole"):
+        assert found[0]["figures"][key] == pytest.approx(expected[0]["figures"][key], rel=1e-3)
+    assert found[0]["figures"]["decides"] == expected[0]["figures"]["decides"]

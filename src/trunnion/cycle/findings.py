@@ -36,6 +36,7 @@ from trunnion.solve.drawn import hinted_at
 from trunnion.solve.end_loads import NO_LOAD, EndLoads, plain
 from trunnion.solve.forward import start
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
+from trunnion.solve.margin import margin_in
 from trunnion.solve.seating import ROUNDS as SEAT_ROUNDS
 from trunnion.solve.seating import UNSETTLED, Seating, seating_of
 from trunnion.solve.space.determinacy import spins_of
@@ -67,6 +68,7 @@ LEAST = 0.01  # of the drive work: what supplies less is not worth a word
 RESOLVED = 1e-7  # of its largest value: a resistance that is below 0 by less is 0, for so well its course is known
 ROUNDED = 1e-6  # beside its error: an efficiency is above 1 by more, for seats settle to as much of their clearance
 MOST_PLACES = 8  # named in one sentence
+WITHIN = 17  # times at which a range that locks between the positions is looked at, with its ends
 APART = 2e-3  # of the cycle: times of lifting off that are nearer to each other are told as one
 ENDS = ("", " (end 1)", " (end 2)", " (along its axis)")  # by the place of an end
 JUMP = 0.2  # of the largest effort: what changes by more at a break jumps there
@@ -334,15 +336,15 @@ def _undefined(cycle: Cycle) -> Iterator[Finding]:
 def _locked(cycle: Cycle) -> Iterator[Finding]:
     """Modules that lock: how far they are from running, the joint that decides, and whether they lock backward too."""
     rubs = felt(cycle.run.system, cycle.run.values)
-    for number, (places, shares) in cycle.at.causes.of("locked").items():
+    for number, where, share, margin in _locks(cycle):
         module = cycle.run.system.plan.modules[number]
-        joints, share = [name for name in module.joints if name in rubs], float(np.min(shares))
-        what = f"locked by friction {cycle.at.dial.intervals(places)}: there is a solution only up to "
+        joints = [name for name in module.joints if name in rubs]
+        what = f"locked by friction {where}: there is a solution only up to "
         what += f"{share:.4g} times the friction of {', '.join(joints)}"
         remedy = (
             f"lower these coefficients below {share:.3g} times their values, shorten the arms or lengthen the guides"
         )
-        figures: dict[str, Any] = {"at": cycle.at.dial.intervals(places), "share": share, "joints": joints}
+        figures: dict[str, Any] = {"at": where, "share": share, "joints": joints, "whole": margin}
         figures |= {"reverse": "", "decides": None, "multiple": None}
         if cycle.locking is not None:
             states, responsible = cycle.locking.all_states(), cycle.locking.responsible
@@ -354,11 +356,31 @@ def _locked(cycle: Cycle) -> Iterator[Finding]:
                 figures |= {"decides": responsible[0], "multiple": responsible[1]}
                 alone = f"lower the coefficient of {responsible[0]} alone below {responsible[1]:.3g} times its value"
                 remedy = f"{alone}; or {remedy}"
-        figures["whole"] = margin = float(np.nanmin(cycle.at.arrays["locking_margin"][places], initial=np.inf))
         if margin < (1 - NEXT) * share:
             remedy = f"lower the coefficients of all joints below {margin:.3g} times their values (where "
             remedy += f"{', '.join(joints)} no longer lock, other joints do), shorten the arms or lengthen the guides"
         yield Finding.error("friction.locked", f"links {', '.join(module.links)}", what, remedy, **figures)
+
+
+def _locks(cycle: Cycle) -> Iterator[tuple[int, str, float, float]]:
+    """Each module that locks, where, its share of the friction and the margin of all; between the positions if only
+    there."""
+    at, run, course = cycle.at, cycle.run, cycle.course
+    noted = at.causes.of("locked")
+    for number, (places, shares) in noted.items():
+        margin = float(np.nanmin(at.arrays["locking_margin"][places], initial=np.inf))
+        yield number, at.dial.intervals(places), float(np.min(shares)), margin
+    if course is None or noted or not np.any(course.status == Status.LOCKED):
+        return
+    panels, edges = np.flatnonzero(course.status == Status.LOCKED), course.courses.edges
+    time = np.linspace(edges[panels], edges[panels + 1], WITHIN)[1:-1].T.ravel()
+    back = seating_of(run, at.method).at(time, at.method).back if run.seats else run.solve(time, method=at.method)
+    margin = float(np.nanmin(margin_in(back, 1.0), initial=np.inf))
+    runs = np.split(panels, np.flatnonzero(np.diff(panels) > 1) + 1)
+    where = listed([cycle.between(edges[part[0]], edges[part[-1] + 1]) for part in runs])
+    for number, settled in zip(reversed(range(len(back.settled))), back.settled, strict=True):
+        if (share := float(np.min(settled.share))) < 1.0:
+            yield number, where, share, margin
 
 
 def _badly_solved(cycle: Cycle) -> Iterator[Finding]:

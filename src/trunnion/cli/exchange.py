@@ -25,7 +25,7 @@ def import_(
     material: Annotated[str, Option("--material", help="Material of parts without one: steel, aluminium, …")] = "steel",
     density: Annotated[str | None, Option("--density", help="Density instead: 7850kg/m^3.")] = None,
     gap: Annotated[str, Option("--gap", help="Greatest difference of the radii of a pin and its hole.")] = "0.5mm",
-    unit: Annotated[str, Option("--unit", help="Length unit of a file that states none: mm, in, m.")] = "mm",
+    unit: Annotated[str, Option("--unit", help="Length unit of a file that states none, such as mm, in, m.")] = "mm",
     force: Annotated[bool, Option("--force", help="Overwrite the model file if it exists.")] = False,
 ) -> None:
     """Make a model file of a drawing or a model of another program."""

@@ -263,9 +263,7 @@ def chosen(mechanism: Mechanism, names: Sequence[str] | None, values: Values) ->
 def _meant(name: str, mechanism: Mechanism) -> str:
     """A remedy for a text that is no measure: what is most like it, else how one is written."""
     head, colon, _ = name.partition(":")
-    points = (
-        f"{link}.{point}" for link, joined_link in mechanism.effective_links.items() for point in joined_link.points
-    )
+    points = (f"{link}.{point}" for link, entry in mechanism.effective_links.items() for point in entry.points)
     components = [f"{point}.{axis}" for point in points for axis in AXES[: mechanism.coordinates]]
     near = nearest(head, [*STATISTICS, *MEASURES]) if colon else nearest(name, [*mechanism.measures, *components])
     if near.startswith("did you mean"):

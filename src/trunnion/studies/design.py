@@ -123,7 +123,8 @@ class Design:
         Source: any textbook of machine theory, e.g. R. L. Norton, Design of Machinery, "Flywheels".
         """
         if not fluctuation > 0:
-            raise MechanismError(Finding(f"a fluctuation of {fluctuation:g} needs no end of inertia", "fluctuation"))
+            what = f"a fluctuation of {fluctuation:g} would need an infinite inertia"
+            raise MechanismError(Finding(what, "fluctuation", "give a number above 0, such as 0.02"))
         return self.energy_swing / (fluctuation * self.mean_speed**2) if self.mean_speed else float("nan")
 
 

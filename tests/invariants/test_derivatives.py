@@ -54,7 +54,7 @@ CASES = [
 
 
 @pytest.mark.sample(10)
-@pytest.mark.spread(3)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("name", "friction"), CASES)
 def test_duals_equal_central_differences(name: str, friction: float | Data | None) -> None:
     """To 1e-7 of the largest derivative or value per step-scale: sixth-order differences, all numbers at once."""

@@ -494,6 +494,7 @@ def test_locking_says_nothing_where_there_is_no_answer() -> None:
         assert not np.any(np.isnan(found[name].values[..., found["status"].values < Status.NOT_CONVERGED]))
 
 
+@pytest.mark.slow
 def test_the_joint_that_need_be_lowered_alone_is_one_with_which_it_runs() -> None:
     """At 0° a pin of the cross is at rest for a moment: what locks there is what locks on either side of it.
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import trunnion
 from brief import brief
-from mechanisms import model, slider_crank, transformed
+from mechanisms import DURANGO, model, slider_crank, transformed
 from mechanisms_space import rssr
 from trunnion import Mechanism
 from trunnion.results.scales import Scales, without_noise
@@ -144,3 +144,11 @@ def test_a_floor_follows_the_dimension_of_its_unit(length: float, rate: float, f
         if name != "1/s":
             assert floor(name) == pytest.approx(unit * size, rel=1e-9)
     assert np.isnan(floor("of its RMS"))
+
+
+def test_a_speed_near_the_end_of_the_floats_has_an_answer() -> None:
+    """What has no finite force is not a number or infinite; nothing is divided by a scale that is 0."""
+    data = trunnion.read(DURANGO).data()
+    data["drivers"]["A"] = {"speed": 1e301}
+    result = trunnion.analyse(trunnion.Mechanism(**data), 6)
+    assert np.all(np.isfinite(result["point_position"]))

@@ -70,7 +70,9 @@ def _sources(run: Run, length: float, rate: float) -> float:
         if entry.location[0] in ("links", "springs") and path in run.values:
             lengths, rates, forces = powers_of(entry.kind.unit)
             if forces == 1.0 and (lengths or rates):
-                sizes.append(peak(primal(run.values[path])) / (length**lengths * rate**rates))
+                with np.errstate(all="ignore"):  # a scale beyond the floats makes no force
+                    scale = np.float64(length) ** -lengths * np.float64(rate) ** -rates
+                    sizes.append(float(np.nan_to_num(peak(primal(run.values[path])) * scale, posinf=0.0)))
     return max(sizes)
 
 

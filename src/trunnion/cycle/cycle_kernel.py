@@ -258,8 +258,8 @@ class Many:
         def look(mechanism: NDArray[np.intp], time: NDArray[np.float64]) -> tuple[Any, Any]:
             shape = (1, time.size) if len(of.cycles) == 1 else time.shape
             meant = None if without is None else without.picked(mechanism)
-            courses_of = self.filled(of.picked(mechanism), meant, of.lanes(time), shape, names, method, method)[0]
-            arrays = {name: array.reshape(*array.shape[:-2], *time.shape) for name, array in courses_of.items()}
+            solved = self.filled(of.picked(mechanism), meant, of.lanes(time), shape, names, method, method)[0]
+            arrays = {name: array.reshape(*array.shape[:-2], *time.shape) for name, array in solved.items()}
             again, rows = stacked(arrays, names, 2)
             shapes.update(again)
             return rows, arrays["status"]
@@ -271,5 +271,5 @@ class Many:
         ]
         accuracy = accuracy_of(self.run.cycle, Accuracy())
         with np.errstate(all="ignore"):
-            courses_of = Courses.many(look, breaks, lambda sizes: like(self.run, shapes, sizes), accuracy)
-        return [CycleCourse(self.run, shapes, item) for item in courses_of]
+            solved = Courses.many(look, breaks, lambda sizes: like(self.run, shapes, sizes), accuracy)
+        return [CycleCourse(self.run, shapes, item) for item in solved]

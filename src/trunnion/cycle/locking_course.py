@@ -330,8 +330,8 @@ class LockingCourse:
             answered = ((status < Status.NOT_CONVERGED) | (status == Status.LOCKED)) & np.isfinite(other.acting)
             forward = np.where(ahead.locked | locked, np.nan, [ahead.delivered, ahead.acting])
             powers = [*forward, other.delivered, other.acting, other.given, other.acting - other.given]
-            codes_of = np.where(answered, 2 * locked + other.locked, 4)  # 0: runs both ways; 3: neither
-            return np.stack([*powers, *(other.efforts[name] for name in drivers)]), codes_of
+            state_codes = np.where(answered, 2 * locked + other.locked, 4)  # 0: runs both ways; 3: neither
+            return np.stack([*powers, *(other.efforts[name] for name in drivers)]), state_codes
 
         def like(sizes: Array) -> Array:
             return np.concatenate([np.full(6, np.max(sizes[:6])), np.full(len(drivers), np.max(sizes[6:]))])

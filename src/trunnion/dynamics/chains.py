@@ -134,8 +134,8 @@ def _turning(run: Run, walk: Forward, first: str, second: str) -> Array:
         raise MechanismError(
             Finding(what, f"links.{second}", "let fewer joints of this link be in play, or it turn less")
         )
-    rotation_of: Array = best @ home.T
-    return rotation_of
+    cosines: Array = best @ home.T
+    return cosines
 
 
 def _tried(turned: Array) -> Iterator[Array]:

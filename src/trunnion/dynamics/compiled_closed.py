@@ -120,8 +120,8 @@ def _closed(motion: FreeMotion, at: Moment, force: float) -> list[Number]:
     second: Any = numbers[: len(nothing)]
     onsets = motion.forced(at.onsets, numbers[len(nothing) :], active)
     done = at._replace(onsets=motion.shared(onsets, active.walls))
-    pushes_of = motion.contacts.pushes(motion.walk(at, nothing), done.onsets)
-    touches = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in pushes_of]
+    pushes = motion.contacts.pushes(motion.walk(at, nothing), done.onsets)
+    touches = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in pushes]
     columns_seen = [number[i] for i in range(len(Seen._fields)) for number in touches]
     xp = namespace(pivots[0])
     least = functools.reduce(xp.minimum, pivots)

@@ -321,12 +321,12 @@ def _by_rounds(motion: FreeMotion, at: Moment) -> tuple[list[Number], Number]:
         return [*(number - part for number, part in zip(second, change, strict=True)), *change, turned]
 
     begin = [0.0 * rate for rate in at.rate]
-    *change_of, positive = looped(step, [*begin, *begin, 1.0], ROUNDS)
+    *step_and_change, positive = looped(step, [*begin, *begin, 1.0], ROUNDS)
     doubt: Number = np.where(positive > 0.0, 0.0, 1.0)
-    for number, change, size in zip(change_of[:count], change_of[count:], unit, strict=True):
+    for number, change, size in zip(step_and_change[:count], step_and_change[count:], unit, strict=True):
         small = CLOSE * np.maximum(np.abs(number), 1e-2 * size)
         doubt = np.maximum(doubt, np.where(np.abs(change) <= small, 0.0, 1.0))
-    return change_of[:count], doubt
+    return step_and_change[:count], doubt
 
 
 def _affine(motion: FreeMotion, at: Moment) -> list[Number]:
@@ -366,8 +366,8 @@ def missing_of(motion: FreeMotion, at: Moment, second: Any) -> list[Number]:
 def _seen(motion: FreeMotion, at: Moment) -> list[Number]:
     """What `rates.Seen` has, of every contact."""
     nothing: Any = [0.0] * len(motion.names)
-    pushes_of = motion.contacts.pushes(motion.walk(at, nothing), at.onsets)
-    parts = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in pushes_of]
+    pushes = motion.contacts.pushes(motion.walk(at, nothing), at.onsets)
+    parts = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in pushes]
     return [*(part[i] for i in range(len(Seen._fields)) for part in parts), 0.0]
 
 

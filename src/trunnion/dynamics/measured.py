@@ -39,8 +39,8 @@ class MotionKernel(NumpyKernel):
 
     def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Curves, NDArray[np.int8]]:
         """As `NumpyKernel.courses`; a measure of a motion in time is one number a sample."""
-        values_of, status = super().courses(values, time)
-        return values_of | courses_in_time(self.run, self.measures, values, shape_of(values, time)), status
+        rows, status = super().courses(values, time)
+        return rows | courses_in_time(self.run, self.measures, values, shape_of(values, time)), status
 
 
 def not_steady(run: Run, measure: Measure) -> str:
@@ -54,16 +54,16 @@ def courses_in_time(
     run: Run, measures: Iterable[Measure], values: Mapping[str, Number], shape: tuple[int, ...]
 ) -> dict[str, tuple[Number, ...]]:
     """Those measures that are of a motion in time, by name: one number a sample, to broadcast to the shape."""
-    courses_of: dict[str, tuple[Number, ...]] = {}
-    figures_of: dict[tuple[str, float | None], dict[str, Number]] = {}
+    by_measure: dict[str, tuple[Number, ...]] = {}
+    by_place: dict[tuple[str, float | None], dict[str, Number]] = {}
     for measure in measures:
         if not measure.in_time:
             continue
         motion = measure.subject, measure.duration
-        if motion not in figures_of:
-            figures_of[motion] = numbers_in_time(run, *motion, values, shape)
-        courses_of[measure.name] = (figures_of[motion][measure.kind],)
-    return courses_of
+        if motion not in by_place:
+            by_place[motion] = numbers_in_time(run, *motion, values, shape)
+        by_measure[measure.name] = (by_place[motion][measure.kind],)
+    return by_measure
 
 
 def numbers_in_time(

@@ -162,14 +162,14 @@ def applied_to(driver: str) -> str:
 
 def drives(system: System, values: Values, number: Callable[[Any], Any] = float) -> dict[str, Drive]:
     """What drives each free coordinate, by driver. number: what becomes of a value."""
-    drives_of: dict[str, Drive] = {}
+    by_driver: dict[str, Drive] = {}
     for name, driver in system.mechanism.drivers.items():
         if not driver.found:
             continue
         motor, path = driver.motor, f"drivers.{name}.motor."
         applied = number(values.get(applied_to(name), 0.0))
         if motor is None:
-            drives_of[name] = Drive(None, {}, applied=applied)
+            by_driver[name] = Drive(None, {}, applied=applied)
             continue
         own_parameters = {
             key.removeprefix(path): number(value) for key, value in values.items() if key.startswith(path)
@@ -179,7 +179,7 @@ def drives(system: System, values: Values, number: Callable[[Any], Any] = float)
             parameters[f"points.{key}"] = [own_parameters[f"points.{k}.{key}"] for k in range(len(motor.points or ()))]
         keys = ("ratio", "efficiency", "inertia", "off_from", "brake", "brake_from",
                  "clutch", "clutch_from", "clutch_until")  # fmt: skip
-        drives_of[name] = Drive(
+        by_driver[name] = Drive(
             motor, parameters, applied=applied, **{key: own_parameters[key] for key in keys if key in own_parameters}
         )
-    return drives_of
+    return by_driver

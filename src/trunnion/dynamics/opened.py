@@ -99,8 +99,8 @@ def opened(run: Run) -> Opened:
     hung = [name for name in coordinates if name not in single]
     missing = mobility_by_formula(base) - len(passive(base)) - len(base.drivers) - len(hung)
     chosen = _chosen(base, hung, max(missing, 0), cut, run)
-    coordinates_of = {name: coordinates.get(name) or _coordinate(walk, name) for name in (*hung, *chosen)}
-    data["drivers"] = {**data.get("drivers", {}), **_drivers(run, base, coordinates_of)}
+    by_joint = {name: coordinates.get(name) or _coordinate(walk, name) for name in (*hung, *chosen)}
+    data["drivers"] = {**data.get("drivers", {}), **_drivers(run, base, by_joint)}
     return Opened(Mechanism(**data), run, parts)
 
 

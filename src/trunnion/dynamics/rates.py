@@ -181,8 +181,8 @@ class Walks:
     def look(self, at: Moment) -> Seen:
         """See `Seeing`."""
         motion = self.motion
-        pushes_of = motion.contacts.pushes(motion.walk(at, np.zeros_like(at.q)), at.onsets)
-        return seen_of(pushes_of, at.q.shape[1])
+        pushes = motion.contacts.pushes(motion.walk(at, np.zeros_like(at.q)), at.onsets)
+        return seen_of(pushes, at.q.shape[1])
 
     def derivative(
         self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()

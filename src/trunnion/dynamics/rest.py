@@ -41,10 +41,10 @@ class Rest:
 
     def held(self, begin: float, row: Array, time: Array) -> Array:
         """The state at times of a rest that began at a time in a row: only controllers move on."""
-        rows_of = np.repeat(row[:, None], len(time), axis=1)
+        rows = np.repeat(row[:, None], len(time), axis=1)
         (drive,), n = self.motion.drives.values(), self.layout.coordinates
-        rows_of[2 * n] = drive.waiting(time - begin, row[2 * n], begin)
-        return rows_of
+        rows[2 * n] = drive.waiting(time - begin, row[2 * n], begin)
+        return rows
 
     def beyond(self, time: Array, row: Array, begin: float, now: float) -> tuple[Array, Array]:
         """By how much what drives it exceeds the break-away effort forward and backward, N m or N; both < 0 at rest."""

@@ -213,13 +213,13 @@ def result_of(motion: FreeMotion, integrated: Found, duration: float, nominal: R
     def build() -> xr.Dataset:
         variables = {name: event.over("time") for name, event in results.variables(mechanism.space).items()}
         units = member_units(system)
-        arrays_of = described(books.arrays, variables, units)
-        arrays_of |= described(_own(motion, run, solution, books), MOTION, units)
+        parts = described(books.arrays, variables, units)
+        parts |= described(_own(motion, run, solution, books), MOTION, units)
         labels, along = dict(books.labels), {"time": Variable(("time",), "s", "time from the start")}
         coordinates = {"time": books.time}
         if nominal is not None and books.touches is not None:
             labels["contact"] = list(motion.contacts.labels)
-            arrays_of |= described(books.touches.arrays(books.works[-1]), CONTACT) | described(
+            parts |= described(books.touches.arrays(books.works[-1]), CONTACT) | described(
                 impact_arrays(impacts), IMPACT
             )
             rows = np.flatnonzero(np.all(np.isfinite(books.touches.normal), axis=0))
@@ -227,8 +227,8 @@ def result_of(motion: FreeMotion, integrated: Found, duration: float, nominal: R
             if len(rows) >= FEWEST and not is_rigid(mechanism):  # an impact of rigid bodies has no force
                 along["frequency"] = FREQUENCY
                 coordinates["frequency"], amplitude = spectrum(books.time[rows], books.touches.normal[:, rows])
-                arrays_of |= described({"contact_force_amplitude": amplitude}, SPECTRUM)
-        return dataset_of("motion", arrays_of, labels, attributes, described(coordinates, along))
+                parts |= described({"contact_force_amplitude": amplitude}, SPECTRUM)
+        return dataset_of("motion", parts, labels, attributes, described(coordinates, along))
 
     return Result(attributes, build)
 

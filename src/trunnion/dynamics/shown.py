@@ -100,14 +100,14 @@ def as_stated(
 ) -> tuple[dict[str, Array], dict[str, list[str]]]:
     """Arrays and labels of the mechanism as it is stated, from those of the mechanism without its joints in play."""
     system = run.system
-    names_of, arrays_played = fill.labels(system), played.arrays
+    stated_labels, arrays_played = fill.labels(system), played.arrays
     variables = results.variables(system.mechanism.space)
     for name, array in arrays.items():
         if name not in arrays_played or results.SAME_AS.get(name) in arrays_played:
             continue
         into, dims = arrays_played[name], variables[name].dims
-        places = [[(i, labels[dim].index(label)) for i, label in enumerate(names_of[dim]) if label in labels[dim]]
-                  for dim in dims if dim in names_of]  # fmt: skip
+        places = [[(i, labels[dim].index(label)) for i, label in enumerate(stated_labels[dim]) if label in labels[dim]]
+                  for dim in dims if dim in stated_labels]  # fmt: skip
         if not places:
             into[...] = array
             continue
@@ -115,11 +115,11 @@ def as_stated(
         into[to] = array[of]
     if system.mechanism.space == "planar":
         for joint, row in played.rows.items():
-            first, second = (names_of["link"].index(link) for link in system.joints[joint][1])
+            first, second = (stated_labels["link"].index(link) for link in system.joints[joint][1])
             for suffix in ("", "_velocity", "_acceleration"):
                 angles = arrays_played[f"link_angle{suffix}"]
                 arrays_played[f"joint_rotation{suffix}"][row] = angles[second] - angles[first]
-    return arrays_played, names_of
+    return arrays_played, stated_labels
 
 
 @dataclass

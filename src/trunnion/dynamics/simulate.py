@@ -212,8 +212,8 @@ def check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float
         return
     rows = np.repeat(row[:, None], 2, axis=1)
     rows[0, 1] += BESIDE * (1.0 if motion.system.turns(motion.names[0]) else motion.system.size(motion.values))
-    inertia, shift_of = np.abs(motion.inertia(Layout.of(motion).moment(np.zeros(2), rows))[0, 0])
-    if inertia < MASSLESS * shift_of:
+    inertia, shifted = np.abs(motion.inertia(Layout.of(motion).moment(np.zeros(2), rows))[0, 0])
+    if inertia < MASSLESS * shifted:
         what = "begins where nothing moves that has a mass, as at a dead centre, so that it has no acceleration there"
         remedy = "state the inertia of the link or the rotor that it turns, or begin elsewhere"
         raise MechanismError(Finding(what, f"drivers.{motion.names[0]}.initial", remedy))

@@ -316,8 +316,8 @@ class FreeMotion:
         """What the motors give, less the brakes, of each coordinate. senses: shares of what resists the joints that
         stick, and senses of those that slide, where several coordinates are free."""
         efforts = list[Number]()
-        for i, (name, drive_of) in enumerate(self.drives.items()):
-            rate, drive = at.rate[i], drive_of.seen(at.now, at.slips)
+        for i, (name, motor_drive) in enumerate(self.drives.items()):
+            rate, drive = at.rate[i], motor_drive.seen(at.now, at.slips)
             if at.senses and name in senses:
                 efforts.append(drive.resisted(at.time, rate, second[i], at.integral[i], at.now, senses[name]))
                 continue

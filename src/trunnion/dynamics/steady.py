@@ -43,20 +43,20 @@ def steady(
         what = "it may stick while others slide, as several drivers are free, which is not followed in a steady cycle"
         remedy = "use friction laws that are smooth at rest (brown-mcphee, dahl, lugre), or leave --steady out"
         raise MechanismError([Finding(what, f"joints.{joint}", remedy) for joint in motion.resisted])
-    cycle_of = steady_cycle(motion, duration, tolerance, progress, evaluations)
-    each = Repeated.of(motion, cycle_of.solution)
+    repeated_cycle = steady_cycle(motion, duration, tolerance, progress, evaluations)
+    each = Repeated.of(motion, repeated_cycle.solution)
     moving = mechanism.with_motions(
         {name: motion_law(repeated) for name, repeated in zip(motion.names, each, strict=True)}
     )
     run = prepare(moving)
     at = positions(run, steps, engine="numpy")
     cycle = summary.result_of(run, at)
-    missing = _missing(cycle_of, at)
-    findings = [*findings_of(cycle), *_findings(cycle_of, missing)]
+    missing = _missing(repeated_cycle, at)
+    findings = [*findings_of(cycle), *_findings(repeated_cycle, missing)]
     attributes = encoded({
         **cycle.attrs,
         "findings": finding_rows(findings),
-        **scales_in(cycle).summary([*_figures(cycle_of, each, missing), *summary_of(cycle)]),
+        **scales_in(cycle).summary([*_figures(repeated_cycle, each, missing), *summary_of(cycle)]),
         "steady": 1,
     })  # fmt: skip
     return Result(attributes, lambda: cycle.dataset.assign_attrs(attributes))

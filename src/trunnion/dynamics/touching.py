@@ -189,7 +189,7 @@ class PinContact(Contact):
     def accelerations(self, walk: Forward) -> tuple[Array, Array]:
         """Of ρ − |c|, and of the slip c·t + ω_pin (R − |c|) − ω_hole R."""
         a, b = _point(walk, self.body, self.pin), _point(walk, self.other, self.hole)
-        cx, cy, ux, uy = (difference_of - other for difference_of, other in zip(a, b, strict=True))
+        cx, cy, ux, uy = (p - other for p, other in zip(a, b, strict=True))
         far, first = _acceleration(walk, self.body, self.pin), _acceleration(walk, self.other, self.hole)
         ax, ay = far[0] - first[0], far[1] - first[1]
         size = namespace(cx, cy).hypot(cx, cy)
@@ -278,11 +278,11 @@ class SpatialContact(Contact):
 
     def _axes(self, walk: Forward) -> tuple[Frame, Frame]:
         """Global frames of pin and hole."""
-        axes_of = []
+        pairs_of_axes = []
         for link, local in ((self.body, self.axle), (self.other, self.hole)):
             frame = walk.motions[link].frame
-            axes_of.append(each(walk.algebra.compose(frame, local), primal))
-        return axes_of[0], axes_of[1]
+            pairs_of_axes.append(each(walk.algebra.compose(frame, local), primal))
+        return pairs_of_axes[0], pairs_of_axes[1]
 
     def _speed(self, walk: Forward, place: Vector3) -> Vector3:
         """Velocity of the pin against the hole, of their materials at a place, m/s."""

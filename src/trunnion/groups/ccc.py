@@ -101,8 +101,8 @@ def rates(axes: tuple[Vector3, Vector3, Vector3], twist: Vector3) -> Vector3:
 
 def closure(loop: Loop, twists: Sequence[Number]) -> tuple[Number, Number]:
     """By how much a loop misses closing: the largest entry of the product less I, real and dual part; rad, m."""
-    product_of = compose(*(link(angle, twist) for angle, twist in zip(loop.angles, twists, strict=True)))
-    gaps = [parts(entry - (1.0 if i == j else 0.0)) for i, row in enumerate(product_of) for j, entry in enumerate(row)]
+    product = compose(*(link(angle, twist) for angle, twist in zip(loop.angles, twists, strict=True)))
+    gaps = [parts(entry - (1.0 if i == j else 0.0)) for i, row in enumerate(product) for j, entry in enumerate(row)]
     real, dual = (np.broadcast_arrays(*map(primal, half)) for half in zip(*gaps, strict=True))
     return np.max(np.abs(real), axis=0), np.max(np.abs(dual), axis=0)
 

@@ -222,19 +222,19 @@ class Tree(ABC):
     ) -> tuple[tuple[Any, ...], tuple[Element, ...], tuple[list[Any], ...]]:
         """Frames of all links, elements of all joints (global) and the screws of their freedoms."""
         frames: dict[int, Any] = {}
-        frames_of: dict[tuple[int, int], Any] = {}
+        element_frames: dict[tuple[int, int], Any] = {}
 
         def placed(k: int, side: int) -> Any:
-            if (k, side) not in frames_of:
+            if (k, side) not in element_frames:
                 link, local = self.joints[k].sides[side], elements[k][side]
-                frames_of[k, side] = local if link == OUTER else self.algebra.compose(frames[link], local)
-            return frames_of[k, side]
+                element_frames[k, side] = local if link == OUTER else self.algebra.compose(frames[link], local)
+            return element_frames[k, side]
 
         for step in self.steps:
             k, motion = step.joint, self.motion(step.joint)
             move = motion.place if step.near == 0 else motion.unplace
             far = move(placed(k, step.near), q[k], *elements[k][2:])
-            frames_of[k, 1 - step.near] = far
+            element_frames[k, 1 - step.near] = far
             frames[step.child] = self.algebra.relative(far, elements[k][1 - step.near])
         pairs = tuple(Element(placed(k, 0), placed(k, 1), *elements[k][2:]) for k in range(len(self.joints)))
         screws = tuple(self.motion(k).screws(*pair) for k, pair in enumerate(pairs))

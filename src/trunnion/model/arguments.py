@@ -89,12 +89,12 @@ def _strict(function: Callable[..., Any], call: str) -> Callable[..., Any]:
     def hints() -> dict[str, Any]:
         """What the annotations mean where the function stands; nothing said is anything."""
         place = inspect.unwrap(function).__globals__
-        hints_of = {
+        annotations = {
             name: parameter.annotation
             for name, parameter in parameters.items()
             if parameter.annotation is not parameter.empty
         }
-        return {name: eval(text, place) if isinstance(text, str) else text for name, text in hints_of.items()}
+        return {name: eval(text, place) if isinstance(text, str) else text for name, text in annotations.items()}
 
     @functools.wraps(function)
     def strict(*args: Any, **keywords: Any) -> Any:

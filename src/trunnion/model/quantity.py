@@ -193,7 +193,7 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
     terms = [term(part) for part in parts]
     value = LITERAL.fullmatch(main.strip().lstrip("-+ "))
     unit_of_value = value["unit"] or "" if value else ""
-    unit = next((unit_of for _, unit_of in reversed(terms) if unit_of), unit_of_value)
+    unit = next((named for _, named in reversed(terms) if named), unit_of_value)
     if value and unit == "%" and unit_of_value != unit:
         shares = ", ".join(f"{number.lstrip('+')} % is {_share(number, value)}" for number, _ in terms)
         raise UnitError(f"the tolerance in '{text}' is in percent, the value is not", f"write the deviation: {shares}")

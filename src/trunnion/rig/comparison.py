@@ -312,7 +312,7 @@ def _attributes(
 ) -> dict[str, Any]:  # fmt: skip
     first, entries = rows[0].model, {row["path"]: row for row in inputs(mechanism)}
     signals = {name: next(row.signals[name] for row in rows if name in row.signals) for name in measures}
-    entries_of = [entries.get(mechanism.path_of(name), {"unit": "", "text": ""}) for name in sets]
+    set_entries = [entries.get(mechanism.path_of(name), {"unit": "", "text": ""}) for name in sets]
     figures = [figures for row in rows for figures in row.figures.values()]
     agreed = [item["verdict"] is Verdict.WITHIN for item in figures if "verdict" in item]
     agreed += [item["efficiency_within"] == 1 for item in figures if "efficiency_within" in item]
@@ -329,8 +329,8 @@ def _attributes(
         "channel_units": [signal.unit for signal in signals.values()],
         "channel_read_in": [signal.read_in for signal in signals.values()],
         "channel_measures": list(measures.values()),
-        "set_units": [entry["unit"] for entry in entries_of],
-        "set_written": [written_unit(entry["text"], entry["unit"]) for entry in entries_of],
+        "set_units": [entry["unit"] for entry in set_entries],
+        "set_written": [written_unit(entry["text"], entry["unit"]) for entry in set_entries],
         "findings": finding_rows(_findings(mechanism, list(measures), rows)),
         "data_findings": data_findings(measurement),
         "done": list(measurement.done),

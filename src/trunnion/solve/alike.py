@@ -55,10 +55,10 @@ def _plain(walk: Forward, number: int) -> set[int]:
             mechanism.effective_links[name],
             [k for k in walk.system.joints if name in walk.system.joints[k][1]],
         )
-        joints_of = {joint: mechanism.effective_joints[joint] for joint in joints}
+        own_joints = {joint: mechanism.effective_joints[joint] for joint in joints}
         bare = link.mass.source == 0 and "inertia" not in link.model_fields_set and set(link.points) <= set(joints)
         inside = set(joints) <= set(module.joints) and spoken.isdisjoint({name, *joints})
-        shifted = any(joint.pin is not None and joint.pin.offset is not None for joint in joints_of.values())
+        shifted = any(joint.pin is not None and joint.pin.offset is not None for joint in own_joints.values())
         if bare and inside and not shifted and i not in spun and not mechanism.loop:
             plain.add(i)
     return plain

@@ -381,17 +381,17 @@ def _misnamed(system: System, module: Module, count: int) -> list[Finding]:
 
 def hints(walk: Forward, module: Module) -> list[tuple[str, str, tuple[Number, ...]]]:
     """(link, point, place) or ("", joint, (angle or slide,)) of the hints that tell assemblies of a module apart."""
-    hints_of: list[tuple[str, str, tuple[Number, ...]]] = []
+    rows: list[tuple[str, str, tuple[Number, ...]]] = []
     for key in walk.system.mechanism.assembly:
         path = f"assembly.{key}"
         if f"{path}.x" in walk.values:
             link, name = _point_of(walk.system, module, key)
             if link:
                 place = tuple(walk.values[f"{path}.{axis}"] for axis in "xyz" if f"{path}.{axis}" in walk.values)
-                hints_of.append((link, name, place))
+                rows.append((link, name, place))
         elif key in module.joints:
-            hints_of.append(("", key, (walk.values[path],)))
-    return hints_of
+            rows.append(("", key, (walk.values[path],)))
+    return rows
 
 
 def _point_of(system: System, module: Module, key: str) -> tuple[str, str]:

@@ -87,8 +87,8 @@ def _in_one_frame(system: System, values: Values, size: float) -> bool:
     mechanism = system.mechanism
     if mechanism.loop or mechanism.gears or not mechanism.drivers:
         return False
-    elements_of = system.stated_elements(values)
-    elements = {key: each(frame, lambda n: float(np.ravel(primal(n))[0])) for key, frame in elements_of.items()}
+    drawn_elements = system.stated_elements(values)
+    elements = {key: each(frame, lambda n: float(np.ravel(primal(n))[0])) for key, frame in drawn_elements.items()}
     return all(
         _meets(system, kind, elements[first, name], elements[second, name], size)
         for name, (kind, (first, second)) in system.joints.items()

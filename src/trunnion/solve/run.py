@@ -125,8 +125,8 @@ class Run:
 
     def _bends(self, values: Values) -> list[Bend]:
         passed = {time for met in self.chosen.meetings.values() for place in met.at for time in place}
-        bends_of = stated_bends(Mechanisms(self.system, self.chosen.assembly, values, [self.cycle]))
-        return [*bends_of, *(Bend(time) for time in sorted(passed))]
+        bends = stated_bends(Mechanisms(self.system, self.chosen.assembly, values, [self.cycle]))
+        return [*bends, *(Bend(time) for time in sorted(passed))]
 
     @np.errstate(all="ignore")
     def courses(

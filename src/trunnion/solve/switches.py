@@ -72,8 +72,8 @@ class Mechanisms:
     def shaped(self, number: Number, time: Array) -> Array:
         """A number that a walk at `lanes` has, (lane, place)."""
         shape = (1, time.size) if len(self.cycles) == 1 else time.shape
-        lanes_of: Array = np.broadcast_to(np.asarray(primal(number), float), shape).reshape(time.shape)
-        return lanes_of
+        reshaped: Array = np.broadcast_to(np.asarray(primal(number), float), shape).reshape(time.shape)
+        return reshaped
 
     def row(self, number: Number) -> Array:
         """A number that does not change along the way, (mechanism,)."""

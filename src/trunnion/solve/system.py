@@ -309,9 +309,9 @@ class System:
         """The same without errors of joints; c, s in the plane and z in space is the direction of the joint."""
         if self.mechanism.loop:
             return self._loop_elements(values)
-        element_of = self._element_in_space if self.spatial else self._element_in_plane
+        read_element = self._element_in_space if self.spatial else self._element_in_plane
         return {
-            (link, name): element_of(values, link, name) for name, (_, links) in self.joints.items() for link in links
+            (link, name): read_element(values, link, name) for name, (_, links) in self.joints.items() for link in links
         }
 
     def _element_in_plane(self, values: Values, link: str, joint: str) -> plane.Frame:

@@ -434,7 +434,7 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
         "extreme_time": np.array([of.time for of in played.figures.linear.measures]),
     }
     units = [measure.unit(system) for measure in played.measures]
-    units_of, per_length = MemberUnits("measure", units), MemberUnits("measure", [f"{unit}/m" for unit in units])
+    plain_units, per_length = MemberUnits("measure", units), MemberUnits("measure", [f"{unit}/m" for unit in units])
     labels = {
         "measure": [measure.name for measure in played.measures],
         "joint": list(played.inputs.loose),
@@ -455,7 +455,7 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
         "findings": finding_rows(findings),
         "missed": [f"{finding.where}: {finding.what}" for finding in findings if finding.code == "limit.exceeded"],
     }
-    variables = described(arrays, VARIABLES, {"measure": units_of, "sensitivity": per_length})
+    variables = described(arrays, VARIABLES, {"measure": plain_units, "sensitivity": per_length})
     return dataset_of("play", variables, labels, attributes, driven(played.time, *dial))
 
 

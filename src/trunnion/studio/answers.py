@@ -391,8 +391,8 @@ def _layers(question: Asked) -> dict[str, Any]:
         if layers_wanted & {"centres", "transmission"}:
             with np.errstate(all="ignore"):
                 walk = run.walk(run.cycle.times(question.steps))
-            layer_of = {"centres": _centres, "transmission": _transmission}
-            layers |= {name: tell(walk, question.steps) for name, tell in layer_of.items() if name in layers_wanted}
+            makers = {"centres": _centres, "transmission": _transmission}
+            layers |= {name: tell(walk, question.steps) for name, tell in makers.items() if name in layers_wanted}
     return layers
 
 

@@ -87,9 +87,9 @@ def figures(question: Asked) -> list[dict[str, Any]]:
 def _ratios(state: Loaded) -> tuple[tuple[str, float], ...]:
     """Time ratios of what slides on the ground, or where nothing does of what turns back on it."""
     run = state.run
-    outputs_of = [] if run.seats or run.cycle.duration <= 0 else outputs(run.system)
-    outputs_of = [output for output in outputs_of if output.kind == "slide"] or outputs_of
-    measures = [Measure(output.subject, "time_ratio", output.subject) for output in outputs_of]
+    driven = [] if run.seats or run.cycle.duration <= 0 else outputs(run.system)
+    driven = [output for output in driven if output.kind == "slide"] or driven
+    measures = [Measure(output.subject, "time_ratio", output.subject) for output in driven]
     ratios = figures_of(run, measures, FrictionMethod()) if measures else {}
     return tuple((joint, float(ratio)) for joint, ratio in ratios.items() if np.isfinite(ratio))
 

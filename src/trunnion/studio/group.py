@@ -272,9 +272,9 @@ def _copied(sketch: Sketch, links: list[str]) -> list[str]:
 def _add(sketch: Sketch, part: Mapping[str, Any], names: Mapping[str, str], points: Mapping[str, str]) -> None:
     """Add what has new names in a copy of the entries, and what acts between those."""
     ground, links, joints = sketch.ground, set(names.values()), set(points.values())
-    for section, names_of in (("links", links), ("joints", joints), ("drivers", joints), ("assembly", joints)):
+    for section, copied in (("links", links), ("joints", joints), ("drivers", joints), ("assembly", joints)):
         sketch.section(section).update(
-            {name: item for name, item in (part.get(section) or {}).items() if name in names_of}
+            {name: item for name, item in (part.get(section) or {}).items() if name in copied}
         )
     fixed = part["links"].get(ground, {}).get("points", {})
     sketch.section("links")[ground]["points"] |= {name: at for name, at in fixed.items() if name in joints}

@@ -248,11 +248,11 @@ def pinned(sketch: Sketch, gesture: Given) -> str:
     end = gesture["point"]
     if isinstance(end, Mapping) and end["on"] == sketch.ground:
         raise refused("is the ground", sketch.ground, "choose a link that moves")
-    link_of, point = point_of(sketch, end) if isinstance(end, Mapping) else free(sketch, end)
+    owner, point = point_of(sketch, end) if isinstance(end, Mapping) else free(sketch, end)
     begin(sketch)
-    place = sketch.places[f"{link_of}.{point}"]
+    place = sketch.places[f"{owner}.{point}"]
     put(sketch, sketch.ground, point, place)
-    pin(sketch, point, sketch.ground, link_of, place)
+    pin(sketch, point, sketch.ground, owner, place)
     return f"Pin {point} to the ground"
 
 
@@ -326,13 +326,13 @@ def _end_to_slide(sketch: Sketch, name: str, carrier: str) -> tuple[str, str]:
     if carrier not in joint["links"]:
         slider, point = held(sketch, name)
         return slider, doubled(sketch, slider, point)
-    slider = next(name_of for name_of in joint["links"] if name_of != carrier)
+    slider = next(entry_name for entry_name in joint["links"] if entry_name != carrier)
     for section, what in (("loads", "load"), ("springs", "spring")):
-        for name_of, entry in sketch.of(section).items():
+        for entry_name, entry in sketch.of(section).items():
             if (entry.get("link"), entry.get("at")) == (carrier, name) or f"{carrier}.{name}" in entry.get(
                 "between", ()
             ):
-                raise refused(f"carries the {what} {name_of}", f"joints.{name}", f"delete that {what} first")
+                raise refused(f"carries the {what} {entry_name}", f"joints.{name}", f"delete that {what} first")
     del sketch.section("joints")[name]
     for section in ("drivers", "assembly"):
         sketch.section(section).pop(name, None)

@@ -120,17 +120,17 @@ def _rpp(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
 
 def _prp(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
     """A pin between a block that slides along the link of the pin that is given, and one in a guide on the ground."""
-    link_of, _ = point_of(sketch, pins[0])
-    if link_of == sketch.ground:
+    carrier, _ = point_of(sketch, pins[0])
+    if carrier == sketch.ground:
         raise refused("is on no link that moves", "the pin", "choose a pin of the link along which it slides")
-    spots = [sketch.places[f"{link_of}.{point}"] for point in sketch.points(link_of)]
+    spots = [sketch.places[f"{carrier}.{point}"] for point in sketch.points(carrier)]
     x, y = at or (sum(spot[0] for spot in spots) / len(spots), sum(spot[1] for spot in spots) / len(spots))
-    c, s = line_near(sketch, link_of, (x, y)).direction
+    c, s = line_near(sketch, carrier, (x, y)).direction
     slider, point, angle = numbered(sketch, "links", "block"), letter(sketch), atan2(c, -s)  # across the link
     sketch.section("links")[slider] = {"points": {point: [0, 0]}}
     sketch.show(slider, Frame(x, y, cos(angle), sin(angle)))
     slide(sketch, {"joint": {"on": slider, "at": [x, y]}, "angle": angle})
-    slide(sketch, {"joint": f"{slider}.{point}", "along": link_of})
+    slide(sketch, {"joint": f"{slider}.{point}", "along": carrier})
 
 
 def _triad(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:

@@ -261,10 +261,10 @@ def sensors(result: xr.Dataset) -> Table:
             texts = []
             for end in (np.nanmin(values), np.nanmax(values)) if np.isfinite(values).any() else ():
                 factor, display_unit = (1 / size, read) if read and size != 1 else prefixed(float(end), unit)
-                text_of = (
+                size_text = (
                     text(end * factor, display_unit) if what == "zero" else f"{number(100 * float(end), 3)}\u00a0%"
                 )
-                texts.append(text_of if end else "0")
+                texts.append(size_text if end else "0")
             cells.append(" to ".join(dict.fromkeys(texts)) or NONE)
         rows.append([name, measures[i], "" if (read or unit) == "1" else read or unit, *cells])
     return Table("sensors", ["channel", "measures", "unit", "u of the zero", "u of the gain"], rows)
@@ -326,12 +326,12 @@ def figure(
         chart = efficiency(result)
         over = "condition" if chart.x.title == "condition" else varied(result)[0].name
         return draw(f"Efficiency, measured and model, over {over}", result, [Panel("", [chart], 3.75)])
-    panels_of = panels(result, channel, condition)
-    if not panels_of:
+    charts = panels(result, channel, condition)
+    if not charts:
         remedy = "see the findings of `trunnion data`"
         raise MechanismError(Finding("there is no signal to draw", "--kind overlay", remedy))
-    more = f", {MOST_PANELS} of {len(panels_of)} signals" if len(panels_of) > MOST_PANELS else ""
-    courses = [course(result, i, k, 80) for i, k in panels_of[:MOST_PANELS]]
+    more = f", {MOST_PANELS} of {len(charts)} signals" if len(charts) > MOST_PANELS else ""
+    courses = [course(result, i, k, 80) for i, k in charts[:MOST_PANELS]]
     return draw(f"Measured and model{more}", result, courses, columns=2)
 
 
@@ -368,10 +368,10 @@ def efficiency(result: xr.Dataset) -> Chart:
     measured = f"measured, ±U ({coverage_of(result)})"
     marks += [Line(nothing, nothing, measured, dots.but(dash="none", mark="o")), Line(nothing, nothing, "model", line)]
     stripes, limits = _unanswered(result, over)
-    conditions_of = names(result, "condition")
-    named = over.name == "condition" and len(conditions_of) <= 24 and max(map(len, conditions_of)) <= 24
-    across = Axis(over.title, limits, [(k + 1, name) for k, name in enumerate(conditions_of)] if named else None,
-                  turned=60 if named and sum(map(len, conditions_of)) > 70 else 0)  # fmt: skip
+    conditions = names(result, "condition")
+    named = over.name == "condition" and len(conditions) <= 24 and max(map(len, conditions)) <= 24
+    across = Axis(over.title, limits, [(k + 1, name) for k, name in enumerate(conditions)] if named else None,
+                  turned=60 if named and sum(map(len, conditions)) > 70 else 0)  # fmt: skip
     return Chart(across, Axis("efficiency"), [*marks, *stripes], legend=Legend(least=1), colours=colours)
 
 
@@ -493,12 +493,12 @@ def report(result: xr.Dataset) -> str:
     parts += [Section("Verdicts", about, tables=[verdicts(result)])]
     parts += [Section(one.title.capitalize(), tables=[one]) for one in (conditions(result), sensors(result))]
     for i, name in enumerate(names(result, "channel")):
-        panels_of = [k for _, k in panels(result, name)]
-        drawn = sorted(sorted(panels_of, key=lambda k, i=i: -_severity(result, i, k))[:MOST_DRAWN])  # type: ignore[misc]
+        compared = [k for _, k in panels(result, name)]
+        drawn = sorted(sorted(compared, key=lambda k, i=i: -_severity(result, i, k))[:MOST_DRAWN])  # type: ignore[misc]
         unit = str(attribute(result, "channel_units")[i])
         about = f"measures {attribute(result, 'channel_measures')[i]}{f', {unit}' if unit != '1' else ''}"
-        if len(drawn) < len(panels_of):
-            about += f"; {len(drawn)} of {len(panels_of)} conditions are drawn, those with the largest residuals for " \
+        if len(drawn) < len(compared):
+            about += f"; {len(drawn)} of {len(compared)} conditions are drawn, those with the largest residuals for " \
                      "their uncertainty"  # fmt: skip
         pictures = [(f"{name}, {label(result, k)}", small(course(result, i, k, 62))) for k in drawn]
         why = explained(result, i)

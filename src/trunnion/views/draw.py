@@ -119,10 +119,10 @@ def small(panel: Panel, width: float = 4.4) -> Figure:
 def _panel(place: FigureBase, panel: Panel, wide: float, labels: Labels) -> None:
     """The charts of a panel below one another; texts that are to hide nothing wait until all else is there."""
     ratios = list(panel.parts) or [1.0] * len(panel.charts)
-    axes_of = place.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
-    for axes, spec in zip(axes_of, panel.charts, strict=True):
+    rows_of_axes = place.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
+    for axes, spec in zip(rows_of_axes, panel.charts, strict=True):
         chart(axes, spec, wide)
-        if axes is not axes_of[-1]:
+        if axes is not rows_of_axes[-1]:
             axes.set_xlabel("")
             axes.tick_params(labelbottom=False)
         for mark in spec.marks:

@@ -45,11 +45,11 @@ def tables(measurement: Measurement) -> list[Table]:
         rows.append([*labels, f"{turns:,}", *speed, *means])
     if len(conditions) > MOST:
         rows.append([f"{len(conditions) - MOST} more", *[""] * (len(head) - 1)])
-    tables_of = [Table(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
+    made = [Table(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
     head = ["channel", "measures", "unit", "least", "largest", "scatter", "uncertainty"]
     rows = [[name, *_channel([item.courses[name] for item in conditions if name in item.courses])] for name in channels]
     title = "channels: mean signal, scatter of turns, standard uncertainty of the mean"
-    return [*tables_of, Table(title, head, rows)]
+    return [*made, Table(title, head, rows)]
 
 
 def _channel(courses: list[Signal]) -> list[str]:

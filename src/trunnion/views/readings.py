@@ -401,8 +401,8 @@ def readings(result: xr.Dataset) -> list[MeasureReading]:
         pairs = [(-math.inf if low is None else float(low), math.inf if high is None else float(high))
                  for low, high in ends]  # fmt: skip
         text, rule, course = (str(row[i]) if i < len(row) else "" for row in words)
-        course_of = _of_course(result.isel(measure=i))
-        reads.append(MeasureReading(course_of, name, text, str(units[i]), pairs[0], pairs[1], rule, course))
+        name_of_course = _of_course(result.isel(measure=i))
+        reads.append(MeasureReading(name_of_course, name, text, str(units[i]), pairs[0], pairs[1], rule, course))
     return reads
 
 

@@ -142,7 +142,7 @@ def _number(entries: Mapping[str, Entry], path: str, used: set[str], where: str)
     elif not may_vary(entry):
         what = f"'{path}' is not a parameter of the mechanism"
         yield Finding(what, where, "state tolerances of dimensions, joints, links, loads, springs or drivers")
-    elif path.startswith(DEFAULTS) and not any(entry_of.alias == path for entry_of in entries.values()):
+    elif path.startswith(DEFAULTS) and not any(follower.alias == path for follower in entries.values()):
         yield Finding(f"no joint follows '{path}'", where, "name the number of a joint, as B.pin.clearance")
     elif path.startswith("dimensions.") and path.partition(".")[2] not in used:
         yield Finding(f"no result depends on '{path}'", where, "use it, or remove it", Severity.WARNING)

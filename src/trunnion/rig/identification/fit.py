@@ -245,8 +245,8 @@ class Fit:
     def reading(self, x: Array, k: int) -> tuple[Array, Array]:
         """What the sensor of a block would read, (position,), and its derivatives, (unknown and sensor, position)."""
         block = self.blocks[k]
-        courses_of, size = self.courses(x).said[block.condition][block.channel], block.signal.turns.shape[1]
-        value, slope, datum = courses_of.value[:size], courses_of.slope[:, :size], block.signal.accuracy.datum
+        modelled, size = self.courses(x).said[block.condition][block.channel], block.signal.turns.shape[1]
+        value, slope, datum = modelled.value[:size], modelled.slope[:, :size], block.signal.accuracy.datum
         # the errors behind a course that is computed are added to it
         acting = [(s, "zero" if block.effects else error.kind, error.sizes[k])
                   for s, error in enumerate(self.sensors, self.count) if error.sizes[k]]  # fmt: skip

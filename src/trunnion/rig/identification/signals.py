@@ -124,8 +124,8 @@ class Model:
                          for name, signal in courses.items()}  # fmt: skip
                 for i, k in enumerate(part):
                     lanes = slice(i * many, (i + 1) * many)
-                    courses_of = {name: Said(value[lanes][0], slope[lanes]) for name, (value, slope) in parts.items()}
-                    rows[k] = courses_of, np.max(status[lanes], axis=0), np.any(turned[lanes], axis=0)
+                    by_channel = {name: Said(value[lanes][0], slope[lanes]) for name, (value, slope) in parts.items()}
+                    rows[k] = by_channel, np.max(status[lanes], axis=0), np.any(turned[lanes], axis=0)
         return Courses(*zip(*(rows[k] for k in range(len(self.phases))), strict=True))
 
     def _batch(

@@ -298,11 +298,11 @@ def shortfalls(problem: AllocationProblem, least: Array) -> list[Finding]:
     least: the half widths, m or rad, that are the least to be had.
     """
     used, effects = problem.used(least), problem.effects
-    rows_of: dict[str, list[int]] = {}
+    by_measure: dict[str, list[int]] = {}
     for row in range(len(used)):
-        rows_of.setdefault(effects.label(row) if effects.labels else "", []).append(row)
+        by_measure.setdefault(effects.label(row) if effects.labels else "", []).append(row)
     findings = []
-    for rows in rows_of.values():
+    for rows in by_measure.values():
         over = [row for row in rows if used[row] > 1 + ALLOWED]
         if over:
             places, broken = (len({effects.place(row) for row in group}) for group in (rows, over))

@@ -148,17 +148,17 @@ def _courses(
     rows, times = len(effects.rows), moved(kernel.run, values, plan.times)
     count = len(plan.times)
     step = max(1, AT_ONCE // rows)
-    courses_of: dict[str, Course] = {}
+    by_measure: dict[str, Course] = {}
     status = np.empty((rows, count), np.int8)
     for low in range(0, count, step):
         window = slice(low, min(low + step, count))
         courses, status[:, window] = kernel.courses(values, times[..., window])
         for name, course in courses.items():
-            if name not in courses_of:
-                courses_of[name] = [Dual(np.empty((rows, count)), np.empty((rows, count))) for _ in course]
-            for row, part in zip(courses_of[name], course, strict=True):
+            if name not in by_measure:
+                by_measure[name] = [Dual(np.empty((rows, count)), np.empty((rows, count))) for _ in course]
+            for row, part in zip(by_measure[name], course, strict=True):
                 row.real[:, window], row.dual[:, window] = effects.slopes(part, (window.stop - low,))
-    return courses_of, status
+    return by_measure, status
 
 
 def _of(

@@ -316,13 +316,13 @@ def cylinder(drawing: Picture, name: str) -> Cylinder | None:
     """The cylinder that a slide is; None where no driver moves it, where its links have more than two joints, where the
     eyes do not lie on the guide, or where the stroke is longer than a barrel could be.
     """
-    layout_of, eyes = drawing.stated, list[str]()
-    for link in layout_of["joints"][name]["links"]:
+    parts_drawn, eyes = drawing.stated, list[str]()
+    for link in parts_drawn["joints"][name]["links"]:
         keys = [key for key in drawing.joints(link) if key != f"{link}.{name}"]
-        if link == drawing.ground or len(keys) != 1 or keys[0].split(".", 1)[1] not in layout_of["joints"]:
+        if link == drawing.ground or len(keys) != 1 or keys[0].split(".", 1)[1] not in parts_drawn["joints"]:
             return None
         eyes += keys
-    if name not in layout_of.get("drivers", ()):
+    if name not in parts_drawn.get("drivers", ()):
         return None
     apart = drawing.tracks[eyes[1]] - drawing.tracks[eyes[0]]
     turns = np.array([drawing.axis(name, position) for position in range(apart.shape[1])])

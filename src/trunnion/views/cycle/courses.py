@@ -279,8 +279,8 @@ def _rate(result: xr.Dataset, over: Abscissa, kind: Motions, order: int) -> Char
 
 def _motions(result: xr.Dataset) -> list[Motions]:
     """What moves: links that turn and joints that slide; in space also joints that turn."""
-    layout_of, spatial = layout(result), is_spatial(result)
-    kinds = {name: layout_of["joints"].get(name, {}).get("type") for name in names(result, "joint")}
+    facts, spatial = layout(result), is_spatial(result)
+    kinds = {name: facts["joints"].get(name, {}).get("type") for name in names(result, "joint")}
 
     def rated(variable: str, dim: str, of: Collection[str]) -> list[dict[str, Array]]:
         every = (members(result, variable + rate, dim) for rate in ("", "_velocity", "_acceleration"))
@@ -288,7 +288,7 @@ def _motions(result: xr.Dataset) -> list[Motions]:
 
     if not spatial:
         turning = [link for link, angle in members(result, "link_angle", "link").items()
-                   if link != layout_of["ground"] and _moves(angle)]  # fmt: skip
+                   if link != facts["ground"] and _moves(angle)]  # fmt: skip
         sliding = [name for name, kind in kinds.items() if kind in GUIDED]
         angles = [Motions("angle", "rad", rated("link_angle", "link", turning))] if turning or not sliding else []
         return [*angles, *([Motions("slide", "m", rated("joint_slide", "joint", sliding))] if sliding else [])]
@@ -302,7 +302,7 @@ def _motions(result: xr.Dataset) -> list[Motions]:
     for rate in ("velocity", "acceleration"):
         vectors = members(result, f"link_angular_{rate}", "link")
         turns.append({link: np.linalg.norm(vector, axis=0) for link, vector in vectors.items()})
-    courses = [{link: course for link, course in order.items() if link != layout_of["ground"]} for order in turns]
+    courses = [{link: course for link, course in order.items() if link != facts["ground"]} for order in turns]
     return [*panels, Motions("turn of the link", "rad", courses, ("angular velocity", "angular acceleration"))]
 
 
@@ -357,21 +357,21 @@ def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
         raise MechanismError(Finding(what, "measures", "state measures: in the model"))
     units, figure_units = (units_along(result[f"measure_{part}"], "measure") for part in ("value", "figure"))
     measures_stated, aspects = layout(result).get("measures", {}), {row.name: row.aspect for row in summary_of(result)}
-    names_of = [str(name) for name in result["measure"].values]
+    labels = [str(name) for name in result["measure"].values]
     values, figures, charts = result["measure_value"].values, result["measure_figure"].values, list[Chart]()
     for i in rows:
         same = [k for k in rows if units[k] == units[i] and np.array_equal(values[k], values[i], equal_nan=True)]
         if i != same[0]:
             continue
-        title = names_of[i] if len(same) == 1 else measures_stated.get(names_of[i], "course of the measures")
+        title = labels[i] if len(same) == 1 else measures_stated.get(labels[i], "course of the measures")
         scope = usual_peak(ease(result), values[i])
         factor, display_unit = (scaled if units[i] == "m" else prefixed)(scope, units[i])
         marks = list[Mark]()
         for k in same:
             if np.isfinite(figures[k]):
-                aspect = aspects.get(names_of[k], "")
+                aspect = aspects.get(labels[k], "")
                 level = aspect in LEVELS and figure_units[k] == units[i]
-                text = f"{names_of[k]}: {aspect} {quantity(float(figures[k]), figure_units[k])}"
+                text = f"{labels[k]}: {aspect} {quantity(float(figures[k]), figure_units[k])}"
                 look = nth(1 + len(marks)).but(width=1.2, dash="dashed")
                 # a figure that is no value of the course is told in the legend alone
                 marks.append(Rule(figures[k] * factor if level else np.nan, text, look, upright=False))

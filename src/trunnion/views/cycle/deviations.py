@@ -103,11 +103,11 @@ class Output(NamedTuple):
 
 def outputs(result: xr.Dataset) -> list[Output]:
     """Transmission errors, as the summary of the result has them."""
-    layout_of, drivers, picked = layout(result), names(result, "driver"), []
+    facts, drivers, picked = layout(result), names(result, "driver"), []
     turns, slides = (members(result, f"joint_{what}_error", "joint") for what in ("rotation", "slide"))
     for joint in names(result, "joint"):
-        about = layout_of["joints"].get(joint, {})
-        if layout_of["ground"] in about.get("links", ()) and joint not in drivers:
+        about = facts["joints"].get(joint, {})
+        if facts["ground"] in about.get("links", ()) and joint not in drivers:
             guided = PAIRS[about["type"]].guided
             error = (slides if guided else turns).get(joint)
             if error is not None and np.isfinite(error).any():
@@ -127,17 +127,17 @@ def with_worst_case(result: xr.Dataset, mechanism: Mechanism) -> xr.Dataset:
     `transmission_centre` and `transmission_reach` (joint, position), rad or m, NaN of joints that are no outputs: the
     error with every pin in the middle of its hole, and the most that all plays can add to it, to first order.
     """
-    outputs_of = outputs(result) if has(result, "errors") else []
-    if not outputs_of:
+    driven = outputs(result) if has(result, "errors") else []
+    if not driven:
         return result
-    measures = [f"{'slide' if output.unit == 'm' else 'rotation'}:{output.joint}" for output in outputs_of]
+    measures = [f"{'slide' if output.unit == 'm' else 'rotation'}:{output.joint}" for output in driven]
     try:
         free = play_of(mechanism, measures, result.sizes["position"])
     except MechanismError:  # no joint has a play
         return result
     joints = names(result, "joint")
     centre, reach = (np.full((len(joints), result.sizes["position"]), np.nan) for _ in range(2))
-    for output, measure in zip(outputs_of, measures, strict=True):
+    for output, measure in zip(driven, measures, strict=True):
         rotation = column(result, f"joint_{measure.split(':')[0]}", joint=output.joint)
         middle, most = (column(free, name, measure=measure) for name in ("value", "worst_case_total"))
         if rotation is None or middle is None or most is None:
@@ -183,13 +183,13 @@ class Seats(NamedTuple):
 
 def seated(result: xr.Dataset) -> list[Seats]:
     """Every joint with a seat that is known anywhere."""
-    layout_of, every = layout(result), []
+    facts, every = layout(result), []
     offsets, forces = (members(result, name, "joint") for name in ("seat_offset", "end_force"))
-    for joint, play in layout_of.get("plays", {}).items():
+    for joint, play in facts.get("plays", {}).items():
         if joint in offsets and np.isfinite(offsets[joint]).any():
             offset, force, kind = offsets[joint], forces[joint], play["kind"]
             ends = 1 if kind == "ball" or (kind == "pin" and offset.shape[1] == 2) else 2
-            first, second = layout_of["joints"][joint]["links"]
+            first, second = facts["joints"][joint]["links"]
             every.append(Seats(joint, kind, play["clearance"], play["float"], play["length"], offset[:ends],
                                force[:ends], (first, second)))  # fmt: skip
     return every

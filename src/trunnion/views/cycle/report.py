@@ -200,12 +200,12 @@ def animation(result: xr.Dataset, ideal: xr.Dataset | None = None, height: int =
     """
     from markupsafe import Markup
 
-    scene_of = scene(result, ideal)
+    drawn = scene(result, ideal)
     style, script = web_text("report.css"), bundle("report.js")
     context = {
-        "name": scene_of["name"] or "Mechanism", "version": result.attrs.get("trunnion_version", ""),
+        "name": drawn["name"] or "Mechanism", "version": result.attrs.get("trunnion_version", ""),
         "style": Markup(style), "style_hash": hashed(style), "script": Markup(script), "script_hash": hashed(script),
-        "scene": Markup(embedded(scene_of)),
+        "scene": Markup(embedded(drawn)),
     }  # fmt: skip
     return Animation(_template().render(context), height)
 

@@ -62,9 +62,9 @@ def scene(
     over, steady = abscissa(result), "steady" in result.attrs
     picked_rows = result.isel(position=picked)
     other = None if ideal is None else ideal.isel(position=picked)
-    layout_of = layout(result)
+    facts = layout(result)
     points = _points(picked_rows)
-    scene_of = {
+    drawn = {
         "format": FORMAT,
         "name": result.attrs.get("name", ""),
         "formula": result.attrs.get("formula", ""),
@@ -79,12 +79,12 @@ def scene(
         "gaps": [{"from": over.say(int(run.start)), "to": over.say(int(run.stop) - 1), "text": run.text}
                  for run in intervals(result)],
         "points": points,
-        "links": _links(layout_of, picked_rows, points),
-        "joints": _joints(layout_of, picked_rows, other),
-        "loads": _loads(layout_of, picked_rows, points),
-        "springs": _springs(picked_rows, layout_of, points),
-        "gears": [{"name": name, **circle} for name, pair in layout_of["gears"].items() for circle in pair],
-        "drivers": _drivers(picked_rows, other, layout_of),
+        "links": _links(facts, picked_rows, points),
+        "joints": _joints(facts, picked_rows, other),
+        "loads": _loads(facts, picked_rows, points),
+        "springs": _springs(picked_rows, facts, points),
+        "gears": [{"name": name, **circle} for name, pair in facts["gears"].items() for circle in pair],
+        "drivers": _drivers(picked_rows, other, facts),
         "units": units_of(result),
         "sums": {name: series(column(picked_rows, name)) for name in SUMS
                  if name in picked_rows and not (steady and name in DRIVEN)},
@@ -92,10 +92,10 @@ def scene(
         "built": built(picked_rows, _lost(result, picked)),
     }  # fmt: skip
     if is_spatial(result):
-        scene_of |= space_scene(picked_rows)
-    for load in scene_of["loads"]:
+        drawn |= space_scene(picked_rows)
+    for load in drawn["loads"]:
         load["course"] = course(result, picked, load["name"])
-    return scene_of
+    return drawn
 
 
 def _lost(result: xr.Dataset, picked: NDArray[np.intp]) -> list[int]:
@@ -123,24 +123,22 @@ def _points(result: xr.Dataset) -> dict[str, dict[str, Any]]:
 
 def _links(layout_of: dict[str, Any], result: xr.Dataset, points: dict[str, Any]) -> list[dict[str, Any]]:
     """Links with the keys of their points, their angle, and which of their points are no joints."""
-    links_of = names(result, "link")
+    present = names(result, "link")
     rows = []
     for name, link in layout_of["links"].items():
         keys = [f"{name}.{point}" for point in link["points"] if f"{name}.{point}" in points]
         free = [key for key in keys if key[len(name) + 1 :] not in layout_of["joints"]]
-        angle = (
-            series(column(result, "link_angle", link=name)) if name in links_of and not is_spatial(result) else [0.0]
-        )
+        angle = series(column(result, "link_angle", link=name)) if name in present and not is_spatial(result) else [0.0]
         rows.append({"name": name, "ground": name == layout_of["ground"], "points": keys, "free": free, "angle": angle})
     return rows
 
 
 def _joints(layout_of: dict[str, Any], result: xr.Dataset, ideal: xr.Dataset | None) -> list[dict[str, Any]]:
     """Joints with their loads and the point they are drawn at: the second link's, where the reaction acts."""
-    joints_of = names(result, "joint")
+    present = names(result, "joint")
     rows = []
     for name, joint in layout_of["joints"].items():
-        if name not in joints_of:
+        if name not in present:
             continue
         first, second = joint["links"]
         slides = joint["type"] == "prismatic"

@@ -56,18 +56,18 @@ def _stated(seconds: float) -> str:
 
 def _account(rows: xr.Dataset) -> dict[str, list[tuple[str, str]]]:
     """What came in and went out until the end, and what is left; empty where nothing moves."""
-    energies_of = energies(rows)
-    if not energies_of:
+    energy_rows = energies(rows)
+    if not energy_rows:
         return {}
 
     def lines(at_rest: bool) -> list[tuple[str, str]]:
-        rows_of = []
-        for name, text, course in energies_of:
+        account = []
+        for name, text, course in energy_rows:
             if (name in HELD) is at_rest:
                 title = f"change of the {text}" if at_rest else text
                 value = float(course[-1]) * (-1 if name in LOST else 1)
-                rows_of.append((title[:1].upper() + title[1:], quantity(value, "J")))
-        return rows_of
+                account.append((title[:1].upper() + title[1:], quantity(value, "J")))
+        return account
 
     rest = quantity(float(rows["energy_residual"].values[-1]), "J")
     return {"works": lines(False), "held": lines(True), "rest": [("Difference", rest)]}
@@ -100,7 +100,7 @@ def motion_scene(motion: Shown) -> dict[str, Any]:
     """
     rows = motion.rows
     picked = _picked(rows)
-    scene_of = scene(rows, picked=picked)
+    drawn = scene(rows, picked=picked)
     picked_rows = rows.isel(position=picked)
     status = np.where(picked_rows["resting"].values == 1, RESTS, picked_rows["status"].values)
     status = np.where(np.isfinite(picked_rows["kinetic_energy"].values), status, NONE)
@@ -121,11 +121,11 @@ def motion_scene(motion: Shown) -> dict[str, Any]:
             for event in motion.events
         ],
     }
-    return scene_of | {
+    return drawn | {
         "status": [int(code) for code in status],
-        "states": scene_of["states"] | {str(code): text for code, text in STATES.items()},
+        "states": drawn["states"] | {str(code): text for code, text in STATES.items()},
         "gaps": [],
-        "sums": {name: values for name, values in scene_of["sums"].items() if name != "efficiency_instant"},
+        "sums": {name: values for name, values in drawn["sums"].items() if name != "efficiency_instant"},
         "ease": [1.0],  # no peak is cut: a motion in time has no dead centre that forces it
         "motion": of_motion,
     }

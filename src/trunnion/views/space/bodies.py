@@ -202,18 +202,18 @@ def space(result: xr.Dataset) -> Space:
 
 def gathered(result: xr.Dataset) -> Space:
     """The same, whether or not a position can be drawn."""
-    layout_of, count = layout(result), result.sizes["position"]
+    facts, count = layout(result), result.sizes["position"]
     turns, origins = members(result, "link_rotation", "link"), members(result, "link_position", "link")
     poses = {link: BodyPose(rotation_matrix(turns[link]), origins[link]) for link in turns}
     still = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, count)), np.zeros((3, count))
-    poses[layout_of["ground"]] = BodyPose(*still)  # the global frame, also where nothing else is known
+    poses[facts["ground"]] = BodyPose(*still)  # the global frame, also where nothing else is known
     free = {}
     for key, track in members(result, "point_position", "point").items():
         link, point = key.split(".", 1)
-        if link in poses and point not in layout_of["joints"]:
+        if link in poses and point not in facts["joints"]:
             pose = poses[link]
             for index in np.flatnonzero(np.isfinite(track).all(axis=0) & pose.known)[:1]:  # the first that is known
                 free[key] = np.asarray(pose.matrix[:, :, index].T @ (track[:, index] - pose.origin[:, index]), float)
     radii = [float(row["value"]) for row in attribute(result, "inputs")
              if str(row["path"]).endswith("pin.radius") and isinstance(row.get("value"), int | float)]  # fmt: skip
-    return Space(layout_of, poses, free, max(radii, default=0.0))
+    return Space(facts, poses, free, max(radii, default=0.0))

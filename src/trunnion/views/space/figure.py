@@ -90,20 +90,20 @@ def _telling(result: xr.Dataset, bodies: Space) -> int:
 
 def sketch(axes: Axes, look: Scenery, index: int, only: tuple[str, ...] = (), curves: bool = True) -> None:
     """Bodies and curves at a position, without a letter; only: links that have a colour, all if none is named."""
-    bodies_of = look.shown
+    gathered = look.shown
     bodies = [
-        (solid, bodies_of.poses[solid.link].matrix[:, :, index], bodies_of.poses[solid.link].origin[:, index],
-         _colour(bodies_of, solid.paint, only))
+        (solid, gathered.poses[solid.link].matrix[:, :, index], gathered.poses[solid.link].origin[:, index],
+         _colour(gathered, solid.paint, only))
         for solid in look.solids
     ]  # fmt: skip
     strokes: list[Strokes] = []
     if curves:
-        free = [key for key in bodies_of.free if key.split(".", 1)[0] != bodies_of.ground]
-        inner = [name for name, joint in bodies_of.joints.items()
-                 if bodies_of.ground not in joint["links"] and not bodies_of.shifts[name]]  # fmt: skip
-        strokes += [Strokes(_pieces(bodies_of.track(key)), INK, 1.2) for key in free]
-        strokes += [Strokes(_dashed(bodies_of.seated(name), 0.013 * bodies_of.size), MUTED, 0.7) for name in inner]
-    paint(axes, look.camera, bodies, strokes, bodies_of.size)
+        free = [key for key in gathered.free if key.split(".", 1)[0] != gathered.ground]
+        inner = [name for name, joint in gathered.joints.items()
+                 if gathered.ground not in joint["links"] and not gathered.shifts[name]]  # fmt: skip
+        strokes += [Strokes(_pieces(gathered.track(key)), INK, 1.2) for key in free]
+        strokes += [Strokes(_dashed(gathered.seated(name), 0.013 * gathered.size), MUTED, 0.7) for name in inner]
+    paint(axes, look.camera, bodies, strokes, gathered.size)
 
 
 def _colour(bodies: Space, name: str, only: tuple[str, ...]) -> str:

@@ -103,10 +103,8 @@ def _loads(bodies: Space) -> list[dict[str, Any]]:
             continue
         seats = {joint: bodies.seat(joint, entry["links"].index(link)) for joint, entry in bodies.joints.items()
                  if link in entry["links"]}  # fmt: skip
-        places_of = seats | {
-            key.split(".", 1)[1]: at for key, at in bodies.free.items() if key.split(".", 1)[0] == link
-        }
-        at = places_of.get(load.get("at") or load.get("joint") or "")
+        spots = seats | {key.split(".", 1)[1]: at for key, at in bodies.free.items() if key.split(".", 1)[0] == link}
+        at = spots.get(load.get("at") or load.get("joint") or "")
         if at is None and load.get("at") is None and seats:
             at = np.mean(list(seats.values()), axis=0)
         if at is not None:

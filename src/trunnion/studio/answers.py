@@ -47,13 +47,13 @@ from trunnion.studio.findings import (
     sentence,
     spoken,
 )  # fmt: skip
-from trunnion.studio.group import group
 from trunnion.studio.live import Live, live_in_space, places_at, uncollected
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
 from trunnion.studio.message import Exact, packed
 from trunnion.studio.placed import column, plain, tracks
+from trunnion.studio.selected_links import group
 from trunnion.studio.sketch import Sketch, Vector
-from trunnion.studio.strokes import add_point, held, join, link, lock, move, pinned, slide, vector
+from trunnion.studio.strokes import add_point, held, join, link, move, pinned, slide, vector
 from trunnion.studio.tolerances import corner_of, measured
 from trunnion.studio.wiring import block
 from trunnion.version import __version__
@@ -71,7 +71,6 @@ Array = NDArray[np.float64]
 MOST_OTHERS = 3  # assemblies
 MOST_LINKS = 12  # whose instant centres against each other are told; of more only those against the ground
 MOST_BLOCKS = 24  # whose share of the margin is told: each takes an analysis
-KEPT = 1e-2  # of the size: a locked joint that stays may be off by as much as a position is fine
 
 
 def answer(request: bytes, turn: AbstractContextManager[object] | None = None) -> bytes:
@@ -166,13 +165,8 @@ def _model(question: Asked) -> dict[str, Any]:
 
 def _sketch(question: Asked, places: dict[str, Vector] | None = None) -> Sketch:
     """A drawing of a model's entries that may be changed."""
-    locked, fine = _hand(question)
-    return Sketch(copy.deepcopy(dict(question.state.entries or {})), places or {}, locked, fine=fine)
-
-
-def _hand(question: Asked) -> tuple[set[str], float]:
-    """What is locked, and what the hand can tell apart, m."""
-    return set(map(str, question.get("locked") or ())), float(question.get("fine") or 0.0)
+    entries = copy.deepcopy(dict(question.state.entries or {}))
+    return Sketch(entries, places or {}, fine=float(question.get("fine") or 0.0))
 
 
 def _cycle(question: Asked) -> dict[str, Any]:
@@ -245,8 +239,8 @@ def _drag(question: Asked) -> dict[str, Any]:
         shifts = sketch.shifted(str(question["point"]), by, _turns(question.state, question.index))
         return _live(question, {change.path: change.value for change in shifts}, question.index)
     index, to, point = question.index, vector(question["to"]), str(question["point"])
-    locked, fine = _hand(question)
-    sketch = _Still(dict(question.state.entries or {}), places_at(question), locked, fine=fine)
+    fine = float(question.get("fine") or 0.0)
+    sketch = _Still(dict(question.state.entries or {}), places_at(question), fine=fine)
     if question.state.mechanism is not None:
         sketch.numbers = question.state.mechanism.parameter_set.nominal
     changes = {change.path: change for change in sketch.moved(point, to, bool(question.get("keep")))}  # a number once
@@ -256,11 +250,6 @@ def _drag(question: Asked) -> dict[str, Any]:
     near = index if not np.any(np.isfinite(far)) else int(np.nanargmin(far))
     if np.isfinite(far[index]) and far[index] <= far[near] + 1e-6 * sketch.size:
         near = index
-    for name in sketch.locked & {*sketch.joints, *live.tracks}:
-        key = ".".join(held(sketch, name))
-        if not np.hypot(*(live.tracks[key][:, near] - sketch.places[key])) <= KEPT * sketch.size:
-            near = index  # the crank would turn, and a locked joint with it
-            break
     rows = []
     for path, value in values.items():
         section, name, *inner = path.split(".")
@@ -312,7 +301,6 @@ def _edit(question: Asked) -> dict[str, Any]:
     return {
         "text": changed,
         "places": {key: list(place) for key, place in sketch.places.items() if key in points},
-        "locked": sorted(sketch.locked & (points | set(sketch.joints))),
         "says": ", ".join(says),
         "made": sketch.made,
     }
@@ -321,7 +309,7 @@ def _edit(question: Asked) -> dict[str, Any]:
 GESTURES: dict[str, Callable[[Sketch, Mapping[str, Any]], str]] = {
     "link": link, "pin": pinned, "join": join, "slide": slide, "add-point": add_point, "driver": driver, "load": load,
     "spring": spring, "gear": gear, "block": block, "bar-mass": bar_mass, "centre": centre, "move": move,
-    "group": group, "lock": lock, "set": put_value, "delete": delete, "rename": rename, "add-row": add_row,
+    "group": group, "set": put_value, "delete": delete, "rename": rename, "add-row": add_row,
 }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Files of a solved cycle for the page: table, report, pictures, an animation."""
+"""Files of a solved cycle for the page: table, report, pictures."""
 
 from __future__ import annotations
 
@@ -7,15 +7,10 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from trunnion.errors import Finding, MechanismError
 from trunnion.studio.loaded import Loaded
 
 __all__ = ["EXPORTS", "exported"]
-
-IMAGES, PACE = 60, 50  # of an animation, and ms that each is shown
-ROOM = 0.09  # of the size, around what is drawn
 
 
 def exported(state: Loaded, what: str, steps: int, index: int = 0) -> dict[str, Any]:
@@ -49,34 +44,9 @@ def _picture(state: Loaded, steps: int, index: int, kind: str) -> bytes:
     return stream.getvalue()
 
 
-def _animation(state: Loaded, steps: int, _: int) -> bytes:
-    """A cycle of 60 pictures in 3 seconds; MechanismError in space."""
-    from matplotlib.figure import Figure
-    from PIL import Image
-
-    from trunnion.views.common.drawing import bare, facts, picture, sketch
-
-    result = state.result(steps, True)
-    if result.sizes["axis"] > 2:
-        raise MechanismError(Finding("is not drawn as GIF in space", remedy="write the report, whose drawing moves"))
-    drawing, figure, images = picture(result), Figure((6, 6), layout="constrained"), list[Image.Image]()
-    low, high = np.array(drawing.box[:2]) - ROOM * drawing.size, np.array(drawing.box[2:]) + ROOM * drawing.size
-    for index in range(0, steps, -(-steps // IMAGES)):
-        figure.clear()
-        axes = bare(figure.subplots(), low, high, facts(result, index))
-        sketch(axes, drawing, index)
-        stream = io.BytesIO()
-        figure.savefig(stream, format="png")
-        images.append(Image.open(stream).convert("P"))
-    stream = io.BytesIO()
-    images[0].save(stream, "GIF", save_all=True, append_images=images[1:], duration=PACE, loop=0)
-    return stream.getvalue()
-
-
 EXPORTS: dict[str, tuple[str, str, Callable[[Loaded, int, int], bytes]]] = {
     "csv": ("csv", "text/csv", _csv),
     "report": ("html", "text/html", _report),
     "png": ("png", "image/png", partial(_picture, kind="png")),
     "svg": ("svg", "image/svg+xml", partial(_picture, kind="svg")),
-    "gif": ("gif", "image/gif", _animation),
 }

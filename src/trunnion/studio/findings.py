@@ -4,7 +4,6 @@ tried against them, what the model can be asked and what it still lacks.
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
@@ -23,7 +22,7 @@ from trunnion.results.quantities import quantity
 from trunnion.results.variables import VARIABLES
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import prepare
-from trunnion.solve.system import Values, felt, rubbing
+from trunnion.solve.system import felt, rubbing
 from trunnion.studio.loaded import Asked, Loaded
 from trunnion.studio.sketch import Sketch
 from trunnion.views.common.cycle import abscissa, names
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
 __all__ = ["cures", "figures", "margin_of", "missing", "reached", "readiness", "remedied", "sentence", "spoken"]
 
 ENOUGH = 0.9  # of the friction at which it just runs: what is tried
-SIZES = {"pin.radius": ENOUGH, "guide.length": 1.0 / ENOUGH}  # a shorter arm, a longer guide
 NOUNS = {
     "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair",
     "dimensions": "dimension", "loop": "joint", "measures": "measure", "tables": "table",
@@ -180,40 +178,36 @@ def cures(state: Loaded, finding: Finding) -> list[dict[str, Any]]:
     joints = entries.get("joints")
     if finding.code != "friction.locked" or not isinstance(joints, Mapping):
         return []
-    coefficients = {joint: f"joints.{joint}.friction.coefficient" for joint in felt(state.run.system, numbers)}
-    coefficients = {joint: path for joint, path in coefficients.items() if path in numbers}
+    before = {path: float(np.ravel(value)[0]) for path, value in numbers.items() if path.startswith("joints.")}
+    usual = [joint for joint in felt(state.run.system, numbers) if f"joints.{joint}.friction.coefficient" in before]
     alike = facts["whole"] >= (1 - 1e-3) * facts["share"]  # else other joints lock where these no longer do
-    trials = [(list(facts["joints"]) if alike else list(coefficients), min(facts["share"], facts["whole"]))]
+    trials = [(list(facts["joints"]) if alike else usual, min(facts["share"], facts["whole"]))]
     decides, multiple = facts["decides"], facts["multiple"]
     if decides and multiple and trials[0][0] != [decides]:
         trials.insert(0, ([decides], multiple))
     listed = []
     for chosen, times in trials:
-        if times > 0 and all(joint in coefficients and isinstance(joints.get(joint), Mapping) for joint in chosen):
-            befores = [float(np.ravel(numbers[coefficients[joint]])[0]) for joint in chosen]
-            values = [float(f"{ENOUGH * times * before:.3g}") for before in befores]
-            stated_groups = [isinstance(joints[joint].get("friction", {}), Mapping) for joint in chosen]
-            gestures = [{"do": "set", "path": ["joints", joint, "friction", *["coefficient"] * inside], "value": value}
-                        for joint, inside, value in zip(chosen, stated_groups, values, strict=True)]  # fmt: skip
-            change = f"{befores[0]:.3g} → {values[0]:.3g}" if len(chosen) == 1 else f"× {ENOUGH * times:.3g}"
-            what = f"friction coefficient{'s' * (len(chosen) > 1)} of {', '.join(chosen)}"
-            listed.append({"label": f"{what} {change}", "gestures": gestures})
-    return listed + list(_resized(entries, numbers, decides, multiple))
-
-
-def _resized(entries: dict[str, Any], numbers: Values, joint: str | None, multiple: float) -> Iterator[dict[str, Any]]:
-    """The radius and length by which the friction of a joint is as much less as it need be, where they are stated."""
-    sketch = Sketch(copy.deepcopy(entries))
-    for key, enough in SIZES.items():
-        path = ["joints", str(joint), *key.split(".")]
-        part = entries["joints"].get(joint, {}).get(path[2], {})
-        if ".".join(path) not in numbers or not isinstance(part, Mapping) or "fit" in part:
-            continue  # a fit states the radius
-        before = float(np.ravel(numbers[".".join(path)])[0])
-        times = enough * (multiple if key == "pin.radius" else 1.0 / multiple)
-        length = sketch.length(float(f"{times * before:.3g}"))
-        label = f"{key.replace('.', ' ')} of {joint} {sketch.length(before)} → {length}"
-        yield {"label": label, "gestures": [{"do": "set", "path": path, "value": length}]}
+        if times <= 0 or not all(joint in usual and isinstance(joints.get(joint), Mapping) for joint in chosen):
+            continue
+        gestures = []
+        for joint in chosen:
+            inside = ["coefficient"] if isinstance(joints[joint].get("friction", {}), Mapping) else []
+            value = float(f"{ENOUGH * times * before[f'joints.{joint}.friction.coefficient']:.3g}")
+            gestures.append({"do": "set", "path": ["joints", joint, "friction", *inside], "value": value})
+        change = f"× {ENOUGH * times:.3g}"
+        if len(chosen) == 1:
+            change = f"{before[f'joints.{chosen[0]}.friction.coefficient']:.3g} → {gestures[0]['value']:.3g}"
+        what = f"friction coefficient{'s' * (len(chosen) > 1)} of {', '.join(chosen)}"
+        listed.append({"label": f"{what} {change}", "gestures": gestures})
+    shorter = ENOUGH * multiple if decides and multiple else None  # of the radius: a longer guide does as much
+    for part, key, times in (("pin", "radius", shorter), ("guide", "length", shorter and 1.0 / shorter)):
+        path, stated = f"joints.{decides}.{part}.{key}", joints.get(decides, {}).get(part, {})
+        if times and path in before and isinstance(stated, Mapping) and "fit" not in stated:  # a fit states the radius
+            sketch, after = Sketch(entries), float(f"{times * before[path]:.3g}")
+            was, length = sketch.length(before[path]), sketch.length(after)
+            gesture = {"do": "set", "path": path.split("."), "value": length}
+            listed.append({"label": f"{part} {key} of {decides} {was} → {length}", "gestures": [gesture]})
+    return listed
 
 
 # ---- what it can be asked -----------------------------------------------------------------------------------------

@@ -103,12 +103,12 @@ function solveSoon() {
   typing = setTimeout(solve, TYPING);
 }
 
-/** Text, places and locks of the mechanism as it is shown: what a gesture starts from. */
+/** Text and places of the mechanism as it is shown: what a gesture starts from. */
 export function present() {
   const { scene } = state.answer.value ?? {};
   const fresh = state.solved.value && state.answer.value.text === state.text.value && !state.spatial.value;
   const places = fresh ? { ...state.places.value, ...placesAt(scene, posedAt(scene, state.index.value)) } : state.places.value;
-  return { text: state.text.value, places, locked: state.locked.value };
+  return { text: state.text.value, places };
 }
 
 /** @type {Promise<boolean>} */
@@ -160,7 +160,7 @@ export function setValue(path, value, merge = null) {
 /** The mechanism with a point at another place ("drag") or other numbers ("try"); null where something newer was asked. */
 export function changed(kind, fields) {
   const friction = state.friction.value === "off" ? "off" : "stated";
-  return link.ask(kind, { text: state.text.value, steps: STEPS, friction, locked: state.locked.value, fine: sheet.fine(), ...fields });
+  return link.ask(kind, { text: state.text.value, steps: STEPS, friction, fine: sheet.fine(), ...fields });
 }
 
 /**

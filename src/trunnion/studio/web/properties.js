@@ -46,8 +46,6 @@ function Chosen({ kind, name }) {
         ${kind === "joints" && !driver && html`<${Button} label="Drive this joint" onClick=${() => edit([{ do: "driver", joint: name }])} />`}
         ${kind === "joints" && !MANY_WAYS.has(entries?.joints?.[name]?.type) && html`<${Button} label="Load against its motion" onClick=${() => edit([{ do: "load", against: name }])} />`}
         ${kind === "loads" && against(entries, name).map((joint) => html`<${Button} label=${`Let it oppose the motion of ${joint}`} onClick=${() => edit([{ do: "load", against: joint, instead: name }])} />`)}
-        ${(kind === "joints" || kind === "points") && !state.spatial.value && html`<${Button} label=${state.locked.value.includes(name) ? "Unlock" : "Lock"}
-          title="A locked joint stays where it is while others are dragged (K)" onClick=${() => edit([{ do: "lock", point: name }])} />`}
         ${kind === "points" && !state.spatial.value && html`<${Button} label="Pin to the ground" onClick=${() => edit([{ do: "pin", point: name }])} />`}
         ${!(kind === "links" && name === groundOf(entries)) && html`<${Button} label=${`Delete ${NOUNS[kind].toLowerCase()}`} onClick=${() => removePart({ kind, name })} />`}
         <${Button} label="All parts" onClick=${() => (state.selection.value = null)} />

@@ -45,7 +45,6 @@ function mount(holder) {
     effect(() => show(view)),
     effect(() => {
       state.selection.value;
-      state.locked.value;
       others.value;
       laid.value;
       compared.value;

@@ -19,7 +19,7 @@ from trunnion.model.renaming import renamed
 from trunnion.model.units import KINDS, unit
 from trunnion.studio.changing import delete
 from trunnion.studio.sketch import LIMITS, Sketch, Vector
-from trunnion.studio.strokes import letter, numbered, refused, vector
+from trunnion.studio.strokes import letter, numbered, refused, spoken_of, vector
 
 __all__ = ["group"]
 
@@ -79,8 +79,6 @@ class _Moving:
         sketch, ground = self.sketch, self.sketch.ground
         mine = {name: item for name, item in sketch.joints.items() if set(item["links"]) & set(self.links)}
         outside = [name for name, item in mine.items() if not set(item["links"]) <= {*self.links, ground}]
-        if locked := [name for name in mine if name in sketch.locked]:
-            raise refused("is locked where it is", ", ".join(locked), "unlock it first (K)")
         for name in outside:
             if sketch.kind(name) != "revolute":
                 raise refused("slides along a link that is not chosen", f"joints.{name}", "choose both links")
@@ -234,8 +232,8 @@ def _assembled(sketch: Sketch, links: list[str]) -> None:
 def _fastened(sketch: Sketch, links: list[str]) -> set[str]:
     """Points of the ground that springs of some links are fastened to."""
     ends = [[str(end).split(".") for end in item.get("between") or ()] for item in sketch.of("springs").values()]
-    used = [pair for pair in ends if any(link in links for link, *_ in pair)]
-    return {point for pair in used for link, point in pair if link == sketch.ground}
+    return {point for pair in ends if any(link in links for link, *_ in pair)
+            for link, point in pair if link == sketch.ground}  # fmt: skip
 
 
 # ---- copied ---------------------------------------------------------------------------------------------------
@@ -280,8 +278,7 @@ def _add(sketch: Sketch, part: Mapping[str, Any], names: Mapping[str, str], poin
     sketch.section("links")[ground]["points"] |= {name: at for name, at in fixed.items() if name in joints}
     for section in ("loads", "springs", "gears"):
         for name, item in (part.get(section) or {}).items():
-            ends = [str(end).partition(".")[0] for end in item.get("between", ())]
-            parts = {*ends, item.get("link"), item.get("joint"), *item.get("joints", ())} - {None}
+            parts = {part.partition(".")[0] for part in spoken_of(item)}
             if parts <= {*links, *joints, ground} and item != sketch.section(section)[name]:
                 sketch.section(section)[_again(sketch, section, name)] = item
 

@@ -37,9 +37,8 @@ def put_value(sketch: Sketch, gesture: Given) -> str:
     path, value = ".".join(map(str, named)), gesture.get("value")
     words = spoken(path)
     if value is not None:
-        if path not in ("name", "notes") and parents != ["dimensions"]:
-            value = _defined(sketch, value)
-        group[last] = _typed(value)
+        value = _written(sketch, value, path not in ("name", "notes") and parents != ["dimensions"])
+        group[last] = value
         text_of_value = ("no", "yes")[value] if isinstance(value, bool) else value
         return f"Set {words} to {', '.join(map(str, value)) if isinstance(value, list) else text_of_value}"
     if parents[:1] == ["gears"] and last in ("ratio", "radius", "lead"):
@@ -61,21 +60,14 @@ def _refuse_missing(sketch: Sketch, path: list[Any]) -> None:
         raise refused("is not there", ".".join(map(str, path)), "choose what is drawn")
 
 
-def _defined(sketch: Sketch, value: Any) -> Any:
-    """The name of a dimension that "crank = 30 mm" makes."""
+def _written(sketch: Sketch, value: Any, defines: bool) -> Any:
+    """What was typed, as it is written: "0.3" as a number; "crank = 30 mm" makes a dimension and is its name."""
     if isinstance(value, list):
-        return [_defined(sketch, part) for part in value]
-    match = DEFINED.fullmatch(value) if isinstance(value, str) else None
-    if not match:
-        return value
-    sketch.section("dimensions")[match[1]] = _typed(match[2].strip())
-    return match[1]
-
-
-def _typed(value: Any) -> Any:
-    """What was typed, as it is written: "0.3" as a number."""
-    if isinstance(value, list):
-        return [_typed(part) for part in value]
+        return [_written(sketch, part, defines) for part in value]
+    match = DEFINED.fullmatch(value) if defines and isinstance(value, str) else None
+    if match:
+        sketch.section("dimensions")[match[1]] = _written(sketch, match[2].strip(), False)
+        return match[1]
     if isinstance(value, str) and NUMBER.fullmatch(value.strip()):
         number = float(value)
         return int(number) if number.is_integer() and abs(number) < 1e15 and "." not in value else number

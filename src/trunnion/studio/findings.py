@@ -5,7 +5,7 @@ tried against them, what the model can be asked and what it still lacks.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -63,12 +63,10 @@ def figures(question: Asked) -> list[dict[str, Any]]:
         None where there is none, or nothing but a bound.
     """
     units = units_of(question.result)
-    found = [row for row in summary_of(question.result) if not row.numerical]
-    ratios = [
-        Figure(f"{joint}.time_ratio", f"time ratio of {joint}", ratio) for joint, ratio in _ratios(question.state)
-    ]
+    figures = [row for row in summary_of(question.result) if not row.numerical]
+    figures += [Figure(f"{name}.time_ratio", f"time ratio of {name}", ratio) for name, ratio in _ratios(question.state)]
     rows = []
-    for row in (*found, *ratios):
+    for row in figures:
         bound = row.aspect == MORE_THAN
         text = row.value if isinstance(row.value, str) else quantity(row.value, row.unit, units) or "—"
         rows.append({
@@ -129,19 +127,19 @@ def spoken(where: str) -> str:
     if not PATH.fullmatch(where):
         return where
     section, name, *inner = where.split(".")
+    part = f"{NOUNS[section]} {name}" if section in NOUNS else ""
     if section == "joint_defaults":
-        return _plain([name, *inner], "all joints")
-    if section not in NOUNS:
-        return f"start of {'.'.join([name, *inner])}" if section == "assembly" else _plain([section, name, *inner])
-    part = name if section == "dimensions" and not inner else f"{NOUNS[section]} {name}"
-    if section == "links" and len(inner) > 1 and inner[0] == "points":
+        part, inner = "all joints", [name, *inner]
+    elif section == "assembly":
+        return f"start of {'.'.join([name, *inner])}"
+    elif section == "dimensions" and not inner:
+        part = name
+    elif section not in NOUNS:
+        inner = [section, name, *inner]
+    elif section == "links" and len(inner) > 1 and inner[0] == "points":
         part = f"point {inner[1]} of {part}"
         inner = [dict(zip("012", "xyz", strict=True)).get(key, key) for key in inner[2:] if key not in "xyz at"]
-    return _plain(inner, part)
-
-
-def _plain(keys: Sequence[str], part: str = "") -> str:
-    return " of ".join(text for text in (" ".join(keys).replace("_", " "), part) if text)
+    return " of ".join(text for text in (" ".join(inner).replace("_", " "), part) if text)
 
 
 def remedied(remedy: str) -> str:
@@ -220,28 +218,20 @@ def readiness(
 
     lacks: what is not drawn yet.
     """
+    subjects = ("motion", "forces", "friction", "play", "tolerance", "time")
     if mechanism is None or result is None:
         errors = [finding for finding in findings if finding.severity is Severity.ERROR]
         why = f"{spoken(errors[0].where)} {errors[0].what}".strip() if errors else "Draw links and drive a joint."
-        answers = [(False, " ".join(lacks) or why), *[(False, "The motion comes first.")] * 5]
-    else:
-        answers = [_moves(mechanism, result, lacks), *_acts(mechanism)]
-    subjects = ("motion", "forces", "friction", "play", "tolerance", "time")
-    return [{"what": what, "ok": ok, "why": why} for what, (ok, why) in zip(subjects, answers, strict=True)]
-
-
-def _moves(mechanism: Mechanism, result: xr.Dataset, lacks: Sequence[str]) -> tuple[bool, str]:
+        reasons = [" ".join(lacks) or why, *["The motion comes first."] * 5]
+        return [{"what": what, "ok": False, "why": why} for what, why in zip(subjects, reasons, strict=True)]
     count, able = result.sizes["position"], int(np.sum(result["status"].values < Status.SINGULAR))
-    if not mechanism.drivers:
-        return False, " ".join(lacks) or "No joint is driven: it stands still."
     rest = f"; the other {count - able} cannot be reached" if able < count else ""
-    return able > 0, f"Moves through {able} of {counted(count, 'position')}{rest}."
-
-
-def _acts(mechanism: Mechanism) -> Iterator[tuple[bool, str]]:
+    still = " ".join(lacks) or "No joint is driven: it stands still."
+    moves = f"Moves through {able} of {counted(count, 'position')}{rest}." if mechanism.drivers else still
     numbers = mechanism.parameters()
     weighs = any(path.endswith((".mass", ".stiffness")) and bool(np.any(numbers[path])) for path in numbers)
-    subjects = (
+    answers = (
+        (bool(mechanism.drivers) and able > 0, moves, moves),
         (bool(mechanism.loads) or weighs, "Loads or masses act on it.", "Add a load, a mass or a spring."),
         (bool(rubbing(prepare(mechanism).system)), "Joints rub.",
          "State friction of a joint, and the radius of its pin."),
@@ -252,8 +242,8 @@ def _acts(mechanism: Mechanism) -> Iterator[tuple[bool, str]]:
         (any(driver.found for driver in mechanism.drivers.values()), "A motor drives it: the study lets it run.",
          "Give a driver a motor in the text, as motor: {kind: constant, effort: 5 N m}."),
     )  # fmt: skip
-    for ok, done, remedy in subjects:
-        yield ok, done if ok else remedy
+    return [{"what": what, "ok": ok, "why": done if ok else remedy}
+            for what, (ok, done, remedy) in zip(subjects, answers, strict=True)]  # fmt: skip
 
 
 # ---- what it lacks ------------------------------------------------------------------------------------------------
@@ -264,11 +254,7 @@ def missing(sketch: Sketch, findings: Sequence[Finding]) -> list[str]:
     errors = [finding for finding in findings if finding.severity is Severity.ERROR]
     if not errors and sketch.joints and not sketch.of("drivers"):
         return ["It stands still: its joints let no link move. Take one away, or let an end slide."]
-    unfinished = [
-        error.what.startswith(("there are no", "no joint connects"))
-        or (error.where == "drivers" and error.remedy.startswith("drive a joint"))
-        for error in errors
-    ]
-    if not errors or not all(unfinished):
-        return []
-    return [f"{errors[0].what[:1].upper()}{errors[0].what[1:]}: {remedied(errors[0].remedy)}."]
+    steps = [error for error in errors if error.what.startswith(("there are no", "no joint connects"))
+             or (error.where == "drivers" and error.remedy.startswith("drive a joint"))]  # fmt: skip
+    complete = len(steps) < len(errors)
+    return [f"{error.what[:1].upper()}{error.what[1:]}: {remedied(error.remedy)}." for error in steps[: not complete]]

@@ -84,15 +84,11 @@ class Studio:
 
     def server(self) -> uvicorn.Server:
         """What serves it. No pings: an answer may take longer than they wait, and a loopback does not break."""
-        config = uvicorn.Config(
-            self.app(),
-            log_level="warning",
-            ws="websockets-sansio",
-            ws_per_message_deflate=False,  # nothing is far: to press an answer takes longer than to send it
+        return uvicorn.Server(uvicorn.Config(
+            self.app(), log_level="warning", ws="websockets-sansio", ws_ping_interval=None,
             ws_max_size=MOST_OF_A_QUESTION,
-            ws_ping_interval=None,
-        )
-        return uvicorn.Server(config)
+            ws_per_message_deflate=False,  # nothing is far: to press an answer takes longer than to send it
+        ))  # fmt: skip
 
     def app(self) -> Starlette:
         """The web application."""
@@ -180,11 +176,9 @@ class Studio:
             "form-action 'none'; frame-src 'self'; frame-ancestors 'none'"
         )
         headers = {
-            "Content-Security-Policy": policy,
-            "Cross-Origin-Opener-Policy": "same-origin",
-            "Cache-Control": "no-store",
-            "Referrer-Policy": "no-referrer",
-        }
+            "Content-Security-Policy": policy, "Cross-Origin-Opener-Policy": "same-origin",
+            "Cache-Control": "no-store", "Referrer-Policy": "no-referrer",
+        }  # fmt: skip
         text = document(nonce, self.token if token is not None or entered else "")
         return Response(text, media_type="text/html; charset=utf-8", headers=headers)
 
@@ -219,14 +213,11 @@ class Studio:
         for path in self.folder.iterdir():
             with contextlib.suppress(ValueError, OSError):
                 names += [path.name] if self._model(path.name).is_file() else []
-        return JSONResponse(
-            {
-                "folder": self.folder.name.encode("utf-8", "replace").decode(),
-                "id": hashlib.sha256(os.fsencode(os.path.realpath(self.folder))).hexdigest()[:16],
-                "open": self.opened,
-                "files": sorted(names)[:MOST_FILES],
-            }
-        )
+        return JSONResponse({
+            "folder": self.folder.name.encode("utf-8", "replace").decode(),
+            "id": hashlib.sha256(os.fsencode(os.path.realpath(self.folder))).hexdigest()[:16],
+            "open": self.opened, "files": sorted(names)[:MOST_FILES],
+        })  # fmt: skip
 
     def _text(self, name: str) -> str:
         """The text of a model of the folder; ValueError or OSError if it cannot be had."""

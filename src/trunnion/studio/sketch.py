@@ -206,32 +206,55 @@ class Sketch:
         keep: the links at a pin on the ground keep their lengths.
         """
         joints = self._together(point) if point in self.joints else []
-        if not joints:
-            (link,), name = self.links_at(point)
-            if name not in self.points(link):
-                raise MechanismError(Finding("is not a joint or a point", point, "drag one that is drawn"))
-            local = {one: self.local(link, one) for one in self.points(link)}
-            local_aim = self.frame(link).into(to)
-            self._apart(link, local, local | {name: local_aim})
-            return list(self._at(link, name, local_aim))
+        links, name = self.links_at(point)
+        if not joints and name not in self.points(links[0]):
+            raise MechanismError(Finding("is not a joint or a point", point, "drag one that is drawn"))
+        pins = [joint for joint in joints if self._turns(joint)]
+        if keep and any(self.ground in self.joints[pin]["links"] for pin in pins):
+            links = [self.ground]
+        elif joints:
+            links = list(dict.fromkeys(link for joint in joints for link in self.joints[joint]["links"]))
         changes: list[Change] = []
-        pins = [one for one in joints if self.ground in self.joints[one]["links"] and self._turns(one)]
-        if keep and pins:
-            return [change for pin in pins for change in self._at(self.ground, pin, to)]
-        for link in dict.fromkeys(link for joint in joints for link in self.joints[joint]["links"]):
-            mine = [joint for joint in joints if link in self.joints[joint]["links"] and self._turns(joint)]
-            if link == self.ground:
-                changes += [change for joint in mine for change in self._at(link, joint, to)]
-            else:
-                changes += self.followed(link, mine, to)
+        for link in links:
+            mine = [pin for pin in pins if link in self.joints[pin]["links"]] if joints else [name]
+            changes += self.followed(link, mine, to)
         return changes
 
-    def followed(self, link: str, pins: list[str], to: Vector) -> Iterator[Change]:
-        """What changes of a moving link whose pins, or block if it has none, go to a place; its others stay."""
-        if guide := self._guide(link):
-            yield from self._shifted(guide, to)
-        elif pins:
-            yield from self._relocated(link, pins, to)
+    def followed(self, link: str, moving: list[str], to: Vector) -> Iterator[Change]:
+        """What changes of a link some of whose points, or the block that it is, go to a place; its other pins stay.
+
+        A link whose frame begins at one joint and has its x through another keeps that form, unless it has a slot.
+        """
+        slides = [name for name, item in self.joints.items() if link in item["links"] and not self._turns(name)]
+        pins = [name for name in self.points(link) if name in self.joints and self._turns(name)]
+        spots = {self.places.get(f"{link}.{name}") for name in (*slides, *pins)}
+        if slides and len(spots) == 1 and self.joints[slides[0]]["links"][1] == link and set(moving) <= set(pins):
+            yield from self._shifted(slides[0], to)
+            return
+        local = {point: self.local(link, point) for point in dict.fromkeys([*pins, *moving])}
+        old = self.frame(link)
+        places = {point: to if point in moving else old.out(local[point]) for point in local}
+        self._refuse_together(link, local, places)
+        origin = next((point for point in pins if local[point] == (0.0, 0.0)), None)
+        ahead = next((point for point in pins if local[point][1] == 0.0 and local[point][0] != 0.0), None)
+        slots = [name for name in slides if self.joints[name]["links"][0] == link]
+        frame = old
+        if link == self.ground:
+            origin = ahead = None
+        elif slots:
+            ahead = None
+            pivot = min(pins, key=lambda name: self.ground not in self.joints[name]["links"], default=None)
+            frame = self._aimed(link, slots[0], pivot, to) if pivot in moving else old
+        elif origin and ahead and {origin, ahead} & set(moving):
+            sign = 1.0 if local[ahead][0] > 0 else -1.0
+            (x, y), (a, b) = places[origin], places[ahead]
+            length = hypot(a - x, b - y)
+            frame = Frame(x, y, sign * (a - x) / length, sign * (b - y) / length)
+        elif origin in moving:
+            frame = old._replace(x=to[0], y=to[1])
+        for point in local:
+            x, y = (0.0, 0.0) if point == origin and frame is not old else frame.into(places[point])
+            yield from self._at(link, point, (x, 0.0) if point == ahead and frame is not old else (x, y))
 
     def _turns(self, joint: str) -> bool:
         return self.kind(joint) == "revolute"
@@ -248,16 +271,6 @@ class Sketch:
                 links |= set(item["links"])
         return together
 
-    def _joints_of(self, link: str, turning: bool) -> list[str]:
-        """The joints of a link that turn, or those that slide."""
-        return [name for name, item in self.joints.items() if link in item["links"] and self._turns(name) == turning]
-
-    def _guide(self, link: str) -> str | None:
-        """The sliding joint of a block: a link with one of them that has a pin on the same spot or none at all."""
-        slides, turning = (self._joints_of(link, turns) for turns in (False, True))
-        spots = {self.places.get(f"{link}.{name}") for name in (*slides, *turning)}
-        return slides[0] if slides and len(spots) == 1 and self.joints[slides[0]]["links"][1] == link else None
-
     def _shifted(self, joint: str, to: Vector) -> Iterator[Change]:
         """The guide of a block, if it stands on the ground, shifted across to where its block is dragged."""
         first, second = self.joints[joint]["links"]
@@ -269,40 +282,9 @@ class Sketch:
         across = ((to[1] - before[1]) * x - (to[0] - before[0]) * y) / norm
         yield from self._at(first, joint, (base[0] - across * y / norm, base[1] + across * x / norm))
 
-    def _relocated(self, link: str, moving: list[str], to: Vector) -> Iterator[Change]:
-        """New coordinates of the joints of a link where some of them go to a place and the others stay.
-
-        A link whose frame begins at one joint and has its x through another keeps that form, unless it has a slot.
-        """
-        old = self.frame(link)
-        pins = [name for name in self.points(link) if name in self.joints and self._turns(name)]
-        local = {point: self.local(link, point) for point in pins}
-        places = {point: to if point in moving else old.out(local[point]) for point in pins}
-        self._apart(link, local, places)
-        origin = next((point for point in pins if local[point] == (0.0, 0.0)), None)
-        ahead = next((point for point in pins if local[point][1] == 0.0 and local[point][0] != 0.0), None)
-        slots = [name for name in self._joints_of(link, False) if self.joints[name]["links"][0] == link]
-        turning = self._joints_of(link, True)
-        pivot = min(turning, key=lambda name: self.ground not in self.joints[name]["links"])  # the first on the ground
-        frame = old
-        if slots:
-            ahead = None
-            frame = self._aimed(link, slots[0], pivot, to) if pivot in moving else old
-        elif origin and ahead and {origin, ahead} & set(moving):
-            sign = 1.0 if local[ahead][0] > 0 else -1.0
-            (x, y), (a, b) = places[origin], places[ahead]
-            length = hypot(a - x, b - y)
-            frame = Frame(x, y, sign * (a - x) / length, sign * (b - y) / length)
-        elif origin in moving:
-            frame = old._replace(x=to[0], y=to[1])
-        for point in pins:
-            place = frame.into(places[point])
-            fixed = (0.0, 0.0) if point == origin and frame is not old else place
-            yield from self._at(link, point, (fixed[0], 0.0) if point == ahead and frame is not old else fixed)
-
-    def _apart(self, link: str, local: Mapping[str, Vector], places: Mapping[str, Vector]) -> None:
-        """Refuse to bring points of a link together that are apart."""
-        for first, two in combinations(local, 2):
+    def _refuse_together(self, link: str, local: Mapping[str, Vector], places: Mapping[str, Vector]) -> None:
+        """Refuse to bring points of a moving link together that are apart."""
+        for first, two in combinations(local if link != self.ground else (), 2):
             before, after = (dist(spots[first], spots[two]) for spots in (local, places))
             if after <= SHORT * self.size < before:
                 what = f"would have no length: {first} would lie on {two}"

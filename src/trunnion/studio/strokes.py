@@ -49,11 +49,11 @@ def typed(text: Any, kind: str, where: str, unit: str = "") -> float:
     try:
         read = Quantity.read(f"{text} {unit}" if unit and NUMBER.fullmatch(text) else text, KINDS[kind])
         value = float(np.asarray(read.evaluate()))
-    except (UnitError, ValueError, TypeError, KeyError) as error:
+        if not isfinite(value):
+            raise ValueError(text)
+    except (UnitError, ValueError, TypeError, KeyError, ZeroDivisionError) as error:
         remedy = getattr(error, "remedy", "") or f"type it as {KINDS[kind].example}"
         raise refused(f"'{text[:30]}' is no {kind}", where, remedy) from None
-    if not isfinite(value):
-        raise refused(f"'{text[:30]}' is no {kind}", where, f"type it as {KINDS[kind].example}")
     return value
 
 

@@ -89,6 +89,22 @@ def test_the_cycle_is_that_of_analyse():
     }  # fmt: skip
 
 
+def test_the_outline_is_what_the_answer_draws_at_the_start():
+    outline, found = (ask(ask=kind, text=EXAMPLES[FOURBAR]) for kind in ("outline", "model"))
+    assert (outline["entries"], outline["numbers"]) == (found["entries"], found["numbers"])
+    for key, place in found["places"].items():
+        assert outline["places"][key] == pytest.approx(place, abs=1e-6)
+
+
+def test_a_drag_that_changes_nothing_says_so():
+    text = EXAMPLES["scotch-yoke"]
+    places = ask(ask="model", text=text)["places"]
+    (place,) = {tuple(at) for key, at in places.items() if key.endswith(".G") and not key.startswith("frame")}
+    gesture = {"do": "move", "point": "G", "to": [place[0] + 0.003, place[1]]}
+    found = ask(ask="edit", text=text, places=places, gestures=[gesture])
+    assert found["says"] == "Move G: no length changes"
+
+
 @pytest.mark.sample(8)
 @pytest.mark.spread(6, "jansen", "rssr")
 def test_every_example_opens(example):

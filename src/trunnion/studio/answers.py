@@ -156,6 +156,12 @@ def _model(question: Asked) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _outline(question: Asked) -> dict[str, Any]:
+    """What can be drawn of a text in the plane before its answer is there: its points at the shown position."""
+    state = question.state
+    return {"entries": state.entries, "numbers": plain(state.run.values), "places": places_at(question)}
+
+
 def _sketch(question: Asked, places: dict[str, Vector] | None = None) -> Sketch:
     """A drawing of a model's entries that may be changed."""
     entries = copy.deepcopy(dict(question.state.entries or {}))
@@ -450,8 +456,8 @@ def _corner(question: Asked) -> dict[str, Any]:
 
 
 ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
-    "start": _start, "example": _example, "model": _model, "cycle": _cycle, "drag": _drag, "try": _try, "edit": _edit,
-    "export": _export, "assemblies": _assemblies, "layers": _layers, "blocks": _blocks, "margins": _margins,
-    "curves": _curves, "compare": _compare, "corner": _corner,
+    "start": _start, "example": _example, "outline": _outline, "model": _model, "cycle": _cycle, "drag": _drag,
+    "try": _try, "edit": _edit, "export": _export, "assemblies": _assemblies, "layers": _layers, "blocks": _blocks,
+    "margins": _margins, "curves": _curves, "compare": _compare, "corner": _corner,
 }  # fmt: skip
-BESIDE = (_cycle, _margins, _corner)
+BESIDE = (_outline, _cycle, _margins, _corner)

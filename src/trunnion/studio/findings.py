@@ -56,6 +56,8 @@ REACHED = {
 def figures(question: Asked) -> list[dict[str, Any]]:
     """The figures one looks at first, without those of the solution: of the result, and time ratios.
 
+    Without friction nothing is lost: what would be an efficiency is what weights and springs give and take.
+
     Returns
     -------
     list
@@ -64,6 +66,7 @@ def figures(question: Asked) -> list[dict[str, Any]]:
     """
     units = units_of(question.result)
     figures = [row for row in summary_of(question.result) if not row.numerical]
+    figures = [row for row in figures if question.friction or not row.name.startswith("efficiency")]
     figures += [Figure(f"{name}.time_ratio", f"time ratio of {name}", ratio) for name, ratio in _ratios(question.state)]
     rows = []
     for row in figures:

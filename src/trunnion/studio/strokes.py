@@ -377,7 +377,8 @@ def move(sketch: Sketch, gesture: Given) -> str:
     if "by" in gesture:
         return _move_in_space(sketch, gesture)
     point, to = str(gesture["point"]), vector(gesture["to"])
-    sketch.write(sketch.moved(point, to, bool(gesture.get("keep"))))
+    changes = sketch.moved(point, to, bool(gesture.get("keep")))
+    sketch.write(changes)
     hints = sketch.entries.get("assembly") or {}
     if isinstance(hints.get(point), list) and not gesture.get("index"):
         hints[point] = [sketch.length(part) for part in to]
@@ -386,7 +387,7 @@ def move(sketch: Sketch, gesture: Given) -> str:
         sketch.places[f"{link}.{name}"] = to
     for link in links:
         sketch.show(link, sketch.frame(link))
-    return f"Move {point}"
+    return f"Move {point}" if changes else f"Move {point}: no length changes"
 
 
 def _move_in_space(sketch: Sketch, gesture: Given) -> str:

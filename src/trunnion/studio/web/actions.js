@@ -71,6 +71,7 @@ async function answered() {
   const sent = state.text.value;
   const friction = state.friction.value;
   const asked = { text: sent, steps: STEPS, friction: friction === "off" ? "off" : "stated" };
+  if (!state.answer.value && sent.trim()) outlined(asked);
   const found = await link.ask("model", asked);
   if (!found || sent !== state.text.value) return;
   if (found.error) return state.say(found.error, true);
@@ -81,6 +82,14 @@ async function answered() {
   if (state.selection.value && !isPart(found, state.selection.value)) state.selection.value = null; // its name was undone, or it is gone
   if (found.scene && state.index.value >= found.scene.count) state.index.value = 0;
   if (found.solved) await (cycles = cycles.then(() => figured(asked)));
+}
+
+/** Links and joints at their start, drawn while the first answer is awaited. */
+async function outlined(asked) {
+  const found = await link.ask("outline", asked);
+  if (!found || found.error || state.answer.value || asked.text !== state.text.value) return;
+  if (!Object.keys(state.places.value).length) state.places.value = found.places;
+  state.answer.value = { ...found, outline: true, solved: false, scene: null, findings: [], missing: [], ready: [], text: asked.text, friction: asked.friction };
 }
 
 let cycles = Promise.resolve(); // one after another, for a long one would hold up the next

@@ -57,7 +57,7 @@ export function poseOverlay(view) {
   const seats = wanted.seats && view.ideal ? (told.seats ?? []) : [];
   for (const { joint, node } of view.parts.vectors) set(node, { visibility: corner || seats.some((one) => one.joint === joint.name) ? "hidden" : null }); // drawn where it touches
   layers.overlay.replaceChildren(
-    ...dimensionMarks(view, words, (x, y, text) => taken.push({ left: x - 0.5 * LETTER * text.length, right: x + 0.5 * LETTER * text.length, y: y + 4 })),
+    ...dimensionMarks(view, words, spare),
     ...(told.circles ? circles(view, told.circles, key) : []),
     ...(told.transmission ? told.transmission.flatMap((one) => transmission(view, one)) : []),
     ...(told.centres ? centres(view, told.centres, wanted) : []),
@@ -77,6 +77,14 @@ function words(x, y, text, kind = "") {
   while (taken.some(meets)) y += LINE;
   taken.push({ left, right: left + wide, y });
   return svg("text", { class: `laid ${kind}`, x: (kind === "to-left" ? left + wide : left).toFixed(1), y: y.toFixed(1) }, text);
+}
+
+/** Whether there is room for words about a place; then it is theirs. */
+function spare(x, y, text) {
+  const half = 0.5 * LETTER * text.length;
+  const free = !taken.some((one) => x - half < one.right && x + half > one.left && Math.abs(one.y - y - 4) < 1.6 * LINE);
+  if (free) taken.push({ left: x - half, right: x + half, y: y + 4 });
+  return free;
 }
 
 /** Words beyond the tip of an arrow from a spot. */

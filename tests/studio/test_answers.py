@@ -89,6 +89,14 @@ def test_the_cycle_is_that_of_analyse():
     }  # fmt: skip
 
 
+def test_pictures_of_examples():
+    found = ask(ask="picture", name=FOURBAR)
+    assert [one["ground"] for one in found["links"]] == [True, False, False, False]
+    crank = next(track for track in found["paths"] if np.ptp(np.hypot(track["x"], track["y"])) < 1e-6)
+    assert max(crank["x"]) == pytest.approx(2.0, rel=0.01)  # m, as the file states
+    assert "no example" in ask(ask="picture", name="none")["error"]
+
+
 def test_the_outline_is_what_the_answer_draws_at_the_start():
     outline, found = (ask(ask=kind, text=EXAMPLES[FOURBAR]) for kind in ("outline", "model"))
     assert (outline["entries"], outline["numbers"]) == (found["entries"], found["numbers"])

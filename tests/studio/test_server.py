@@ -13,7 +13,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from urllib.parse import quote
 
-import numpy as np
 import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
@@ -59,7 +58,7 @@ def saved(studio, name, text, **how):
     return status, json.loads(told)
 
 
-GUARDED = ["/files", "/file/R%C3%A4der.yaml", "/thumbnail/hoecken"]
+GUARDED = ["/files", "/file/R%C3%A4der.yaml"]
 CODE = ["/", "/modules.js", "/studio/index.html", "/web/chart.js"]  # of the page: the same for everybody
 WRONG = ["x", "é", "\xff\xfe", "", "Räder" * 2000]
 
@@ -160,14 +159,6 @@ def test_files_of_the_folder_alone(served):
     assert (told["open"], told["files"]) == ("Räder.yaml", ["Räder.yaml"])
     assert json.loads(raw(served, "GET", "/file/R%C3%A4der.yaml")[2])["text"] == EXAMPLES["hoecken"]
     assert fetched(served, "GET", "/file/notes.txt")[0] == 404
-
-
-def test_pictures_of_examples(served):
-    found = unpacked(raw(served, "GET", "/thumbnail/durango-fourbar")[2])
-    assert [one["ground"] for one in found["links"]] == [True, False, False, False]
-    crank = next(track for track in found["paths"] if np.ptp(np.hypot(track["x"], track["y"])) < 1e-6)
-    assert max(crank["x"]) == pytest.approx(2.0, rel=0.01)  # m, as the file states
-    assert fetched(served, "GET", "/thumbnail/none")[0] == 404
 
 
 @pytest.mark.parametrize(

@@ -44,23 +44,24 @@ from trunnion.studio.findings import (
     sentence,
     spoken,
 )  # fmt: skip
-from trunnion.studio.layers import blocks_of, centres_of, corner_of, measured, seats_of, transmission_of
+from trunnion.studio.layers import centres_of, corner_of, measured, seats_of, transmission_of
 from trunnion.studio.live import Live, live_in_space, places_at, uncollected
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
 from trunnion.studio.message import packed
-from trunnion.studio.placed import plain, tracks
+from trunnion.studio.placed import plain, thumbnail, tracks
 from trunnion.studio.selected_links import group
 from trunnion.studio.sketch import Sketch, Vector
 from trunnion.studio.strokes import add_point, held, join, link, move, pinned, slide, vector
 from trunnion.studio.wiring import block
 from trunnion.version import __version__
+from trunnion.views.cycle.blocks import blocks_of
 from trunnion.views.cycle.scene import scene
 from trunnion.views.space.bodies import gathered
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ANSWERS", "answer", "examples"]
+__all__ = ["ANSWERS", "answer"]
 
 Array = NDArray[np.float64]
 
@@ -98,7 +99,7 @@ def answer(request: bytes, turn: AbstractContextManager[object] | None = None) -
 
 def _start(question: Asked) -> dict[str, Any]:
     rows = [{"name": name, "title": _stated(text, "name"), "space": _stated(text, "space") or "planar"}
-            for name, text in examples().items()]  # fmt: skip
+            for name, text in _examples().items()]  # fmt: skip
     return {"version": __version__, "examples": rows, "laws": list(FRICTION_LAWS)}
 
 
@@ -108,7 +109,7 @@ def _stated(text: str, key: str) -> str:
 
 
 @lru_cache(maxsize=1)
-def examples() -> dict[str, str]:
+def _examples() -> dict[str, str]:
     """The example models that stand alone in one file, by name."""
     shipped = files("trunnion") / "examples"
     if not shipped.is_dir():  # a working tree
@@ -121,10 +122,11 @@ def examples() -> dict[str, str]:
 
 
 def _example(question: Asked) -> dict[str, Any]:
+    """The text of an example; asked as "picture" its small picture."""
     name = str(question["name"])
-    if name not in examples():
+    if name not in _examples():
         raise MechanismError(Finding(f"there is no example '{name}'", remedy="choose one of the list"))
-    return {"text": examples()[name]}
+    return thumbnail(_examples()[name]) if question["ask"] == "picture" else {"text": _examples()[name]}
 
 
 # ---- a model ------------------------------------------------------------------------------------------------------
@@ -456,8 +458,8 @@ def _corner(question: Asked) -> dict[str, Any]:
 
 
 ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
-    "start": _start, "example": _example, "outline": _outline, "model": _model, "cycle": _cycle, "drag": _drag,
-    "try": _try, "edit": _edit, "export": _export, "assemblies": _assemblies, "layers": _layers, "blocks": _blocks,
-    "margins": _margins, "curves": _curves, "compare": _compare, "corner": _corner,
+    "start": _start, "example": _example, "picture": _example, "outline": _outline, "model": _model, "cycle": _cycle,
+    "drag": _drag, "try": _try, "edit": _edit, "export": _export, "assemblies": _assemblies, "layers": _layers,
+    "blocks": _blocks, "margins": _margins, "curves": _curves, "compare": _compare, "corner": _corner,
 }  # fmt: skip
 BESIDE = (_outline, _cycle, _margins, _corner)

@@ -173,9 +173,8 @@ class _Moving:
         for name, load in sketch.of("loads").items():
             if load.get("link") in self.links:
                 parts = [part for part in (*load.get("force", ()), load.get("moment")) if isinstance(part, str)]
-                if {symbol for part in parts for symbol in Quantity.read(part).names} - set(
-                    sketch.section("dimensions")
-                ):
+                symbols = {symbol for part in parts for symbol in Quantity.read(part).names}
+                if symbols - set(sketch.section("dimensions")):
                     raise refused("follows the motion by a formula", f"loads.{name}", "mirror it in the text")
                 signs = (1, -1) if load.get("frame") == "link" else self.signs
                 load |= {"force": _signed(load["force"], signs)} if "force" in load else {}

@@ -96,7 +96,6 @@ class Studio:
             Route("/", self._own(self._page)),
             Route("/modules.js", self._own(self._modules)),
             Route("/files", self._admitted(self._files)),
-            Route("/thumbnail/{name}", self._admitted(_thumbnail)),
             Route("/file/{name:path}", self._admitted(self._read)),
             Route("/file/{name:path}", self._admitted(self._write), methods=["PUT"]),
             Route("/jobs", self._admitted(self._jobs)),
@@ -314,22 +313,6 @@ class Studio:
             with contextlib.suppress(WebSocketDisconnect):
                 while (question := await socket.receive())["type"] == "websocket.receive":
                     answering.create_task(tell(question.get("bytes") or (question.get("text") or "").encode()))
-
-
-async def _thumbnail(request: Request) -> Response:
-    """The small picture of an example, as an answer to a question."""
-    content = await run_in_threadpool(_pictured, request.path_params["name"])
-    return Response(content, media_type="application/octet-stream", headers={"Cache-Control": "max-age=3600"})
-
-
-def _pictured(name: str) -> bytes:
-    from trunnion.studio.answers import examples
-    from trunnion.studio.placed import thumbnail
-
-    if name not in examples():
-        raise ValueError("there is no such example")
-    with ANSWERING:
-        return thumbnail(examples()[name])
 
 
 def _warm(text: str) -> None:

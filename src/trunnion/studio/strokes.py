@@ -10,7 +10,7 @@ import itertools
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from math import atan2, cos, hypot, isfinite, sin
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -200,24 +200,19 @@ def pin(sketch: Sketch, name: str, first: str, second: str, place: Vector) -> No
         sketch.section("assembly")[name] = [sketch.length(part) for part in place]
 
 
-class Line(NamedTuple):
-    """A line of a link: where it begins, m, its direction, and how far left of it a place lies, m."""
+def line_near(sketch: Sketch, link: str, place: Vector) -> tuple[Vector, Vector, float]:
+    """The line through two points of a link that passes nearest to a place; of several the longest.
 
-    start: Vector
-    direction: Vector
-    beside: float
-
-
-def line_near(sketch: Sketch, link: str, place: Vector) -> Line:
-    """The line through two points of a link that passes nearest to a place; of several the longest."""
+    Where it begins, m, its direction, and how far left of it the place lies, m.
+    """
     spots = [sketch.places[key] for point in sketch.points(link) if (key := f"{link}.{point}") in sketch.places]
-    lines: list[tuple[float, float, Line]] = []
+    lines: list[tuple[float, float, tuple[Vector, Vector, float]]] = []
     for (x, y), (a, b) in itertools.combinations(spots, 2):
         length = hypot(a - x, b - y)
         if length > TOGETHER * sketch.size:
             c, s = (a - x) / length, (b - y) / length
             offset = c * (place[1] - y) - s * (place[0] - x)
-            lines.append((round(abs(offset) / sketch.size, 6), -length, Line((x, y), (c, s), offset)))
+            lines.append((round(abs(offset) / sketch.size, 6), -length, ((x, y), (c, s), offset)))
     if not lines:
         raise refused("has no two points that a slot could go along", f"links.{link}", "add a point to it first")
     return min(lines, key=lambda row: row[:2])[2]
@@ -313,9 +308,8 @@ def _guided(sketch: Sketch, carrier: str, place: Vector, gesture: Given) -> tupl
         angle = float(gesture.get("angle", 0.0))
         put(sketch, carrier, name, place, angle)
         return name, angle
-    line = line_near(sketch, carrier, place)
-    (x, y), (c, s) = line.start, line.direction
-    offset = line.beside if abs(line.beside) > float(gesture.get("near", 0.0)) else 0.0
+    (x, y), (c, s), beside = line_near(sketch, carrier, place)
+    offset = beside if abs(beside) > float(gesture.get("near", 0.0)) else 0.0
     put(sketch, carrier, name, (x - s * offset, y + c * offset), atan2(s, c))
     along = c * (place[0] - x) + s * (place[1] - y)
     sketch.section("assembly")[name] = sketch.length(along)  # on which side of the point the block is

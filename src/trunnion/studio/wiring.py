@@ -111,7 +111,7 @@ def _prp(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
         raise refused("is on no link that moves", "the pin", "choose a pin of the link along which it slides")
     spots = [sketch.places[f"{carrier}.{point}"] for point in sketch.points(carrier)]
     x, y = at or (sum(spot[0] for spot in spots) / len(spots), sum(spot[1] for spot in spots) / len(spots))
-    c, s = line_near(sketch, carrier, (x, y)).direction
+    _, (c, s), _ = line_near(sketch, carrier, (x, y))
     slider, point, angle = numbered(sketch, "links", "block"), letter(sketch), atan2(c, -s)  # across the link
     sketch.section("links")[slider] = {"points": {point: [0, 0]}}
     sketch.show(slider, Frame(x, y, cos(angle), sin(angle)))

@@ -309,6 +309,11 @@ export function openText(content, words) {
   return opened;
 }
 
+let pictures = Promise.resolve(); // one after another: of questions of a kind the latest alone is answered
+
+/** The small picture of an example, {links, paths}. */
+export const pictureOf = (name) => (pictures = pictures.then(() => link.ask("picture", { name })));
+
 export function openExample(example) {
   return counted(shipped(example));
 }

@@ -194,8 +194,16 @@ class Sketch:
         changes: dict[str, Change] = {}  # a number once
         for link in links:
             columns = turns[link].T if link != self.ground else np.eye(3)
-            local = np.array(self.vector(f"links.{link}.points.{name}", "xyz")) + columns @ np.asarray(by, float)
-            changes |= {change.path: change for change in self._at(link, name, local)}
+            ends = {point: np.array(self.vector(f"links.{link}.points.{point}", "xyz")) for point in self.points(link)}
+            local = ends[name] + columns @ np.asarray(by, float)
+            moved_to = self._at(link, name, local)
+            near, *far = sorted(ends, key=lambda point: float(np.abs(ends[point]).sum()))
+            plain = all(isinstance(entry, list) for entry in self.points(link).values())
+            if plain and len(far) == 1 and not ends[near].any() and ends[far[0]][0] > 0 and not ends[far[0]][1:].any():
+                # a rod with two balls, from its origin along its x: so it stays, for it is alike about its line
+                length = float(np.linalg.norm(local - ends[near if name in far else far[0]]))
+                moved_to = self._at(link, far[0], (length, 0.0, 0.0))
+            changes |= {change.path: change for change in moved_to}
         return list(changes.values())
 
     # ---- dragging ---------------------------------------------------------------------------------------------

@@ -48,7 +48,7 @@ function apart(spots) {
   return spots.filter((spot, order) => !spots.slice(0, order).some((other) => far(spot, other) <= 1e-6 * size));
 }
 
-/** The dimensions as they are drawn; `words(x, y, text)` puts words where there is room, `spare(x, y, text)` tells whether there is room at a place:
+/** The dimensions as they are drawn; `words(x, y, text)` puts words where there is room, `spare(x, y, text, angle)` tells whether there is room at a place:
  * dimensions that have none are left out, those of the chosen link last. */
 export function dimensionMarks(view, words, spare) {
   if (!state.layers.peek().dimensions || !view.scene || view.ideal) return [];
@@ -85,7 +85,7 @@ function length(frame, { name, ends, ground }, middle, spare) {
   const turn = (Math.atan2(uy, ux) * 180) / Math.PI;
   const upright = turn >= 90 || turn < -90 ? turn + 180 : turn;
   const words = stated(Number(Math.hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]).toPrecision(6)), "m");
-  if (!spare((x + a) / 2 + nx * aside, (y + b) / 2 + ny * aside, words)) return []; // it is told under Properties
+  if (!spare((x + a) / 2 + nx * aside, (y + b) / 2 + ny * aside, words, Math.atan2(uy, ux))) return []; // it is told under Properties
   const spot = `translate(${at((x + a) / 2, (y + b) / 2, aside)}) rotate(${upright.toFixed(2)})`;
   return [
     svg("path", { class: "dimension-line", d }),

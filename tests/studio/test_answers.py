@@ -89,6 +89,30 @@ def test_the_cycle_is_that_of_analyse():
     }  # fmt: skip
 
 
+def test_pictures_of_examples():
+    found = ask(ask="picture", name=FOURBAR)
+    assert [one["ground"] for one in found["links"]] == [True, False, False, False]
+    crank = next(track for track in found["paths"] if np.ptp(np.hypot(track["x"], track["y"])) < 1e-6)
+    assert max(crank["x"]) == pytest.approx(2.0, rel=0.01)  # m, as the file states
+    assert "no example" in ask(ask="picture", name="none")["error"]
+
+
+def test_the_outline_is_what_the_answer_draws_at_the_start():
+    outline, found = (ask(ask=kind, text=EXAMPLES[FOURBAR]) for kind in ("outline", "model"))
+    assert (outline["entries"], outline["numbers"]) == (found["entries"], found["numbers"])
+    for key, place in found["places"].items():
+        assert outline["places"][key] == pytest.approx(place, abs=1e-6)
+
+
+def test_a_drag_that_changes_nothing_says_so():
+    text = EXAMPLES["scotch-yoke"]
+    places = ask(ask="model", text=text)["places"]
+    (place,) = {tuple(at) for key, at in places.items() if key.endswith(".G") and not key.startswith("frame")}
+    gesture = {"do": "move", "point": "G", "to": [place[0] + 0.003, place[1]]}
+    found = ask(ask="edit", text=text, places=places, gestures=[gesture])
+    assert found["says"] == "Move G: no length changes"
+
+
 @pytest.mark.sample(8)
 @pytest.mark.spread(6, "jansen", "rssr")
 def test_every_example_opens(example):
@@ -246,9 +270,7 @@ def test_a_pin_on_the_ground_keeps_lengths_where_it_shall():
         )
         np.testing.assert_allclose(after, before, rtol=1e-6)
     assert [found["rocker.D"][axis][0] for axis in "xy"] == pytest.approx(to, abs=1e-6)
-    free, locked = ask(ask="drag", **asked), ask(ask="drag", keep=True, locked=["C"], **asked)
-    assert free["changes"] == locked["changes"] != []
-    assert any(row[0] == "CD" for row in free["changes"])
+    assert any(row[0] == "CD" for row in ask(ask="drag", **asked)["changes"])
 
 
 def test_a_crank_follows_by_turning():
@@ -354,7 +376,7 @@ def test_a_link_that_the_loop_alone_names_takes_a_mass():
     assert entries_of(text)[0]["links"] == {"crank": {"mass": "2 kg"}}
 
 
-@pytest.mark.parametrize("what", ["csv", "report", "png", "svg", "gif"])
+@pytest.mark.parametrize("what", ["csv", "report", "png", "svg"])
 def test_files(what):
     found = ask(ask="export", text=EXAMPLES[FOURBAR], what=what, steps=36)
     assert len(found["bytes"]) > 500

@@ -13,14 +13,12 @@ from pathlib import Path
 from types import SimpleNamespace
 from urllib.parse import quote
 
-import numpy as np
 import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-import trunnion
 from served import served as serving
-from studio.asking import EXAMPLES, model_of, unpacked
+from studio.asking import EXAMPLES, unpacked
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +58,7 @@ def saved(studio, name, text, **how):
     return status, json.loads(told)
 
 
-GUARDED = ["/files", "/file/R%C3%A4der.yaml", "/thumbnail/hoecken"]
+GUARDED = ["/files", "/file/R%C3%A4der.yaml"]
 CODE = ["/", "/modules.js", "/studio/index.html", "/web/chart.js"]  # of the page: the same for everybody
 WRONG = ["x", "é", "\xff\xfe", "", "Räder" * 2000]
 
@@ -161,14 +159,6 @@ def test_files_of_the_folder_alone(served):
     assert (told["open"], told["files"]) == ("Räder.yaml", ["Räder.yaml"])
     assert json.loads(raw(served, "GET", "/file/R%C3%A4der.yaml")[2])["text"] == EXAMPLES["hoecken"]
     assert fetched(served, "GET", "/file/notes.txt")[0] == 404
-
-
-def test_pictures_of_examples(served):
-    found = unpacked(raw(served, "GET", "/thumbnail/durango-fourbar")[2])
-    assert [one["ground"] for one in found["links"]] == [True, False, False, False]
-    crank = next(track for track in found["paths"] if np.ptp(np.hypot(track["x"], track["y"])) < 1e-6)
-    assert max(crank["x"]) == pytest.approx(2.0, rel=0.01)  # m, as the file states
-    assert fetched(served, "GET", "/thumbnail/none")[0] == 404
 
 
 @pytest.mark.parametrize(
@@ -345,17 +335,3 @@ def test_nobody_else_may_ask(served, how):
     how = {"origin": f"http://127.0.0.1:{served.port}", "Cookie": f"trunnion_studio_{served.port}={served.token}"} | how
     with pytest.raises(InvalidStatus, match="403"):
         socket_of(served, **how)
-
-
-def test_a_dropped_file_of_another_program_becomes_a_model(served, tmp_path) -> None:
-    mechanism = model_of(EXAMPLES["durango-fourbar"])
-    path = tmp_path / "arm.urdf"
-    trunnion.exchange.export_model(mechanism, path, at="60 deg")
-    status, _, content = raw(served, "PUT", "/import/arm.urdf", path.read_bytes())
-    assert status == 200
-    model = model_of(json.loads(content)["text"])
-    assert set(model.links) == set(mechanism.links)
-    status, _, content = raw(served, "PUT", "/import/arm.urdf", b"<robot><link")
-    assert status == 400
-    assert "arm.urdf" in json.loads(content)["error"].lower()
-    assert raw(served, "PUT", "/import/arm.urdf", b"", token=False)[0] == 403

@@ -122,4 +122,4 @@ def test_a_chip_opens_its_study_and_the_report_is_read_in_the_page(user) -> None
     page.get_by_role("button", name="Open the report").click(timeout=60_000)
     page.frame_locator("iframe.report").get_by_text("Four-bar with tolerances").first.wait_for()
     page.get_by_role("button", name="Back to the studies").click()
-    assert "trunnion tolerance four-bar.yaml --samples=0 --steps=36" in page.locator(".job code").inner_text()
+    assert "trunnion tolerance four-bar.yaml --samples=0 --steps=36" in page.locator(".job code").text_content()

@@ -53,7 +53,6 @@ def test_the_kernel_answers_as_the_server_does(widget) -> None:
     for path, status in (
         ("/files", 200),
         ("/file/mechanism.yaml", 200),
-        ("/thumbnail/jansen", 200),
         ("/import/a.step", 404),
     ):
         widget._asked(widget, {"id": "a 2", "path": path}, [])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from itertools import combinations
 from math import atan2, degrees, dist, hypot
@@ -15,7 +14,6 @@ from trunnion.studio.strokes import begin, numbered, point_of, refused, typed, v
 __all__ = ["bar_mass", "centre", "driver", "gear", "load", "spring"]
 
 Given = Mapping[str, Any]
-RATIO = re.compile(r"\s*([-+]?)\s*(\d+\.?\d*|\.\d+)\s*(?:([:/])\s*(\d+\.?\d*|\.\d+)\s*)?")
 
 
 def driver(sketch: Sketch, gesture: Given) -> str:
@@ -45,12 +43,16 @@ def _turned(sketch: Sketch, joint: str) -> float:
 def load(sketch: Sketch, gesture: Given) -> str:
     """A force at a joint, a point or a place of a moving link; or what opposes the motion of the joint `against`.
 
-    size: of that, N or N m, as it was typed; instead: the load that it takes the place of, with its size.
+    size: of that, N or N m, as it was typed.
     """
-    before = str(gesture.get("instead") or "")
-    name = before if before in sketch.of("loads") else numbered(sketch, "loads", "load")
+    name = numbered(sketch, "loads", "load")
     if "against" in gesture:
-        entry = _resisting(sketch, gesture, name)
+        joint = str(gesture["against"])
+        kind = sketch.kind(joint)
+        if kind not in ("revolute", "prismatic", "cylindrical"):
+            raise refused("does not turn or slide", joint, "choose a pin or a slide")
+        what, usual = ("resisting_force", "100 N") if kind == "prismatic" else ("resisting_torque", "10 N m")
+        entry = {"joint": joint, what: gesture.get("size") or usual}
     else:
         link, point = point_of(sketch, gesture["at"])
         if link == sketch.ground:
@@ -58,21 +60,7 @@ def load(sketch: Sketch, gesture: Given) -> str:
         entry = {"link": link, "at": point, "force": list(gesture["force"])}
     sketch.section("loads")[name] = entry
     sketch.made = ("loads", name)
-    return f"Change {name}" if name == before else f"Add {name}"
-
-
-def _resisting(sketch: Sketch, gesture: Given, name: str) -> dict[str, Any]:
-    joint = str(gesture["against"])
-    kind = sketch.kind(joint)
-    if kind not in ("revolute", "prismatic", "cylindrical"):
-        raise refused("does not turn or slide", joint, "choose a pin or a slide")
-    turns = kind != "prismatic"
-    size = gesture.get("size") or ("10 N m" if turns else "100 N")
-    parts = [sketch.numbers.get(f"loads.{name}.force.{axis}") for axis in "xy"]
-    if not turns and None not in parts:
-        size = f"{hypot(*map(float, parts)):.6g} N"  # type: ignore[arg-type]  # none of them is None
-    marked = {"useful": True} if sketch.of("loads").get(name, {}).get("useful") else {}
-    return {"joint": joint, "resisting_torque" if turns else "resisting_force": size, **marked}
+    return f"Add {name}"
 
 
 def spring(sketch: Sketch, gesture: Given) -> str:
@@ -155,7 +143,13 @@ def gear(sketch: Sketch, gesture: Given) -> str:
         )
     if any({*pair.get("joints", ())} == {one, two} for pair in sketch.of("gears").values()):
         raise refused(f"and {two} are geared already", one, "change the ratio of that gear pair")
-    written, ratio = _ratio(str(gesture.get("ratio") or "1"))
+    text = str(gesture.get("ratio") or "1").replace(":", "/").strip()
+    written: float | int | str = f"{'' if text.startswith('+') else '-'}{text.lstrip('+-')}"
+    ratio = typed(written, "number", "the ratio")
+    if not ratio:
+        raise refused(f"'{text}' is no ratio of gears", "", "type the teeth as 20:40, or a number")
+    if "/" not in text:
+        written = int(ratio) if ratio.is_integer() else ratio
     name = numbered(sketch, "gears", "gear")
     phase = (_turned(sketch, two) - ratio * _turned(sketch, one)) % 360.0
     entry: dict[str, Any] = {"joints": [one, two], "ratio": written}
@@ -175,15 +169,3 @@ def _pivot(sketch: Sketch, end: Any) -> str:
     if end not in sketch.joints or sketch.joints[end].get("type", "revolute") != "revolute":
         raise refused("is no pin that turns", str(end), "choose the pivot of a link")
     return str(end)
-
-
-def _ratio(text: str) -> tuple[float | int | str, float]:
-    """A ratio as it is written, and its value."""
-    match = RATIO.fullmatch(text)
-    if not match or float(match[2]) == 0.0 or (match[4] and float(match[4]) == 0.0):
-        raise refused(f"'{text}' is no ratio of gears", "", "type the teeth as 20:40, or a number")
-    sign = "" if match[1] == "+" else "-"
-    value = float(f"{sign}{match[2]}") / float(match[4] or 1.0)
-    if match[4]:
-        return f"{sign}{match[2]}/{match[4]}", value
-    return (int(value) if value.is_integer() else value), value

@@ -8,6 +8,7 @@ prepared of a text is kept for the next question about the same.
 from __future__ import annotations
 
 import copy
+import io
 import json
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -29,13 +30,9 @@ from trunnion.results.attributes import findings_of
 from trunnion.results.scales import without_noise
 from trunnion.results.tables import selected
 from trunnion.solve.assembly_modes import choices
-from trunnion.solve.forward import Forward
 from trunnion.solve.run import prepare
-from trunnion.studies.design import instant_centres, transmission_angles
 from trunnion.studio.acting import bar_mass, centre, driver, gear, load, spring
-from trunnion.studio.blocks import blocks_of
 from trunnion.studio.changing import add_row, delete, put_value, rename
-from trunnion.studio.exports import exported
 from trunnion.studio.findings import (
     cures,
     figures,
@@ -47,31 +44,31 @@ from trunnion.studio.findings import (
     sentence,
     spoken,
 )  # fmt: skip
-from trunnion.studio.group import group
+from trunnion.studio.layers import centres_of, corner_of, measured, seats_of, transmission_of
 from trunnion.studio.live import Live, live_in_space, places_at, uncollected
 from trunnion.studio.loaded import MOST_STEPS, STEPS, Asked, Loaded
-from trunnion.studio.message import Exact, packed
-from trunnion.studio.placed import column, plain, tracks
+from trunnion.studio.message import packed
+from trunnion.studio.placed import plain, thumbnail, tracks
+from trunnion.studio.selected_links import group
 from trunnion.studio.sketch import Sketch, Vector
-from trunnion.studio.strokes import add_point, held, join, link, lock, move, pinned, slide, vector
-from trunnion.studio.tolerances import corner_of, measured
+from trunnion.studio.strokes import add_point, held, join, link, move, pinned, slide, vector
 from trunnion.studio.wiring import block
 from trunnion.version import __version__
-from trunnion.views.cycle.deviations import seated
+from trunnion.views.cycle.blocks import blocks_of
 from trunnion.views.cycle.scene import scene
 from trunnion.views.space.bodies import gathered
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ANSWERS", "answer", "examples"]
+__all__ = ["ANSWERS", "answer"]
 
 Array = NDArray[np.float64]
 
 MOST_OTHERS = 3  # assemblies
-MOST_LINKS = 12  # whose instant centres against each other are told; of more only those against the ground
+FILES = {"csv": ("csv", "text/csv"), "report": ("html", "text/html"), "png": ("png", "image/png"),
+         "svg": ("svg", "image/svg+xml")}  # fmt: skip
 MOST_BLOCKS = 24  # whose share of the margin is told: each takes an analysis
-KEPT = 1e-2  # of the size: a locked joint that stays may be off by as much as a position is fine
 
 
 def answer(request: bytes, turn: AbstractContextManager[object] | None = None) -> bytes:
@@ -102,7 +99,7 @@ def answer(request: bytes, turn: AbstractContextManager[object] | None = None) -
 
 def _start(question: Asked) -> dict[str, Any]:
     rows = [{"name": name, "title": _stated(text, "name"), "space": _stated(text, "space") or "planar"}
-            for name, text in examples().items()]  # fmt: skip
+            for name, text in _examples().items()]  # fmt: skip
     return {"version": __version__, "examples": rows, "laws": list(FRICTION_LAWS)}
 
 
@@ -112,7 +109,7 @@ def _stated(text: str, key: str) -> str:
 
 
 @lru_cache(maxsize=1)
-def examples() -> dict[str, str]:
+def _examples() -> dict[str, str]:
     """The example models that stand alone in one file, by name."""
     shipped = files("trunnion") / "examples"
     if not shipped.is_dir():  # a working tree
@@ -125,10 +122,11 @@ def examples() -> dict[str, str]:
 
 
 def _example(question: Asked) -> dict[str, Any]:
+    """The text of an example; asked as "picture" its small picture."""
     name = str(question["name"])
-    if name not in examples():
+    if name not in _examples():
         raise MechanismError(Finding(f"there is no example '{name}'", remedy="choose one of the list"))
-    return {"text": examples()[name]}
+    return thumbnail(_examples()[name]) if question["ask"] == "picture" else {"text": _examples()[name]}
 
 
 # ---- a model ------------------------------------------------------------------------------------------------------
@@ -141,14 +139,10 @@ def _model(question: Asked) -> dict[str, Any]:
     numbers: Mapping[str, Any] = {}
     with suppress(MechanismError):  # of what is half drawn those that can be read
         numbers = state.mechanism.parameters() if state.mechanism else _sketch(question).numbers
-    head = {
-        **answer_so_far,
-        "entries": state.entries,
-        "numbers": plain(numbers),
-        "solved": result is not None,
-        "bare": state.bare,
+    head = answer_so_far | {
+        "entries": state.entries, "numbers": plain(numbers), "solved": result is not None, "bare": state.bare,
         "scene": None,
-    }
+    }  # fmt: skip
     if result is None:
         return head
     drawn_scene = scene(result, max_positions=MOST_STEPS)
@@ -164,15 +158,16 @@ def _model(question: Asked) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _outline(question: Asked) -> dict[str, Any]:
+    """What can be drawn of a text in the plane before its answer is there: its points at the shown position."""
+    state = question.state
+    return {"entries": state.entries, "numbers": plain(state.run.values), "places": places_at(question)}
+
+
 def _sketch(question: Asked, places: dict[str, Vector] | None = None) -> Sketch:
     """A drawing of a model's entries that may be changed."""
-    locked, fine = _hand(question)
-    return Sketch(copy.deepcopy(dict(question.state.entries or {})), places or {}, locked, fine=fine)
-
-
-def _hand(question: Asked) -> tuple[set[str], float]:
-    """What is locked, and what the hand can tell apart, m."""
-    return set(map(str, question.get("locked") or ())), float(question.get("fine") or 0.0)
+    entries = copy.deepcopy(dict(question.state.entries or {}))
+    return Sketch(entries, places or {}, fine=float(question.get("fine") or 0.0))
 
 
 def _cycle(question: Asked) -> dict[str, Any]:
@@ -197,11 +192,8 @@ def _solved(question: Asked, solve: Callable[[], xr.Dataset]) -> tuple[xr.Datase
             findings += state.placed(error.findings)
     lacks = missing(_sketch(question), findings)
     ready = readiness(state.mechanism, result, findings, lacks)
-    return result, {
-        "findings": [_row(state, finding, result) for finding in findings],
-        "missing": lacks,
-        "ready": ready,
-    }
+    rows = [_row(state, finding, result) for finding in findings]
+    return result, {"findings": rows, "missing": lacks, "ready": ready}
 
 
 def _row(state: Loaded, finding: Finding, result: xr.Dataset | None) -> dict[str, Any]:
@@ -209,17 +201,14 @@ def _row(state: Loaded, finding: Finding, result: xr.Dataset | None) -> dict[str
     section, _, names = finding.where.replace(" ", ".", 1).partition(".")  # "links coupler, rocker"
     joint = finding.figures.get("decides") or next(iter(finding.figures.get("joints") or ()), None)
     part = f"joints.{joint}" if joint else f"{section}.{names.split(', ')[0]}" if names else finding.where
+    of_part = state.placed((replace(finding, where=part, line=None),))[0]
     return {
-        "severity": finding.severity.value,
-        "place": finding.kind_of_part or spoken(finding.where),
-        "remedy": remedied(finding.remedy),
-        "part": part,
-        "line": (
-            finding if finding.where.startswith(part) else state.placed((replace(finding, where=part, line=None),))[0]
-        ).line,
+        "code": finding.code, "what": finding.what, "where": finding.where, "severity": finding.severity.value,
+        "place": finding.kind_of_part or spoken(finding.where), "remedy": remedied(finding.remedy), "part": part,
+        "line": (finding if finding.where.startswith(part) else of_part).line,
         "index": None if result is None else reached(finding, result),
         "cures": [] if result is None else cures(state, finding),
-    } | {key: getattr(finding, key) for key in ("code", "what", "where")}
+    }  # fmt: skip
 
 
 # ---- dragging -----------------------------------------------------------------------------------------------------
@@ -245,8 +234,8 @@ def _drag(question: Asked) -> dict[str, Any]:
         shifts = sketch.shifted(str(question["point"]), by, _turns(question.state, question.index))
         return _live(question, {change.path: change.value for change in shifts}, question.index)
     index, to, point = question.index, vector(question["to"]), str(question["point"])
-    locked, fine = _hand(question)
-    sketch = _Still(dict(question.state.entries or {}), places_at(question), locked, fine=fine)
+    fine = float(question.get("fine") or 0.0)
+    sketch = _Still(dict(question.state.entries or {}), places_at(question), fine=fine)
     if question.state.mechanism is not None:
         sketch.numbers = question.state.mechanism.parameter_set.nominal
     changes = {change.path: change for change in sketch.moved(point, to, bool(question.get("keep")))}  # a number once
@@ -256,11 +245,6 @@ def _drag(question: Asked) -> dict[str, Any]:
     near = index if not np.any(np.isfinite(far)) else int(np.nanargmin(far))
     if np.isfinite(far[index]) and far[index] <= far[near] + 1e-6 * sketch.size:
         near = index
-    for name in sketch.locked & {*sketch.joints, *live.tracks}:
-        key = ".".join(held(sketch, name))
-        if not np.hypot(*(live.tracks[key][:, near] - sketch.places[key])) <= KEPT * sketch.size:
-            near = index  # the crank would turn, and a locked joint with it
-            break
     rows = []
     for path, value in values.items():
         section, name, *inner = path.split(".")
@@ -312,7 +296,6 @@ def _edit(question: Asked) -> dict[str, Any]:
     return {
         "text": changed,
         "places": {key: list(place) for key, place in sketch.places.items() if key in points},
-        "locked": sorted(sketch.locked & (points | set(sketch.joints))),
         "says": ", ".join(says),
         "made": sketch.made,
     }
@@ -321,7 +304,7 @@ def _edit(question: Asked) -> dict[str, Any]:
 GESTURES: dict[str, Callable[[Sketch, Mapping[str, Any]], str]] = {
     "link": link, "pin": pinned, "join": join, "slide": slide, "add-point": add_point, "driver": driver, "load": load,
     "spring": spring, "gear": gear, "block": block, "bar-mass": bar_mass, "centre": centre, "move": move,
-    "group": group, "lock": lock, "set": put_value, "delete": delete, "rename": rename, "add-row": add_row,
+    "group": group, "set": put_value, "delete": delete, "rename": rename, "add-row": add_row,
 }  # fmt: skip
 
 
@@ -387,50 +370,13 @@ def _layers(question: Asked) -> dict[str, Any]:
     layers: dict[str, Any] = _columns(result, question)
     if run.system.mechanism.space == "planar":
         if "seats" in layers_wanted:
-            layers["seats"] = _seats(result)
+            layers["seats"] = seats_of(result)
         if layers_wanted & {"centres", "transmission"}:
             with np.errstate(all="ignore"):
                 walk = run.walk(run.cycle.times(question.steps))
-            makers = {"centres": _centres, "transmission": _transmission}
+            makers = {"centres": centres_of, "transmission": transmission_of}
             layers |= {name: tell(walk, question.steps) for name, tell in makers.items() if name in layers_wanted}
     return layers
-
-
-def _centres(walk: Forward, steps: int) -> list[dict[str, Any]]:
-    """Instant centres of the pairs of links; `ground`: whether one of them is it."""
-    ground = walk.system.mechanism.fixed_link
-    return [
-        {
-            **vars(instant_centre),
-            "ground": ground in instant_centre.pair,
-            "far": instant_centre.far and dict(zip("xy", instant_centre.far, strict=True)),
-        }
-        for instant_centre in instant_centres(walk, steps, MOST_LINKS)
-    ]
-
-
-def _seats(result: xr.Dataset) -> list[dict[str, Any]]:
-    """Of each joint with a seat, at each end: offset of the pin from the middle of its hole, m, and force of the pin on
-    the hole, N, both in the hole's axes.
-    """
-    return [
-        {
-            "joint": seat.joint, "kind": seat.kind, "clearance": seat.clearance, "length": seat.length,
-            "ends": [{what: {axis: Exact(row) for axis, row in zip("xy", rows, strict=True)}
-                      for what, rows in (("offset", offset), ("force", force))}
-                     for offset, force in zip(seat.offsets, seat.forces, strict=True)],
-        }
-        for seat in seated(result)
-    ]  # fmt: skip
-
-
-@np.errstate(all="ignore")
-def _transmission(walk: Forward, steps: int) -> list[dict[str, Any]]:
-    """Transmission angle of each dyad, rad, 0 … π/2, and its middle joint."""
-    middle = {"-".join(module.joints): module.joints[1:2] for module in walk.system.plan.modules}
-    angles = transmission_angles(walk)
-    return [{"name": name, "joint": joint, "angle": column(angle, steps)}
-            for name, angle in angles.items() for joint in middle[name]]  # fmt: skip
 
 
 def _blocks(question: Asked) -> dict[str, Any]:
@@ -482,10 +428,28 @@ def _compare(question: Asked) -> dict[str, Any]:
 
 
 def _export(question: Asked) -> dict[str, Any]:
-    """A file of the solved cycle; a picture of the position `index`."""
-    if question.state.bare:  # its file would be one without friction
-        raise MechanismError(question.state.findings)
-    return exported(question.state, str(question["what"]), question.steps, question.index)
+    """A file of the solved cycle, its table, report or a picture of the position `index`: name, type and bytes."""
+    from trunnion.results.export import frame
+    from trunnion.views.cycle.plots import mechanism
+    from trunnion.views.cycle.report import report
+
+    state, what, steps = question.state, str(question["what"]), question.steps
+    if state.bare:  # its file would be one without friction
+        raise MechanismError(state.findings)
+    if what not in FILES:
+        raise MechanismError(Finding(f"'{what}' is no file of the studio", remedy=f"use {', '.join(FILES)}"))
+    ending, mime = FILES[what]
+    result = state.result(steps, True)
+    if what == "csv":
+        content = str(frame(result, units="model").to_csv(index=False, lineterminator="\n")).encode()
+    elif what == "report":
+        content = report(result, state.result(steps, False)).encode()
+    else:
+        stream = io.BytesIO()
+        mechanism(result, index=question.index).savefig(stream, format=what)
+        content = stream.getvalue()
+    stem = "".join(sign if sign.isalnum() else "-" for sign in str((state.entries or {}).get("name") or ""))
+    return {"name": f"{stem[:60].strip('-') or 'mechanism'}.{ending}", "mime": mime, "bytes": content}
 
 
 def _corner(question: Asked) -> dict[str, Any]:
@@ -494,20 +458,8 @@ def _corner(question: Asked) -> dict[str, Any]:
 
 
 ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
-    "start": _start,
-    "example": _example,
-    "model": _model,
-    "cycle": _cycle,
-    "drag": _drag,
-    "try": _try,
-    "edit": _edit,
-    "export": _export,
-    "assemblies": _assemblies,
-    "layers": _layers,
-    "blocks": _blocks,
-    "margins": _margins,
-    "curves": _curves,
-    "compare": _compare,
-    "corner": _corner,
-}
-BESIDE = (_cycle, _margins, _corner)
+    "start": _start, "example": _example, "picture": _example, "outline": _outline, "model": _model, "cycle": _cycle,
+    "drag": _drag, "try": _try, "edit": _edit, "export": _export, "assemblies": _assemblies, "layers": _layers,
+    "blocks": _blocks, "margins": _margins, "curves": _curves, "compare": _compare, "corner": _corner,
+}  # fmt: skip
+BESIDE = (_outline, _cycle, _margins, _corner)

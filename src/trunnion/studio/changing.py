@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from trunnion.model.renaming import renamed
 from trunnion.studio.findings import spoken
 from trunnion.studio.sketch import Sketch
-from trunnion.studio.strokes import NUMBER, free, letter, numbered, refused, rename_point, taken
+from trunnion.studio.strokes import NUMBER, free, letter, numbered, refused, rename_point, spoken_of, taken
 
 __all__ = ["add_row", "delete", "put_value", "rename"]
 
@@ -31,14 +31,14 @@ def put_value(sketch: Sketch, gesture: Given) -> str:
         group = group[key] if isinstance(group, list) else group.setdefault(key, {})
         if not isinstance(group, (dict, list)):
             raise refused("is a single value", ".".join(map(str, parents)), "change it in the text of the model")
-    in_loop = parents[:1] == ["loop"] and len(parents) > 1
-    way_told = [parents[0], sketch.rows[parents[1]].get("joint"), *parents[2:]] if in_loop else parents
-    path, value = ".".join(map(str, [*way_told, last])), gesture.get("value")
+    named = [*parents, last]
+    if parents[:1] == ["loop"] and len(parents) > 1:
+        named[1] = sketch.rows[parents[1]].get("joint")
+    path, value = ".".join(map(str, named)), gesture.get("value")
     words = spoken(path)
     if value is not None:
-        if path not in ("name", "notes") and parents != ["dimensions"]:
-            value = _defined(sketch, value)
-        group[last] = _typed(value)
+        value = _written(sketch, value, path not in ("name", "notes") and parents != ["dimensions"])
+        group[last] = value
         text_of_value = ("no", "yes")[value] if isinstance(value, bool) else value
         return f"Set {words} to {', '.join(map(str, value)) if isinstance(value, list) else text_of_value}"
     if parents[:1] == ["gears"] and last in ("ratio", "radius", "lead"):
@@ -60,21 +60,14 @@ def _refuse_missing(sketch: Sketch, path: list[Any]) -> None:
         raise refused("is not there", ".".join(map(str, path)), "choose what is drawn")
 
 
-def _defined(sketch: Sketch, value: Any) -> Any:
-    """The name of a dimension that "crank = 30 mm" makes."""
+def _written(sketch: Sketch, value: Any, defines: bool) -> Any:
+    """What was typed, as it is written: "0.3" as a number; "crank = 30 mm" makes a dimension and is its name."""
     if isinstance(value, list):
-        return [_defined(sketch, part) for part in value]
-    match = DEFINED.fullmatch(value) if isinstance(value, str) else None
-    if not match:
-        return value
-    sketch.section("dimensions")[match[1]] = _typed(match[2].strip())
-    return match[1]
-
-
-def _typed(value: Any) -> Any:
-    """What was typed, as it is written: "0.3" as a number."""
-    if isinstance(value, list):
-        return [_typed(part) for part in value]
+        return [_written(sketch, part, defines) for part in value]
+    match = DEFINED.fullmatch(value) if defines and isinstance(value, str) else None
+    if match:
+        sketch.section("dimensions")[match[1]] = _written(sketch, match[2].strip(), False)
+        return match[1]
     if isinstance(value, str) and NUMBER.fullmatch(value.strip()):
         number = float(value)
         return int(number) if number.is_integer() and abs(number) < 1e15 and "." not in value else number
@@ -84,33 +77,56 @@ def _typed(value: Any) -> Any:
 def delete(sketch: Sketch, gesture: Given) -> str:
     """An entry goes, and what cannot be without it."""
     section, name = map(str, gesture["what"])
+    before = _orphans(sketch)  # of an unfinished file: it stays
     if section == "points":
         link, point = free(sketch, name)
         del sketch.section("links")[link]["points"][point]
-        _drop(sketch, "loads", lambda load: load.get("link") == link and load.get("at") == point)
-        _drop(sketch, "springs", lambda spring: name in (spring.get("between") or ()))
-        return f"Delete point {point}"
-    if section in ("joints", "links") and any(row.get(section[:-1]) == name for row in sketch.rows):
-        return _delete_row(sketch, section[:-1], name)
-    if section not in SECTIONS or name not in sketch.section(section):
-        raise refused("is not there", f"{section}.{name}", "choose what is drawn")
-    if section == "links" and name == sketch.ground:
-        raise refused("is the ground", name, "delete its joints")
-    blocks = [item for item in sketch.of("links") if item != sketch.ground and _block(sketch, item)]
-    del sketch.section(section)[name]
-    gone = [name] if section == "joints" else []
-    if section == "links":
-        gone = [joint for joint, item in sketch.joints.items() if name in item["links"]]
-        _drop(sketch, "joints", lambda joint: name in (joint.get("links") or ()))
-        _drop(sketch, "loads", lambda load: load.get("link") == name)
-        _drop(sketch, "springs", lambda spring: any(end.startswith(f"{name}.") for end in spring.get("between") or ()))
-    for joint in gone:
-        _without_joint(sketch, joint)
-    for block in blocks:
-        types = {item.get("type", "revolute") for item in sketch.joints.values() if block in item["links"]}
-        if len(types) < 2 and block in sketch.of("links"):  # slides no longer, or nothing is pinned to it
-            delete(sketch, {"what": ["links", block]})
-    return f"Delete {SECTIONS[section]} {name}"
+        title = f"point {point}"
+    elif section in SIDES and any(row.get(section[:-1]) == name for row in sketch.rows):
+        _delete_row(sketch, section[:-1], name)
+        title = f"{section[:-1]} {name}"
+    else:
+        if section not in SECTIONS or name not in sketch.section(section):
+            raise refused("is not there", f"{section}.{name}", "choose what is drawn")
+        if section == "links" and name == sketch.ground:
+            raise refused("is the ground", name, "delete its joints")
+        del sketch.section(section)[name]
+        title = f"{SECTIONS[section]} {name}"
+    while gone := _orphans(sketch) - before:
+        for *parents, last in sorted(gone, key=len, reverse=True):  # points before their link
+            group = sketch.entries
+            for key in parents:
+                group = group[key]
+            del group[last]
+    return f"Delete {title}"
+
+
+def _orphans(sketch: Sketch) -> set[tuple[str, ...]]:
+    """Paths of entries that are nothing by themselves: what they join or act on is not there."""
+    links, pairs = sketch.of("links"), sketch.joints
+    joints = {*pairs, *(row.get("joint") for row in sketch.rows)}
+    points = {f"{link}.{point}" for link in links for point in sketch.points(link)}
+    acting = [(section, name, spoken_of(item)) for section in ("loads", "springs", "gears")
+              for name, item in sketch.of(section).items()]  # fmt: skip
+    parts = {*joints, *links, *(row.get("link") for row in sketch.rows), *points}
+    orphans: set[tuple[str, ...]] = {(section, name) for section, name, needs in acting if not needs <= parts}
+    orphans |= {("joints", name) for name, item in pairs.items() if not set(item["links"]) <= set(links)}
+    orphans |= {(section, name) for section in ("drivers", "assembly", *(("joints",) if sketch.rows else ()))
+                for name in sketch.section(section) if name not in joints}  # fmt: skip
+    if sketch.rows:
+        orphans |= {("links", name) for name in links if name not in {row.get("link") for row in sketch.rows}}
+    used = joints.union(*(needs for *_, needs in acting))
+    for link in links:
+        of_link = sketch.points(link)
+        axes = [name for name, entry in of_link.items() if isinstance(entry, dict) and "axis" in entry]
+        lost = list(of_link) if link == sketch.ground else axes
+        orphans |= {("links", link, "points", name) for name in lost if not {name, f"{link}.{name}"} & used}
+        types = {item.get("type", "revolute") for item in pairs.values() if link in item["links"]}
+        spots = [entry["at"] if isinstance(entry, dict) else entry for entry in of_link.values()]
+        on_one_spot = len(spots) > 1 and all(spot == [0, 0] for spot in spots)
+        if axes and on_one_spot and len(types) < 2 and link != sketch.ground:
+            orphans.add(("links", link))  # a block that slides no longer, or nothing is pinned to it
+    return orphans
 
 
 def add_row(sketch: Sketch, gesture: Given) -> str:
@@ -121,50 +137,14 @@ def add_row(sketch: Sketch, gesture: Given) -> str:
     return f"Add joint {joint}"
 
 
-def _delete_row(sketch: Sketch, key: str, name: str) -> str:
+def _delete_row(sketch: Sketch, key: str, name: str) -> None:
     """A joint of a loop goes with the link after it; that before it where the ground comes after it."""
     index, row = next((index, row) for index, row in enumerate(sketch.rows) if row.get(key) == name)
     if len(sketch.rows) < 3 or (key, name) == ("link", sketch.ground):
         raise refused("cannot go: the loop would not close", name, "change its type, twist or distance")
-    link = row.get("link")
-    if link == sketch.ground:
-        link, sketch.rows[index - 1]["link"] = sketch.rows[index - 1]["link"], link
+    if row.get("link") == sketch.ground:
+        sketch.rows[index - 1]["link"] = sketch.ground
     del sketch.entries["loop"][index]
-    _without_joint(sketch, str(row["joint"]))
-    sketch.section("links").pop(str(link), None)
-    return f"Delete {key} {name}"
-
-
-def _block(sketch: Sketch, link: str) -> bool:
-    """Whether a link is a block of a guide: all its points on one spot, one of them with the axis of the guide."""
-    points = sketch.points(link)
-    axes = [point for point in points.values() if isinstance(point, dict) and "axis" in point]
-    spots = [point.get("at") if isinstance(point, dict) else point for point in points.values()]
-    return len(points) > 1 and bool(axes) and all(spot == [0, 0] for spot in spots)
-
-
-def _without_joint(sketch: Sketch, joint: str) -> None:
-    """What a joint that is gone leaves behind: its driver and hint go, and its point on the ground."""
-    for section in ("drivers", "assembly"):
-        if isinstance(sketch.entries.get(section), dict):
-            sketch.entries[section].pop(joint, None)
-    ground = sketch.section("links").get(sketch.ground, {})
-    used = {end for spring in sketch.of("springs").values() for end in spring.get("between") or ()}
-    if f"{sketch.ground}.{joint}" not in used:
-        ground.get("points", {}).pop(joint, None)
-    for link in sketch.of("links"):  # the guide of a slot
-        entry = sketch.points(link).get(joint)
-        if isinstance(entry, dict) and "axis" in entry:
-            del sketch.section("links")[link]["points"][joint]
-    _drop(sketch, "gears", lambda gear: joint in (gear.get("joints") or ()))
-    _drop(sketch, "loads", lambda load: load.get("joint") == joint)
-    _drop(sketch, "springs", lambda spring: spring.get("joint") == joint)
-
-
-def _drop(sketch: Sketch, section: str, gone: Callable[[Mapping[str, Any]], bool]) -> None:
-    for name, item in sketch.of(section).items():
-        if gone(item):
-            del sketch.section(section)[name]
 
 
 # ---- renamed --------------------------------------------------------------------------------------------------------
@@ -188,14 +168,9 @@ def rename(sketch: Sketch, gesture: Given) -> str:
     if section == "links" and old == sketch.ground:
         sketch.entries["ground"] = new
     if section in SIDES:
-        sketch.places = {_key(key, section, old, new): place for key, place in sketch.places.items()}
-        sketch.locked = {_key(key, section, old, new) for key in sketch.locked}
+        side = SIDES.index(section)
+        for key in list(sketch.places):
+            parts = key.split(".")
+            parts[side] = new if parts[side] == old else parts[side]
+            sketch.places[".".join(parts)] = sketch.places.pop(key)
     return f"Rename {old} to {new}"
-
-
-def _key(key: str, section: str, old: str, new: str) -> str:
-    """The key "link.P" of a point, or the name of a joint, after a link or joint is renamed."""
-    link, dot, point = key.rpartition(".")
-    if section == "links":
-        return f"{new if link == old else link}{dot}{point}"
-    return f"{link}{dot}{new if point == old else point}"

@@ -4,9 +4,8 @@ tried against them, what the model can be asked and what it still lacks.
 
 from __future__ import annotations
 
-import copy
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +22,7 @@ from trunnion.results.quantities import quantity
 from trunnion.results.variables import VARIABLES
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import prepare
-from trunnion.solve.system import Values, felt, rubbing
+from trunnion.solve.system import felt, rubbing
 from trunnion.studio.loaded import Asked, Loaded
 from trunnion.studio.sketch import Sketch
 from trunnion.views.common.cycle import abscissa, names
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
 __all__ = ["cures", "figures", "margin_of", "missing", "reached", "readiness", "remedied", "sentence", "spoken"]
 
 ENOUGH = 0.9  # of the friction at which it just runs: what is tried
-SIZES = {"pin.radius": ENOUGH, "guide.length": 1.0 / ENOUGH}  # a shorter arm, a longer guide
 NOUNS = {
     "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair",
     "dimensions": "dimension", "loop": "joint", "measures": "measure", "tables": "table",
@@ -58,6 +56,8 @@ REACHED = {
 def figures(question: Asked) -> list[dict[str, Any]]:
     """The figures one looks at first, without those of the solution: of the result, and time ratios.
 
+    Without friction nothing is lost: what would be an efficiency is what weights and springs give and take.
+
     Returns
     -------
     list
@@ -65,12 +65,11 @@ def figures(question: Asked) -> list[dict[str, Any]]:
         None where there is none, or nothing but a bound.
     """
     units = units_of(question.result)
-    found = [row for row in summary_of(question.result) if not row.numerical]
-    ratios = [
-        Figure(f"{joint}.time_ratio", f"time ratio of {joint}", ratio) for joint, ratio in _ratios(question.state)
-    ]
+    figures = [row for row in summary_of(question.result) if not row.numerical]
+    figures = [row for row in figures if question.friction or not row.name.startswith("efficiency")]
+    figures += [Figure(f"{name}.time_ratio", f"time ratio of {name}", ratio) for name, ratio in _ratios(question.state)]
     rows = []
-    for row in (*found, *ratios):
+    for row in figures:
         bound = row.aspect == MORE_THAN
         text = row.value if isinstance(row.value, str) else quantity(row.value, row.unit, units) or "—"
         rows.append({
@@ -131,19 +130,19 @@ def spoken(where: str) -> str:
     if not PATH.fullmatch(where):
         return where
     section, name, *inner = where.split(".")
+    part = f"{NOUNS[section]} {name}" if section in NOUNS else ""
     if section == "joint_defaults":
-        return _plain([name, *inner], "all joints")
-    if section not in NOUNS:
-        return f"start of {'.'.join([name, *inner])}" if section == "assembly" else _plain([section, name, *inner])
-    part = name if section == "dimensions" and not inner else f"{NOUNS[section]} {name}"
-    if section == "links" and len(inner) > 1 and inner[0] == "points":
+        part, inner = "all joints", [name, *inner]
+    elif section == "assembly":
+        return f"start of {'.'.join([name, *inner])}"
+    elif section == "dimensions" and not inner:
+        part = name
+    elif section not in NOUNS:
+        inner = [section, name, *inner]
+    elif section == "links" and len(inner) > 1 and inner[0] == "points":
         part = f"point {inner[1]} of {part}"
         inner = [dict(zip("012", "xyz", strict=True)).get(key, key) for key in inner[2:] if key not in "xyz at"]
-    return _plain(inner, part)
-
-
-def _plain(keys: Sequence[str], part: str = "") -> str:
-    return " of ".join(text for text in (" ".join(keys).replace("_", " "), part) if text)
+    return " of ".join(text for text in (" ".join(inner).replace("_", " "), part) if text)
 
 
 def remedied(remedy: str) -> str:
@@ -180,40 +179,36 @@ def cures(state: Loaded, finding: Finding) -> list[dict[str, Any]]:
     joints = entries.get("joints")
     if finding.code != "friction.locked" or not isinstance(joints, Mapping):
         return []
-    coefficients = {joint: f"joints.{joint}.friction.coefficient" for joint in felt(state.run.system, numbers)}
-    coefficients = {joint: path for joint, path in coefficients.items() if path in numbers}
+    before = {path: float(np.ravel(value)[0]) for path, value in numbers.items() if path.startswith("joints.")}
+    usual = [joint for joint in felt(state.run.system, numbers) if f"joints.{joint}.friction.coefficient" in before]
     alike = facts["whole"] >= (1 - 1e-3) * facts["share"]  # else other joints lock where these no longer do
-    trials = [(list(facts["joints"]) if alike else list(coefficients), min(facts["share"], facts["whole"]))]
+    trials = [(list(facts["joints"]) if alike else usual, min(facts["share"], facts["whole"]))]
     decides, multiple = facts["decides"], facts["multiple"]
     if decides and multiple and trials[0][0] != [decides]:
         trials.insert(0, ([decides], multiple))
     listed = []
     for chosen, times in trials:
-        if times > 0 and all(joint in coefficients and isinstance(joints.get(joint), Mapping) for joint in chosen):
-            befores = [float(np.ravel(numbers[coefficients[joint]])[0]) for joint in chosen]
-            values = [float(f"{ENOUGH * times * before:.3g}") for before in befores]
-            stated_groups = [isinstance(joints[joint].get("friction", {}), Mapping) for joint in chosen]
-            gestures = [{"do": "set", "path": ["joints", joint, "friction", *["coefficient"] * inside], "value": value}
-                        for joint, inside, value in zip(chosen, stated_groups, values, strict=True)]  # fmt: skip
-            change = f"{befores[0]:.3g} → {values[0]:.3g}" if len(chosen) == 1 else f"× {ENOUGH * times:.3g}"
-            what = f"friction coefficient{'s' * (len(chosen) > 1)} of {', '.join(chosen)}"
-            listed.append({"label": f"{what} {change}", "gestures": gestures})
-    return listed + list(_resized(entries, numbers, decides, multiple))
-
-
-def _resized(entries: dict[str, Any], numbers: Values, joint: str | None, multiple: float) -> Iterator[dict[str, Any]]:
-    """The radius and length by which the friction of a joint is as much less as it need be, where they are stated."""
-    sketch = Sketch(copy.deepcopy(entries))
-    for key, enough in SIZES.items():
-        path = ["joints", str(joint), *key.split(".")]
-        part = entries["joints"].get(joint, {}).get(path[2], {})
-        if ".".join(path) not in numbers or not isinstance(part, Mapping) or "fit" in part:
-            continue  # a fit states the radius
-        before = float(np.ravel(numbers[".".join(path)])[0])
-        times = enough * (multiple if key == "pin.radius" else 1.0 / multiple)
-        length = sketch.length(float(f"{times * before:.3g}"))
-        label = f"{key.replace('.', ' ')} of {joint} {sketch.length(before)} → {length}"
-        yield {"label": label, "gestures": [{"do": "set", "path": path, "value": length}]}
+        if times <= 0 or not all(joint in usual and isinstance(joints.get(joint), Mapping) for joint in chosen):
+            continue
+        gestures = []
+        for joint in chosen:
+            inside = ["coefficient"] if isinstance(joints[joint].get("friction", {}), Mapping) else []
+            value = float(f"{ENOUGH * times * before[f'joints.{joint}.friction.coefficient']:.3g}")
+            gestures.append({"do": "set", "path": ["joints", joint, "friction", *inside], "value": value})
+        change = f"× {ENOUGH * times:.3g}"
+        if len(chosen) == 1:
+            change = f"{before[f'joints.{chosen[0]}.friction.coefficient']:.3g} → {gestures[0]['value']:.3g}"
+        what = f"friction coefficient{'s' * (len(chosen) > 1)} of {', '.join(chosen)}"
+        listed.append({"label": f"{what} {change}", "gestures": gestures})
+    shorter = ENOUGH * multiple if decides and multiple else None  # of the radius: a longer guide does as much
+    for part, key, times in (("pin", "radius", shorter), ("guide", "length", shorter and 1.0 / shorter)):
+        path, stated = f"joints.{decides}.{part}.{key}", joints.get(decides, {}).get(part, {})
+        if times and path in before and isinstance(stated, Mapping) and "fit" not in stated:  # a fit states the radius
+            sketch, after = Sketch(entries), float(f"{times * before[path]:.3g}")
+            was, length = sketch.length(before[path]), sketch.length(after)
+            gesture = {"do": "set", "path": path.split("."), "value": length}
+            listed.append({"label": f"{part} {key} of {decides} {was} → {length}", "gestures": [gesture]})
+    return listed
 
 
 # ---- what it can be asked -----------------------------------------------------------------------------------------
@@ -226,28 +221,20 @@ def readiness(
 
     lacks: what is not drawn yet.
     """
+    subjects = ("motion", "forces", "friction", "play", "tolerance", "time")
     if mechanism is None or result is None:
         errors = [finding for finding in findings if finding.severity is Severity.ERROR]
         why = f"{spoken(errors[0].where)} {errors[0].what}".strip() if errors else "Draw links and drive a joint."
-        answers = [(False, " ".join(lacks) or why), *[(False, "The motion comes first.")] * 5]
-    else:
-        answers = [_moves(mechanism, result, lacks), *_acts(mechanism)]
-    subjects = ("motion", "forces", "friction", "play", "tolerance", "time")
-    return [{"what": what, "ok": ok, "why": why} for what, (ok, why) in zip(subjects, answers, strict=True)]
-
-
-def _moves(mechanism: Mechanism, result: xr.Dataset, lacks: Sequence[str]) -> tuple[bool, str]:
+        reasons = [" ".join(lacks) or why, *["The motion comes first."] * 5]
+        return [{"what": what, "ok": False, "why": why} for what, why in zip(subjects, reasons, strict=True)]
     count, able = result.sizes["position"], int(np.sum(result["status"].values < Status.SINGULAR))
-    if not mechanism.drivers:
-        return False, " ".join(lacks) or "No joint is driven: it stands still."
     rest = f"; the other {count - able} cannot be reached" if able < count else ""
-    return able > 0, f"Moves through {able} of {counted(count, 'position')}{rest}."
-
-
-def _acts(mechanism: Mechanism) -> Iterator[tuple[bool, str]]:
+    still = " ".join(lacks) or "No joint is driven: it stands still."
+    moves = f"Moves through {able} of {counted(count, 'position')}{rest}." if mechanism.drivers else still
     numbers = mechanism.parameters()
     weighs = any(path.endswith((".mass", ".stiffness")) and bool(np.any(numbers[path])) for path in numbers)
-    subjects = (
+    answers = (
+        (bool(mechanism.drivers) and able > 0, moves, moves),
         (bool(mechanism.loads) or weighs, "Loads or masses act on it.", "Add a load, a mass or a spring."),
         (bool(rubbing(prepare(mechanism).system)), "Joints rub.",
          "State friction of a joint, and the radius of its pin."),
@@ -258,8 +245,8 @@ def _acts(mechanism: Mechanism) -> Iterator[tuple[bool, str]]:
         (any(driver.found for driver in mechanism.drivers.values()), "A motor drives it: the study lets it run.",
          "Give a driver a motor in the text, as motor: {kind: constant, effort: 5 N m}."),
     )  # fmt: skip
-    for ok, done, remedy in subjects:
-        yield ok, done if ok else remedy
+    return [{"what": what, "ok": ok, "why": done if ok else remedy}
+            for what, (ok, done, remedy) in zip(subjects, answers, strict=True)]  # fmt: skip
 
 
 # ---- what it lacks ------------------------------------------------------------------------------------------------
@@ -270,11 +257,7 @@ def missing(sketch: Sketch, findings: Sequence[Finding]) -> list[str]:
     errors = [finding for finding in findings if finding.severity is Severity.ERROR]
     if not errors and sketch.joints and not sketch.of("drivers"):
         return ["It stands still: its joints let no link move. Take one away, or let an end slide."]
-    unfinished = [
-        error.what.startswith(("there are no", "no joint connects"))
-        or (error.where == "drivers" and error.remedy.startswith("drive a joint"))
-        for error in errors
-    ]
-    if not errors or not all(unfinished):
-        return []
-    return [f"{errors[0].what[:1].upper()}{errors[0].what[1:]}: {remedied(errors[0].remedy)}."]
+    steps = [error for error in errors if error.what.startswith(("there are no", "no joint connects"))
+             or (error.where == "drivers" and error.remedy.startswith("drive a joint"))]  # fmt: skip
+    complete = len(steps) < len(errors)
+    return [f"{error.what[:1].upper()}{error.what[1:]}: {remedied(error.remedy)}." for error in steps[: not complete]]

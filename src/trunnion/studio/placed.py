@@ -14,7 +14,6 @@ from trunnion.algebra.dual import primal
 from trunnion.errors import MechanismError
 from trunnion.solve.forward import Forward
 from trunnion.studio.loaded import Loaded, loaded
-from trunnion.studio.message import packed
 
 __all__ = ["column", "plain", "thumbnail", "tracked", "tracks"]
 
@@ -57,8 +56,8 @@ def plain(numbers: Mapping[str, Any]) -> dict[str, float]:
 
 
 @lru_cache(maxsize=128)
-def thumbnail(text: str) -> bytes:
-    """As an answer: links with their points at one position, and paths, in a plane, m; none of a model not placed.
+def thumbnail(text: str) -> dict[str, Any]:
+    """Links with their points at one position, and paths, in a plane, m; none of a model not placed.
 
     Of mechanisms in space a parallel projection.
     """
@@ -69,17 +68,17 @@ def thumbnail(text: str) -> bytes:
         places = {}
     complete = np.all([np.isfinite(track).all(axis=0) for track in places.values()], axis=0) if places else [False]
     if not np.any(complete):
-        return packed({"links": [], "paths": []})
+        return {"links": [], "paths": []}
     reached, ground = np.flatnonzero(complete), state.run.system.mechanism.fixed_link
     index = reached[min(SHOWN, len(reached) - 1)]
     links: dict[str, list[list[float]]] = {}
     for key, track in places.items():
         links.setdefault(key.rpartition(".")[0], []).append([float(part) for part in track[:, index]])
     moved = [track[:, reached] for key, track in places.items() if key.rpartition(".")[0] != ground]
-    return packed({
+    return {
         "links": [{"ground": link == ground, "points": points} for link, points in links.items()],
         "paths": [{"x": x, "y": y} for x, y in moved if np.ptp(x) + np.ptp(y) > 0],
-    })  # fmt: skip
+    }  # fmt: skip
 
 
 def _projected(place: list[Array]) -> Array:

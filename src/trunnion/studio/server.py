@@ -17,7 +17,6 @@ import logging
 import mimetypes
 import os
 import secrets
-import tempfile
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -33,7 +32,6 @@ from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from trunnion.errors import MechanismError
 from trunnion.files import whole
 from trunnion.studio.jobs import Jobs
 from trunnion.studio.page import document, found, script
@@ -86,15 +84,11 @@ class Studio:
 
     def server(self) -> uvicorn.Server:
         """What serves it. No pings: an answer may take longer than they wait, and a loopback does not break."""
-        config = uvicorn.Config(
-            self.app(),
-            log_level="warning",
-            ws="websockets-sansio",
-            ws_per_message_deflate=False,  # nothing is far: to press an answer takes longer than to send it
+        return uvicorn.Server(uvicorn.Config(
+            self.app(), log_level="warning", ws="websockets-sansio", ws_ping_interval=None,
             ws_max_size=MOST_OF_A_QUESTION,
-            ws_ping_interval=None,
-        )
-        return uvicorn.Server(config)
+            ws_per_message_deflate=False,  # nothing is far: to press an answer takes longer than to send it
+        ))  # fmt: skip
 
     def app(self) -> Starlette:
         """The web application."""
@@ -102,10 +96,8 @@ class Studio:
             Route("/", self._own(self._page)),
             Route("/modules.js", self._own(self._modules)),
             Route("/files", self._admitted(self._files)),
-            Route("/thumbnail/{name}", self._admitted(_thumbnail)),
             Route("/file/{name:path}", self._admitted(self._read)),
             Route("/file/{name:path}", self._admitted(self._write), methods=["PUT"]),
-            Route("/import/{name}", self._admitted(_imported), methods=["PUT"]),
             Route("/jobs", self._admitted(self._jobs)),
             Route("/jobs", self._admitted(self._start), methods=["PUT"]),
             Route("/jobs/{number}", self._admitted(self._stop), methods=["DELETE"]),
@@ -183,11 +175,9 @@ class Studio:
             "form-action 'none'; frame-src 'self'; frame-ancestors 'none'"
         )
         headers = {
-            "Content-Security-Policy": policy,
-            "Cross-Origin-Opener-Policy": "same-origin",
-            "Cache-Control": "no-store",
-            "Referrer-Policy": "no-referrer",
-        }
+            "Content-Security-Policy": policy, "Cross-Origin-Opener-Policy": "same-origin",
+            "Cache-Control": "no-store", "Referrer-Policy": "no-referrer",
+        }  # fmt: skip
         text = document(nonce, self.token if token is not None or entered else "")
         return Response(text, media_type="text/html; charset=utf-8", headers=headers)
 
@@ -222,14 +212,11 @@ class Studio:
         for path in self.folder.iterdir():
             with contextlib.suppress(ValueError, OSError):
                 names += [path.name] if self._model(path.name).is_file() else []
-        return JSONResponse(
-            {
-                "folder": self.folder.name.encode("utf-8", "replace").decode(),
-                "id": hashlib.sha256(os.fsencode(os.path.realpath(self.folder))).hexdigest()[:16],
-                "open": self.opened,
-                "files": sorted(names)[:MOST_FILES],
-            }
-        )
+        return JSONResponse({
+            "folder": self.folder.name.encode("utf-8", "replace").decode(),
+            "id": hashlib.sha256(os.fsencode(os.path.realpath(self.folder))).hexdigest()[:16],
+            "open": self.opened, "files": sorted(names)[:MOST_FILES],
+        })  # fmt: skip
 
     def _text(self, name: str) -> str:
         """The text of a model of the folder; ValueError or OSError if it cannot be had."""
@@ -326,46 +313,6 @@ class Studio:
             with contextlib.suppress(WebSocketDisconnect):
                 while (question := await socket.receive())["type"] == "websocket.receive":
                     answering.create_task(tell(question.get("bytes") or (question.get("text") or "").encode()))
-
-
-async def _imported(request: Request) -> Response:
-    """The text of a model made of a dropped file of another program, `{text, says}`."""
-    text, says = await run_in_threadpool(_import, request.path_params["name"], await request.body())
-    return JSONResponse({"text": text, "says": says})
-
-
-def _import(name: str, content: bytes) -> tuple[str, list[str]]:
-    from trunnion.exchange.formats import import_file
-    from trunnion.exchange.model_file import model_text
-
-    with tempfile.TemporaryDirectory(prefix="trunnion-import-") as folder:
-        path = Path(folder) / f"dropped{Path(name).suffix}"
-        path.write_bytes(content)
-        try:
-            draft = import_file(path)
-        except MechanismError as error:
-            why = "; ".join(
-                f"{finding.what}{f' ({finding.remedy})' if finding.remedy else ''}" for finding in error.findings[:3]
-            )
-            raise ValueError(f"{name[:80]} {why}") from None
-    draft.source, draft.name = name, Path(name).stem if draft.name == "dropped" else draft.name
-    return model_text(draft), [f"{finding.where}: {finding.what}" for finding in draft.findings]
-
-
-async def _thumbnail(request: Request) -> Response:
-    """The small picture of an example, as an answer to a question."""
-    content = await run_in_threadpool(_pictured, request.path_params["name"])
-    return Response(content, media_type="application/octet-stream", headers={"Cache-Control": "max-age=3600"})
-
-
-def _pictured(name: str) -> bytes:
-    from trunnion.studio.answers import examples
-    from trunnion.studio.placed import thumbnail
-
-    if name not in examples():
-        raise ValueError("there is no such example")
-    with ANSWERING:
-        return thumbnail(examples()[name])
 
 
 def _warm(text: str) -> None:

@@ -15,7 +15,6 @@ from math import atan2, copysign, cos, dist, floor, hypot, isfinite, log10, sin,
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from trunnion.errors import Finding, MechanismError
@@ -69,7 +68,6 @@ class Change(NamedTuple):
 class Sketch:
     """entries: plain data of the model, changed in place; places: of "link.point" in the plane, m, as shown.
 
-    locked: joints, and free points "link.point", that stay where they are while others are dragged.
     made: section and name of what a gesture made whose numbers are to be looked at.
     turns: in space, rotation of every link, (3, 3), at a position of the cycle.
     fine: what the hand can tell apart in the picture, m: lengths are rounded to a power of ten below it.
@@ -77,7 +75,6 @@ class Sketch:
 
     entries: Entries
     places: dict[str, Vector] = field(default_factory=dict)
-    locked: set[str] = field(default_factory=set)
     made: tuple[str, str] | None = None
     fine: float = 0.0
     turns: Callable[[int], Mapping[str, Any]] = lambda _: {}
@@ -197,69 +194,75 @@ class Sketch:
         changes: dict[str, Change] = {}  # a number once
         for link in links:
             columns = turns[link].T if link != self.ground else np.eye(3)
-            moved = self._in_space(link, name) + columns @ np.asarray(by, float)
-            other = self._rod_end(link, name)
-            if other is None:
-                moved_to = self._at(link, name, moved)
-            else:  # it keeps its form: from its origin along its x
-                far = max((name, other), key=lambda point: float(np.linalg.norm(self._in_space(link, point))))
-                moved_to = self._at(link, far, (float(np.linalg.norm(moved - self._in_space(link, other))), 0.0, 0.0))
+            ends = {point: np.array(self.vector(f"links.{link}.points.{point}", "xyz")) for point in self.points(link)}
+            local = ends[name] + columns @ np.asarray(by, float)
+            moved_to = self._at(link, name, local)
+            near, *far = sorted(ends, key=lambda point: float(np.abs(ends[point]).sum()))
+            plain = all(isinstance(entry, list) for entry in self.points(link).values())
+            if plain and len(far) == 1 and not ends[near].any() and ends[far[0]][0] > 0 and not ends[far[0]][1:].any():
+                # a rod with two balls, from its origin along its x: so it stays, for it is alike about its line
+                length = float(np.linalg.norm(local - ends[near if name in far else far[0]]))
+                moved_to = self._at(link, far[0], (length, 0.0, 0.0))
             changes |= {change.path: change for change in moved_to}
         return list(changes.values())
-
-    def _in_space(self, link: str, point: str) -> NDArray[np.float64]:
-        """A point in the frame of its link in space, m."""
-        return np.array(self.vector(f"links.{link}.points.{point}", "xyz"))
-
-    def _rod_end(self, link: str, point: str) -> str | None:
-        """The other end of a rod with two balls: a link of two points without axes, its origin and one on its x."""
-        others = [other_point for other_point in self.points(link) if other_point != point]
-        if len(others) != 1 or not all(isinstance(entry, list) for entry in self.points(link).values()):
-            return None
-        ends = sorted(
-            (self._in_space(link, other_point) for other_point in self.points(link)),
-            key=lambda end: float(np.abs(end).sum()),
-        )
-        return others[0] if not ends[0].any() and ends[1][0] > 0 and not ends[1][1:].any() else None
 
     # ---- dragging ---------------------------------------------------------------------------------------------
 
     def moved(self, point: str, to: Vector, keep: bool = False) -> list[Change]:
         """What changes where a joint, or a free point "link.point", is dragged to a place.
 
-        keep: the links at a pin on the ground keep their lengths, unless other joints are locked where they are.
+        keep: the links at a pin on the ground keep their lengths.
         """
         joints = self._together(point) if point in self.joints else []
-        if locked := sorted(self.locked & {point, *joints}):
-            raise MechanismError(Finding("is locked where it is", locked[0], "unlock it first (key K)"))
-        if not joints:
-            (link,), name = self.links_at(point)
-            if name not in self.points(link):
-                raise MechanismError(Finding("is not a joint or a point", point, "drag one that is drawn"))
-            local = {one: self.local(link, one) for one in self.points(link)}
-            local_aim = self.frame(link).into(to)
-            self._apart(link, local, local | {name: local_aim})
-            return list(self._at(link, name, local_aim))
+        links, name = self.links_at(point)
+        if not joints and name not in self.points(links[0]):
+            raise MechanismError(Finding("is not a joint or a point", point, "drag one that is drawn"))
+        pins = [joint for joint in joints if self._turns(joint)]
+        if keep and any(self.ground in self.joints[pin]["links"] for pin in pins):
+            links = [self.ground]
+        elif joints:
+            links = list(dict.fromkeys(link for joint in joints for link in self.joints[joint]["links"]))
         changes: list[Change] = []
-        pins = [one for one in joints if self.ground in self.joints[one]["links"] and self._turns(one)]
-        if keep and pins and not self.locked:
-            return [change for pin in pins for change in self._at(self.ground, pin, to)]
-        for link in dict.fromkeys(link for joint in joints for link in self.joints[joint]["links"]):
-            mine = [joint for joint in joints if link in self.joints[joint]["links"] and self._turns(joint)]
-            if link == self.ground:
-                changes += [change for joint in mine for change in self._at(link, joint, to)]
-            else:
-                changes += self.followed(link, mine, to)
+        for link in links:
+            mine = [pin for pin in pins if link in self.joints[pin]["links"]] if joints else [name]
+            changes += self.followed(link, mine, to)
         return changes
 
-    def followed(self, link: str, pins: list[str], to: Vector) -> Iterator[Change]:
-        """What changes of a moving link whose pins, or block if it has none, go to a place; its others stay."""
-        if guide := self._guide(link):
-            yield from self._shifted(guide, to)
-        elif pins:
-            yield from self._relocated(link, pins, to)
-        elif slot := self._slot(link):
-            yield from self._turned(link, slot, to)
+    def followed(self, link: str, moving: list[str], to: Vector) -> Iterator[Change]:
+        """What changes of a link some of whose points, or the block that it is, go to a place; its other pins stay.
+
+        A link whose frame begins at one joint and has its x through another keeps that form, unless it has a slot.
+        """
+        slides = [name for name, item in self.joints.items() if link in item["links"] and not self._turns(name)]
+        pins = [name for name in self.points(link) if name in self.joints and self._turns(name)]
+        spots = {self.places.get(f"{link}.{name}") for name in (*slides, *pins)}
+        if slides and len(spots) == 1 and self.joints[slides[0]]["links"][1] == link and set(moving) <= set(pins):
+            yield from self._shifted(slides[0], to)
+            return
+        local = {point: self.local(link, point) for point in dict.fromkeys([*pins, *moving])}
+        old = self.frame(link)
+        places = {point: to if point in moving else old.out(local[point]) for point in local}
+        self._refuse_together(link, local, places)
+        origin = next((point for point in pins if local[point] == (0.0, 0.0)), None)
+        ahead = next((point for point in pins if local[point][1] == 0.0 and local[point][0] != 0.0), None)
+        slots = [name for name in slides if self.joints[name]["links"][0] == link]
+        frame = old
+        if link == self.ground:
+            origin = ahead = None
+        elif slots:
+            ahead = None
+            pivot = min(pins, key=lambda name: self.ground not in self.joints[name]["links"], default=None)
+            frame = self._aimed(link, slots[0], pivot, to) if pivot in moving else old
+        elif origin and ahead and {origin, ahead} & set(moving):
+            sign = 1.0 if local[ahead][0] > 0 else -1.0
+            (x, y), (a, b) = places[origin], places[ahead]
+            length = hypot(a - x, b - y)
+            frame = Frame(x, y, sign * (a - x) / length, sign * (b - y) / length)
+        elif origin in moving:
+            frame = old._replace(x=to[0], y=to[1])
+        for point in local:
+            x, y = (0.0, 0.0) if point == origin and frame is not old else frame.into(places[point])
+            yield from self._at(link, point, (x, 0.0) if point == ahead and frame is not old else (x, y))
 
     def _turns(self, joint: str) -> bool:
         return self.kind(joint) == "revolute"
@@ -276,16 +279,6 @@ class Sketch:
                 links |= set(item["links"])
         return together
 
-    def _joints_of(self, link: str, turning: bool) -> list[str]:
-        """The joints of a link that turn, or those that slide."""
-        return [name for name, item in self.joints.items() if link in item["links"] and self._turns(name) == turning]
-
-    def _guide(self, link: str) -> str | None:
-        """The sliding joint of a block: a link with one of them that has a pin on the same spot or none at all."""
-        slides, turning = (self._joints_of(link, turns) for turns in (False, True))
-        spots = {self.places.get(f"{link}.{name}") for name in (*slides, *turning)}
-        return slides[0] if slides and len(spots) == 1 and self.joints[slides[0]]["links"][1] == link else None
-
     def _shifted(self, joint: str, to: Vector) -> Iterator[Change]:
         """The guide of a block, if it stands on the ground, shifted across to where its block is dragged."""
         first, second = self.joints[joint]["links"]
@@ -297,82 +290,33 @@ class Sketch:
         across = ((to[1] - before[1]) * x - (to[0] - before[0]) * y) / norm
         yield from self._at(first, joint, (base[0] - across * y / norm, base[1] + across * x / norm))
 
-    def _relocated(self, link: str, moving: list[str], to: Vector) -> Iterator[Change]:
-        """New coordinates of the joints of a link where some of them go to a place and the others stay.
-
-        A link whose frame begins at one joint and has its x through another keeps that form, unless it has a slot.
-        """
-        old = self.frame(link)
-        pins = [name for name in self.points(link) if name in self.joints and self._turns(name)]
-        local = {point: self.local(link, point) for point in pins}
-        places = {point: to if point in moving else old.out(local[point]) for point in pins}
-        self._apart(link, local, places)
-        origin = next((point for point in pins if local[point] == (0.0, 0.0)), None)
-        ahead = next((point for point in pins if local[point][1] == 0.0 and local[point][0] != 0.0), None)
-        slot, frame = self._slot(link), old
-        if slot:
-            ahead = None
-            frame = self._aimed(link, slot, to) if self._pivot(link) in moving else old
-        elif origin and ahead and {origin, ahead} & set(moving):
-            sign = 1.0 if local[ahead][0] > 0 else -1.0
-            (x, y), (a, b) = places[origin], places[ahead]
-            length = hypot(a - x, b - y)
-            frame = Frame(x, y, sign * (a - x) / length, sign * (b - y) / length)
-        elif origin in moving:
-            frame = old._replace(x=to[0], y=to[1])
-        for point in pins:
-            place = frame.into(places[point])
-            fixed = (0.0, 0.0) if point == origin and frame is not old else place
-            yield from self._at(link, point, (fixed[0], 0.0) if point == ahead and frame is not old else fixed)
-
-    def _apart(self, link: str, local: Mapping[str, Vector], places: Mapping[str, Vector]) -> None:
-        """Refuse to bring points of a link together that are apart."""
-        for first, two in combinations(local, 2):
+    def _refuse_together(self, link: str, local: Mapping[str, Vector], places: Mapping[str, Vector]) -> None:
+        """Refuse to bring points of a moving link together that are apart."""
+        for first, two in combinations(local if link != self.ground else (), 2):
             before, after = (dist(spots[first], spots[two]) for spots in (local, places))
             if after <= SHORT * self.size < before:
                 what = f"would have no length: {first} would lie on {two}"
                 raise MechanismError(Finding(what, f"links.{link}", "keep them apart"))
 
-    def _slot(self, link: str) -> str | None:
-        """The sliding joint whose guide is on a moving link."""
-        slides = (name for name in self._joints_of(link, False) if self.joints[name]["links"][0] == link)
-        return next(slides, None) if link != self.ground else None
-
-    def _pivot(self, link: str) -> str | None:
-        """The pin that a link with a slot turns about: that on the ground, or its first."""
-        pins = self._joints_of(link, True)
-        return next((name for name in pins if self.ground in self.joints[name]["links"]), pins[0] if pins else None)
-
-    def _turned(self, link: str, slot: str, to: Vector) -> Iterator[Change]:
-        """Where the block in a slot is dragged the link turns; locked joints of the link keep their places."""
-        frame, pivot = self._aimed(link, slot, to, block=True), self._pivot(link)
-        for point in self.points(link):
-            if {point, f"{link}.{point}"} & self.locked and point != pivot:
-                yield from self._at(link, point, frame.into(self.places[f"{link}.{point}"]))
-
-    def _aimed(self, link: str, slot: str, to: Vector, block: bool = False) -> Frame:
-        """The frame of a link whose slot is led over a block, with its pivot at a place; or, with block, that there.
+    def _aimed(self, link: str, slot: str, pivot: str, to: Vector) -> Frame:
+        """The frame of a link whose pivot goes to a place and whose slot is led over its block.
 
         The slot passes the pivot at the distance e at which it lies in the link, the pivot being e to the left: with
         d from the pivot to the block, the block is √(d² − e²) along the slot, on the side where it was.
         """
-        pivot, second = self._pivot(link), self.joints[slot]["links"][1]
-        if pivot is None:
-            return self.frame(link)
-        here = self.places[f"{second}.{slot}"]
-        centre, end = (self.places[f"{link}.{pivot}"], to) if block else (to, here)
+        here = self.places[f"{self.joints[slot]['links'][1]}.{slot}"]
         (x, y), (a, b) = self.local(link, pivot), self.local(link, slot)
         c, s = self.vector(f"links.{link}.points.{slot}.axis")
         turn, (u, v) = atan2(s, c), self.frame(link).into(here)
         offset = cos(turn) * (y - b) - sin(turn) * (x - a)
-        far = dist(centre, end)
+        far = dist(to, here)
         if far <= abs(offset) + SHORT * self.size:
             raise MechanismError(Finding("would not reach its block", f"links.{link}", "keep them apart"))
         along = copysign(sqrt(far**2 - offset**2), cos(turn) * (u - x) + sin(turn) * (v - y))
-        angle = atan2(end[1] - centre[1], end[0] - centre[0]) - atan2(-offset, along) - turn
+        angle = atan2(here[1] - to[1], here[0] - to[0]) - atan2(-offset, along) - turn
         turned = Frame(0.0, 0.0, cos(angle), sin(angle))
         p, q = turned.out((x, y))
-        return turned._replace(x=centre[0] - p, y=centre[1] - q)
+        return turned._replace(x=to[0] - p, y=to[1] - q)
 
     def _at(self, link: str, point: str, local: Sequence[float]) -> Iterator[Change]:
         """The numbers to be changed so that a point has these coordinates: dimensions, where they are stated so."""

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from math import atan2, cos, hypot, isfinite, sin
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +20,8 @@ from trunnion.model.units import KINDS, UnitError
 from trunnion.studio.sketch import TOGETHER, Frame, Sketch, Vector
 
 __all__ = [
-    "NUMBER", "add_point", "bar", "begin", "free", "held", "join", "letter", "line_near", "link", "lock", "move",
-    "numbered", "pinned", "place_of", "point_of", "refused", "rename_point", "slide", "taken", "typed", "vector",
+    "NUMBER", "add_point", "bar", "begin", "free", "held", "join", "letter", "line_near", "link", "move", "numbered",
+    "pinned", "place_of", "point_of", "refused", "rename_point", "slide", "spoken_of", "taken", "typed", "vector",
 ]  # fmt: skip
 
 Given = Mapping[str, Any]
@@ -49,11 +49,11 @@ def typed(text: Any, kind: str, where: str, unit: str = "") -> float:
     try:
         read = Quantity.read(f"{text} {unit}" if unit and NUMBER.fullmatch(text) else text, KINDS[kind])
         value = float(np.asarray(read.evaluate()))
-    except (UnitError, ValueError, TypeError, KeyError) as error:
+        if not isfinite(value):
+            raise ValueError(text)
+    except (UnitError, ValueError, TypeError, KeyError, ZeroDivisionError) as error:
         remedy = getattr(error, "remedy", "") or f"type it as {KINDS[kind].example}"
         raise refused(f"'{text[:30]}' is no {kind}", where, remedy) from None
-    if not isfinite(value):
-        raise refused(f"'{text[:30]}' is no {kind}", where, f"type it as {KINDS[kind].example}")
     return value
 
 
@@ -119,6 +119,13 @@ def free(sketch: Sketch, name: str) -> tuple[str, str]:
     return link, point
 
 
+def spoken_of(entry: Given) -> set[str]:
+    """What a load, spring or gear pair acts on: links, joints, and points "link.P"."""
+    link, at = entry.get("link"), entry.get("at")
+    names = {*(entry.get("between") or ()), *(entry.get("joints") or ()), entry.get("joint"), link}
+    return {str(name) for name in names if name} | ({f"{link}.{at}"} if link and at else set())
+
+
 def point_of(sketch: Sketch, end: Any) -> tuple[str, str]:
     """Link and point of an end, where a force acts or a spring is fastened: on the moving link of a pin on the ground.
 
@@ -135,30 +142,33 @@ def point_of(sketch: Sketch, end: Any) -> tuple[str, str]:
     return link, point
 
 
-def joined(sketch: Sketch, link: str, end: Any, place: Vector) -> str:
-    """The name of an end of a new link, and the joint that it makes."""
-    if isinstance(end, Mapping):
-        point, other = letter(sketch), str(end.get("on", sketch.ground))
-        put(sketch, other, point, place)
-        pin(sketch, point, other, link, place)
-        return point
-    if not isinstance(end, str):
-        return letter(sketch)
-    other, point = held(sketch, end)
-    if point in sketch.joints:
-        point = doubled(sketch, other, point)
-    sketch.places[f"{other}.{point}"] = place
-    pin(sketch, point, other, link, place)
-    return point
+def connect(sketch: Sketch, ends: Sequence[tuple[str, str]], place: Vector) -> str:
+    """A pin between two links: its name, that of a free end, of the first before the second, else a new one.
 
-
-def doubled(sketch: Sketch, link: str, point: str, name: str = "") -> str:
-    """Another point of a link on the spot of one that is a joint already, for a second pin there: its name."""
-    entry, name = sketch.points(link)[point], name or letter(sketch)
-    sketch.section("links")[link]["points"][name] = list(entry["at"] if isinstance(entry, dict) else entry)
-    sketch.places[f"{link}.{name}"] = sketch.places[f"{link}.{point}"]
+    ends: (link, its point there); without a point the link gets one. A point that is a joint already is doubled.
+    """
+    free_names = (
+        point for link, point in ends if point and point not in sketch.joints
+        and all(point not in sketch.points(other) for other in sketch.of("links") if other != link)
+    )  # fmt: skip
+    name = next(free_names, None) or letter(sketch)
+    for link, point in ends:
+        if not point:
+            put(sketch, link, name, place)
+        elif point in sketch.joints:
+            entry = sketch.points(link)[point]
+            sketch.section("links")[link]["points"][name] = list(entry["at"] if isinstance(entry, dict) else entry)
+            sketch.places[f"{link}.{name}"] = sketch.places[f"{link}.{point}"]
+        elif point != name:
+            rename_point(sketch, f"{link}.{point}", name)
     sketch.forget()
+    pin(sketch, name, ends[0][0], ends[1][0], place)
     return name
+
+
+def _on(sketch: Sketch, end: Any) -> tuple[str, str]:
+    """Link and point of an end; no point of a place on a link or on the ground."""
+    return held(sketch, end) if isinstance(end, str) else (str(end.get("on", sketch.ground)), "")
 
 
 def put(sketch: Sketch, link: str, point: str, place: Vector, axis: float | None = None) -> None:
@@ -190,24 +200,19 @@ def pin(sketch: Sketch, name: str, first: str, second: str, place: Vector) -> No
         sketch.section("assembly")[name] = [sketch.length(part) for part in place]
 
 
-class Line(NamedTuple):
-    """A line of a link: where it begins, m, its direction, and how far left of it a place lies, m."""
+def line_near(sketch: Sketch, link: str, place: Vector) -> tuple[Vector, Vector, float]:
+    """The line through two points of a link that passes nearest to a place; of several the longest.
 
-    start: Vector
-    direction: Vector
-    beside: float
-
-
-def line_near(sketch: Sketch, link: str, place: Vector) -> Line:
-    """The line through two points of a link that passes nearest to a place; of several the longest."""
+    Where it begins, m, its direction, and how far left of it the place lies, m.
+    """
     spots = [sketch.places[key] for point in sketch.points(link) if (key := f"{link}.{point}") in sketch.places]
-    lines: list[tuple[float, float, Line]] = []
+    lines: list[tuple[float, float, tuple[Vector, Vector, float]]] = []
     for (x, y), (a, b) in itertools.combinations(spots, 2):
         length = hypot(a - x, b - y)
         if length > TOGETHER * sketch.size:
             c, s = (a - x) / length, (b - y) / length
             offset = c * (place[1] - y) - s * (place[0] - x)
-            lines.append((round(abs(offset) / sketch.size, 6), -length, Line((x, y), (c, s), offset)))
+            lines.append((round(abs(offset) / sketch.size, 6), -length, ((x, y), (c, s), offset)))
     if not lines:
         raise refused("has no two points that a slot could go along", f"links.{link}", "add a point to it first")
     return min(lines, key=lambda row: row[:2])[2]
@@ -235,10 +240,10 @@ def bar(sketch: Sketch, *ends: Any, length: Any = None) -> str:
     frame = Frame(x, y, (a - x) / far, (b - y) / far)
     sketch.section("links")[name] = {"points": {}}
     for end, place, local in zip(ends, places, (0, length or sketch.length(far)), strict=True):
-        sketch.forget()
-        point = joined(sketch, name, end, place)
+        on_something = isinstance(end, (str, Mapping))
+        point = connect(sketch, (_on(sketch, end), (name, "")), place) if on_something else letter(sketch)
         sketch.section("links")[name]["points"][point] = [local, 0]
-    sketch.forget()
+        sketch.forget()
     sketch.show(name, frame)
     return name
 
@@ -248,12 +253,10 @@ def pinned(sketch: Sketch, gesture: Given) -> str:
     end = gesture["point"]
     if isinstance(end, Mapping) and end["on"] == sketch.ground:
         raise refused("is the ground", sketch.ground, "choose a link that moves")
-    owner, point = point_of(sketch, end) if isinstance(end, Mapping) else free(sketch, end)
     begin(sketch)
-    place = sketch.places[f"{owner}.{point}"]
-    put(sketch, sketch.ground, point, place)
-    pin(sketch, point, sketch.ground, owner, place)
-    return f"Pin {point} to the ground"
+    owner = _on(sketch, end) if isinstance(end, Mapping) else free(sketch, end)
+    name = connect(sketch, ((sketch.ground, ""), owner), place_of(sketch, end))
+    return f"Pin {name} to the ground"
 
 
 def add_point(sketch: Sketch, gesture: Given) -> str:
@@ -287,12 +290,13 @@ def slide(sketch: Sketch, gesture: Given) -> str:
         sketch.section("joints")[name] = {"type": "prismatic", "links": [carrier, slider]}
         put(sketch, slider, name, place, angle)
         return f"Guide {slider}" if carrier == sketch.ground else f"Slide {slider} along {carrier}"
-    slider, point = _end_to_slide(sketch, str(slid), carrier)
+    end = _end_to_slide(sketch, str(slid), carrier)
     block, (name, angle) = numbered(sketch, "links", "block"), _guided(sketch, carrier, place, gesture)
-    sketch.section("links")[block] = {"points": {point: [0, 0], name: {"at": [0, 0], "axis": [1, 0]}}}
+    sketch.section("links")[block] = {"points": {}}
     sketch.section("joints")[name] = {"type": "prismatic", "links": [carrier, block]}
+    point = connect(sketch, (end, (block, "")), place)
+    sketch.section("links")[block]["points"] = {point: [0, 0], name: {"at": [0, 0], "axis": [1, 0]}}
     sketch.forget()
-    pin(sketch, point, slider, block, place)
     sketch.show(block, Frame(*place, cos(angle), sin(angle)))
     return f"Guide {point}" if carrier == sketch.ground else f"Slide {point} along {carrier}"
 
@@ -304,9 +308,8 @@ def _guided(sketch: Sketch, carrier: str, place: Vector, gesture: Given) -> tupl
         angle = float(gesture.get("angle", 0.0))
         put(sketch, carrier, name, place, angle)
         return name, angle
-    line = line_near(sketch, carrier, place)
-    (x, y), (c, s) = line.start, line.direction
-    offset = line.beside if abs(line.beside) > float(gesture.get("near", 0.0)) else 0.0
+    (x, y), (c, s), beside = line_near(sketch, carrier, place)
+    offset = beside if abs(beside) > float(gesture.get("near", 0.0)) else 0.0
     put(sketch, carrier, name, (x - s * offset, y + c * offset), atan2(s, c))
     along = c * (place[0] - x) + s * (place[1] - y)
     sketch.section("assembly")[name] = sketch.length(along)  # on which side of the point the block is
@@ -324,15 +327,12 @@ def _end_to_slide(sketch: Sketch, name: str, carrier: str) -> tuple[str, str]:
     if joint.get("type", "revolute") != "revolute":
         raise refused("slides already", f"joints.{name}", "choose a pin, or the free end of a link")
     if carrier not in joint["links"]:
-        slider, point = held(sketch, name)
-        return slider, doubled(sketch, slider, point)
-    slider = next(entry_name for entry_name in joint["links"] if entry_name != carrier)
+        return held(sketch, name)
+    slider = next(other for other in joint["links"] if other != carrier)
     for section, what in (("loads", "load"), ("springs", "spring")):
-        for entry_name, entry in sketch.of(section).items():
-            if (entry.get("link"), entry.get("at")) == (carrier, name) or f"{carrier}.{name}" in entry.get(
-                "between", ()
-            ):
-                raise refused(f"carries the {what} {entry_name}", f"joints.{name}", f"delete that {what} first")
+        for other, entry in sketch.of(section).items():
+            if f"{carrier}.{name}" in spoken_of(entry):
+                raise refused(f"carries the {what} {other}", f"joints.{name}", f"delete that {what} first")
     del sketch.section("joints")[name]
     for section in ("drivers", "assembly"):
         sketch.section(section).pop(name, None)
@@ -350,8 +350,8 @@ def join(sketch: Sketch, gesture: Given) -> str:
     begin(sketch)
     first, second = gesture["ends"]
     place = place_of(sketch, second)
-    owners = [_owners(sketch, end) for end in (first, second)]
-    (*_, link), (*_, other) = owners  # of a joint its second, which moves
+    (link, _), (other, _) = ends = [_on(sketch, end) for end in (first, second)]
+    owners = [sketch.links_at(end)[0] if isinstance(end, str) else [str(end["on"])] for end in (first, second)]
     if set(owners[0]) & set(owners[1]):
         raise refused("would be joined with itself", link, "choose ends of two links")
     for name, joint in sketch.joints.items():
@@ -359,44 +359,8 @@ def join(sketch: Sketch, gesture: Given) -> str:
             raise refused(f"and {other} are joined at {name} already", link, "choose two other links")
     if isinstance(first, str):
         move(sketch, {"point": first, "to": place})
-    name = _name(sketch, (link, other), (first, second))
-    for side, end in ((link, first), (other, second)):
-        _call(sketch, side, end, name, place)
-    sketch.forget()
-    pin(sketch, name, other, link, place)
-    sketch.made = ("joints", name)
+    sketch.made = ("joints", connect(sketch, ends[::-1], place))
     return f"Join {link} with {other}"
-
-
-def _owners(sketch: Sketch, end: Any) -> list[str]:
-    """The links that an end is on."""
-    if isinstance(end, Mapping):
-        return [str(end["on"])]
-    held(sketch, end)
-    return sketch.links_at(end)[0]
-
-
-def _name(sketch: Sketch, links: tuple[str, str], ends: tuple[Any, Any]) -> str:
-    """The name of the new pin: that of a free end, the second's before the first's, if nothing else has it."""
-    for side in (1, 0):
-        if not isinstance(ends[side], str) or ends[side] in sketch.joints:
-            continue
-        name = free(sketch, ends[side])[1]
-        if all(name not in sketch.points(link) for link in sketch.of("links") if link != links[side]):
-            return name
-    return letter(sketch)
-
-
-def _call(sketch: Sketch, link: str, end: Any, name: str, place: Vector) -> None:
-    """The link has a point of this name at an end of it."""
-    if not isinstance(end, str):
-        put(sketch, link, name, place)
-        return
-    point = held(sketch, end)[1]
-    if point in sketch.joints:
-        doubled(sketch, link, point, name)
-    elif point != name:
-        rename_point(sketch, f"{link}.{point}", name)
 
 
 # ---- what is drawn already ------------------------------------------------------------------------------------------
@@ -407,7 +371,8 @@ def move(sketch: Sketch, gesture: Given) -> str:
     if "by" in gesture:
         return _move_in_space(sketch, gesture)
     point, to = str(gesture["point"]), vector(gesture["to"])
-    sketch.write(sketch.moved(point, to, bool(gesture.get("keep"))))
+    changes = sketch.moved(point, to, bool(gesture.get("keep")))
+    sketch.write(changes)
     hints = sketch.entries.get("assembly") or {}
     if isinstance(hints.get(point), list) and not gesture.get("index"):
         hints[point] = [sketch.length(part) for part in to]
@@ -416,7 +381,7 @@ def move(sketch: Sketch, gesture: Given) -> str:
         sketch.places[f"{link}.{name}"] = to
     for link in links:
         sketch.show(link, sketch.frame(link))
-    return f"Move {point}"
+    return f"Move {point}" if changes else f"Move {point}: no length changes"
 
 
 def _move_in_space(sketch: Sketch, gesture: Given) -> str:
@@ -431,14 +396,6 @@ def _move_in_space(sketch: Sketch, gesture: Given) -> str:
         sketch.entries["assembly"][point] = [sketch.length(sum(pair)) for pair in pairs]
     sketch.write(sketch.shifted(point, by, turns))
     return f"Move {point}"
-
-
-def lock(sketch: Sketch, gesture: Given) -> str:
-    """A joint or point stays where it is while others are dragged; done again, it may be dragged itself."""
-    point = str(gesture["point"])
-    held(sketch, point)
-    sketch.locked ^= {point}
-    return f"{'Lock' if point in sketch.locked else 'Unlock'} {point}"
 
 
 def rename_point(sketch: Sketch, old: str, new: str) -> None:
@@ -457,4 +414,3 @@ def rename_point(sketch: Sketch, old: str, new: str) -> None:
         hints[f"{link}.{new}"] = hints.pop(old)
     if old in sketch.places:
         sketch.places[f"{link}.{new}"] = sketch.places.pop(old)
-    sketch.locked = {f"{link}.{new}" if key == old else key for key in sketch.locked}

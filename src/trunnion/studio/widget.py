@@ -6,16 +6,14 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping
 from typing import Any
-from urllib.parse import unquote
 
 import anywidget
 import traitlets
 
 from trunnion.model.file import entries_of, text_of
 from trunnion.model.mechanism import Mechanism
-from trunnion.studio.answers import answer, examples
+from trunnion.studio.answers import answer
 from trunnion.studio.page import found, one_file
-from trunnion.studio.placed import thumbnail
 
 __all__ = ["StudioWidget", "studio"]
 
@@ -63,11 +61,10 @@ class StudioWidget(anywidget.AnyWidget):
         self.send({"id": message["id"], "status": status}, [body])
 
     def _request(self, path: str, body: bytes) -> tuple[int, bytes]:
-        kind, _, name = path.strip("/").partition("/")
+        kind = path.strip("/").partition("/")[0]
         routes: dict[str, Callable[[], bytes]] = {
             "files": self._files,
             "file": lambda: self._saved(body) if body else json.dumps({"text": self.text}).encode(),
-            "thumbnail": lambda: thumbnail(examples()[unquote(name)]),
             "jobs": lambda: json.dumps({"forms": [], "jobs": []}).encode(),
         }
         if kind not in routes:

@@ -8,27 +8,13 @@ from typing import Any
 
 from trunnion.studio.acting import driver, gear
 from trunnion.studio.sketch import Frame, Sketch, Vector
-from trunnion.studio.strokes import (
-    bar,
-    begin,
-    letter,
-    line_near,
-    numbered,
-    place_of,
-    point_of,
-    refused,
-    slide,
-    typed,
-)  # fmt: skip
+from trunnion.studio.strokes import bar, begin, letter, line_near, numbered, place_of, point_of, refused, slide, typed
 
 __all__ = ["block"]
 
 Given = Mapping[str, Any]
 APEX = 0.6  # of the distance of its pins, how far off their line the inner pin of an RRR is put
-INNER, TURNED = (
-    0.8,
-    1.4,
-)  # the corners of a triad's plate: its pins, so near to its middle and turned so far about it, rad
+INNER, TURNED = 0.8, 1.4  # corners of a triad's plate: its pins, so near to its middle, turned so far about it, rad
 BEYOND = 1.5  # of the distance of its pins, how long the link of an RPR is
 
 
@@ -125,7 +111,7 @@ def _prp(sketch: Sketch, pins: list[Any], at: Vector | None) -> None:
         raise refused("is on no link that moves", "the pin", "choose a pin of the link along which it slides")
     spots = [sketch.places[f"{carrier}.{point}"] for point in sketch.points(carrier)]
     x, y = at or (sum(spot[0] for spot in spots) / len(spots), sum(spot[1] for spot in spots) / len(spots))
-    c, s = line_near(sketch, carrier, (x, y)).direction
+    _, (c, s), _ = line_near(sketch, carrier, (x, y))
     slider, point, angle = numbered(sketch, "links", "block"), letter(sketch), atan2(c, -s)  # across the link
     sketch.section("links")[slider] = {"points": {point: [0, 0]}}
     sketch.show(slider, Frame(x, y, cos(angle), sin(angle)))
@@ -149,9 +135,10 @@ def _loop_in_space(sketch: Sketch, angle: str) -> str:
 
     The axes of both shafts and of the cross meet in a point, and the pins of the cross are at right angles.
     """
-    plain = ("trunnion", "name", "space", "notes", "links", "joints", "drivers", "assembly", "joint_defaults")
+    head = ("trunnion", "name", "notes", "joint_defaults")
+    plain = {*head, "space", "links", "joints", "drivers", "assembly"}
     joints, links = list(sketch.joints), [link for link in sketch.of("links") if link != sketch.ground]
-    more = [key for key, part in sketch.entries.items() if part and key not in plain]
+    more = {key for key, part in sketch.entries.items() if part} - plain
     if more or len(links) > 1 or len(joints) > 1 or sketch.entries.get("space") == "spatial":
         remedy = "place it on a new sheet, or on that of a driver alone; change a loop by its table"
         raise refused("closes a loop in space with a driver", "a CCC", remedy)
@@ -163,20 +150,14 @@ def _loop_in_space(sketch: Sketch, angle: str) -> str:
             for joint, link in zip(joints, [*links, sketch.ground], strict=True)]  # fmt: skip
     rows[0]["type"], rows[3]["twist"] = "revolute", f"{round(180.0 - degrees(shafts), 12):.15g} deg"
     output = degrees(atan2(-cos(start) * cos(shafts), sin(start)))  # the pins of the cross are at right angles
-    head = {key: part for key, part in sketch.entries.items() if key in ("trunnion", "name", "notes", "joint_defaults")}
-    moved = {"drivers": {joints[0]: driver}, "assembly": {joints[3]: f"{output:.6g} deg"}}
-    sketch.entries, sketch.places = {**head, "space": "spatial", "loop": rows, **moved}, {}
+    sketch.entries, sketch.places = {
+        **{key: part for key, part in sketch.entries.items() if key in head}, "space": "spatial", "loop": rows,
+        "drivers": {joints[0]: driver}, "assembly": {joints[3]: f"{output:.6g} deg"},
+    }, {}  # fmt: skip
     return "Add CCC"
 
 
 BLOCKS: dict[str, Callable[[Sketch, list[Any], Vector | None], None]] = {
-    "driver": _crank,
-    "RRR": _rrr,
-    "RRP": _rrp,
-    "RPR": _rpr,
-    "PRP": _prp,
-    "RPP": _rpp,
-    "triad": _triad,
-    "CCC": lambda *_: None,
-    "gear": lambda *_: None,
-}
+    "driver": _crank, "RRR": _rrr, "RRP": _rrp, "RPR": _rpr, "PRP": _prp, "RPP": _rpp, "triad": _triad,
+    "CCC": lambda *_: None, "gear": lambda *_: None,
+}  # fmt: skip

@@ -71,6 +71,7 @@ async function answered() {
   const sent = state.text.value;
   const friction = state.friction.value;
   const asked = { text: sent, steps: STEPS, friction: friction === "off" ? "off" : "stated" };
+  if (!state.answer.value && sent.trim()) outlined(asked);
   const found = await link.ask("model", asked);
   if (!found || sent !== state.text.value) return;
   if (found.error) return state.say(found.error, true);
@@ -81,6 +82,14 @@ async function answered() {
   if (state.selection.value && !isPart(found, state.selection.value)) state.selection.value = null; // its name was undone, or it is gone
   if (found.scene && state.index.value >= found.scene.count) state.index.value = 0;
   if (found.solved) await (cycles = cycles.then(() => figured(asked)));
+}
+
+/** Links and joints at their start, drawn while the first answer is awaited. */
+async function outlined(asked) {
+  const found = await link.ask("outline", asked);
+  if (!found || found.error || state.answer.value || asked.text !== state.text.value) return;
+  if (!Object.keys(state.places.value).length) state.places.value = found.places;
+  state.answer.value = { ...found, outline: true, solved: false, scene: null, findings: [], missing: [], ready: [], text: asked.text, friction: asked.friction };
 }
 
 let cycles = Promise.resolve(); // one after another, for a long one would hold up the next
@@ -103,12 +112,12 @@ function solveSoon() {
   typing = setTimeout(solve, TYPING);
 }
 
-/** Text, places and locks of the mechanism as it is shown: what a gesture starts from. */
+/** Text and places of the mechanism as it is shown: what a gesture starts from. */
 export function present() {
   const { scene } = state.answer.value ?? {};
   const fresh = state.solved.value && state.answer.value.text === state.text.value && !state.spatial.value;
   const places = fresh ? { ...state.places.value, ...placesAt(scene, posedAt(scene, state.index.value)) } : state.places.value;
-  return { text: state.text.value, places, locked: state.locked.value };
+  return { text: state.text.value, places };
 }
 
 /** @type {Promise<boolean>} */
@@ -160,7 +169,7 @@ export function setValue(path, value, merge = null) {
 /** The mechanism with a point at another place ("drag") or other numbers ("try"); null where something newer was asked. */
 export function changed(kind, fields) {
   const friction = state.friction.value === "off" ? "off" : "stated";
-  return link.ask(kind, { text: state.text.value, steps: STEPS, friction, locked: state.locked.value, fine: sheet.fine(), ...fields });
+  return link.ask(kind, { text: state.text.value, steps: STEPS, friction, fine: sheet.fine(), ...fields });
 }
 
 /**
@@ -299,6 +308,11 @@ export function openText(content, words) {
   state.say(`${words}.${step ? " Undo brings the unsaved sheet back." : ""}${file ? ` Unsaved work on ${file} is kept: open it again.` : ""}`);
   return opened;
 }
+
+let pictures = Promise.resolve(); // one after another: of questions of a kind the latest alone is answered
+
+/** The small picture of an example, {links, paths}. */
+export const pictureOf = (name) => (pictures = pictures.then(() => link.ask("picture", { name })));
 
 export function openExample(example) {
   return counted(shipped(example));

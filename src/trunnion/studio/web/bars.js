@@ -11,7 +11,7 @@ import { nextTheme, theme } from "./theme.js";
 import { TOOLS, choose, hint } from "./tools.js";
 import { Button, Icon, Menu, html } from "./ui.js";
 
-const EXPORTS = [["csv", "Table (CSV)"], ["png", "Picture (PNG)"], ["svg", "Picture (SVG)"], ["gif", "Animation (GIF)"], ["report", "Report (HTML)"]]; // prettier-ignore
+const EXPORTS = [["csv", "Table (CSV)"], ["png", "Picture (PNG)"], ["svg", "Picture (SVG)"], ["report", "Report (HTML)"]]; // prettier-ignore
 
 export function TopBar() {
   const { past, future, fileName, unsaved, dialog } = state;

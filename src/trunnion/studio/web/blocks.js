@@ -90,7 +90,7 @@ export function Blocks() {
   return html`<div class="blocks">
     ${!state.solved.value && html`<p class="calm">Blocks appear as soon as the mechanism is solved.</p>`}
     <div ref=${holder}></div>
-    ${wired.value?.without && html`<p class="calm bars-of-blocks"><span class="of-power">▬</span> share of the friction power <span class="of-locking">▬</span> by which the locking margin is less for the friction of the block</p>`}
+    ${wired.value?.without && html`<p class="calm bars-of-blocks"><span class="of-power">▬</span> share of the friction power <span class="of-locking">▬</span> by which the locking margin, looked for up to ${BEYOND}, is less for the friction of the block</p>`}
     ${wired.value && html`<${Values} found=${wired.value} />`}
     ${!state.spatial.value && html`<${Palette} />`}
   </div>`;
@@ -209,7 +209,7 @@ function Values({ found }) {
   return html`<section class="passing" aria-label="What passes the wires">
     <h2>${block ? block.label : "All wires"}</h2>
     ${block && html`<p class="calm">${block.links.join(", ")}${share === null || share === undefined ? "" : `; ${number(100 * share, 3)} % of the friction power`}</p>`}
-    ${margins && html`<p class="calm">Locking margin here ${upTo(margins.all)}; without the friction of this block ${upTo(margins.without)}.</p>`}
+    ${margins && html`<p class="calm">Locking margin here ${upTo(margins.all)}${margins.all >= BEYOND ? ", far from locking" : `; without the friction of this block ${upTo(margins.without)}`}.</p>`}
     <div class="scrolls"><table>
       <thead><tr><th>pin</th><th>forward</th><th>back</th></tr></thead>
       <tbody>${wires.map((wire) => html`<tr><th>${wire.joint}<br /><span class="calm">${goes(wire)}</span></th>
@@ -260,7 +260,9 @@ function Palette() {
     const ends = Array.from({ length: fields }, (_, order) => (count && there(order) ? there(order) : { ground: typed.ground[order] }));
     if (!(await edit([{ do: "block", kind, pins: ends, at: typed.at, ratio: typed.ratio }]))) return;
     setTyped({ ...typed, at: "" });
-    if (!state.spatial.value) sheet.fit();
+    if (state.spatial.value) return;
+    sheet.fit();
+    if (choices.length < 2) sheet.zoom(0.4); // a first block has room for more
   };
   const inner = { driver: "End at", RPR: "End at", RPP: "Guide at", CCC: "Angle between the shafts", triad: "Middle at" }[kind] ?? "Inner pin at";
   return html`<form class="palette" aria-label="Add a block" onSubmit=${place}>

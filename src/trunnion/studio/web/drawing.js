@@ -15,7 +15,7 @@ export const TARGET = 12; // px, radius of what a pointer may hit
 /** The drawing of a scene in an SVG element; `draw(scene)` builds, `pose(…)` moves, `fit` and `zoom` change the frame. */
 export function drawing(root) {
   const layers = Object.fromEntries(
-    ["grid", "tracks", "ghosts", "ground", "bodies", "parts", "vectors", "names", "handles", "locks", "tools", "key"].map((name) => [
+    ["grid", "tracks", "ghosts", "ground", "bodies", "parts", "vectors", "names", "handles", "tools", "key"].map((name) => [
       name,
       svg("g", { class: `layer ${name}` }),
     ]),

@@ -2,8 +2,7 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { hull } from "../web/data.js";
-import { openExample } from "./actions.js";
-import { decode, request } from "./socket.js";
+import { openExample, pictureOf } from "./actions.js";
 import * as state from "./state.js";
 import { html } from "./ui.js";
 
@@ -44,8 +43,8 @@ export function Picture({ name }) {
 }
 
 async function fetched(name) {
-  const reply = await request(`/thumbnail/${encodeURIComponent(name)}`);
-  return reply.ok ? decode(await reply.arrayBuffer()) : { links: [], paths: [] };
+  const found = await pictureOf(name);
+  return found && !found.error ? found : { links: [], paths: [] };
 }
 
 /** Paths below, links as the hulls of their points, a dot at each point. */

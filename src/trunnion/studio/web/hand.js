@@ -116,7 +116,7 @@ function pull(view, held, at, alt) {
   if (held.group) return void held.group.to(view.frame.from(at));
   if (held.joint) dragTo(held.joint, view.frame.from(at), view.frame.scale, alt);
   else if (held.centre) held.centre.to(view.frame.from(at).map((value) => onGrid(value, sheet.step() / (alt ? 100 : 10))));
-  else if (!held.locked && (held.panning || state.tool.value === "select")) sheet.pan(at[0] - held.last[0], at[1] - held.last[1]);
+  else if (held.panning || state.tool.value === "select") sheet.pan(at[0] - held.last[0], at[1] - held.last[1]);
   held.last = at;
 }
 
@@ -127,13 +127,9 @@ function takeHold(view, held) {
     return;
   }
   if (held.panning || state.tool.value !== "select" || (kind !== "joints" && kind !== "points")) return;
-  if (state.locked.value.includes(name)) {
-    held.locked = true;
-    return state.say(`${name} is locked where it is; unlock it first (K).`, true);
-  }
   const base = present();
   const { sketched, scene } = drawn.peek();
-  const path = sketched || state.locked.value.length ? null : pathOf(scene, key); // a locked joint stays where it is
+  const path = sketched ? null : pathOf(scene, key);
   held.joint = { kind, name, key, index: view.posed, asked: null, told: "", sketched, base, together: sketched ? together(kind, name, base.places) : [], path, scene, crank: Boolean(path) && driven(scene, name, key) };
   const { joint } = held;
   joint.ask = newest((to) => changed("drag", { point: name, index: joint.index, to, keep: joint.keep }), (found, to) => follow(joint, found, to));

@@ -5,7 +5,6 @@ import { set, svg } from "../web/dom.js";
 import { stated } from "../web/format.js";
 import { TARGET } from "./drawing.js";
 import { gridStep } from "./geometry.js";
-import * as state from "./state.js";
 
 const NOUNS = { joints: "Joint", points: "Point", centres: "Mass centre of" };
 const MOST = 400; // targets; of larger mechanisms the list under Properties chooses
@@ -13,8 +12,6 @@ const MOST = 400; // targets; of larger mechanisms the list under Properties cho
 /** Put targets over the spots; `chosen` {kind, name} is marked. */
 export function poseHandles(view, spots, chosen) {
   const { layers, frame } = view;
-  const locked = new Set(state.locked.value);
-  layers.locks.replaceChildren(...spots.filter(({ name }) => locked.has(name)).map(({ at }) => padlock(frame.to(at))));
   const few = spots.slice(0, MOST);
   const least = gridStep(frame.scale) / 1000; // what a hand can tell apart: less is rounding
   const coordinate = (value) => stated(Math.abs(value) < least ? 0 : value, "m");
@@ -23,7 +20,7 @@ export function poseHandles(view, spots, chosen) {
   const joints = few.filter(({ kind }) => kind !== "centres").map((one) => frame.to(one.at));
   few.forEach(({ kind, name, key, at, mass }, order) => {
     const [x, y] = frame.to((key && place(view.scene, key, view.drawn)) ?? at); // errors may be drawn larger
-    const words = `${NOUNS[kind]} ${name}${mass ? `, ${Number(mass.toPrecision(4))} kg` : ""}${locked.has(name) ? ", locked" : ""}, at ${coordinate(at[0])}, ${coordinate(at[1])}`;
+    const words = `${NOUNS[kind]} ${name}${mass ? `, ${Number(mass.toPrecision(4))} kg` : ""}, at ${coordinate(at[0])}, ${coordinate(at[1])}`;
     const active = chosen?.kind === kind && chosen.name === name;
     set(layers.handles.children[order], {
       cx: x.toFixed(1),
@@ -32,13 +29,6 @@ export function poseHandles(view, spots, chosen) {
       class: active ? "handle chosen" : mass && joints.some((spot) => Math.hypot(spot[0] - x, spot[1] - y) < TARGET) ? "handle under" : "handle",
     });
   });
-}
-
-/** The mark of a locked joint, below it to the right. */
-function padlock([x, y]) {
-  const shackle = svg("path", { class: "shackle", d: "M-3.2,0v-3a3.2,3.2 0 0 1 6.4,0v3" });
-  const body = svg("rect", { x: -5.5, y: 0, width: 11, height: 8.5, rx: 1.5 });
-  return svg("g", { class: "padlock", transform: `translate(${(x + 15).toFixed(1)},${(y + 9).toFixed(1)})` }, shackle, body);
 }
 
 function build(view, spots, names) {

@@ -40,7 +40,7 @@ export async function lookForTabs() {
 }
 
 /**
- * What was left of the sheets of this folder, [{key, name, text, saved, places, locked, past, future, variant, time}], by this tab and by
+ * What was left of the sheets of this folder, [{key, name, text, saved, places, past, future, variant, time}], by this tab and by
  * those that are closed; the latest first.
  */
 function works() {
@@ -100,7 +100,7 @@ export function keepSteps() {
   addEventListener("beforeunload", (event) => state.unkept.value && state.unsaved.value && event.preventDefault());
   effect(() => {
     const [saved, name, variant] = [state.basis.value, state.fileName.value, state.variant.value];
-    const work = { text: state.text.value, saved, places: state.places.peek(), locked: state.locked.value, past: state.past.value, future: state.future.value, variant };
+    const work = { text: state.text.value, saved, places: state.places.peek(), past: state.past.value, future: state.future.value, variant };
     put(sessionStorage, LAST, { folder: state.folder.value.id, name });
     put(sessionStorage, state.VARIANT, variant);
     const nothing = name && !unsaved(work) && !work.past.length && !work.future.length;

@@ -105,6 +105,8 @@ export function centreHeld(view, link) {
   };
 }
 
+const inertiaOf = (value) => (value < 0.1 ? stated(1e6 * value, "kg\u00a0mm²") : stated(value, "kg\u00a0m²"));
+
 /** Mass, centre and inertia of all moving links, as they are by now. */
 export function Masses() {
   const { entries, numbers = {} } = state.answer.value ?? {};
@@ -114,7 +116,7 @@ export function Masses() {
   const row = (name) => [
     stated(mass(name), "kg"),
     localOf(numbers, `links.${name}.centre`).map((one) => stated(one, "m")).join(", ").replace(/\b0\u00a0m\b/g, "0"),
-    stated(numbers[`links.${name}.inertia`] ?? 0, "kg\u00a0m²"),
+    inertiaOf(numbers[`links.${name}.inertia`] ?? 0),
   ]; // prettier-ignore
   const total = links.reduce((sum, name) => sum + mass(name), 0);
   return html`<section class="mass-table"><h2>Masses</h2>

@@ -48,17 +48,19 @@ function apart(spots) {
   return spots.filter((spot, order) => !spots.slice(0, order).some((other) => far(spot, other) <= 1e-6 * size));
 }
 
-/** The dimensions as they are drawn; `words(x, y, text)` puts words where there is room, `keep(x, y, text)` keeps room for some. */
-export function dimensionMarks(view, words, keep) {
+/** The dimensions as they are drawn; `words(x, y, text)` puts words where there is room, `spare(x, y, text, angle)` tells whether there is room at a place:
+ * dimensions that have none are left out, those of the chosen link last. */
+export function dimensionMarks(view, words, spare) {
   if (!state.layers.peek().dimensions || !view.scene || view.ideal) return [];
   const { scene, frame, posed } = view;
-  const rows = lengthsOf(scene, posed);
+  const chosen = state.selection.peek()?.name;
+  const rows = lengthsOf(scene, posed).sort((one, other) => Number(other.name === chosen) - Number(one.name === chosen));
   const all = scene.links.flatMap((link) => link.points.map((key) => place(scene, key, posed)).filter(Boolean)).map(frame.to);
   const middle = [0, 1].map((axis) => all.reduce((sum, spot) => sum + spot[axis], 0) / all.length);
   const ground = scene.links.find((link) => link.ground)?.name;
   const rails = scene.joints.filter(({ type, links }) => type === "prismatic" && links.includes(ground));
   return [
-    ...[...rows, ...offsetsOf(scene, rails, ground, posed)].flatMap((row) => length(frame, row, row.middle ? frame.to(row.middle) : middle, keep)),
+    ...[...rows, ...offsetsOf(scene, rails, ground, posed)].flatMap((row) => length(frame, row, row.middle ? frame.to(row.middle) : middle, spare)),
     ...rows.filter((row) => row.ground).flatMap(({ ends: [a, b] }) => angle(frame, a, Math.atan2(b[1] - a[1], b[0] - a[0]), words)),
     ...rails.flatMap((one) => {
       const spot = place(scene, one.at, posed) ?? place(scene, one.on, posed);
@@ -68,7 +70,7 @@ export function dimensionMarks(view, words, keep) {
 }
 
 /** A line beside two points with its length, away from the middle of the mechanism. */
-function length(frame, { name, ends, ground }, middle, keep) {
+function length(frame, { name, ends, ground }, middle, spare) {
   const [[x, y], [a, b]] = ends.map(frame.to);
   const far = Math.hypot(a - x, b - y);
   if (far < SHORT) return [];
@@ -83,7 +85,7 @@ function length(frame, { name, ends, ground }, middle, keep) {
   const turn = (Math.atan2(uy, ux) * 180) / Math.PI;
   const upright = turn >= 90 || turn < -90 ? turn + 180 : turn;
   const words = stated(Number(Math.hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]).toPrecision(6)), "m");
-  keep((x + a) / 2 + nx * aside, (y + b) / 2 + ny * aside, words);
+  if (!spare((x + a) / 2 + nx * aside, (y + b) / 2 + ny * aside, words, Math.atan2(uy, ux))) return []; // it is told under Properties
   const spot = `translate(${at((x + a) / 2, (y + b) / 2, aside)}) rotate(${upright.toFixed(2)})`;
   return [
     svg("path", { class: "dimension-line", d }),

@@ -77,7 +77,6 @@ function rowsOf(part, at) {
     ...(grounded ? [] : [["Let it slide …", () => with_("slide", spot)]]),
     ["Force on it …", () => with_("load", spot)],
     ["Spring from here …", () => with_("spring", spot)],
-    [state.locked.peek().includes(name) ? "Unlock it" : "Lock it", () => edit([{ do: "lock", point: name }])],
     last,
   ];
 }

@@ -52,7 +52,7 @@ function fill(holder) {
     if (!scene) {
       crank.player?.pause();
       crank.player = null;
-      const words = first ? `It does not move yet: ${first.what}${first.place ? ` (${first.place})` : ""}.` : whole ? "It stands still: no joint is driven." : "The mechanism moves as soon as it is whole and has a driver.";
+      const words = first ? `It does not move yet: ${first.what}${first.place ? ` (${first.place})` : ""}.` : whole ? "It stands still: no joint is driven." : state.answer.value?.outline ? "Being solved …" : "The mechanism moves as soon as it is whole and has a driver.";
       holder.replaceChildren(element("p", { class: "calm" }, words));
       return;
     }

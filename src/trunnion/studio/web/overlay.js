@@ -21,12 +21,14 @@ const CIRCLE = 12; // px: smaller friction circles are drawn enlarged
 const ROOM = 26; // px between the frame and what points out of it
 const LETTER = 7.3; // px, its width in what is written
 const LINE = 15; // px, its height
+const SMALL = 6.2; // px, a letter of a dimension
 const RING = 14; // px, radius of the ring of a joint that locks
 const NOTHING = 1e-9; // of the largest force: less is rounding
 const VECTORS = [["velocity", "v", "m/s"], ["acceleration", "a", "m/s²"]];
 
 /** Where words stand already, [{left, right, y}] px. */
 let taken = [];
+let dimensions = []; // the rows of those that are taken by dimensions
 let room = 0; // px, where words end at the right
 
 /** Make room for it: variants under the mechanism, all else over it. */
@@ -50,6 +52,7 @@ export function poseOverlay(view) {
   const told = view.ideal ? { point, seats: corner ? null : found.seats } : found; // the rest is where it is
   const key = []; // lines of the key, from below
   room = view.frame.width - 6;
+  dimensions = [];
   taken = [...view.parts.names, ...view.parts.loads].flatMap(({ box }) => box ?? []);
   if (sheet.beside().length) key.push(keyed(view, 22, "other assemblies", (x, y) => svg("g", { class: "ghost" }, svg("path", { d: `M${x},${y}h22` }))));
   layers.variants.replaceChildren(...(view.ideal ? nominal(view, wanted, key) : wanted.variant ? variants(view, key) : []));
@@ -57,7 +60,7 @@ export function poseOverlay(view) {
   const seats = wanted.seats && view.ideal ? (told.seats ?? []) : [];
   for (const { joint, node } of view.parts.vectors) set(node, { visibility: corner || seats.some((one) => one.joint === joint.name) ? "hidden" : null }); // drawn where it touches
   layers.overlay.replaceChildren(
-    ...dimensionMarks(view, words, (x, y, text) => taken.push({ left: x - 0.5 * LETTER * text.length, right: x + 0.5 * LETTER * text.length, y: y + 4 })),
+    ...dimensionMarks(view, words, spare),
     ...(told.circles ? circles(view, told.circles, key) : []),
     ...(told.transmission ? told.transmission.flatMap((one) => transmission(view, one)) : []),
     ...(told.centres ? centres(view, told.centres, wanted) : []),
@@ -77,6 +80,22 @@ function words(x, y, text, kind = "") {
   while (taken.some(meets)) y += LINE;
   taken.push({ left, right: left + wide, y });
   return svg("text", { class: `laid ${kind}`, x: (kind === "to-left" ? left + wide : left).toFixed(1), y: y.toFixed(1) }, text);
+}
+
+/** Whether there is room among the dimensions for words about a place, turned by an angle; then it is theirs. */
+function spare(x, y, text, turn) {
+  const half = 0.5 * SMALL * text.length;
+  const [c, s] = [Math.abs(Math.cos(turn)), Math.sin(turn) * Math.sign(Math.cos(turn) || 1)];
+  const steps = Math.ceil((half * Math.abs(s)) / (LINE / 2)); // a row for each line of height
+  const wide = steps ? Math.max((half * c) / (steps + 1), SMALL / 2) : half;
+  const rows = Array.from({ length: 2 * steps + 1 }, (_, order) => {
+    const share = steps ? order / steps - 1 : 0;
+    const middle = x + share * Math.max(half * c - wide, 0);
+    return { left: middle - wide, right: middle + wide, y: y + share * half * s + 4 };
+  });
+  const free = !rows.some((row) => dimensions.some((one) => row.left < one.right && row.right > one.left && Math.abs(one.y - row.y) < 0.8 * LINE));
+  if (free) [taken, dimensions].forEach((list) => list.push(...rows));
+  return free;
 }
 
 /** Words beyond the tip of an arrow from a spot. */

@@ -16,7 +16,8 @@ import * as state from "./state.js";
 import { Button, html } from "./ui.js";
 import { Variants, compared } from "./variants.js";
 
-const MOST = 24; // joints whose reactions are drawn
+const MOST = 24; // joints that are all drawn; of more the most loaded
+const LOADED = 12;
 const FEW = 2; // curves of a variant that are named one by one
 const DASHES = ["variant", "variant second"];
 const BEYOND = 10; // a margin that is larger is drawn there
@@ -30,6 +31,7 @@ const plane = signal("x–y");
 export function Plots() {
   return html`<div class="plots">
     <${Variants} />
+    ${state.solved.value && state.answer.value.scene.joints.length > MOST && html`<p class="calm">Of ${state.answer.value.scene.joints.length} joints the ${LOADED} most loaded are shown; others are among the curves of your choice.</p>`}
     <${Curves} class="charts" listOf=${curves} />
     <${Chosen} />
     <${Polars} />
@@ -92,12 +94,21 @@ function curves(found, others) {
 }
 
 function listed({ scene, margin, margin_least: least }) {
-  const few = { ...scene, joints: scene.joints.slice(0, MOST) };
+  const few = { ...scene, joints: drawnJoints(scene) };
   const list = charts(few, kindsOf(few));
   const series = margin ? [{ label: "margin", values: margin, kind: "k2", most: BEYOND }] : [];
   // one that is beyond 10 everywhere is shown only beside another
   list.splice(1, 0, { title: "Locking margin", unit: "", series, limits: [0, BEYOND], note: MEANING, only: !margin || least?.beyond });
   return list;
+}
+
+/** The joints that are drawn: of many those with the largest reactions. */
+function drawnJoints(scene) {
+  const { joints, count } = scene;
+  if (joints.length <= MOST) return joints;
+  scene.loaded ??= joints.map((joint) => ({ joint, most: Math.max(...magnitude(joint.reaction, count).map((size) => size ?? 0)) }))
+    .sort((one, other) => other.most - one.most).slice(0, LOADED).map(({ joint }) => joint); // prettier-ignore
+  return scene.loaded;
 }
 
 /** Lay the series of a variant's chart over the one of the same title. */
@@ -128,7 +139,7 @@ function Joints() {
   if (!state.solved.value) return null;
   const ofCycle = (name) => !coming && figures.find(([label]) => label.startsWith(`reaction of ${name}, maximum`)); // between positions too
   const largest = (values) => values.reduce((best, value, index) => ((value ?? -1) > (values[best] ?? -1) ? index : best), 0);
-  const rows = scene.joints.slice(0, MOST).map(({ name, reaction, friction_power: power }) => {
+  const rows = drawnJoints(scene).map(({ name, reaction, friction_power: power }) => {
     const cell = (values, unit) => {
       const index = largest(values);
       return values[index] ? [quantity(values[index], unit, undefined, scene.units), position(scene, index)] : ["0", ""];
@@ -170,7 +181,7 @@ function loops({ scene }, others) {
   const axes = plane.value.split("–");
   const seen = scene.space === "spatial" ? axes : ["x", "y"];
   const [other] = others;
-  return scene.joints.slice(0, MOST).map((joint) => {
+  return drawnJoints(scene).map((joint) => {
     const ideal = other?.scene.joints.find(({ name }) => name === joint.name)?.reaction ?? null;
     const chart = polarChart(framed(scene), { ...joint, ideal }, kinds.get(joint.name), crank.pick, seen);
     if (ideal) chart.element.append(Object.assign(document.createElement("p"), { className: "remark", textContent: `Dashed: ${other.name}` }));

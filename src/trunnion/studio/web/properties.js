@@ -45,9 +45,6 @@ function Chosen({ kind, name }) {
       <p class="row-of-buttons">
         ${kind === "joints" && !driver && html`<${Button} label="Drive this joint" onClick=${() => edit([{ do: "driver", joint: name }])} />`}
         ${kind === "joints" && !MANY_WAYS.has(entries?.joints?.[name]?.type) && html`<${Button} label="Load against its motion" onClick=${() => edit([{ do: "load", against: name }])} />`}
-        ${kind === "loads" && against(entries, name).map((joint) => html`<${Button} label=${`Let it oppose the motion of ${joint}`} onClick=${() => edit([{ do: "load", against: joint, instead: name }])} />`)}
-        ${(kind === "joints" || kind === "points") && !state.spatial.value && html`<${Button} label=${state.locked.value.includes(name) ? "Unlock" : "Lock"}
-          title="A locked joint stays where it is while others are dragged (K)" onClick=${() => edit([{ do: "lock", point: name }])} />`}
         ${kind === "points" && !state.spatial.value && html`<${Button} label="Pin to the ground" onClick=${() => edit([{ do: "pin", point: name }])} />`}
         ${!(kind === "links" && name === groundOf(entries)) && html`<${Button} label=${`Delete ${NOUNS[kind].toLowerCase()}`} onClick=${() => removePart({ kind, name })} />`}
         <${Button} label="All parts" onClick=${() => (state.selection.value = null)} />
@@ -60,14 +57,6 @@ function arrowOf(joint) {
   if (!joint) return null;
   const { type, links: [first, second] } = joint; // prettier-ignore
   return `Its arrow is the force on ${second} by ${first}${type === "prismatic" ? ", the friction along the guide included" : ""}.`;
-}
-
-/** The slides and pivots on the ground that a load with a direction could oppose. */
-function against(entries, name) {
-  const { link } = entries?.loads?.[name] ?? {};
-  const ground = groundOf(entries);
-  const joints = Object.entries(dictionary(entries?.joints));
-  return link && !state.spatial.value ? joints.filter(([, one]) => one?.links?.includes(link) && one.links.includes(ground)).map(([joint]) => joint) : [];
 }
 
 function Name({ kind, name }) {

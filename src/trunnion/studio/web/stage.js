@@ -45,7 +45,6 @@ function mount(holder) {
     effect(() => show(view)),
     effect(() => {
       state.selection.value;
-      state.locked.value;
       others.value;
       laid.value;
       compared.value;
@@ -97,7 +96,7 @@ function show(view) {
   }
   pose(view, found.scene, index, state.share.value);
   if (view.fresh && view.sized) {
-    view.fresh = false;
+    view.fresh = Boolean(state.answer.peek()?.outline); // the whole motion is to be in view
     untracked(sheet.fit);
   }
   untracked(() => chosen(view));

@@ -46,8 +46,6 @@ export const boxed = signal(null);
 export const shifted = signal(null);
 /** The end or place on a link {kind, name, on, at} that a dragged end is joined with where it is let go, or null. */
 export const dropping = signal(null);
-/** Joints, and free points "link.P", that stay where they are while others are dragged. */
-export const locked = signal([]);
 /** Answer to the latest `drag` question while a joint is dragged. */
 export const live = signal(null);
 /** How many times as large as they are errors and play are drawn. */
@@ -105,7 +103,7 @@ export function say(words, bad = false) {
 }
 
 /**
- * Take a text with its places and locks as the present ones, `before` {text, places, locked} becoming a step to undo. Steps with the same
+ * Take a text with its places as the present ones, `before` {text, places} becoming a step to undo. Steps with the same
  * `merge` in a row (arrow keys, a slider, typed letters) are one.
  */
 export function commit(name, before, next, merge = null) {
@@ -116,7 +114,6 @@ export function commit(name, before, next, merge = null) {
     future.value = [];
     text.value = next.text;
     places.value = next.places;
-    locked.value = next.locked;
   });
 }
 
@@ -131,10 +128,9 @@ function swap(from, to) {
   if (!step) return null;
   batch(() => {
     from.value = from.value.slice(0, -1);
-    to.value = [...to.value, { name: step.name, text: text.value, places: places.value, locked: locked.value }];
+    to.value = [...to.value, { name: step.name, text: text.value, places: places.value }];
     text.value = step.text;
     places.value = step.places;
-    locked.value = step.locked ?? [];
     recovered.value = null;
   });
   return step.name;
@@ -153,7 +149,6 @@ export function begin({ name, saved, content, steps = null }) {
     basis.value = steps && content !== saved ? steps.saved : saved;
     text.value = content;
     places.value = steps?.places ?? {};
-    locked.value = steps?.locked ?? [];
     past.value = steps?.past ?? [];
     future.value = steps?.future ?? [];
     corner.value = null;

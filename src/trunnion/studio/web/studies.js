@@ -6,6 +6,14 @@ import { request } from "./socket.js";
 import * as state from "./state.js";
 import { Button, html } from "./ui.js";
 
+/** What a study is called; others by their verb. */
+const TITLES = {
+  locking: "Locking", assemble: "Assembly", play: "Play", sweep: "Sweep of a number", tolerance: "Tolerances", allocate: "Tolerances to buy", simulate: "Motion in time",
+  design: "Design", optimise: "Best numbers", compare: "Compare with measured data", identify: "Identify from measured data", rig: "Virtual test rig",
+}; // prettier-ignore
+const titleOf = (name) => TITLES[name] ?? `${name[0].toUpperCase()}${name.slice(1)}`;
+/** Help of an option without what is for the command line alone. */
+const plainHelp = (help) => help.replace(/\s*\([^()]*--[^()]*\)/g, "").replace(/[;,] [^;,.]*exit status[^;,.]*/g, "");
 const OFTEN = 400; // ms between two looks at what runs
 /** What the chips of the bar below ask, by the study that answers it. */
 export const STUDY_OF = { play: "play", tolerance: "tolerance", time: "simulate" };
@@ -67,7 +75,7 @@ export function Studies() {
     <div class="studies">
       <form onSubmit=${start}>
         <label class="choice">Study <select aria-label="Study" value=${form.verb} onChange=${(event) => (verb.value = event.target.value)}>
-          ${known.value.forms.map((one) => html`<option value=${one.verb}>${one.verb}</option>`)}</select></label>
+          ${known.value.forms.map((one) => html`<option value=${one.verb}>${titleOf(one.verb)}</option>`)}</select></label>
         <p class="calm">${form.help}</p>
         ${form.mapping && html`<label class="field"><span>mapping</span><select aria-label="mapping" value=${mapping} onChange=${(event) => setMapping(event.target.value)}>
           <option value="">the file that describes the measured data</option>${state.folder.value.names.map((name) => html`<option>${name}</option>`)}</select></label>`}
@@ -85,14 +93,14 @@ export function Studies() {
 function Field({ study, field: { flag, help, kind, choices, several, usual } }) {
   const own = settings.value[study]?.[flag] ?? "";
   const put = (value) => (settings.value = { ...settings.value, [study]: { ...settings.value[study], [flag]: value } });
-  const name = flag.slice(2);
+  const name = flag.slice(2).replaceAll("-", " ");
   const control = () => {
     if (kind === "flag") return html`<input type="checkbox" aria-label=${name} checked=${own === true} onChange=${(event) => put(event.target.checked)} />`;
     if (choices) return html`<select aria-label=${name} value=${own} onChange=${(event) => put(event.target.value)}><option value="">${usual || "as usual"}</option>${choices.map((one) => html`<option>${one}</option>`)}</select>`;
     if (several) return html`<textarea aria-label=${name} rows=${Math.max(own.split("\n").length, 1)} placeholder="one a line" value=${own} onInput=${(event) => put(event.target.value)}></textarea>`;
     return html`<input aria-label=${name} value=${own} placeholder=${usual} inputmode=${kind === "number" ? "decimal" : "text"} onInput=${(event) => put(event.target.value)} />`;
   };
-  return html`<label class="field" title=${help}><span>${name}</span>${control()}<small class="calm">${help}</small></label>`;
+  return html`<label class="field" title=${plainHelp(help)}><span>${name}</span>${control()}<small class="calm">${plainHelp(help)}</small></label>`;
 }
 
 function Job({ job, latest, open }) {
@@ -104,16 +112,17 @@ function Job({ job, latest, open }) {
   const copy = () => navigator.clipboard?.writeText(command).then(() => state.say("The command is on the clipboard."));
   const stop = () => request(`/jobs/${id}`, { method: "DELETE" }).then(look);
   return html`<article class="job">
-    <p><code>${command}</code>${doubts && html` <em class="calm">(${doubts})</em>`}</p>
+    <p><b>${titleOf(verb)}</b>${doubts && html` <em class="calm">(${doubts})</em>`}</p>
     <p class="row-of-buttons"><span role="status">${words}, ${seconds} s${running && done !== null ? `, ${done}${total ? ` of ${total}` : ""}` : ""}</span>
       ${running && html`<progress aria-label="Progress" value=${total ? done : undefined} max=${total ?? undefined}></progress><${Button} label="Stop" onClick=${stop} />`}
       ${report && html`<${Button} label="Open the report" onClick=${open} /><a class="plain" href=${report} download=${`${verb}.html`}>Save the report</a>`}
       <${Button} label="Copy as command" onClick=${copy} /></p>
+    <details><summary>Command</summary><code>${command}</code></details>
     ${output.trim() && html`<details open=${latest || (!report && !running)}><summary>Output</summary><pre>${output}</pre></details>`}
   </article>`; // prettier-ignore
 }
 
 function Report({ job, back }) {
-  return html`<p class="row-of-buttons"><${Button} label="Back to the studies" onClick=${back} /> <code>${job.command}</code></p>
+  return html`<p class="row-of-buttons"><${Button} label="Back to the studies" onClick=${back} /> <b>${titleOf(job.verb)}</b></p>
     <iframe class="report" title=${`Report of ${job.command}`} sandbox="allow-scripts allow-downloads" src=${job.report}></iframe>`;
 }

@@ -33,7 +33,6 @@ export const TOOLS = [
   { id: "point", label: "Point", key: "C", hint: ["Click the link that the point belongs to.", "Click where on it, or beside it, the point is."], click: addPoint, on: true },
   { id: "load", label: "Load", key: "F", hint: ["Click the joint, point or link that the force acts on.", "Click the direction of the force, or the same slide, pivot or link again for one against its motion; type its size first, as 250 N."], click: load, tells: tellForce, begins: /[0-9.,]/, on: true },
   { id: "spring", label: "Spring", key: "S", hint: ["Click the first end of a spring: a point, a link, or the ground.", "Click the second end; type the stiffness first, as 2 N/mm."], click: spring, tells: tellStiffness, begins: /[0-9.,]/, on: true },
-  { id: "lock", label: "Lock", key: "K", hint: ["Click a joint to keep it where it is while others are dragged, or to let it go again."], click: lock },
   { id: "delete", label: "Delete", key: "X", hint: ["Click what is to go."], click: remove },
 ]; // prettier-ignore
 
@@ -290,12 +289,7 @@ function tellStiffness() {
   return `${letters}${/[a-z]/i.test(letters) ? "" : " N/mm"}`;
 }
 
-// ---- locks, and what goes
-
-function lock({ kind, name }) {
-  if (!kind) return say("Click a joint or a point.", true);
-  edit([{ do: "lock", point: name }]);
-}
+// ---- what goes
 
 function remove(spot, { part }) {
   const what = spot.kind ? { kind: spot.kind, name: spot.name } : part;

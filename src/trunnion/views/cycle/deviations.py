@@ -13,7 +13,6 @@ from trunnion.results.attributes import units_of
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import Units, number, prefixed, quantity
 from trunnion.results.scales import without_noise
-from trunnion.studies.play import play as play_of
 from trunnion.views.common.cycle import (
     Array,
     abscissa,
@@ -127,6 +126,8 @@ def with_worst_case(result: xr.Dataset, mechanism: Mechanism) -> xr.Dataset:
     `transmission_centre` and `transmission_reach` (joint, position), rad or m, NaN of joints that are no outputs: the
     error with every pin in the middle of its hole, and the most that all plays can add to it, to first order.
     """
+    from trunnion.studies.play import play as play_of  # not for the first picture of the studio
+
     driven = outputs(result) if has(result, "errors") else []
     if not driven:
         return result

@@ -1,4 +1,4 @@
-"""The worst corner of tolerances and plays for a measure, as `tolerance` finds it, with the mechanism there."""
+"""What is laid over a drawing of a solved mechanism: instant centres, transmission angles, seats, the worst corner."""
 
 from __future__ import annotations
 
@@ -12,14 +12,59 @@ from trunnion.algebra.dual import primal
 from trunnion.measures.measures import chosen, outputs
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import quantity
+from trunnion.solve.forward import Forward
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.shifts import play_of
+from trunnion.studies.design import instant_centres, transmission_angles
+from trunnion.studio.message import Exact
+from trunnion.studio.placed import column
+from trunnion.views.cycle.deviations import seated
 from trunnion.views.cycle.scene import scene
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from trunnion.studies.tolerance.first_order import ToleranceStudy
 
-__all__ = ["corner_of", "measured"]
+__all__ = ["centres_of", "corner_of", "measured", "seats_of", "transmission_of"]
+
+MOST_LINKS = 12  # whose instant centres against each other are told; of more only those against the ground
+
+
+def centres_of(walk: Forward, steps: int) -> list[dict[str, Any]]:
+    """Instant centres of the pairs of links; `ground`: whether one of them is it."""
+    ground = walk.system.mechanism.fixed_link
+    return [
+        {**vars(row), "ground": ground in row.pair, "far": row.far and dict(zip("xy", row.far, strict=True))}
+        for row in instant_centres(walk, steps, MOST_LINKS)
+    ]
+
+
+def seats_of(result: xr.Dataset) -> list[dict[str, Any]]:
+    """Of each joint with a seat, at each end: offset of the pin from the middle of its hole, m, and force of the pin on
+    the hole, N, both in the hole's axes.
+    """
+    return [
+        {
+            "joint": seat.joint, "kind": seat.kind, "clearance": seat.clearance, "length": seat.length,
+            "ends": [{what: {axis: Exact(row) for axis, row in zip("xy", rows, strict=True)}
+                      for what, rows in (("offset", offset), ("force", force))}
+                     for offset, force in zip(seat.offsets, seat.forces, strict=True)],
+        }
+        for seat in seated(result)
+    ]  # fmt: skip
+
+
+@np.errstate(all="ignore")
+def transmission_of(walk: Forward, steps: int) -> list[dict[str, Any]]:
+    """Transmission angle of each dyad, rad, 0 … π/2, and its middle joint."""
+    middle = {"-".join(module.joints): module.joints[1:2] for module in walk.system.plan.modules}
+    angles = transmission_angles(walk)
+    return [{"name": name, "joint": joint, "angle": column(angle, steps)}
+            for name, angle in angles.items() for joint in middle[name]]  # fmt: skip
+
+
+# ---- the worst corner ---------------------------------------------------------------------------------------------
 
 
 def measured(run: Run) -> dict[str, list[str]]:
@@ -74,9 +119,8 @@ def _scene(prepared: ToleranceStudy, numbers: Mapping[str, float], steps: int) -
     inputs, bare = prepared.inputs, prepare(prepared.run.system.mechanism.with_friction("off"))
     run = replace(bare, values={**bare.values, **numbers})
     run.__dict__.update(ideal_values=inputs.nominal, erring=True, seats=[])  # its pins lie where the corner has them
-    drawn_scene = scene(
-        result_of(run, positions(run, steps, margin=False, averaged=False)).dataset, max_positions=steps
-    )
+    result = result_of(run, positions(run, steps, margin=False, averaged=False)).dataset
+    drawn_scene = scene(result, max_positions=steps)
     for joint in inputs.loose:
         play, links = inputs.play(joint, numbers), run.system.joints[joint][1]
         assert play is not None  # else it would not be loose

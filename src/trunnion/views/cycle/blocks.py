@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,17 +41,11 @@ def blocks_of(system: System, result: xr.Dataset) -> dict[str, Any]:
             later = next(link for link in links if link != earlier)
             wire = {"joint": joint, "type": kind, "from": home[earlier], "to": number, "links": [earlier, later]}
             wires.append(wire | _passing(system, result, joint, earlier, later))
-        blocks.append(
-            {
-                "label": module.label,
-                "kind": "driver" if module.rank == 1 else module.kind,
-                "links": list(module.links),
-                "inner": inner,
-                "driven": list(module.driven),
-                "gears": list(module.gears),
-                "share": _share(result, module.joints),
-            }
-        )
+        blocks.append({
+            "label": module.label, "kind": "driver" if module.rank == 1 else module.kind, "links": list(module.links),
+            "inner": inner, "driven": list(module.driven), "gears": list(module.gears),
+            "share": _share(result, module.joints),
+        })  # fmt: skip
     return {"blocks": blocks, "wires": wires}
 
 
@@ -70,10 +63,9 @@ def _passing(system: System, result: xr.Dataset, joint: str, earlier: str, later
         forward["angle"] = result["link_angle"].sel(link=earlier).values
         forward["rate"] = result["link_angle_velocity"].sel(link=earlier).values
     sign = -1.0 if system.joints[joint][1][1] == later else 1.0  # reactions are on the second link, by the first
-    force = dict(zip(axes, sign * result["reaction_force"].sel(joint=joint).values, strict=True))
     moment = sign * result["reaction_moment"].sel(joint=joint).values
-    back: Mapping[str, Any] = {
-        "force": force,
+    back = {
+        "force": dict(zip(axes, sign * result["reaction_force"].sel(joint=joint).values, strict=True)),
         "moment": dict(zip(axes, moment, strict=True)) if moment.ndim > 1 else moment,
         "friction": result["friction_torque" if system.turns(joint) else "friction_force"].sel(joint=joint).values,
     }

@@ -19,19 +19,14 @@ from trunnion.model.renaming import renamed
 from trunnion.model.units import KINDS, unit
 from trunnion.studio.changing import delete
 from trunnion.studio.sketch import LIMITS, Sketch, Vector
-from trunnion.studio.strokes import letter, numbered, refused, vector
+from trunnion.studio.strokes import letter, numbered, refused, spoken_of, vector
 
 __all__ = ["group"]
 
 Given = Mapping[str, Any]
 PLAIN = re.compile(r"([\d.]+([eE][-+]?\d+)?\s*([^\W\d]*|°)|[^\W\d]\w*)")  # a number or a name, without a sign
 DRIVEN = {"speed", "start", "range", "law", "ends"}  # of a driver that is mirrored
-SIDED = (
-    "gears",
-    "measures",
-    "errors",
-    "tolerances",
-)  # what may speak of a side that a mirror changes
+SIDED = ("gears", "measures", "errors", "tolerances")  # what may speak of a side that a mirror changes
 DIRECTED = {"seat", "seat_on", "misalignment", "only", "backward"}  # keys that do
 
 
@@ -59,8 +54,11 @@ def group(sketch: Sketch, gesture: Given) -> str:
     else:
         x, y = vector(gesture["at"])
         signs, offset = ((1, -1), (0.0, 2 * y)) if gesture.get("level") else ((-1, 1), (2 * x, 0.0))
-        if gesture.get("start"):
-            _assembled(sketch, links)
+        hints = sketch.section("assembly")
+        for name, item in sketch.joints.items():  # without hints the other assembly may be taken
+            place = sketch.places.get(f"{item['links'][1]}.{name}") if gesture.get("start") else None
+            if place and set(item["links"]) <= set(links) and name not in hints:
+                hints[name] = [sketch.length(part) for part in place]
         _Moving(sketch, links, signs, offset).do()
     return f"{ {'shift': 'Move', 'mirror': 'Mirror'}.get(what, 'Copy') } {title}"
 
@@ -79,8 +77,6 @@ class _Moving:
         sketch, ground = self.sketch, self.sketch.ground
         mine = {name: item for name, item in sketch.joints.items() if set(item["links"]) & set(self.links)}
         outside = [name for name, item in mine.items() if not set(item["links"]) <= {*self.links, ground}]
-        if locked := [name for name in mine if name in sketch.locked]:
-            raise refused("is locked where it is", ", ".join(locked), "unlock it first (K)")
         for name in outside:
             if sketch.kind(name) != "revolute":
                 raise refused("slides along a link that is not chosen", f"joints.{name}", "choose both links")
@@ -134,15 +130,11 @@ class _Moving:
             parts.append(part if sign * before + by == before else moved)
         return parts
 
-    def _half(self, joint: str) -> float:
-        """What the rotation q of a joint is taken from when it is mirrored, rad: q' = half − q."""
-        if self.signs[0] > 0 or self.sketch.ground not in self.sketch.joints[joint]["links"]:
-            return 0.0
-        return pi if self.sketch.joints[joint]["links"][0] == self.sketch.ground else -pi
-
     def _angle(self, joint: str, value: Any) -> Any:
-        turned = degrees(self._half(joint) - self._value(value, "angle"))
-        return f"{round(turned, 12) + 0.0:.15g} deg{_limits(value)}"
+        """The rotation of a joint when it is mirrored: −q, or from the ground over an upright line ±π − q."""
+        first, second = self.sketch.joints[joint]["links"]
+        half = 0.0 if self.signs[0] > 0 else {first: pi, second: -pi}.get(self.sketch.ground, 0.0)
+        return f"{round(degrees(half - self._value(value, 'angle')), 12) + 0.0:.15g} deg{_limits(value)}"
 
     # ---- mirrored --------------------------------------------------------------------------------------------
 
@@ -180,16 +172,13 @@ class _Moving:
                     driver["start"] = self._angle(name, driver.get("start", 0))
         for name, load in sketch.of("loads").items():
             if load.get("link") in self.links:
-                self._still(f"loads.{name}", [*load.get("force", ()), load.get("moment", 0)])
+                parts = [part for part in (*load.get("force", ()), load.get("moment")) if isinstance(part, str)]
+                symbols = {symbol for part in parts for symbol in Quantity.read(part).names}
+                if symbols - set(sketch.section("dimensions")):
+                    raise refused("follows the motion by a formula", f"loads.{name}", "mirror it in the text")
                 signs = (1, -1) if load.get("frame") == "link" else self.signs
                 load |= {"force": _signed(load["force"], signs)} if "force" in load else {}
                 load |= {"moment": _negated(load["moment"])} if "moment" in load else {}
-
-    def _still(self, where: str, parts: list[Any]) -> None:
-        """Refuse a load that follows the motion: its formula speaks of angles or joints as they were."""
-        names = {name for part in parts if isinstance(part, str) for name in Quantity.read(part).names}
-        if names - set(self.sketch.section("dimensions")):
-            raise refused("follows the motion by a formula", where, "mirror it in the text")
 
 
 def _signed(parts: list[Any], signs: tuple[int, int]) -> list[Any]:
@@ -223,19 +212,11 @@ def _limits(value: Any) -> str:
     return limits[0] if limits else ""
 
 
-def _assembled(sketch: Sketch, links: list[str]) -> None:
-    """Hints of where the joints between some links are at the start: without them the other assembly may be taken."""
-    hints = sketch.section("assembly")
-    for name, item in sketch.joints.items():
-        if set(item["links"]) <= set(links) and name not in hints and f"{item['links'][1]}.{name}" in sketch.places:
-            hints[name] = [sketch.length(part) for part in sketch.places[f"{item['links'][1]}.{name}"]]
-
-
 def _fastened(sketch: Sketch, links: list[str]) -> set[str]:
     """Points of the ground that springs of some links are fastened to."""
     ends = [[str(end).split(".") for end in item.get("between") or ()] for item in sketch.of("springs").values()]
-    used = [pair for pair in ends if any(link in links for link, *_ in pair)]
-    return {point for pair in used for link, point in pair if link == sketch.ground}
+    return {point for pair in ends if any(link in links for link, *_ in pair)
+            for link, point in pair if link == sketch.ground}  # fmt: skip
 
 
 # ---- copied ---------------------------------------------------------------------------------------------------
@@ -251,7 +232,7 @@ def _copied(sketch: Sketch, links: list[str]) -> list[str]:
              if set(item["links"]) <= {*links, ground} and set(item["links"]) & set(links)]  # fmt: skip
     names: dict[str, str] = {}
     for link in links:
-        names[link] = _again(sketch, "links", link)
+        names[link] = numbered(sketch, "links", link.rstrip("0123456789") or link)
         sketch.section("links")[names[link]] = {"points": {}}  # its name is spoken for
     points: dict[str, str] = {}
     of_links = [point for link in links for point in sketch.points(link)]
@@ -273,18 +254,12 @@ def _add(sketch: Sketch, part: Mapping[str, Any], names: Mapping[str, str], poin
     """Add what has new names in a copy of the entries, and what acts between those."""
     ground, links, joints = sketch.ground, set(names.values()), set(points.values())
     for section, copied in (("links", links), ("joints", joints), ("drivers", joints), ("assembly", joints)):
-        sketch.section(section).update(
-            {name: item for name, item in (part.get(section) or {}).items() if name in copied}
-        )
+        entries = part.get(section) or {}
+        sketch.section(section).update({name: item for name, item in entries.items() if name in copied})
     fixed = part["links"].get(ground, {}).get("points", {})
     sketch.section("links")[ground]["points"] |= {name: at for name, at in fixed.items() if name in joints}
     for section in ("loads", "springs", "gears"):
         for name, item in (part.get(section) or {}).items():
-            ends = [str(end).partition(".")[0] for end in item.get("between", ())]
-            parts = {*ends, item.get("link"), item.get("joint"), *item.get("joints", ())} - {None}
+            parts = {part.partition(".")[0] for part in spoken_of(item)}
             if parts <= {*links, *joints, ground} and item != sketch.section(section)[name]:
-                sketch.section(section)[_again(sketch, section, name)] = item
-
-
-def _again(sketch: Sketch, section: str, name: str) -> str:
-    return numbered(sketch, section, name.rstrip("0123456789") or name)
+                sketch.section(section)[numbered(sketch, section, name.rstrip("0123456789") or name)] = item

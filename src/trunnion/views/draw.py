@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import singledispatch
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection
-from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize, to_hex, to_rgba
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize, to_hex, to_rgba
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator, ScalarFormatter
 
@@ -22,9 +22,9 @@ from trunnion.views.charts import (
     Axis,
     Band,
     Bars,
-    Cells,
     Chart,
     ColourScale,
+    Contours,
     Line,
     Look,
     Note,
@@ -55,15 +55,15 @@ from trunnion.views.common.figures import (
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.colorbar import Colorbar
     from matplotlib.figure import Figure, FigureBase
 
-__all__ = ["Board", "chart", "figure", "plot", "small"]
+__all__ = ["chart", "figure", "grid", "plot", "small"]
 
 COLOURS = {"ink": INK, "muted": MUTED, "rule": RULE, "shade": SHADE, "limit": "#a1260d", "pale": "#b9c3cd"}
 DASHES: dict[str, Any] = {"solid": "-", "long": (0, (5, 2)), "dashed": (0, (3, 2)), "short": (0, (2, 1.5)),
                           "dotted": (0, (1, 1.5)), "dash-dot": (0, (6, 2, 1.5, 2)),
                           "none": "none"}  # fmt: skip
+BANDED = colormaps["viridis"]
 # without the end that fades on white
 RISING: Colormap = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)), "viridis to green")
 PAGE = {1: WIDTH, 2: 12.6, 3: 14.4}  # width of a figure by its columns, inches
@@ -130,90 +130,56 @@ def _panel(place: FigureBase, panel: Panel, wide: float, labels: Labels) -> None
                 labels.add(axes, mark.text, np.array([mark.x, mark.y]), mark.size, weight="normal")
 
 
-class Board(NamedTuple):
-    """Panels that share both axes, labelled along their outer edges, and a strip above several for their legend."""
+def grid(
+    title: str, result: xr.Dataset, charts: Sequence[Chart], columns: int, colours: ColourScale | None = None
+) -> Figure:
+    """Charts with common axes in rows, titled along the outer ones; their legend and the scale of colours at the right.
 
-    sheet: Figure
-    axes: list[Axes]
-    columns: int
-    strip: Axes | None
-
-    @classmethod
-    def new(cls, title: str, result: xr.Dataset, count: int, columns: int) -> Board:
-        """Empty panels, so many, under a title."""
-        rows = -(-count // columns)
-        height = (4.3 if count == 1 else 1.6 + {1: 2.5, 2: 2.1}.get(rows, 1.9) * rows) + 0.2 * title.count("\n")
-        sheet = new(title, result, height)
-        space = sheet.add_gridspec(rows + 1, columns, height_ratios=[0.01] + [1.0] * rows)
-        panels: list[Axes] = []
-        for k in range(count):
-            shared = panels[0] if panels else None
-            where = space[1 + k // columns, k % columns] if count > 1 else space[:, :]
-            panels.append(sheet.add_subplot(where, sharex=shared, sharey=shared))
-        strip = sheet.add_subplot(space[0, :]) if count > 1 else None
-        if strip is not None:
-            strip.set_axis_off()
-        return cls(sheet, panels, columns, strip)
-
-    def draw(self, k: int, spec: Chart) -> Axes:
-        """The chart of the panel k; titles of its axes stand at the outer panels alone."""
-        axes, lowest, leftmost = self.axes[k], k + self.columns >= len(self.axes), k % self.columns == 0
-        chart(axes, spec)
+    Parameters
+    ----------
+    title : of the whole figure, of one line or more
+    result : whose mechanism is named beneath
+    charts : what is drawn, row by row
+    columns : charts side by side
+    colours : what the colours of all charts mean
+    """
+    rows = -(-len(charts) // columns)
+    height = (4.0 if rows == 1 else 0.9 + 2.1 * rows) + 0.2 * title.count("\n")
+    sheet = new(title, result, height, WIDTH if len(charts) == 1 else 9.4)
+    places = sheet.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel().tolist()
+    named: dict[str, Any] = {}
+    for k, (axes, spec) in enumerate(zip(places, charts, strict=False)):
+        chart(axes, spec if len(charts) == 1 else replace(spec, legend=None))
+        lowest, leftmost = k + columns >= len(charts), k % columns == 0
         axes.tick_params(labelbottom=lowest, labelleft=leftmost)
-        if not lowest:
-            axes.set_xlabel("")
-        if not leftmost:
-            axes.set_ylabel("")
-        axes.title.set_fontsize(8.5)
-        axes.set_title(axes.get_title(loc="left"), loc="left", fontsize=(8.5, 8.5, 8.5, 8.0, 7.2)[self.columns])
-        return axes
-
-    def add(self, k: int, spec: Chart) -> None:
-        """The marks of a chart, over what the panel k has."""
-        for mark in spec.marks:
-            _mark(mark, self.axes[k], spec)
-
-    def finish(self, colours: ColourScale | None = None) -> None:
-        """A legend of everything that is named in any panel; the scale of their colours beside all."""
-        if self.strip is None:
-            legend(self.axes[0], least=1)
-        else:
-            named: dict[str, Any] = {}
-            entries = [pair for axes in self.axes for pair in zip(*axes.get_legend_handles_labels(), strict=True)]
-            for handle, label in sorted(entries, key=lambda pair: not isinstance(pair[0], Line2D)):  # curves first
-                named.setdefault(label, handle)
-            if not named:
-                self.strip.remove()
-            else:
-                columns = max(1, min(len(named), 100 // (max(map(len, named)) + 7)))
-                self.strip.legend(
-                    list(named.values()), list(named), loc="lower left", bbox_to_anchor=(0.0, 0.0), ncols=columns,
-                    frameon=False, fontsize=8.5, labelcolor=INK, handlelength=2.2, columnspacing=1.6,
-                    borderaxespad=0.0,
-                )  # fmt: skip
-        if colours is not None:
-            self.colour_bar(_mappable(colours), colours.title).outline.set_visible(False)
-
-    def colour_bar(self, colours: ScalarMappable, title: str, ticks: Array | None = None) -> Colorbar:
-        """A scale of colours beside all panels."""
-        rows = -(-len(self.axes) // self.columns)
-        bar = _colour_bar(self.sheet, self.axes, colours, title, 30 if len(self.axes) == 1 else 24 * rows, ticks)
-        bar.ax.minorticks_off()
-        return bar
+        axes.set_xlabel(axes.get_xlabel() if lowest else "")
+        axes.set_ylabel(axes.get_ylabel() if leftmost else "")
+        named |= dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    for axes in places[len(charts) :]:
+        axes.remove()
+    if len(charts) > 1 and named:
+        sheet.legend(list(named.values()), list(named), loc="outside right upper", frameon=False, fontsize=8.5,
+                     labelcolor=INK)  # fmt: skip
+    if colours is not None:
+        _colour_bar(sheet, places[: len(charts)], colours)
+    return sheet
 
 
-def _mappable(scale: ColourScale) -> ScalarMappable:
-    return ScalarMappable((LogNorm if scale.log else Normalize)(scale.low, scale.high), RISING)
-
-
-def _colour_bar(
-    sheet: Figure, axes: Any, colours: ScalarMappable, title: str, aspect: float = 30, ticks: Array | None = None
-) -> Colorbar:
+def _colour_bar(sheet: Figure, axes: Any, scale: ColourScale) -> None:
     """A scale of colours beside axes."""
-    bar = sheet.colorbar(colours, ax=axes, pad=0.02, aspect=aspect, ticks=ticks)
-    bar.set_label(plain(title), fontsize=9, color=INK)
+    colours = ScalarMappable((LogNorm if scale.log else Normalize)(scale.low, scale.high), RISING)
+    bar = sheet.colorbar(_bands(scale) if scale.levels else colours, ax=axes, pad=0.02, aspect=30,
+                         ticks=scale.levels or None)  # fmt: skip
+    bar.set_label(plain(scale.title), fontsize=9, color=INK)
     bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
-    return bar
+    bar.outline.set_visible(False)
+
+
+def _bands(scale: ColourScale) -> ScalarMappable:
+    """The colours of bands between levels, with more at either end where a number is beyond."""
+    below, above = scale.low < scale.levels[0], scale.high > scale.levels[-1]
+    extend: Any = "both" if below and above else "min" if below else "max" if above else "neither"
+    return ScalarMappable(BoundaryNorm(scale.levels, BANDED.N, extend=extend), BANDED)
 
 
 def chart(axes: Axes, spec: Chart, wide: float = 1.0) -> None:
@@ -242,7 +208,7 @@ def chart(axes: Axes, spec: Chart, wide: float = 1.0) -> None:
     if spec.aside:
         axes.set_title(plain(spec.aside), fontsize=7.5, color=MUTED, loc="right", pad=2)
     if spec.colours is not None:
-        _colour_bar(axes.figure, axes, _mappable(spec.colours), spec.colours.title)  # type: ignore[arg-type]
+        _colour_bar(axes.figure, axes, spec.colours)  # type: ignore[arg-type]
     if spec.legend is not None:
         legend(axes, spec.legend.most, int(wide * spec.legend.room), spec.legend.least, spec.legend.lift)
 
@@ -390,10 +356,8 @@ def _stairs(mark: Stairs, axes: Axes, spec: Chart) -> None:
 
 @_mark.register(Bars)
 def _bars(mark: Bars, axes: Axes, spec: Chart) -> None:
-    spread = None if mark.low is None or mark.high is None else np.stack([mark.low, mark.high])
     axes.barh(mark.at, mark.sizes, mark.thickness, color=colour(mark.look.colour), label=_name(mark.name),
-              zorder=mark.look.order, xerr=spread,
-              error_kw={"ecolor": INK, "elinewidth": 1.0, "capsize": 2.5})  # fmt: skip
+              zorder=mark.look.order)  # fmt: skip
 
 
 @_mark.register(Rule)
@@ -443,23 +407,25 @@ def _note(mark: Note, axes: Axes, spec: Chart) -> None:
     )  # fmt: skip
 
 
-@_mark.register(Cells)
-def _cells(mark: Cells, axes: Axes, spec: Chart) -> None:
-    count = len(mark.names)
-    picture = axes.imshow(np.ma.masked_invalid(mark.values), vmin=-1, vmax=1, cmap=colormaps["RdBu_r"])
+@_mark.register(Contours)
+def _contours(mark: Contours, axes: Axes, spec: Chart) -> None:
+    """Bands within cells that have a number at each corner, over the surroundings of each point that has one."""
     axes.grid(False)
-    axes.set_facecolor(SHADE)
-    names = [plain(name) for name in mark.names]
-    level = count < 4
-    axes.xaxis.set_ticks(range(count), names, fontsize=8.5, rotation=0 if level else 35,
-                         ha="center" if level else "right")  # fmt: skip
-    axes.yaxis.set_ticks(range(count), names, fontsize=8.5)
-    axes.tick_params(length=0)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
-    for (p, q), value in np.ndenumerate(mark.values) if mark.written else ():
-        text = "—" if np.isnan(value) else f"{value:.2f}".replace("-", "−")
-        paint = MUTED if np.isnan(value) else "white" if abs(value) > 0.6 else INK
-        axes.text(q, p, text, ha="center", va="center", fontsize=8, color=paint)
-    bar = axes.figure.colorbar(picture, ax=axes, shrink=0.8, aspect=25)
-    bar.ax.tick_params(labelsize=8, colors=MUTED, labelcolor=INK)
+    bands = _bands(mark.colours)
+    known = np.ma.masked_invalid(mark.values).T
+    look: dict[str, Any] = {"cmap": BANDED, "norm": bands.norm}
+    axes.pcolormesh(mark.x_edges, mark.y_edges, known, zorder=0.8, **look)
+    if known.count():
+        levels = mark.colours.levels
+        axes.contourf(mark.x, mark.y, known, levels, extend=bands.norm.extend, corner_mask=False,  # type: ignore[attr-defined]
+                      antialiased=False, zorder=1, **look)  # fmt: skip
+        within = [level for level in levels if known.min() < level < known.max()]
+        if within:
+            axes.contour(mark.x, mark.y, known, within, colors=INK, linewidths=0.6, linestyles="-",
+                         corner_mask=False, zorder=2)  # fmt: skip
+    for name, hatch, where in mark.gaps:
+        boxes = [[(mark.x_edges[i + a], mark.y_edges[k + b]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+                 for i, k in np.argwhere(where)]  # fmt: skip
+        fill = "none" if np.isfinite(mark.values[where]).all() else SHADE  # a number that is known is seen
+        axes.add_collection(PolyCollection(boxes, facecolors=fill, edgecolors=MUTED, hatch=hatch, linewidths=0,
+                                           label=plain(name), zorder=1.5), autolim=False)  # fmt: skip

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.errors import Severity
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.results.attributes import attribute, findings_of
 from trunnion.results.quantities import decimals, number, prefixed, read_in, with_uncertainty
 from trunnion.rig.identification.uncertainty import quantile
-from trunnion.views.charts import Axis, Band, Cells, Chart, Legend, Line, Look, Mark, Note, Panel, check_kind
+from trunnion.views.charts import Axis, Band, Chart, Legend, Line, Look, Mark, Note, Panel, check_kind
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.compare import about_data, data_section
 from trunnion.views.measured import shortened
@@ -26,14 +26,11 @@ if TYPE_CHECKING:
 
 __all__ = ["KINDS", "MOST_PANELS", "Estimate", "estimates", "figure", "report", "sensors", "tables"]
 
-KINDS = ("intervals", "correlation", "residuals")  # of figures
+KINDS = ("intervals", "residuals")  # of figures
 MOST_PANELS = 8  # curves of residuals
 MOST_TILES = 8  # estimates that are read first
 MANY = 1e4  # degrees of freedom: Student's t is the normal distribution to four digits
 LEAST = 0.005  # of a variance: a smaller share of all is no row of the budget
-FEW = 5  # conditions whose names stand side by side
-FEW_ESTIMATES = 2  # whose correlation needs no picture
-MOST_WRITTEN = 12  # parameters whose correlations have room for their numbers
 COVERED = 2.0  # standard uncertainties of the band
 BEFORE, AFTER = 4, 0
 
@@ -246,17 +243,14 @@ def figure(result: xr.Dataset, kind: str | None = None) -> Figure:
     from trunnion.views.draw import figure as draw
 
     check_kind(kind or "intervals", KINDS)
-    if kind == "correlation":
-        short, side = [row.short for row in estimates(result)], _side(result)
-        cells = Cells(result["correlation"].values, short, len(short) <= MOST_WRITTEN)
-        panel = Panel("", [Chart(Axis(), Axis(), [cells], legend=None)], side + 0.4)
-        return draw("Correlation of the estimates", result, [panel], width=side + 2.8)
     if kind == "residuals":
         every = courses(result)
+        if not every:
+            what = "no signal was fitted over the cycle: there is no figure 'residuals'"
+            raise MechanismError(Finding(what, "--kind", "see the table of residuals"))
         picked = [every[k] for k in thinned(len(every), MOST_PANELS)]
         more = f", {len(picked)} of {len(every)} curves" if len(picked) < len(every) else ""
-        curves = _residual_panels(result, picked) if every else _residual_figures(result)
-        return draw(f"Residuals, before and after{more}", result, curves, columns=2 if every else 1)
+        return draw(f"Residuals, before and after{more}", result, _residual_panels(result, picked), columns=2)
     panels = [_interval(row, Legend(least=1) if k == 0 else None) for k, row in enumerate(estimates(result))]
     return draw("Estimates with their 95 % intervals", result, panels)
 
@@ -278,11 +272,6 @@ def _interval(row: Estimate, legend: Legend | None) -> Panel:
     across = Axis(row.unit, (low - margin, high + margin), count=7)
     chart = Chart(across, Axis("", (-1, 1), [(0, row.short)]), marks, legend=legend, bare=True)
     return Panel("", [chart], 0.95 if legend is None else 1.25)
-
-
-def _side(result: xr.Dataset) -> float:
-    """Of the matrix of correlations, inches."""
-    return min(1.6 + 0.62 * result.sizes["parameter"], 7.0)
 
 
 def courses(result: xr.Dataset) -> list[tuple[int, int]]:
@@ -332,51 +321,19 @@ def _residual(
     return Chart(across, Axis(f"{name} [{display_unit}]" if display_unit else name), marks, True, legend)
 
 
-def _residual_figures(result: xr.Dataset) -> list[Panel]:
-    """Residuals of data with one figure a condition."""
-    title, short = shortened(names(result, "condition"))
-    channels = _channels(result)
-    every = sorted({k for *_, conditions in channels for k in conditions})
-    panels: list[Panel] = []
-    for i, name, unit, conditions in channels:
-        before, after, spread = (
-            np.array([result[f"residual_{key}"].values[i, k, 0] for k in conditions], float)
-            for key in ("before", "after", "uncertainty")
-        )
-        factor, display_unit = prefixed(float(np.nanmax(np.abs([before, after]), initial=0.0)), unit)
-        x, half = np.searchsorted(every, conditions).astype(float), COVERED * np.nan_to_num(spread) * factor
-        marks: list[Mark] = [
-            Line(x, before * factor, "before", Look(BEFORE, dash="none", mark="D", size=5, hollow=True)),
-            Line(x, after * factor, f"after, ±{COVERED:g} u by scatter", Look(AFTER, dash="none", mark="o", size=5),
-                 half, half),
-        ]  # fmt: skip
-        across = Axis(title, places=[(n, short[k]) for n, k in enumerate(every)], turned=90 if len(every) > FEW else 0)
-        legend = None if panels else Legend(least=1)
-        panels.append(
-            Panel(
-                "",
-                [Chart(across, Axis(f"{name} [{display_unit}]" if display_unit else name), marks, True, legend)],
-                2.8,
-            )
-        )
-    return panels
-
-
 # ---- report -------------------------------------------------------------------------------------------------------
 
 
 def report(result: xr.Dataset) -> str:
     """The whole report as HTML, to be filed."""
     several, holdout = correlations(result), held_out(result)
-    members = sum(row.identifiable for row in estimates(result))
     numbers = [table for table in (estimated(result).titled(""), budget(result), sensors(result)) if table is not None]
     parts = [Section("Estimates", pictures=[("Estimates", figure(result, "intervals"))], after=numbers)]
     if several:
-        pictures = [("Correlation", figure(result, "correlation"))] if members > FEW_ESTIMATES else []
-        parts.append(Section("Correlation", "", pictures, after=[several]))
+        parts.append(Section("Correlation", after=[several]))
     fit = fits(result)
     about = "Measured minus model over the cycle, before and after the fit."
-    pictures = [("Residuals", figure(result, "residuals"))]
+    pictures = [("Residuals", figure(result, "residuals"))] if courses(result) else []
     parts.append(Section("Residuals", about, pictures, after=[fit] if fit else []))
     if holdout:
         about = "Data not used in the fit, and the error of their prediction."

@@ -72,11 +72,10 @@ def with_code(text: str) -> str:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page, in this order: what it is about, lines, tables, pictures, further tables, findings, terms.
+    """A part of the page, in this order: what it is about, lines, tables, pictures, further tables, findings.
 
     title: of the part, as what is shown
     pictures: (what it shows in words, figure), the only one broad, several side by side; small: of half the size
-    terms: (term, what it means), which may be markup
     findings: rows of `attrs["findings"]`; calm: what is said where there are none, if anything
     anchor: by which the page leads to it
     """
@@ -88,7 +87,6 @@ class Section:
     after: Sequence[Table] = ()
     small: bool = False
     lines: Sequence[str] = ()
-    terms: Sequence[tuple[str, str]] = ()
     findings: Sequence[dict[str, str]] = ()
     calm: str = ""
     anchor: str = ""

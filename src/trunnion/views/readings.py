@@ -111,7 +111,7 @@ def share_parts(value: float, low: float, high: float) -> tuple[str, str, int | 
 APART = 5e-4  # two shares that differ by more are written each
 OUTER = (0.00135, 0.99865)  # quantiles of the 99.73 % range
 DEGREE = ("°", "deg")
-LEAST, LEAST_INDEX = 1e-3, 5e-3  # shares below which a number has no row and no bar of its own
+LEAST, LEAST_INDEX = 1e-3, 5e-3  # shares below which a number has no row of its own
 
 
 @dataclass(frozen=True)
@@ -383,7 +383,7 @@ class MeasureReading:
         return large, [row for row in rows if row not in large]
 
     def sobol_order(self, most: int) -> list[int]:
-        """Numbers whose Sobol indices are shown, the largest first."""
+        """Numbers whose Sobol indices are listed, the largest first."""
         total = np.where(np.isfinite(self.row("total_order")), self.row("total_order"), -1.0)
         order = [int(k) for k in np.argsort(-total, kind="stable")]
         return [k for k in order if total[k] >= LEAST_INDEX][:most] or order[:1]

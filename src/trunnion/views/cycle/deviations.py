@@ -13,7 +13,6 @@ from trunnion.results.attributes import units_of
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import Units, number, prefixed, quantity
 from trunnion.results.scales import without_noise
-from trunnion.studies.play import play as play_of
 from trunnion.views.common.cycle import (
     Array,
     abscissa,
@@ -31,18 +30,14 @@ from trunnion.views.space.bodies import Space, gathered, is_spatial
 if TYPE_CHECKING:
     import xarray as xr
 
-    from trunnion.model.mechanism import Mechanism
-
 __all__ = [
-    "JUMP", "NOWHERE", "Output", "Seats", "broken", "built", "error_rows", "has", "jumps", "loss_rows", "losses",
-    "need", "outputs", "point_errors", "seat_angles", "seated", "with_worst_case", "worst_points",
+    "Output", "Seats", "built", "error_rows", "has", "loss_rows", "losses", "need", "outputs", "point_errors",
+    "seat_angles", "seated", "worst_points",
 ]  # fmt: skip
 
 
-JUMP = np.pi / 3  # a seat that turns by more from one position to the next is taken to have jumped
-SUDDEN = 6.0  # times the step before or after: a jump
+JUMP = 60.0  # °: a seat that turns by more from one position to the next is taken to have jumped
 LEAST = 0.1  # of the largest error of place: points below it are not among the worst
-NOWHERE = np.zeros(0, np.intp)
 ALIKE = 1e-3  # of the largest: two curves nearer than this are one
 # what a result may lack, and what to do
 LACKS = {
@@ -121,36 +116,6 @@ def losses(result: xr.Dataset) -> dict[str, NDArray[np.intp]]:
     return {joint: places for joint, places in lost.items() if places.size}
 
 
-def with_worst_case(result: xr.Dataset, mechanism: Mechanism) -> xr.Dataset:
-    """The result with the band in which the play of all joints holds the error of each output, if there is any play.
-
-    `transmission_centre` and `transmission_reach` (joint, position), rad or m, NaN of joints that are no outputs: the
-    error with every pin in the middle of its hole, and the most that all plays can add to it, to first order.
-    """
-    driven = outputs(result) if has(result, "errors") else []
-    if not driven:
-        return result
-    measures = [f"{'slide' if output.unit == 'm' else 'rotation'}:{output.joint}" for output in driven]
-    try:
-        free = play_of(mechanism, measures, result.sizes["position"])
-    except MechanismError:  # no joint has a play
-        return result
-    joints = names(result, "joint")
-    centre, reach = (np.full((len(joints), result.sizes["position"]), np.nan) for _ in range(2))
-    for output, measure in zip(driven, measures, strict=True):
-        rotation = column(result, f"joint_{measure.split(':')[0]}", joint=output.joint)
-        middle, most = (column(free, name, measure=measure) for name in ("value", "worst_case_total"))
-        if rotation is None or middle is None or most is None:
-            continue
-        apart = middle - rotation
-        turns = 2 * np.pi * np.round(apart / (2 * np.pi)) if output.unit == "rad" else 0.0
-        centre[joints.index(output.joint)], reach[joints.index(output.joint)] = output.error + apart - turns, most
-    if not np.nanmax(reach, initial=0.0) > 0:
-        return result
-    dims = ("joint", "position")
-    return result.assign(transmission_centre=(dims, centre), transmission_reach=(dims, reach))
-
-
 # ---- seats ----------------------------------------------------------------------------------------------------
 
 
@@ -197,52 +162,14 @@ def seated(result: xr.Dataset) -> list[Seats]:
 
 def seat_angles(result: xr.Dataset) -> list[tuple[str, str, Array]]:
     """ "β" or "ξ", the joint and the course, °, of every pin in space, ξ of those of the plane."""
-    betas, xis = (members(result, f"seat_{name}", "joint") for name in ("beta", "xi"))
-    courses = []
-    for seats in seated(result):
-        joint = seats.joint
-        if not seats.planar_guide and joint in betas and np.isfinite(betas[joint]).any():
-            for sign, values in zip("βξ", np.degrees(continued(betas[joint], xis[joint])), strict=True):
-                if sign == "ξ" or len(seats.offsets) == 2:
-                    courses.append((sign, joint, values))
-    return courses
-
-
-def continued(beta: Array, xi: Array) -> tuple[Array, Array]:
-    """β and ξ without the seam of their description, in which (β, ξ) and (β − 2π, ξ + π) are the same seat.
-
-    β stays as near as it can to the position before, within a turn to either side; ξ in (−π, π].
-    """
-    turns = np.zeros(beta.size)
-    finite = np.flatnonzero(np.isfinite(beta))
-    turns[finite] = np.cumsum(np.append(0.0, -np.round(np.diff(beta[finite]) / (2 * np.pi))))
-    usual = float(np.median((beta + 2 * np.pi * turns)[finite])) if finite.size else 0.0
-    middle = np.ceil((usual - 1.5 * np.pi) / (2 * np.pi))  # crossed ends, ±π, are shown at π
-    turns = turns - middle
-    revolutions = (beta + 2 * np.pi * turns) / (
-        2 * np.pi
-    )  # an end that goes round and round starts anew after each turn
-    turns = turns - np.where(
-        np.abs(revolutions) > 1.0 + 1e-9, np.sign(revolutions) * np.ceil(np.abs(revolutions) - 1.0 - 1e-9), 0.0
-    )
-    turned = xi - np.pi * turns
-    return beta + 2 * np.pi * turns, turned - 2 * np.pi * np.ceil((turned - np.pi) / (2 * np.pi))
-
-
-def jumps(y: Array, jump: float, lost: NDArray[np.intp] = NOWHERE) -> NDArray[np.intp]:
-    """Positions before which a curve jumps: by more than `jump`, by far more than on either side, or where contact is
-    lost.
-    """
-    step = np.abs(np.diff(y))
-    neighbours = np.nan_to_num(np.maximum(np.append(0.0, step[:-1]), np.append(step[1:], 0.0)))
-    near = np.isin(np.arange(step.size), [lost - 1, lost])
-    return np.flatnonzero((step > jump) | (step > np.where(near, 0.0, SUDDEN * neighbours) + jump / 20)) + 1
-
-
-def broken(x: Array, y: Array, jump: float, lost: NDArray[np.intp] = NOWHERE) -> tuple[Array, Array]:
-    """A curve with a NaN wherever it jumps, so that no line crosses the jump."""
-    after = jumps(y, jump, lost)
-    return np.insert(x, after, (x[after - 1] + x[after]) / 2), np.insert(y, after, np.nan)
+    angles = {sign: members(result, f"seat_{name}", "joint") for sign, name in (("β", "beta"), ("ξ", "xi"))}
+    return [
+        (sign, seats.joint, np.degrees(angles[sign][seats.joint]))
+        for seats in seated(result)
+        for sign in ("β", "ξ")
+        if not seats.planar_guide and (sign == "ξ" or len(seats.offsets) == 2)
+        and np.isfinite(angles[sign].get(seats.joint, np.nan)).any()
+    ]  # fmt: skip
 
 
 # ---- tables ---------------------------------------------------------------------------------------------------------
@@ -342,7 +269,7 @@ def built(result: xr.Dataset, lost: list[int]) -> dict[str, Any] | None:
         "outputs": _outputs(result),
         "lost": lost,
         "seats": [_seat(seat) for seat in seated(result)],
-        "angles": _angles(result, np.array(lost, np.intp)),
+        "angles": _angles(result),
     }
 
 
@@ -438,16 +365,11 @@ def _drawn(bodies: Space, link: str, point: str, place: Array) -> list[float]:
 
 
 def _outputs(result: xr.Dataset) -> list[dict[str, Any]]:
-    """Transmission errors, m or °; the band of the worst case of the play if the result has it."""
+    """Transmission errors, m or °."""
     rows = []
     for output in outputs(result):
-        centre, reach = (column(result, f"transmission_{name}", joint=output.joint) for name in ("centre", "reach"))
-        band = [] if centre is None or reach is None else [centre - reach, centre + reach]
         factor, unit = prefixed(1.0, "rad") if output.unit == "rad" else (1.0, "m")
-        worst = {side: _series(edge * factor) for side, edge in zip(("low", "high"), band, strict=False)}
-        rows.append(
-            {"label": output.label, "unit": unit, "values": _series(output.error * factor), "worst": worst or None}
-        )
+        rows.append({"label": output.label, "unit": unit, "values": _series(output.error * factor)})
     return rows
 
 
@@ -460,10 +382,10 @@ def _seat(seats: Seats) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _angles(result: xr.Dataset, lost: NDArray[np.intp]) -> list[dict[str, Any]]:
+def _angles(result: xr.Dataset) -> list[dict[str, Any]]:
     """β and ξ of the pins, °, with the positions before which they jump."""
-    closed, rows = abscissa(result).closed, []
-    for sign, joint, values in seat_angles(result):
-        cuts = jumps(np.append(values, values[0]) if closed else values, float(np.degrees(JUMP)), lost) % values.size
-        rows.append({"sign": sign, "joint": joint, "values": _series(values), "breaks": cuts.tolist()})
-    return rows
+    return [
+        {"sign": sign, "joint": joint, "values": _series(values),
+         "breaks": np.flatnonzero(np.abs(np.diff(values, prepend=values[-1:])) > JUMP).tolist()}
+        for sign, joint, values in seat_angles(result)
+    ]  # fmt: skip

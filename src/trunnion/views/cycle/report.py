@@ -11,7 +11,6 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,7 +29,6 @@ from trunnion.views.page import hashed, headline, inputs_of, said, template
 
 if TYPE_CHECKING:
     import xarray as xr
-    from jinja2 import Template
 
 __all__ = ["Animation", "animation", "embedded", "page", "report"]
 
@@ -207,12 +205,4 @@ def animation(result: xr.Dataset, ideal: xr.Dataset | None = None, height: int =
         "style": Markup(style), "style_hash": hashed(style), "script": Markup(script), "script_hash": hashed(script),
         "scene": Markup(embedded(drawn)),
     }  # fmt: skip
-    return Animation(_template().render(context), height)
-
-
-@cache
-def _template() -> Template:
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
-    return environment.from_string(web_text("animation.html.j2"))
+    return Animation(template("animation.html.j2").render(context), height)

@@ -16,17 +16,14 @@ from trunnion.views import draw
 from trunnion.views.charts import (
     Axis,
     Chart,
-    Legend,
     Line,
     Look,
     Mark,
-    Note,
     Panel,
     Plot,
     Ring,
     Rule,
     check_kind,
-    joined,
     nth,
 )
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, members, names
@@ -40,13 +37,11 @@ if TYPE_CHECKING:
 __all__ = ["KINDS", "OF_CONTACTS", "check_contacts", "figure", "pictures", "sheet"]
 
 PANEL = 2.6  # height, inches
-LINE, LETTER = 9.5, 0.009  # of an event's word: points from row to row, share of the axes' width a letter
+DASHES: Any = ("dashed", "dotted", "dash-dot", "solid")  # of events
 MOST_MARKED = 12  # events drawn; of more, marks would hide the curves
-OF_CONTACTS = ("contacts", "gaps", "orbit", "spectrum")  # kinds of figures that need a joint in play
+OF_CONTACTS = ("contacts", "gaps", "orbit")  # kinds of figures that need a joint in play
 LONGEST = 0.6  # of the clearance: how far the largest force is drawn beyond the wall
 MOST_SPOKES = 240  # forces drawn around a hole
-DEEPEST = 1e-4  # of the largest amplitude: the lowest that is drawn
-RESOLVED = 4.0  # rows in a contact whose force is resolved
 SIDE = 4.6  # of the figure of a hole, inches
 
 
@@ -56,8 +51,8 @@ def figure(result: xr.Dataset, kind: str = "sheet") -> Figure:
     if kind == "sheet":
         return sheet(result)
     check_contacts(kind, _in_play(result))
-    if kind in OWN:
-        return draw.plot(OWN[kind](result), result)
+    if kind == "orbit":
+        return draw.plot(_orbit(result), result)
     title, build = OVER_TIME[kind]
     motion = shown(result)
     chart = build(motion.rows, abscissa(motion.rows))
@@ -84,19 +79,17 @@ def sheet(result: xr.Dataset) -> Figure:
 
 
 def pictures(result: xr.Dataset) -> Iterator[tuple[str, Figure]]:
-    """What a report has beside the courses, with what it shows: the ways of pins in their holes, and the spectrum."""
+    """What a report has beside the courses, with what it shows: the ways of pins in their holes."""
     if _in_play(result) and _pins(result):
         yield "The ways of the pins in their holes, with the forces on the walls", figure(result, "orbit")
-    if "frequency" in result.dims:
-        yield "Amplitude of the contact forces over frequency", figure(result, "spectrum")
 
 
 # ---- over time ----------------------------------------------------------------------------------------------------
 
 
 def _curves(over: Abscissa, title: str, unit: str, rows: dict[str, Array]) -> Chart:
-    """Curves of one unit over time; those that coincide are one."""
-    lines = joined([Line(over.values, values, name, nth(k)) for k, (name, values) in enumerate(rows.items())])
+    """Curves of one unit over time."""
+    lines = [Line(over.values, values, name, nth(k)) for k, (name, values) in enumerate(rows.items())]
     factor, label = prefixed(peak(*rows.values()), unit)
     return Chart(over, Axis(f"{title} [{label}]"), [line.times(factor) for line in lines], zero=True)
 
@@ -147,24 +140,19 @@ def _phase(result: xr.Dataset, over: Abscissa) -> Chart:
 
 
 def _with_events(chart: Chart, motion: Shown) -> Chart:
-    """The chart with thin lines where something happens, and words above it, each in the lowest row where it meets no
-    other."""
+    """The chart with thin lines where something happens; what, stands in the legend."""
     events = [event for event in motion.events if event.word not in OF_IMPACTS]  # the curves show these
+    words = list(dict.fromkeys(event.word for event in events))
     over, last = abscissa(motion.rows), float(motion.rows["time"].values[-1])
     if len(events) > MOST_MARKED or not last > 0:
         return chart
-    ends: list[float] = []  # of what stands in each row, as shares of the axes' width
-    marks: list[Mark] = []
-    low, span = float(over.values.min()), over.span or 1.0
-    for event in events:
-        at = float(over.values[-1] * min(event.time, last) / last)
-        half = 0.5 * LETTER * (len(event.word) + 2)
-        middle = min(max((at - low) / span, half), 1.0 - half)
-        row = next((k for k, end in enumerate(ends) if end <= middle - half), len(ends))
-        ends[row : row + 1] = [middle + half]
-        marks.append(Rule(at, None, Look("muted", 0.8, "dashed", order=1.2)))
-        marks.append(Note(event.word, middle, 1.0, up="bottom", size=7.5, shift=(0, 2 + LINE * row)))
-    return replace(chart, marks=[*chart.marks, *marks], legend=Legend(lift=LINE * len(ends)))
+    looks = [Look("muted", 0.9, DASHES[k % len(DASHES)], order=1.2) for k in range(len(words))]
+    marks = list[Mark]()
+    for k, event in enumerate(events):
+        first = event.word not in [before.word for before in events[:k]]
+        at, look = float(over.values[-1] * min(event.time, last) / last), looks[words.index(event.word)]
+        marks.append(Rule(at, event.word if first else None, look))
+    return replace(chart, marks=[*chart.marks, *marks])
 
 
 # ---- contacts -----------------------------------------------------------------------------------------------------
@@ -178,27 +166,6 @@ def _pins(result: xr.Dataset) -> list[int]:
     """The contacts that are pins in holes: of a guide there are four to a joint."""
     joints = set(attribute(result, "contact_pins"))
     return [k for k, contact in enumerate(names(result, "contact")) if contact in joints]
-
-
-def _spectrum(result: xr.Dataset) -> Plot:
-    """Amplitude of the contact forces over frequency, both logarithmic."""
-    if "frequency" not in result.dims:
-        what = "no contact forces over time: bodies are rigid, or there are too few rows"
-        raise MechanismError(Finding(what, "--kind spectrum", "state a contact law, or give more --steps"))
-    frequency, amplitude = result["frequency"].values[1:], result["contact_force_amplitude"].values[:, 1:]
-    largest = float(np.max(amplitude, initial=0.0))
-    factor, label = prefixed(largest, "N")
-    lines = [Line(frequency, amplitude[k] * factor, name, nth(k).but(width=1.2))
-             for k, name in enumerate(names(result, "contact"))]  # fmt: skip
-    y = Axis(f"amplitude [{label}]")
-    if largest > 0:
-        y = replace(y, log=True, limits=(DEEPEST * largest * factor, 2 * largest * factor))
-    lasts, step = result["impact_end"].values - result["impact_begin"].values, float(np.diff(result["time"][:2])[0])
-    shortest = float(np.nanmin(lasts, initial=np.inf))
-    short = f"; contacts last {quantity(shortest, 's')} and rows are {quantity(step, 's')} apart: give more --steps"
-    title = f"Hann's window, {quantity(float(frequency[0]), 'Hz')} apart{short if shortest < RESOLVED * step else ''}"
-    chart = Chart(Axis("frequency [Hz]", log=True), y, lines, title=title)
-    return Plot("Spectrum of the contact forces", [Panel("", [chart], 3.75)])
 
 
 def _orbit(result: xr.Dataset) -> Plot:
@@ -240,6 +207,4 @@ OVER_TIME: dict[str, tuple[str, Callable[[Any, Abscissa], Chart]]] = {
     "gaps": ("Gaps", _gaps),
     "phase": ("Speed over coordinate", _phase),
 }
-# kinds of figures with axes of their own
-OWN: dict[str, Callable[[Any], Plot]] = {"orbit": _orbit, "spectrum": _spectrum}
-KINDS = ("sheet", *OVER_TIME, *OWN)
+KINDS = ("sheet", *OVER_TIME, "orbit")

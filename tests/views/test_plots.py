@@ -8,14 +8,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from stand_in import blank, four_bar, slider
 
 import trunnion
 from trunnion.cycle.locking import LockingState
 from trunnion.errors import MechanismError, Status
-from trunnion.views.common.cycle import abscissa, intervals, thin
+from trunnion.views.common.cycle import abscissa, intervals
 from trunnion.views.common.drawing import cylinder, picture
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
@@ -115,19 +113,6 @@ def test_intervals_name_each_run_without_an_answer(plain):
         (10, 20, Status.LOCKED.text),
         (300, 360, Status.NOT_ASSEMBLED.text),
     ]
-
-
-@given(st.lists(st.floats(-1e6, 1e6) | st.just(np.nan), min_size=1, max_size=400), st.integers(4, 60))
-def test_thinning_keeps_both_peaks_and_every_long_gap(values, most):
-    column = np.array(values)
-    picked = thin(column, most)
-    kept = column[picked]
-    assert (np.diff(picked) > 0).all()
-    assert picked.size <= 2 * most + 2 or picked.size == column.size
-    if np.isfinite(column).any():
-        assert np.nanmax(kept) == np.nanmax(column)
-        assert np.nanmin(kept) == np.nanmin(column)
-    assert np.isnan(kept).any() == np.isnan(column).any()
 
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

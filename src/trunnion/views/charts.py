@@ -6,7 +6,7 @@ A chart has two axes and marks, drawn in order. Colours are numbers of the palet
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -219,8 +219,7 @@ class Axis:
 
     limits: its ends, None where the marks decide; margin: around the marks, as a share; places: where it is marked,
     with names, which may be turned by so many degrees; integer: marked at whole numbers only; angles: at parts of a
-    turn; count: of its marks; form: how a number is written; powers: very large and small numbers by a common power of
-    ten.
+    turn; count: of its marks; powers: very large and small numbers by a common power of ten.
     """
 
     title: str = ""
@@ -230,20 +229,17 @@ class Axis:
     integer: bool = False
     angles: bool = False
     count: int = 0
-    form: Callable[[float], str] | None = None
     turned: float = 0.0
     margin: float | None = None
     powers: bool = False
 
 
 class Legend(NamedTuple):
-    """A legend above the chart: entries in a row, characters that a row has room for, fewest entries; lift: height of
-    what stands below it, points."""
+    """A legend above the chart: entries in a row, characters that a row has room for, fewest entries."""
 
     most: int = 6
     room: int = 90
     least: int = 2
-    lift: float = 0.0
 
 
 LEGEND = Legend()
@@ -261,7 +257,6 @@ class Chart:
     legend: Legend | None = LEGEND
     title: str = ""
     aside: str = ""
-    colours: ColourScale | None = None
     bare: bool = False  # without a line and marks at the left
     equal: bool = False
 

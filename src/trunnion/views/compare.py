@@ -434,7 +434,7 @@ def course(result: xr.Dataset, channel: int, condition: int, room: int) -> Panel
 
 def report(result: xr.Dataset) -> str:
     """The whole report as HTML, to be filed."""
-    from trunnion.views.draw import small
+    from trunnion.views.draw import figure as draw
 
     parts = []
     table = efficiencies(result)
@@ -453,7 +453,9 @@ def report(result: xr.Dataset) -> str:
         about = f"measures {attribute(result, 'channel_measures')[i]}{f', {unit}' if unit != '1' else ''}"
         if len(drawn) < len(compared):
             about += f"; {len(drawn)} of {len(compared)} conditions are drawn, those with the least within ±U"
-        pictures = [(f"{name}, {label(result, k)}", small(course(result, i, k, 62))) for k in drawn]
+        pictures = [
+            (f"{name}, {label(result, k)}", draw("", result, [course(result, i, k, 62)], width=5.2)) for k in drawn
+        ]
         why = explained(result, i)
         parts.append(Section(name, about, pictures, [results(result, i), *([why] if why else [])], small=True,
                              calm="" if pictures else "No signal."))  # fmt: skip

@@ -31,6 +31,7 @@ from trunnion.views.charts import (
 from trunnion.views.common.cycle import names
 from trunnion.views.page import Section, Table, counts, page
 from trunnion.views.readings import (
+    LEAST_INDEX,
     OUTER,
     MeasureReading,
     ending,
@@ -49,6 +50,8 @@ if TYPE_CHECKING:
 
 __all__ = ["KINDS", "MOST_PANELS", "drawable", "figure", "report", "sheet", "tables"]
 
+EXTREMES = ("maximum", "minimum", "largest")  # rules of figures that are taken where the course is extreme
+APART = 5e-4  # two shares that differ by more are written each
 MOST_ROWS, MOST_BARS = 20, 16  # contributions with a row and a bar of their own
 
 
@@ -82,7 +85,7 @@ def cells_of(read: MeasureReading) -> dict[str, Cells]:
     middle = read.nominal + shift
     mean = "" if math.isnan(shift) or read.is_size else read.say(middle)
     three = "" if read.is_size else read.between(middle - 3 * sigma, middle + 3 * sigma)
-    at = read.at_place if read.is_extreme and read.nominal != 0.0 else ""
+    at = read.at_place if read.rule in EXTREMES and read.nominal != 0.0 else ""
     least, most = read.value("least"), read.value("most")
     extremes = read.written("most") if read.is_size else read.deviations(least - read.nominal, most - read.nominal)
     rss = read.written("rss")
@@ -112,7 +115,8 @@ def figures(read: MeasureReading) -> Table:
     if not rows:
         return Table("results", ["", "linear"], [["nominal", "undefined"]])
     columns = [key for key in COLUMNS if any(cells.get(key) for cells in rows.values())]
-    sampling = "Monte Carlo" if read.independent else "quasi-Monte Carlo"
+    independent = read.result.attrs.get("sampling", "monte-carlo") == "monte-carlo"
+    sampling = "Monte Carlo" if independent else "quasi-Monte Carlo"
     head = ["", *(sampling if key == "sampled" else COLUMNS[key] for key in columns)]
     return Table("results", head, [[label, *(cells.get(k, "") for k in columns)] for label, cells in rows.items()])
 
@@ -122,7 +126,8 @@ def contributions(read: MeasureReading) -> Table:
     counted."""
     large, rest = read.largest(MOST_ROWS)
     shares = {"share": "worst_share", "of RSS²": "rss_share"}
-    shares |= {"of variance": "variance_share"} if read.shares_apart else {}
+    if any(abs(row.variance_share - row.rss_share) > APART for row in read.contributions):
+        shares["of variance"] = "variance_share"
     head = ["contribution", "tolerance", "sensitivity", "worst ±", *shares]
     rows = [
         [row.short, row.limits, read.slope(row), read.say(row.worst),
@@ -140,7 +145,9 @@ def indices(read: MeasureReading) -> Table:
     """Sobol indices with their 95 % intervals, the largest total first; those below half a per cent are counted."""
     short = {row.name: row.short for row in read.contributions}
     paths = names(read.result, "parameter")
-    order = read.sobol_order(len(paths))
+    total = np.where(np.isfinite(read.row("total_order")), read.row("total_order"), -1.0)
+    every = np.argsort(-total, kind="stable").tolist()
+    order = [j for j in every if total[j] >= LEAST_INDEX] or every[:1]
     ends = [[read.row(f"{key}{end}") for end in ("", "_low", "_high")] for key in ("first_order", "total_order")]
     rows = [
         [short[paths[j]], *(share_interval(*(float(row[j]) for row in key)).replace("-", "−") for key in ends)]
@@ -279,7 +286,7 @@ def contribution_bars(read: MeasureReading, most: int = MOST_BARS) -> Panel:
         for key in ("rss_share", "worst_share")
     )  # fmt: skip
     at = np.arange(float(len(labels)))
-    marks: list[Mark] = [Bars(at - 0.17, rss, 0.4, "RSS², uncorrelated" if read.correlated else "RSS²", Look(0)),
+    marks: list[Mark] = [Bars(at - 0.17, rss, 0.4, read.rss_label.replace("RSS", "RSS²"), Look(0)),
                          Bars(at + 0.23, worst, 0.28, "worst case", Look("pale"))]  # fmt: skip
     running = np.nancumsum(rss)
     marks.append(Line(running, at - 0.17, "RSS², added up", Look("ink", 1.2, mark="o", size=3.5, order=3)))
@@ -316,7 +323,7 @@ def envelope(read: MeasureReading) -> Panel:
         rss, middle = (factor * read.row(f"curve_{key}") for key in ("rss", "shift"))
         marks += [Line(x, (middle if middle.size else 0.0) + sign * rss, name, Look("ink", 1.1, "long"), close=True)
                   for sign, name in ((1, read.rss_label), (-1, None))]  # fmt: skip
-    if read.nominal == 0.0 and (read.rule in ("", "deviation") or read.is_extreme):  # limits of the course, too
+    if read.nominal == 0.0 and read.rule in ("", "deviation", *EXTREMES):  # limits of the course, too
         limits = [limit for limit in read.limits if math.isfinite(limit)]
         marks += [Rule(limit * factor, None if k else f"limits {read.limits_said}", LIMIT, upright=False)
                   for k, limit in enumerate(limits)]  # fmt: skip

@@ -168,9 +168,9 @@ def _round_angle(span: float) -> float:
     return next((step for step in (15, 30, 45, 60, 90, 180, 360) if span / step <= 9), 720)
 
 
-def legend(axes: Axes, most: int = 6, room: int = 90, least: int = 2, lift: float = 0.0) -> None:
+def legend(axes: Axes, most: int = 6, room: int = 90, least: int = 2) -> None:
     """A legend in rows above the axes, where it hides no curve; room: characters that a row holds; none of fewer than
-    `least` entries; lift: height of what stands between axes and legend, points.
+    `least` entries.
     """
     handles, labels = axes.get_legend_handles_labels()
     if len(handles) < least:
@@ -179,7 +179,7 @@ def legend(axes: Axes, most: int = 6, room: int = 90, least: int = 2, lift: floa
     columns = len(labels) if fits else max(1, min(most, (room + 10) // (max(map(len, labels)) + 7)))
     axes.legend(
         handles, labels, loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=columns, frameon=False, fontsize=8.5,
-        labelcolor=INK, handlelength=2.2, columnspacing=1.6, borderaxespad=0.3 + lift / 8.5,
+        labelcolor=INK, handlelength=2.2, columnspacing=1.6, borderaxespad=0.3,
     )  # fmt: skip
 
 
@@ -230,12 +230,13 @@ class Labels:
         dark = np.clip(DARK * (1 - pixels.min(axis=2) / 255), 0, 1)
         edge, spots = np.array(dark.shape)[::-1], list[Array]()
         for note, symbol in self.waiting:
-            spot, end = note.axes.transData.transform([note.xy, np.add(note.xy, (symbol, 0.0))])  # type: ignore[union-attr]
-            spots.append(spot)
-            _fill(dark, spot, max(LEAST * scale, float(np.hypot(*(end - spot)))), 1.0)
+            ends = note.axes.transData.transform(np.add([note.xy] * 2, [(0.0, 0.0), (symbol, 0.0)]))  # type: ignore[union-attr]
+            spots.append(ends[0])
+            _fill(dark, ends[0], max(LEAST * scale, float(np.hypot(*(ends[1] - ends[0])))), 1.0)
         for k, (note, _) in enumerate(self.waiting):
             note.set_visible(True)
-            half = 0.5 * np.asarray(note.get_window_extent(canvas.get_renderer()).size) + MARGIN * scale  # type: ignore[no-untyped-call]
+            extent = note.get_window_extent(canvas.get_renderer())  # type: ignore[no-untyped-call]
+            half = 0.5 * np.array([extent.width, extent.height]) + MARGIN * scale
             others, best = np.array(spots[:k] + spots[k + 1 :]).reshape(-1, 2), (np.inf, np.zeros(2))
             for far, gap in enumerate(GAPS):
                 for side in SIDES:

@@ -106,7 +106,7 @@ def figure(
         return mechanism(result, ideal, index)
     plot = PLOTS[kind](result, ideal)
     assert isinstance(plot, Plot)  # all but the mechanism
-    return drawn.plot(plot, result)
+    return drawn.figure(plot.title, result, plot.panels, plot.columns, plot.width, plot.note)
 
 
 def position_at(result: xr.Dataset, place: str | float) -> int:

@@ -20,7 +20,6 @@ from trunnion.views.charts import (
     Look,
     Mark,
     Panel,
-    Plot,
     Ring,
     Rule,
     check_kind,
@@ -50,14 +49,18 @@ def figure(result: xr.Dataset, kind: str = "sheet") -> Figure:
     check_kind(kind, KINDS)
     if kind == "sheet":
         return sheet(result)
-    check_contacts(kind, _in_play(result))
+    check_contacts(kind, "contact" in result.dims)
     if kind == "orbit":
-        return draw.plot(_orbit(result), result)
+        panels = [Panel("", [_hole(result, k)], SIDE) for k in _pins(result)]
+        if not panels:
+            what = "no pin of this motion is in play"
+            raise MechanismError(Finding(what, "--kind orbit", "use --kind gaps for guides"))
+        return draw.figure("Pin in its hole", result, panels, len(panels), 0.4 + SIDE * len(panels))
     title, build = OVER_TIME[kind]
     motion = shown(result)
     chart = build(motion.rows, abscissa(motion.rows))
     chart = chart if kind == "phase" else _with_events(chart, motion)
-    return draw.plot(Plot(title, [Panel("", [chart], 3.75)]), result)
+    return draw.figure(title, result, [Panel("", [chart], 3.75)])
 
 
 def check_contacts(kind: str, in_play: bool) -> None:
@@ -71,16 +74,16 @@ def sheet(result: xr.Dataset) -> Figure:
     """Everything over time, one panel under the other."""
     motion = shown(result)
     idle = () if np.any(motion.rows["drive_effort"].values) else ("effort",)  # nothing drives it
-    left_out = ("phase", *idle, *(() if _in_play(result) else OF_CONTACTS))
+    left_out = ("phase", *idle, *(() if "contact" in result.dims else OF_CONTACTS))
     over = abscissa(motion.rows)
     charts = [_with_events(build(motion.rows, over), motion)
               for kind, (_, build) in OVER_TIME.items() if kind not in left_out]  # fmt: skip
-    return draw.plot(Plot("Motion in time", [Panel("", charts, 0.4 + PANEL * len(charts))]), result)
+    return draw.figure("Motion in time", result, [Panel("", charts, 0.4 + PANEL * len(charts))])
 
 
 def pictures(result: xr.Dataset) -> Iterator[tuple[str, Figure]]:
     """What a report has beside the courses, with what it shows: the ways of pins in their holes."""
-    if _in_play(result) and _pins(result):
+    if "contact" in result.dims and _pins(result):
         yield "The ways of the pins in their holes, with the forces on the walls", figure(result, "orbit")
 
 
@@ -89,25 +92,17 @@ def pictures(result: xr.Dataset) -> Iterator[tuple[str, Figure]]:
 
 def _curves(over: Abscissa, title: str, unit: str, rows: dict[str, Array]) -> Chart:
     """Curves of one unit over time."""
-    lines = [Line(over.values, values, name, nth(k)) for k, (name, values) in enumerate(rows.items())]
     factor, label = prefixed(peak(*rows.values()), unit)
-    return Chart(over, Axis(f"{title} [{label}]"), [line.times(factor) for line in lines], zero=True)
+    lines = [Line(over.values, values * factor, name, nth(k)) for k, (name, values) in enumerate(rows.items())]
+    return Chart(over, Axis(f"{title} [{label}]"), lines, zero=True)
 
 
-def _speed(result: xr.Dataset, over: Abscissa) -> Chart:
-    drivers = [(i, name, "rad/s" if effort == "N m" else "m/s") for i, name, effort in drivers_of(result)]
-    unit = drivers[0][2]
-    rows = {
-        name if unit_own == unit else f"{name} [{unit_own}]": result["drive_rate"].values[i]
-        for i, name, unit_own in drivers
-    }
-    return _curves(over, "speed", unit, rows)
-
-
-def _effort(result: xr.Dataset, over: Abscissa) -> Chart:
-    drivers = drivers_of(result)
-    rows = {name: result["drive_effort"].values[i] for i, name, _ in drivers}
-    return _curves(over, f"drive {'torque' if drivers[0][2] == 'N m' else 'force'}", drivers[0][2], rows)
+def _of_drivers(result: xr.Dataset, over: Abscissa, title: str, variable: str, units: tuple[str, str]) -> Chart:
+    """A variable of every driver; units: of those that turn and those that slide, of which the first has the axis."""
+    drivers = [(i, name, units[effort != "N m"]) for i, name, effort in drivers_of(result)]
+    first = drivers[0][2]
+    rows = {name if unit == first else f"{name} [{unit}]": result[variable].values[i] for i, name, unit in drivers}
+    return _curves(over, title, first, rows)
 
 
 def _reactions(result: xr.Dataset, over: Abscissa) -> Chart:
@@ -115,28 +110,15 @@ def _reactions(result: xr.Dataset, over: Abscissa) -> Chart:
     return _curves(over, "reaction", "N", {name: size for name, size in sizes.items() if peak(size) > 0})
 
 
-def _energy(result: xr.Dataset, over: Abscissa) -> Chart:
-    return _curves(over, "energy", "J", {text: values for _, text, values in energies(result)})
-
-
-def _forces(result: xr.Dataset, over: Abscissa) -> Chart:
-    return _curves(over, "contact force", "N", members(result, "contact_normal_force", "contact"))
-
-
-def _gaps(result: xr.Dataset, over: Abscissa) -> Chart:
-    """Below 0 the surfaces press each other in."""
-    return _curves(over, "gap", "m", members(result, "contact_gap", "contact"))
-
-
 def _phase(result: xr.Dataset, over: Abscissa) -> Chart:
     drivers, marks = drivers_of(result), list[Mark]()
-    turns = drivers[0][2] == "N m"
+    units = ("rad", "rad/s") if drivers[0][2] == "N m" else ("m", "m/s")
     for k, (i, name, _) in enumerate(drivers):
         q, rate = result["drive_coordinate"].values[i], result["drive_rate"].values[i]
         first = np.flatnonzero(np.isfinite(q))[:1]
         marks.append(Line(q, rate, name, nth(k)))
         marks.append(Line(q[first], rate[first], None if k else "start", Look(k, dash="none", mark="o", size=6.0)))
-    return Chart(Axis(f"coordinate [{'rad' if turns else 'm'}]"), Axis(f"speed [{'rad/s' if turns else 'm/s'}]"), marks)
+    return Chart(Axis(f"coordinate [{units[0]}]"), Axis(f"speed [{units[1]}]"), marks)
 
 
 def _with_events(chart: Chart, motion: Shown) -> Chart:
@@ -158,23 +140,10 @@ def _with_events(chart: Chart, motion: Shown) -> Chart:
 # ---- contacts -----------------------------------------------------------------------------------------------------
 
 
-def _in_play(result: xr.Dataset) -> bool:
-    return "contact" in result.dims
-
-
 def _pins(result: xr.Dataset) -> list[int]:
     """The contacts that are pins in holes: of a guide there are four to a joint."""
     joints = set(attribute(result, "contact_pins"))
     return [k for k, contact in enumerate(names(result, "contact")) if contact in joints]
-
-
-def _orbit(result: xr.Dataset) -> Plot:
-    """The way of each pin's centre in its hole, in the hole's axes, with the force on the wall where it touches."""
-    pins = _pins(result)
-    if not pins:
-        raise MechanismError(Finding("no pin of this motion is in play", "--kind orbit", "use --kind gaps for guides"))
-    panels = [Panel("", [_hole(result, k)], SIDE) for k in pins]
-    return Plot("Pin in its hole", panels, len(pins), 0.4 + SIDE * len(pins))
 
 
 def _hole(result: xr.Dataset, k: int) -> Chart:
@@ -199,12 +168,16 @@ def _hole(result: xr.Dataset, k: int) -> Chart:
 
 # a kind of figure over time: its title, and what makes its chart
 OVER_TIME: dict[str, tuple[str, Callable[[Any, Abscissa], Chart]]] = {
-    "speed": ("Speed", _speed),
-    "effort": ("Drive effort", _effort),
+    "speed": ("Speed", lambda rows, over: _of_drivers(rows, over, "speed", "drive_rate", ("rad/s", "m/s"))),
+    "effort": ("Drive effort",
+               lambda rows, over: _of_drivers(rows, over, "drive effort", "drive_effort", ("N m", "N"))),
     "reactions": ("Reactions", _reactions),
-    "energy": ("Energy account", _energy),
-    "contacts": ("Contact forces", _forces),
-    "gaps": ("Gaps", _gaps),
+    "energy": ("Energy account",
+               lambda rows, over: _curves(over, "energy", "J", {text: row for _, text, row in energies(rows)})),
+    "contacts": ("Contact forces", lambda rows, over: _curves(over, "contact force", "N",
+                                                              members(rows, "contact_normal_force", "contact"))),
+    # below 0 the surfaces press each other in
+    "gaps": ("Gaps", lambda rows, over: _curves(over, "gap", "m", members(rows, "contact_gap", "contact"))),
     "phase": ("Speed over coordinate", _phase),
-}
+}  # fmt: skip
 KINDS = ("sheet", *OVER_TIME, "orbit")

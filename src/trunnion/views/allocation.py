@@ -71,7 +71,10 @@ def bought(result: xr.Dataset) -> Table:
             for key in ("tolerance", "cost", "cost_share", "tolerance_before", "cost_before")
         )
         made, group = str(result["choice"].values[j]), groups.get(paths[j], "")
-        halves = (_half_width(half, units[j], "" if is_play(paths[j]) else "±") for half in (t, was))
+        halves, sign = [], "" if is_play(paths[j]) else "±"
+        for half in (t, was):  # in mm or degrees, to five digits
+            factor, display_unit = drawn_in(half, units[j])
+            halves.append(joined(f"{sign}{half * factor:.5g}", display_unit) if math.isfinite(half) else NONE)
         now, then = halves
         rows.append([paths[j], now, made, group, _cost(cost), share(part, 1), then, _cost(paid)])
     totals = (_cost(float(result[key])) for key in ("cost_total", "cost_total_before"))
@@ -106,14 +109,6 @@ def offers_table(result: xr.Dataset) -> Table:
         for factor, cost in zip(result["trade_off_factor"].values, result["trade_off_cost"].values, strict=True)
     ]
     return Table("cost over accuracy", ["limits, relative to stated", "minimum cost"], rows)
-
-
-def _half_width(t: float, unit: str, sign: str) -> str:
-    """A half width in mm or degrees, to five digits."""
-    if not math.isfinite(t):
-        return NONE
-    factor, display_unit = drawn_in(t, unit)
-    return joined(f"{sign}{t * factor:.5g}", display_unit)
 
 
 def _cost(cost: float) -> str:

@@ -162,7 +162,12 @@ def explained(result: xr.Dataset, channel: int | None = None) -> Table | None:
     """What would explain each residual beyond U: size and share, of all channels or of one; None if there is none."""
 
     def cells(i: int, k: int) -> list[str]:
-        causes = [_cause(result, kind, i, k) for kind in CAUSES]
+        causes = []
+        for kind in CAUSES:  # errors that would explain it, with the share that they explain
+            size, part = (float(result[f"{kind}_{what}"].values[i, k]) for what in ("error", "explains"))
+            factor, unit = {"zero": scale_of(result, i, k), "angle": (180 / math.pi, "°")}.get(kind, (100.0, "%"))
+            sized = f"{'+' if size > 0 else ''}{text(size * factor, unit)} ({100 * part:.1f}\u00a0%)"
+            causes.append(sized if np.isfinite(size) else NONE)
         return causes if any(cause != NONE for cause in causes) else []
 
     table = _by_condition("what would explain the residual, each by itself", [*CAUSES], result, channel, cells)
@@ -181,15 +186,6 @@ def _by_condition(
         if (row := cells(i, k))
     ]
     return Table(title, [first, *(["channel"] if channel is None else []), *head], rows)
-
-
-def _cause(result: xr.Dataset, kind: str, i: int, k: int) -> str:
-    """An error that would explain a residual, with the share that it explains."""
-    size, part = (float(result[f"{kind}_{what}"].values[i, k]) for what in ("error", "explains"))
-    if not np.isfinite(size):
-        return NONE
-    factor, unit = {"zero": scale_of(result, i, k), "angle": (180 / math.pi, "°")}.get(kind, (100.0, "%"))
-    return f"{'+' if size > 0 else ''}{text(size * factor, unit)} ({100 * part:.1f}\u00a0%)"
 
 
 def verdicts(result: xr.Dataset) -> Table:
@@ -256,13 +252,12 @@ def sensors(result: xr.Dataset) -> Table:
         cells = []
         for what in ("zero", "gain"):
             values = result[f"accuracy_{what}"].values[i]
-            texts = []
-            for end in (np.nanmin(values), np.nanmax(values)) if np.isfinite(values).any() else ():
-                factor, display_unit = (1 / size, read) if read and size != 1 else prefixed(float(end), unit)
-                size_text = (
-                    text(end * factor, display_unit) if what == "zero" else f"{number(100 * float(end), 3)}\u00a0%"
-                )
-                texts.append(size_text if end else "0")
+            ends = [float(np.nanmin(values)), float(np.nanmax(values))] if np.isfinite(values).any() else []
+            in_unit = [(1 / size, read) if read and size != 1 else prefixed(end, unit) for end in ends]
+            scales = in_unit if what == "zero" else [(100.0, "%")] * 2
+            texts = [
+                text(end * factor, sign) if end else "0" for end, (factor, sign) in zip(ends, scales, strict=False)
+            ]
             cells.append(" to ".join(dict.fromkeys(texts)) or NONE)
         rows.append([name, measures[i], "" if (read or unit) == "1" else read or unit, *cells])
     return Table("sensors", ["channel", "measures", "unit", "u of the zero", "u of the gain"], rows)

@@ -279,7 +279,7 @@ def _line(mark: Line, axes: Axes, spec: Chart) -> None:
 def _mark(mark: Mark, axes: Axes, spec: Chart) -> None:
     """An area, a shape or a text."""
     name = getattr(mark, "name", None)
-    named = {"label": None if name is None else plain(name)}
+    named: dict[str, Any] = {"label": None if name is None else plain(name)}
     match mark:
         case charts.Band(x, low, high):
             x, low, high = _closed(spec, x, mark.close, low, high)

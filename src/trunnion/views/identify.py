@@ -14,10 +14,10 @@ from trunnion.results.attributes import attribute, findings_of
 from trunnion.results.quantities import decimals, number, prefixed, read_in, with_uncertainty
 from trunnion.rig.identification.uncertainty import quantile
 from trunnion.views.charts import Axis, Band, Chart, Legend, Line, Look, Mark, Note, Panel, check_kind
-from trunnion.views.common.cycle import Array, names
+from trunnion.views.common.cycle import names
 from trunnion.views.compare import about_data, data_section
 from trunnion.views.measured import shortened
-from trunnion.views.page import NONE, Section, Summary, Table, counts, page
+from trunnion.views.page import NONE, Section, Table, counts, page
 from trunnion.views.scales import thinned
 
 if TYPE_CHECKING:
@@ -157,12 +157,6 @@ def estimated(result: xr.Dataset) -> Table:
     return Table(f"{result.attrs['identified']}: estimates", head, rows)
 
 
-def stated(result: xr.Dataset) -> Table:
-    """What of the model each parameter is: all its paths, and its value at the start."""
-    rows = [[row.name, ", ".join(row.paths), row.start_text] for row in estimates(result)]
-    return Table("parameters", ["parameter", "paths in the model", "start"], rows)
-
-
 def correlations(result: xr.Dataset) -> Table | None:
     """Between the estimates, of several; columns are numbered as the rows are, for names would be too wide."""
     every, values = estimates(result), result["correlation"].values
@@ -257,14 +251,13 @@ def figure(result: xr.Dataset, kind: str | None = None) -> Figure:
 
 def _interval(row: Estimate, legend: Legend | None) -> Panel:
     """A parameter on a scale of its own: where it started, where it is, and its 95 % interval."""
-    points, marks, zero = [row.start], list[Mark](), np.zeros(1)
+    zero, points = np.zeros(1), [row.start]
+    marks: list[Mark] = [Note(row.lacking, 0.5, 0.75, size=8.5)]
     if row.identifiable:
         ends = [end if np.isfinite(end) else row.value for end in (row.lower, row.upper)]
         points += ends
         marks = [Line(np.array(ends), np.zeros(2), "95 % interval", Look(AFTER, 6.0, alpha=0.35)),
                  Line(np.array([row.value]), zero, "estimate", Look(AFTER, dash="none", mark="o", size=6))]  # fmt: skip
-    else:
-        marks = [Note(row.lacking, 0.5, 0.75, size=8.5)]
     start = Look(BEFORE, dash="none", mark="D", size=5, hollow=True)
     marks.append(Line(np.array([row.start]), zero, "start", start))
     low, high = min(points), max(points)
@@ -281,44 +274,34 @@ def courses(result: xr.Dataset) -> list[tuple[int, int]]:
 
 
 def _residual_panels(result: xr.Dataset, pairs: list[tuple[int, int]]) -> list[Panel]:
-    """Measured less model over the cycle, before beside after, with the band that the scatter leaves the mean."""
-    phases = {k: np.asarray(result["phase"].values[k], float) for _, k in pairs}
-    ranges = attribute(result, "drive_range")
-    turned = all(k < len(ranges) and ranges[k] is not None for k in phases)
+    """Measured less model over the cycle: before, with that after in front of it, beside after, on its own scale with
+    the band that the scatter leaves the mean."""
+    ranges, channels = attribute(result, "drive_range"), _channels(result)
+    turned = all(k < len(ranges) and ranges[k] is not None for _, k in pairs)
     title = f"drive angle {result.attrs.get('drive', '')} [°]" if turned else "share of the cycle"
     panels = []
     for n, (channel, condition) in enumerate(pairs):
-        x = phases[condition]
+        x, (_, name, unit, _) = np.asarray(result["phase"].values[condition], float), channels[channel]
         if turned:
             first, last = ranges[condition]
             x = np.degrees(first + (last - first) * x)
         across = Axis(title if n == len(pairs) - 1 else "", (float(np.nanmin(x)), float(np.nanmax(x))))
+        start, end, spread = (np.asarray(result[f"residual_{key}"].values[channel, condition], float)
+                              for key in ("before", "after", "uncertainty"))  # fmt: skip
         for before in (True, False):
-            chart = _residual(result, channel, condition, x, across, before, Legend(least=1) if n == 0 else None)
+            sizes = np.concatenate([start, end] if before else [end, COVERED * spread])
+            factor, display_unit = prefixed(float(np.nanmax(np.abs(sizes), initial=0.0)), unit)
+            half, marks = COVERED * spread * factor, list[Mark]()
+            if before:
+                marks.append(Line(x, start * factor, "before", Look(BEFORE, 1.1, mark="o", size=2)))
+            elif np.isfinite(spread).any():
+                marks.append(Band(x, -half, half, f"±{COVERED:g} u of the mean, by scatter", Look("shade", order=1)))
+            marks.append(Line(x, end * factor, "after", Look(AFTER, 1.1, mark="o", size=2)))
+            upward = Axis(f"{name} [{display_unit}]" if display_unit else name)
+            chart = Chart(across, upward, marks, True, Legend(least=1) if n == 0 else None)
             where = names(result, "condition")[condition] if before else " "
             panels.append(Panel(where, [chart], 2.3 if n == 0 else 1.9))
     return panels
-
-
-def _residual(
-    result: xr.Dataset, channel: int, condition: int, x: Array, across: Axis, before: bool, legend: Legend | None
-) -> Chart:
-    """One course: before, with that after in front of it, or after with the band, on its own scale."""
-    _, name, unit, _ = _channels(result)[channel]
-    start, end, spread = (
-        np.asarray(result[f"residual_{key}"].values[channel, condition], float)
-        for key in ("before", "after", "uncertainty")
-    )
-    sizes = np.concatenate([start, end] if before else [end, COVERED * spread])
-    factor, display_unit = prefixed(float(np.nanmax(np.abs(sizes), initial=0.0)), unit)
-    marks: list[Mark] = []
-    if before:
-        marks.append(Line(x, start * factor, "before", Look(BEFORE, 1.1, mark="o", size=2)))
-    elif np.isfinite(spread).any():
-        half = COVERED * spread * factor
-        marks.append(Band(x, -half, half, f"±{COVERED:g} u of the mean, by scatter", Look("shade", order=1)))
-    marks.append(Line(x, end * factor, "after", Look(AFTER, 1.1, mark="o", size=2)))
-    return Chart(across, Axis(f"{name} [{display_unit}]" if display_unit else name), marks, True, legend)
 
 
 # ---- report -------------------------------------------------------------------------------------------------------
@@ -338,22 +321,21 @@ def report(result: xr.Dataset) -> str:
     if holdout:
         about = "Data not used in the fit, and the error of their prediction."
         parts.append(Section("Held out", about, after=[holdout]))
-    end = [data_section(result, "data_files"), Section("Parameters", tables=[stated(result)])]
+    end = [data_section(result, "data_files"), Section("Parameters", tables=[Table(
+        "parameters", ["parameter", "paths in the model", "start"],
+        [[row.name, ", ".join(row.paths), row.start_text] for row in estimates(result)],
+    )])]  # fmt: skip
+    summary: list[tuple[str, list[tuple[str, str]]]] = []
+    for row in estimates(result)[:MOST_TILES]:
+        pair = (row.say(row.value), "at its bound" if row.limit else f"± {row.say(row.half)}, 95 %")
+        summary.append((row.short, [pair if row.identifiable else (row.lacking, "from these data")]))
+    chi = float(result["reduced_chi_squared"])
+    summary += [("reduced χ²", [(number(chi, 3), "near 1 if the model fits")])] if np.isfinite(chi) else []
     model = str(result.attrs["name"]) or "model"
     sizes = [(result.sizes[dim], dim) for dim in ("parameter", "channel", "condition")]
     facts = [(model, f"model {result.attrs.get('model_hash', '')}"),
              *counts(*sizes, (int(result["used"].sum()), "position"))]  # fmt: skip
     return page(
-        result, "Parameter identification from a measurement", facts, parts, summary=_summary(result), end=end,
+        result, "Parameter identification from a measurement", facts, parts, summary=summary, end=end,
         name=str(result.attrs["identified"]) or "Measurement", about_data=about_data(result), signed=True,
     )  # fmt: skip
-
-
-def _summary(result: xr.Dataset) -> Summary:
-    """The first estimates, and whether the model fits."""
-    summary = []
-    for row in estimates(result)[:MOST_TILES]:
-        pair = (row.say(row.value), "at its bound" if row.limit else f"± {row.say(row.half)}, 95 %")
-        summary.append((row.short, [pair if row.identifiable else (row.lacking, "from these data")]))
-    chi = float(result["reduced_chi_squared"])
-    return [*summary, *([("reduced χ²", [(number(chi, 3), "near 1 if the model fits")])] if np.isfinite(chi) else [])]

@@ -164,7 +164,7 @@ def _number(value: float, head: str = "") -> str:
 WIDE = 74  # characters of a title in a line
 MOST_PANELS = 12
 MOST_NAMED = 8  # curves that are told apart by a legend; more by a scale of colours
-MARKS = "os^DvPX*"  # so that curves are told apart in grey, too
+MARKS, MOST_MARKED = "os^DvPX*", 40  # points of a curve, so that curves are told apart in grey, too
 BANDS = 10  # of a map
 ALIKE = 1e-9  # of the largest: numbers that differ by less are taken as one
 NOTHING = -1  # beside the statuses: sound, and yet without a number
@@ -277,7 +277,9 @@ def _curves(
         if gone[start]:
             marks.append(Stripe(bounds[start], bounds[stop], field.word(int(gone[start]))))
     for k in range(values.shape[1]):
-        look, label = Look(k, mark=MARKS[k % len(MARKS)], size=3.5), "as built" if ideal is not None else None
+        look, label = Look(k, mark=MARKS[k % 8] if x.size <= MOST_MARKED else "", size=3.5), None
+        if ideal is not None:
+            label = "as built"
         if colours is not None and other is not None:
             look, label = Look(colours.share(float(other.values[k])), 1.2, mark="o" * (x.size == 1)), None
         elif other is not None:
@@ -292,8 +294,7 @@ def _curves(
     rows, across = np.nonzero((status == Status.CONTACT_LOST) & np.isfinite(values))
     marks += _lost(x[rows], values[rows, across], 6.0)
     finite = every[np.isfinite(every)]
-    low, high = (float(np.clip(end, -field.scope, field.scope)) for end in (finite.min(), finite.max())) \
-        if finite.size else (0.0, 1.0)  # fmt: skip
+    low, high = np.clip([finite.min(), finite.max()], -field.scope, field.scope) if finite.size else (0.0, 1.0)
     margin = 0.05 * (high - low) if high - low > ALIKE * field.scope else 0.1 * abs(high) or 1.0
     upward = Axis(fill(field.label, 60 if not head else 32, break_long_words=False), (low - margin, high + margin))
     return Chart(axis_of(plan.x, field.room), upward, [*marks, *field.beyond(values)], title=head)

@@ -27,7 +27,7 @@ from trunnion.views.space.solids import Camera, best, looking, scenery
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import Figure
 
 __all__ = ["ways"]
 
@@ -86,35 +86,25 @@ def _sheet(
     parts = figure.subfigures(len(groups), 1, squeeze=False, height_ratios=heights)[:, 0]
     labels, extent = Labels(figure), float(np.hypot(box[2] - box[0], box[3] - box[1]))
     for part, choice, row in zip(parts, groups, rows, strict=True):
-        for axes, cell in zip(_panels(part, choice, [cell.way for cell in row], columns, box), row, strict=True):
+        where = f", at {choice.where}" if choice.where else ""
+        more = f", {len(row)} of {len(choice.ways)} assembly modes" if len(row) < len(choice.ways) else ""
+        head = f"{choice.label}    {', '.join(choice.links)}{where}{more}"
+        part.suptitle(plain(head), x=0.012, ha="left", fontsize=9, color=INK)
+        grid = part.subplots(math.ceil(len(row) / columns), columns, squeeze=False).ravel().tolist()
+        for axes in grid[len(row) :]:
+            axes.set_visible(False)
+        for axes, cell in zip(grid, row, strict=False):
+            axes.set_aspect("equal")
+            axes.set(xlim=(box[0], box[2]), ylim=(box[1], box[3]), xticks=[], yticks=[])
+            used = cell.way.taken  # its frame is bold
+            for spine in axes.spines.values():
+                spine.set(color=INK if used else RULE, linewidth=1.8 if used else 1.0)
+            title = plain(f"{choice.link}: {cell.way.name}" + "  used" * used)
+            weight = "bold" if used else "normal"
+            axes.set_title(title, fontsize=8.5, fontweight=weight, color=INK, loc="left", pad=4)
             cell.draw(axes, extent, labels)
     labels.place()
     return figure
-
-
-def _panels(
-    part: SubFigure, choice: GroupModes, modes: Sequence[AssemblyMode], columns: int, box: Sequence[float]
-) -> list[Axes]:
-    """Axes for each of the modes that are drawn, under their names; the frame of the one that is used is bold.
-
-    box: left, below, right, above of all of them, m.
-    """
-    where = f", at {choice.where}" if choice.where else ""
-    more = f", {len(modes)} of {len(choice.ways)} assembly modes" if len(modes) < len(choice.ways) else ""
-    head = f"{choice.label}    {', '.join(choice.links)}{where}{more}"
-    part.suptitle(plain(head), x=0.012, ha="left", fontsize=9, color=INK)
-    grid = part.subplots(math.ceil(len(modes) / columns), columns, squeeze=False).ravel().tolist()
-    for axes in grid[len(modes) :]:
-        axes.set_visible(False)
-    for axes, mode in zip(grid, modes, strict=False):
-        axes.set_aspect("equal")
-        axes.set(xlim=(box[0], box[2]), ylim=(box[1], box[3]), xticks=[], yticks=[])
-        for spine in axes.spines.values():
-            spine.set(color=INK if mode.taken else RULE, linewidth=1.8 if mode.taken else 1.0)
-        title = f"{choice.link}: {mode.name}" + "  used" * mode.taken
-        weight = "bold" if mode.taken else "normal"
-        axes.set_title(plain(title), fontsize=8.5, fontweight=weight, color=INK, loc="left", pad=4)
-    return list(grid[: len(modes)])
 
 
 def _run(mechanism: Mechanism, choice: GroupModes, mode: AssemblyMode) -> xr.Dataset:

@@ -126,9 +126,11 @@ def sketch(axes: Axes, drawing: Picture, index: int) -> None:
         _body(axes, drawing, link, index, drawing.colour(link))
     for name, spring in drawing.stated["springs"].items():
         _spring(axes, drawing, spring.get("between") or (), index, drawing.pulls.get(name))
-    for pair in drawing.stated["gears"].values():
-        for circle in pair:
-            _pitch_circle(axes, drawing.tracks[circle["at"]][:, index], circle["radius"])
+    for circle in (circle for pair in drawing.stated["gears"].values() for circle in pair):
+        x, y = drawing.tracks[circle["at"]][:, index]
+        if np.isfinite(x + y):  # the pitch circle, dash-dotted as on a drawing
+            axes.add_patch(Circle((x, y), circle["radius"], fill=False, edgecolor=INK, linestyle=(0, (8, 2, 1.5, 2)),
+                                  zorder=3.5))  # fmt: skip
     for name, joint in drawing.stated["joints"].items():
         _joint(axes, drawing, name, joint, index)
 
@@ -220,13 +222,6 @@ def _spring(axes: Axes, drawing: Picture, ends: Sequence[str], index: int, pull:
     path = places[0][:, None] + np.outer(along, COILS[0]) + np.outer(across, COILS[1])
     line = ":" if pull is not None and pull[index] == 0 else "-"
     axes.plot(*path, color=MUTED, linewidth=1.1, linestyle=line, zorder=4.5, solid_joinstyle="round")
-
-
-def _pitch_circle(axes: Axes, place: Array, radius: float) -> None:
-    """The pitch circle of a gear, dash-dotted as on a drawing."""
-    if np.isfinite(place).all():
-        line = (0, (8, 2, 1.5, 2))
-        axes.add_patch(Circle((place[0], place[1]), radius, fill=False, edgecolor=INK, linestyle=line, zorder=3.5))
 
 
 def _joint(axes: Axes, drawing: Picture, name: str, joint: dict[str, Any], index: int) -> None:

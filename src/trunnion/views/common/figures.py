@@ -83,11 +83,12 @@ def families() -> tuple[str, ...]:
 @cache
 def _signs() -> frozenset[int]:
     """All signs that can be drawn both upright and bold."""
-    return frozenset().union(*(_charmap(name, "normal") & _charmap(name, "bold") for name in families()))
-
-
-def _charmap(family: str, weight: str) -> set[int]:
-    return set(get_font(findfont(FontProperties(family=family, weight=weight))).get_charmap())
+    signs = set[int]()
+    for name in families():
+        upright, bold = (set(get_font(findfont(FontProperties(family=name, weight=weight))).get_charmap())
+                         for weight in ("normal", "bold"))  # fmt: skip
+        signs |= upright & bold
+    return frozenset(signs)
 
 
 def plain(name: str) -> str:
@@ -95,16 +96,10 @@ def plain(name: str) -> str:
 
     A sign that no font has, or that is invisible, is told by its code: \u66f2, as YAML and JSON write it too.
     """
-    text = "".join(sign if _drawable(sign) else _code(sign) for sign in name).replace("$", r"\$")
+    codes = (f"\\u{ord(sign):04x}" if ord(sign) < 0x10000 else f"\\U{ord(sign):08x}" for sign in name)
+    text = "".join(sign if ord(sign) in _signs() and category(sign)[0] != "C" else code
+                   for sign, code in zip(name, codes, strict=True)).replace("$", r"\$")  # fmt: skip
     return f"\u2009{text}" if text.startswith("_") else text
-
-
-def _drawable(sign: str) -> bool:
-    return ord(sign) in _signs() and category(sign)[0] != "C"
-
-
-def _code(sign: str) -> str:
-    return f"\\u{ord(sign):04x}" if ord(sign) < 0x10000 else f"\\U{ord(sign):08x}"
 
 
 # ---- axes -----------------------------------------------------------------------------------------------------------
@@ -150,7 +145,9 @@ def along(axes: Axes, over: Abscissa, y: str, *, zero: bool = True) -> None:
     dress(axes, plain(over.title), y)
     span = over.span
     if over.unit == "°" and span >= 90:
-        axes.xaxis.set_major_locator(MultipleLocator(_round_angle(span)))
+        axes.xaxis.set_major_locator(
+            MultipleLocator(next((step for step in (15, 30, 45, 60, 90, 180, 360) if span / step <= 9), 720))
+        )
     elif over.unit == "":
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.xaxis.set_minor_locator(AutoMinorLocator(2))
@@ -162,10 +159,6 @@ def along(axes: Axes, over: Abscissa, y: str, *, zero: bool = True) -> None:
         axes.set_xlim(low, low + span)
     if zero:
         axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
-
-
-def _round_angle(span: float) -> float:
-    return next((step for step in (15, 30, 45, 60, 90, 180, 360) if span / step <= 9), 720)
 
 
 def legend(axes: Axes, most: int = 6, room: int = 90, least: int = 2) -> None:

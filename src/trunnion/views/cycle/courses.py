@@ -5,9 +5,9 @@ Each kind is a function of the result and, if wanted, of the same run without fr
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -200,10 +200,8 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 
     In space a row for each joint: the vector seen along z, y and x.
     """
-    over, forces = (
-        abscissa(result),
-        [members(of, "reaction_force", "joint") for of in (result, ideal) if of is not None],
-    )
+    over = abscissa(result)
+    forces = [members(of, "reaction_force", "joint") for of in (result, ideal) if of is not None]
     planes = PLANES if is_spatial(result) else PLANES[:1]
     charts = [_hodograph([of[joint][list(plane)] for of in forces], ease(result), over, joint, plane, index)
               for index, joint in enumerate(forces[0]) for plane in planes]  # fmt: skip
@@ -249,54 +247,33 @@ def _hodograph(
 # ---- motion -------------------------------------------------------------------------------------------------------
 
 
-class Motions(NamedTuple):
-    """A quantity of links or joints with its first and second rate: its name, unit, and the members of the three."""
-
-    noun: str
-    unit: str
-    courses: list[dict[str, Array]]
-
-
 def motion(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Angles of the turning links, in space of the joints, slides of the sliding joints, and their rates."""
-    over, kinds = abscissa(result), _motions(result)
-    panels = [Panel("", [_rate(result, over, kind, order) for order in range(3)], 5.8) for kind in kinds]
-    return Plot("Motion", panels, len(panels), 7.4 if len(panels) == 1 else 2.8 + 3.6 * len(panels))
-
-
-def _rate(result: xr.Dataset, over: Abscissa, kind: Motions, order: int) -> Chart:
-    """The quantity itself or one of its rates."""
-    turn = TURN if kind.unit == "rad" and not order else 0.0
-    lines = [line._replace(turn=turn) for line in _lines(over, kind.courses[order])]
-    scale = (1.0, kind.unit) if order else None
-    if kind.unit == "m":  # as the drive
-        scale = scaled(usual_peak(ease(result), *(line.y for line in lines)), "m")
-    title, legend = (kind.noun, "velocity", "acceleration")[order], None if order else Legend(6, least=1)
-    return over_drive(result, over, title, kind.unit, lines, rate=RATES[order], scale=scale, legend=legend)
-
-
-def _motions(result: xr.Dataset) -> list[Motions]:
-    """What moves: links that turn, in space joints that turn, and joints that slide."""
-    facts, spatial = layout(result), is_spatial(result)
+    over, facts, panels = abscissa(result), layout(result), list[Panel]()
     kinds = {name: facts["joints"].get(name, {}).get("type") for name in names(result, "joint")}
-
-    def rated(variable: str, dim: str, of: Collection[str]) -> list[dict[str, Array]]:
-        every = (members(result, variable + rate, dim) for rate in ("", "_velocity", "_acceleration"))
-        return [{name: values for name, values in rate.items() if name in of} for rate in every]
-
-    if not spatial:
+    if is_spatial(result):
+        moving = [(f"joint {noun}", unit, f"joint_{noun}", "joint",
+                   [name for name, course in members(result, f"joint_{noun}", "joint").items()
+                    if getattr(PAIRS[kinds[name]], moves) and _moves(course)])
+                  for noun, unit, moves in (("rotation", "rad", "turns"), ("slide", "m", "slides"))]  # fmt: skip
+    else:
         turning = [link for link, angle in members(result, "link_angle", "link").items()
                    if link != facts["ground"] and _moves(angle)]  # fmt: skip
         sliding = [name for name, kind in kinds.items() if kind in GUIDED]
-        angles = [Motions("angle", "rad", rated("link_angle", "link", turning))] if turning or not sliding else []
-        return [*angles, *([Motions("slide", "m", rated("joint_slide", "joint", sliding))] if sliding else [])]
-    panels = []
-    for noun, unit, moves in (("rotation", "rad", "turns"), ("slide", "m", "slides")):
-        joints = [name for name, course in members(result, f"joint_{noun}", "joint").items()
-                  if getattr(PAIRS[kinds[name]], moves) and _moves(course)]  # fmt: skip
-        if joints:
-            panels.append(Motions(f"joint {noun}", unit, rated(f"joint_{noun}", "joint", joints)))
-    return panels
+        moving = [("angle", "rad", "link_angle", "link", turning), ("slide", "m", "joint_slide", "joint", sliding)]
+    for noun, unit, variable, dim, of in [part for part in moving if part[-1]] or moving[:1]:
+        charts = []
+        for order, rate in enumerate(("", "_velocity", "_acceleration")):
+            rows = {name: values for name, values in members(result, variable + rate, dim).items() if name in of}
+            turn = TURN if unit == "rad" and not order else 0.0
+            lines = [line._replace(turn=turn) for line in _lines(over, rows)]
+            scale = (1.0, unit) if order else None
+            if unit == "m":  # as the drive
+                scale = scaled(usual_peak(ease(result), *rows.values()), "m")
+            title, legend = (noun, "velocity", "acceleration")[order], None if order else Legend(6, least=1)
+            charts.append(over_drive(result, over, title, unit, lines, rate=RATES[order], scale=scale, legend=legend))
+        panels.append(Panel("", charts, 5.8))
+    return Plot("Motion", panels, len(panels), 7.4 if len(panels) == 1 else 2.8 + 3.6 * len(panels))
 
 
 def _varies(values: Array, least: float) -> bool:
@@ -321,33 +298,28 @@ def drawn_measures(result: xr.Dataset) -> list[int]:
 
 def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """The model's measures over the drive: a panel for each course, with the figures of all measures of it."""
-    rows, over = drawn_measures(result), abscissa(result)
+    rows, over, charts = drawn_measures(result), abscissa(result), list[Chart]()
     if not rows:
         what = "there is no measure with one number at every position"
         raise MechanismError(Finding(what, "measures", "state measures: in the model"))
     units, figure_units = (units_along(result[f"measure_{part}"], "measure") for part in ("value", "figure"))
-    measures_stated, aspects = layout(result).get("measures", {}), {row.name: row.aspect for row in summary_of(result)}
-    labels = [str(name) for name in result["measure"].values]
-    values, figures, charts = result["measure_value"].values, result["measure_figure"].values, list[Chart]()
+    texts, aspects = layout(result).get("measures", {}), {row.name: row.aspect for row in summary_of(result)}
+    labels, values, figures = names(result, "measure"), result["measure_value"].values, result["measure_figure"].values
     for i in rows:
         same = [k for k in rows if units[k] == units[i] and np.array_equal(values[k], values[i], equal_nan=True)]
         if i != same[0]:
             continue
-        title = labels[i] if len(same) == 1 else measures_stated.get(labels[i], "course of the measures")
-        scope = usual_peak(ease(result), values[i])
-        factor, display_unit = (scaled if units[i] == "m" else prefixed)(scope, units[i])
-        marks = list[Mark]()
-        for k in same:
-            if np.isfinite(figures[k]):
-                aspect = aspects.get(labels[k], "")
-                level = aspect in LEVELS and figure_units[k] == units[i]
-                text = f"{labels[k]}: {aspect} {quantity(float(figures[k]), figure_units[k])}"
-                look = nth(1 + len(marks)).but(width=1.2, dash="dashed")
-                # a figure that is no value of the course is told in the legend alone
-                marks.append(Rule(figures[k] * factor if level else np.nan, text, look, upright=False))
+        title = labels[i] if len(same) == 1 else texts.get(labels[i], "course of the measures")
+        scope, marks = usual_peak(ease(result), values[i]), list[Mark]()
+        scale = (scaled if units[i] == "m" else prefixed)(scope, units[i])
+        for k in (k for k in same if np.isfinite(figures[k])):
+            aspect = aspects.get(labels[k], "")
+            level = aspect in LEVELS and figure_units[k] == units[i]  # what is none is told in the legend alone
+            text = f"{labels[k]}: {aspect} {quantity(float(figures[k]), figure_units[k])}"
+            look = nth(1 + len(marks)).but(width=1.2, dash="dashed")
+            marks.append(Rule(figures[k] * scale[0] if level else np.nan, text, look, upright=False))
         line = Line(over.values, values[i], title, Look(0, 2.0), close=True)
-        charts.append(over_drive(result, over, title, units[i], [line], marks=marks, scale=(factor, display_unit),
-                                 legend=Legend(3)))  # fmt: skip
+        charts.append(over_drive(result, over, title, units[i], [line], marks=marks, scale=scale, legend=Legend(3)))
     return _stack("Measures", charts)
 
 
@@ -357,7 +329,10 @@ def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """Errors against the mechanism without any: of the worst points and of the joints of the ground, over the drive."""
     need(result, "errors", "error")
-    over, lost, legend = abscissa(result), contact_losses(result), Legend(4, least=1)
+    over, lost_at, legend = abscissa(result), losses(result), Legend(4, least=1)
+    places = np.unique(np.concatenate(list(lost_at.values()))) if lost_at else np.empty(0, int)
+    lost = [Rule(float(over.values[place]), None if k else f"contact lost: {', '.join(lost_at)}",
+                 Look("limit", 0.9, "dotted", order=1.4)) for k, place in enumerate(places)]  # fmt: skip
     # the scale is that of all points: those that are not drawn err less
     scale = prefixed(usual_peak(ease(result), *point_errors(result).values()), "m")
     charts = [over_drive(result, over, "position error", "m", _lines(over, worst_points(result)), scale=scale,
@@ -368,15 +343,6 @@ def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
             title = f"transmission error,\n{noun}"
             charts.append(over_drive(result, over, title, unit, _lines(over, errors), marks=lost, legend=legend))
     return _stack("Errors of the mechanism as built", charts)
-
-
-def contact_losses(result: xr.Dataset) -> list[Mark]:
-    """A dotted line wherever a joint loses contact, in the legend with the joints."""
-    lost, over = losses(result), abscissa(result)
-    places = np.unique(np.concatenate(list(lost.values()))) if lost else np.empty(0, int)
-    label = f"contact lost: {', '.join(lost)}"
-    return [Rule(float(over.values[place]), None if k else label, Look("limit", 0.9, "dotted", order=1.4))
-            for k, place in enumerate(places)]  # fmt: skip
 
 
 # ---- locking ------------------------------------------------------------------------------------------------------

@@ -259,18 +259,35 @@ def built(result: xr.Dataset, lost: list[int]) -> dict[str, Any] | None:
         return None
     spatial = is_spatial(result)
     bodies, points = gathered(result) if spatial else None, members(result, "point_error", "point")
+    tracks = members(result, "point_position", "point").values()
+    places = np.concatenate([track.T for track in tracks]) if tracks else np.zeros((1, 2))
+    places = places[np.isfinite(places).all(axis=1)] if np.isfinite(places).any() else np.zeros((1, 2))
     return {
-        "preset": _preset(result, bodies.size if bodies else _size(result)),
+        "preset": _preset(result, bodies.size if bodies else float(np.linalg.norm(np.ptp(places, axis=0)))),
         "points": {} if spatial else {key: _vector(error) for key, error in points.items()},
-        "links": _moved(result, bodies)
-        if bodies
+        "links": _moved(result, bodies) if bodies
         else {link: _series(error) for link, error in members(result, "link_error", "link").items()},
         "worst": [{"label": key, "values": _series(values)} for key, values in worst_points(result).items()],
-        "outputs": _outputs(result),
+        "outputs": [
+            {"label": output.label, "unit": unit, "values": _series(output.error * factor)}
+            for output in outputs(result)
+            for factor, unit in [prefixed(1.0, "rad") if output.unit == "rad" else (1.0, "m")]
+        ],
         "lost": lost,
-        "seats": [_seat(seat) for seat in seated(result)],
-        "angles": _angles(result),
-    }
+        "seats": [
+            {"joint": seats.joint, "kind": seats.kind, "clearance": seats.clearance, "length": seats.length,
+             "links": seats.links,
+             "ends": [{"offset": _vector(offset), "force": _vector(force)}
+                      for offset, force in zip(seats.offsets, seats.forces, strict=True)]}
+            for seats in seated(result)
+        ],
+        # β and ξ of the pins, °, with the positions before which they jump
+        "angles": [
+            {"sign": sign, "joint": joint, "values": _series(values),
+             "breaks": np.flatnonzero(np.abs(np.diff(values, prepend=values[-1:])) > JUMP).tolist()}
+            for sign, joint, values in seat_angles(result)
+        ],
+    }  # fmt: skip
 
 
 def _series(values: Array) -> list[float | None]:
@@ -281,13 +298,6 @@ def _series(values: Array) -> list[float | None]:
 
 def _vector(values: Array) -> dict[str, list[float | None]]:
     return {axis: _series(part) for axis, part in zip("xyz", values, strict=False)}
-
-
-def _size(result: xr.Dataset) -> float:
-    """Diagonal of the box around all points of a mechanism in the plane, m."""
-    places = np.asarray(result["point_position"].transpose("axis", ...).values, dtype=float).reshape(2, -1)
-    finite = places[:, np.isfinite(places).all(axis=0)]
-    return float(np.linalg.norm(np.ptp(finite, axis=1))) if finite.size else 0.0
 
 
 def _preset(result: xr.Dataset, size: float) -> float:
@@ -304,88 +314,33 @@ def _preset(result: xr.Dataset, size: float) -> float:
 
 
 def _moved(result: xr.Dataset, bodies: Space) -> dict[str, Any]:
-    """Of each link the mean error of its points, its rotation vector, the middle of the points, and its stretch."""
-    moved = {}
+    """Of each link the mean error of its points, its rotation vector, the middle of the points, and its stretch: by how
+    much each point lies elsewhere in it than in the ideal one, with where it is drawn.
+    """
+    moved, turns = {}, members(result, "link_error", "link")
+    errors, tracks = (members(result, f"point_{what}", "point") for what in ("error", "position"))
     for link, pose in bodies.poses.items():
-        turn = column(result, "link_error", link=link) if link in names(result, "link") else None
-        if turn is None or not bodies.drawable.any():
+        of_link = {key: error for key, error in errors.items() if key.split(".", 1)[0] == link}
+        if link not in turns or not bodies.drawable.any() or not of_link:
             continue
-        point_errors = {key: error for key in names(result, "point") if key.split(".", 1)[0] == link
-               and (error := column(result, "point_error", point=key)) is not None}  # fmt: skip
-        places = {key: _local(result, key, pose.matrix, pose.origin) for key in point_errors}
-        if not point_errors:
-            continue
-        about = np.mean(list(places.values()), axis=0)
-        shift = np.mean(list(point_errors.values()), axis=0)
+        # places in the frame of the link, the means over the positions that are known
+        places = {key: np.nanmean(np.einsum("jin,jn->in", pose.matrix, tracks[key] - pose.origin), axis=1)
+                  for key in of_link}  # fmt: skip
+        about, shift = np.mean(list(places.values()), axis=0), np.mean(list(of_link.values()), axis=0)
+        rows, largest = [], max(float(np.nanmax(np.abs(error), initial=0.0)) for error in of_link.values())
+        for key, error in of_link.items():
+            arm = np.einsum("ijn,j->in", pose.matrix, places[key] - about)
+            left = error - shift - np.cross(turns[link], arm, axis=0)
+            by = np.nan_to_num(np.nanmedian(np.einsum("jin,jn->in", pose.matrix, left), axis=1))
+            name = key.split(".", 1)[1]
+            joint = bodies.joints.get(name)
+            within = joint is not None and link in joint["links"]
+            seated_at = bodies.seat(name, joint["links"].index(link)) if joint and within else places[key]
+            rows.append({"at": [float(f"{number:.7g}") for number in seated_at],
+                         "by": [float(f"{number:.5g}") for number in by]})  # fmt: skip
+        stretched = max(np.abs(row["by"]).max() for row in rows) > SLIGHT * largest
         moved[link] = {
-            "about": [float(f"{number:.7g}") for number in about], "shift": _vector(shift), "turn": _vector(turn),
-            "stretch": _stretch(bodies, link, point_errors, places, about, shift, turn),
+            "about": [float(f"{number:.7g}") for number in about], "shift": _vector(shift),
+            "turn": _vector(turns[link]), "stretch": rows if stretched else [],
         }  # fmt: skip
     return moved
-
-
-def _local(result: xr.Dataset, key: str, matrix: Array, origin: Array) -> Array:
-    """A point in the frame of its link, the mean over the positions that are known."""
-    place = column(result, "point_position", point=key)
-    assert place is not None
-    return np.asarray(np.nanmean(np.einsum("jin,jn->in", matrix, place - origin), axis=1))
-
-
-def _stretch(
-    bodies: Space,
-    link: str,
-    point_errors: dict[str, Array],
-    places: dict[str, Array],
-    about: Array,
-    shift: Array,
-    turn: Array,
-) -> list[dict[str, Any]]:
-    """By how much each point of a link lies elsewhere in it than in the ideal one, with where it is drawn."""
-    matrix = bodies.poses[link].matrix
-    largest = max(float(np.nanmax(np.abs(error), initial=0.0)) for error in point_errors.values())
-    rows = []
-    for key, error in point_errors.items():
-        arm = np.einsum("ijn,j->in", matrix, places[key] - about)
-        left = error - shift - np.cross(turn, arm, axis=0)
-        by = np.nan_to_num(np.nanmedian(np.einsum("jin,jn->in", matrix, left), axis=1))
-        rows.append(
-            {"at": _drawn(bodies, link, key.split(".", 1)[1], places[key]), "by": [float(f"{n:.5g}") for n in by]}
-        )
-    return rows if max(np.abs(row["by"]).max() for row in rows) > SLIGHT * largest else []
-
-
-def _drawn(bodies: Space, link: str, point: str, place: Array) -> list[float]:
-    """Where a point of a link is drawn: that of a joint where its symbol is."""
-    joint = bodies.joints.get(point)
-    at = bodies.seat(point, joint["links"].index(link)) if joint and link in joint["links"] else place
-    return [float(f"{number:.7g}") for number in at]
-
-
-# ---- charts ---------------------------------------------------------------------------------------------------
-
-
-def _outputs(result: xr.Dataset) -> list[dict[str, Any]]:
-    """Transmission errors, m or °."""
-    rows = []
-    for output in outputs(result):
-        factor, unit = prefixed(1.0, "rad") if output.unit == "rad" else (1.0, "m")
-        rows.append({"label": output.label, "unit": unit, "values": _series(output.error * factor)})
-    return rows
-
-
-def _seat(seats: Seats) -> dict[str, Any]:
-    return {
-        "joint": seats.joint, "kind": seats.kind, "clearance": seats.clearance, "length": seats.length,
-        "links": seats.links,
-        "ends": [{"offset": _vector(offset), "force": _vector(force)}
-                 for offset, force in zip(seats.offsets, seats.forces, strict=True)],
-    }  # fmt: skip
-
-
-def _angles(result: xr.Dataset) -> list[dict[str, Any]]:
-    """β and ξ of the pins, °, with the positions before which they jump."""
-    return [
-        {"sign": sign, "joint": joint, "values": _series(values),
-         "breaks": np.flatnonzero(np.abs(np.diff(values, prepend=values[-1:])) > JUMP).tolist()}
-        for sign, joint, values in seat_angles(result)
-    ]  # fmt: skip

@@ -58,12 +58,15 @@ def scene(
     if ideal is not None and ideal.sizes["position"] != count:
         raise ValueError(f"`ideal` has {ideal.sizes['position']} positions, the result {count}")
     result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
-    picked = _picked(count, max_positions) if picked is None else picked
+    picked = np.arange(0, count, -(-count // max(max_positions, 1)) or 1) if picked is None else picked
     over, steady = abscissa(result), "steady" in result.attrs
     picked_rows = result.isel(position=picked)
     other = None if ideal is None else ideal.isel(position=picked)
-    facts = layout(result)
+    facts, efficiency = layout(result), column(result, "efficiency")
     points = _points(picked_rows)
+    lost = {int(index) for places in losses(result).values() for index in places}
+    # the shown positions at or before those at which a joint loses contact
+    before = sorted({int(np.searchsorted(picked, index, side="right")) - 1 for index in lost})
     drawn = {
         "format": FORMAT,
         "name": result.attrs.get("name", ""),
@@ -88,31 +91,14 @@ def scene(
         "units": units_of(result),
         "sums": {name: series(column(picked_rows, name)) for name in SUMS
                  if name in picked_rows and not (steady and name in DRIVEN)},
-        "efficiency": _single(result, "efficiency"),
-        "built": built(picked_rows, _lost(result, picked)),
+        "efficiency": numbers(efficiency.reshape(1))[0] if efficiency is not None and not efficiency.ndim else None,
+        "built": built(picked_rows, before),
     }  # fmt: skip
     if is_spatial(result):
         drawn |= space_scene(picked_rows)
     for load in drawn["loads"]:
         load["course"] = course(result, picked, load["name"])
     return drawn
-
-
-def _lost(result: xr.Dataset, picked: NDArray[np.intp]) -> list[int]:
-    """The shown positions at or before those at which a joint loses contact."""
-    places = {int(index) for places in losses(result).values() for index in places}
-    return sorted({int(np.searchsorted(picked, index, side="right")) - 1 for index in places})
-
-
-def _picked(count: int, most: int) -> NDArray[np.intp]:
-    """Indices of evenly spaced positions, at most `most` of them, from the first on."""
-    stride = -(-count // max(most, 1)) if count else 1
-    return np.arange(0, count, stride)
-
-
-def _single(result: xr.Dataset, name: str) -> float | None:
-    value = column(result, name)
-    return None if value is None or value.ndim else numbers(value.reshape(1))[0]
 
 
 def _points(result: xr.Dataset) -> dict[str, dict[str, Any]]:

@@ -16,6 +16,7 @@ from trunnion.views import draw
 from trunnion.views.charts import (
     Axis,
     Chart,
+    Legend,
     Line,
     Look,
     Mark,
@@ -134,7 +135,7 @@ def _with_events(chart: Chart, motion: Shown) -> Chart:
         first = event.word not in [before.word for before in events[:k]]
         at, look = float(over.values[-1] * min(event.time, last) / last), looks[words.index(event.word)]
         marks.append(Rule(at, event.word if first else None, look))
-    return replace(chart, marks=[*chart.marks, *marks])
+    return replace(chart, marks=[*chart.marks, *marks], legend=Legend(least=1))
 
 
 # ---- contacts -----------------------------------------------------------------------------------------------------

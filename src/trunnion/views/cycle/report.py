@@ -62,12 +62,15 @@ def page(
     from markupsafe import Markup  # with jinja2 only needed here, and slow to import
 
     style, script = web_text("report.css"), bundle("report.js")
-    runs = intervals(result)
+    runs, thinned = intervals(result), ""
+    if scene_of["thinned"] is not None:  # "3rd" if every third position is shown
+        stride = -(-scene_of["thinned"] // scene_of["count"])
+        thinned = f"{stride}{'th' if 10 <= stride % 100 <= 20 else {1: 'st', 2: 'nd', 3: 'rd'}.get(stride % 10, 'th')}"
     context = {
         "name": scene_of["name"] or "Mechanism", "formula": scene_of["formula"], "compared": compared,
         "motion": motion, "closed": scene_of["abscissa"]["closed"],
         "spatial": scene_of.get("space") == "spatial",
-        "positions": result.sizes["position"], "thinned": _ordinal(scene_of),
+        "positions": result.sizes["position"], "thinned": thinned,
         "drawn": scene_of["count"], "method": result.attrs.get("method", ""),
         "unanswered": sum(run.stop - run.start for run in runs),
         "summary": headline(result),
@@ -86,15 +89,6 @@ def embedded(data: Any) -> str:
     for sign in "<>&\u2028\u2029":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return text
-
-
-def _ordinal(scene_of: dict[str, Any]) -> str:
-    """ "3rd" if every third position is shown, empty if all are."""
-    if scene_of["thinned"] is None:
-        return ""
-    stride = -(-scene_of["thinned"] // scene_of["count"])
-    suffix = "th" if 10 <= stride % 100 <= 20 else {1: "st", 2: "nd", 3: "rd"}.get(stride % 10, "th")
-    return f"{stride}{suffix}"
 
 
 def _holding(result: xr.Dataset) -> dict[str, Any] | None:

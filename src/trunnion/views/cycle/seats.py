@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.quantities import number, prefixed, quantity
@@ -53,31 +52,21 @@ def seat(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     return Plot("Seats of the pins in their holes", panels, columns, width)
 
 
-def _share(over: Abscissa) -> Array:
-    """Places of the positions on the scale of colours."""
-    low = float(over.values.min(initial=np.inf))
-    return (over.values - low) / (over.span or 1.0)
-
-
-def _marked(over: Abscissa, solved: NDArray[np.bool_]) -> list[int]:
-    """Positions that are told by name: every quarter of a turn, or start, middle and end of a way."""
-    picked = [0, over.values.size // 2, over.values.size - 1]
-    if over.closed:
-        angles = over.values[0] + over.period * np.arange(4) / 4
-        picked = [int(np.argmin(np.abs(over.values - angle))) for angle in angles]
-    return [index for index in dict.fromkeys(picked) if solved[index]]
-
-
 def _hole(seats: Seats, end: int, plane: tuple[int, int], over: Abscissa) -> Chart:
     """Pin in hole: wall, clearance, locus, and at the marked positions the pin with its load."""
     factor, unit = prefixed(seats.clearance, "m")
     rho, offset = seats.clearance * factor, seats.offsets[end, list(plane)] * factor
-    force, square, share, most = seats.forces[end, list(plane)], seats.kind == "guide", _share(over), seats.peak
+    force, square, most = seats.forces[end, list(plane)], seats.kind == "guide", seats.peak
+    share = (over.values - float(over.values.min())) / (over.span or 1.0)  # places on the scale of colours
     wall = [Ring((0.0, 0.0), size * rho, look, square, filled) for size, look, filled in (
         (1 + PIN + WALL, Look("shade", 0.0, order=0.7), 1.0), (1 + PIN, Look("ink", 1.4, order=0.8), 0.0),
         (1.0, Look("muted", 0.8, "dashed", order=2.0), 0.0))]  # fmt: skip
     marks: list[Mark] = [*wall, *_locus(offset, share, over, rho)]
-    for index in _marked(over, np.asarray(np.isfinite(offset).all(axis=0))):
+    picked = [0, over.values.size // 2, over.values.size - 1]  # positions that are named
+    if over.closed:
+        angles = over.values[0] + over.period * np.arange(4) / 4
+        picked = [int(np.argmin(np.abs(over.values - angle))) for angle in angles]
+    for index in (index for index in dict.fromkeys(picked) if np.isfinite(offset[:, index]).all()):
         paint, place = Look(float(share[index])), offset[:, index]
         at = (float(place[0]), float(place[1]))
         marks.append(Ring(at, PIN * rho, paint.but(width=1.1, alpha=0.85, order=1.5), square, 0.07))
@@ -92,14 +81,17 @@ def _hole(seats: Seats, end: int, plane: tuple[int, int], over: Abscissa) -> Cha
     if np.isfinite(slack).any():
         text = f"along the axis {number(float(np.nanmin(slack)), 3)} to {number(float(np.nanmax(slack)), 3)} {unit}"
         marks.append(Note(text, 0.02, 0.02, "left", "bottom", size=7.0))
-    ends = [(-rho, _tick(-rho)), (0.0, ""), (rho, _tick(rho))]
-    x, y = (Axis(f"{'xyz'[axis]} [{unit}]", (-ROOM * rho, ROOM * rho), ends) for axis in plane)
+    ends = [(-rho, f"−{rho:.3g}"), (0.0, ""), (rho, f"{rho:.3g}")]
+    first, second = (name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in seats.links)
+    below = f"\n{seats.kind} of {first} in {second}\nlongest load {quantity(seats.peak, 'N')}"
+    x, y = (Axis(f"{'xyz'[axis]} [{unit}]{text}", (-ROOM * rho, ROOM * rho), ends)
+            for axis, text in zip(plane, (below, ""), strict=True))  # fmt: skip
     title = seats.joint
     if seats.kind == "ball":
         title = f"{seats.joint}: {''.join('xyz'[axis] for axis in plane)}"
     elif len(seats.offsets) == 2:
         title = f"{seats.joint}, end {end + 1}"
-    return Chart(_described(x, seats), y, marks, title=title, legend=None, equal=True)
+    return Chart(x, y, marks, title=title, legend=None, equal=True)
 
 
 def _locus(offset: Array, share: Array, over: Abscissa, jump: float) -> list[Mark]:
@@ -114,17 +106,6 @@ def _locus(offset: Array, share: Array, over: Abscissa, jump: float) -> list[Mar
         elif np.isfinite(part).all():
             marks.append(Line(part[0], part[1], None, Look(float(hue[0]), dash="none", mark="o", size=3.7, order=3.0)))
     return marks
-
-
-def _described(axis: Axis, seats: Seats) -> Axis:
-    """The axis with what lies in what, and the load that the longest arrow stands for."""
-    first, second = (name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in seats.links)
-    lines = [axis.title, f"{seats.kind} of {first} in {second}", f"longest load {quantity(seats.peak, 'N')}"]
-    return Axis("\n".join(lines), axis.limits, axis.places, count=axis.count)
-
-
-def _tick(value: float) -> str:
-    return f"{value:.3g}".replace("-", "−")
 
 
 # ---- over the drive -----------------------------------------------------------------------------------------------

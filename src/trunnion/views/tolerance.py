@@ -178,16 +178,13 @@ def overview(result: xr.Dataset) -> Table:
     rows, label = [], ""
     for read in readings(result):
         cells, label = cells_of(read), read.rss_label
+        worst = cells["worst case"].get("searched") or cells["worst case"].get("linear", "")
         sampled = [cells[key].get("sampled") or cells[key].get("linear", "")
                    for key in ("mean", "deviation σ", "yield", "Cpk")]  # fmt: skip
-        rows.append([read.name, read.limits_said, cells["nominal"]["linear"], _worst(cells), cells[label]["linear"],
+        rows.append([read.name, read.limits_said, cells["nominal"]["linear"], worst, cells[label]["linear"],
                      *sampled])  # fmt: skip
     head = ["measure", "limits", "nominal", "worst case", label, "mean", "deviation σ", "yield", "Cpk"]
     return Table("measures", head, rows).without_empty()
-
-
-def _worst(cells: dict[str, Cells]) -> str:
-    return cells["worst case"].get("searched") or cells["worst case"].get("linear", "")
 
 
 def failed(result: xr.Dataset) -> list[Table]:

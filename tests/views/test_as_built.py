@@ -7,7 +7,7 @@ import shutil
 
 import numpy as np
 import pytest
-from as_built_models import EXAMPLES, four_bar, four_bar_model, loaded
+from as_built_models import EXAMPLES, four_bar, loaded
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle
 
@@ -15,10 +15,8 @@ import trunnion
 from trunnion.errors import MechanismError, Status
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.deviations import (
-    continued,
     losses,
     seated,
-    with_worst_case,
 )
 from trunnion.views.cycle.plots import drawable, save
 from trunnion.views.cycle.scene import scene
@@ -52,30 +50,6 @@ def test_errors_are_those_of_the_result(slider):
     dotted = [line for line in place.lines if str(line.get_linestyle()) == "--" and len(line.get_xdata()) == 2]
     assert len(dotted) >= len(np.unique(np.concatenate(list(losses(slider).values()))))
     assert "contact lost: S" in [text.get_text() for text in place.get_legend().get_texts()]
-
-
-def test_the_transmission_error_of_a_four_bar_is_in_minutes_of_arc_with_its_worst_case():
-    """One pin with 0.02 mm: at 60° of crank angle the output errs by at most 0.017902°."""
-    result = with_worst_case(four_bar(), four_bar_model())
-    wrong = result.joint_rotation_error.sel(joint="D").values
-    axes = plots.figure(result, "error").axes[1]
-    assert "rotation [°]" in axes.get_ylabel()
-    assert _label(axes, "D").get_ydata()[:-1] == pytest.approx(np.degrees(wrong))
-    (band,) = [one for one in axes.collections if one.get_label() == "worst case of the play, first order"]
-    x, y = band.get_paths()[0].vertices.T
-    at = y[np.isclose(x, 60.0)]
-    assert [at.min(), at.max()] == pytest.approx([-0.017902, 0.017902], rel=1e-4)
-    assert abs(wrong[12]) <= np.radians(0.017902)
-
-
-def test_the_band_lies_about_the_error_of_the_dimensions():
-    """A crank 0.1 mm too long: without play it errs by the middle of the band, with any seat it stays inside."""
-    result = with_worst_case(four_bar(AB="0.1 mm"), four_bar_model(AB="0.1 mm"))
-    centre, reach = (result[f"transmission_{name}"].sel(joint="D").values for name in ("centre", "reach"))
-    free = trunnion.analyse(four_bar_model(AB="0.1 mm").with_values({"B.pin.clearance": 0}), 72)
-    assert centre == pytest.approx(free.joint_rotation_error.sel(joint="D").values, abs=1e-12)
-    assert (np.abs(result.joint_rotation_error.sel(joint="D").values - centre) <= reach * (1 + 1e-3)).all()
-    assert np.isnan(result["transmission_centre"].sel(joint="B")).all()
 
 
 @pytest.mark.slow
@@ -134,34 +108,6 @@ def test_a_seat_that_is_given_is_drawn_where_it_is():
     axes = plots.figure(result, "beta").axes
     assert len(axes) == 1  # no β in the plane
     assert axes[0].lines[1].get_ydata() == pytest.approx(30.0)
-
-
-def test_beta_stays_within_a_turn():
-    """Ends of which one goes round and round against the other."""
-    way = np.linspace(0.0, 6 * np.pi, 400)
-    beta = np.angle(np.exp(1j * way))  # as it is told, in (−π, π]
-    xi = np.angle(np.exp(1j * (0.3 + np.round((beta - way) / (2 * np.pi)) * np.pi)))
-    shown, direction = continued(beta, xi)
-    assert np.abs(shown).max() <= 2 * np.pi * (1 + 1e-6)
-    for sign in (1.0, -1.0):  # the same places of both ends
-        one, other = xi + sign * beta / 2, direction + sign * shown / 2
-        assert np.allclose(np.cos(one - other), 1.0)
-    steps = np.abs(np.diff(shown))
-    assert np.count_nonzero(steps > 1.0) <= 3  # whole turns only, at which the curve is broken
-
-
-def test_no_line_crosses_a_jump_and_losses_are_marked(slider, cardan):
-    for result, jump in ((slider, 60.0), (cardan, 60.0)):
-        figure = plots.figure(result, "beta")
-        for axes in figure.axes:
-            if "[°]" not in axes.get_ylabel():
-                continue
-            for joint in result.joint.values:
-                for line in (one for one in axes.lines if one.get_label() == joint):
-                    step = np.abs(np.diff(line.get_ydata()))
-                    assert np.nanmax(step, initial=0.0) < jump
-    marks = _label(plots.figure(slider, "beta").axes[1], "contact lost").get_xdata()
-    assert sorted(marks) == pytest.approx(sorted(5.0 * np.repeat(losses(slider)["S"], 1)))
 
 
 @pytest.fixture(scope="module")

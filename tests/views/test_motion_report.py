@@ -152,9 +152,9 @@ def test_every_figure_bears_every_motion(motion: tuple[str, xr.Dataset], kind: s
     name, result = motion
     drawn = figure(result, kind)
     drawn.canvas.draw()
-    marks = [text.get_text() for axes in drawn.axes for text in axes.texts]
-    panels = len(drawn.axes) if kind != "phase" else 0
-    assert marks == [word for _ in range(panels) for word, _ in EVENTS[name]]
+    for axes in drawn.axes if kind != "phase" else ():
+        labels = [text.get_text() for text in axes.get_legend().get_texts()] if axes.get_legend() else []
+        assert {word for word, _ in EVENTS[name]} <= set(labels)
     if kind != "phase":
         end = shown(result).end
         low, high = drawn.axes[-1].get_xlim()
@@ -233,7 +233,7 @@ def test_each_end_of_a_pin_in_space_has_its_hole() -> None:
 
 
 @pytest.mark.slow
-def test_the_report_has_force_gap_orbit_and_spectrum() -> None:
+def test_the_report_has_force_gap_and_orbit() -> None:
     page = Page(report(rattled()))
     assert not page.open
     (contact,) = page.scene()["motion"]["contacts"]
@@ -241,9 +241,8 @@ def test_the_report_has_force_gap_orbit_and_spectrum() -> None:
     assert max(contact["force"]) == pytest.approx(float(rattled()["contact_normal_force"].max()), rel=1e-6)
     assert contact["gap"] == pytest.approx(rattled()["contact_gap"].values[0], rel=1e-6)
     pictures = [attrs["alt"] for tag, attrs in page.tags if tag == "img"]
-    assert len(pictures) == 2
+    assert len(pictures) == 1
     assert "holes" in pictures[0]
-    assert "frequency" in pictures[1]
 
 
 def test_columns_of_contacts_and_impacts() -> None:

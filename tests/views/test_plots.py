@@ -8,17 +8,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from stand_in import blank, four_bar, slider
 
 import trunnion
 from trunnion.cycle.locking import LockingState
 from trunnion.errors import MechanismError, Status
-from trunnion.views.common.cycle import abscissa, intervals, thin
+from trunnion.views.common.cycle import abscissa, intervals
 from trunnion.views.common.drawing import cylinder, picture
 from trunnion.views.cycle import plots
-from trunnion.views.cycle.courses import turned_from_start
 from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
 
 PLAIN = [name for name in PLOTS if name not in READY]  # of results without errors
@@ -118,19 +115,6 @@ def test_intervals_name_each_run_without_an_answer(plain):
     ]
 
 
-@given(st.lists(st.floats(-1e6, 1e6) | st.just(np.nan), min_size=1, max_size=400), st.integers(4, 60))
-def test_thinning_keeps_both_peaks_and_every_long_gap(values, most):
-    column = np.array(values)
-    picked = thin(column, most)
-    kept = column[picked]
-    assert (np.diff(picked) > 0).all()
-    assert picked.size <= 2 * most + 2 or picked.size == column.size
-    if np.isfinite(column).any():
-        assert np.nanmax(kept) == np.nanmax(column)
-        assert np.nanmin(kept) == np.nanmin(column)
-    assert np.isnan(kept).any() == np.isnan(column).any()
-
-
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
@@ -164,31 +148,6 @@ def test_a_shaft_that_turns_fully_ends_a_turn_further():
     assert crank[-1] - crank[0] == pytest.approx([360.0, 360.0])
     rocker = _line(figure.axes[0], "rocker").get_xydata()
     assert rocker[-1] - rocker[0] == pytest.approx([360.0, 0.0])
-
-
-def test_a_crank_in_space_turns_on_and_a_rocker_comes_back():
-    angle = np.linspace(0.0, 4 * np.pi, 97)
-    axis = np.array([0.6, 0.0, 0.8])
-    turn = np.vstack([np.cos(angle / 2), axis[:, None] * np.sin(angle / 2)])
-    flipped = turn * np.where(np.arange(97) % 3 == 0, -1.0, 1.0)  # q and −q are one orientation
-    assert turned_from_start(flipped) == pytest.approx(angle, abs=1e-7)
-    there_and_back = np.append(turn[:, :40], turn[:, 39::-1], axis=1)
-    assert turned_from_start(there_and_back) == pytest.approx([*angle[:40], *angle[39::-1]], abs=1e-7)
-    hole = flipped.copy()
-    hole[:, 20:25] = np.nan
-    assert np.isnan(turned_from_start(hole)[20:25]).all()
-    assert turned_from_start(hole)[25:] == pytest.approx(angle[25:], abs=1e-7)
-
-
-def test_curves_that_coincide_are_named_together_and_have_the_colour_of_the_first():
-    result = four_bar(36)
-    forces = result["reaction_force"].values
-    forces[3] = -forces[2]
-    figure = plots.figure(result.assign(reaction_force=(result["reaction_force"].dims, forces)), "reactions")
-    labels = figure.axes[0].get_legend_handles_labels()[1]
-    assert labels == ["A", "B", "C = D"]
-    alone = plots.figure(result.isel(joint=[0, 1, 2]), "reactions")
-    assert _line(figure.axes[0], "C = D").get_color() == _line(alone.axes[0], "C").get_color()
 
 
 def test_a_cylinder_is_a_barrel_with_a_rod_in_it():
@@ -263,14 +222,6 @@ def test_colours_change_where_the_state_does_and_the_drive_effort_its_sign():
     assert line.get_xdata()[0] == pytest.approx(180 - limit, abs=0.01)
     colours = {patch.get_facecolor() for patch in upper.patches}
     assert len(colours) == 4
-
-
-@pytest.mark.parametrize("kind", ["torque", "reactions", "power", "locking", "motion"])
-def test_a_place_is_marked_in_every_panel(cycle, kind):
-    figure = plots.figure(cycle, kind, at="59 mm")
-    place = cycle["drive"].values[int(np.argmin(np.abs(cycle["drive"].values - 59)))]
-    for axes in figure.axes:
-        assert any(np.ptp(line.get_xdata()) == 0 and line.get_xdata()[0] == pytest.approx(place) for line in axes.lines)
 
 
 def test_the_mechanism_is_drawn_at_a_place(cycle):

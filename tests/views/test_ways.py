@@ -41,9 +41,7 @@ def test_what_has_no_place_is_said():
     data = stephenson_six_bar()
     data["links"]["rod"]["points"]["H"] = [0.3, 0]  # long enough for one way of the four-bar only
     drawn = panels(ways(build(data)))
-    silent = [
-        title for title, axes in drawn.items() if any("not assembled here: rod, output" in one for one in texts(axes))
-    ]
+    silent = [title for title, axes in drawn.items() if "cannot be assembled in this mode" in texts(axes)]
     assert silent == ["coupler: way-2"]
 
 

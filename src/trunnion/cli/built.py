@@ -123,7 +123,7 @@ def tolerance(
     ] = None,
     kind: Annotated[
         str | None,
-        Option("--kind", help="A single figure: histogram, contributions, envelope, convergence or sobol."),
+        Option("--kind", help="A single figure: histogram, contributions or envelope."),
     ] = None,
 ) -> None:  # fmt: skip
     """Effect of tolerances and play: worst case, RSS, yield, shares."""
@@ -184,7 +184,7 @@ def allocate(
         int, Option("--samples", help="Number of random mechanisms for the verification; 0: none.")
     ] = 10_000,
     seed: Seed = 1, jobs: Jobs = None, write: Write = None, force: Force = False,
-    kind: Annotated[str | None, Option("--kind", help="Which figure: cost, trade-off, or one of `tolerance`.")] = None,
+    kind: Annotated[str | None, Option("--kind", help="Which figure: trade-off, or one of `tolerance`.")] = None,
 ) -> None:  # fmt: skip
     """Find the tolerances of minimum cost that meet the limits.
 

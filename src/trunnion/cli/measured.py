@@ -193,7 +193,7 @@ def identify(
                help="Write the mapping with the zero of the angle or of a channel that was found: .yaml."),
     ] = None,
     force: Force = False,
-    kind: Annotated[str | None, Option("--kind", help="Which figure: intervals, correlation or residuals.")] = None,
+    kind: Annotated[str | None, Option("--kind", help="Which figure: intervals or residuals.")] = None,
 ) -> None:  # fmt: skip
     """Identify parameters of a model from measured data.
 

@@ -106,14 +106,13 @@ def plot(
     steps: Steps = 360,
     at: Annotated[
         str | None,
-        Option("--at", help="Position to draw the mechanism in and to mark in curves: 60deg, 20mm, 0.1s."),
+        Option("--at", help="Position to draw the mechanism in: 60deg, 20mm, 0.1s."),
     ] = None,
     image: Picture = "png", uncut: Uncut = False,
 ) -> None:  # fmt: skip
     """Plot a cycle: torque, friction power, reactions, mechanism."""
     from trunnion.views.charts import check_kind
     from trunnion.views.common.peaks import whole_peaks
-    from trunnion.views.cycle.deviations import with_worst_case
     from trunnion.views.cycle.plots import PLOTS, drawable, figure, save
 
     for name in kind or []:
@@ -128,7 +127,7 @@ def plot(
     ideal = _ideal(mechanism, steps)
     if not single:
         folder(out)
-    drawn = whole_peaks(with_worst_case(result, mechanism) if "error" in (kind or PLOTS) else result, uncut)
+    drawn = whole_peaks(result, uncut)
     for name, picture in [(name, figure(drawn, name, ideal, at)) for name in kind or drawable(result)]:
         path = out if single else out / f"{name}.{image.lstrip('.')}"
         save(picture, path)
@@ -170,11 +169,10 @@ def _ideal(mechanism: "Mechanism", steps: int) -> "xr.Dataset | None":
 def _page(mechanism: "Mechanism", analysed: "Result", uncut: bool) -> str:
     """The report of a cycle as HTML."""
     from trunnion.views.common.peaks import whole_peaks
-    from trunnion.views.cycle.deviations import with_worst_case
     from trunnion.views.cycle.report import report as page
 
     result = analysed.dataset
-    drawn = whole_peaks(with_worst_case(result, mechanism), uncut)
+    drawn = whole_peaks(result, uncut)
     return page(drawn, _ideal(mechanism, result.sizes["position"]))
 
 
@@ -201,8 +199,8 @@ def simulate(
     kind: Annotated[
         str | None,
         Option("--kind",
-               help="Figure to write: sheet, speed, effort, reactions, energy, phase; in play contacts, gaps, orbit, "
-               "spectrum; of a steady cycle those of `trunnion plot`."),
+               help="Figure to write: sheet, speed, effort, reactions, energy, phase; in play contacts, gaps, orbit; "
+               "of a steady cycle those of `trunnion plot`."),
     ] = None,
 ) -> None:  # fmt: skip
     """Motion in time: start-up, run-down, rest, locking, pins in play.

@@ -6,7 +6,7 @@ A chart has two axes and marks, drawn in order. Colours are numbers of the palet
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -23,13 +23,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "FREE", "Arrow", "Axis", "Band", "Bars", "Cells", "Chart", "ColourScale", "Legend", "Line", "Look", "Mark", "Note",
-    "Panel", "Plot", "Ring", "Rule", "Stairs", "Stripe", "check_kind", "joined", "nth", "outside", "over_drive",
+    "FREE", "Arrow", "Axis", "Band", "Bars", "Chart", "ColourScale", "Contours", "Legend", "Line", "Look", "Mark",
+    "Note", "Panel", "Plot", "Ring", "Rule", "Stairs", "Stripe", "check_kind", "nth", "outside", "over_drive",
     "silent",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
-SAME = 1e-6  # of the largest value of all curves: a difference that no figure shows
 RIPPLE = 0.1  # of the largest value: curves that vary by less are shown without 0
 COLOURS, DASHES = 6, ("solid", "long", "short", "dash-dot")  # colours of the palette, then the next dash
 
@@ -110,15 +109,13 @@ class Stairs(NamedTuple):
 
 
 class Bars(NamedTuple):
-    """Level bars from 0 at heights `at`; low, high: lengths of the bars of their uncertainty."""
+    """Level bars from 0 at heights `at`."""
 
     at: Array
     sizes: Array
     thickness: float
     name: str | None = None
     look: Look = Look()
-    low: Array | None = None
-    high: Array | None = None
 
 
 class Rule(NamedTuple):
@@ -177,12 +174,34 @@ class Note(NamedTuple):
     beside: bool = False
 
 
-class Cells(NamedTuple):
-    """A matrix of coloured cells from −1 to 1 with their numbers, the names along both sides."""
+class ColourScale(NamedTuple):
+    """What the colours of a chart mean: a number from low to high, in bands between `levels` if there are any."""
 
+    title: str
+    low: float
+    high: float
+    log: bool = False
+    levels: Sequence[float] = ()
+
+    def share(self, value: float) -> float:
+        """The place of a value on the scale, from 0 to 1."""
+        if self.low == self.high:
+            return 0.5
+        low, high, at = (math.log(v) if self.log else v for v in (self.low, self.high, value))
+        return (at - low) / (high - low)
+
+
+class Contours(NamedTuple):
+    """Bands of a number over a grid, (x, y), not drawn across points without it; the surroundings of those, which end
+    at the edges, are hatched: gaps are (name, hatch, (x, y)) of each cause."""
+
+    x: Array
+    y: Array
     values: Array
-    names: list[str]
-    written: bool
+    x_edges: Array
+    y_edges: Array
+    colours: ColourScale
+    gaps: Sequence[tuple[str, str, NDArray[np.bool_]]] = ()
 
 
 def outside(peak: float, unit: str) -> Note:
@@ -191,7 +210,7 @@ def outside(peak: float, unit: str) -> Note:
     return Note(text, 0.99, 0.97, "right", "top", boxed=True)
 
 
-Mark = Line | Band | Stairs | Bars | Rule | Stripe | Arrow | Ring | Note | Cells
+Mark = Line | Band | Stairs | Bars | Rule | Stripe | Arrow | Ring | Note | Contours
 
 
 @dataclass(frozen=True)
@@ -200,8 +219,7 @@ class Axis:
 
     limits: its ends, None where the marks decide; margin: around the marks, as a share; places: where it is marked,
     with names, which may be turned by so many degrees; integer: marked at whole numbers only; angles: at parts of a
-    turn; count: of its marks; form: how a number is written; powers: very large and small numbers by a common power of
-    ten.
+    turn; count: of its marks; powers: very large and small numbers by a common power of ten.
     """
 
     title: str = ""
@@ -211,39 +229,20 @@ class Axis:
     integer: bool = False
     angles: bool = False
     count: int = 0
-    form: Callable[[float], str] | None = None
     turned: float = 0.0
     margin: float | None = None
     powers: bool = False
 
 
 class Legend(NamedTuple):
-    """A legend above the chart: entries in a row, characters that a row has room for, fewest entries; lift: height of
-    what stands below it, points."""
+    """A legend above the chart: entries in a row, characters that a row has room for, fewest entries."""
 
     most: int = 6
     room: int = 90
     least: int = 2
-    lift: float = 0.0
 
 
 LEGEND = Legend()
-
-
-class ColourScale(NamedTuple):
-    """What the colours of a chart mean: a number from low to high."""
-
-    title: str
-    low: float
-    high: float
-    log: bool = False
-
-    def share(self, value: float) -> float:
-        """The place of a value on the scale, from 0 to 1."""
-        if self.low == self.high:
-            return 0.5
-        low, high, at = (math.log(v) if self.log else v for v in (self.low, self.high, value))
-        return (at - low) / (high - low)
 
 
 @dataclass(frozen=True)
@@ -258,7 +257,6 @@ class Chart:
     legend: Legend | None = LEGEND
     title: str = ""
     aside: str = ""
-    colours: ColourScale | None = None
     bare: bool = False  # without a line and marks at the left
     equal: bool = False
 
@@ -291,23 +289,6 @@ def check_kind(kind: str, kinds: Iterable[str]) -> None:
         hint = nearest(kind, kinds)
         remedy = hint if hint.startswith("did") else f"use one of {', '.join(kinds)}"
         raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", remedy))
-
-
-def joined(lines: Sequence[Line]) -> list[Line]:
-    """The lines, those with a name that are the same as one with the names of all: "A = B". Gaps are a part of them."""
-    sizes = [np.max(np.abs(line.y[np.isfinite(line.y)]), initial=0.0) for line in lines]
-    near, groups = SAME * float(max(sizes, default=0.0)), list[Line]()
-    for line in lines:
-        alike = (
-            k for k, other in enumerate(groups) if line.name and other.name and line.y.shape == other.y.shape
-            and np.allclose(line.y, other.y, rtol=0.0, atol=near, equal_nan=True)
-        )  # fmt: skip
-        k = next(alike, None)
-        if k is None:
-            groups.append(line)
-        else:
-            groups[k] = groups[k]._replace(name=f"{groups[k].name} = {line.name}")
-    return groups
 
 
 def over_drive(
@@ -343,7 +324,7 @@ def over_drive(
         cut.append(outside(most, unit + rate))
     elif 1e-9 * most * factor < varies < RIPPLE * most * factor:
         y, zero = replace(y, margin=0.1, count=5), False
-    drawn = [line.times(factor) for line in joined(lines)]
+    drawn = [line.times(factor) for line in lines]
     areas = [band._replace(low=band.low * factor, high=band.high * factor) for band in bands]
     return Chart(over, y, [*silent(result, over), *areas, *drawn, *marks, *cut], zero, **chart)
 

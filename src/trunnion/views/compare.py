@@ -12,7 +12,6 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.names import nearest
@@ -24,7 +23,6 @@ from trunnion.views.charts import (
     Axis,
     Band,
     Chart,
-    ColourScale,
     Legend,
     Line,
     Look,
@@ -32,12 +30,13 @@ from trunnion.views.charts import (
     Panel,
     Stripe,
     check_kind,
+    nth,
     silent,
 )
 from trunnion.views.common.cycle import Abscissa, Array, names, over_turn
 from trunnion.views.measured import shortened
 from trunnion.views.page import NONE, Section, Summary, Table, counts, page
-from trunnion.views.scales import Scale, cause
+from trunnion.views.scales import Scale, cause, edges
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,10 +50,9 @@ APART = 0.05  # of the range of a number: values nearer to each other are the sa
 TRIFLE = 0.005  # of a number: less is no change of a setting
 KINDS = {"efficiency": "measured and modelled efficiency", "overlay": "signals with residuals"}
 MOST_PANELS = 6
-MOST_NAMED = 8  # series that a legend tells apart; more by a scale of colours
+MOST_NAMED = 8  # curves that a legend tells apart
 MOST_DRAWN = 6  # conditions of a channel in the report
 MEASURED, MODEL = 0, 1
-Indices = NDArray[np.intp]
 
 
 # ---- settings and units -------------------------------------------------------------------------------------------
@@ -164,7 +162,12 @@ def explained(result: xr.Dataset, channel: int | None = None) -> Table | None:
     """What would explain each residual beyond U: size and share, of all channels or of one; None if there is none."""
 
     def cells(i: int, k: int) -> list[str]:
-        causes = [_cause(result, kind, i, k) for kind in CAUSES]
+        causes = []
+        for kind in CAUSES:  # errors that would explain it, with the share that they explain
+            size, part = (float(result[f"{kind}_{what}"].values[i, k]) for what in ("error", "explains"))
+            factor, unit = {"zero": scale_of(result, i, k), "angle": (180 / math.pi, "°")}.get(kind, (100.0, "%"))
+            sized = f"{'+' if size > 0 else ''}{text(size * factor, unit)} ({100 * part:.1f}\u00a0%)"
+            causes.append(sized if np.isfinite(size) else NONE)
         return causes if any(cause != NONE for cause in causes) else []
 
     table = _by_condition("what would explain the residual, each by itself", [*CAUSES], result, channel, cells)
@@ -183,15 +186,6 @@ def _by_condition(
         if (row := cells(i, k))
     ]
     return Table(title, [first, *(["channel"] if channel is None else []), *head], rows)
-
-
-def _cause(result: xr.Dataset, kind: str, i: int, k: int) -> str:
-    """An error that would explain a residual, with the share that it explains."""
-    size, part = (float(result[f"{kind}_{what}"].values[i, k]) for what in ("error", "explains"))
-    if not np.isfinite(size):
-        return NONE
-    factor, unit = {"zero": scale_of(result, i, k), "angle": (180 / math.pi, "°")}.get(kind, (100.0, "%"))
-    return f"{'+' if size > 0 else ''}{text(size * factor, unit)} ({100 * part:.1f}\u00a0%)"
 
 
 def verdicts(result: xr.Dataset) -> Table:
@@ -258,13 +252,12 @@ def sensors(result: xr.Dataset) -> Table:
         cells = []
         for what in ("zero", "gain"):
             values = result[f"accuracy_{what}"].values[i]
-            texts = []
-            for end in (np.nanmin(values), np.nanmax(values)) if np.isfinite(values).any() else ():
-                factor, display_unit = (1 / size, read) if read and size != 1 else prefixed(float(end), unit)
-                size_text = (
-                    text(end * factor, display_unit) if what == "zero" else f"{number(100 * float(end), 3)}\u00a0%"
-                )
-                texts.append(size_text if end else "0")
+            ends = [float(np.nanmin(values)), float(np.nanmax(values))] if np.isfinite(values).any() else []
+            in_unit = [(1 / size, read) if read and size != 1 else prefixed(end, unit) for end in ends]
+            scales = in_unit if what == "zero" else [(100.0, "%")] * 2
+            texts = [
+                text(end * factor, sign) if end else "0" for end, (factor, sign) in zip(ends, scales, strict=False)
+            ]
             cells.append(" to ".join(dict.fromkeys(texts)) or NONE)
         rows.append([name, measures[i], "" if (read or unit) == "1" else read or unit, *cells])
     return Table("sensors", ["channel", "measures", "unit", "u of the zero", "u of the gain"], rows)
@@ -324,8 +317,7 @@ def figure(
             remedy = "measure effort: and rate: of the driver, load: and rate: of a load's joint"
             raise MechanismError(Finding("the efficiency was not measured", "--kind efficiency", remedy))
         chart = efficiency(result)
-        over = "condition" if chart.x.title == "condition" else varied(result)[0].name
-        return draw(f"Efficiency, measured and model, over {over}", result, [Panel("", [chart], 3.75)])
+        return draw("Efficiency, measured and model", result, [Panel("", [chart], 3.75)])
     charts = panels(result, channel, condition)
     if not charts:
         remedy = "see the findings of `trunnion data`"
@@ -350,93 +342,49 @@ def panels(result: xr.Dataset, channel: str | None = None, condition: str | None
 
 
 def efficiency(result: xr.Dataset) -> Chart:
-    """Measured efficiency with bars of ±U beside the model's, over what was varied; a curve for each further value."""
-    over, series, other = _series(result)
-    single, many = len(series) == 1, len(series) > MOST_NAMED and other is not None
-    values = np.empty(0) if other is None else other.values
-    colours = ColourScale(other.title, float(np.nanmin(values)), float(np.nanmax(values))) if many and other else None
-    marks: list[Mark] = []
-    for k, (name, where) in enumerate(series):
-        look = Look(MODEL if single else k, dash=("solid", "long", "short", "dotted")[k // 6 % 4])
-        if colours is not None:
-            look = Look(colours.share(float(np.nanmean(values[where]))))
-        marks += _efficiency_marks(result, over, where, look, MEASURED if single else look.colour)
-        if name and not many:
-            marks.append(Line(np.empty(0), np.empty(0), name, look))
-    nothing = np.empty(0)
-    dots, line = (Look("ink"),) * 2 if not single else (Look(MEASURED), Look(MODEL))
-    measured = f"measured, ±U ({coverage_of(result)})"
-    marks += [Line(nothing, nothing, measured, dots.but(dash="none", mark="o")), Line(nothing, nothing, "model", line)]
-    stripes, limits = _unanswered(result, over)
+    """Measured efficiency with bars of ±U beside the model's, over what was varied; a curve for each combination of
+    further numbers, over the conditions if there are too many."""
+    count, (several, by_number) = result.sizes["condition"], (varied(result), Scale("condition", "", np.empty(0)))
+    over, *others = several or [by_number]
+    keys = np.array([np.nan_to_num(levels(scale.values), nan=np.inf) for scale in others]).reshape(-1, count)
+    combined = np.unique(keys, axis=1).T if others else np.empty((1, 0))
+    if len(combined) > MOST_NAMED:
+        over, others, keys, combined = by_number, [], keys[:0], np.empty((1, 0))
+    x = over.values if over.values.size else np.arange(1.0, count + 1)
+    model, measured, wide = (result[f"efficiency{part}"].values for part in ("_model", "", "_expanded"))
+    marks, order = list[Mark](), np.argsort(x, kind="stable")
+    for k, at in enumerate(combined):
+        where = order[(keys == at[:, None]).all(axis=0)[order] & np.isfinite(x[order])]
+        parts = (f"{scale.name} = {setting(value, scale.unit)}" for scale, value in zip(others, at, strict=True))
+        look, half = nth(k) if others else Look(MODEL), np.nan_to_num(wide[where])
+        dash = look.dash if over is not by_number else "none"  # conditions are in no order
+        marks += [
+            Line(x[where], model[where], ", ".join(["model", *parts]), look.but(dash=dash, mark="_", size=13.0)),
+            Line(x[where], measured[where], None if k else f"measured, ±U ({coverage_of(result)})",
+                 Look(look.colour if others else MEASURED, dash="none", mark="o", order=3), half, half),
+        ]  # fmt: skip
+    stripes, limits = _unanswered(result, x)
     conditions = names(result, "condition")
-    named = over.name == "condition" and len(conditions) <= 24 and max(map(len, conditions)) <= 24
+    named = over is by_number and count <= 24 and max(map(len, conditions)) <= 24
     across = Axis(over.title, limits, [(k + 1, name) for k, name in enumerate(conditions)] if named else None,
                   turned=60 if named and sum(map(len, conditions)) > 70 else 0)  # fmt: skip
-    return Chart(across, Axis("efficiency"), [*marks, *stripes], legend=Legend(least=1), colours=colours)
+    return Chart(across, Axis("efficiency"), [*marks, *stripes], legend=Legend(least=1))
 
 
-def _series(result: xr.Dataset) -> tuple[Scale, list[tuple[str, Indices]], Scale | None]:
-    """What to draw over, the conditions of each curve with its name, and the number that tells the curves apart."""
-    count, several = result.sizes["condition"], varied(result)
-    by_number = Scale("condition", "", np.arange(1.0, count + 1)), [("", np.arange(count))], None
-    if not several:
-        return by_number
-    over, *others = several
-    if not others:
-        return over, [("", np.flatnonzero(np.isfinite(over.values)))], None
-    keys = np.stack([np.nan_to_num(levels(scale.values), nan=np.inf) for scale in others])
-    combined = np.unique(keys, axis=1).T
-    if len(others) > 1 and len(combined) > MOST_NAMED:
-        return by_number
-    series = []
-    for at in combined:
-        members = np.flatnonzero((keys == at[:, None]).all(axis=0) & np.isfinite(over.values))
-        parts = [f"{scale.name} = {setting(value, scale.unit)}" for scale, value in zip(others, at, strict=True)]
-        series.append((", ".join(parts), members))
-    return over, series, others[0]
-
-
-def _efficiency_marks(
-    result: xr.Dataset, over: Scale, where: Indices, look: Look, dots: int | float | str
-) -> list[Mark]:
-    """One curve of the model, crosses where it ends at a gap, with its measured points."""
-    order = where[np.argsort(over.values[where], kind="stable")]
-    x = over.values[order]
-    model, measured, wide = (
-        result[key].values[order] for key in ("efficiency_model", "efficiency", "efficiency_expanded")
-    )
-    answered = np.isfinite(model)
-    bars = look.but(dash="none", mark="_", size=13.0, order=2.5)
-    marks: list[Mark] = [Line(x, model, None, look.but(order=2.5))]
-    if over.name == "condition":  # which are in no order
-        marks = [Line(x, model, None, bars)]
-    elif np.count_nonzero(answered) == 1:  # a line of one point is none
-        marks.append(Line(x[answered], model[answered], None, bars))
-    ends = answered & (np.append(False, ~answered[:-1]) | np.append(~answered[1:], False))
-    if over.name != "condition" and ends.any():
-        marks.append(Line(x[ends], model[ends], None, look.but(dash="none", mark="x", size=7.0, order=4.0)))
-    half = np.nan_to_num(wide)
-    return [*marks, Line(x, measured, None, Look(dots, dash="none", mark="o", order=3), half, half)]
-
-
-def _unanswered(result: xr.Dataset, over: Scale) -> tuple[list[Mark], tuple[float | None, float | None]]:
+def _unanswered(result: xr.Dataset, x: Array) -> tuple[list[Mark], tuple[float | None, float | None]]:
     """Stripes where no condition has an answer of the model, with the cause; and the ends of the axis."""
-    model, status, at = result["efficiency_model"].values, result["status"].values, levels(over.values)
+    model, status, at = result["efficiency_model"].values, result["status"].values, levels(x)
     sampled, places = np.isfinite(result["phase"].values), np.unique(at[np.isfinite(at)])
     if not places.size:
         return [], (None, None)
-    margin = 0.05 * float(np.ptp(places)) or 0.5 * abs(float(places[0])) or 0.5
-    edges = np.concatenate([[places[0] - margin], (places[1:] + places[:-1]) / 2, [places[-1] + margin]])
-    marks, before = list[Mark](), ""
+    sides, marks = edges(Scale("", "", places), places, 0.05), list[Mark]()
     for k, place in enumerate(places):
         here = at == place
-        if np.isfinite(model[here]).any():
-            continue
-        gravest = int(status[here][sampled[here]].max())
-        why = f"model: {cause(gravest) if gravest >= Status.NOT_CONVERGED else 'no efficiency'}"
-        marks.append(Stripe(edges[k], edges[k + 1], why if why != before else ""))
-        before = why
-    return marks, (float(edges[0]), float(edges[-1]))
+        if not np.isfinite(model[here]).any():
+            gravest = int(status[here][sampled[here]].max())
+            why = cause(gravest) if gravest >= Status.NOT_CONVERGED else "no efficiency"
+            marks.append(Stripe(sides[k], sides[k + 1], f"model: {why}"))
+    return marks, (float(sides[0]), float(sides[-1]))
 
 
 def course(result: xr.Dataset, channel: int, condition: int, room: int) -> Panel:
@@ -481,7 +429,7 @@ def course(result: xr.Dataset, channel: int, condition: int, room: int) -> Panel
 
 def report(result: xr.Dataset) -> str:
     """The whole report as HTML, to be filed."""
-    from trunnion.views.draw import small
+    from trunnion.views.draw import figure as draw
 
     parts = []
     table = efficiencies(result)
@@ -494,13 +442,15 @@ def report(result: xr.Dataset) -> str:
     parts += [Section(one.title.capitalize(), tables=[one]) for one in (conditions(result), sensors(result))]
     for i, name in enumerate(names(result, "channel")):
         compared = [k for _, k in panels(result, name)]
-        drawn = sorted(sorted(compared, key=lambda k, i=i: -_severity(result, i, k))[:MOST_DRAWN])  # type: ignore[misc]
+        within = np.nan_to_num(result["within"].values[i], nan=2.0)
+        drawn = sorted(sorted(compared, key=lambda k, within=within: within[k])[:MOST_DRAWN])  # type: ignore[misc]
         unit = str(attribute(result, "channel_units")[i])
         about = f"measures {attribute(result, 'channel_measures')[i]}{f', {unit}' if unit != '1' else ''}"
         if len(drawn) < len(compared):
-            about += f"; {len(drawn)} of {len(compared)} conditions are drawn, those with the largest residuals for " \
-                     "their uncertainty"  # fmt: skip
-        pictures = [(f"{name}, {label(result, k)}", small(course(result, i, k, 62))) for k in drawn]
+            about += f"; {len(drawn)} of {len(compared)} conditions are drawn, those with the least within ±U"
+        pictures = [
+            (f"{name}, {label(result, k)}", draw("", result, [course(result, i, k, 62)], width=5.2)) for k in drawn
+        ]
         why = explained(result, i)
         parts.append(Section(name, about, pictures, [results(result, i), *([why] if why else [])], small=True,
                              calm="" if pictures else "No signal."))  # fmt: skip
@@ -530,13 +480,3 @@ def data_section(result: xr.Dataset, key: str) -> Section:
 def of_file(row: dict[str, str]) -> dict[str, str]:
     """A finding about data with the name of its file."""
     return {**row, "where": " ".join(part for part in (Path(row["file"]).name, row["where"]) if part)}
-
-
-def _severity(result: xr.Dataset, channel: int, condition: int) -> float:
-    """Root mean square of the residual in expanded uncertainties; of an unknown one in its own unit."""
-    residual, wide = (result[key].values[channel, condition] for key in ("residual", "expanded"))
-    finite = np.isfinite(residual)
-    if not finite.any():
-        return -1.0
-    scale = np.where(np.isfinite(wide) & (wide > 0), wide, 1.0)
-    return float(np.sqrt(np.mean((residual / scale)[finite] ** 2)))

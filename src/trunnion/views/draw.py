@@ -1,41 +1,20 @@
-"""Charts drawn by matplotlib: `chart` on axes, `figure` as panels under a title."""
+"""Charts drawn by matplotlib: `figure` as panels under a title, `grid` side by side on common axes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import singledispatch
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib import colormaps, patches, ticker
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection
-from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize, to_hex, to_rgba
-from matplotlib.layout_engine import ConstrainedLayoutEngine
-from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Rectangle
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator, ScalarFormatter
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize, to_hex, to_rgba
 
-from trunnion.views.charts import (
-    Arrow,
-    Axis,
-    Band,
-    Bars,
-    Cells,
-    Chart,
-    ColourScale,
-    Line,
-    Look,
-    Note,
-    Panel,
-    Plot,
-    Ring,
-    Rule,
-    Stairs,
-    Stripe,
-)
-from trunnion.views.common.cycle import Abscissa, Array, thin
+from trunnion.views import charts
+from trunnion.views.charts import Axis, Chart, ColourScale, Contours, Line, Look, Mark, Note, Panel, Rule
+from trunnion.views.common.cycle import Abscissa, Array
 from trunnion.views.common.figures import (
     INK,
     MUTED,
@@ -44,7 +23,6 @@ from trunnion.views.common.figures import (
     SHADE,
     WIDTH,
     Labels,
-    Sheet,
     along,
     dress,
     legend,
@@ -55,25 +33,27 @@ from trunnion.views.common.figures import (
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.colorbar import Colorbar
-    from matplotlib.figure import Figure, FigureBase
+    from matplotlib.figure import Figure
 
-__all__ = ["Board", "chart", "figure", "plot", "small"]
+__all__ = ["figure", "grid"]
 
 COLOURS = {"ink": INK, "muted": MUTED, "rule": RULE, "shade": SHADE, "limit": "#a1260d", "pale": "#b9c3cd"}
 DASHES: dict[str, Any] = {"solid": "-", "long": (0, (5, 2)), "dashed": (0, (3, 2)), "short": (0, (2, 1.5)),
                           "dotted": (0, (1, 1.5)), "dash-dot": (0, (6, 2, 1.5, 2)),
                           "none": "none"}  # fmt: skip
+BANDED = colormaps["viridis"]
 # without the end that fades on white
 RISING: Colormap = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)), "viridis to green")
 PAGE = {1: WIDTH, 2: 12.6, 3: 14.4}  # width of a figure by its columns, inches
-BOX: dict[str, Any] = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+
+
+# ---- figures ------------------------------------------------------------------------------------------------------
 
 
 def figure(
     title: str, result: xr.Dataset, panels: Sequence[Panel], columns: int = 1, width: float = 0.0, note: str = ""
 ) -> Figure:
-    """Panels in rows of so many columns under a title.
+    """Panels in rows of so many columns under a title; the charts of a panel below one another.
 
     Parameters
     ----------
@@ -88,136 +68,80 @@ def figure(
     rows = [panels[k : k + columns] for k in range(0, len(panels), columns)]
     heights = [max(panel.height for panel in row) for row in rows]
     sheet = new(title, result, 0.55 + sum(heights), width or PAGE[columns])
-    parts = sheet.subfigures(len(rows), columns, squeeze=False, height_ratios=heights).ravel()
-    drawn = [(place, panel) for place, panel in zip(parts, panels, strict=False) if panel.charts]
-    labels = Labels(sheet)
-    for place, panel in drawn:  # but those of measures that lack this figure
+    parts, labels = sheet.subfigures(len(rows), columns, squeeze=False, height_ratios=heights).ravel(), Labels(sheet)
+    for place, panel in zip(parts, panels, strict=False):
+        if not panel.charts:  # of a measure that lacks this figure
+            continue
         if panel.title and len(panels) > 1:
             place.suptitle(_lines(panel.title), x=0.012, ha="left", fontsize=9.5, color=INK)
-        _panel(place, panel, min(1.0, sheet.get_figwidth() / columns / WIDTH), labels)
+        ratios = list(panel.parts) or [1.0] * len(panel.charts)
+        stacked = place.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
+        for axes, spec in zip(stacked, panel.charts, strict=True):
+            _chart(axes, spec, min(1.0, sheet.get_figwidth() / columns / WIDTH))
+            if axes is not stacked[-1]:
+                axes.set_xlabel("")
+                axes.tick_params(labelbottom=False)
+            for mark in spec.marks:
+                if isinstance(mark, Note) and mark.beside:
+                    labels.add(axes, mark.text, np.array([mark.x, mark.y]), mark.size, weight="normal")
     labels.place()
     if note:
         sheet.text(0.012, 0.005, plain(note), fontsize=7.5, color=MUTED)
     return sheet
 
 
-def plot(drawn: Plot, result: xr.Dataset) -> Figure:
-    """A figure of a result as it is described."""
-    return figure(drawn.title, result, drawn.panels, drawn.columns, drawn.width, drawn.note)
+def grid(
+    title: str, result: xr.Dataset, specs: Sequence[Chart], columns: int, colours: ColourScale | None = None
+) -> Figure:
+    """Charts with common axes in rows, titled along the outer ones; their legend and the scale of colours at the right.
 
-
-def small(panel: Panel, width: float = 4.4) -> Figure:
-    """One panel for a page that has several side by side, without the name of the mechanism."""
-    layout = ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.04, hspace=0.03, wspace=0.03)
-    sheet = Sheet(figsize=(width, panel.height), dpi=150, facecolor="white", layout=layout)
-    FigureCanvasAgg(sheet)
-    sheet.suptitle(_lines(panel.title), x=0.012, ha="left", fontsize=9, color=INK)
-    _panel(sheet, panel, width / WIDTH, Labels(sheet))
+    Parameters
+    ----------
+    title : of the whole figure, of one line or more
+    result : whose mechanism is named beneath
+    specs : what is drawn, row by row
+    columns : charts side by side
+    colours : what the colours of all charts mean
+    """
+    rows = -(-len(specs) // columns)
+    height = (4.0 if rows == 1 else 0.9 + 2.1 * rows) + 0.2 * title.count("\n")
+    sheet = new(title, result, height, WIDTH if len(specs) == 1 else 9.4)
+    places = sheet.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel().tolist()
+    named: dict[str, Any] = {}
+    for k, (axes, spec) in enumerate(zip(places, specs, strict=False)):
+        _chart(axes, spec if len(specs) == 1 else replace(spec, legend=None))
+        lowest, leftmost = k + columns >= len(specs), k % columns == 0
+        axes.tick_params(labelbottom=lowest, labelleft=leftmost)
+        axes.set_xlabel(axes.get_xlabel() if lowest else "")
+        axes.set_ylabel(axes.get_ylabel() if leftmost else "")
+        named |= dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    for axes in places[len(specs) :]:
+        axes.remove()
+    if len(specs) > 1 and named:
+        sheet.legend(list(named.values()), list(named), loc="outside right upper", frameon=False, fontsize=8.5,
+                     labelcolor=INK)  # fmt: skip
+    if colours is not None:
+        risen = ScalarMappable((LogNorm if colours.log else Normalize)(colours.low, colours.high), RISING)
+        bar = sheet.colorbar(_bands(colours) if colours.levels else risen, ax=places[: len(specs)], pad=0.02, aspect=30,
+                             ticks=colours.levels or None)  # fmt: skip
+        bar.set_label(plain(colours.title), fontsize=9, color=INK)
+        bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
+        bar.outline.set_visible(False)
     return sheet
 
 
-def _panel(place: FigureBase, panel: Panel, wide: float, labels: Labels) -> None:
-    """The charts of a panel below one another; texts that are to hide nothing wait until all else is there."""
-    ratios = list(panel.parts) or [1.0] * len(panel.charts)
-    rows_of_axes = place.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
-    for axes, spec in zip(rows_of_axes, panel.charts, strict=True):
-        chart(axes, spec, wide)
-        if axes is not rows_of_axes[-1]:
-            axes.set_xlabel("")
-            axes.tick_params(labelbottom=False)
-        for mark in spec.marks:
-            if isinstance(mark, Note) and mark.beside:
-                labels.add(axes, mark.text, np.array([mark.x, mark.y]), mark.size, weight="normal")
+def _bands(scale: ColourScale) -> ScalarMappable:
+    """The colours of bands between levels, with more at either end where a number is beyond."""
+    below, above = scale.low < scale.levels[0], scale.high > scale.levels[-1]
+    extend: Any = "both" if below and above else "min" if below else "max" if above else "neither"
+    return ScalarMappable(BoundaryNorm(scale.levels, BANDED.N, extend=extend), BANDED)
 
 
-class Board(NamedTuple):
-    """Panels that share both axes, labelled along their outer edges, and a strip above several for their legend."""
-
-    sheet: Figure
-    axes: list[Axes]
-    columns: int
-    strip: Axes | None
-
-    @classmethod
-    def new(cls, title: str, result: xr.Dataset, count: int, columns: int) -> Board:
-        """Empty panels, so many, under a title."""
-        rows = -(-count // columns)
-        height = (4.3 if count == 1 else 1.6 + {1: 2.5, 2: 2.1}.get(rows, 1.9) * rows) + 0.2 * title.count("\n")
-        sheet = new(title, result, height)
-        space = sheet.add_gridspec(rows + 1, columns, height_ratios=[0.01] + [1.0] * rows)
-        panels: list[Axes] = []
-        for k in range(count):
-            shared = panels[0] if panels else None
-            where = space[1 + k // columns, k % columns] if count > 1 else space[:, :]
-            panels.append(sheet.add_subplot(where, sharex=shared, sharey=shared))
-        strip = sheet.add_subplot(space[0, :]) if count > 1 else None
-        if strip is not None:
-            strip.set_axis_off()
-        return cls(sheet, panels, columns, strip)
-
-    def draw(self, k: int, spec: Chart) -> Axes:
-        """The chart of the panel k; titles of its axes stand at the outer panels alone."""
-        axes, lowest, leftmost = self.axes[k], k + self.columns >= len(self.axes), k % self.columns == 0
-        chart(axes, spec)
-        axes.tick_params(labelbottom=lowest, labelleft=leftmost)
-        if not lowest:
-            axes.set_xlabel("")
-        if not leftmost:
-            axes.set_ylabel("")
-        axes.title.set_fontsize(8.5)
-        axes.set_title(axes.get_title(loc="left"), loc="left", fontsize=(8.5, 8.5, 8.5, 8.0, 7.2)[self.columns])
-        return axes
-
-    def add(self, k: int, spec: Chart) -> None:
-        """The marks of a chart, over what the panel k has."""
-        for mark in spec.marks:
-            _mark(mark, self.axes[k], spec)
-
-    def finish(self, colours: ColourScale | None = None) -> None:
-        """A legend of everything that is named in any panel; the scale of their colours beside all."""
-        if self.strip is None:
-            legend(self.axes[0], least=1)
-        else:
-            named: dict[str, Any] = {}
-            entries = [pair for axes in self.axes for pair in zip(*axes.get_legend_handles_labels(), strict=True)]
-            for handle, label in sorted(entries, key=lambda pair: not isinstance(pair[0], Line2D)):  # curves first
-                named.setdefault(label, handle)
-            if not named:
-                self.strip.remove()
-            else:
-                columns = max(1, min(len(named), 100 // (max(map(len, named)) + 7)))
-                self.strip.legend(
-                    list(named.values()), list(named), loc="lower left", bbox_to_anchor=(0.0, 0.0), ncols=columns,
-                    frameon=False, fontsize=8.5, labelcolor=INK, handlelength=2.2, columnspacing=1.6,
-                    borderaxespad=0.0,
-                )  # fmt: skip
-        if colours is not None:
-            self.colour_bar(_mappable(colours), colours.title).outline.set_visible(False)
-
-    def colour_bar(self, colours: ScalarMappable, title: str, ticks: Array | None = None) -> Colorbar:
-        """A scale of colours beside all panels."""
-        rows = -(-len(self.axes) // self.columns)
-        bar = _colour_bar(self.sheet, self.axes, colours, title, 30 if len(self.axes) == 1 else 24 * rows, ticks)
-        bar.ax.minorticks_off()
-        return bar
+# ---- a chart ------------------------------------------------------------------------------------------------------
 
 
-def _mappable(scale: ColourScale) -> ScalarMappable:
-    return ScalarMappable((LogNorm if scale.log else Normalize)(scale.low, scale.high), RISING)
-
-
-def _colour_bar(
-    sheet: Figure, axes: Any, colours: ScalarMappable, title: str, aspect: float = 30, ticks: Array | None = None
-) -> Colorbar:
-    """A scale of colours beside axes."""
-    bar = sheet.colorbar(colours, ax=axes, pad=0.02, aspect=aspect, ticks=ticks)
-    bar.set_label(plain(title), fontsize=9, color=INK)
-    bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
-    return bar
-
-
-def chart(axes: Axes, spec: Chart, wide: float = 1.0) -> None:
-    """One chart on axes; wide: of the width of all figures, which its legend has room in."""
+def _chart(axes: Axes, spec: Chart, wide: float = 1.0) -> None:
+    """A chart on axes; wide: of the width of all figures, which its legend has room in."""
     if isinstance(spec.x, Abscissa):
         along(axes, spec.x, _lines(spec.y.title), zero=spec.zero)
     else:
@@ -229,25 +153,28 @@ def chart(axes: Axes, spec: Chart, wide: float = 1.0) -> None:
         axes.set_aspect("equal", adjustable="box" if spec.y.limits[0] is not None else "datalim")
     _axis(axes, "y", spec.y)
     for mark in sorted(spec.marks, key=lambda mark: isinstance(mark, Rule)):
-        if isinstance(mark, Rule):  # in view or not: the limits must stand
+        if isinstance(mark, Rule):
             _limits(axes, spec)
-        _mark(mark, axes, spec)
+            name, (low, high) = None if mark.name is None else plain(mark.name), sorted(axes.get_xlim())
+            if not mark.upright:
+                axes.axhline(mark.at, label=name, **_stroke(mark.look))
+            elif low <= mark.at <= high:  # in view: the limits must stand
+                axes.axvline(mark.at, label=name, **_stroke(mark.look))
+        elif isinstance(mark, Line):
+            _line(mark, axes, spec)
+        elif isinstance(mark, Contours):
+            _contours(mark, axes)
+        else:
+            _mark(mark, axes, spec)
     _limits(axes, spec)
     if spec.bare:
         axes.spines["left"].set_visible(False)
         axes.tick_params(axis="y", length=0)
         axes.grid(visible=False, axis="y")
-    if spec.title:
-        axes.set_title(_lines(spec.title), fontsize=8.5, color=INK, loc="left")
-    if spec.aside:
-        axes.set_title(plain(spec.aside), fontsize=7.5, color=MUTED, loc="right", pad=2)
-    if spec.colours is not None:
-        _colour_bar(axes.figure, axes, _mappable(spec.colours), spec.colours.title)  # type: ignore[arg-type]
+    axes.set_title(_lines(spec.title), fontsize=8.5, color=INK, loc="left")
+    axes.set_title(plain(spec.aside), fontsize=7.5, color=MUTED, loc="right", pad=2)
     if spec.legend is not None:
-        legend(axes, spec.legend.most, int(wide * spec.legend.room), spec.legend.least, spec.legend.lift)
-
-
-# ---- axes ---------------------------------------------------------------------------------------------------------
+        legend(axes, spec.legend.most, int(wide * spec.legend.room), spec.legend.least)
 
 
 def _lines(text: str) -> str:
@@ -261,27 +188,19 @@ def _axis(axes: Axes, name: str, axis: Axis) -> None:
         (axes.set_xscale if name == "x" else axes.set_yscale)("log")
     if axis.places is not None:
         side.set_ticks([at for at, _ in axis.places], [plain(text) for _, text in axis.places])
-        side.set_minor_locator(NullLocator())
+        side.set_minor_locator(ticker.NullLocator())
         for label in side.get_ticklabels() if axis.turned else ():
-            label.set(rotation=axis.turned, ha="right" if axis.turned < 90 else "center", rotation_mode="anchor")
-    elif axis.log and axis.count:
-        subs = (1.0, 2.0, 5.0) if axis.count > 1 else (1.0,)
-        side.set_major_locator(LogLocator(subs=subs, numticks=6))
-        side.set_minor_formatter(NullFormatter())
+            label.set(rotation=axis.turned, ha="right", rotation_mode="anchor")
     elif axis.angles:
-        side.set_major_locator(MaxNLocator(nbins=8, steps=[1, 1.5, 3, 4.5, 9, 10]))
+        side.set_major_locator(ticker.MaxNLocator(nbins=8, steps=[1, 1.5, 3, 4.5, 9, 10]))
     elif axis.count or axis.integer:
-        side.set_major_locator(MaxNLocator(integer=axis.integer, nbins=axis.count or 6))
+        side.set_major_locator(ticker.MaxNLocator(integer=axis.integer, nbins=axis.count or 6))
+        axes.ticklabel_format(axis=name, useOffset=False)  # type: ignore[arg-type]  # "x" or "y"
     if axis.powers:
-        form = ScalarFormatter(useMathText=True)
+        form = ticker.ScalarFormatter(useMathText=True)
         form.set_powerlimits((-4, 6))
         side.set_major_formatter(form)
         side.get_offset_text().set(fontsize=8, color=MUTED)
-    if axis.form is not None:
-        written: Callable[[float], str] = axis.form
-        side.set_major_formatter(FuncFormatter(lambda value, _: written(value)))
-    elif axis.count and not axis.log:
-        axes.ticklabel_format(axis=name, useOffset=False)  # type: ignore[arg-type]  # "x" or "y"
 
 
 def _limits(axes: Axes, spec: Chart) -> None:
@@ -298,17 +217,16 @@ def _limits(axes: Axes, spec: Chart) -> None:
 # ---- marks --------------------------------------------------------------------------------------------------------
 
 
-def colour(name: int | float | str) -> str:
+def _colour(name: int | float | str) -> str:
     """A colour of the palette, of the scale of colours, of the names, or as it is."""
     if isinstance(name, float):
         return to_hex(RISING(name))
     return PALETTE[name % len(PALETTE)] if isinstance(name, int) else COLOURS.get(name, name)
 
 
-def line_style(look: Look) -> dict[str, Any]:
+def _stroke(look: Look) -> dict[str, Any]:
     """The look of a line as matplotlib takes it."""
-    paint = colour(look.colour)
-    style: dict[str, Any] = {"color": paint, "linewidth": look.width, "linestyle": DASHES[look.dash],
+    style: dict[str, Any] = {"color": _colour(look.colour), "linewidth": look.width, "linestyle": DASHES[look.dash],
                              "zorder": look.order, "alpha": look.alpha, "clip_on": not look.unclipped}  # fmt: skip
     if look.mark:
         style |= {"marker": look.mark, "markersize": look.size}
@@ -320,14 +238,10 @@ def line_style(look: Look) -> dict[str, Any]:
 def _area(look: Look) -> dict[str, Any]:
     """The look of an area; hatched instead of filled where it has a hatch and a rule for a colour."""
     if look.hatch and look.colour in ("rule", "shade"):
-        return {"facecolor": "none", "edgecolor": colour("rule"), "hatch": look.hatch, "linewidth": 0,
+        return {"facecolor": "none", "edgecolor": COLOURS["rule"], "hatch": look.hatch, "linewidth": 0,
                 "zorder": look.order}  # fmt: skip
     hatch = {"hatch": look.hatch} if look.hatch else {}
-    return {"facecolor": colour(look.colour), "alpha": look.alpha, "linewidth": 0, "zorder": look.order, **hatch}
-
-
-def _name(name: str | None) -> str | None:
-    return None if name is None else plain(name)
+    return {"facecolor": _colour(look.colour), "alpha": look.alpha, "linewidth": 0, "zorder": look.order, **hatch}
 
 
 def _closed(spec: Chart, x: Array, close: bool, *rows: Array, turn: float = 0.0) -> list[Array]:
@@ -339,31 +253,22 @@ def _closed(spec: Chart, x: Array, close: bool, *rows: Array, turn: float = 0.0)
     return [np.append(x, x[0] + spec.x.period), *ends]
 
 
-@singledispatch
-def _mark(mark: object, axes: Axes, spec: Chart) -> None:
-    raise TypeError(mark)
-
-
-@_mark.register(Line)
 def _line(mark: Line, axes: Axes, spec: Chart) -> None:
-    style = line_style(mark.look)
+    """A curve or points."""
+    style, label = _stroke(mark.look), None if mark.name is None else plain(mark.name)
     x, y = _closed(spec, mark.x, mark.close, np.asarray(mark.y, float), turn=mark.turn)
     if mark.low is not None and mark.high is not None:
-        axes.errorbar(x, y, [mark.low, mark.high], label=_name(mark.name), capsize=3, elinewidth=1.1,
+        axes.errorbar(x, y, [mark.low, mark.high], label=label, capsize=3, elinewidth=1.1,
                       fmt="none" if not mark.look.mark else "", **style)  # fmt: skip
         return
     if mark.shares is not None:
         pieces = np.stack([np.stack([x[:-1], y[:-1]], 1), np.stack([x[1:], y[1:]], 1)], 1)
         paints = RISING((mark.shares[:-1] + mark.shares[1:]) / 2)
-        axes.add_collection(
-            LineCollection(list(pieces), colors=paints, linewidths=mark.look.width, zorder=mark.look.order)
-        )
+        lines = LineCollection(list(pieces), colors=paints, linewidths=mark.look.width, zorder=mark.look.order)
+        axes.add_collection(lines)
         return
-    if isinstance(spec.x, Abscissa) and mark.look.dash != "none":  # a dense course, without losing a peak
-        picked = thin(y)
-        x, y = x[picked], y[picked]
     drawstyle: dict[str, Any] = {"drawstyle": "steps-post"} if mark.steps else {}
-    axes.plot(x, y, label=_name(mark.name), solid_joinstyle="round", **style, **drawstyle)
+    axes.plot(x, y, label=label, solid_joinstyle="round", **style, **drawstyle)
     finite = np.isfinite(y)
     alone = finite & ~np.append(False, finite[:-1]) & ~np.append(finite[1:], False)
     if alone.any() and not mark.look.mark:  # a single position makes no line; a dashed curve's dots are open
@@ -371,95 +276,68 @@ def _line(mark: Line, axes: Axes, spec: Chart) -> None:
         axes.plot(x[alone], y[alone], "o", markersize=4.5, color=style["color"], markerfacecolor=face)
 
 
-@_mark.register(Band)
-def _band(mark: Band, axes: Axes, spec: Chart) -> None:
-    x, low, high = _closed(spec, mark.x, mark.close, mark.low, mark.high)
-    picked = np.union1d(thin(low), thin(high))
-    axes.fill_between(x[picked], low[picked], high[picked], label=_name(mark.name), **_area(mark.look))
+def _mark(mark: Mark, axes: Axes, spec: Chart) -> None:
+    """An area, a shape or a text."""
+    name = getattr(mark, "name", None)
+    named: dict[str, Any] = {"label": None if name is None else plain(name)}
+    match mark:
+        case charts.Band(x, low, high):
+            x, low, high = _closed(spec, x, mark.close, low, high)
+            axes.fill_between(x, low, high, **named, **_area(mark.look))
+        case charts.Stairs(counts, edges):
+            bars = axes.stairs(
+                counts, edges, fill=True, color=_colour(mark.look.colour), zorder=mark.look.order, **named
+            )
+            if mark.window is not None:
+                start, end = mark.window
+                height = 2 * float(counts.max())
+                clip = patches.Rectangle((start, 0), max(end - start, 0.0), height, transform=axes.transData)
+                bars.set_clip_path(clip)
+        case charts.Bars(at, sizes, thickness):
+            axes.barh(at, sizes, thickness, color=_colour(mark.look.colour), zorder=mark.look.order, **named)
+        case charts.Stripe(start, end, text):
+            axes.axvspan(start, end, **named, **_area(mark.look))
+            middle = np.sqrt(start * end) if axes.get_xscale() == "log" else (start + end) / 2
+            if text:
+                axes.text(middle, 0.5, plain(text), transform=axes.get_xaxis_transform(), rotation=90, ha="center",
+                          va="center", fontsize=8, color=MUTED, zorder=3, clip_on=True)  # fmt: skip
+        case charts.Arrow(begin, tip):
+            arrow = {"arrowstyle": "-|>", "color": _colour(mark.look.colour), "linewidth": mark.look.width,
+                     "shrinkA": 0, "shrinkB": 0, "mutation_scale": 9}  # fmt: skip
+            axes.annotate("", xy=tip, xytext=begin, arrowprops=arrow, zorder=mark.look.order)
+        case charts.Ring((x0, y0), r):
+            paint = _colour(mark.look.colour)
+            shape: dict[str, Any] = {
+                "facecolor": to_rgba(paint, mark.filled), "edgecolor": to_rgba(paint, mark.look.alpha or 1),
+                "zorder": mark.look.order, "linewidth": mark.look.width, "linestyle": DASHES[mark.look.dash],
+            }  # fmt: skip
+            square = patches.Rectangle((x0 - r, y0 - r), 2 * r, 2 * r, **shape)
+            axes.add_patch(square if mark.square else patches.Circle((x0, y0), r, **shape))
+        case Note(text, x0, y0) if not mark.beside:  # else when all else is there
+            box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+            axes.annotate(
+                _lines(text), (x0, y0), xycoords="data" if mark.data else "axes fraction", xytext=mark.shift,
+                textcoords="offset points", ha=mark.across, va=mark.up, fontsize=mark.size,
+                color=_colour(mark.colour), zorder=4, bbox=box if mark.boxed else None,
+            )  # fmt: skip
 
 
-@_mark.register(Stairs)
-def _stairs(mark: Stairs, axes: Axes, spec: Chart) -> None:
-    drawn = axes.stairs(mark.counts, mark.edges, fill=True, color=colour(mark.look.colour), zorder=mark.look.order,
-                        label=_name(mark.name))  # fmt: skip
-    if mark.window is not None:
-        low, high = mark.window
-        top = 2 * float(mark.counts.max())
-        drawn.set_clip_path(Rectangle((low, 0), max(high - low, 0.0), top, transform=axes.transData))
-
-
-@_mark.register(Bars)
-def _bars(mark: Bars, axes: Axes, spec: Chart) -> None:
-    spread = None if mark.low is None or mark.high is None else np.stack([mark.low, mark.high])
-    axes.barh(mark.at, mark.sizes, mark.thickness, color=colour(mark.look.colour), label=_name(mark.name),
-              zorder=mark.look.order, xerr=spread,
-              error_kw={"ecolor": INK, "elinewidth": 1.0, "capsize": 2.5})  # fmt: skip
-
-
-@_mark.register(Rule)
-def _rule(mark: Rule, axes: Axes, spec: Chart) -> None:
-    if not mark.upright:
-        axes.axhline(mark.at, label=_name(mark.name), **line_style(mark.look))
-        return
-    low, high = sorted(axes.get_xlim())
-    if low <= mark.at <= high:
-        axes.axvline(mark.at, label=_name(mark.name), **line_style(mark.look))
-
-
-@_mark.register(Stripe)
-def _stripe(mark: Stripe, axes: Axes, spec: Chart) -> None:
-    axes.axvspan(mark.low, mark.high, label=_name(mark.name), **_area(mark.look))
-    if mark.text:
-        log = axes.get_xscale() == "log"
-        middle = np.sqrt(mark.low * mark.high) if log else (mark.low + mark.high) / 2
-        axes.text(middle, 0.5, plain(mark.text), transform=axes.get_xaxis_transform(), rotation=90,
-                  ha="center", va="center", fontsize=8, color=MUTED, zorder=3, clip_on=True)  # fmt: skip
-
-
-@_mark.register(Arrow)
-def _arrow(mark: Arrow, axes: Axes, spec: Chart) -> None:
-    style = {"arrowstyle": "-|>", "color": colour(mark.look.colour), "linewidth": mark.look.width, "shrinkA": 0,
-             "shrinkB": 0, "mutation_scale": 9}  # fmt: skip
-    axes.annotate("", xy=mark.end, xytext=mark.start, arrowprops=style, zorder=mark.look.order)
-
-
-@_mark.register(Ring)
-def _ring(mark: Ring, axes: Axes, spec: Chart) -> None:
-    paint, (x, y), r = colour(mark.look.colour), mark.middle, mark.radius
-    edge = to_rgba(paint, mark.look.alpha or 1)
-    style: dict[str, Any] = {"facecolor": to_rgba(paint, mark.filled), "edgecolor": edge, "zorder": mark.look.order,
-                             "linewidth": mark.look.width, "linestyle": DASHES[mark.look.dash]}  # fmt: skip
-    axes.add_patch(Rectangle((x - r, y - r), 2 * r, 2 * r, **style) if mark.square else Circle((x, y), r, **style))
-
-
-@_mark.register(Note)
-def _note(mark: Note, axes: Axes, spec: Chart) -> None:
-    if mark.beside:  # when all else is there
-        return
-    axes.annotate(
-        _lines(mark.text), (mark.x, mark.y), xycoords="data" if mark.data else "axes fraction", xytext=mark.shift,
-        textcoords="offset points", ha=mark.across, va=mark.up, fontsize=mark.size, color=colour(mark.colour),
-        zorder=4, bbox=BOX if mark.boxed else None,
-    )  # fmt: skip
-
-
-@_mark.register(Cells)
-def _cells(mark: Cells, axes: Axes, spec: Chart) -> None:
-    count = len(mark.names)
-    picture = axes.imshow(np.ma.masked_invalid(mark.values), vmin=-1, vmax=1, cmap=colormaps["RdBu_r"])
+def _contours(mark: Contours, axes: Axes) -> None:
+    """Bands within cells that have a number at each corner, over the surroundings of each point that has one."""
     axes.grid(False)
-    axes.set_facecolor(SHADE)
-    names = [plain(name) for name in mark.names]
-    level = count < 4
-    axes.xaxis.set_ticks(range(count), names, fontsize=8.5, rotation=0 if level else 35,
-                         ha="center" if level else "right")  # fmt: skip
-    axes.yaxis.set_ticks(range(count), names, fontsize=8.5)
-    axes.tick_params(length=0)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
-    for (p, q), value in np.ndenumerate(mark.values) if mark.written else ():
-        text = "—" if np.isnan(value) else f"{value:.2f}".replace("-", "−")
-        paint = MUTED if np.isnan(value) else "white" if abs(value) > 0.6 else INK
-        axes.text(q, p, text, ha="center", va="center", fontsize=8, color=paint)
-    bar = axes.figure.colorbar(picture, ax=axes, shrink=0.8, aspect=25)
-    bar.ax.tick_params(labelsize=8, colors=MUTED, labelcolor=INK)
+    bands, known = _bands(mark.colours), np.ma.masked_invalid(mark.values).T
+    look: dict[str, Any] = {"cmap": BANDED, "norm": bands.norm}
+    axes.pcolormesh(mark.x_edges, mark.y_edges, known, zorder=0.8, **look)
+    if known.count():
+        axes.contourf(mark.x, mark.y, known, mark.colours.levels, extend=bands.norm.extend,  # type: ignore[attr-defined]
+                      corner_mask=False, antialiased=False, zorder=1, **look)  # fmt: skip
+        within = [level for level in mark.colours.levels if known.min() < level < known.max()]
+        if within:
+            axes.contour(mark.x, mark.y, known, within, colors=INK, linewidths=0.6, linestyles="-",
+                         corner_mask=False, zorder=2)  # fmt: skip
+    for name, hatch, where in mark.gaps:
+        boxes = [[(mark.x_edges[i + a], mark.y_edges[k + b]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+                 for i, k in np.argwhere(where)]  # fmt: skip
+        fill = "none" if np.isfinite(mark.values[where]).all() else SHADE  # a number that is known is seen
+        axes.add_collection(PolyCollection(boxes, facecolors=fill, edgecolors=MUTED, hatch=hatch, linewidths=0,
+                                           label=plain(name), zorder=1.5), autolim=False)  # fmt: skip

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.errors import Severity
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.results.attributes import attribute, findings_of
 from trunnion.results.quantities import decimals, number, prefixed, read_in, with_uncertainty
 from trunnion.rig.identification.uncertainty import quantile
-from trunnion.views.charts import Axis, Band, Cells, Chart, Legend, Line, Look, Mark, Note, Panel, check_kind
-from trunnion.views.common.cycle import Array, names
+from trunnion.views.charts import Axis, Band, Chart, Legend, Line, Look, Mark, Note, Panel, check_kind
+from trunnion.views.common.cycle import names
 from trunnion.views.compare import about_data, data_section
 from trunnion.views.measured import shortened
-from trunnion.views.page import NONE, Section, Summary, Table, counts, page
+from trunnion.views.page import NONE, Section, Table, counts, page
 from trunnion.views.scales import thinned
 
 if TYPE_CHECKING:
@@ -26,14 +26,11 @@ if TYPE_CHECKING:
 
 __all__ = ["KINDS", "MOST_PANELS", "Estimate", "estimates", "figure", "report", "sensors", "tables"]
 
-KINDS = ("intervals", "correlation", "residuals")  # of figures
+KINDS = ("intervals", "residuals")  # of figures
 MOST_PANELS = 8  # curves of residuals
 MOST_TILES = 8  # estimates that are read first
 MANY = 1e4  # degrees of freedom: Student's t is the normal distribution to four digits
 LEAST = 0.005  # of a variance: a smaller share of all is no row of the budget
-FEW = 5  # conditions whose names stand side by side
-FEW_ESTIMATES = 2  # whose correlation needs no picture
-MOST_WRITTEN = 12  # parameters whose correlations have room for their numbers
 COVERED = 2.0  # standard uncertainties of the band
 BEFORE, AFTER = 4, 0
 
@@ -160,12 +157,6 @@ def estimated(result: xr.Dataset) -> Table:
     return Table(f"{result.attrs['identified']}: estimates", head, rows)
 
 
-def stated(result: xr.Dataset) -> Table:
-    """What of the model each parameter is: all its paths, and its value at the start."""
-    rows = [[row.name, ", ".join(row.paths), row.start_text] for row in estimates(result)]
-    return Table("parameters", ["parameter", "paths in the model", "start"], rows)
-
-
 def correlations(result: xr.Dataset) -> Table | None:
     """Between the estimates, of several; columns are numbered as the rows are, for names would be too wide."""
     every, values = estimates(result), result["correlation"].values
@@ -246,31 +237,27 @@ def figure(result: xr.Dataset, kind: str | None = None) -> Figure:
     from trunnion.views.draw import figure as draw
 
     check_kind(kind or "intervals", KINDS)
-    if kind == "correlation":
-        short, side = [row.short for row in estimates(result)], _side(result)
-        cells = Cells(result["correlation"].values, short, len(short) <= MOST_WRITTEN)
-        panel = Panel("", [Chart(Axis(), Axis(), [cells], legend=None)], side + 0.4)
-        return draw("Correlation of the estimates", result, [panel], width=side + 2.8)
     if kind == "residuals":
         every = courses(result)
+        if not every:
+            what = "no signal was fitted over the cycle: there is no figure 'residuals'"
+            raise MechanismError(Finding(what, "--kind", "see the table of residuals"))
         picked = [every[k] for k in thinned(len(every), MOST_PANELS)]
         more = f", {len(picked)} of {len(every)} curves" if len(picked) < len(every) else ""
-        curves = _residual_panels(result, picked) if every else _residual_figures(result)
-        return draw(f"Residuals, before and after{more}", result, curves, columns=2 if every else 1)
+        return draw(f"Residuals, before and after{more}", result, _residual_panels(result, picked), columns=2)
     panels = [_interval(row, Legend(least=1) if k == 0 else None) for k, row in enumerate(estimates(result))]
     return draw("Estimates with their 95 % intervals", result, panels)
 
 
 def _interval(row: Estimate, legend: Legend | None) -> Panel:
     """A parameter on a scale of its own: where it started, where it is, and its 95 % interval."""
-    points, marks, zero = [row.start], list[Mark](), np.zeros(1)
+    zero, points = np.zeros(1), [row.start]
+    marks: list[Mark] = [Note(row.lacking, 0.5, 0.75, size=8.5)]
     if row.identifiable:
         ends = [end if np.isfinite(end) else row.value for end in (row.lower, row.upper)]
         points += ends
         marks = [Line(np.array(ends), np.zeros(2), "95 % interval", Look(AFTER, 6.0, alpha=0.35)),
                  Line(np.array([row.value]), zero, "estimate", Look(AFTER, dash="none", mark="o", size=6))]  # fmt: skip
-    else:
-        marks = [Note(row.lacking, 0.5, 0.75, size=8.5)]
     start = Look(BEFORE, dash="none", mark="D", size=5, hollow=True)
     marks.append(Line(np.array([row.start]), zero, "start", start))
     low, high = min(points), max(points)
@@ -280,11 +267,6 @@ def _interval(row: Estimate, legend: Legend | None) -> Panel:
     return Panel("", [chart], 0.95 if legend is None else 1.25)
 
 
-def _side(result: xr.Dataset) -> float:
-    """Of the matrix of correlations, inches."""
-    return min(1.6 + 0.62 * result.sizes["parameter"], 7.0)
-
-
 def courses(result: xr.Dataset) -> list[tuple[int, int]]:
     """(channel, condition) with courses over the cycle that were fitted."""
     after = np.isfinite(result["residual_after"].values).sum(axis=2)
@@ -292,73 +274,33 @@ def courses(result: xr.Dataset) -> list[tuple[int, int]]:
 
 
 def _residual_panels(result: xr.Dataset, pairs: list[tuple[int, int]]) -> list[Panel]:
-    """Measured less model over the cycle, before beside after, with the band that the scatter leaves the mean."""
-    phases = {k: np.asarray(result["phase"].values[k], float) for _, k in pairs}
-    ranges = attribute(result, "drive_range")
-    turned = all(k < len(ranges) and ranges[k] is not None for k in phases)
+    """Measured less model over the cycle: before, with that after in front of it, beside after, on its own scale with
+    the band that the scatter leaves the mean."""
+    ranges, channels = attribute(result, "drive_range"), _channels(result)
+    turned = all(k < len(ranges) and ranges[k] is not None for _, k in pairs)
     title = f"drive angle {result.attrs.get('drive', '')} [°]" if turned else "share of the cycle"
     panels = []
     for n, (channel, condition) in enumerate(pairs):
-        x = phases[condition]
+        x, (_, name, unit, _) = np.asarray(result["phase"].values[condition], float), channels[channel]
         if turned:
             first, last = ranges[condition]
             x = np.degrees(first + (last - first) * x)
         across = Axis(title if n == len(pairs) - 1 else "", (float(np.nanmin(x)), float(np.nanmax(x))))
+        start, end, spread = (np.asarray(result[f"residual_{key}"].values[channel, condition], float)
+                              for key in ("before", "after", "uncertainty"))  # fmt: skip
         for before in (True, False):
-            chart = _residual(result, channel, condition, x, across, before, Legend(least=1) if n == 0 else None)
+            sizes = np.concatenate([start, end] if before else [end, COVERED * spread])
+            factor, display_unit = prefixed(float(np.nanmax(np.abs(sizes), initial=0.0)), unit)
+            half, marks = COVERED * spread * factor, list[Mark]()
+            if before:
+                marks.append(Line(x, start * factor, "before", Look(BEFORE, 1.1, mark="o", size=2)))
+            elif np.isfinite(spread).any():
+                marks.append(Band(x, -half, half, f"±{COVERED:g} u of the mean, by scatter", Look("shade", order=1)))
+            marks.append(Line(x, end * factor, "after", Look(AFTER, 1.1, mark="o", size=2)))
+            upward = Axis(f"{name} [{display_unit}]" if display_unit else name)
+            chart = Chart(across, upward, marks, True, Legend(least=1) if n == 0 else None)
             where = names(result, "condition")[condition] if before else " "
             panels.append(Panel(where, [chart], 2.3 if n == 0 else 1.9))
-    return panels
-
-
-def _residual(
-    result: xr.Dataset, channel: int, condition: int, x: Array, across: Axis, before: bool, legend: Legend | None
-) -> Chart:
-    """One course: before, with that after in front of it, or after with the band, on its own scale."""
-    _, name, unit, _ = _channels(result)[channel]
-    start, end, spread = (
-        np.asarray(result[f"residual_{key}"].values[channel, condition], float)
-        for key in ("before", "after", "uncertainty")
-    )
-    sizes = np.concatenate([start, end] if before else [end, COVERED * spread])
-    factor, display_unit = prefixed(float(np.nanmax(np.abs(sizes), initial=0.0)), unit)
-    marks: list[Mark] = []
-    if before:
-        marks.append(Line(x, start * factor, "before", Look(BEFORE, 1.1, mark="o", size=2)))
-    elif np.isfinite(spread).any():
-        half = COVERED * spread * factor
-        marks.append(Band(x, -half, half, f"±{COVERED:g} u of the mean, by scatter", Look("shade", order=1)))
-    marks.append(Line(x, end * factor, "after", Look(AFTER, 1.1, mark="o", size=2)))
-    return Chart(across, Axis(f"{name} [{display_unit}]" if display_unit else name), marks, True, legend)
-
-
-def _residual_figures(result: xr.Dataset) -> list[Panel]:
-    """Residuals of data with one figure a condition."""
-    title, short = shortened(names(result, "condition"))
-    channels = _channels(result)
-    every = sorted({k for *_, conditions in channels for k in conditions})
-    panels: list[Panel] = []
-    for i, name, unit, conditions in channels:
-        before, after, spread = (
-            np.array([result[f"residual_{key}"].values[i, k, 0] for k in conditions], float)
-            for key in ("before", "after", "uncertainty")
-        )
-        factor, display_unit = prefixed(float(np.nanmax(np.abs([before, after]), initial=0.0)), unit)
-        x, half = np.searchsorted(every, conditions).astype(float), COVERED * np.nan_to_num(spread) * factor
-        marks: list[Mark] = [
-            Line(x, before * factor, "before", Look(BEFORE, dash="none", mark="D", size=5, hollow=True)),
-            Line(x, after * factor, f"after, ±{COVERED:g} u by scatter", Look(AFTER, dash="none", mark="o", size=5),
-                 half, half),
-        ]  # fmt: skip
-        across = Axis(title, places=[(n, short[k]) for n, k in enumerate(every)], turned=90 if len(every) > FEW else 0)
-        legend = None if panels else Legend(least=1)
-        panels.append(
-            Panel(
-                "",
-                [Chart(across, Axis(f"{name} [{display_unit}]" if display_unit else name), marks, True, legend)],
-                2.8,
-            )
-        )
     return panels
 
 
@@ -368,35 +310,32 @@ def _residual_figures(result: xr.Dataset) -> list[Panel]:
 def report(result: xr.Dataset) -> str:
     """The whole report as HTML, to be filed."""
     several, holdout = correlations(result), held_out(result)
-    members = sum(row.identifiable for row in estimates(result))
     numbers = [table for table in (estimated(result).titled(""), budget(result), sensors(result)) if table is not None]
     parts = [Section("Estimates", pictures=[("Estimates", figure(result, "intervals"))], after=numbers)]
     if several:
-        pictures = [("Correlation", figure(result, "correlation"))] if members > FEW_ESTIMATES else []
-        parts.append(Section("Correlation", "", pictures, after=[several]))
+        parts.append(Section("Correlation", after=[several]))
     fit = fits(result)
     about = "Measured minus model over the cycle, before and after the fit."
-    pictures = [("Residuals", figure(result, "residuals"))]
+    pictures = [("Residuals", figure(result, "residuals"))] if courses(result) else []
     parts.append(Section("Residuals", about, pictures, after=[fit] if fit else []))
     if holdout:
         about = "Data not used in the fit, and the error of their prediction."
         parts.append(Section("Held out", about, after=[holdout]))
-    end = [data_section(result, "data_files"), Section("Parameters", tables=[stated(result)])]
+    end = [data_section(result, "data_files"), Section("Parameters", tables=[Table(
+        "parameters", ["parameter", "paths in the model", "start"],
+        [[row.name, ", ".join(row.paths), row.start_text] for row in estimates(result)],
+    )])]  # fmt: skip
+    summary: list[tuple[str, list[tuple[str, str]]]] = []
+    for row in estimates(result)[:MOST_TILES]:
+        pair = (row.say(row.value), "at its bound" if row.limit else f"± {row.say(row.half)}, 95 %")
+        summary.append((row.short, [pair if row.identifiable else (row.lacking, "from these data")]))
+    chi = float(result["reduced_chi_squared"])
+    summary += [("reduced χ²", [(number(chi, 3), "near 1 if the model fits")])] if np.isfinite(chi) else []
     model = str(result.attrs["name"]) or "model"
     sizes = [(result.sizes[dim], dim) for dim in ("parameter", "channel", "condition")]
     facts = [(model, f"model {result.attrs.get('model_hash', '')}"),
              *counts(*sizes, (int(result["used"].sum()), "position"))]  # fmt: skip
     return page(
-        result, "Parameter identification from a measurement", facts, parts, summary=_summary(result), end=end,
+        result, "Parameter identification from a measurement", facts, parts, summary=summary, end=end,
         name=str(result.attrs["identified"]) or "Measurement", about_data=about_data(result), signed=True,
     )  # fmt: skip
-
-
-def _summary(result: xr.Dataset) -> Summary:
-    """The first estimates, and whether the model fits."""
-    summary = []
-    for row in estimates(result)[:MOST_TILES]:
-        pair = (row.say(row.value), "at its bound" if row.limit else f"± {row.say(row.half)}, 95 %")
-        summary.append((row.short, [pair if row.identifiable else (row.lacking, "from these data")]))
-    chi = float(result["reduced_chi_squared"])
-    return [*summary, *([("reduced χ²", [(number(chi, 3), "near 1 if the model fits")])] if np.isfinite(chi) else [])]

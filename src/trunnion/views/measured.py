@@ -47,19 +47,19 @@ def tables(measurement: Measurement) -> list[Table]:
         rows.append([f"{len(conditions) - MOST} more", *[""] * (len(head) - 1)])
     made = [Table(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
     head = ["channel", "measures", "unit", "least", "largest", "scatter", "uncertainty"]
-    rows = [[name, *_channel([item.courses[name] for item in conditions if name in item.courses])] for name in channels]
+    rows = []
+    for name in channels:
+        courses = [item.courses[name] for item in conditions if name in item.courses]
+        unit, factor = courses[0].shown
+        every = np.concatenate([course.mean for course in courses]) / factor
+        finite = every[np.isfinite(every)]
+        extremes = [_figure(float(finite.min())), _figure(float(finite.max()))] if finite.size else ["none", "none"]
+        spreads = (np.concatenate([getattr(course, figure) for course in courses])
+                   for figure in ("scatter", "uncertainty"))  # fmt: skip
+        rows.append([name, courses[0].measures, _unit(unit), *extremes,
+                     *(_figure(rms(spread) / factor, 3) for spread in spreads)])  # fmt: skip
     title = "channels: mean signal, scatter of turns, standard uncertainty of the mean"
     return [*made, Table(title, head, rows)]
-
-
-def _channel(courses: list[Signal]) -> list[str]:
-    """Measure and unit of a channel; extremes of its mean courses; RMS of scatter and of uncertainty."""
-    unit, factor = courses[0].shown
-    means = np.concatenate([item.mean for item in courses]) / factor
-    finite = means[np.isfinite(means)]
-    extremes = [_figure(float(finite.min())), _figure(float(finite.max()))] if finite.size else ["none", "none"]
-    spreads = [np.concatenate([getattr(item, figure) for item in courses]) for figure in ("scatter", "uncertainty")]
-    return [courses[0].measures, _unit(unit), *extremes, *(_figure(rms(item) / factor, 3) for item in spreads)]
 
 
 def _overall(course: Signal, size: float) -> float:

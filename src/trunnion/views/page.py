@@ -72,11 +72,10 @@ def with_code(text: str) -> str:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page, in this order: what it is about, lines, tables, pictures, further tables, findings, terms.
+    """A part of the page, in this order: what it is about, lines, tables, pictures, further tables, findings.
 
     title: of the part, as what is shown
     pictures: (what it shows in words, figure), the only one broad, several side by side; small: of half the size
-    terms: (term, what it means), which may be markup
     findings: rows of `attrs["findings"]`; calm: what is said where there are none, if anything
     anchor: by which the page leads to it
     """
@@ -88,7 +87,6 @@ class Section:
     after: Sequence[Table] = ()
     small: bool = False
     lines: Sequence[str] = ()
-    terms: Sequence[tuple[str, str]] = ()
     findings: Sequence[dict[str, str]] = ()
     calm: str = ""
     anchor: str = ""
@@ -210,24 +208,20 @@ def value_of(row: Stated, units: Units) -> str:
 
 
 def inputs_of(result: xr.Dataset) -> list[tuple[str, list[dict[str, str]]]]:
-    """Input rows by section of the model, the first name of their path."""
-    rows = attribute(result, "inputs")
+    """Input rows by section of the model, the first name of their path: a plain number with its SI unit, a text as it
+    was written, an expression with what it comes to."""
     sections = []
-    for section, members in groupby(rows, key=lambda row: str(row["path"]).split(".")[0]):
-        lines = [{"path": str(row["path"]).removeprefix(f"{section}."), "text": _stated(row)} for row in members]
+    for section, members in groupby(attribute(result, "inputs"), key=lambda row: str(row["path"]).split(".")[0]):
+        lines = []
+        for row in members:
+            text, value, unit = str(row.get("text") or ""), row.get("value"), str(row.get("unit") or "")
+            unit = "" if unit in ("1", "SI") else unit  # a dimension is a length or an angle, as its own text says
+            if not text:
+                text = quantity(value, unit)
+            elif value is not None and text.lstrip("+-")[:1] not in "0123456789.±":
+                text = f"{text} = {quantity(value, unit)}"
+            elif value is not None and unit and is_number(text):
+                text = f"{text}\u00a0{unit}"
+            lines.append({"path": str(row["path"]).removeprefix(f"{section}."), "text": text})
         sections.append((section.replace("_", " ").capitalize(), lines))
     return sections
-
-
-def _stated(row: dict[str, Any]) -> str:
-    """An input as it was written: a plain number with its SI unit, an expression with what it comes to."""
-    text, value = str(row.get("text") or ""), row.get("value")
-    unit = str(row.get("unit") or "")
-    unit = "" if unit in ("1", "SI") else unit  # a dimension is a length or an angle, as its own text says
-    if not text:
-        return quantity(value, unit)
-    if value is None:  # an expression of the motion
-        return text
-    if text.lstrip("+-")[:1] not in "0123456789.±":
-        return f"{text} = {quantity(value, unit)}"
-    return f"{text}\u00a0{unit}" if unit and is_number(text) else text

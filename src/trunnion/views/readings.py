@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "OUTER", "ContributionRow", "MeasureReading", "ending", "failures", "fixed", "is_play", "limits_in",
-    "limits_text", "readings", "rounded", "share", "share_interval", "share_parts", "signed_limit", "value_text",
+    "LEAST_INDEX", "OUTER", "ContributionRow", "MeasureReading", "ending", "failures", "is_play", "limits_in",
+    "readings", "share", "share_interval", "share_parts", "value_text",
 ]  # fmt: skip
 
 
@@ -41,16 +41,12 @@ def rounded(value: float, digits: int = 6) -> str:
     return f"{value + 0.0:.{digits}g}".replace("inf", "∞").replace("-", "−")
 
 
-def signed_limit(value: float) -> str:
-    """One limit of a deviation: "+0.02", "−0.01", "0", and "—" where there is none."""
-    if math.isinf(value):
-        return "—"
-    return f"+{rounded(value)}" if value > 0 else rounded(value)
-
-
 def limits_text(lower: float, upper: float) -> str:
-    """Limits of a deviation as a drawing has them: "±0.05", "+0.02/−0.01"."""
-    return f"±{rounded(upper)}" if lower == -upper else f"{signed_limit(upper)}/{signed_limit(lower)}"
+    """Limits of a deviation as a drawing has them: "±0.05", "+0.02/−0.01", "—" for what has no limit."""
+    if lower == -upper:
+        return f"±{rounded(upper)}"
+    ends = ("—" if math.isinf(end) else f"{'+' if end > 0 else ''}{rounded(end)}" for end in (upper, lower))
+    return "/".join(ends)
 
 
 def limits_in(lower: float, upper: float, unit: str, path: str) -> str:
@@ -108,14 +104,11 @@ def share_parts(value: float, low: float, high: float) -> tuple[str, str, int | 
 # ---- measures -------------------------------------------------------------------------------------------------------
 
 
-APART = 5e-4  # two shares that differ by more are written each
 OUTER = (0.00135, 0.99865)  # quantiles of the 99.73 % range
-DEGREE = ("°", "deg")
-LEAST, LEAST_INDEX = 1e-3, 5e-3  # shares below which a number has no row and no bar of its own
+LEAST, LEAST_INDEX = 1e-3, 5e-3  # shares below which a number has no row of its own
 
 
-@dataclass(frozen=True)
-class ContributionRow:
+class ContributionRow(NamedTuple):
     """What one toleranced number has in a measure, in SI; shares from 0 to 1, NaN where they are not known.
 
     name: its path; short: without the section, where that names one number only; limits: as in a drawing;
@@ -133,30 +126,33 @@ class ContributionRow:
     rss_share: float
     variance_share: float
 
-    @property
-    def largest_share(self) -> float:
-        """The largest of its shares, whatever its sign; 0 where none is known."""
-        shares = (self.worst_share, self.rss_share, self.variance_share)
-        return max(abs(part) if math.isfinite(part) else 0.0 for part in shares)
-
 
 @dataclass(frozen=True)
 class MeasureReading:
-    """One measure of a result, (parameter, position, quantile, …), its unit and its limits.
+    """One measure of a result, (parameter, position, quantile, …), with all its numbers in one unit.
 
-    All its numbers are written in one unit, with as many decimals as its spread needs: 112.3000° beside 0.0486°.
-    limits: (lower, upper) of the deviation from nominal, bounds: of the measure itself; SI, infinite without.
-    rule: what makes the figure of the course, empty if it is not stated; course: what the course is, in words.
+    name, text: of the measure, and what it is; course: what its course is, in words; rule: what makes the figure of
+    it, empty if it is not stated. unit: SI; factor: from SI to the unit that is shown, label: that unit, not to be
+    broken; decimals: as many as its spread needs: 112.3000° beside 0.0486°. limits: (lower, upper) of the deviation
+    from nominal, bounds: of the measure itself; SI, infinite without. nominal: 0 if not known; is_size: whether the
+    figure is the size of a deviation, nominally 0 and never below. over: what its course is drawn over, None if it is
+    known at less than two positions or if the figure is a place itself.
     """
 
     result: xr.Dataset
     name: str
     text: str
+    course: str
+    rule: str
     unit: str
+    factor: float
+    label: str
+    decimals: int
     limits: tuple[float, float]
     bounds: tuple[float, float]
-    rule: str = ""
-    course: str = ""
+    nominal: float
+    is_size: bool
+    over: Abscissa | None
 
     def value(self, key: str) -> float:
         """One number, NaN if the result lacks it."""
@@ -170,19 +166,7 @@ class MeasureReading:
         """Whether there is any such number."""
         return bool(np.isfinite(self.row(key)).any())
 
-    @cached_property
-    def nominal(self) -> float:
-        """The figure of the mechanism without deviations; 0 if it is not known."""
-        value = self.value("nominal")
-        return value if math.isfinite(value) else 0.0
-
-    @cached_property
-    def is_size(self) -> bool:
-        """Whether the figure is the size of a deviation: nominally 0 and never below."""
-        least = self.value("least") if self.has("least") else self.value("worst_case_lower")
-        return self.nominal == 0.0 and not least < 0.0
-
-    @cached_property
+    @property
     def room(self) -> tuple[float, float]:
         """(lower, upper) that the figure may deviate from nominal; the size of a deviation has no lower limit."""
         lower = max(self.limits[0], self.bounds[0] - self.nominal)
@@ -195,59 +179,21 @@ class MeasureReading:
         return any(math.isfinite(limit) for limit in (*self.limits, *self.bounds))
 
     @property
-    def correlated(self) -> bool:
-        """Whether numbers go with each other, of which RSS does not know."""
-        return bool(self.result.attrs.get("correlated", 0))
-
-    @property
     def rss_label(self) -> str:
-        """RSS, with what it leaves out."""
-        return "RSS, uncorrelated" if self.correlated else "RSS"
-
-    @property
-    def independent(self) -> bool:
-        """Whether the samples are, so that an interval shrinks with the root of their number."""
-        return str(self.result.attrs.get("sampling", "monte-carlo")) == "monte-carlo"
+        """RSS, with what it leaves out: that numbers go with each other."""
+        return "RSS, uncorrelated" if self.result.attrs.get("correlated", 0) else "RSS"
 
     @property
     def heading(self) -> str:
         """Name, and what it is."""
         return f"{self.name}: {self.text}" if self.text else self.name
 
-    # ---- unit ---------------------------------------------------------------------------------------------------
-
-    @cached_property
-    def spread(self) -> float:
-        """The size of what is written of the measure beside its nominal."""
-        sizes = [abs(self.value(key)) for key in ("worst_case_lower", "worst_case_upper", "rss")]
-        sizes += [3 * self.value("deviation"), *map(abs, self.limits)]
-        return max((size for size in sizes if math.isfinite(size) and size > 0), default=abs(self.nominal))
-
-    @cached_property
-    def scale(self) -> tuple[float, str]:
-        """Factor and unit for all numbers of the measure."""
-        return scale_of(self.nominal, [self.spread], self.unit)
-
-    @property
-    def factor(self) -> float:
-        """From SI to the unit that is shown."""
-        return self.scale[0]
-
-    @property
-    def label(self) -> str:
-        """The unit that is shown, not to be broken; empty for a pure number."""
-        return self.scale[1].replace(" ", "\u00a0")
-
     @property
     def in_unit(self) -> str:
         """The unit behind a title: " [°]"; empty for a pure number."""
         return f" [{self.label}]" if self.label else ""
 
-    @cached_property
-    def decimals(self) -> int:
-        """As many as give the spread four digits."""
-        size = self.spread * self.factor
-        return min(max(3 - math.floor(math.log10(size)), 0), 9) if size > 0 and math.isfinite(size) else 4
+    # ---- in words -------------------------------------------------------------------------------------------------
 
     def say(self, value: float, sign: bool = False) -> str:
         """A value of the measure with its unit; sign: a plus before what is above 0."""
@@ -256,13 +202,11 @@ class MeasureReading:
 
     def written(self, key: str) -> str:
         """A number of the result with its unit; empty if it is not known."""
-        value = self.value(key)
-        return "" if math.isnan(value) else self.say(value)
+        return "" if math.isnan(value := self.value(key)) else self.say(value)
 
     def between(self, low: float, high: float) -> str:
         """Two values with their unit once; empty if one is not known."""
-        unknown = math.isnan(low) or math.isnan(high)
-        return "" if unknown else f"{fixed(low * self.factor, self.decimals)} to {self.say(high)}"
+        return "" if math.isnan(low + high) else f"{fixed(low * self.factor, self.decimals)} to {self.say(high)}"
 
     def deviations(self, low: float, high: float) -> str:
         """Deviations from nominal as limits are written: "±0.2375°", "−0.1732 to +0.1599°"; the end of a size."""
@@ -278,48 +222,21 @@ class MeasureReading:
     @property
     def limits_said(self) -> str:
         """The limits in words; empty if there are none."""
-        parts = []
-        lower, upper = self.limits
-        if math.isfinite(lower) or math.isfinite(upper):
-            parts.append(joined(limits_text(lower * self.factor, upper * self.factor), self.label))
+        lower, upper = (limit * self.factor for limit in self.limits)
+        texts = [joined(limits_text(lower, upper), self.label)] if math.isfinite(lower) or math.isfinite(upper) else []
         for word, bound in zip(("at least", "at most"), self.bounds, strict=True):
-            if math.isfinite(bound):
-                parts.append(f"{word} {joined(rounded(bound * self.factor), self.label)}")
-        return ", ".join(parts)
-
-    # ---- over the drive -------------------------------------------------------------------------------------------
-
-    @cached_property
-    def over(self) -> Abscissa | None:
-        """What its curve is drawn over; None if it is known at less than two positions, or if the figure is a place
-        itself, another quantity than its course."""
-        if (
-            self.rule.startswith(("place", "dead"))
-            or "drive" not in self.result.coords
-            or np.isfinite(self.row("curve")).sum() < 2
-        ):
-            return None
-        over = abscissa(self.result)
-        return over if over.span > 0 else None
-
-    @cached_property
-    def place(self) -> float:
-        """Coordinate of the drive, in its shown unit, at which the figure is taken; NaN if there is no one such."""
-        turned = str(self.result["place"].attrs.get("units", "")) if "place" in self.result else ""
-        return self.value("place") * {"rad": 180 / math.pi, "m": 1e3}.get(turned, 1.0)
+            texts += [f"{word} {joined(rounded(bound * self.factor), self.label)}"] if math.isfinite(bound) else []
+        return ", ".join(texts)
 
     @property
     def at_place(self) -> str:
-        """The place with its unit: " at 212°"; empty if there is none."""
+        """The place of the drive at which the figure is taken: " at 212°"; empty if there is no such one."""
+        turned = str(self.result["place"].attrs.get("units", "")) if "place" in self.result else ""
+        place = self.value("place") * {"rad": 180 / math.pi, "m": 1e3}.get(turned, 1.0)
         unit = str(self.result.attrs.get("drive_unit", ""))
-        if not math.isfinite(self.place) or self.over is None:
+        if not math.isfinite(place) or self.over is None:
             return ""
-        return f" at {self.place:.4g}°" if unit in DEGREE else f" at {self.place:.4g}\u00a0{unit}".rstrip()
-
-    @property
-    def is_extreme(self) -> bool:
-        """Whether the figure is that of the position where the course is largest or least."""
-        return self.rule in ("maximum", "minimum", "largest")
+        return f" at {place:.4g}°" if unit in ("°", "deg") else f" at {place:.4g}\u00a0{unit}".rstrip()
 
     # ---- shares ---------------------------------------------------------------------------------------------------
 
@@ -336,11 +253,6 @@ class MeasureReading:
         levels, values = np.asarray(self.result["quantile"].values, float), self.row("quantile_value")
         ends = [float(values[np.argmin(np.abs(levels - end))]) for end in OUTER if np.isclose(levels, end).any()]
         return (ends[0], ends[1]) if len(ends) == 2 else None
-
-    @property
-    def shares_apart(self) -> bool:
-        """Whether the shares in the variance are others than those in RSS²."""
-        return any(abs(row.variance_share - row.rss_share) > APART for row in self.contributions)
 
     @cached_property
     def contributions(self) -> list[ContributionRow]:
@@ -377,42 +289,48 @@ class MeasureReading:
     def largest(self, most: int) -> tuple[list[ContributionRow], list[ContributionRow]]:
         """At most so many contributions that have a row or bar of their own, and the rest."""
         rows = self.contributions
-        large = [row for row in rows if row.largest_share >= LEAST][:most] or rows[:1]
+        sizes = [np.nanmax(np.abs([0.0, row.worst_share, row.rss_share, row.variance_share])) for row in rows]
+        large = [row for row, size in zip(rows, sizes, strict=True) if size >= LEAST][:most] or rows[:1]
         if len(rows) == len(large) + 1:  # the last takes no more room than its being left out
             large = rows
         return large, [row for row in rows if row not in large]
 
-    def sobol_order(self, most: int) -> list[int]:
-        """Numbers whose Sobol indices are shown, the largest first."""
-        total = np.where(np.isfinite(self.row("total_order")), self.row("total_order"), -1.0)
-        order = [int(k) for k in np.argsort(-total, kind="stable")]
-        return [k for k in order if total[k] >= LEAST_INDEX][:most] or order[:1]
-
 
 def readings(result: xr.Dataset) -> list[MeasureReading]:
     """Every measure of a result."""
-    keys = ("limits", "bounds", "measure_texts", "measure_rules", "curve_texts")
     result = without_noise(result)
-    units = units_along(result["nominal"], "measure")
+    units, reads = units_along(result["nominal"], "measure"), []
+    keys = ("limits", "bounds", "measure_texts", "measure_rules", "curve_texts")
     limits, bounds, *words = (attribute(result, key) for key in keys)
-    reads = []
     for i, name in enumerate(names(result, "measure")):
-        ends = [(row[i] if i < len(row) else None) or (None, None) for row in (limits, bounds)]
-        pairs = [(-math.inf if low is None else float(low), math.inf if high is None else float(high))
-                 for low, high in ends]  # fmt: skip
+        alone, over = result.isel(measure=i), None
         text, rule, course = (str(row[i]) if i < len(row) else "" for row in words)
-        name_of_course = _of_course(result.isel(measure=i))
-        reads.append(MeasureReading(name_of_course, name, text, str(units[i]), pairs[0], pairs[1], rule, course))
+        if "curve" in alone and "drive" in alone.coords:  # the positions of its course, rising
+            unsolved = np.asarray(alone["status"].values) >= Status.NOT_CONVERGED
+            picked = np.flatnonzero(np.isfinite(alone["curve"].values) | unsolved)
+            alone = alone.isel(position=picked[np.argsort(alone["drive"].values[picked], kind="stable")])
+            if not rule.startswith(("place", "dead")) and np.isfinite(alone["curve"].values).sum() > 1:
+                over = abscissa(alone)
+        allowed = [(row[i] if i < len(row) else None) or (None, None) for row in (limits, bounds)]
+        pairs = [(-math.inf if low is None else float(low), math.inf if high is None else float(high))
+                 for low, high in allowed]  # fmt: skip
+
+        def value(key: str, alone: xr.Dataset = alone) -> float:
+            return float(alone[key].values) if key in alone else math.nan
+
+        nominal = value("nominal") if math.isfinite(value("nominal")) else 0.0
+        least = value("least") if math.isfinite(value("least")) else value("worst_case_lower")
+        sizes = [abs(value(key)) for key in ("worst_case_lower", "worst_case_upper", "rss")]
+        sizes += [3 * value("deviation"), *map(abs, pairs[0])]
+        spread = max((size for size in sizes if math.isfinite(size) and size > 0), default=abs(nominal))
+        factor, label = scale_of(nominal, [spread], str(units[i]))
+        size = spread * factor
+        decimals = min(max(3 - math.floor(math.log10(size)), 0), 9) if size > 0 and math.isfinite(size) else 4
+        reads.append(MeasureReading(
+            alone, name, text, course, rule, str(units[i]), factor, label.replace(" ", "\u00a0"), decimals, pairs[0],
+            pairs[1], nominal, nominal == 0.0 and not least < 0.0, over if over is not None and over.span > 0 else None,
+        ))  # fmt: skip
     return reads
-
-
-def _of_course(result: xr.Dataset) -> xr.Dataset:
-    """The result of one measure with the positions of its course, rising, without those of other measures."""
-    if "curve" not in result or "drive" not in result.coords:
-        return result
-    unsolved = np.asarray(result["status"].values) >= Status.NOT_CONVERGED
-    picked = np.flatnonzero(np.isfinite(result["curve"].values) | unsolved)
-    return result.isel(position=picked[np.argsort(result["drive"].values[picked], kind="stable")])
 
 
 def failures(result: xr.Dataset) -> list[tuple[str, int]]:

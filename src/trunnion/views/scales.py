@@ -6,9 +6,6 @@ Figures are named as the columns of the CSV file: `efficiency`, `A.effort_max`, 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from itertools import product
-from math import prod
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,20 +16,18 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import SUPERSCRIPT, WORDS, prefixed
+from trunnion.results.quantities import SUPERSCRIPT, WORDS
 from trunnion.results.tables.studies import swept as figures
 from trunnion.studies.sweep.study import FIGURES
-from trunnion.views.charts import Axis, Line, Look, Mark, outside
+from trunnion.views.charts import Axis
 from trunnion.views.common.cycle import Array
-from trunnion.views.common.peaks import ease_of_status, usual_peak
-from trunnion.views.readings import ending
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "ALIKE", "KINDS", "NOTHING", "Arrangement", "Field", "Scale", "arrange", "axis_of", "cause", "check_axes",
-    "check_measure", "ends", "field_of", "grid", "middles", "on_scale", "rings", "statuses", "thinned",
+    "KINDS", "Arrangement", "Scale", "arrange", "axis_of", "cause", "check_axes", "check_measure", "edges", "grid",
+    "meaning", "on_scale", "statuses", "thinned",
 ]  # fmt: skip
 
 KINDS = ("curves", "map")  # of figures
@@ -44,9 +39,6 @@ CAUSES = {
     int(Status.NOT_ASSEMBLED): "cannot be assembled",
 }
 SIGNS = {"um": "µm", "deg": "°", **WORDS}  # in figures
-MOST_PANELS = 12
-NOTHING = -1  # beside the statuses: sound, and yet without a number
-ALIKE = 1e-9  # of the largest: numbers that differ by less are taken as one
 
 
 class Scale(NamedTuple):
@@ -194,7 +186,7 @@ def check_measure(names: str | Iterable[str], mechanism: Mechanism) -> list[str]
     return of_model
 
 
-def _meaning(name: str, unit: str) -> str:
+def meaning(name: str, unit: str) -> str:
     """A figure in words: "largest reaction of B"; of a whole cycle what it is called."""
     member, _, key = name.rpartition(".")
     about = FIGURES.get(key) or FIGURES.get(f"drive_{key}")
@@ -203,85 +195,6 @@ def _meaning(name: str, unit: str) -> str:
     if key == "transmission_error_max":
         return f"maximum error of the {'slide' if unit == 'm' else 'rotation'} of {member}"
     return f"{about.long_name} of {member}"
-
-
-# ---- what a figure shows ------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Field:
-    """A figure of a sweep as it is drawn: numbers in its unit, (axis, curve, panel), the axis rising.
-
-    label: with the unit; scope: the magnitude that is shown; factor: from SI. panels: their titles; hidden: how many
-    more there are; columns: how many stand side by side; room: characters along a panel. nothing: what a sound point
-    without a number has: "∞" or "no value".
-    """
-
-    plan: Arrangement
-    x: Array
-    values: Array
-    ideal: Array | None
-    status: NDArray[np.int8]
-    unit: str
-    title: str
-    label: str
-    scope: float
-    factor: float
-    panels: list[str]
-    hidden: int
-    columns: int
-    nothing: str
-
-    @property
-    def room(self) -> int:
-        """Characters along a panel."""
-        return {1: 70, 2: 40, 3: 28, 4: 24}[self.columns]
-
-    def beyond(self, panel: int) -> list[Mark]:
-        """What a panel says of its peak, where that is outside the frame."""
-        peak = float(np.nanmax(np.abs(self.values[:, :, panel]), initial=0.0))
-        return [outside(peak / self.factor, self.unit)] if peak > self.scope else []
-
-
-def field_of(result: xr.Dataset, measure: str, x: str, family: str) -> Field:
-    """The numbers of a figure, brought into order; of too many panels some."""
-    plan = arrange(result, x, family)
-    unit, values = grid(result, plan, measure)
-    nothing = "∞" if np.isinf(values).any() else "no value"  # a margin beyond the last that is looked for
-    values = np.where(np.isfinite(values), values, np.nan)
-    ideal = grid(result, plan, f"{measure}_ideal")[1] if f"{measure}_ideal" in result else None
-    order = np.argsort(plan.x.values, kind="stable")
-    sizes = [len(scale.values) for scale in plan.facets]
-    total = prod(sizes)
-    while prod(sizes) > MOST_PANELS:
-        sizes[int(np.argmax(sizes))] -= 1
-    places = list(product(*(thinned(len(s.values), size) for s, size in zip(plan.facets, sizes, strict=True))))
-
-    def panelled(array: NDArray[Any]) -> NDArray[Any]:
-        rows: list[Any] = [(order, slice(None), *place) for place in places]
-        return np.stack([array[row] for row in rows], axis=-1)
-
-    values, status = panelled(values), panelled(statuses(result, plan))
-    ideal = None if ideal is None else panelled(ideal)
-    scope = usual_peak(ease_of_status(result, status), values, ideal)
-    factor, display_unit = prefixed(scope, unit)
-    count, title = len(places), _meaning(measure, unit)
-    columns = count if count <= 3 else 2 if count == 4 else 3 if count <= 6 or count == 9 else 4
-    if len(sizes) == 2 and 1 < sizes[-1] <= 4:  # the values of the last name side by side
-        columns = sizes[-1]
-    room = {1: 70, 2: 40, 3: 28, 4: 24}[columns]
-    titles = [_panel_title([s.equation(i) for s, i in zip(plan.facets, place, strict=True)], room) for place in places]
-    return Field(
-        plan, plan.x.values[order], values * factor, None if ideal is None else ideal * factor, status, unit, title,
-        f"{title} [{display_unit}]" if display_unit else title,
-        scope * factor, factor, titles, total - count, columns, nothing,
-    )  # fmt: skip
-
-
-def _panel_title(parts: list[str], room: int) -> str:
-    """The values of a panel in lines of so many characters; too long names by their ends."""
-    short = (ending(part, room).replace(" ", "\u00a0") for part in parts)
-    return fill(", ".join(short), room, break_long_words=False).replace("\u00a0", " ")
 
 
 def on_scale(scale: Scale) -> str:
@@ -293,19 +206,15 @@ def on_scale(scale: Scale) -> str:
     return "log" if ratios.max() / ratios.min() < min(4.0, steps.max() / steps.min()) else "linear"
 
 
-def middles(scale: Scale, values: Array) -> Array:
-    """Half-way between neighbours of rising values, on the scale that their axis has."""
-    return np.sqrt(values[:-1] * values[1:]) if on_scale(scale) == "log" else (values[:-1] + values[1:]) / 2
-
-
-def ends(scale: Scale, margin: float = 0.015) -> tuple[float, float]:
-    """Ends of an axis: a little beyond the first and the last value."""
-    low, high = float(scale.values.min()), float(scale.values.max())
-    if on_scale(scale) == "log":
-        more = (high / low) ** margin
-        return low / more, high * more
+def edges(scale: Scale, values: Array, margin: float = 0.015) -> Array:
+    """Where the surroundings of rising values end: half-way to the next on the scale of their axis, a little beyond the
+    first and the last."""
+    log = on_scale(scale) == "log"
+    places = np.log(values) if log else values
+    low, high = float(places[0]), float(places[-1])
     more = margin * (high - low) if high > low else 0.5 * abs(low) or 0.5
-    return low - more, high + more
+    places = np.concatenate([[low - more], (places[:-1] + places[1:]) / 2, [high + more]])
+    return np.asarray(np.exp(places) if log else places, float)
 
 
 def axis_of(scale: Scale, room: int, margin: float = 0.015) -> Axis:
@@ -314,11 +223,5 @@ def axis_of(scale: Scale, room: int, margin: float = 0.015) -> Axis:
     few = values.size == 1 or (log and values.size <= 7)
     places = [(float(value), _written(value)) for value in values] if few else None
     title = fill(scale.label, room, break_long_words=False)
-    return Axis(title, ends(scale, margin), places, log, powers=not log and not few)
-
-
-def rings(x: Array, y: Array, size: float, beyond: bool = False) -> list[Mark]:
-    """Rings of a size around points at which contact is lost; in the legend one that is seen. beyond: the frame, too"""
-    look, empty = Look("limit", dash="none", mark="o", size=7, hollow=True, order=4), np.empty(0)
-    legend = Line(empty, empty, "contact lost at some position", look)
-    return [legend, Line(x, y, None, look.but(size=size, unclipped=beyond))]
+    low, *_, high = edges(scale, values, margin).tolist()
+    return Axis(title, (low, high), places, log, powers=not log and not few)

@@ -23,17 +23,13 @@ if TYPE_CHECKING:
 
 __all__ = ["animation_of", "check_kind", "figure_of", "html_of", "plot", "report", "report_of"]
 
-# kind of result: the module of its view, in which `report` or `figure` stands; loaded when it is asked for, for
+# kind of result: the modules in which its `figure` and its `report` stand; loaded when they are asked for, for
 # matplotlib is slow to import
-REPORTS = {
-    "cycle": "cycle.report", "tolerance": "tolerance", "allocation": "allocation",
-    "comparison": "compare", "identification": "identify",
-    "motion": "motion.report", "play": "play", "sweep": "sweep", "assembly": "assembly.figure",
-}  # fmt: skip
-FIGURES = {
-    "cycle": "cycle.plots", "sweep": "sweep", "play": "play", "assembly": "assembly.figure",
-    "tolerance": "tolerance", "allocation": "allocation", "comparison": "compare",
-    "identification": "identify", "motion": "motion.figure",
+VIEWS = {
+    "cycle": ("cycle.plots", "cycle.report"), "motion": ("motion.figure", "motion.report"),
+    "sweep": ("sweep", "sweep"), "play": ("play", "play"), "assembly": ("assembly.figure", "assembly.figure"),
+    "tolerance": ("tolerance", "tolerance"), "allocation": ("allocation", "allocation"),
+    "comparison": ("compare", "compare"), "identification": ("identify", "identify"),
 }  # fmt: skip
 
 
@@ -64,15 +60,13 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None, **options: Any) 
 
 def report_of(result: xr.Dataset, **options: Any) -> str:
     """The report of a result as HTML. options: those of its view, such as ideal= of a cycle."""
-    whole(result, "a report")
-    view = _view(kind_of(result), REPORTS, "report")
+    view = _view(result, "report")
     return str(_called(view.report, f"report() of a {kind_of(result)}", result, options))
 
 
 def figure_of(result: xr.Dataset, kind: str | None = None, **options: Any) -> Figure:
     """A figure of a result; kind: of those of its view, the main one if not given; options: those of its view."""
-    whole(result, "a figure")
-    view, call = _view(kind_of(result), FIGURES, "figure"), f"plot() of a {kind_of(result)}"
+    view, call = _view(result, "figure"), f"plot() of a {kind_of(result)}"
     if kind is None:
         return _called(getattr(view, "sheet", view.figure), call, result, options)  # type: ignore[no-any-return]
     if "kind" not in signature(view.figure).parameters:
@@ -90,9 +84,9 @@ def _called(view: Callable[..., Any], call: str, result: xr.Dataset, options: Ma
 
 def animation_of(result: xr.Dataset, ideal: xr.Dataset | None, height: int) -> Animation:
     """The moving mechanism of a cycle."""
-    whole(result, "an animation")
-    view = _view(kind_of(result), {"cycle": "cycle.report"}, "animation")
-    return view.animation(result, ideal, height)  # type: ignore[no-any-return]
+    if kind_of(result) != "cycle":
+        raise MechanismError(Finding(f"there is no animation of a {kind_of(result)}", "kind", "analyse a cycle"))
+    return _view(result, "animation").animation(result, ideal, height)  # type: ignore[no-any-return]
 
 
 def html_of(result: xr.Dataset) -> str:
@@ -102,11 +96,13 @@ def html_of(result: xr.Dataset) -> str:
 
 def check_kind(of: str, kind: str) -> None:
     """MechanismError if a result of some kind (`of`) has no such kind of figure."""
-    one_of(kind, _view(of, FIGURES, "figure").KINDS)
+    one_of(kind, import_module(f"trunnion.views.{VIEWS[of][0]}").KINDS)
 
 
-def _view(kind: str, views: dict[str, str], what: str) -> Any:
-    if kind not in views:
-        remedy = f"there are {what}s of {', '.join(views)}"
-        raise MechanismError(Finding(f"there is no {what} of a {kind}", "kind", remedy))
-    return import_module(f"trunnion.views.{views[kind]}")
+def _view(result: xr.Dataset, what: str) -> Any:
+    """The module of the view of a whole result."""
+    whole(result, f"a {what}")
+    if kind_of(result) not in VIEWS:
+        remedy = f"there are {what}s of {', '.join(VIEWS)}"
+        raise MechanismError(Finding(f"there is no {what} of a {kind_of(result)}", "kind", remedy))
+    return import_module(f"trunnion.views.{VIEWS[kind_of(result)][what != 'figure']}")

@@ -11,35 +11,33 @@ from dataclasses import replace
 from itertools import pairwise, product
 from math import prod
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import prefixed
 from trunnion.results.scales import without_noise
 from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import MARGIN
-from trunnion.views.charts import Axis, Chart, ColourScale, Line, Look, Mark, Note, Stripe, check_kind
+from trunnion.views.charts import Axis, Chart, ColourScale, Contours, Line, Look, Mark, Stripe, check_kind, outside
 from trunnion.views.common.cycle import Array
+from trunnion.views.common.peaks import ease_of_status, usual_peak
 from trunnion.views.page import Section, Table, counts, page
+from trunnion.views.readings import ending
 from trunnion.views.scales import (
-    ALIKE,
     KINDS,
-    NOTHING,
     Arrangement,
-    Field,
     Scale,
     arrange,
     axis_of,
     cause,
-    ends,
-    field_of,
+    edges,
     grid,
-    middles,
+    meaning,
     on_scale,
-    rings,
     statuses,
     thinned,
 )  # fmt: skip
@@ -161,15 +159,25 @@ def _number(value: float, head: str = "") -> str:
     return f"{value + 0.0:.6g}".replace("inf", "∞")  # + 0.0: no negative zero
 
 
-# ---- what is drawn ------------------------------------------------------------------------------------------------
+# ---- figures ------------------------------------------------------------------------------------------------------
 
 WIDE = 74  # characters of a title in a line
+MOST_PANELS = 12
+MOST_NAMED = 8  # curves that are told apart by a legend; more by a scale of colours
+MARKS, MOST_MARKED = "os^DvPX*", 40  # points of a curve, so that curves are told apart in grey, too
+BANDS = 10  # of a map
+ALIKE = 1e-9  # of the largest: numbers that differ by less are taken as one
+NOTHING = -1  # beside the statuses: sound, and yet without a number
+HATCHES = {
+    NOTHING: "oo", int(Status.NOT_CONVERGED): "...", int(Status.LOCKED): "////", int(Status.LOAD_UNDEFINED): "||||",
+    int(Status.SINGULAR): "----", int(Status.NOT_ASSEMBLED): "xxx",
+}  # fmt: skip
 
 
 def figure(
     result: xr.Dataset, measure: str = "efficiency", x: str = "", family: str = "", kind: str = "curves"
 ) -> Figure:
-    """A number of the cycle over swept names.
+    """A number of the cycle over swept names, a panel for each value of further names.
 
     Parameters
     ----------
@@ -184,134 +192,149 @@ def figure(
     ------
     MechanismError : for names that are not swept, and for a map of fewer than two names that vary
     """
-    from trunnion.views.draw import Board
+    from trunnion.views.draw import grid as draw
 
     check_kind(kind, KINDS)
-    field = field_of(without_noise(result), measure, x, family)
-    plan, other, count = field.plan, field.plan.other, len(field.panels)
-    over = plan.x.name
-    if kind == "map":
-        short = [scale.name for scale in (plan.x, other) if scale and np.unique(scale.values).size < 2]
-        if other is None or short:
-            what = f"'{short[0]}' has one value" if short else f"'{plan.x.name}' alone is swept"
-            remedy = "sweep over two names with several values each, or draw curves"
-            raise MechanismError(Finding(f"{what}: a map needs two that vary", "--kind map", remedy))
-        over += f" and {other.name}"
-    title = f"{field.title} over {over}{f' at {plan.at()}' if plan.fixed else ''}"
-    if field.hidden:
-        title += f" ({count} of {count + field.hidden} panels)"
+    result = without_noise(result)
+    plan = arrange(result, x, family)
+    if kind == "map" and any(scale is None or np.unique(scale.values).size < 2 for scale in (plan.x, plan.other)):
+        remedy = "sweep over two names with several values each, or draw curves"
+        raise MechanismError(Finding("a map needs two names that vary", "--kind map", remedy))
+    unit, values = grid(result, plan, measure)
+    ideal = grid(result, plan, f"{measure}_ideal")[1] if f"{measure}_ideal" in result else None
+    status, nothing = statuses(result, plan), "∞" if np.isinf(values).any() else "no value"
+    values = np.where(np.isfinite(values), values, np.nan)
+    scope = usual_peak(ease_of_status(result, status), values, ideal)
+    factor, shown = prefixed(scope, unit)
+    over = f"{plan.x.name} and {plan.other.name}" if kind == "map" and plan.other else plan.x.name
+    noun = meaning(measure, unit)
+    label = f"{noun} [{shown}]" if shown else noun
+    places = list(product(*(range(len(scale.values)) for scale in plan.facets)))
+    picked = [places[k] for k in thinned(len(places), MOST_PANELS)]
+    hidden = f" ({len(picked)} of {len(places)} panels)" if len(picked) < len(places) else ""
+    title = f"{noun} over {over}{f' at {plan.at()}' if plan.fixed else ''}{hidden}"
+    columns = len(picked) if len(picked) <= 3 else 2 if len(picked) == 4 else 3 if len(picked) <= 9 else 4
+    field = Field(plan, label, nothing, 78 // columns, scope * factor, (factor, unit))
+    make = _map if kind == "map" else _curves
+    every, charts = factor * (values if ideal is None else np.append(values, ideal)), []
+    for place in picked:
+        index: Any = (slice(None), slice(None), *place)
+        at = (ending(scale.equation(i), field.room) for scale, i in zip(plan.facets, place, strict=True))
+        head = fill(", ".join(text.replace(" ", "\u00a0") for text in at), field.room, break_long_words=False)
+        like = None if ideal is None else ideal[index] * factor
+        charts.append(make(field, every, values[index] * factor, like, status[index], head))
+    colours = _levels(label, every, field.scope) if kind == "map" else _colours(plan.other)
     title = fill(f"{title[:1].upper()}{title[1:]}", WIDE, break_long_words=False)
-    board = Board.new(title, result, count, field.columns)
-    if kind == "map":
-        from trunnion.views.sweep_map import draw
-
-        draw(board, field)
-        return board.sheet
-    for k in range(count):
-        board.draw(k, _curves(field, k))
-    board.finish(_colours(other) if other is not None and len(other.values) > MOST_NAMED else None)
-    return board.sheet
+    return draw(title, result, charts, columns, colours)
 
 
-# ---- curves -------------------------------------------------------------------------------------------------------
+class Field(NamedTuple):
+    """What all panels share: what runs along what, the number with its unit, what a sound point without one has,
+    characters along a panel, the magnitude that is shown, and factor and unit of the number."""
 
-MOST_NAMED = 8  # curves that are told apart by a legend; more by a scale of colours
-MOST_MARKED = 40  # points of a curve that are marked
-MARKS = "os^DvPX*"  # so that curves are told apart in grey, too
-DASHES: Any = ("solid", "long", "short", "dotted")
+    plan: Arrangement
+    label: str
+    nothing: str
+    room: int
+    scope: float
+    scale: tuple[float, str]
 
+    def beyond(self, values: Array) -> list[Mark]:
+        """What a panel says of its peak, where that is outside the frame."""
+        peak = float(np.nanmax(np.abs(values), initial=0.0))
+        return [outside(peak / self.scale[0], self.scale[1])] if peak > self.scope * (1 + ALIKE) else []
 
-def _curves(field: Field, panel: int) -> Chart:
-    """One curve for each value of the second name, with what hinders it where there is none."""
-    other, x, alone = field.plan.other, field.x, len(field.panels) == 1
-    y, status = field.values[:, :, panel], field.status[:, :, panel]
-    answered = np.isfinite(y)
-    empty = ~answered & (status < Status.NOT_CONVERGED) & bool(answered.any())
-    marks = _hindered(field, np.where(empty, NOTHING, status))
-    count = y.shape[1]
-    for k in range(count):
-        look, label = _look(field, k), "as built" if field.ideal is not None else None
-        if other is not None:  # many are told apart by the scale of colours
-            label = other.equation(k) if count <= MOST_NAMED else None
-        marks += _curve(x, y[:, k], label, look)
-        if field.ideal is not None:
-            name = ("ideal" if other is None else "ideal, dashed") if k == count - 1 else None
-            faint = look.but(colour="ink", dash="long", width=1.0, size=2.2)
-            marks += _curve(x, field.ideal[:, k, panel], name, faint)
-    rows, columns = np.nonzero((status == Status.CONTACT_LOST) & answered)
-    if rows.size:
-        marks += rings(x[rows], y[rows, columns], float(np.clip(8 * np.sqrt(60 / rows.size), 2, 8)))
-    if not answered.any() and not (status >= Status.NOT_CONVERGED).any():
-        marks.append(Note(f"{field.nothing} at all points", 0.5, 0.5))
-    side = replace(_frame(field), title=fill(field.label, 60 if alone else 32, break_long_words=False))
-    return Chart(axis_of(field.plan.x, field.room), side, [*marks, *field.beyond(panel)], legend=None,
-                 title="" if alone else field.panels[panel])  # fmt: skip
+    def word(self, code: int) -> str:
+        """Why a point has no number."""
+        return self.nothing if code == NOTHING else cause(code)
 
 
-def _look(field: Field, k: int) -> Look:
-    """Colour of a curve, and its marks or, of curves without, its dashes; beside ideal ones none."""
-    count, points, other = field.values.shape[1], field.x.size, field.plan.other
-    if other is not None and count > MOST_NAMED:
-        mark = "o" if points == 1 else ""
-        return Look(_colours(other).share(float(other.values[k])), 1.2, mark=mark, size=5)
-    if points <= MOST_MARKED:
-        return Look(k, mark=MARKS[k], size=5 if points == 1 else 3.5)
-    plain = field.ideal is not None or count == 1
-    return Look(k, dash="solid" if plain else DASHES[k % 4])
+def _codes(values: Array, status: NDArray[np.int8]) -> NDArray[np.int8]:
+    """Status of the points without an answer, NOTHING of sound ones without a number, 0 of all others."""
+    return np.where(status >= Status.NOT_CONVERGED, status, np.where(np.isfinite(values), 0, NOTHING))
 
 
-def _colours(other: Scale) -> ColourScale:
-    log = on_scale(other) == "log"
-    low, high = float(other.values.min()), float(other.values.max())
-    return ColourScale(other.label, *(ends(other) if low == high else (low, high)), log)
+def _lost(x: Array, y: Array, size: float) -> list[Mark]:
+    """Rings around points at which contact is lost at some position."""
+    look = Look("limit", dash="none", mark="o", size=size, hollow=True, order=4, unclipped=True)
+    return [Line(x, y, "contact lost at some position", look)] if x.size else []
 
 
-def _curve(x: Array, y: Array, label: str | None, look: Look) -> list[Mark]:
-    """One curve; points beside a gap have a cross."""
-    answered = np.isfinite(y)
-    edges = answered & (np.append(False, ~answered[:-1]) | np.append(~answered[1:], False))
-    cross = look.but(dash="none", mark="x", size=7.0 if look.mark or look.width > 1.2 else 3.5, order=4.0)
-    return [Line(x, y, label, look), *([Line(x[edges], y[edges], None, cross)] if edges.any() else [])]
+def _curves(
+    field: Field, every: Array, values: Array, ideal: Array | None, status: NDArray[np.int8], head: str
+) -> Chart:
+    """One curve for each value of the second name; grey where none has an answer, crosses at the ends of gaps.
 
-
-def _frame(field: Field) -> Axis:
-    """One scale upwards for all panels, cut where some rise far above the rest; flat curves in the middle of it."""
-    both = field.values if field.ideal is None else np.append(field.values, field.ideal)
-    finite = both[np.isfinite(both)]
-    if not finite.size:
-        return Axis(places=[])
-    low, high, scope = float(finite.min()), float(finite.max()), field.scope
-    most = max(abs(low), abs(high))
-    if scope < most * (1 - 1e-12):
-        return Axis(limits=(max(min(low, 0.0), -scope) * 1.05, min(max(high, 0.0), scope) * 1.05))
-    half = 0.1 * most or 1.0
-    return Axis(limits=(low - half, high + half)) if high - low <= ALIKE * most else Axis()
-
-
-def _hindered(field: Field, status: NDArray[np.int8]) -> list[Mark]:
-    """Grey where no curve has an answer, hatched where some have none; the cause in it or, in panels, above.
-
-    status: or NOTHING, where a point with an answer has no number.
+    every: the numbers of all panels, which have one scale.
     """
-    missing, alone = (status >= Status.NOT_CONVERGED) | (status == NOTHING), len(field.panels) == 1
-    low, high = ends(field.plan.x)
-    edges = np.concatenate([[low], middles(field.plan.x, field.x), [high]])
-    kind = np.where(missing.all(axis=1), 2, np.where(missing.any(axis=1), 1, 0))
-    codes = np.where(missing, status, NOTHING).max(axis=1)
-    bounds = np.append(np.flatnonzero(np.diff(np.append(-1, kind))), len(kind)).tolist()
-    marks, causes = list[Mark](), set[str]()
-    for start, stop in pairwise(bounds):
-        if not kind[start]:
-            continue
-        code, partial = int(codes[start:stop].max()), bool(kind[start] == 1)
-        text = (field.nothing if code == NOTHING else cause(code)) + " for some" * partial
-        look = Look("rule" if partial else "shade", hatch="///" * partial, order=0.5)
-        new = text not in causes
-        wide = new or (stop - start) / len(kind) > 0.03  # a second time only where there is room
-        name = text if new and not alone else None
-        marks.append(Stripe(edges[start], edges[stop], text if alone and wide else "", look, name))
-        causes.add(text)
-    return marks
+    plan, other = field.plan, field.plan.other
+    order = np.argsort(plan.x.values, kind="stable")
+    x, values, status = plan.x.values[order], values[order], status[order]
+    codes, colours, marks = _codes(values, status), _colours(other), list[Mark]()
+    gone = np.where((codes == 0).any(axis=1), 0, np.where(codes, codes, NOTHING).max(axis=1))
+    bounds, sides = edges(plan.x, x), np.append(np.flatnonzero(np.diff(gone, prepend=99)), len(gone))
+    for start, stop in pairwise(sides.tolist()):
+        if gone[start]:
+            marks.append(Stripe(bounds[start], bounds[stop], field.word(int(gone[start]))))
+    for k in range(values.shape[1]):
+        look, label = Look(k, mark=MARKS[k % 8] if x.size <= MOST_MARKED else "", size=3.5), None
+        if ideal is not None:
+            label = "as built"
+        if colours is not None and other is not None:
+            look, label = Look(colours.share(float(other.values[k])), 1.2, mark="o" * (x.size == 1)), None
+        elif other is not None:
+            label = other.equation(k)
+        y = values[:, k]
+        ends = np.isfinite(y) & (np.isnan(np.append(y[:1], y[:-1])) | np.isnan(np.append(y[1:], y[-1:])))
+        cross = look.but(dash="none", mark="x", size=7.0, order=4.0)
+        marks += [Line(x, y, label, look), *([Line(x[ends], y[ends], None, cross)] if ends.any() else [])]
+        if ideal is not None:
+            name = None if k else "ideal" if other is None else "ideal, dashed"
+            marks.append(Line(x, ideal[order, k], name, Look("ink", 1.0, "long")))
+    rows, across = np.nonzero((status == Status.CONTACT_LOST) & np.isfinite(values))
+    marks += _lost(x[rows], values[rows, across], 6.0)
+    finite = every[np.isfinite(every)]
+    low, high = np.clip([finite.min(), finite.max()], -field.scope, field.scope) if finite.size else (0.0, 1.0)
+    margin = 0.05 * (high - low) if high - low > ALIKE * field.scope else 0.1 * abs(high) or 1.0
+    upward = Axis(fill(field.label, 60 if not head else 32, break_long_words=False), (low - margin, high + margin))
+    return Chart(axis_of(plan.x, field.room), upward, [*marks, *field.beyond(values)], title=head)
+
+
+def _colours(other: Scale | None) -> ColourScale | None:
+    """The scale of colours that tells many curves apart."""
+    if other is None or len(other.values) <= MOST_NAMED:
+        return None
+    return ColourScale(other.label, float(other.values.min()), float(other.values.max()), on_scale(other) == "log")
+
+
+def _map(field: Field, every: Array, values: Array, ideal: Array | None, status: NDArray[np.int8], head: str) -> Chart:
+    """Bands of the number over two names, hatched where there is none."""
+    assert field.plan.other is not None  # as `figure` sees to
+    scales = field.plan.x, field.plan.other
+    (x, across), (y, upward) = (np.unique(scale.values, return_index=True) for scale in scales)
+    values, status = values[np.ix_(across, upward)], status[np.ix_(across, upward)]
+    codes = _codes(values, status)
+    gaps = [(field.word(code), hatch, codes == code) for code, hatch in HATCHES.items() if np.any(codes == code)]
+    sides = [edges(scale, places, 0.0) for scale, places in zip(scales, (x, y), strict=True)]
+    drawn = Contours(x, y, values, sides[0], sides[1], _levels(field.label, every, field.scope), gaps)
+    rows, columns = np.nonzero((status == Status.CONTACT_LOST) & np.isfinite(values))
+    lost = _lost(x[rows], y[columns], float(np.clip(160 / max(status.shape), 1.5, 8)))
+    along = axis_of(scales[0], field.room, 0.0), axis_of(scales[1], 32 if head else 60, 0.0)
+    return Chart(*along, [drawn, *lost, *field.beyond(values)], title=head)
+
+
+def _levels(title: str, values: Array, scope: float) -> ColourScale:
+    """Round edges of a few bands over what is shown."""
+    from matplotlib.ticker import MaxNLocator
+
+    finite = values[np.isfinite(values)]
+    ends = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+    low, high = np.clip(ends, -scope, scope).tolist() if finite.size else ends
+    if high - low <= ALIKE * max(abs(low), abs(high)):
+        half = 0.05 * max(abs(low), abs(high)) or 1.0
+        return ColourScale(title, low - half, high + half, levels=(low - half, high + half))
+    levels = [float(level) for level in MaxNLocator(BANDS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)]
+    return ColourScale(title, *ends, levels=levels)
 
 
 # ---- report -------------------------------------------------------------------------------------------------------

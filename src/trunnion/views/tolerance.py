@@ -12,7 +12,6 @@ import numpy as np
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number
-from trunnion.statistics import intervals
 from trunnion.views.charts import (
     Axis,
     Band,
@@ -29,9 +28,10 @@ from trunnion.views.charts import (
     check_kind,
     silent,
 )
-from trunnion.views.common.cycle import Array, names
-from trunnion.views.page import Section, Summary, Table, counts, page
+from trunnion.views.common.cycle import names
+from trunnion.views.page import Section, Table, counts, page
 from trunnion.views.readings import (
+    LEAST_INDEX,
     OUTER,
     MeasureReading,
     ending,
@@ -48,9 +48,10 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["KINDS", "MOST_PANELS", "NOTES", "drawable", "figure", "report", "sheet", "tables"]
+__all__ = ["KINDS", "MOST_PANELS", "drawable", "figure", "report", "sheet", "tables"]
 
-MOST_HEADS = 6  # measures whose figures are read first
+EXTREMES = ("maximum", "minimum", "largest")  # rules of figures that are taken where the course is extreme
+APART = 5e-4  # two shares that differ by more are written each
 MOST_ROWS, MOST_BARS = 20, 16  # contributions with a row and a bar of their own
 
 
@@ -84,7 +85,7 @@ def cells_of(read: MeasureReading) -> dict[str, Cells]:
     middle = read.nominal + shift
     mean = "" if math.isnan(shift) or read.is_size else read.say(middle)
     three = "" if read.is_size else read.between(middle - 3 * sigma, middle + 3 * sigma)
-    at = read.at_place if read.is_extreme and read.nominal != 0.0 else ""
+    at = read.at_place if read.rule in EXTREMES and read.nominal != 0.0 else ""
     least, most = read.value("least"), read.value("most")
     extremes = read.written("most") if read.is_size else read.deviations(least - read.nominal, most - read.nominal)
     rss = read.written("rss")
@@ -114,7 +115,8 @@ def figures(read: MeasureReading) -> Table:
     if not rows:
         return Table("results", ["", "linear"], [["nominal", "undefined"]])
     columns = [key for key in COLUMNS if any(cells.get(key) for cells in rows.values())]
-    sampling = "Monte Carlo" if read.independent else "quasi-Monte Carlo"
+    independent = read.result.attrs.get("sampling", "monte-carlo") == "monte-carlo"
+    sampling = "Monte Carlo" if independent else "quasi-Monte Carlo"
     head = ["", *(sampling if key == "sampled" else COLUMNS[key] for key in columns)]
     return Table("results", head, [[label, *(cells.get(k, "") for k in columns)] for label, cells in rows.items()])
 
@@ -124,7 +126,8 @@ def contributions(read: MeasureReading) -> Table:
     counted."""
     large, rest = read.largest(MOST_ROWS)
     shares = {"share": "worst_share", "of RSS²": "rss_share"}
-    shares |= {"of variance": "variance_share"} if read.shares_apart else {}
+    if any(abs(row.variance_share - row.rss_share) > APART for row in read.contributions):
+        shares["of variance"] = "variance_share"
     head = ["contribution", "tolerance", "sensitivity", "worst ±", *shares]
     rows = [
         [row.short, row.limits, read.slope(row), read.say(row.worst),
@@ -142,7 +145,9 @@ def indices(read: MeasureReading) -> Table:
     """Sobol indices with their 95 % intervals, the largest total first; those below half a per cent are counted."""
     short = {row.name: row.short for row in read.contributions}
     paths = names(read.result, "parameter")
-    order = read.sobol_order(len(paths))
+    total = np.where(np.isfinite(read.row("total_order")), read.row("total_order"), -1.0)
+    every = np.argsort(-total, kind="stable").tolist()
+    order = [j for j in every if total[j] >= LEAST_INDEX] or every[:1]
     ends = [[read.row(f"{key}{end}") for end in ("", "_low", "_high")] for key in ("first_order", "total_order")]
     rows = [
         [short[paths[j]], *(share_interval(*(float(row[j]) for row in key)).replace("-", "−") for key in ends)]
@@ -173,34 +178,13 @@ def overview(result: xr.Dataset) -> Table:
     rows, label = [], ""
     for read in readings(result):
         cells, label = cells_of(read), read.rss_label
+        worst = cells["worst case"].get("searched") or cells["worst case"].get("linear", "")
         sampled = [cells[key].get("sampled") or cells[key].get("linear", "")
                    for key in ("mean", "deviation σ", "yield", "Cpk")]  # fmt: skip
-        rows.append([read.name, read.limits_said, cells["nominal"]["linear"], _worst(cells), cells[label]["linear"],
+        rows.append([read.name, read.limits_said, cells["nominal"]["linear"], worst, cells[label]["linear"],
                      *sampled])  # fmt: skip
     head = ["measure", "limits", "nominal", "worst case", label, "mean", "deviation σ", "yield", "Cpk"]
     return Table("measures", head, rows).without_empty()
-
-
-def _worst(cells: dict[str, Cells]) -> str:
-    return cells["worst case"].get("searched") or cells["worst case"].get("linear", "")
-
-
-def headline(result: xr.Dataset) -> Summary:
-    """What is read first: of each measure the yield, the nominal value and the worst case; then of all limits."""
-    summary = []
-    for read in sorted(readings(result), key=lambda read: not read.limited)[:MOST_HEADS]:
-        cells = cells_of(read)
-        order = "" if cells["worst case"].get("searched") else ", first order"
-        pairs = [
-            (cells["yield"].get("sampled", ""), f"yield, {cells['yield'].get('interval', '')}"),
-            ("" if read.is_size else cells["nominal"]["linear"], "nominal"),
-            (_worst(cells), f"worst case{order}" if read.is_size else f"worst-case deviation{order}"),
-            (cells["Cpk"].get("sampled", ""), "Cpk"),
-        ]
-        summary.append((read.name, [pair for pair in pairs if pair[0]]))
-    yields = _overall(result)
-    summary += [("All limits together", [(share_parts(*yields)[0], "yield")])] if yields else []
-    return [part for part in summary if part[1]]
 
 
 def failed(result: xr.Dataset) -> list[Table]:
@@ -240,8 +224,6 @@ def inputs(result: xr.Dataset) -> Table:
 WITHIN, BEYOND = 0, 1
 LIMIT = Look("limit", 1.3, "dotted", order=3)
 FEWEST, MOST = 20, 60  # bars of a histogram
-CORE = 0.01  # share of the samples at either end beyond the core
-FAR = 1.5  # of the width of the core, beyond which no sample decides how far the picture goes
 READABLE = 0.02  # of nominal: a spread below it is drawn as a deviation
 INSIDE = 0.14  # share of a bar that holds its number
 NAME = 34  # characters of a name beside a bar
@@ -250,13 +232,16 @@ NAME = 34  # characters of a name beside a bar
 def histogram(read: MeasureReading) -> Panel:
     """Counts of the samples within and beyond the limits, with nominal, mean and the range of 99.73 %."""
     tally, edges = read.row("histogram"), read.row("edge")
-    low, high = _core(tally, edges)
+    starts = np.arange(0, len(tally), max(round(len(tally) / np.clip(np.sqrt(tally.sum()), FEWEST, MOST)), 1))
+    heights, bins = np.add.reduceat(tally, starts), np.append(edges[starts], edges[-1])
+    low, high = float(bins[0]), float(bins[-1])
     shift, title = 0.0, f"{read.name}{read.in_unit}"
     if 0 < high - low <= READABLE * abs(read.nominal) or (low == high and read.nominal):
         shift, title = read.nominal, f"deviation of {read.name} from nominal {read.say(read.nominal)}{read.in_unit}"
-    low, high = _window(read, low, high)
-    heights, bins = _rebinned(tally, edges, low, high)
-    x = (bins - shift) * read.factor
+    width = high - low or abs(high) or 1.0
+    ends = [low, high, read.nominal, *(read.nominal + end for end in read.room)]
+    ends = [end for end in ends if low - width < end < high + width]  # no limit far away makes the bars narrow
+    x, margin = (bins - shift) * read.factor, 0.04 * (max(ends) - min(ends))
     marks: list[Mark] = [Stairs(heights, x, "samples", Look(WITHIN))]
     if read.limited:
         lower, upper = ((read.nominal + end - shift) * read.factor for end in read.room)
@@ -267,52 +252,9 @@ def histogram(read: MeasureReading) -> Panel:
         marks = [Stairs(heights, x, f"within {share_interval(*read.interval)}", Look(WITHIN, order=2.1), window),
                  Stairs(heights, x, outside_text, Look(BEYOND))]  # fmt: skip
     marks += _histogram_lines(read, shift)
-    outside = int(tally[(edges[1:] <= low) | (edges[:-1] >= high)].sum())
-    if outside:
-        least, most = read.value("least"), read.value("most")
-        ends = [f"down to {read.say(least)}"] if least < low else []
-        ends += [f"up to {read.say(most)}"] if most > high else []
-        text = f"{outside:,} sample{'s' if outside > 1 else ''} outside, {' and '.join(ends)}"
-        marks.append(Note(text, 0.99, 0.97, "right", "top", boxed=True))
-    top = 1.06 * max(float(heights.max(initial=0.0)), 1.0)
-    across = Axis(title, ((low - shift) * read.factor, (high - shift) * read.factor))
-    return Panel("", [Chart(across, Axis("samples", (0, top), integer=True), marks, legend=Legend(3))])
-
-
-def _core(tally: Array, edges: Array) -> tuple[float, float]:
-    """Where the samples lie, without what lies far beyond nearly all of them."""
-    filled = np.flatnonzero(tally)
-    if not filled.size:
-        return float(edges[0]), float(edges[-1])
-    ends, total = edges[[filled[0], filled[-1] + 1]], np.append(0.0, np.cumsum(tally))
-    low, high = np.interp([CORE * total[-1], (1 - CORE) * total[-1]], total, edges)
-    room = FAR * (high - low)
-    return max(float(ends[0]), low - room), min(float(ends[1]), high + room)
-
-
-def _window(read: MeasureReading, low: float, high: float) -> tuple[float, float]:
-    """Ends of the axis: the core, and what lies within one more width of it to either side: limits, nominal."""
-    width = high - low or abs(high) or 1.0
-    marks = [read.nominal, *(read.nominal + end for end in read.room)]
-    near = [mark for mark in marks if low - width < mark < high + width]
-    low, high = min([low, *near]), max([high, *near])
-    margin = 0.04 * (high - low)
-    return (low if read.is_size and low <= 0 else low - margin), high + margin
-
-
-def _rebinned(tally: Array, edges: Array, low: float, high: float) -> tuple[Array, Array]:
-    """The counts over some 20 to 60 even bars in the picture, the more the more samples there are."""
-    visible = np.flatnonzero((edges[1:] > low) & (edges[:-1] < high))
-    widths = np.diff(edges)[visible]
-    bars = int(np.clip(np.sqrt(tally.sum()), FEWEST, MOST))
-    if not widths.size or visible.size <= 1.5 * bars:
-        return tally, edges
-    if np.ptp(widths) <= 0.01 * widths.max():  # even: some of them together
-        group = max(round(visible.size / bars), 1)
-        starts = np.arange(visible[0] % group, len(tally) - group + 1, group)
-        return np.add.reduceat(tally[: starts[-1] + group], starts), edges[np.append(starts, starts[-1] + group)]
-    even = np.linspace(low, high, bars + 1)
-    return np.diff(np.interp(even, edges, np.append(0.0, np.cumsum(tally)))), even
+    across = Axis(title, ((min(ends) - margin - shift) * read.factor, (max(ends) + margin - shift) * read.factor))
+    upward = Axis("samples", (0, 1.06 * max(float(heights.max(initial=0.0)), 1.0)), integer=True)
+    return Panel("", [Chart(across, upward, marks, legend=Legend(3))])
 
 
 def _histogram_lines(read: MeasureReading, shift: float) -> list[Mark]:
@@ -331,23 +273,18 @@ def _histogram_lines(read: MeasureReading, shift: float) -> list[Mark]:
 
 
 def contribution_bars(read: MeasureReading, most: int = MOST_BARS) -> Panel:
-    """Share of each number in the sum of squares, sorted, with the running total; beside it those in the worst case,
-    and in the variance where they are others."""
+    """Share of each number in the sum of squares, sorted, with the running total, and beside it in the worst case."""
     large, rest = read.largest(most)
     labels = [f"{ending(row.short, NAME)}  {row.limits}".rstrip() for row in large]
     labels += [f"{len(rest)} others"] if rest else []
-    rss, worst, variance = (
+    rss, worst = (
         100 * np.array([*(getattr(row, key) for row in large),
                         *([np.nansum([getattr(row, key) for row in rest])] if rest else [])], float)
-        for key in ("rss_share", "worst_share", "variance_share")
+        for key in ("rss_share", "worst_share")
     )  # fmt: skip
     at = np.arange(float(len(labels)))
-    marks: list[Mark] = [Bars(at - 0.17, rss, 0.4, "RSS², uncorrelated" if read.correlated else "RSS²", Look(0))]
-    if read.shares_apart:
-        marks += [Bars(at + 0.12, variance, 0.18, "variance", Look(2)),
-                  Bars(at + 0.3, worst, 0.18, "worst case", Look("pale"))]  # fmt: skip
-    else:
-        marks.append(Bars(at + 0.23, worst, 0.28, "worst case", Look("pale")))
+    marks: list[Mark] = [Bars(at - 0.17, rss, 0.4, read.rss_label.replace("RSS", "RSS²"), Look(0)),
+                         Bars(at + 0.23, worst, 0.28, "worst case", Look("pale"))]  # fmt: skip
     running = np.nancumsum(rss)
     marks.append(Line(running, at - 0.17, "RSS², added up", Look("ink", 1.2, mark="o", size=3.5, order=3)))
     for y, part in zip(at, rss, strict=True):
@@ -355,34 +292,10 @@ def contribution_bars(read: MeasureReading, most: int = MOST_BARS) -> Panel:
             inside = part > 100 * INSIDE
             marks.append(Note(f"{part:.1f}", float(part), y - 0.17, "right" if inside else "left", data=True, size=7.5,
                               colour="white" if inside else "ink", shift=(-6 if inside else 4, 0)))  # fmt: skip
-    ends = [part for part in variance if math.isfinite(part)] if read.shares_apart else []
-    return _bar_panel("share [%]", labels, marks, max([100.0, *running, *ends]), min([0.0, *ends]))
-
-
-def sobol_bars(read: MeasureReading, most: int = MOST_BARS) -> Panel:
-    """First-order and total share of each number in the variance, with 95 % intervals, sorted by the total."""
-    order, short = read.sobol_order(most + 1), {row.name: row.short for row in read.contributions}
-    paths, at = names(read.result, "parameter"), np.arange(float(len(order)))
-    marks: list[Mark] = []
-    tops = [5.0]
-    for key, offset, look, label in (
-        ("total_order", 0.2, Look("pale"), "total, with all interactions"),
-        ("first_order", -0.2, Look(0), "first order, alone"),
-    ):
-        value, low, high = (100 * read.row(f"{key}{end}") for end in ("", "_low", "_high"))
-        ends = [np.nan_to_num(np.maximum(gap[order], 0)) for gap in (value - low, high - value)] if low.size else None
-        marks.append(Bars(at + offset, value[order], 0.36, label, look, *(ends or (None, None))))
-        tops += [float(np.nanmax(part, initial=0.0)) for part in (value, high) if part.size]
-    if len(order) < len(paths):
-        marks.append(Note(f"{len(paths) - len(order)} smaller are not shown", 0.99, 0.02, "right", "bottom"))
-    return _bar_panel("share of the variance [%]", [ending(short[paths[k]], NAME) for k in order], marks, max(tops))
-
-
-def _bar_panel(title: str, labels: list[str], marks: list[Mark], most: float, least: float = 0.0) -> Panel:
-    """Bars with their names down the side, the largest on top, and room for them."""
-    side = Axis("", (len(labels) - 0.4, -0.6), list(enumerate(labels)))
     marks.append(Rule(0.0, None, Look("muted", 0.8)))
-    chart = Chart(Axis(title, (1.04 * least, 1.04 * most)), side, marks, legend=Legend(room=44), bare=True)
+    across = Axis("share [%]", (0.0, 1.04 * max([100.0, *running])))
+    side = Axis("", (len(labels) - 0.4, -0.6), list(enumerate(labels)))  # names down the side, the largest on top
+    chart = Chart(across, side, marks, legend=Legend(room=44), bare=True)
     return Panel("", [chart], max(1.4 + 0.34 * len(labels), 2.6))
 
 
@@ -407,55 +320,12 @@ def envelope(read: MeasureReading) -> Panel:
         rss, middle = (factor * read.row(f"curve_{key}") for key in ("rss", "shift"))
         marks += [Line(x, (middle if middle.size else 0.0) + sign * rss, name, Look("ink", 1.1, "long"), close=True)
                   for sign, name in ((1, read.rss_label), (-1, None))]  # fmt: skip
-    corner = max((read.value(f"searched_{end}") for end in ("lower", "upper")), key=abs)
-    if read.nominal == 0.0 and math.isfinite(corner + read.value("searched_lower") + read.place) and corner != 0.0:
-        label = f"worst corner, searched: {read.say(corner, sign=True)}{read.at_place}"
-        look = Look("ink", dash="none", mark="D", size=5, hollow=True, order=5)
-        marks.append(Line(np.array([read.place]), np.array([corner * factor]), label, look))
-    if read.nominal == 0.0 and (read.rule in ("", "deviation") or read.is_extreme):  # limits of the course, too
+    if read.nominal == 0.0 and read.rule in ("", "deviation", *EXTREMES):  # limits of the course, too
         limits = [limit for limit in read.limits if math.isfinite(limit)]
         marks += [Rule(limit * factor, None if k else f"limits {read.limits_said}", LIMIT, upright=False)
                   for k, limit in enumerate(limits)]  # fmt: skip
     title = f"deviation of {read.course or read.name}{read.in_unit}"
     return Panel("", [Chart(over, Axis(title, margin=0.07), marks, zero=True, legend=Legend(4))], 3.8)
-
-
-def convergence(read: MeasureReading) -> Panel:
-    """Mean, standard deviation and yield of the first samples, 2ᵏ of them, with their 95 % intervals."""
-    size = read.row("convergence_samples")
-    rows = [("mean", f"mean{read.in_unit}", read.factor, (-np.inf, np.inf)),
-            ("deviation", f"deviation σ{read.in_unit}", read.factor, (0.0, np.inf)),
-            ("yield", "yield [%]", 100.0, (0.0, 100.0))]  # fmt: skip
-    across = Axis("samples", log=True, count=2 if size[-1] < 50 * size[0] else 1,
-                  form=lambda value: f"{value:,.0f}".replace(",", "\u202f"))  # fmt: skip
-    charts: list[Chart] = []
-    for key, title, factor, ends in rows if read.limited else rows[:2]:
-        values = read.row(f"convergence_{key}")
-        # of few samples normal intervals reach beyond
-        low, high = (np.clip(factor * end, *ends) for end in _running_interval(read, key, values, size))
-        bounded, values = np.isfinite(low), values * factor
-        marks: list[Mark] = [Line(size, values, "of the first samples", Look(WITHIN, mark="o", size=3.2))]
-        if bounded.sum() > 1:
-            marks.append(Band(size, low, high, "95 % interval", Look(WITHIN, alpha=0.18)))
-        elif bounded.any():
-            middle, half = (0.5 * (high + sign * low)[bounded] for sign in (1, -1))
-            marks.append(Line(size[bounded], middle, "95 % interval", Look(WITHIN, 1.3, "none"), half, half))
-        dashed = Look("muted", 0.8, "dashed", order=1.5)
-        marks += [Rule(float(last), None, dashed, upright=False) for last in values[np.isfinite(values)][-1:]]
-        charts.append(Chart(across, Axis(title, count=4), marks, legend=None if charts else Legend()))
-    return Panel("", charts, 4.5)
-
-
-def _running_interval(read: MeasureReading, key: str, values: Array, size: Array) -> tuple[Array, Array]:
-    """95 % intervals at every number of samples; of other than independent ones only of the last."""
-    low, high = read.value(f"{key}_low"), read.value(f"{key}_high")
-    if not read.independent:
-        last = np.arange(len(size)) == len(size) - 1
-        return np.where(last, low, np.nan), np.where(last, high, np.nan)
-    if key == "yield":
-        return intervals.share(np.rint(values * size), size)
-    half = 0.5 * (high - low) * np.sqrt(size[-1] / size)
-    return values - half, values + half
 
 
 # ---- figures ------------------------------------------------------------------------------------------------------
@@ -481,9 +351,6 @@ KINDS: dict[str, Kind] = {
                           "add --method linear"),
     "envelope": Kind("Envelope over the drive", envelope, lambda read: read.over is not None,
                      "use a measure at every position instead of one position"),
-    "convergence": Kind("Convergence", convergence, lambda read: len(read.row("convergence_samples")) > 1,
-                        "add samples: --method monte-carlo"),
-    "sobol": Kind("Sobol indices", sobol_bars, lambda read: read.has("total_order"), "add --method sobol"),
 }  # fmt: skip
 
 
@@ -521,19 +388,14 @@ def sheet(result: xr.Dataset, measures: Sequence[str] | None = None) -> Figure:
         (read,) = reads
         panels = [replace(KINDS[kind].panel(read), title=KINDS[kind].title) for kind in drawable(read)]
         return draw(read.heading, result, panels, columns=2)
-    few = {"histogram": histogram, "contributions": lambda read: contribution_bars(read, FEW_BARS),
-           "envelope": envelope}  # fmt: skip
+    few: dict[str, Callable[[MeasureReading], Panel]] = {
+        "histogram": histogram, "contributions": lambda read: contribution_bars(read, FEW_BARS), "envelope": envelope
+    }  # fmt: skip
     kinds = [kind for kind in few if any(KINDS[kind].ready(read) for read in reads)]
     height = max(min(3.3, TALL / len(reads)), SHORT)
-    panels, explained = [], {kind: set[str | None]() for kind in kinds}
-    for k, read in enumerate(reads):
-        for kind in kinds:
-            charts = few[kind](read).charts if KINDS[kind].ready(read) else []
-            labels = {getattr(mark, "name", None) for chart in charts for mark in chart.marks}
-            if kind != "histogram" and labels <= explained[kind]:
-                charts = [replace(chart, legend=None) for chart in charts]
-            explained[kind] |= labels
-            panels.append(Panel(f"{read.name}: {KINDS[kind].title.lower()}", charts, height + (0.9 if k == 0 else 0)))
+    panels = [Panel(f"{read.name}: {KINDS[kind].title.lower()}",
+                    few[kind](read).charts if KINDS[kind].ready(read) else [], height)
+              for read in reads for kind in kinds]  # fmt: skip
     return draw("Effect of the tolerances", result, panels, columns=len(kinds))
 
 
@@ -550,47 +412,23 @@ def _named(
 
 # ---- report -------------------------------------------------------------------------------------------------------
 
-# method: heading, what was done
-NOTES: dict[str, tuple[str, str]] = {
-    "linear": ("Linear", "Sensitivities are exact derivatives of the measure, carried through motion and forces by "
-               "dual numbers. The worst case is the sum of their sizes times the limits, RSS the root of the sum of "
-               "squares. A clearance contributes by the load that its pin bears under a unit load at the measure."),
-    "worst-case": ("Worst case by search", "From the corner to which the sensitivities point the nonlinear model is "
-                   "improved to a worse one, whose figure is reported. It is not proven that no corner is worse."),
-    "monte-carlo": ("Monte Carlo", "Each sample is a mechanism drawn from the distributions and run through the same "
-                    "analysis as the nominal one. Numbers are counter-based (Salmon et al., 2011, "
-                    "doi:10.1145/2063384.2063405): the same seed gives the same samples however the work is divided."),
-    "quasi-monte-carlo": ("Quasi-Monte Carlo", "The samples are scrambled replicates of Sobol's sequence, which fills "
-                          "the space of the tolerances more evenly than random points; intervals are Student's t of "
-                          "the scatter between replicates."),
-    "sobol": ("Sobol indices", "The share of the variance due to a parameter alone, and with its interactions (Sobol, "
-              "2001, doi:10.1016/S0378-4754(00)00270-6), of large and nonlinear deviations of independent numbers."),
-}  # fmt: skip
-ON_SAMPLES = (
-    "Samples that cannot be assembled, lock or do not converge are outside every limit; means, deviations and "
-    "quantiles are of the others. The interval of a yield is Wilson's (1927, doi:10.1080/01621459.1927.10502953), at "
-    "95 %. Cp is the width of the limits over 6 σ, Cpk the distance from the mean to the nearer limit over 3 σ."
-)
-
 
 def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "Tolerance analysis of a linkage") -> str:
     """The whole report as HTML; first: parts that stand before those of the measures, as an allocation has them."""
-    methods = [name for name in map(str, attribute(result, "methods")) if name in NOTES]
-    reads, sampled = readings(result), any("monte-carlo" in name for name in methods)
+    methods = [str(name) for name in attribute(result, "methods")]
     facts = counts((result.sizes["measure"], "measure"), (result.sizes["parameter"], "toleranced parameter"))
-    if sampled:
+    if any("monte-carlo" in name for name in methods):
         count = int(result["samples"].values) if "samples" in result else int(result.attrs.get("samples", 0))
         facts += [*counts((count, "sample")), (f"seed {result.attrs.get('seed', '')}", "")]
-    facts.append(("", ", ".join(NOTES[name][0] for name in methods)))
+    facts.append(("", ", ".join(method.replace("-", " ") for method in methods)))
     lines = set(attribute(result, "missed"))  # what is wrong stands first, once, with its remedy
     missed = [row for row in attribute(result, "findings") if f"{row['where']}: {row['what']}".lstrip(": ") in lines]
-    together = [*([overview(result)] if len(reads) > 1 else []), *failed(result)]
-    parts = [Section("Measures", tables=together)] if together else []
+    yields = _overall(result)
+    about = f"All limits together: yield {share_interval(*yields)}" if yields else ""
+    parts = [Section("Measures", about, tables=[overview(result), *failed(result)])]
     end = [Section("Toleranced parameters", tables=[inputs(result)])]
-    terms = [NOTES[name] for name in methods] + ([("Samples", ON_SAMPLES)] if sampled else [])
-    end += [Section("Methods", terms=terms)] if terms else []
-    parts += [*first, *(_section(result, read) for read in reads)]
-    return page(result, kicker, facts, parts, summary=headline(result), missed=missed, end=end)
+    parts += [*first, *(_section(result, read) for read in readings(result))]
+    return page(result, kicker, facts, parts, missed=missed, end=end)
 
 
 def _section(result: xr.Dataset, read: MeasureReading) -> Section:

@@ -10,7 +10,7 @@ from trunnion.errors import agreeing
 from trunnion.results.attributes import summary_of
 from trunnion.results.quantities import parts, prefixed, quantity
 from trunnion.views import draw
-from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Rule, Stripe, nth
+from trunnion.views.charts import Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Rule, Stripe, nth
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, names
 from trunnion.views.page import Section, Table, page
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["figure", "report"]
 
 
+TITLE = "Clearance needed for assembly"
 FITS = 0  # code of the status of a position that goes together
 TOLD = 0.01  # of the need: a joint whose part is nowhere larger has no curve
 
@@ -36,7 +37,7 @@ def figure(result: xr.Dataset) -> Figure:
         charts.append(_share(result, share, over))
     if np.nanmax(result["uniform_part"].values, initial=0.0) > 0:
         charts.append(_parts(result, over))
-    return draw.plot(Plot("Clearance needed for assembly", [Panel("", charts, 1.4 + 1.6 * len(charts))]), result)
+    return draw.figure(TITLE, result, [Panel("", charts, 1.4 + 1.6 * len(charts))])
 
 
 def _need(result: xr.Dataset, over: Abscissa) -> Chart:
@@ -94,21 +95,14 @@ def _short(result: xr.Dataset, over: Abscissa) -> list[Mark]:
 # ---- report ---------------------------------------------------------------------------------------------------------
 
 
-TITLE = "Clearance needed for assembly"
-
-
 def report(result: xr.Dataset) -> str:
     """The whole report as HTML."""
     count = result.sizes["position"]
-    part = Section("Over the cycle", pictures=[(TITLE, figure(result))], after=[_results(result)])
+    rows = []  # the figures of the summary, as the terminal shows them
+    for row in summary_of(result):
+        value = "undefined" if row.value is None else row.value
+        text, unit = (value, "") if isinstance(value, str) else parts(value, row.unit)
+        rows.append([row.label, text, "" if unit == "1" else unit])
+    after = [Table("results", ["", "value", "unit"], rows)]
+    part = Section("Over the cycle", pictures=[(TITLE, figure(result))], after=after)
     return page(result, TITLE, [(f"{count:,}", agreeing(count, "position", "positions"))], [part])
-
-
-def _results(result: xr.Dataset) -> Table:
-    """The figures of the summary, as the terminal shows them."""
-    rows = []
-    for figure in summary_of(result):
-        value = "undefined" if figure.value is None else figure.value
-        text, unit = (value, "") if isinstance(value, str) else parts(value, figure.unit)
-        rows.append([figure.label, text, "" if unit == "1" else unit])
-    return Table("results", ["", "value", "unit"], rows)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Abscissa", "Array", "Interval", "abscissa", "column", "course", "intervals", "larger_end", "layout",
-    "mean_friction", "members", "names", "numbers", "over_turn", "series", "status_text", "thin", "valid",
+    "mean_friction", "members", "names", "numbers", "over_turn", "series", "status_text", "valid",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -181,20 +181,3 @@ def mean_friction(result: xr.Dataset, joint: str, of: str = "") -> float:
     """Mean friction power of a joint, W; of: "_ideal" of the mechanism without errors. NaN where there is no answer."""
     mean = column(result, f"friction_power_mean{of}", joint=joint)
     return float("nan") if mean is None else float(mean)
-
-
-def thin(values: Array, most: int = 4000) -> NDArray[np.intp]:
-    """Indices of about `most` samples that keep every peak and gap: least, greatest, first NaN of each bucket."""
-    count = values.size
-    if count <= most:
-        return np.arange(count)
-    width = -(-2 * count // most)
-    padded = np.full(-(-count // width) * width, np.nan)
-    padded[:count] = values
-    rows = padded.reshape(-1, width)
-    start = np.arange(rows.shape[0]) * width
-    low = start + np.where(np.isnan(rows), np.inf, rows).argmin(axis=1)
-    high = start + np.where(np.isnan(rows), -np.inf, rows).argmax(axis=1)
-    holes = start + np.isnan(rows).argmax(axis=1)  # without a NaN, the start
-    picked = np.unique(np.concatenate([low, high, holes, [count - 1]]))
-    return picked[picked < count]

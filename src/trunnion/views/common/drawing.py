@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.patches import Circle, Polygon, Rectangle
 from matplotlib.transforms import Affine2D
+from scipy.spatial import ConvexHull, QhullError
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import GUIDED, PAIRS
@@ -76,25 +77,19 @@ class Picture:
 
 
 def picture(result: xr.Dataset) -> Picture:
-    """Gather what the drawings need; raises MechanismError if no position can be drawn."""
-    tracks, angles = members(result, "point_position", "point"), members(result, "link_angle", "link")
-    return replace(framed(layout(result), tracks, angles), pulls=members(result, "spring_force", "spring"))
-
-
-def framed(layout_of: dict[str, Any], tracks: dict[str, Array], angles: dict[str, Array]) -> Picture:
-    """The picture with the box around all that is known; raises MechanismError if nothing is."""
-    points = np.concatenate([track.T for track in tracks.values()]) if tracks else np.empty((0, 2))
-    points = points[np.isfinite(points).all(axis=1)]
-    if not points.size:
+    """Gather what the drawings need, with the box around it; raises MechanismError if no position can be drawn."""
+    stated, tracks = layout(result), members(result, "point_position", "point")
+    points = [track.T for track in tracks.values()]
+    for circle in (circle for pair in stated["gears"].values() for circle in pair):
+        points += [tracks[circle["at"]].T + sign * circle["radius"] for sign in (-1, 1)]
+    places = np.concatenate(points) if points else np.empty((0, 2))
+    places = places[np.isfinite(places).all(axis=1)]
+    if not places.size:
         what = "no position of the mechanism can be assembled: there is nothing to draw"
         raise MechanismError(Finding(what, remedy="change the lengths or the range of the driver"))
-    centres = [(tracks[circle["at"]], circle["radius"]) for pair in layout_of["gears"].values() for circle in pair]
-    rims = [np.array([np.nanmin(track, axis=1) - radius, np.nanmax(track, axis=1) + radius])
-            for track, radius in centres if np.isfinite(track).any()]  # fmt: skip
-    points = np.concatenate([points, *rims])
-    low, high = points.min(axis=0), points.max(axis=0)
-    size = float(np.hypot(*(high - low))) or 1.0
-    return Picture(layout_of, tracks, angles, size, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
+    (x0, y0), (x1, y1) = places.min(axis=0).tolist(), places.max(axis=0).tolist()
+    angles, pulls = members(result, "link_angle", "link"), members(result, "spring_force", "spring")
+    return Picture(stated, tracks, angles, float(np.hypot(x1 - x0, y1 - y0)) or 1.0, (x0, y0, x1, y1), pulls=pulls)
 
 
 def bare(axes: Axes, low: Array, high: Array, title: Sequence[str]) -> Axes:
@@ -131,9 +126,11 @@ def sketch(axes: Axes, drawing: Picture, index: int) -> None:
         _body(axes, drawing, link, index, drawing.colour(link))
     for name, spring in drawing.stated["springs"].items():
         _spring(axes, drawing, spring.get("between") or (), index, drawing.pulls.get(name))
-    for pair in drawing.stated["gears"].values():
-        for circle in pair:
-            _pitch_circle(axes, drawing.tracks[circle["at"]][:, index], circle["radius"])
+    for circle in (circle for pair in drawing.stated["gears"].values() for circle in pair):
+        x, y = drawing.tracks[circle["at"]][:, index]
+        if np.isfinite(x + y):  # the pitch circle, dash-dotted as on a drawing
+            axes.add_patch(Circle((x, y), circle["radius"], fill=False, edgecolor=INK, linestyle=(0, (8, 2, 1.5, 2)),
+                                  zorder=3.5))  # fmt: skip
     for name, joint in drawing.stated["joints"].items():
         _joint(axes, drawing, name, joint, index)
 
@@ -181,24 +178,15 @@ def _corners(drawing: Picture, link: str, index: int) -> Array | None:
 
 
 def hull(points: Array) -> Array:
-    """The convex hull of a few points (corner, axis), counter-clockwise; Andrew's monotone chain."""
-    ordered = sorted({(float(x), float(y)) for x, y in points})
-    if len(ordered) < 3:
-        return np.array(ordered)
-
-    def half(chain: list[tuple[float, float]]) -> list[tuple[float, float]]:
-        corners: list[tuple[float, float]] = []
-        for point in chain:
-            while len(corners) > 1 and _turn(corners[-2], corners[-1], point) <= 0:
-                corners.pop()
-            corners.append(point)
-        return corners[:-1]
-
-    return np.array(half(ordered) + half(ordered[::-1]))
-
-
-def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    """The convex hull of a few points (corner, axis), counter-clockwise; its two ends where they lie in one line."""
+    points = np.unique(points, axis=0)
+    if len(points) < 3:
+        return points
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except QhullError:
+        along = (points - points[0]) @ (points[-1] - points[0])
+        return np.asarray(points[[along.argmin(), along.argmax()]])
 
 
 def _body(axes: Axes, drawing: Picture, link: str, index: int, colour: str) -> None:
@@ -234,13 +222,6 @@ def _spring(axes: Axes, drawing: Picture, ends: Sequence[str], index: int, pull:
     path = places[0][:, None] + np.outer(along, COILS[0]) + np.outer(across, COILS[1])
     line = ":" if pull is not None and pull[index] == 0 else "-"
     axes.plot(*path, color=MUTED, linewidth=1.1, linestyle=line, zorder=4.5, solid_joinstyle="round")
-
-
-def _pitch_circle(axes: Axes, place: Array, radius: float) -> None:
-    """The pitch circle of a gear, dash-dotted as on a drawing."""
-    if np.isfinite(place).all():
-        line = (0, (8, 2, 1.5, 2))
-        axes.add_patch(Circle((place[0], place[1]), radius, fill=False, edgecolor=INK, linestyle=line, zorder=3.5))
 
 
 def _joint(axes: Axes, drawing: Picture, name: str, joint: dict[str, Any], index: int) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 from dataclasses import dataclass, field
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 from unicodedata import category
 
 import numpy as np
@@ -18,7 +18,6 @@ from matplotlib.font_manager import FontProperties, findfont, fontManager, get_f
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.text import Text
 from matplotlib.ticker import AutoMinorLocator, MaxNLocator, MultipleLocator
-from numpy.typing import NDArray
 
 from trunnion.views.common.cycle import Abscissa, Array
 
@@ -84,11 +83,12 @@ def families() -> tuple[str, ...]:
 @cache
 def _signs() -> frozenset[int]:
     """All signs that can be drawn both upright and bold."""
-    return frozenset().union(*(_charmap(name, "normal") & _charmap(name, "bold") for name in families()))
-
-
-def _charmap(family: str, weight: str) -> set[int]:
-    return set(get_font(findfont(FontProperties(family=family, weight=weight))).get_charmap())
+    signs = set[int]()
+    for name in families():
+        upright, bold = (set(get_font(findfont(FontProperties(family=name, weight=weight))).get_charmap())
+                         for weight in ("normal", "bold"))  # fmt: skip
+        signs |= upright & bold
+    return frozenset(signs)
 
 
 def plain(name: str) -> str:
@@ -96,16 +96,10 @@ def plain(name: str) -> str:
 
     A sign that no font has, or that is invisible, is told by its code: \u66f2, as YAML and JSON write it too.
     """
-    text = "".join(sign if _drawable(sign) else _code(sign) for sign in name).replace("$", r"\$")
+    codes = (f"\\u{ord(sign):04x}" if ord(sign) < 0x10000 else f"\\U{ord(sign):08x}" for sign in name)
+    text = "".join(sign if ord(sign) in _signs() and category(sign)[0] != "C" else code
+                   for sign, code in zip(name, codes, strict=True)).replace("$", r"\$")  # fmt: skip
     return f"\u2009{text}" if text.startswith("_") else text
-
-
-def _drawable(sign: str) -> bool:
-    return ord(sign) in _signs() and category(sign)[0] != "C"
-
-
-def _code(sign: str) -> str:
-    return f"\\u{ord(sign):04x}" if ord(sign) < 0x10000 else f"\\U{ord(sign):08x}"
 
 
 # ---- axes -----------------------------------------------------------------------------------------------------------
@@ -151,7 +145,9 @@ def along(axes: Axes, over: Abscissa, y: str, *, zero: bool = True) -> None:
     dress(axes, plain(over.title), y)
     span = over.span
     if over.unit == "°" and span >= 90:
-        axes.xaxis.set_major_locator(MultipleLocator(_round_angle(span)))
+        axes.xaxis.set_major_locator(
+            MultipleLocator(next((step for step in (15, 30, 45, 60, 90, 180, 360) if span / step <= 9), 720))
+        )
     elif over.unit == "":
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.xaxis.set_minor_locator(AutoMinorLocator(2))
@@ -165,13 +161,9 @@ def along(axes: Axes, over: Abscissa, y: str, *, zero: bool = True) -> None:
         axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
 
 
-def _round_angle(span: float) -> float:
-    return next((step for step in (15, 30, 45, 60, 90, 180, 360) if span / step <= 9), 720)
-
-
-def legend(axes: Axes, most: int = 6, room: int = 90, least: int = 2, lift: float = 0.0) -> None:
+def legend(axes: Axes, most: int = 6, room: int = 90, least: int = 2) -> None:
     """A legend in rows above the axes, where it hides no curve; room: characters that a row holds; none of fewer than
-    `least` entries; lift: height of what stands between axes and legend, points.
+    `least` entries.
     """
     handles, labels = axes.get_legend_handles_labels()
     if len(handles) < least:
@@ -180,7 +172,7 @@ def legend(axes: Axes, most: int = 6, room: int = 90, least: int = 2, lift: floa
     columns = len(labels) if fits else max(1, min(most, (room + 10) // (max(map(len, labels)) + 7)))
     axes.legend(
         handles, labels, loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=columns, frameon=False, fontsize=8.5,
-        labelcolor=INK, handlelength=2.2, columnspacing=1.6, borderaxespad=0.3 + lift / 8.5,
+        labelcolor=INK, handlelength=2.2, columnspacing=1.6, borderaxespad=0.3,
     )  # fmt: skip
 
 
@@ -195,20 +187,6 @@ MARGIN = 1.5  # points that are to be empty around a name
 CROSSED, CUT, STRAY = 5.0, 100.0, 0.4  # costs of lying on another name, outside the figure, nearer to another place
 
 
-class _Name(NamedTuple):
-    axes: Axes
-    text: str
-    place: Array
-    size: float
-    symbol: float
-    weight: str
-
-    def reach(self) -> float:
-        """Half width of its symbol, pixels."""
-        ends = self.axes.transData.transform([[0.0, 0.0], [self.symbol, 0.0]])
-        return float(np.hypot(*(ends[1] - ends[0])))
-
-
 @dataclass
 class Labels:
     """The names of one figure: added while it is drawn, placed when all else is there.
@@ -218,68 +196,55 @@ class Labels:
     """
 
     figure: Figure
-    waiting: list[_Name] = field(default_factory=list)
+    waiting: list[tuple[Annotation, float]] = field(default_factory=list)
 
     def add(
         self, axes: Axes, text: str, place: Array, size: float = 10.0, symbol: float = 0.0, weight: str = "bold"
     ) -> None:
         """A name of a place in the coordinates of the axes. size: of its letters, points; symbol: half width of what is
         drawn there, in the same coordinates."""
-        if np.all(np.isfinite(place)):
-            self.waiting.append(_Name(axes, plain(text), np.asarray(place, float), size, symbol, weight))
-
-    def place(self) -> None:
-        """Write all names, the most crowded first, each where it covers least."""
-        if not self.waiting:
+        if not np.all(np.isfinite(place)):
             return
-        canvas = FigureCanvasAgg(self.figure)
-        canvas.draw()  # type: ignore[no-untyped-call]
-        renderer, scale = canvas.get_renderer(), self.figure.dpi / 72  # type: ignore[no-untyped-call]
-        spots = np.array([name.axes.transData.transform(name.place) for name in self.waiting])
-        sums = self._darkness(np.asarray(canvas.buffer_rgba()), spots, scale)  # type: ignore[no-untyped-call]
-        notes = [self._note(name) for name in self.waiting]
-        halves = [0.5 * np.asarray(note.get_window_extent(renderer).size, float) for note in notes]
-        ways = [np.array(GAPS)[:, None, None] * scale * SIDES + half * SIDES / np.abs(SIDES).max(axis=1, keepdims=True)
-                for half in halves]  # fmt: skip
-        costs = [_costs(sums, spot + direction, half + MARGIN * scale)
-                 for spot, direction, half in zip(spots, ways, halves, strict=True)]  # fmt: skip
-        boxes: list[tuple[Array, Array]] = []
-        for k in np.argsort([-cost.min() for cost in costs], kind="stable"):
-            middles, cost = spots[k] + ways[k], costs[k]
-            for middle, half in boxes:
-                cost = cost + CROSSED * np.all(np.abs(middles - middle) < halves[k] + MARGIN * scale + half, axis=-1)
-            for other in np.delete(spots, k, axis=0):
-                far = np.linalg.norm(middles - other, axis=-1)
-                cost = cost + STRAY * (far < np.linalg.norm(ways[k], axis=-1))
-            offset = ways[k].reshape(-1, 2)[int(np.argmin(cost))]
-            boxes.append((spots[k] + offset, halves[k]))
-            notes[k].set_position(tuple(offset / scale))
-
-    def _darkness(self, pixels: NDArray[np.uint8], spots: Array, scale: float) -> Array:
-        """Sums of what is drawn below and left of every pixel, counted from below left."""
-        dark = np.clip(DARK * (1 - pixels[::-1, :, :3].min(axis=2) / 255), 0, 1)
-        for (column, row), name in zip(np.rint(spots).astype(int), self.waiting, strict=True):
-            reach = round(max(LEAST * scale, name.reach()))
-            dark[max(row - reach, 0) : max(row + reach, 0), max(column - reach, 0) : max(column + reach, 0)] = 1.0
-        return np.pad(np.cumsum(np.cumsum(dark, axis=0), axis=1), ((1, 0), (1, 0)))
-
-    @staticmethod
-    def _note(name: _Name) -> Annotation:
-        """The name at its place, to be moved; it takes no part in the layout, which it would change."""
-        note = name.axes.annotate(
-            name.text, (name.place[0], name.place[1]), xytext=(0, 0), textcoords="offset points", ha="center",
-            va="center", fontsize=name.size, fontweight=name.weight, color=INK, zorder=8, annotation_clip=False,
+        note = axes.annotate(
+            plain(text), (place[0], place[1]), xytext=(0, 0), textcoords="offset points", ha="center", va="center",
+            fontsize=size, fontweight=weight, color=INK, zorder=8, annotation_clip=False, visible=False,
             bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
         )  # fmt: skip
-        note.set_in_layout(False)
-        return note
+        note.set_in_layout(False)  # which it would change
+        self.waiting.append((note, symbol))
+
+    def place(self) -> None:
+        """Move every name to where it covers least of what is drawn, and of the names before it."""
+        if not self.waiting:
+            return
+        canvas, scale = FigureCanvasAgg(self.figure), self.figure.dpi / 72
+        canvas.draw()  # type: ignore[no-untyped-call]
+        pixels = np.asarray(canvas.buffer_rgba())[::-1, :, :3]  # type: ignore[no-untyped-call]  # rows from below
+        dark = np.clip(DARK * (1 - pixels.min(axis=2) / 255), 0, 1)
+        edge, spots = np.array(dark.shape)[::-1], list[Array]()
+        for note, symbol in self.waiting:
+            ends = note.axes.transData.transform(np.add([note.xy] * 2, [(0.0, 0.0), (symbol, 0.0)]))  # type: ignore[union-attr]
+            spots.append(ends[0])
+            _fill(dark, ends[0], max(LEAST * scale, float(np.hypot(*(ends[1] - ends[0])))), 1.0)
+        for k, (note, _) in enumerate(self.waiting):
+            note.set_visible(True)
+            extent = note.get_window_extent(canvas.get_renderer())  # type: ignore[no-untyped-call]
+            half = 0.5 * np.array([extent.width, extent.height]) + MARGIN * scale
+            others, best = np.array(spots[:k] + spots[k + 1 :]).reshape(-1, 2), (np.inf, np.zeros(2))
+            for far, gap in enumerate(GAPS):
+                for side in SIDES:
+                    offset = gap * scale * side + half * side / np.abs(side).max()
+                    low, high = (np.rint(spots[k] + offset + sign * half).astype(int) for sign in (-1, 1))
+                    beyond = bool(np.any((low < 0) | (high > edge)))
+                    stray = bool(np.any(np.linalg.norm(spots[k] + offset - others, axis=1) < np.hypot(*offset)))
+                    box = dark[max(low[1], 0) : max(high[1], 1), max(low[0], 0) : max(high[0], 1)]
+                    cost = (box.mean() if box.size else 1.0) + FURTHER * far + CUT * beyond + STRAY * stray
+                    best = min(best, (float(cost), offset), key=lambda pair: pair[0])
+            note.set_position(tuple(best[1] / scale))
+            _fill(dark, spots[k] + best[1], half, CROSSED)
 
 
-def _costs(sums: Array, middles: Array, room: Array) -> Array:
-    """Of every middle of a name, (gap, side): the share of its box that is drawn on, and that it is far or cut off."""
-    low, high, size = middles - room, middles + room, np.array(sums.shape)[::-1] - 1
-    a, b = (np.clip(np.rint(end), 0, size).astype(int) for end in (low, high))
-    drawn = sums[b[..., 1], b[..., 0]] - sums[a[..., 1], b[..., 0]]
-    drawn += sums[a[..., 1], a[..., 0]] - sums[b[..., 1], a[..., 0]]
-    outside = np.any((low < 0) | (high > size), axis=-1)
-    return np.asarray(drawn / np.prod(2 * room) + CUT * outside + FURTHER * np.arange(len(GAPS))[:, None])
+def _fill(dark: Array, middle: Array, half: Array | float, value: float) -> None:
+    """Make a box of the pixels dark."""
+    low, high = (np.maximum(np.rint(middle + sign * half).astype(int), 0) for sign in (-1, 1))
+    dark[low[1] : high[1], low[0] : high[0]] = value

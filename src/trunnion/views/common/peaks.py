@@ -40,10 +40,16 @@ def ease(result: xr.Dataset) -> Array:
         return np.ones(count)
     if "condition" not in result:
         return ease_of_status(result, status)
-    grown = np.fmax(_condition(result), _friction(result))
+    condition, margin = np.asarray(result["condition"].values, float), column(result, "locking_margin")
+    finite = condition[np.isfinite(condition)]
+    friction = np.ones(count)  # by how much friction that feeds on its own reactions raises them: ∞ where it locks
+    if margin is not None:
+        more = 1.0 / np.maximum(margin - 1.0, 1e-300)
+        friction = np.where(np.isinf(margin), 1.0, np.where(margin > 1.0, 1.0 + more, 1.0))
+    grown = np.fmax(condition / float(np.median(finite)) if finite.size else 1.0, friction)
     grown = np.where(np.isfinite(grown), grown, 1.0)
     unbounded = np.isin(status, [Status.LOCKED, Status.SINGULAR, Status.NOT_ASSEMBLED])
-    core = np.isin(status, [int(code) for code in BESIDE]) | (_friction(result) > CLOSE)
+    core = np.isin(status, [int(code) for code in BESIDE]) | (friction > CLOSE)
     within = (grown > GROWN) | unbounded
     near = _touched(within, core, abscissa(result).closed) & ~unbounded
     return np.where(near, GROWN / grown, 1.0)
@@ -57,23 +63,6 @@ def ease_of_status(result: xr.Dataset, status: NDArray[np.generic]) -> Array:
 def whole_peaks(result: xr.Dataset, uncut: bool = True) -> xr.Dataset:
     """The result whose views cut no peak, if that is wanted."""
     return result.assign_attrs({UNCUT: 1}) if uncut else result
-
-
-def _condition(result: xr.Dataset) -> Array:
-    """Condition over the usual one, (position,)."""
-    condition = column(result, "condition")
-    assert condition is not None  # `ease` has looked
-    finite = condition[np.isfinite(condition)]
-    return condition / float(np.median(finite)) if finite.size else np.ones(condition.size)
-
-
-def _friction(result: xr.Dataset) -> Array:
-    """By how much friction that feeds on its own reactions raises them: 1 far from locking, ∞ where it locks."""
-    margin = column(result, "locking_margin")
-    if margin is None:
-        return np.ones(int(result.sizes["position"]))
-    more = np.maximum(margin - 1.0, 1e-300)
-    return np.where(np.isinf(margin), 1.0, np.where(margin > 1.0, 1.0 + 1.0 / more, 1.0))
 
 
 def _touched(within: NDArray[np.bool_], core: NDArray[np.bool_], closed: bool) -> NDArray[np.bool_]:

@@ -5,9 +5,9 @@ Each kind is a function of the result and, if wanted, of the same run without fr
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,7 +32,6 @@ from trunnion.views.charts import (
     Plot,
     Rule,
     Stripe,
-    joined,
     nth,
     outside,
     over_drive,
@@ -58,7 +57,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "drawn_measures", "error", "friction_power", "has_friction", "locking", "measures", "motion", "polar", "power",
-    "reactions", "speed", "torque", "turned_from_start", "varying",
+    "reactions", "speed", "torque", "varying",
 ]  # fmt: skip
 
 SEEN = 0.002  # of the largest effort: narrower ranges would not be seen
@@ -142,8 +141,8 @@ def friction_power(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     def named(text: str, mean: float) -> str:
         return f"{text}, mean {number(mean * factor)} {unit}" if np.isfinite(mean) else f"{text}, not solved"
 
-    lines = joined([line for line in _lines(over, losses_of, 1.4) if line.name in rubbing])
-    lines = [line._replace(name=named(str(line.name), means[str(line.name).split(" = ")[0]])) for line in lines]
+    lines = [line._replace(name=named(str(line.name), means[str(line.name)]))
+             for line in _lines(over, losses_of, 1.4) if line.name in rubbing]  # fmt: skip
     every = Line(over.values, total, named("all joints", sum(means.values())), Look("ink", 1.8), close=True)
     area = Band(over.values, np.zeros(total.size), total, None, Look("shade", alpha=0.6, order=1.0), close=True)
     return _stack("Friction power by joint", [over_drive(
@@ -201,10 +200,8 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 
     In space a row for each joint: the vector seen along z, y and x.
     """
-    over, forces = (
-        abscissa(result),
-        [members(of, "reaction_force", "joint") for of in (result, ideal) if of is not None],
-    )
+    over = abscissa(result)
+    forces = [members(of, "reaction_force", "joint") for of in (result, ideal) if of is not None]
     planes = PLANES if is_spatial(result) else PLANES[:1]
     charts = [_hodograph([of[joint][list(plane)] for of in forces], ease(result), over, joint, plane, index)
               for index, joint in enumerate(forces[0]) for plane in planes]  # fmt: skip
@@ -250,60 +247,33 @@ def _hodograph(
 # ---- motion -------------------------------------------------------------------------------------------------------
 
 
-class Motions(NamedTuple):
-    """A quantity of links or joints with its first and second rate: its name, unit, and the members of the three."""
-
-    noun: str
-    unit: str
-    courses: list[dict[str, Array]]
-    rates: tuple[str, str] = ("velocity", "acceleration")
-
-
 def motion(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
-    """Angles of the turning links, slides of the sliding joints, and their rates; in space also those of the joints."""
-    over, kinds = abscissa(result), _motions(result)
-    panels = [Panel("", [_rate(result, over, kind, order) for order in range(3)], 5.8) for kind in kinds]
-    return Plot("Motion", panels, len(panels), 7.4 if len(panels) == 1 else 2.8 + 3.6 * len(panels))
-
-
-def _rate(result: xr.Dataset, over: Abscissa, kind: Motions, order: int) -> Chart:
-    """The quantity itself or one of its rates."""
-    turn = TURN if kind.unit == "rad" and not order else 0.0
-    lines = [line._replace(turn=turn) for line in _lines(over, kind.courses[order])]
-    scale = (1.0, kind.unit) if order else None
-    if kind.unit == "m":  # as the drive
-        scale = scaled(usual_peak(ease(result), *(line.y for line in lines)), "m")
-    return over_drive(result, over, (kind.noun, *kind.rates)[order], kind.unit, lines, rate=RATES[order], scale=scale,
-                      legend=Legend(6, least=1) if order == 0 else None)  # fmt: skip
-
-
-def _motions(result: xr.Dataset) -> list[Motions]:
-    """What moves: links that turn and joints that slide; in space also joints that turn."""
-    facts, spatial = layout(result), is_spatial(result)
+    """Angles of the turning links, in space of the joints, slides of the sliding joints, and their rates."""
+    over, facts, panels = abscissa(result), layout(result), list[Panel]()
     kinds = {name: facts["joints"].get(name, {}).get("type") for name in names(result, "joint")}
-
-    def rated(variable: str, dim: str, of: Collection[str]) -> list[dict[str, Array]]:
-        every = (members(result, variable + rate, dim) for rate in ("", "_velocity", "_acceleration"))
-        return [{name: values for name, values in rate.items() if name in of} for rate in every]
-
-    if not spatial:
+    if is_spatial(result):
+        moving = [(f"joint {noun}", unit, f"joint_{noun}", "joint",
+                   [name for name, course in members(result, f"joint_{noun}", "joint").items()
+                    if getattr(PAIRS[kinds[name]], moves) and _moves(course)])
+                  for noun, unit, moves in (("rotation", "rad", "turns"), ("slide", "m", "slides"))]  # fmt: skip
+    else:
         turning = [link for link, angle in members(result, "link_angle", "link").items()
                    if link != facts["ground"] and _moves(angle)]  # fmt: skip
         sliding = [name for name, kind in kinds.items() if kind in GUIDED]
-        angles = [Motions("angle", "rad", rated("link_angle", "link", turning))] if turning or not sliding else []
-        return [*angles, *([Motions("slide", "m", rated("joint_slide", "joint", sliding))] if sliding else [])]
-    panels = []
-    for noun, unit, moves in (("rotation", "rad", "turns"), ("slide", "m", "slides")):
-        joints = [name for name, course in members(result, f"joint_{noun}", "joint").items()
-                  if getattr(PAIRS[kinds[name]], moves) and _moves(course)]  # fmt: skip
-        if joints:
-            panels.append(Motions(f"joint {noun}", unit, rated(f"joint_{noun}", "joint", joints)))
-    turns = [{link: turned_from_start(turn) for link, turn in members(result, "link_rotation", "link").items()}]
-    for rate in ("velocity", "acceleration"):
-        vectors = members(result, f"link_angular_{rate}", "link")
-        turns.append({link: np.linalg.norm(vector, axis=0) for link, vector in vectors.items()})
-    courses = [{link: course for link, course in order.items() if link != facts["ground"]} for order in turns]
-    return [*panels, Motions("turn of the link", "rad", courses, ("angular velocity", "angular acceleration"))]
+        moving = [("angle", "rad", "link_angle", "link", turning), ("slide", "m", "joint_slide", "joint", sliding)]
+    for noun, unit, variable, dim, of in [part for part in moving if part[-1]] or moving[:1]:
+        charts = []
+        for order, rate in enumerate(("", "_velocity", "_acceleration")):
+            rows = {name: values for name, values in members(result, variable + rate, dim).items() if name in of}
+            turn = TURN if unit == "rad" and not order else 0.0
+            lines = [line._replace(turn=turn) for line in _lines(over, rows)]
+            scale = (1.0, unit) if order else None
+            if unit == "m":  # as the drive
+                scale = scaled(usual_peak(ease(result), *rows.values()), "m")
+            title, legend = (noun, "velocity", "acceleration")[order], None if order else Legend(6, least=1)
+            charts.append(over_drive(result, over, title, unit, lines, rate=RATES[order], scale=scale, legend=legend))
+        panels.append(Panel("", charts, 5.8))
+    return Plot("Motion", panels, len(panels), 7.4 if len(panels) == 1 else 2.8 + 3.6 * len(panels))
 
 
 def _varies(values: Array, least: float) -> bool:
@@ -314,29 +284,6 @@ def _varies(values: Array, least: float) -> bool:
 def _moves(values: Array) -> bool:
     """Also where it is known at one position alone."""
     return np.isfinite(values).sum() == 1 or _varies(values, 1e-9 * max(1.0, peak(values)))
-
-
-def turned_from_start(rotation: Array) -> Array:
-    """Angle (rad) by which a link is turned from the first orientation (w, x, y, z; position) that is known.
-
-    It goes on beyond a turn: of q and −q, which are one orientation, and of an axis and its opposite the one that is
-    nearer to the position before is taken.
-    """
-    angle = np.full(rotation.shape[1], np.nan)
-    solved = np.flatnonzero(np.isfinite(rotation).all(axis=0))
-    if not solved.size:
-        return angle
-    w0, *v0 = rotation[:, solved[0]]
-    w, v = rotation[0, solved], rotation[1:, solved]
-    cosine = w0 * w + np.array(v0) @ v
-    sine = w0 * v - np.array(v0)[:, None] * w - np.cross(v0, v, axisb=0).T
-    same = np.sign(np.sum(rotation[:, solved[1:]] * rotation[:, solved[:-1]], axis=0))
-    cosine, sine = (part * np.cumprod([1.0, *np.where(same < 0, -1.0, 1.0)]) for part in (cosine, sine))
-    size = np.linalg.norm(sine, axis=0)
-    turning = np.sum(sine[:, 1:] * sine[:, :-1], axis=0)
-    size = size * np.cumprod([1.0, *np.where(turning < 0, -1.0, 1.0)])
-    angle[solved] = np.unwrap(2 * np.arctan2(size, cosine), period=4 * np.pi)
-    return angle
 
 
 # ---- measures -----------------------------------------------------------------------------------------------------
@@ -351,33 +298,28 @@ def drawn_measures(result: xr.Dataset) -> list[int]:
 
 def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """The model's measures over the drive: a panel for each course, with the figures of all measures of it."""
-    rows, over = drawn_measures(result), abscissa(result)
+    rows, over, charts = drawn_measures(result), abscissa(result), list[Chart]()
     if not rows:
         what = "there is no measure with one number at every position"
         raise MechanismError(Finding(what, "measures", "state measures: in the model"))
     units, figure_units = (units_along(result[f"measure_{part}"], "measure") for part in ("value", "figure"))
-    measures_stated, aspects = layout(result).get("measures", {}), {row.name: row.aspect for row in summary_of(result)}
-    labels = [str(name) for name in result["measure"].values]
-    values, figures, charts = result["measure_value"].values, result["measure_figure"].values, list[Chart]()
+    texts, aspects = layout(result).get("measures", {}), {row.name: row.aspect for row in summary_of(result)}
+    labels, values, figures = names(result, "measure"), result["measure_value"].values, result["measure_figure"].values
     for i in rows:
         same = [k for k in rows if units[k] == units[i] and np.array_equal(values[k], values[i], equal_nan=True)]
         if i != same[0]:
             continue
-        title = labels[i] if len(same) == 1 else measures_stated.get(labels[i], "course of the measures")
-        scope = usual_peak(ease(result), values[i])
-        factor, display_unit = (scaled if units[i] == "m" else prefixed)(scope, units[i])
-        marks = list[Mark]()
-        for k in same:
-            if np.isfinite(figures[k]):
-                aspect = aspects.get(labels[k], "")
-                level = aspect in LEVELS and figure_units[k] == units[i]
-                text = f"{labels[k]}: {aspect} {quantity(float(figures[k]), figure_units[k])}"
-                look = nth(1 + len(marks)).but(width=1.2, dash="dashed")
-                # a figure that is no value of the course is told in the legend alone
-                marks.append(Rule(figures[k] * factor if level else np.nan, text, look, upright=False))
+        title = labels[i] if len(same) == 1 else texts.get(labels[i], "course of the measures")
+        scope, marks = usual_peak(ease(result), values[i]), list[Mark]()
+        scale = (scaled if units[i] == "m" else prefixed)(scope, units[i])
+        for k in (k for k in same if np.isfinite(figures[k])):
+            aspect = aspects.get(labels[k], "")
+            level = aspect in LEVELS and figure_units[k] == units[i]  # what is none is told in the legend alone
+            text = f"{labels[k]}: {aspect} {quantity(float(figures[k]), figure_units[k])}"
+            look = nth(1 + len(marks)).but(width=1.2, dash="dashed")
+            marks.append(Rule(figures[k] * scale[0] if level else np.nan, text, look, upright=False))
         line = Line(over.values, values[i], title, Look(0, 2.0), close=True)
-        charts.append(over_drive(result, over, title, units[i], [line], marks=marks, scale=(factor, display_unit),
-                                 legend=Legend(3)))  # fmt: skip
+        charts.append(over_drive(result, over, title, units[i], [line], marks=marks, scale=scale, legend=Legend(3)))
     return _stack("Measures", charts)
 
 
@@ -385,38 +327,22 @@ def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
 
 
 def error(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
-    """Errors against the mechanism without any: of the worst points, and of the joints of the ground, over the drive.
-
-    The band of the worst case of the play is drawn if the result has it; see `with_worst_case`.
-    """
+    """Errors against the mechanism without any: of the worst points and of the joints of the ground, over the drive."""
     need(result, "errors", "error")
-    over, lost, legend = abscissa(result), contact_losses(result), Legend(4, least=1)
+    over, lost_at, legend = abscissa(result), losses(result), Legend(4, least=1)
+    places = np.unique(np.concatenate(list(lost_at.values()))) if lost_at else np.empty(0, int)
+    lost = [Rule(float(over.values[place]), None if k else f"contact lost: {', '.join(lost_at)}",
+                 Look("limit", 0.9, "dotted", order=1.4)) for k, place in enumerate(places)]  # fmt: skip
     # the scale is that of all points: those that are not drawn err less
     scale = prefixed(usual_peak(ease(result), *point_errors(result).values()), "m")
     charts = [over_drive(result, over, "position error", "m", _lines(over, worst_points(result)), scale=scale,
                          marks=lost, legend=legend)]  # fmt: skip
-    centres, reaches = (members(result, f"transmission_{part}", "joint") for part in ("centre", "reach"))
     for unit, noun in (("rad", "rotation"), ("m", "slide")):
         errors = {output.joint: output.error for output in outputs(result) if output.unit == unit}
-        bands = list[Band]()
-        for k, joint in enumerate(errors):
-            if joint in centres and np.isfinite(centres[joint] + reaches[joint]).any():
-                low, high = centres[joint] - reaches[joint], centres[joint] + reaches[joint]
-                text = f"worst case of the play, first order{f', {joint}' if len(errors) > 1 else ''}"
-                bands.append(Band(over.values, low, high, text, Look(k, alpha=0.15, order=1.2), close=True))
         if errors:
-            charts.append(over_drive(result, over, f"transmission error,\n{noun}", unit, _lines(over, errors),
-                                     bands=bands, marks=lost, legend=legend))  # fmt: skip
+            title = f"transmission error,\n{noun}"
+            charts.append(over_drive(result, over, title, unit, _lines(over, errors), marks=lost, legend=legend))
     return _stack("Errors of the mechanism as built", charts)
-
-
-def contact_losses(result: xr.Dataset) -> list[Mark]:
-    """A dotted line wherever a joint loses contact, in the legend with the joints."""
-    lost, over = losses(result), abscissa(result)
-    places = np.unique(np.concatenate(list(lost.values()))) if lost else np.empty(0, int)
-    label = f"contact lost: {', '.join(lost)}"
-    return [Rule(float(over.values[place]), None if k else label, Look("limit", 0.9, "dotted", order=1.4))
-            for k, place in enumerate(places)]  # fmt: skip
 
 
 # ---- locking ------------------------------------------------------------------------------------------------------
@@ -463,7 +389,7 @@ def locking(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     finite = {f"{joint} alone": np.where(np.isfinite(row), row, np.nan) for joint, row in margins.items()}
     lines = [Line(over.values, np.where(np.isfinite(margin), margin, np.nan), f"locking margin, all friction{never}",
                   Look("ink", 2.0), close=True)]  # fmt: skip
-    lines += joined([line for line in _lines(over, finite, 1.3) if np.isfinite(line.y).any()])
+    lines += [line for line in _lines(over, finite, 1.3) if np.isfinite(line.y).any()]
     marks: list[Mark] = [*_states(result, over, named=True), *silent(result, over), *lines]
     marks.append(Rule(1.0, "locks at 1", Look("ink", 1.0, "dashed", order=1.6), upright=False))
     if not largest:  # nothing to draw
@@ -490,7 +416,7 @@ def _efficiency(result: xr.Dataset, over: Abscissa) -> Chart:
     low = min((float(np.nanmin(line.y)) for line in lines if np.isfinite(line.y).any()), default=0.0)
     limits = min(0.0, max(1.05 * low, -105.0)), 103.0
     return Chart(over, Axis("efficiency [%]", limits),
-                 [*_states(result, over, named=False), *silent(result, over), *joined(lines)], zero=True)  # fmt: skip
+                 [*_states(result, over, named=False), *silent(result, over), *lines], zero=True)  # fmt: skip
 
 
 def _states(result: xr.Dataset, over: Abscissa, named: bool) -> list[Mark]:

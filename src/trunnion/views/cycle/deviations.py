@@ -30,18 +30,14 @@ from trunnion.views.space.bodies import Space, gathered, is_spatial
 if TYPE_CHECKING:
     import xarray as xr
 
-    from trunnion.model.mechanism import Mechanism
-
 __all__ = [
-    "JUMP", "NOWHERE", "Output", "Seats", "broken", "built", "error_rows", "has", "jumps", "loss_rows", "losses",
-    "need", "outputs", "point_errors", "seat_angles", "seated", "with_worst_case", "worst_points",
+    "Output", "Seats", "built", "error_rows", "has", "loss_rows", "losses", "need", "outputs", "point_errors",
+    "seat_angles", "seated", "worst_points",
 ]  # fmt: skip
 
 
-JUMP = np.pi / 3  # a seat that turns by more from one position to the next is taken to have jumped
-SUDDEN = 6.0  # times the step before or after: a jump
+JUMP = 60.0  # °: a seat that turns by more from one position to the next is taken to have jumped
 LEAST = 0.1  # of the largest error of place: points below it are not among the worst
-NOWHERE = np.zeros(0, np.intp)
 ALIKE = 1e-3  # of the largest: two curves nearer than this are one
 # what a result may lack, and what to do
 LACKS = {
@@ -120,38 +116,6 @@ def losses(result: xr.Dataset) -> dict[str, NDArray[np.intp]]:
     return {joint: places for joint, places in lost.items() if places.size}
 
 
-def with_worst_case(result: xr.Dataset, mechanism: Mechanism) -> xr.Dataset:
-    """The result with the band in which the play of all joints holds the error of each output, if there is any play.
-
-    `transmission_centre` and `transmission_reach` (joint, position), rad or m, NaN of joints that are no outputs: the
-    error with every pin in the middle of its hole, and the most that all plays can add to it, to first order.
-    """
-    from trunnion.studies.play import play as play_of  # not for the first picture of the studio
-
-    driven = outputs(result) if has(result, "errors") else []
-    if not driven:
-        return result
-    measures = [f"{'slide' if output.unit == 'm' else 'rotation'}:{output.joint}" for output in driven]
-    try:
-        free = play_of(mechanism, measures, result.sizes["position"])
-    except MechanismError:  # no joint has a play
-        return result
-    joints = names(result, "joint")
-    centre, reach = (np.full((len(joints), result.sizes["position"]), np.nan) for _ in range(2))
-    for output, measure in zip(driven, measures, strict=True):
-        rotation = column(result, f"joint_{measure.split(':')[0]}", joint=output.joint)
-        middle, most = (column(free, name, measure=measure) for name in ("value", "worst_case_total"))
-        if rotation is None or middle is None or most is None:
-            continue
-        apart = middle - rotation
-        turns = 2 * np.pi * np.round(apart / (2 * np.pi)) if output.unit == "rad" else 0.0
-        centre[joints.index(output.joint)], reach[joints.index(output.joint)] = output.error + apart - turns, most
-    if not np.nanmax(reach, initial=0.0) > 0:
-        return result
-    dims = ("joint", "position")
-    return result.assign(transmission_centre=(dims, centre), transmission_reach=(dims, reach))
-
-
 # ---- seats ----------------------------------------------------------------------------------------------------
 
 
@@ -198,52 +162,14 @@ def seated(result: xr.Dataset) -> list[Seats]:
 
 def seat_angles(result: xr.Dataset) -> list[tuple[str, str, Array]]:
     """ "β" or "ξ", the joint and the course, °, of every pin in space, ξ of those of the plane."""
-    betas, xis = (members(result, f"seat_{name}", "joint") for name in ("beta", "xi"))
-    courses = []
-    for seats in seated(result):
-        joint = seats.joint
-        if not seats.planar_guide and joint in betas and np.isfinite(betas[joint]).any():
-            for sign, values in zip("βξ", np.degrees(continued(betas[joint], xis[joint])), strict=True):
-                if sign == "ξ" or len(seats.offsets) == 2:
-                    courses.append((sign, joint, values))
-    return courses
-
-
-def continued(beta: Array, xi: Array) -> tuple[Array, Array]:
-    """β and ξ without the seam of their description, in which (β, ξ) and (β − 2π, ξ + π) are the same seat.
-
-    β stays as near as it can to the position before, within a turn to either side; ξ in (−π, π].
-    """
-    turns = np.zeros(beta.size)
-    finite = np.flatnonzero(np.isfinite(beta))
-    turns[finite] = np.cumsum(np.append(0.0, -np.round(np.diff(beta[finite]) / (2 * np.pi))))
-    usual = float(np.median((beta + 2 * np.pi * turns)[finite])) if finite.size else 0.0
-    middle = np.ceil((usual - 1.5 * np.pi) / (2 * np.pi))  # crossed ends, ±π, are shown at π
-    turns = turns - middle
-    revolutions = (beta + 2 * np.pi * turns) / (
-        2 * np.pi
-    )  # an end that goes round and round starts anew after each turn
-    turns = turns - np.where(
-        np.abs(revolutions) > 1.0 + 1e-9, np.sign(revolutions) * np.ceil(np.abs(revolutions) - 1.0 - 1e-9), 0.0
-    )
-    turned = xi - np.pi * turns
-    return beta + 2 * np.pi * turns, turned - 2 * np.pi * np.ceil((turned - np.pi) / (2 * np.pi))
-
-
-def jumps(y: Array, jump: float, lost: NDArray[np.intp] = NOWHERE) -> NDArray[np.intp]:
-    """Positions before which a curve jumps: by more than `jump`, by far more than on either side, or where contact is
-    lost.
-    """
-    step = np.abs(np.diff(y))
-    neighbours = np.nan_to_num(np.maximum(np.append(0.0, step[:-1]), np.append(step[1:], 0.0)))
-    near = np.isin(np.arange(step.size), [lost - 1, lost])
-    return np.flatnonzero((step > jump) | (step > np.where(near, 0.0, SUDDEN * neighbours) + jump / 20)) + 1
-
-
-def broken(x: Array, y: Array, jump: float, lost: NDArray[np.intp] = NOWHERE) -> tuple[Array, Array]:
-    """A curve with a NaN wherever it jumps, so that no line crosses the jump."""
-    after = jumps(y, jump, lost)
-    return np.insert(x, after, (x[after - 1] + x[after]) / 2), np.insert(y, after, np.nan)
+    angles = {sign: members(result, f"seat_{name}", "joint") for sign, name in (("β", "beta"), ("ξ", "xi"))}
+    return [
+        (sign, seats.joint, np.degrees(angles[sign][seats.joint]))
+        for seats in seated(result)
+        for sign in ("β", "ξ")
+        if not seats.planar_guide and (sign == "ξ" or len(seats.offsets) == 2)
+        and np.isfinite(angles[sign].get(seats.joint, np.nan)).any()
+    ]  # fmt: skip
 
 
 # ---- tables ---------------------------------------------------------------------------------------------------------
@@ -333,18 +259,35 @@ def built(result: xr.Dataset, lost: list[int]) -> dict[str, Any] | None:
         return None
     spatial = is_spatial(result)
     bodies, points = gathered(result) if spatial else None, members(result, "point_error", "point")
+    tracks = members(result, "point_position", "point").values()
+    places = np.concatenate([track.T for track in tracks]) if tracks else np.zeros((1, 2))
+    places = places[np.isfinite(places).all(axis=1)] if np.isfinite(places).any() else np.zeros((1, 2))
     return {
-        "preset": _preset(result, bodies.size if bodies else _size(result)),
+        "preset": _preset(result, bodies.size if bodies else float(np.linalg.norm(np.ptp(places, axis=0)))),
         "points": {} if spatial else {key: _vector(error) for key, error in points.items()},
-        "links": _moved(result, bodies)
-        if bodies
+        "links": _moved(result, bodies) if bodies
         else {link: _series(error) for link, error in members(result, "link_error", "link").items()},
         "worst": [{"label": key, "values": _series(values)} for key, values in worst_points(result).items()],
-        "outputs": _outputs(result),
+        "outputs": [
+            {"label": output.label, "unit": unit, "values": _series(output.error * factor)}
+            for output in outputs(result)
+            for factor, unit in [prefixed(1.0, "rad") if output.unit == "rad" else (1.0, "m")]
+        ],
         "lost": lost,
-        "seats": [_seat(seat) for seat in seated(result)],
-        "angles": _angles(result, np.array(lost, np.intp)),
-    }
+        "seats": [
+            {"joint": seats.joint, "kind": seats.kind, "clearance": seats.clearance, "length": seats.length,
+             "links": seats.links,
+             "ends": [{"offset": _vector(offset), "force": _vector(force)}
+                      for offset, force in zip(seats.offsets, seats.forces, strict=True)]}
+            for seats in seated(result)
+        ],
+        # β and ξ of the pins, °, with the positions before which they jump
+        "angles": [
+            {"sign": sign, "joint": joint, "values": _series(values),
+             "breaks": np.flatnonzero(np.abs(np.diff(values, prepend=values[-1:])) > JUMP).tolist()}
+            for sign, joint, values in seat_angles(result)
+        ],
+    }  # fmt: skip
 
 
 def _series(values: Array) -> list[float | None]:
@@ -355,13 +298,6 @@ def _series(values: Array) -> list[float | None]:
 
 def _vector(values: Array) -> dict[str, list[float | None]]:
     return {axis: _series(part) for axis, part in zip("xyz", values, strict=False)}
-
-
-def _size(result: xr.Dataset) -> float:
-    """Diagonal of the box around all points of a mechanism in the plane, m."""
-    places = np.asarray(result["point_position"].transpose("axis", ...).values, dtype=float).reshape(2, -1)
-    finite = places[:, np.isfinite(places).all(axis=0)]
-    return float(np.linalg.norm(np.ptp(finite, axis=1))) if finite.size else 0.0
 
 
 def _preset(result: xr.Dataset, size: float) -> float:
@@ -378,93 +314,33 @@ def _preset(result: xr.Dataset, size: float) -> float:
 
 
 def _moved(result: xr.Dataset, bodies: Space) -> dict[str, Any]:
-    """Of each link the mean error of its points, its rotation vector, the middle of the points, and its stretch."""
-    moved = {}
+    """Of each link the mean error of its points, its rotation vector, the middle of the points, and its stretch: by how
+    much each point lies elsewhere in it than in the ideal one, with where it is drawn.
+    """
+    moved, turns = {}, members(result, "link_error", "link")
+    errors, tracks = (members(result, f"point_{what}", "point") for what in ("error", "position"))
     for link, pose in bodies.poses.items():
-        turn = column(result, "link_error", link=link) if link in names(result, "link") else None
-        if turn is None or not bodies.drawable.any():
+        of_link = {key: error for key, error in errors.items() if key.split(".", 1)[0] == link}
+        if link not in turns or not bodies.drawable.any() or not of_link:
             continue
-        point_errors = {key: error for key in names(result, "point") if key.split(".", 1)[0] == link
-               and (error := column(result, "point_error", point=key)) is not None}  # fmt: skip
-        places = {key: _local(result, key, pose.matrix, pose.origin) for key in point_errors}
-        if not point_errors:
-            continue
-        about = np.mean(list(places.values()), axis=0)
-        shift = np.mean(list(point_errors.values()), axis=0)
+        # places in the frame of the link, the means over the positions that are known
+        places = {key: np.nanmean(np.einsum("jin,jn->in", pose.matrix, tracks[key] - pose.origin), axis=1)
+                  for key in of_link}  # fmt: skip
+        about, shift = np.mean(list(places.values()), axis=0), np.mean(list(of_link.values()), axis=0)
+        rows, largest = [], max(float(np.nanmax(np.abs(error), initial=0.0)) for error in of_link.values())
+        for key, error in of_link.items():
+            arm = np.einsum("ijn,j->in", pose.matrix, places[key] - about)
+            left = error - shift - np.cross(turns[link], arm, axis=0)
+            by = np.nan_to_num(np.nanmedian(np.einsum("jin,jn->in", pose.matrix, left), axis=1))
+            name = key.split(".", 1)[1]
+            joint = bodies.joints.get(name)
+            within = joint is not None and link in joint["links"]
+            seated_at = bodies.seat(name, joint["links"].index(link)) if joint and within else places[key]
+            rows.append({"at": [float(f"{number:.7g}") for number in seated_at],
+                         "by": [float(f"{number:.5g}") for number in by]})  # fmt: skip
+        stretched = max(np.abs(row["by"]).max() for row in rows) > SLIGHT * largest
         moved[link] = {
-            "about": [float(f"{number:.7g}") for number in about], "shift": _vector(shift), "turn": _vector(turn),
-            "stretch": _stretch(bodies, link, point_errors, places, about, shift, turn),
+            "about": [float(f"{number:.7g}") for number in about], "shift": _vector(shift),
+            "turn": _vector(turns[link]), "stretch": rows if stretched else [],
         }  # fmt: skip
     return moved
-
-
-def _local(result: xr.Dataset, key: str, matrix: Array, origin: Array) -> Array:
-    """A point in the frame of its link, the mean over the positions that are known."""
-    place = column(result, "point_position", point=key)
-    assert place is not None
-    return np.asarray(np.nanmean(np.einsum("jin,jn->in", matrix, place - origin), axis=1))
-
-
-def _stretch(
-    bodies: Space,
-    link: str,
-    point_errors: dict[str, Array],
-    places: dict[str, Array],
-    about: Array,
-    shift: Array,
-    turn: Array,
-) -> list[dict[str, Any]]:
-    """By how much each point of a link lies elsewhere in it than in the ideal one, with where it is drawn."""
-    matrix = bodies.poses[link].matrix
-    largest = max(float(np.nanmax(np.abs(error), initial=0.0)) for error in point_errors.values())
-    rows = []
-    for key, error in point_errors.items():
-        arm = np.einsum("ijn,j->in", matrix, places[key] - about)
-        left = error - shift - np.cross(turn, arm, axis=0)
-        by = np.nan_to_num(np.nanmedian(np.einsum("jin,jn->in", matrix, left), axis=1))
-        rows.append(
-            {"at": _drawn(bodies, link, key.split(".", 1)[1], places[key]), "by": [float(f"{n:.5g}") for n in by]}
-        )
-    return rows if max(np.abs(row["by"]).max() for row in rows) > SLIGHT * largest else []
-
-
-def _drawn(bodies: Space, link: str, point: str, place: Array) -> list[float]:
-    """Where a point of a link is drawn: that of a joint where its symbol is."""
-    joint = bodies.joints.get(point)
-    at = bodies.seat(point, joint["links"].index(link)) if joint and link in joint["links"] else place
-    return [float(f"{number:.7g}") for number in at]
-
-
-# ---- charts ---------------------------------------------------------------------------------------------------
-
-
-def _outputs(result: xr.Dataset) -> list[dict[str, Any]]:
-    """Transmission errors, m or °; the band of the worst case of the play if the result has it."""
-    rows = []
-    for output in outputs(result):
-        centre, reach = (column(result, f"transmission_{name}", joint=output.joint) for name in ("centre", "reach"))
-        band = [] if centre is None or reach is None else [centre - reach, centre + reach]
-        factor, unit = prefixed(1.0, "rad") if output.unit == "rad" else (1.0, "m")
-        worst = {side: _series(edge * factor) for side, edge in zip(("low", "high"), band, strict=False)}
-        rows.append(
-            {"label": output.label, "unit": unit, "values": _series(output.error * factor), "worst": worst or None}
-        )
-    return rows
-
-
-def _seat(seats: Seats) -> dict[str, Any]:
-    return {
-        "joint": seats.joint, "kind": seats.kind, "clearance": seats.clearance, "length": seats.length,
-        "links": seats.links,
-        "ends": [{"offset": _vector(offset), "force": _vector(force)}
-                 for offset, force in zip(seats.offsets, seats.forces, strict=True)],
-    }  # fmt: skip
-
-
-def _angles(result: xr.Dataset, lost: NDArray[np.intp]) -> list[dict[str, Any]]:
-    """β and ξ of the pins, °, with the positions before which they jump."""
-    closed, rows = abscissa(result).closed, []
-    for sign, joint, values in seat_angles(result):
-        cuts = jumps(np.append(values, values[0]) if closed else values, float(np.degrees(JUMP)), lost) % values.size
-        rows.append({"sign": sign, "joint": joint, "values": _series(values), "breaks": cuts.tolist()})
-    return rows

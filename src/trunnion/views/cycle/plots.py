@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,12 +21,11 @@ from trunnion.model.units import ANY, UnitError
 from trunnion.model.units import KINDS as UNITS
 from trunnion.results.scales import without_noise
 from trunnion.views import draw as drawn
-from trunnion.views.charts import Look, Note, Panel, Plot, Rule, check_kind
-from trunnion.views.common.cycle import Abscissa, abscissa
+from trunnion.views.charts import Plot, check_kind
 from trunnion.views.common.drawing import bare, draw, facts, picture
 from trunnion.views.common.figures import Labels, new
 from trunnion.views.cycle import courses, seats
-from trunnion.views.cycle.deviations import has
+from trunnion.views.cycle.deviations import has, seated
 from trunnion.views.space import figure as space_figure
 from trunnion.views.space.bodies import is_spatial
 
@@ -87,7 +85,7 @@ KINDS = tuple(PLOTS)
 READY: dict[str, Callable[[xr.Dataset], bool]] = {
     "speed": lambda result: bool(courses.varying(result)),
     "error": lambda result: has(result, "errors"),
-    "seat": lambda result: has(result, "seats"),
+    "seat": lambda result: any(not seat.planar_guide for seat in seated(result)),
     "beta": seats.described,
     "locking": courses.has_friction,
     "measures": lambda result: bool(courses.drawn_measures(result)),
@@ -99,7 +97,7 @@ def figure(
 ) -> Figure:
     """One figure. kind: of PLOTS; ideal: the same run without friction, to compare with.
 
-    at: a place such as "60deg": the mechanism is drawn there, and curves over the drive are marked.
+    at: a place such as "60deg", at which the mechanism is drawn.
     """
     check_kind(kind, PLOTS)
     index = None if at is None else position_at(result, at)
@@ -108,23 +106,7 @@ def figure(
         return mechanism(result, ideal, index)
     plot = PLOTS[kind](result, ideal)
     assert isinstance(plot, Plot)  # all but the mechanism
-    return drawn.plot(plot if index is None else _marked(plot, abscissa(result), index), result)
-
-
-def _marked(plot: Plot, over: Abscissa, index: int) -> Plot:
-    """The plot with a line at a position in every chart over the drive, named in the first."""
-    x, low = float(over.values[index]), float(over.values.min())
-    note = Note(over.say(index), (x - low) / over.span if over.span else 0.5, 0.0, "left", "bottom", colour="ink",
-                shift=(4, 4), boxed=True)  # fmt: skip
-    line = Rule(x, None, Look("ink", 1.0, "dash-dot", order=2.5))
-
-    def with_line(panel: Panel, first: bool) -> Panel:
-        return replace(panel, charts=[
-            replace(chart, marks=[*chart.marks, line, *[note] * (first and not k)])
-            if isinstance(chart.x, Abscissa) else chart for k, chart in enumerate(panel.charts)
-        ])  # fmt: skip
-
-    return replace(plot, panels=[with_line(panel, not k) for k, panel in enumerate(plot.panels)])
+    return drawn.figure(plot.title, result, plot.panels, plot.columns, plot.width, plot.note)
 
 
 def position_at(result: xr.Dataset, place: str | float) -> int:

@@ -11,7 +11,6 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,7 +29,6 @@ from trunnion.views.page import hashed, headline, inputs_of, said, template
 
 if TYPE_CHECKING:
     import xarray as xr
-    from jinja2 import Template
 
 __all__ = ["Animation", "animation", "embedded", "page", "report"]
 
@@ -64,12 +62,15 @@ def page(
     from markupsafe import Markup  # with jinja2 only needed here, and slow to import
 
     style, script = web_text("report.css"), bundle("report.js")
-    runs = intervals(result)
+    runs, thinned = intervals(result), ""
+    if scene_of["thinned"] is not None:  # "3rd" if every third position is shown
+        stride = -(-scene_of["thinned"] // scene_of["count"])
+        thinned = f"{stride}{'th' if 10 <= stride % 100 <= 20 else {1: 'st', 2: 'nd', 3: 'rd'}.get(stride % 10, 'th')}"
     context = {
         "name": scene_of["name"] or "Mechanism", "formula": scene_of["formula"], "compared": compared,
         "motion": motion, "closed": scene_of["abscissa"]["closed"],
         "spatial": scene_of.get("space") == "spatial",
-        "positions": result.sizes["position"], "thinned": _ordinal(scene_of),
+        "positions": result.sizes["position"], "thinned": thinned,
         "drawn": scene_of["count"], "method": result.attrs.get("method", ""),
         "unanswered": sum(run.stop - run.start for run in runs),
         "summary": headline(result),
@@ -88,15 +89,6 @@ def embedded(data: Any) -> str:
     for sign in "<>&\u2028\u2029":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return text
-
-
-def _ordinal(scene_of: dict[str, Any]) -> str:
-    """ "3rd" if every third position is shown, empty if all are."""
-    if scene_of["thinned"] is None:
-        return ""
-    stride = -(-scene_of["thinned"] // scene_of["count"])
-    suffix = "th" if 10 <= stride % 100 <= 20 else {1: "st", 2: "nd", 3: "rd"}.get(stride % 10, "th")
-    return f"{stride}{suffix}"
 
 
 def _holding(result: xr.Dataset) -> dict[str, Any] | None:
@@ -207,12 +199,4 @@ def animation(result: xr.Dataset, ideal: xr.Dataset | None = None, height: int =
         "style": Markup(style), "style_hash": hashed(style), "script": Markup(script), "script_hash": hashed(script),
         "scene": Markup(embedded(drawn)),
     }  # fmt: skip
-    return Animation(_template().render(context), height)
-
-
-@cache
-def _template() -> Template:
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
-    return environment.from_string(web_text("animation.html.j2"))
+    return Animation(template("animation.html.j2").render(context), height)

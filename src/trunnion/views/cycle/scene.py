@@ -58,12 +58,17 @@ def scene(
     if ideal is not None and ideal.sizes["position"] != count:
         raise ValueError(f"`ideal` has {ideal.sizes['position']} positions, the result {count}")
     result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
-    picked = _picked(count, max_positions) if picked is None else picked
+    picked = np.arange(0, count, -(-count // max(max_positions, 1)) or 1) if picked is None else picked
     over, steady = abscissa(result), "steady" in result.attrs
     picked_rows = result.isel(position=picked)
     other = None if ideal is None else ideal.isel(position=picked)
-    facts = layout(result)
-    points = _points(picked_rows)
+    facts, efficiency = layout(result), column(result, "efficiency")
+    tracks = {} if is_spatial(result) else members(picked_rows, "point_position", "point")  # there the poses tell them
+    points = {name: dict(zip("xy", map(series, track), strict=True)) for name, track in tracks.items()}
+    lost = {int(index) for places in losses(result).values() for index in places}
+    # the shown positions at or before those at which a joint loses contact
+    before = sorted({int(np.searchsorted(picked, index, side="right")) - 1 for index in lost})
+    pulls = members(picked_rows, "spring_force", "spring")
     drawn = {
         "format": FORMAT,
         "name": result.attrs.get("name", ""),
@@ -82,43 +87,22 @@ def scene(
         "links": _links(facts, picked_rows, points),
         "joints": _joints(facts, picked_rows, other),
         "loads": _loads(facts, picked_rows, points),
-        "springs": _springs(picked_rows, facts, points),
+        "springs": [{"name": name, "ends": list(ends), "pull": series(pulls.get(name))}
+                    for name, spring in facts["springs"].items()
+                    if (ends := spring.get("between")) and set(ends) <= points.keys()],
         "gears": [{"name": name, **circle} for name, pair in facts["gears"].items() for circle in pair],
         "drivers": _drivers(picked_rows, other, facts),
         "units": units_of(result),
         "sums": {name: series(column(picked_rows, name)) for name in SUMS
                  if name in picked_rows and not (steady and name in DRIVEN)},
-        "efficiency": _single(result, "efficiency"),
-        "built": built(picked_rows, _lost(result, picked)),
+        "efficiency": numbers(efficiency.reshape(1))[0] if efficiency is not None and not efficiency.ndim else None,
+        "built": built(picked_rows, before),
     }  # fmt: skip
     if is_spatial(result):
         drawn |= space_scene(picked_rows)
     for load in drawn["loads"]:
         load["course"] = course(result, picked, load["name"])
     return drawn
-
-
-def _lost(result: xr.Dataset, picked: NDArray[np.intp]) -> list[int]:
-    """The shown positions at or before those at which a joint loses contact."""
-    places = {int(index) for places in losses(result).values() for index in places}
-    return sorted({int(np.searchsorted(picked, index, side="right")) - 1 for index in places})
-
-
-def _picked(count: int, most: int) -> NDArray[np.intp]:
-    """Indices of evenly spaced positions, at most `most` of them, from the first on."""
-    stride = -(-count // max(most, 1)) if count else 1
-    return np.arange(0, count, stride)
-
-
-def _single(result: xr.Dataset, name: str) -> float | None:
-    value = column(result, name)
-    return None if value is None or value.ndim else numbers(value.reshape(1))[0]
-
-
-def _points(result: xr.Dataset) -> dict[str, dict[str, Any]]:
-    """Each "link.point" with its track; none in space, where the poses of the links tell them."""
-    tracks = {} if is_spatial(result) else members(result, "point_position", "point")
-    return {name: {axis: series(row) for axis, row in zip("xy", track, strict=True)} for name, track in tracks.items()}
 
 
 def _links(layout_of: dict[str, Any], result: xr.Dataset, points: dict[str, Any]) -> list[dict[str, Any]]:
@@ -193,14 +177,6 @@ def _acts(layout_of: dict[str, Any], result: xr.Dataset, load: dict[str, Any]) -
     sense = np.where(still, 0.0, np.sign(speed))
     only = {"positive": 1.0, "negative": -1.0}.get(str(load.get("only")), 0.0)
     return series(-np.where(sense * only < 0, 0.0, sense))
-
-
-def _springs(result: xr.Dataset, layout_of: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any]]:
-    """Springs between two known points, with their pull."""
-    pulls = members(result, "spring_force", "spring")
-    ends = {name: list(spring.get("between") or ()) for name, spring in layout_of["springs"].items()}
-    return [{"name": name, "ends": two, "pull": series(pulls.get(name))}
-            for name, two in ends.items() if two and set(two) <= points.keys()]  # fmt: skip
 
 
 def _drivers(result: xr.Dataset, ideal: xr.Dataset | None, layout_of: dict[str, Any]) -> list[dict[str, Any]]:

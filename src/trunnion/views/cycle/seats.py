@@ -8,13 +8,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.quantities import number, prefixed, quantity
-from trunnion.views.charts import Arrow, Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Ring, nth, silent
+from trunnion.views.charts import Arrow, Axis, Chart, Legend, Line, Look, Mark, Note, Panel, Plot, Ring, silent
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, names
-from trunnion.views.cycle.deviations import JUMP, NOWHERE, Seats, broken, losses, need, seat_angles, seated
+from trunnion.views.cycle.deviations import Seats, losses, need, seat_angles, seated
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,8 +26,6 @@ ARROW = 0.8  # length of the largest load
 ROOM = 1.0 + PIN + ARROW + 0.6  # half width of a diagram
 WEAK = 0.02  # of the largest load: a smaller one has no arrow
 LONGEST = 16  # signs of a link's name
-# two curves that often coincide: one broad and pale, one thin and dashed over it
-ENDS = (Look(0, 4.0, alpha=0.4), Look(0, 1.4, "long"))
 
 
 # ---- in the hole --------------------------------------------------------------------------------------------------
@@ -39,12 +36,15 @@ def seat(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     need(result, "seats", "seat")
     over, charts, paired = abscissa(result), list[Chart](), False
     for seats in seated(result):
-        if seats.planar_guide:
-            charts.append(_guide(seats, over))
+        if seats.planar_guide:  # see `beta`
             continue
         both = [(0, (0, 1)), (0, (0, 2))] if seats.kind == "ball" else [(k, (0, 1)) for k in range(len(seats.offsets))]
         paired |= len(both) == 2  # both ends of a joint stay side by side
         charts += [_hole(seats, end, plane, over) for end, plane in both]
+    if not charts:
+        raise MechanismError(
+            Finding("the seats are those of guides in the plane", "--kind seat", "see the figure 'beta'")
+        )
     few = len(charts) if len(charts) <= 2 else 2 if len(charts) == 4 else 3
     columns = few if not paired else 2 if len(charts) <= 2 else 4
     width = {1: 4.6, 4: 10.4}.get(columns, 7.4)
@@ -52,31 +52,21 @@ def seat(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     return Plot("Seats of the pins in their holes", panels, columns, width)
 
 
-def _share(over: Abscissa) -> Array:
-    """Places of the positions on the scale of colours."""
-    low = float(over.values.min(initial=np.inf))
-    return (over.values - low) / (over.span or 1.0)
-
-
-def _marked(over: Abscissa, solved: NDArray[np.bool_]) -> list[int]:
-    """Positions that are told by name: every quarter of a turn, or start, middle and end of a way."""
-    picked = [0, over.values.size // 2, over.values.size - 1]
-    if over.closed:
-        angles = over.values[0] + over.period * np.arange(4) / 4
-        picked = [int(np.argmin(np.abs(over.values - angle))) for angle in angles]
-    return [index for index in dict.fromkeys(picked) if solved[index]]
-
-
 def _hole(seats: Seats, end: int, plane: tuple[int, int], over: Abscissa) -> Chart:
     """Pin in hole: wall, clearance, locus, and at the marked positions the pin with its load."""
     factor, unit = prefixed(seats.clearance, "m")
     rho, offset = seats.clearance * factor, seats.offsets[end, list(plane)] * factor
-    force, square, share, most = seats.forces[end, list(plane)], seats.kind == "guide", _share(over), seats.peak
+    force, square, most = seats.forces[end, list(plane)], seats.kind == "guide", seats.peak
+    share = (over.values - float(over.values.min())) / (over.span or 1.0)  # places on the scale of colours
     wall = [Ring((0.0, 0.0), size * rho, look, square, filled) for size, look, filled in (
         (1 + PIN + WALL, Look("shade", 0.0, order=0.7), 1.0), (1 + PIN, Look("ink", 1.4, order=0.8), 0.0),
         (1.0, Look("muted", 0.8, "dashed", order=2.0), 0.0))]  # fmt: skip
     marks: list[Mark] = [*wall, *_locus(offset, share, over, rho)]
-    for index in _marked(over, np.asarray(np.isfinite(offset).all(axis=0))):
+    picked = [0, over.values.size // 2, over.values.size - 1]  # positions that are named
+    if over.closed:
+        angles = over.values[0] + over.period * np.arange(4) / 4
+        picked = [int(np.argmin(np.abs(over.values - angle))) for angle in angles]
+    for index in (index for index in dict.fromkeys(picked) if np.isfinite(offset[:, index]).all()):
         paint, place = Look(float(share[index])), offset[:, index]
         at = (float(place[0]), float(place[1]))
         marks.append(Ring(at, PIN * rho, paint.but(width=1.1, alpha=0.85, order=1.5), square, 0.07))
@@ -91,14 +81,17 @@ def _hole(seats: Seats, end: int, plane: tuple[int, int], over: Abscissa) -> Cha
     if np.isfinite(slack).any():
         text = f"along the axis {number(float(np.nanmin(slack)), 3)} to {number(float(np.nanmax(slack)), 3)} {unit}"
         marks.append(Note(text, 0.02, 0.02, "left", "bottom", size=7.0))
-    ends = [(-rho, _tick(-rho)), (0.0, ""), (rho, _tick(rho))]
-    x, y = (Axis(f"{'xyz'[axis]} [{unit}]", (-ROOM * rho, ROOM * rho), ends) for axis in plane)
+    ends = [(-rho, f"−{rho:.3g}"), (0.0, ""), (rho, f"{rho:.3g}")]
+    first, second = (name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in seats.links)
+    below = f"\n{seats.kind} of {first} in {second}\nlongest load {quantity(seats.peak, 'N')}"
+    x, y = (Axis(f"{'xyz'[axis]} [{unit}]{text}", (-ROOM * rho, ROOM * rho), ends)
+            for axis, text in zip(plane, (below, ""), strict=True))  # fmt: skip
     title = seats.joint
     if seats.kind == "ball":
         title = f"{seats.joint}: {''.join('xyz'[axis] for axis in plane)}"
     elif len(seats.offsets) == 2:
         title = f"{seats.joint}, end {end + 1}"
-    return Chart(_described(x, seats), y, marks, title=title, legend=None, equal=True)
+    return Chart(x, y, marks, title=title, legend=None, equal=True)
 
 
 def _locus(offset: Array, share: Array, over: Abscissa, jump: float) -> list[Mark]:
@@ -115,48 +108,13 @@ def _locus(offset: Array, share: Array, over: Abscissa, jump: float) -> list[Mar
     return marks
 
 
-def _guide(seats: Seats, over: Abscissa) -> Chart:
-    """A guide of the plane: the middle line of the bar between its limits, across magnified, along to another scale."""
-    factor, unit = prefixed(seats.clearance, "m")
-    long, long_unit = prefixed(seats.length or 1.0, "m")
-    rho, half = seats.clearance * factor, 0.5 * (seats.length or 1.0) * long
-    x, ends, share = np.array([-half, half]), seats.offsets[:, 1] * factor, _share(over)
-    marks: list[Mark] = [Line(x, np.full(2, side * rho), None, Look("ink", 1.4, order=1.0)) for side in (1, -1)]
-    marks.append(Line(x, np.zeros(2), None, Look("muted", 0.8, "dash-dot", order=0.8)))
-    for index in _marked(over, np.asarray(np.isfinite(ends).all(axis=0))):
-        paint = Look(float(share[index]), 2.2, mark="o", size=4.0, order=3.0)
-        marks.append(Line(x, ends[:, index], None, paint))
-        for end, load in enumerate(seats.forces[:, 1, index]):
-            if abs(load) > WEAK * seats.peak:
-                low = (float(x[end]), float(ends[end, index]))
-                tip = (low[0], float(low[1] + load / seats.peak * ARROW * rho))
-                marks.append(Arrow(low, tip, paint.but(width=1.5, order=6.0)))
-        marks.append(
-            Note(over.say(index), 0.5 * half, float(ends[:, index] @ [0.25, 0.75]), data=True, size=7.5, beside=True)
-        )
-    y = Axis(f"across [{unit}]", (-2.4 * rho, 2.4 * rho), [(side * rho, _tick(side * rho)) for side in (-1, 0, 1)])
-    along = Axis(f"along the guide [{long_unit}]", (-1.2 * half, 1.2 * half), count=4)
-    return Chart(_described(along, seats), y, marks, title=seats.joint, legend=None)
-
-
-def _described(axis: Axis, seats: Seats) -> Axis:
-    """The axis with what lies in what, and the load that the longest arrow stands for."""
-    first, second = (name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in seats.links)
-    lines = [axis.title, f"{seats.kind} of {first} in {second}", f"longest load {quantity(seats.peak, 'N')}"]
-    return Axis("\n".join(lines), axis.limits, axis.places, count=axis.count)
-
-
-def _tick(value: float) -> str:
-    return f"{value:.3g}".replace("-", "−")
-
-
 # ---- over the drive -----------------------------------------------------------------------------------------------
 
 
 def beta(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Plot:
     """β and ξ of every pin in space, ξ of those of the plane, the offsets of both ends of a guide of the plane.
 
-    Jumps are not crossed; crosses mark the positions without contact.
+    A dot for every position, as seats jump; crosses mark the positions without contact.
     """
     need(result, "seats", "beta")
     charts = _courses(result)
@@ -174,50 +132,24 @@ def described(result: xr.Dataset) -> bool:
 def _courses(result: xr.Dataset) -> list[Chart]:
     """A chart of each of β, ξ and the offsets across guides, of those that any joint has."""
     over, lost = abscissa(result), losses(result)
-    order = {joint: k for k, joint in enumerate(names(result, "joint"))}
-    curves: dict[str, list[tuple[str, Line]]] = {"β": [], "ξ": [], "guide": []}
     guides = [seats for seats in seated(result) if seats.planar_guide]
-    scale, unit = prefixed(max((seats.clearance for seats in guides), default=0.0), "m")
-    for seats in guides:
-        for end, look in enumerate(ENDS):
-            line = Line(over.values, seats.offsets[end, 1] * scale, f"{seats.joint}, end {end + 1}",
-                        look.but(colour=order[seats.joint]))  # fmt: skip
-            curves["guide"].append((seats.joint, line))
-    for sign, joint, values in seat_angles(result):
-        curves[sign].append((joint, Line(over.values, values, joint, nth(order[joint]))))
-    turn = float(np.degrees(JUMP))
-    titles = {
-        "β": ("β, between the seats\nof the ends [°]", turn), "ξ": ("ξ, direction of\nthe seat [°]", turn),
-        "guide": (f"offset across\nthe guide [{unit}]", scale * min((g.clearance for g in guides), default=0.0)),
-    }  # fmt: skip
-    charts, gone = [], np.concatenate([NOWHERE, *lost.values()])
-    for sign, lines in curves.items():
-        if lines:
-            title, jump = titles[sign]
-            marks = [*silent(result, over), *(_cut(line, over, jump, gone) for _, line in lines)]
-            axis = Axis(title, angles=sign != "guide", margin=0.12)
-            charts.append(Chart(over, axis, [*marks, *_crosses(lines, lost)], zero=True, legend=Legend(least=1)))
+    factor, unit = prefixed(max((seats.clearance for seats in guides), default=0.0), "m")
+    titles = {"β": "β, between the seats\nof the ends [°]", "ξ": "ξ, direction of\nthe seat [°]",
+              "guide": f"offset across\nthe guide [{unit}]"}  # fmt: skip
+    curves = [(sign, joint, joint, values, True) for sign, joint, values in seat_angles(result)]
+    curves += [("guide", seats.joint, f"{seats.joint}, end {end + 1}", seats.offsets[end, 1] * factor, end == 0)
+               for seats in guides for end in range(2)]  # fmt: skip
+    charts, order = [], names(result, "joint")
+    for kind, title in titles.items():
+        marks = list[Mark]()
+        for _, joint, name, values, filled in (curve for curve in curves if curve[0] == kind):
+            dots = Look(order.index(joint), dash="none", mark="o", size=2.5 if filled else 4.0, hollow=not filled)
+            marks.append(Line(over.values, values, name, dots))
+            places = lost.get(joint, np.empty(0, int))
+            if np.isfinite(values[places]).any():
+                crosses = Look("limit", dash="none", mark="x", size=6.0, order=4.0)
+                marks.append(Line(over.values[places], values[places], "contact lost", crosses))
+        if marks:
+            axis = Axis(title, angles=kind != "guide", margin=0.12)
+            charts.append(Chart(over, axis, [*silent(result, over), *marks], zero=True, legend=Legend(least=1)))
     return charts
-
-
-def _cut(line: Line, over: Abscissa, jump: float, lost: NDArray[np.intp]) -> Line:
-    """The curve, over a whole turn led on to its first value, with a gap wherever it jumps."""
-    x, y = line.x, line.y
-    if over.closed:
-        x, y = np.append(x, x[0] + over.period), np.append(y, y[0])
-    x, y = broken(x, y, jump, lost)
-    if over.closed and np.isnan(y[-2]):  # a jump on closing: the last point is the first once more
-        x, y = x[:-2], y[:-2]
-    return line._replace(x=x, y=y)
-
-
-def _crosses(lines: list[tuple[str, Line]], lost: dict[str, NDArray[np.intp]]) -> list[Mark]:
-    """Crosses on the curves where their joints lose contact."""
-    marks = list[Mark]()
-    for joint, line in lines:
-        places = lost.get(joint, NOWHERE)
-        places = places[np.isfinite(line.y[places])]
-        if places.size:
-            look = Look("limit", dash="none", mark="x", size=6.0, order=4.0)
-            marks.append(Line(line.x[places], line.y[places], None if marks else "contact lost", look))
-    return marks

@@ -20,13 +20,10 @@ from trunnion.views.charts import (
     Line,
     Look,
     Mark,
-    Note,
     Panel,
-    Plot,
     Ring,
     Rule,
     check_kind,
-    joined,
     nth,
 )
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, members, names
@@ -40,13 +37,11 @@ if TYPE_CHECKING:
 __all__ = ["KINDS", "OF_CONTACTS", "check_contacts", "figure", "pictures", "sheet"]
 
 PANEL = 2.6  # height, inches
-LINE, LETTER = 9.5, 0.009  # of an event's word: points from row to row, share of the axes' width a letter
+DASHES: Any = ("dashed", "dotted", "dash-dot", "solid")  # of events
 MOST_MARKED = 12  # events drawn; of more, marks would hide the curves
-OF_CONTACTS = ("contacts", "gaps", "orbit", "spectrum")  # kinds of figures that need a joint in play
+OF_CONTACTS = ("contacts", "gaps", "orbit")  # kinds of figures that need a joint in play
 LONGEST = 0.6  # of the clearance: how far the largest force is drawn beyond the wall
 MOST_SPOKES = 240  # forces drawn around a hole
-DEEPEST = 1e-4  # of the largest amplitude: the lowest that is drawn
-RESOLVED = 4.0  # rows in a contact whose force is resolved
 SIDE = 4.6  # of the figure of a hole, inches
 
 
@@ -55,14 +50,18 @@ def figure(result: xr.Dataset, kind: str = "sheet") -> Figure:
     check_kind(kind, KINDS)
     if kind == "sheet":
         return sheet(result)
-    check_contacts(kind, _in_play(result))
-    if kind in OWN:
-        return draw.plot(OWN[kind](result), result)
+    check_contacts(kind, "contact" in result.dims)
+    if kind == "orbit":
+        panels = [Panel("", [_hole(result, k)], SIDE) for k in _pins(result)]
+        if not panels:
+            what = "no pin of this motion is in play"
+            raise MechanismError(Finding(what, "--kind orbit", "use --kind gaps for guides"))
+        return draw.figure("Pin in its hole", result, panels, len(panels), 0.4 + SIDE * len(panels))
     title, build = OVER_TIME[kind]
     motion = shown(result)
     chart = build(motion.rows, abscissa(motion.rows))
     chart = chart if kind == "phase" else _with_events(chart, motion)
-    return draw.plot(Plot(title, [Panel("", [chart], 3.75)]), result)
+    return draw.figure(title, result, [Panel("", [chart], 3.75)])
 
 
 def check_contacts(kind: str, in_play: bool) -> None:
@@ -76,45 +75,35 @@ def sheet(result: xr.Dataset) -> Figure:
     """Everything over time, one panel under the other."""
     motion = shown(result)
     idle = () if np.any(motion.rows["drive_effort"].values) else ("effort",)  # nothing drives it
-    left_out = ("phase", *idle, *(() if _in_play(result) else OF_CONTACTS))
+    left_out = ("phase", *idle, *(() if "contact" in result.dims else OF_CONTACTS))
     over = abscissa(motion.rows)
     charts = [_with_events(build(motion.rows, over), motion)
               for kind, (_, build) in OVER_TIME.items() if kind not in left_out]  # fmt: skip
-    return draw.plot(Plot("Motion in time", [Panel("", charts, 0.4 + PANEL * len(charts))]), result)
+    return draw.figure("Motion in time", result, [Panel("", charts, 0.4 + PANEL * len(charts))])
 
 
 def pictures(result: xr.Dataset) -> Iterator[tuple[str, Figure]]:
-    """What a report has beside the courses, with what it shows: the ways of pins in their holes, and the spectrum."""
-    if _in_play(result) and _pins(result):
+    """What a report has beside the courses, with what it shows: the ways of pins in their holes."""
+    if "contact" in result.dims and _pins(result):
         yield "The ways of the pins in their holes, with the forces on the walls", figure(result, "orbit")
-    if "frequency" in result.dims:
-        yield "Amplitude of the contact forces over frequency", figure(result, "spectrum")
 
 
 # ---- over time ----------------------------------------------------------------------------------------------------
 
 
 def _curves(over: Abscissa, title: str, unit: str, rows: dict[str, Array]) -> Chart:
-    """Curves of one unit over time; those that coincide are one."""
-    lines = joined([Line(over.values, values, name, nth(k)) for k, (name, values) in enumerate(rows.items())])
+    """Curves of one unit over time."""
     factor, label = prefixed(peak(*rows.values()), unit)
-    return Chart(over, Axis(f"{title} [{label}]"), [line.times(factor) for line in lines], zero=True)
+    lines = [Line(over.values, values * factor, name, nth(k)) for k, (name, values) in enumerate(rows.items())]
+    return Chart(over, Axis(f"{title} [{label}]"), lines, zero=True)
 
 
-def _speed(result: xr.Dataset, over: Abscissa) -> Chart:
-    drivers = [(i, name, "rad/s" if effort == "N m" else "m/s") for i, name, effort in drivers_of(result)]
-    unit = drivers[0][2]
-    rows = {
-        name if unit_own == unit else f"{name} [{unit_own}]": result["drive_rate"].values[i]
-        for i, name, unit_own in drivers
-    }
-    return _curves(over, "speed", unit, rows)
-
-
-def _effort(result: xr.Dataset, over: Abscissa) -> Chart:
-    drivers = drivers_of(result)
-    rows = {name: result["drive_effort"].values[i] for i, name, _ in drivers}
-    return _curves(over, f"drive {'torque' if drivers[0][2] == 'N m' else 'force'}", drivers[0][2], rows)
+def _of_drivers(result: xr.Dataset, over: Abscissa, title: str, variable: str, units: tuple[str, str]) -> Chart:
+    """A variable of every driver; units: of those that turn and those that slide, of which the first has the axis."""
+    drivers = [(i, name, units[effort != "N m"]) for i, name, effort in drivers_of(result)]
+    first = drivers[0][2]
+    rows = {name if unit == first else f"{name} [{unit}]": result[variable].values[i] for i, name, unit in drivers}
+    return _curves(over, title, first, rows)
 
 
 def _reactions(result: xr.Dataset, over: Abscissa) -> Chart:
@@ -122,92 +111,40 @@ def _reactions(result: xr.Dataset, over: Abscissa) -> Chart:
     return _curves(over, "reaction", "N", {name: size for name, size in sizes.items() if peak(size) > 0})
 
 
-def _energy(result: xr.Dataset, over: Abscissa) -> Chart:
-    return _curves(over, "energy", "J", {text: values for _, text, values in energies(result)})
-
-
-def _forces(result: xr.Dataset, over: Abscissa) -> Chart:
-    return _curves(over, "contact force", "N", members(result, "contact_normal_force", "contact"))
-
-
-def _gaps(result: xr.Dataset, over: Abscissa) -> Chart:
-    """Below 0 the surfaces press each other in."""
-    return _curves(over, "gap", "m", members(result, "contact_gap", "contact"))
-
-
 def _phase(result: xr.Dataset, over: Abscissa) -> Chart:
     drivers, marks = drivers_of(result), list[Mark]()
-    turns = drivers[0][2] == "N m"
+    units = ("rad", "rad/s") if drivers[0][2] == "N m" else ("m", "m/s")
     for k, (i, name, _) in enumerate(drivers):
         q, rate = result["drive_coordinate"].values[i], result["drive_rate"].values[i]
         first = np.flatnonzero(np.isfinite(q))[:1]
         marks.append(Line(q, rate, name, nth(k)))
         marks.append(Line(q[first], rate[first], None if k else "start", Look(k, dash="none", mark="o", size=6.0)))
-    return Chart(Axis(f"coordinate [{'rad' if turns else 'm'}]"), Axis(f"speed [{'rad/s' if turns else 'm/s'}]"), marks)
+    return Chart(Axis(f"coordinate [{units[0]}]"), Axis(f"speed [{units[1]}]"), marks)
 
 
 def _with_events(chart: Chart, motion: Shown) -> Chart:
-    """The chart with thin lines where something happens, and words above it, each in the lowest row where it meets no
-    other."""
+    """The chart with thin lines where something happens; what, stands in the legend."""
     events = [event for event in motion.events if event.word not in OF_IMPACTS]  # the curves show these
+    words = list(dict.fromkeys(event.word for event in events))
     over, last = abscissa(motion.rows), float(motion.rows["time"].values[-1])
     if len(events) > MOST_MARKED or not last > 0:
         return chart
-    ends: list[float] = []  # of what stands in each row, as shares of the axes' width
-    marks: list[Mark] = []
-    low, span = float(over.values.min()), over.span or 1.0
-    for event in events:
-        at = float(over.values[-1] * min(event.time, last) / last)
-        half = 0.5 * LETTER * (len(event.word) + 2)
-        middle = min(max((at - low) / span, half), 1.0 - half)
-        row = next((k for k, end in enumerate(ends) if end <= middle - half), len(ends))
-        ends[row : row + 1] = [middle + half]
-        marks.append(Rule(at, None, Look("muted", 0.8, "dashed", order=1.2)))
-        marks.append(Note(event.word, middle, 1.0, up="bottom", size=7.5, shift=(0, 2 + LINE * row)))
-    return replace(chart, marks=[*chart.marks, *marks], legend=Legend(lift=LINE * len(ends)))
+    looks = [Look("muted", 0.9, DASHES[k % len(DASHES)], order=1.2) for k in range(len(words))]
+    marks = list[Mark]()
+    for k, event in enumerate(events):
+        first = event.word not in [before.word for before in events[:k]]
+        at, look = float(over.values[-1] * min(event.time, last) / last), looks[words.index(event.word)]
+        marks.append(Rule(at, event.word if first else None, look))
+    return replace(chart, marks=[*chart.marks, *marks], legend=Legend(least=1))
 
 
 # ---- contacts -----------------------------------------------------------------------------------------------------
-
-
-def _in_play(result: xr.Dataset) -> bool:
-    return "contact" in result.dims
 
 
 def _pins(result: xr.Dataset) -> list[int]:
     """The contacts that are pins in holes: of a guide there are four to a joint."""
     joints = set(attribute(result, "contact_pins"))
     return [k for k, contact in enumerate(names(result, "contact")) if contact in joints]
-
-
-def _spectrum(result: xr.Dataset) -> Plot:
-    """Amplitude of the contact forces over frequency, both logarithmic."""
-    if "frequency" not in result.dims:
-        what = "no contact forces over time: bodies are rigid, or there are too few rows"
-        raise MechanismError(Finding(what, "--kind spectrum", "state a contact law, or give more --steps"))
-    frequency, amplitude = result["frequency"].values[1:], result["contact_force_amplitude"].values[:, 1:]
-    largest = float(np.max(amplitude, initial=0.0))
-    factor, label = prefixed(largest, "N")
-    lines = [Line(frequency, amplitude[k] * factor, name, nth(k).but(width=1.2))
-             for k, name in enumerate(names(result, "contact"))]  # fmt: skip
-    y = Axis(f"amplitude [{label}]")
-    if largest > 0:
-        y = replace(y, log=True, limits=(DEEPEST * largest * factor, 2 * largest * factor))
-    lasts, step = result["impact_end"].values - result["impact_begin"].values, float(np.diff(result["time"][:2])[0])
-    shortest = float(np.nanmin(lasts, initial=np.inf))
-    short = f"; contacts last {quantity(shortest, 's')} and rows are {quantity(step, 's')} apart: give more --steps"
-    title = f"Hann's window, {quantity(float(frequency[0]), 'Hz')} apart{short if shortest < RESOLVED * step else ''}"
-    chart = Chart(Axis("frequency [Hz]", log=True), y, lines, title=title)
-    return Plot("Spectrum of the contact forces", [Panel("", [chart], 3.75)])
-
-
-def _orbit(result: xr.Dataset) -> Plot:
-    """The way of each pin's centre in its hole, in the hole's axes, with the force on the wall where it touches."""
-    pins = _pins(result)
-    if not pins:
-        raise MechanismError(Finding("no pin of this motion is in play", "--kind orbit", "use --kind gaps for guides"))
-    panels = [Panel("", [_hole(result, k)], SIDE) for k in pins]
-    return Plot("Pin in its hole", panels, len(pins), 0.4 + SIDE * len(pins))
 
 
 def _hole(result: xr.Dataset, k: int) -> Chart:
@@ -232,14 +169,16 @@ def _hole(result: xr.Dataset, k: int) -> Chart:
 
 # a kind of figure over time: its title, and what makes its chart
 OVER_TIME: dict[str, tuple[str, Callable[[Any, Abscissa], Chart]]] = {
-    "speed": ("Speed", _speed),
-    "effort": ("Drive effort", _effort),
+    "speed": ("Speed", lambda rows, over: _of_drivers(rows, over, "speed", "drive_rate", ("rad/s", "m/s"))),
+    "effort": ("Drive effort",
+               lambda rows, over: _of_drivers(rows, over, "drive effort", "drive_effort", ("N m", "N"))),
     "reactions": ("Reactions", _reactions),
-    "energy": ("Energy account", _energy),
-    "contacts": ("Contact forces", _forces),
-    "gaps": ("Gaps", _gaps),
+    "energy": ("Energy account",
+               lambda rows, over: _curves(over, "energy", "J", {text: row for _, text, row in energies(rows)})),
+    "contacts": ("Contact forces", lambda rows, over: _curves(over, "contact force", "N",
+                                                              members(rows, "contact_normal_force", "contact"))),
+    # below 0 the surfaces press each other in
+    "gaps": ("Gaps", lambda rows, over: _curves(over, "gap", "m", members(rows, "contact_gap", "contact"))),
     "phase": ("Speed over coordinate", _phase),
-}
-# kinds of figures with axes of their own
-OWN: dict[str, Callable[[Any], Plot]] = {"orbit": _orbit, "spectrum": _spectrum}
-KINDS = ("sheet", *OVER_TIME, *OWN)
+}  # fmt: skip
+KINDS = ("sheet", *OVER_TIME, "orbit")

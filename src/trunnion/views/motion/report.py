@@ -23,11 +23,8 @@ __all__ = ["MOST_EVENTS", "MOST_ROWS", "motion_scene", "report"]
 
 MOST_EVENTS = 200  # rows of the table
 LOST = ("work_friction", "work_contact", "work_clutch")
-HELD = (
-    "kinetic_energy",
-    "potential_energy",
-    "contact_energy",
-)  # what is left in the links of what came in and went out
+# what is left in the links of what came in and went out
+HELD = ("kinetic_energy", "potential_energy", "contact_energy")
 RESIDUAL = "works less changes of the energies, relative to the largest of them"
 
 
@@ -38,13 +35,12 @@ def report(result: xr.Dataset) -> str:
     over = {
         "length": _stated(motion.end),
         "asked": _stated(motion.asked) if motion.early else "",
-        "events": [
-            {"seconds": f"{event.time:.9g}", "time": quantity(event.time, "s"), "cells": event[1:]} for event in events
-        ],
+        "events": [{"seconds": f"{event.time:.9g}", "time": quantity(event.time, "s"), "cells": event[1:]}
+                   for event in events],
         "more": len(motion.events) - len(events),
         "account": _account(motion.rows),
         "pictures": [{"alt": title, "source": source(drawn)} for title, drawn in pictures(result)],
-    }
+    }  # fmt: skip
     return page(motion.rows, motion_scene(motion), over, _residual(motion))
 
 
@@ -107,20 +103,25 @@ def motion_scene(motion: Shown) -> dict[str, Any]:
     over = abscissa(rows)
     last = float(picked_rows["time"].values[-1])
     factor = over.values[-1] / float(rows["time"].values[-1]) if last > 0 else 1.0
+    forces, gaps = (members(picked_rows, f"contact_{name}", "contact") for name in ("normal_force", "gap"))
+    # fmt: off
     of_motion: dict[str, Any] = {
         "duration": last,
-        "free": _free(picked_rows),
-        "contacts": _contacts(picked_rows),
+        "free": [
+            {"name": name, "unit": "rad" if effort == "N m" else "m",
+             "coordinate": series(picked_rows["drive_coordinate"].values[i]),
+             "rate": series(picked_rows["drive_rate"].values[i])}
+            for i, name, effort in drivers_of(picked_rows)
+        ],
+        "contacts": [{"name": name, "force": series(force), "gap": series(gaps[name])}
+                     for name, force in forces.items()],
         "energies": [{"label": text, "values": series(values)} for _, text, values in energies(picked_rows)],
         "events": [
-            {
-                "at": float(f"{min(event.time, last) * factor:.9g}"),
-                "word": event.word,
-                "quiet": event.word in OF_IMPACTS,
-            }
-            for event in motion.events
+            {"at": float(f"{min(event.time, last) * factor:.9g}"), "word": event.word,
+             "quiet": event.word in OF_IMPACTS} for event in motion.events
         ],
     }
+    # fmt: on
     return drawn | {
         "status": [int(code) for code in status],
         "states": drawn["states"] | {str(code): text for code, text in STATES.items()},
@@ -144,19 +145,3 @@ def _picked(rows: xr.Dataset) -> NDArray[np.intp]:
     firsts = np.arange(0, count, -(-count // (MOST_ROWS // 2 - 1)))
     peaks = [begin + int(part.argmax()) for begin, part in zip(firsts, np.split(size, firsts[1:]), strict=True)]
     return np.unique([*firsts, *peaks, count - 1])
-
-
-def _contacts(rows: xr.Dataset) -> list[dict[str, Any]]:
-    """Normal force and gap of every contact of joints in play."""
-    forces, gaps = (members(rows, f"contact_{name}", "contact") for name in ("normal_force", "gap"))
-    return [{"name": name, "force": series(force), "gap": series(gaps[name])} for name, force in forces.items()]
-
-
-def _free(rows: xr.Dataset) -> list[dict[str, Any]]:
-    """Coordinate and rate of every free driver."""
-    parts = []
-    for i, name, effort in drivers_of(rows):
-        unit = "rad" if effort == "N m" else "m"
-        coordinate, rate = rows["drive_coordinate"].values[i], rows["drive_rate"].values[i]
-        parts.append({"name": name, "unit": unit, "coordinate": series(coordinate), "rate": series(rate)})
-    return parts

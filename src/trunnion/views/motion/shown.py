@@ -71,7 +71,11 @@ class Shown(NamedTuple):
 
 def shown(result: xr.Dataset) -> Shown:
     """The motion as its views take it."""
-    rows = as_positions(_resting(without_noise(result)))
+    whole = without_noise(result)
+    moves = whole["resting"] != 1  # at rest the solution leaves powers within its tolerance
+    rows = as_positions(
+        whole.assign({name: whole[name].where(moves, 0.0) for name in ("drive_power", "friction_power")})
+    )
     return Shown(rows, float(result["time"][-1]), float(result.attrs["duration"]), happenings(result))
 
 
@@ -91,12 +95,6 @@ def drivers_of(result: xr.Dataset) -> list[tuple[int, str, str]]:
 def as_positions(result: xr.Dataset) -> xr.Dataset:
     """The result with its times as positions, as the views of a cycle take it."""
     return result.rename_dims(time="position").drop_vars("time").assign_coords(time=("position", result["time"].values))
-
-
-def _resting(result: xr.Dataset) -> xr.Dataset:
-    """The result with no power at rest, which the solution leaves within its tolerance."""
-    moves = result["resting"] != 1
-    return result.assign({name: result[name].where(moves, 0.0) for name in ("drive_power", "friction_power")})
 
 
 def happenings(result: xr.Dataset) -> tuple[Happening, ...]:

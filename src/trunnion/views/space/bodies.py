@@ -140,8 +140,13 @@ class Space:
         places = [self.at(name)[:, self.drawable] for name in self.joints]
         spread = float(np.linalg.norm(np.ptp(np.hstack(places), axis=1))) if places else 0.0
         share = APART if spread < APART * self.size else ASIDE
+        index = int(np.argmax(self.drawable))
         for name in self._crowded():
-            shifts[name] = share * self.size * self._sense(name, shifts)
+            before = sum((np.sign(shift) * self.axis(other)[:, index] for other, shift in shifts.items()
+                          if shift and self.ground in self.joints[other]["links"]), np.zeros(3))  # fmt: skip
+            # along the axis, a joint of the ground away from those of the ground before it
+            turned = self.ground in self.joints[name]["links"] and float(self.axis(name)[:, index] @ before) > 0
+            shifts[name] = share * self.size * (-1.0 if turned else 1.0)
         return shifts
 
     def _crowded(self) -> list[str]:
@@ -163,18 +168,6 @@ class Space:
                     crowded.append(name)
                     break
         return crowded
-
-    def _sense(self, name: str, shifts: dict[str, float]) -> float:
-        """+1 or −1 along the axis: a joint of the ground away from those of the ground before it."""
-        index = int(np.argmax(self.drawable))
-        if self.ground not in self.joints[name]["links"]:
-            return 1.0
-        sum_before = sum(
-            (np.sign(shift) * self.axis(neighbour)[:, index] for neighbour, shift in shifts.items()
-             if shift and self.ground in self.joints[neighbour]["links"]),
-            np.zeros(3),
-        )  # fmt: skip
-        return -1.0 if float(self.axis(name)[:, index] @ sum_before) > 0 else 1.0
 
     def seat(self, joint: str, side: int = 1) -> Array:
         """Place of a joint's symbol on a link, (3,) in the link's frame."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
 from matplotlib.patches import FancyArrowPatch
 from matplotlib.patheffects import Normal, Stroke
 
@@ -21,13 +20,13 @@ from trunnion.views.common.drawing import PALE, bare, closes, facts, short
 from trunnion.views.common.figures import INK, MUTED, PALETTE, Labels, new
 from trunnion.views.common.peaks import ease, usual_peak
 from trunnion.views.space.bodies import Space, space
-from trunnion.views.space.solids import HALF, Camera, Scenery, Solid, scenery
+from trunnion.views.space.solids import HALF, Scenery, Solid, scenery
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["Strokes", "facets", "mechanism", "normal_of", "paint", "sketch"]
+__all__ = ["facets", "mechanism", "name_joints", "normal_of", "sketch"]
 
 
 GREY = "#9aa3ad"  # of the ground
@@ -88,22 +87,45 @@ def _telling(result: xr.Dataset, bodies: Space) -> int:
     return int(drawable[drawable.size // 8])
 
 
-def sketch(axes: Axes, look: Scenery, index: int, only: tuple[str, ...] = (), curves: bool = True) -> None:
-    """Bodies and curves at a position, without a letter; only: links that have a colour, all if none is named."""
-    gathered = look.shown
-    bodies = [
-        (solid, gathered.poses[solid.link].matrix[:, :, index], gathered.poses[solid.link].origin[:, index],
-         _colour(gathered, solid.paint, only))
-        for solid in look.solids
-    ]  # fmt: skip
-    strokes: list[Strokes] = []
-    if curves:
-        free = [key for key in gathered.free if key.split(".", 1)[0] != gathered.ground]
-        inner = [name for name, joint in gathered.joints.items()
-                 if gathered.ground not in joint["links"] and not gathered.shifts[name]]  # fmt: skip
-        strokes += [Strokes(_pieces(gathered.track(key)), INK, 1.2) for key in free]
-        strokes += [Strokes(_dashed(gathered.seated(name), 0.013 * gathered.size), MUTED, 0.7) for name in inner]
-    paint(axes, look.camera, bodies, strokes, gathered.size)
+def sketch(axes: Axes, look: Scenery, index: int, only: tuple[str, ...] = ()) -> None:
+    """Bodies and curves at a position, without a letter; only: links that have a colour, all if none is named.
+
+    What is nearer is painted over what is farther, by the depths of the middles of small facets. The outline of a body
+    is what looks away of a body a little larger.
+    """
+    bodies, camera = look.shown, look.camera
+    faces, depths, colours = list[Array](), list[Array](), list[Array]()
+    strokes = [(_pieces(bodies.track(key)), INK, 1.2) for key in bodies.free if key.split(".", 1)[0] != bodies.ground]
+    strokes += [(_pieces(bodies.seated(name))[::2], MUTED, 0.7) for name, joint in bodies.joints.items()
+                if bodies.ground not in joint["links"] and not bodies.shifts[name]]  # fmt: skip
+    for solid in look.solids:
+        matrix, origin = (of[..., index] for of in (bodies.poses[solid.link].matrix, bodies.poses[solid.link].origin))
+        if solid.kind == "wire":
+            points = solid.points @ matrix.T + origin
+            strokes.append((np.stack([points[:-1], points[1:]], axis=1), INK, 0.7))
+            continue
+        paint = np.array(to_rgb(_colour(bodies, solid.paint, only)))
+        for grown in (OUTLINE * bodies.size, 0.0):
+            corners = camera.seen(facets(solid, bodies.size, grown) @ matrix.T + origin)
+            normals = normal_of(corners)
+            seen = (normals[:, 2] > 0) == (grown == 0.0)
+            faces.append(corners[seen][..., :2])
+            depths.append(corners[seen][..., 2].mean(axis=1))
+            lit = _lit(paint, normals[seen])
+            colours.append(lit if grown == 0.0 else np.broadcast_to(to_rgb(INK), lit.shape))
+    polygons, edges = [*np.concatenate(faces)], [*np.concatenate(colours)]
+    depth, widths, fills = [*np.concatenate(depths)], [0.35] * len(edges), [(*edge, 1.0) for edge in edges]
+    for pieces, colour, width in strokes:  # lines among the bodies, a little nearer than they are
+        lines = camera.seen(pieces)
+        polygons += [*lines[..., :2]]
+        depth += [*(lines[..., 2].mean(axis=1) + 0.003 * bodies.size)]
+        edges, widths = edges + [np.array(to_rgb(colour))] * len(lines), widths + [width] * len(lines)
+        fills += [(0.0, 0.0, 0.0, 0.0)] * len(lines)
+    order = np.argsort(depth, kind="stable").tolist()
+    rows = ([values[k] for k in order] for values in (polygons, fills, edges, widths))
+    drawn, inside, rims, wide = rows
+    axes.add_collection(PolyCollection(drawn, closed=False, facecolors=inside, edgecolors=rims, linewidths=wide,
+                                       zorder=3, joinstyle="round", capstyle="round"))  # fmt: skip
 
 
 def _colour(bodies: Space, name: str, only: tuple[str, ...]) -> str:
@@ -122,19 +144,6 @@ def _pieces(track: Array) -> Array:
     line = (np.hstack([line, line[:, :1]]) if closes(line) else line).T
     pieces = np.stack([line[:-1], line[1:]], axis=1)
     return np.asarray(pieces[np.isfinite(pieces).all(axis=(1, 2))], dtype=float)
-
-
-def _dashed(track: Array, dash: float) -> Array:
-    """Every second piece of a track cut into pieces of one length (m), (n, 2, 3)."""
-    pieces = _pieces(track)
-    lengths = np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1)
-    ends = np.concatenate([[0.0], np.cumsum(lengths)])
-    if ends[-1] < dash:
-        return pieces[:0]
-    marks = np.arange(0.0, ends[-1], dash)
-    line = np.vstack([pieces[:1, 0], pieces[:, 1]])
-    cut = np.array([np.interp(marks, ends, axis) for axis in line.T]).T
-    return np.stack([cut[:-1], cut[1:]], axis=1)[::2]
 
 
 def _reactions(look: Scenery, result: xr.Dataset, index: int) -> tuple[list[tuple[Array, Array]], float]:
@@ -180,37 +189,32 @@ def _round(value: float) -> float:
 
 
 def _key(axes: Axes, look: Scenery, most: float) -> None:
-    """A triad of the global axes, bars of a round length and, where reactions reach `most` N, of a round force."""
-    (x0, x1), y0 = axes.get_xlim(), axes.get_ylim()[0]
+    """A triad of the global axes, a bar of a round length and, where reactions reach `most` N, an arrow of a round
+    force."""
+    (x0, x1), y0, letters = axes.get_xlim(), axes.get_ylim()[0], {"fontsize": 8, "color": MUTED, "va": "center"}
+    y, arm = y0 + 0.025 * look.diagonal, 0.05 * look.diagonal
     if most > 0:
         factor, unit = prefixed(0.6 * most, "N")
-        size = _round(0.6 * most * factor) / factor
-        y, long = y0 + 0.025 * look.diagonal, size / most * LENGTH * look.diagonal
-        start = np.array([x1 - long - 0.01 * look.diagonal, y])
-        _arrow(axes, start, start + np.array([long, 0.0]), REACTION)
-        axes.annotate(f"load {size * factor:g} {unit}", (start[0], y), xytext=(-5, 0), textcoords="offset points",
-                      ha="right", va="center", fontsize=8, color=MUTED)  # fmt: skip
-    arm = 0.05 * look.diagonal
-    origin = np.array([x0 + 1.6 * arm, y0 + 1.6 * arm])
+        size = _round(0.6 * most * factor)
+        left = x1 - size / factor / most * LENGTH * look.diagonal - 0.01 * look.diagonal
+        _arrow(axes, np.array([left, y]), np.array([x1 - 0.01 * look.diagonal, y]), REACTION)
+        axes.text(left - 0.2 * arm, y, f"load {size:g} {unit}", ha="right", **letters)  # type: ignore[arg-type]
+    origin = np.array([x0, y0]) + 1.6 * arm
     for name, axis in zip("xyz", look.camera.matrix.T, strict=True):
         end = origin + arm * axis[:2]
         axes.annotate("", (end[0], end[1]), xytext=(origin[0], origin[1]), zorder=7,
                       arrowprops={"arrowstyle": "-|>", "color": MUTED, "linewidth": 1.1, "shrinkA": 0, "shrinkB": 0,
                                   "mutation_scale": 7})  # fmt: skip
-        away = end + 0.32 * arm * axis[:2] / (np.hypot(*axis[:2]) or 1.0)
-        if np.hypot(*axis[:2]) > 0.15:
-            axes.text(away[0], away[1], name, ha="center", va="center", fontsize=8, style="italic", color=MUTED)
-    if not look.shown.extent:
-        axes.text(origin[0] + 1.8 * arm, y0 + 0.025 * look.diagonal, "all axes meet in one point: drawn on a sphere",
-                  fontsize=8, color=MUTED, va="center")  # fmt: skip
-        return
-    factor, unit = prefixed(0.18 * (x1 - x0), "m")
-    length = _round(0.18 * (x1 - x0) * factor) / factor
-    left, y, tick = origin[0] + 2.1 * arm, y0 + 0.025 * look.diagonal, 0.006 * look.diagonal
-    axes.plot([left, left, left, left + length, left + length, left + length],
-              [y - tick, y + tick, y, y, y - tick, y + tick], color=MUTED, linewidth=1.1, zorder=6)  # fmt: skip
-    axes.annotate(f"{length * factor:g} {unit}", (left + length, y), xytext=(5, 0), textcoords="offset points",
-                  ha="left", va="center", fontsize=8, color=MUTED)  # fmt: skip
+        if (size := float(np.hypot(*axis[:2]))) > 0.15:  # else it points at the viewer
+            place = end + 0.32 * arm * axis[:2] / size
+            axes.text(place[0], place[1], name, ha="center", style="italic", **letters)  # type: ignore[arg-type]
+    left, text = origin[0] + 2.1 * arm, "all axes meet in one point: drawn on a sphere"
+    if look.shown.extent:
+        factor, unit = prefixed(0.18 * (x1 - x0), "m")
+        length = _round(0.18 * (x1 - x0) * factor)
+        axes.plot([left, left + length / factor], [y, y], "|-", color=MUTED, linewidth=1.1, markersize=5, zorder=6)
+        left, text = left + length / factor + 0.2 * arm, f"{length:g} {unit}"
+    axes.text(left, y, text, ha="left", **letters)  # type: ignore[arg-type]
 
 
 def name_joints(
@@ -235,150 +239,71 @@ STEP = 0.03  # rods are cut into pieces of this share of the size: with twice th
 OUTLINE = 0.0026  # share of the size
 LIGHT = np.array([-0.35, 0.55, 0.76])  # from the left and above, in the picture's frame
 JOINT = "#f7f8fa"
+TURN = np.linspace(0, 2 * np.pi, SIDES + 1)
 
 
-@dataclass(frozen=True)
-class Strokes:
-    """Lines drawn among the solids: (n, 2, 3) pieces in the global frame, colour, width in points."""
-
-    pieces: Array
-    colour: str
-    width: float
-
-
-def facets(solid: Solid, size: float, grown: float = 0.0) -> list[Array]:
-    """Polygons (corner, 3) in the link's frame, counter-clockwise from outside; grown: larger all round, m."""
+def facets(solid: Solid, size: float, grown: float = 0.0) -> Array:
+    """Facets (n, corner, 3) in the link's frame, counter-clockwise from outside; grown: larger all round, m."""
+    radius = solid.radius + grown
     if solid.kind == "rod":
-        return _rod(solid.points, solid.radius + grown, grown, STEP * size)
+        return _rod(solid.points, radius, grown, STEP * size)
+    if solid.kind == "wire":
+        return np.empty((0, 4, 3))
     if solid.kind == "ball":
-        return _ball(solid.points[0], solid.radius + grown)
-    return _box(solid.points, grown, STEP * size) if solid.kind == "box" else []
+        up = np.linspace(-np.pi / 2, np.pi / 2, RINGS + 1)[:, None]
+        sphere = [np.cos(up) * np.cos(TURN), np.cos(up) * np.sin(TURN), np.sin(up) + 0 * TURN]
+        return _between(solid.points[0] + radius * np.stack(sphere, axis=-1))
+    middle, *halves = solid.points
+    u, v, w = (half * (1 + grown / np.linalg.norm(half)) for half in halves)
+    w = w if np.cross(u, v) @ w > 0 else -w
+    sides = []
+    for a, b, c in ((u, v, w), (v, w, u), (w, u, v)):
+        for sense in (1, -1):
+            across, up = (np.linspace(-1, 1, 1 + int(np.ceil(2 * np.linalg.norm(side) / (STEP * size))))
+                          for side in (a, b))  # fmt: skip
+            sides.append(_between(middle + sense * (c + up[:, None, None] * b) + across[:, None] * a))
+    return np.concatenate(sides)
 
 
-def _rod(points: Array, radius: float, grown: float, step: float) -> list[Array]:
-    """A round rod along a line through points, mitred at its corners, and its two ends."""
-    line = _cut(points, step)
-    ways = np.diff(line, axis=0)
-    ways /= np.linalg.norm(ways, axis=1)[:, None]
-    line = np.vstack([line[0] - grown * ways[0], line[1:-1], line[-1] + grown * ways[-1]])
-    x = np.cross(ways[0], np.eye(3)[int(np.argmin(np.abs(ways[0])))])  # from the middle to a line along the surface
-    angle = np.linspace(0, 2 * np.pi, SIDES + 1)[:, None]
-    rings = []
-    for place, before, after in zip(line, [ways[0], *ways], [*ways, ways[-1]], strict=True):
-        x /= np.linalg.norm(x)
-        ring = radius * (np.cos(angle) * x + np.sin(angle) * np.cross(before, x))
-        middle = before + after  # the plane of the mitre lies across it
-        ring -= (ring @ middle / (before @ middle))[:, None] * before
-        rings.append(place + ring)
-        x = ring[0] - (ring[0] @ after) * after  # on the next piece the same line of the surface
-    sides = [
-        np.array([low[i], low[i + 1], high[i + 1], high[i]]) for low, high in pairwise(rings) for i in range(SIDES)
-    ]
-    return [*sides, *_cap(rings[0][:0:-1], step), *_cap(rings[-1][:-1], step)]
+def _between(grid: Array) -> Array:
+    """The facets between neighbours of a grid of points, (row, column, 3)."""
+    corners = [grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]]
+    return np.stack(corners, axis=2).reshape(-1, 4, 3)
 
 
-def _cap(rim: Array, step: float) -> list[Array]:
-    """The end of a rod; a wide one, as of a disc, in rings of pieces that sort."""
-    middle = rim.mean(axis=0)
-    count = int(np.linalg.norm(rim[0] - middle) // step)
-    if count < 2:
-        return [rim]
-    shares = np.linspace(1.0, 1.0 / count, count)
-    rings = [middle + share * (np.vstack([rim, rim[:1]]) - middle) for share in shares]
-    pieces = [np.array([out[i], out[i + 1], inner[i + 1], inner[i]]) for out, inner in pairwise(rings)
-              for i in range(len(rim))]  # fmt: skip
-    return [*pieces, rings[-1][:-1]]
-
-
-def _cut(points: Array, step: float) -> Array:
-    """The line through the points with more of them, none farther from the next than a step."""
-    pieces = [points[:1]]
+def _rod(points: Array, radius: float, grown: float, step: float) -> Array:
+    """A round rod along a line through points, cut into pieces, and its two ends, wide ones in rings."""
+    line = points[:1]
     for start, end in pairwise(points):
         count = max(1, int(np.ceil(np.linalg.norm(end - start) / step)))
-        pieces.append(start + np.linspace(0, 1, count + 1)[1:, None] * (end - start))
-    return np.concatenate(pieces)
-
-
-def _ball(middle: Array, radius: float) -> list[Array]:
-    up = np.linspace(-np.pi / 2, np.pi / 2, RINGS + 1)
-    around = np.linspace(0, 2 * np.pi, SIDES + 1)
-    points = middle + radius * np.stack(
-        [np.cos(up)[:, None] * np.cos(around), np.cos(up)[:, None] * np.sin(around), np.sin(up)[:, None] + 0 * around],
-        -1,
-    )
-    return [
-        np.array([points[i, j], points[i, j + 1], points[i + 1, j + 1], points[i + 1, j]])
-        for i in range(RINGS)
-        for j in range(SIDES)
-    ]
-
-
-def _box(points: Array, grown: float, step: float) -> list[Array]:
-    """A box, its sides cut into pieces."""
-    middle, *halves = points
-    u, v, w = (half * (1 + grown / np.linalg.norm(half)) for half in halves)
-    if np.cross(u, v) @ w < 0:
-        w = -w
-    faces = []
-    for a, b, c in ((u, v, w), (v, w, u), (w, u, v)):
-        across, up = (np.linspace(-1, 1, 1 + int(np.ceil(2 * np.linalg.norm(side) / step))) for side in (a, b))
-        for left, right in pairwise(across):
-            for low, high in pairwise(up):
-                piece = np.array([left * a + low * b, right * a + low * b, right * a + high * b, left * a + high * b])
-                faces += [middle + c + piece, middle - c + piece[::-1]]
-    return faces
-
-
-def paint(
-    axes: Axes,
-    camera: Camera,
-    bodies: Iterable[tuple[Solid, Array, Array, str]],
-    strokes: Iterable[Strokes],
-    size: float,
-) -> None:
-    """Draw solids, each with the matrix (3, 3) and origin (3,) of its link and its colour, and lines among them."""
-    pieces: list[tuple[float, Array, str, str, float]] = []  # depth, corners, face, edge, width
-    for solid, matrix, origin, colour in bodies:
-        if solid.kind == "wire":
-            line = camera.seen(solid.points @ matrix.T + origin)
-            pieces += _lines(np.stack([line[:-1], line[1:]], axis=1), INK, 0.7, 0.003 * size)
-            continue
-        for grown in (OUTLINE * size, 0.0):
-            for corners in facets(solid, size, grown):
-                projected = camera.seen(corners @ matrix.T + origin)
-                normal = normal_of(projected)
-                if (normal[2] > 0) == (grown == 0.0):  # the outline is what looks away, the body what looks here
-                    face = shaded(colour, normal) if grown == 0.0 else INK
-                    pieces.append(
-                        (float(projected[:, 2].mean()), np.vstack([projected, projected[:1]])[:, :2], face, face, 0.35)
-                    )
-    for stroke in strokes:
-        pieces += _lines(camera.seen(stroke.pieces), stroke.colour, stroke.width, 0.0)
-    pieces.sort(key=lambda piece: piece[0])
-    axes.add_collection(
-        PolyCollection(
-            [piece[1] for piece in pieces], closed=False, facecolors=[piece[2] for piece in pieces],
-            edgecolors=[piece[3] for piece in pieces], linewidths=[piece[4] for piece in pieces], zorder=3,
-            joinstyle="round", capstyle="round",
-        )
-    )  # fmt: skip
-
-
-def _lines(pieces: Array, colour: str, width: float, forward: float) -> list[tuple[float, Array, str, str, float]]:
-    """Lines as open polygons without a face, a little nearer than they are."""
-    return [(float(piece[:, 2].mean()) + forward, piece[:, :2], "none", colour, width) for piece in pieces]
+        line = np.vstack([line, start + np.linspace(0, 1, count + 1)[1:, None] * (end - start)])
+    pieces = np.diff(line, axis=0)
+    pieces /= np.linalg.norm(pieces, axis=1)[:, None]
+    line[0] -= grown * pieces[0]
+    line[-1] += grown * pieces[-1]
+    along = np.vstack([pieces[:1], pieces[:-1] + pieces[1:], pieces[-1:]])  # across a corner lies its mitre
+    x, rings = np.eye(3)[int(np.argmin(np.abs(pieces[0])))], list[Array]()
+    for place, before, mitre in zip(line, np.vstack([pieces[:1], pieces]), along, strict=True):
+        x = x - (x @ before) * before
+        x /= np.linalg.norm(x)
+        ring = radius * (np.cos(TURN)[:, None] * x + np.sin(TURN)[:, None] * np.cross(before, x))
+        ring -= (ring @ mitre / (before @ mitre))[:, None] * before
+        rings.append(place + ring)
+        x = ring[0]  # on the next piece the same line of the surface
+    shares = np.linspace(1.0, 0.0, 1 + max(1, int(radius // step)))[:, None, None]
+    ends = [place + shares * (ring - place) for place, ring in zip(line[[0, -1]], (rings[0], rings[-1]), strict=True)]
+    return np.concatenate([_between(np.array(rings)), _between(ends[0][::-1]), _between(ends[1])])
 
 
 def normal_of(corners: Array) -> Array:
-    """Unit normal of a polygon, also where two corners fall together."""
-    across = np.cross(corners[2] - corners[0], corners[3 % len(corners)] - corners[1])
-    return np.asarray(across / (np.linalg.norm(across) or 1.0), dtype=float)
+    """Unit normals of facets (…, corner, 3), also where two corners fall together."""
+    across = np.cross(corners[..., 2, :] - corners[..., 0, :], corners[..., 3, :] - corners[..., 1, :])
+    size = np.linalg.norm(across, axis=-1, keepdims=True)
+    return np.asarray(across / np.where(size > 0, size, 1.0), dtype=float)
 
 
-def shaded(colour: str, normal: Array) -> str:
-    """The colour under the light: lighter towards it, darker away from it."""
-    bright = float(np.clip(normal @ LIGHT, 0.0, 1.0))
-    parts = np.array([int(colour[place : place + 2], 16) for place in (1, 3, 5)], dtype=float)
-    lit = parts * (0.62 + 0.38 * bright)
-    lit += (255 - lit) * 0.38 * max(0.0, bright - 0.55) / 0.45
-    return "#" + "".join(f"{round(part):02x}" for part in lit)
+def _lit(colour: Array, normals: Array) -> Array:
+    """The colour of each facet under the light: lighter towards it, darker away from it."""
+    bright = np.clip(normals @ LIGHT, 0.0, 1.0)[:, None]
+    lit = colour * (0.62 + 0.38 * bright)
+    return np.asarray(lit + (1 - lit) * 0.38 * np.maximum(0.0, bright - 0.55) / 0.45, dtype=float)

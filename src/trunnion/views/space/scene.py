@@ -26,22 +26,35 @@ def space_scene(result: xr.Dataset) -> dict[str, Any]:
     """What a scene of a mechanism in space has besides curves; `solids` is empty if no position can be drawn."""
     bodies = gathered(result)
     drawn = bool(bodies.drawable.any())
-    links = [
-        {"name": link, "ground": link == bodies.ground, "pose": _pose(result, link) if drawn else None,
-         "screw": _screw(result, bodies, link) if drawn and link != bodies.ground else None}
-        for link in bodies.stated["links"]
-    ]  # fmt: skip
+    still: dict[str, Any] = {axis: [float(axis == "w")] for axis in "xyzwijk"}
+    links, present = [], names(result, "link")
+    for link in bodies.stated["links"]:
+        pose = still  # place x, y, z (m) and quaternion w, i, j, k
+        if link in present:
+            pose = {axis: series(column(result, "link_position", link=link, axis=axis)) for axis in "xyz"} | {
+                to: series(column(result, "link_rotation", link=link, component=source))
+                for to, source in zip("wijk", "wxyz", strict=True)
+            }
+        screw = _screw(result, bodies, link) if drawn and link != bodies.ground else None
+        links.append({"name": link, "ground": link == bodies.ground, "pose": pose if drawn else None, "screw": screw})
     parts: dict[str, Any] = {"space": "spatial", "links": links, "solids": [], "free": [], "seats": {}, "loads": []}
     if not drawn:
         return parts
     around, above = best(bodies)
     look = scenery(bodies, looking(around, above))
+    seats = {}  # where a joint's symbol sits on its second link and along which axes: none of a ball or a weld
+    for name, joint in bodies.joints.items():
+        pair, sides = PAIRS[joint["type"]], list(enumerate(joint["links"]))
+        sides = sides if pair.crossed else sides[1:] if pair.one_axis or pair.angle else []
+        axes = [{"link": link, "along": _vector(bodies.element(name, side)[1])} for side, link in sides]
+        seats[name] = {"link": joint["links"][1], "at": _vector(bodies.seat(name)), "axes": axes,
+                       "ends": _ends(result, bodies, name)}  # fmt: skip
     return parts | {
         "size": _number(bodies.size), "scaled": bool(bodies.extent), "middle": [_number(n) for n in bodies.middle],
         "view": {"around": around, "above": above, "box": [_number(edge) for edge in look.box]},
         "solids": [solid.data() for solid in look.solids],
         "free": [{"key": key, "link": key.split(".", 1)[0], "at": _vector(at)} for key, at in bodies.free.items()],
-        "seats": {name: _seat(bodies, name) | {"ends": _ends(result, bodies, name)} for name in bodies.joints},
+        "seats": seats,
         "loads": _loads(bodies), "apart": any(bodies.shifts.values()),
     }  # fmt: skip
 
@@ -52,28 +65,6 @@ def _number(value: float) -> float:
 
 def _vector(values: Array) -> list[float]:
     return [_number(float(value)) for value in values]
-
-
-def _pose(result: xr.Dataset, link: str) -> dict[str, Any]:
-    """Place x, y, z (m) and quaternion w, i, j, k."""
-    if link not in names(result, "link"):
-        return {"x": [0.0], "y": [0.0], "z": [0.0], "w": [1.0], "i": [0.0], "j": [0.0], "k": [0.0]}
-    place = {axis: series(column(result, "link_position", link=link, axis=axis)) for axis in "xyz"}
-    turn = {to: series(column(result, "link_rotation", link=link, component=source))
-            for to, source in zip("wijk", "wxyz", strict=True)}  # fmt: skip
-    return place | turn
-
-
-def _seat(bodies: Space, name: str) -> dict[str, Any]:
-    """Where a joint's symbol sits on its second link and along which axis; no axis of a ball, a cross or a weld."""
-    joint = bodies.joints[name]
-    turning = PAIRS[joint["type"]].one_axis or PAIRS[joint["type"]].angle
-    axes = [{"link": joint["links"][1], "along": _vector(bodies.element(name, 1)[1])}] if turning else []
-    if PAIRS[joint["type"]].crossed:
-        axes = [
-            {"link": link, "along": _vector(bodies.element(name, side)[1])} for side, link in enumerate(joint["links"])
-        ]
-    return {"link": joint["links"][1], "at": _vector(bodies.seat(name)), "axes": axes}
 
 
 def _ends(result: xr.Dataset, bodies: Space, name: str) -> list[dict[str, Any]]:

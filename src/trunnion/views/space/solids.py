@@ -9,7 +9,7 @@ browser draw the same list.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -90,7 +90,11 @@ def _body(bodies: Space, link: str) -> list[Solid]:
             shapes.append(Solid("rod", link, route, BAR * bodies.size, link))
     for key, place in bodies.free.items():
         if key.split(".", 1)[0] == link and seats:
-            base = _nearest(place, list(seats.values()), shapes)
+            spots = list(seats.values())  # on the link's rods or at its joints, of which the nearest
+            for start, end in (piece for rod in shapes for piece in pairwise(rod.points)):
+                along = end - start
+                spots.append(start + np.clip((place - start) @ along / (along @ along), 0.0, 1.0) * along)
+            base = spots[int(np.argmin(np.linalg.norm(np.array(spots) - place, axis=1)))]
             shapes.append(_rod(link, base, place, FINE * bodies.size, link))
             shapes.append(Solid("ball", link, place[None], 0.011 * bodies.size, link))
     return shapes
@@ -147,16 +151,6 @@ def _clear(bodies: Space, name: str, side: int, direction: Array) -> Array:
         across = abs(float(direction @ bodies.element(name, side)[1])) < 0.5 * length
         radius = 0.85 * SLEEVE if across else 0.0
     return direction * (radius * bodies.size / length) if length > 3 * radius * bodies.size > 0 else 0.0 * direction
-
-
-def _nearest(place: Array, seats: list[Array], rods: list[Solid]) -> Array:
-    """The place on a link's rods or at its joints that is nearest to a point."""
-    candidates = list(seats)
-    for rod in rods:
-        for start, end in pairwise(rod.points):
-            along = end - start
-            candidates.append(start + np.clip((place - start) @ along / (along @ along), 0.0, 1.0) * along)
-    return min(candidates, key=lambda candidate: float(np.linalg.norm(place - candidate)))
 
 
 def _tree(seats: dict[str, Array]) -> list[tuple[str, str]]:
@@ -248,20 +242,13 @@ def _turning(bodies: Space, name: str) -> list[Solid]:
             near = seat + ((low if side < 0 else high) + side * (HALF + 0.002) * size) * axis
             shapes.append(_rod(links[inner], near, near + side * 0.008 * size * axis, COLLAR * size, links[inner]))
     if pair.threaded:
-        shapes.append(_thread(links[inner], *ends, bodies.element(name, inner)[2], SHAFT * 1.35 * size))
+        # a helix around the shaft; its turns only tell that it is a thread
+        radius, x, whole = SHAFT * 1.35 * size, bodies.element(name, inner)[2], ends[1] - ends[0]
+        turns = max(TURNS, round(float(np.linalg.norm(whole)) / (2.2 * radius)))
+        angle = np.linspace(0, 2 * np.pi * turns, STEPS * turns + 1)[:, None]
+        around = np.cos(angle) * x + np.sin(angle) * np.cross(whole / np.linalg.norm(whole), x)
+        shapes.append(Solid("wire", links[inner], ends[0] + angle / angle[-1] * whole + radius * around))
     return shapes
-
-
-def _thread(link: str, start: Array, end: Array, x: Array, radius: float) -> Solid:
-    """A helix around a shaft; its turns only tell that it is a thread."""
-    length = float(np.linalg.norm(end - start))
-    axis = (end - start) / length
-    turns = max(TURNS, round(length / (2.2 * radius)))
-    angle = np.linspace(0, 2 * np.pi * turns, STEPS * turns + 1)[:, None]
-    points = (
-        start + angle / angle[-1] * (end - start) + radius * (np.cos(angle) * x + np.sin(angle) * np.cross(axis, x))
-    )
-    return Solid("wire", link, points)
 
 
 def _sliding(bodies: Space, name: str) -> list[Solid]:
@@ -434,15 +421,11 @@ def scenery(bodies: Space, camera: Camera | None = None) -> Scenery:
     picked = picked[:: max(1, picked.size // 60)]
     for solid in shapes:
         pose = bodies.poses[solid.link]
-        points = solid.points if solid.kind != "box" else _corners(solid.points)
+        points = solid.points
+        if solid.kind == "box":
+            points = points[0] + np.array(list(product((-1.0, 1.0), repeat=3))) @ points[1:]
         places = np.einsum("ijn,kj->nki", pose.matrix[:, :, picked], points) + pose.origin[:, picked].T[:, None]
         projected = camera.seen(places.reshape(-1, 3))[:, :2]
         corners += [projected.min(axis=0) - solid.radius, projected.max(axis=0) + solid.radius]
     low, high = np.min(corners, axis=0), np.max(corners, axis=0)
     return Scenery(bodies, shapes, camera, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
-
-
-def _corners(points: Array) -> Array:
-    middle, *halves = points
-    signs = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)], dtype=float)
-    return np.asarray(middle + signs @ np.array(halves), dtype=float)

@@ -78,8 +78,8 @@ function errorCharts(scene, kinds) {
     const series = built.worst.map(({ label, values }, order) => ({ label, values: full(values, count), kind: kindOf(order) }));
     list.push({ title: "Position errors, largest", unit: "m", series, marks, note });
   }
-  for (const { label, unit, values, worst } of built.outputs)
-    list.push({ title: `Transmission error, ${label}`, unit, marks, band: worst && { low: full(worst.low, count), high: full(worst.high, count), kind: "k0", label: "worst case of the play, first order" }, note, series: [{ label: "error", values: full(values, count), kind: "k0" }] }); // prettier-ignore
+  for (const { label, unit, values } of built.outputs)
+    list.push({ title: `Transmission error, ${label}`, unit, marks, note, series: [{ label: "error", values: full(values, count), kind: "k0" }] }); // prettier-ignore
   for (const [sign, title] of [["β", "β, between the seats of the ends"], ["ξ", "ξ, direction of the seats"]]) {
     const series = built.angles
       .filter((one) => one.sign === sign)

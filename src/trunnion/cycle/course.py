@@ -183,21 +183,6 @@ class CycleCourse:
         lost = self.status == Status.CONTACT_LOST
         return f"without {self.courses.share(lost):.2g} of the cycle" if np.any(lost) else ""
 
-    def largest(self, name: str) -> float:
-        """The largest magnitude of a variable in sound panels, or a little more."""
-        if name not in self.shapes:
-            return 0.0
-        return float(np.max(np.sum(np.abs(self.picked(name).coefficients[self.sound]), axis=-1), initial=0.0))
-
-    def jumps(self, name: str, *which: int) -> Array:
-        """By how much a number of a variable changes at the end of every panel; to the first one in a period."""
-        row = self._places[name].start + int(np.ravel_multi_index(which, self.shapes[name]))
-        before, after = self.courses.ends(row)
-        after = np.roll(after, -1)
-        if not self.run.cycle.periodic:
-            after[-1] = before[-1]
-        return np.nan_to_num(after - before)
-
     def beside(self, place: Place, status: Status) -> bool:
         """Whether an extreme is at the edge of panels of a status."""
         away = np.minimum(np.abs(self.courses.edges[:-1] - place.time), np.abs(self.courses.edges[1:] - place.time))

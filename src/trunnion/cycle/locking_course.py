@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import pairwise
 from math import floor, isfinite, isnan, log10
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -471,17 +470,6 @@ class LockingCourse:
             place = {"first": first, "count": last - first, "times": [part.low, part.high]}
             rows.append({"state": state, **place, "cells": part.cells(near), "ends": part.ends})
         return {"of": dial.of, "unit": dial.unit.strip(), "positions": len(time), "near": near, "rows": rows}
-
-    def sign_figure(self) -> Figure | None:
-        """Where friction no longer holds the loads that push forward: there the drive effort changes its sign."""
-        ranges = [part for part in self.ranges() if part.state is not None]
-        places = [
-            after.places[0] for before, after in pairwise(ranges) if {before.state, after.state} == HELD_AND_DRIVEN
-        ]
-        if not places:
-            return None
-        where = ", ".join(places[:MOST_PLACES]) + f" and {len(places) - MOST_PLACES} more" * (len(places) > MOST_PLACES)
-        return Figure("drive_effort_sign", f"the drive effort changes sign{centred(self.run, ',')} at", where)
 
     # ---- the margin and the joint that decides ----------------------------------------------------------------
 

@@ -22,7 +22,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.cycle.course import CycleCourse, Means
 from trunnion.cycle.cycle_kernel import Many
 from trunnion.cycle.fill import CONDITIONS
-from trunnion.cycle.findings import of_run
+from trunnion.cycle.model_findings import of_run
 from trunnion.cycle.positions import check_steps, positions
 from trunnion.dynamics.measured import courses_in_time
 from trunnion.errors import Finding, MechanismError, Severity, Status

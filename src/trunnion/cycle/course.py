@@ -38,7 +38,7 @@ from trunnion.solve.system import System
 
 __all__ = [
     "MOST_SUPPOSED", "CycleCourse", "Mean", "Means", "course_of", "followed", "like", "magnitude", "margin_of",
-    "stacked", "unknown",
+    "margin_rows", "stacked", "unknown",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -334,10 +334,14 @@ def _margin(run: Run, method: FrictionMethod) -> CycleCourse:
         back, valid = looking.solved(time)
         status: NDArray[np.integer] = status_of(back, time.shape)
         margin = np.broadcast_to(np.asarray(locking_margin(back), float), time.shape)
-        status = np.where(valid, status, np.maximum(status, Status.CONTACT_LOST))
-        return np.where(np.isfinite(margin) & (status < Status.LOAD_UNDEFINED), margin, np.nan)[None], status
+        return margin_rows(margin, np.where(valid, status, np.maximum(status, Status.CONTACT_LOST)))
 
     return CycleCourse(run, {"locking_margin": ()}, run.courses(look, looking.bends(), MARGINS))
+
+
+def margin_rows(margin: Array, status: NDArray[np.integer]) -> tuple[Array, NDArray[np.integer]]:
+    """The row of the course of a locking margin with its statuses: NaN where it is beyond what is looked for."""
+    return np.where(np.isfinite(margin) & (status < Status.LOAD_UNDEFINED), margin, np.nan)[None], status
 
 
 class _Looking:

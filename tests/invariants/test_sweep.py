@@ -111,6 +111,16 @@ def test_two_names_are_a_grid() -> None:
             np.testing.assert_allclose(found, value, rtol=1e-9, atol=apart, err_msg=f"{key} {length} {coefficient}")
 
 
+@pytest.mark.parametrize("steps", [9, 48])  # each point by itself, and in one pass
+def test_a_locking_margin_does_not_depend_on_steps(steps: int) -> None:
+    """The least over the cycle, as `analyse` has it of a mechanism with the point's number."""
+    mechanism, arms = read("elliptic-trammel"), ["80 mm", "95 mm"]
+    swept = trunnion.sweep(mechanism, {"a": arms}, steps, margin=True)
+    for arm, margin in zip(arms, swept["locking_margin"].values, strict=True):
+        summary = trunnion.analyse(mechanism.with_values({"a": arm}), 360).trunnion.summary
+        assert [margin] == pytest.approx([row.value for row in summary if row.name == "locking_margin"], rel=1e-6)
+
+
 # of every kind: dyads, class III, Newton in space, closed form in space; with points that lock or cannot be assembled
 TOGETHER: dict[str, Values] = {
     "durango-fourbar": {"AB": ["1.6 m", "2.6 m", "2.2 m"], "joint_defaults.friction.coefficient": [0.0, 0.3, 2.0]},

@@ -63,8 +63,6 @@ def test_a_crank_holds_its_load_inside_the_friction_circle() -> None:
     ends = [0.0, limit, np.pi / 2, np.pi - limit, 2.5]  # s, at 1 rad/s
     np.testing.assert_allclose([part.low for part in ranges], ends[:-1], atol=1e-7)
     np.testing.assert_allclose([part.high for part in ranges], ends[1:], atol=1e-7)
-    (sign,) = [one for one in report_figures(prepare(hoist())) if one.name == "drive_effort_sign"]
-    assert sign.value == f"{np.degrees(ends[3]):.2f}°"
 
 
 def test_friction_that_holds_the_load_is_that_whose_circle_its_arm_touches() -> None:
@@ -240,7 +238,7 @@ def test_effort_to_open_a_clamp_past_its_dead_centre(share: float) -> None:
 
 
 def test_a_return_spring_that_supplies_work_leaves_no_efficiency() -> None:
-    """Work of a spring that is not useful is not that of the useful loads; what it keeps at the end is told."""
+    """Work of a spring that is not useful is not that of the useful loads."""
     data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
     data["drivers"]["A"]["range"] = [0.2, 1.2]
     bare = prepare(Mechanism(**data))
@@ -251,8 +249,6 @@ def test_a_return_spring_that_supplies_work_leaves_no_efficiency() -> None:
     run = prepare(sprung)
     (row,) = [one for one in report_figures(run) if one.name == "efficiency_reverse"]
     assert (row.value, row.note) == (None, "springs supply work too")
-    (told,) = [one for one in trunnion.analyse(sprung, 30).trunnion.findings if one.code == "spring.stores"]
-    assert told.figures["stored"] == pytest.approx(0.05 * (1.2**2 - 0.2**2), rel=1e-9)
 
 
 def test_a_short_range_ends_where_the_loads_cease_to_push() -> None:

@@ -38,7 +38,7 @@ from trunnion.solve.system import System
 
 __all__ = [
     "MOST_SUPPOSED", "CycleCourse", "Mean", "Means", "course_of", "followed", "like", "magnitude", "margin_of",
-    "stacked", "unknown",
+    "margin_rows", "stacked", "unknown",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -182,21 +182,6 @@ class CycleCourse:
         """Of how much of the cycle a figure is, where a pin loses contact in the rest; empty where it does nowhere."""
         lost = self.status == Status.CONTACT_LOST
         return f"without {self.courses.share(lost):.2g} of the cycle" if np.any(lost) else ""
-
-    def largest(self, name: str) -> float:
-        """The largest magnitude of a variable in sound panels, or a little more."""
-        if name not in self.shapes:
-            return 0.0
-        return float(np.max(np.sum(np.abs(self.picked(name).coefficients[self.sound]), axis=-1), initial=0.0))
-
-    def jumps(self, name: str, *which: int) -> Array:
-        """By how much a number of a variable changes at the end of every panel; to the first one in a period."""
-        row = self._places[name].start + int(np.ravel_multi_index(which, self.shapes[name]))
-        before, after = self.courses.ends(row)
-        after = np.roll(after, -1)
-        if not self.run.cycle.periodic:
-            after[-1] = before[-1]
-        return np.nan_to_num(after - before)
 
     def beside(self, place: Place, status: Status) -> bool:
         """Whether an extreme is at the edge of panels of a status."""
@@ -349,10 +334,14 @@ def _margin(run: Run, method: FrictionMethod) -> CycleCourse:
         back, valid = looking.solved(time)
         status: NDArray[np.integer] = status_of(back, time.shape)
         margin = np.broadcast_to(np.asarray(locking_margin(back), float), time.shape)
-        status = np.where(valid, status, np.maximum(status, Status.CONTACT_LOST))
-        return np.where(np.isfinite(margin) & (status < Status.LOAD_UNDEFINED), margin, np.nan)[None], status
+        return margin_rows(margin, np.where(valid, status, np.maximum(status, Status.CONTACT_LOST)))
 
     return CycleCourse(run, {"locking_margin": ()}, run.courses(look, looking.bends(), MARGINS))
+
+
+def margin_rows(margin: Array, status: NDArray[np.integer]) -> tuple[Array, NDArray[np.integer]]:
+    """The row of the course of a locking margin with its statuses: NaN where it is beyond what is looked for."""
+    return np.where(np.isfinite(margin) & (status < Status.LOAD_UNDEFINED), margin, np.nan)[None], status
 
 
 class _Looking:

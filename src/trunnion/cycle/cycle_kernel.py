@@ -5,17 +5,17 @@ What is written of one walk into the arrays of a result is recorded once and run
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Accuracy, Courses
+from trunnion.algebra.course import Accuracy, Courses, Solve
 from trunnion.algebra.namespace import Number
 from trunnion.cycle.causes import Causes
-from trunnion.cycle.course import CycleCourse, followed, like, stacked
+from trunnion.cycle.course import CycleCourse, followed, like, margin_rows, stacked
 from trunnion.cycle.fill import (
     COMPARED,
     CONDITIONS,
@@ -33,7 +33,7 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
-from trunnion.solve.switches import Mechanisms, accuracy_of, bends, breaks_between
+from trunnion.solve.switches import MARGINS, Mechanisms, accuracy_of, bends, breaks_between
 from trunnion.solve.system import Values
 from trunnion.solve.walk_kernel import Figure, WalkKernel
 
@@ -264,12 +264,34 @@ class Many:
             shapes.update(again)
             return rows, arrays["status"]
 
+        solved = self._resolved(look, of, without, Accuracy(), lambda sizes: like(self.run, shapes, sizes))
+        return [CycleCourse(self.run, shapes, item) for item in solved]
+
+    def margins(self, of: Mechanisms, method: FrictionMethod) -> list[CycleCourse]:
+        """The courses of the locking margins of some mechanisms; see `margin_of`."""
+
+        def look(mechanism: NDArray[np.intp], time: NDArray[np.float64]) -> tuple[Any, Any]:
+            shape = (1, time.size) if len(of.cycles) == 1 else time.shape
+            arrays = self.arrays(of.picked(mechanism), of.lanes(time), shape, ("locking_margin",), method)
+            margin, status = (arrays[name].reshape(time.shape) for name in ("locking_margin", "status"))
+            return margin_rows(margin, status.astype(np.intp))
+
+        solved = self._resolved(look, of, None, MARGINS)
+        return [CycleCourse(self.run, {"locking_margin": ()}, item) for item in solved]
+
+    def _resolved(
+        self,
+        look: Solve,
+        of: Mechanisms,
+        without: Mechanisms | None,
+        accuracy: Accuracy,
+        sizes: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
+    ) -> list[Courses]:
+        """Courses of some mechanisms between the places where they, or the same without errors, switch."""
         every = [bends(item) for item in (of, without) if item is not None]
         breaks = [
             breaks_between(cycle, np.concatenate(breaks_each))
             for cycle, *breaks_each in zip(of.cycles, *every, strict=True)
         ]
-        accuracy = accuracy_of(self.run.cycle, Accuracy())
         with np.errstate(all="ignore"):
-            solved = Courses.many(look, breaks, lambda sizes: like(self.run, shapes, sizes), accuracy)
-        return [CycleCourse(self.run, shapes, item) for item in solved]
+            return Courses.many(look, breaks, sizes, accuracy_of(self.run.cycle, accuracy))

@@ -14,56 +14,36 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Courses, Place
+from trunnion.algebra.course import Courses
 from trunnion.algebra.dual import primal
 from trunnion.cycle import contact_loss
 from trunnion.cycle.course import CycleCourse, Means, course_of, magnitude
 from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
+from trunnion.cycle.model_findings import far_hints, of_run
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import scales_of
-from trunnion.errors import Finding, Severity, Status, agreeing
-from trunnion.joints.pairs import PAIRS
-from trunnion.model.joint_parts import clearance
+from trunnion.errors import Finding, Status, agreeing
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.parts import AT
-from trunnion.model.quantity import Quantity
-from trunnion.model.tolerances import tolerated
-from trunnion.model.units import KINDS
-from trunnion.results.quantities import between, quantity, readable
+from trunnion.results.quantities import between, readable
 from trunnion.solve import loads
-from trunnion.solve.assembly import grid
-from trunnion.solve.drawn import hinted_at
 from trunnion.solve.end_loads import NO_LOAD, EndLoads, plain
-from trunnion.solve.forward import start
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
 from trunnion.solve.margin import margin_in
 from trunnion.solve.seating import ROUNDS as SEAT_ROUNDS
 from trunnion.solve.seating import UNSETTLED, Seating, seating_of
-from trunnion.solve.space.determinacy import spins_of
 from trunnion.solve.system import System, felt, rubbing
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = [
-    "Cycle",
-    "beside_the_drive",
-    "effort_units",
-    "findings",
-    "listed",
-    "model_notes",
-    "of_run",
-    "shared_dimensions",
-]
+__all__ = ["Cycle", "beside_the_drive", "effort_units", "findings", "listed"]
 
 Array = NDArray[np.float64]
 RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
-FAR = 1.0  # of the size: a hint farther off than this was meant for other lengths
 MEETS = 1e-6  # of its largest length: a spring that is no longer has its ends in one place
 CLASS_TWO = 2
 NEXT = 1e-3  # of the multiple at which one group locks: another that locks at less is told beside it
 NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effort that is less is no finding
-MUCH = 0.02  # of the drive work: what a spring keeps at the end of a range
 LEAST = 0.01  # of the drive work: what supplies less is not worth a word
 RESOLVED = 1e-7  # of its largest value: a resistance that is below 0 by less is 0, for so well its course is known
 ROUNDED = 1e-6  # beside its error: an efficiency is above 1 by more, for seats settle to as much of their clearance
@@ -71,10 +51,6 @@ MOST_PLACES = 8  # named in one sentence
 WITHIN = 17  # times at which a range that locks between the positions is looked at, with its ends
 APART = 2e-3  # of the cycle: times of lifting off that are nearer to each other are told as one
 ENDS = ("", " (end 1)", " (end 2)", " (along its axis)")  # by the place of an end
-JUMP = 0.2  # of the largest effort: what changes by more at a break jumps there
-ALIKE = 0.5  # of a jump: another that differs by less may be the same elsewhere
-NEAR = 1 / 8  # of the cycle: how far a jump is moved at most
-ZERO_INERTIA = Quantity(0, KINDS["moment of inertia"])
 
 
 @dataclass(frozen=True)
@@ -134,115 +110,12 @@ def findings(cycle: Cycle) -> list[Finding]:
 
 def _of_the_model(cycle: Cycle) -> list[Finding]:
     """What the model says that this analysis leaves out, how it was assembled, and what statics leaves open."""
-    return of_run(cycle.run, cycle.run.once("far hints", lambda: list(_far_hints(cycle.run))))
-
-
-def of_run(run: Run, hints: Sequence[Finding] = (), notes: bool = True) -> list[Finding]:
-    """What there is to say before any position is solved. hints: on how it is assembled; notes: of the model, too."""
-    model = run.once("notes", lambda: model_notes(run.system.mechanism, run.system))
-    graver = [finding for finding in model if notes or finding.severity is not Severity.NOTE]
-    return [*graver, *run.chosen.findings, *hints, *(run.determinacy.findings() if run.determinacy else [])]
-
-
-def _far_hints(run: Run) -> Iterator[Finding]:
-    """Hints of places that are far from where their points are then: they choose an assembly by chance."""
-    size = float(np.ravel(primal(run.system.size(run.values)))[0])
-    times = grid(run.cycle)
-    lane = hinted_at(start(run.system, run.values), times)
-    walk, when = run.walk(times[lane : lane + 1]), f"with {AT} at its place" if lane else "at the start"
-    spins = [(members, ends) for _, (_, *ends), members in spins_of(run.system)]
-    for name, hint in run.system.mechanism.assembly.items():
-        if not isinstance(hint, tuple):
-            continue
-        link, _, point = name.rpartition(".")
-        link = link or run.system.joints[name][1][1]
-        if any(link in members and point not in ends for members, ends in spins):
-            continue  # it may be anywhere about the line
-        place = [float(np.ravel(primal(part))[0]) for part in walk.point(link, point).place]
-        numbers = [float(run.values[f"assembly.{name}.{axis}"]) for axis in "xyz"[: len(place)]]
-        distance = float(np.linalg.norm(np.subtract(place, numbers)))
-        if distance > FAR * size:
-            words = ", ".join(quantity(part, "m") for part in place)
-            what = f"the hint for {name} is {readable(distance, 'm')} from where {name} is {when}"
-            remedy = f"check the hint or the lengths; {when} it is at {words}"
-            figures = {"point": name, "distance": distance, "place": words}
-            yield Finding.warning("assembly.far_hint", f"assembly.{name}", what, remedy, **figures)
+    return of_run(cycle.run, cycle.run.once("far hints", lambda: list(far_hints(cycle.run))))
 
 
 def effort_units(system: System) -> list[str]:
     """Unit of every driver's effort."""
     return ["N m" if system.turns(name) else "N" for name in system.mechanism.drivers]
-
-
-def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
-    """What the model says that this analysis leaves out, and warnings about the data."""
-    notes = list(mechanism.checked)
-    values = mechanism.parameters()
-    play = {name: clearance(name, values) for name in mechanism.effective_joints if name not in mechanism.seated}
-    playing = [name for name, gap in play.items() if gap is not None and gap > 0]
-    bodies = {name: link for name, link in mechanism.effective_links.items() if name != mechanism.fixed_link}
-    heavy = [name for name, link in bodies.items() if link.mass.source != 0]
-    if heavy and mechanism.gravity is None:
-        down, none = ("[0, -9.81]", "[0, 0]") if mechanism.space == "planar" else ("[0, 0, -9.81]", "[0, 0, 0]")
-        what = f"gravity is not stated and taken as zero, although {', '.join(heavy)} have mass"
-        remedy = f"state gravity: {down}, or gravity: {none}"
-        notes.append(Finding.note("model.gravity", "gravity", what, remedy, links=heavy))
-    if not heavy and any(part.source != 0 for part in mechanism.gravity or ()):
-        what = "has no effect: no link has a mass"
-        remedy = "state mass: … and centre: … of the links, or no gravity"
-        notes.append(Finding.note("model.no_mass", "gravity", what, remedy))
-    sliding = {link for joint in mechanism.joints.values() if PAIRS[joint.type].guided for link in joint.links}
-    points = [name for name in heavy if bodies[name].inertia == ZERO_INERTIA and name not in sliding]
-    if points:
-        what = f"{', '.join(points)} have a mass but no inertia: each is a point mass at its centre"
-        notes.append(Finding.note("model.point_mass", "links", what, "state inertia: …", links=points))
-    tight = [
-        name
-        for name, joint in mechanism.effective_joints.items()
-        if joint.seat not in (None, "free")
-        and play.get(name) is not None
-        and f"joints.{name}.pin.hole_radius" in values
-    ]
-    if tight:
-        what = f"{', '.join(tight)} have a seat but no play at nominal size: these joints are ideal"
-        remedy = "analyse with --set fits=maximum for the largest play"
-        notes.append(Finding.note("model.seat_without_play", "joints", what, remedy, joints=tight))
-    if playing:
-        # no seats are taken where links are over-constrained
-        redundant_joints = {name for module in system.plan.modules if module.redundant for name in module.joints}
-        seatable = [name for name in playing if name not in redundant_joints]
-        of = f" of {', '.join(seatable)}" if len(seatable) < len(playing) else ", or analyse with --seat loaded"
-        remedy = f"for pins pressed to one side by their loads state seat: loaded{of}"
-        if not seatable:
-            remedy = "see `trunnion play` for the effect of the play, `trunnion assemble` for whether the links fit "
-            remedy += "together"
-        what = f"the pins of {', '.join(playing)} are at the middle of their play"
-        notes.append(Finding.note("model.play_centred", "joints", what, remedy, joints=playing, seatable=seatable))
-    return notes
-
-
-def shared_dimensions(mechanism: Mechanism) -> Iterator[Finding]:
-    """Of each toleranced dimension that alone sets points of more than one link: as one they vary together, as parts do
-    not.
-
-    Where it stands beside other dimensions, as the radius of a roller between two links does, it is one part's own.
-    """
-    placed = [
-        (path, entry.depends)
-        for path, entry in mechanism.parameter_set.entries.items()
-        if path.startswith("links.") and ".points." in path
-    ]
-    for tolerance in tolerated(mechanism):
-        used = [path for path, depends in placed if depends == (tolerance.path,)]
-        links = list(dict.fromkeys(path.split(".")[1] for path in used))
-        if tolerance.path.startswith("dimensions.") and len(links) > 1:
-            name = tolerance.path.removeprefix("dimensions.")
-            names = [path.removeprefix("links.").replace(".points.", ".") for path in used]
-            more = f" and {len(names) - MOST_PLACES} more" if len(names) > MOST_PLACES else ""
-            what = f"one tolerance sets points of {', '.join(links)} ({', '.join(names[:MOST_PLACES])}{more}): these "
-            what += "links deviate together, by the same amount"
-            remedy = "if the links are made separately, give each a dimension of its own with its own tolerance"
-            yield Finding.note("tolerance.shared_dimension", tolerance.path, what, remedy, name=name, links=links)
 
 
 # ---- assembly, locking and singular positions -----------------------------------------------------------------
@@ -578,13 +451,12 @@ def beside_the_drive(mechanism: Mechanism) -> list[str]:
 
 
 def _uncounted_work(cycle: Cycle) -> Iterator[Finding]:
-    """A warning of an efficiency above 1, with the work of each source beside the drives; else notes of springs that
-    keep work at the end of a range, and of loads that act beside the drive and supply work."""
-    run, means, mechanism = cycle.run, cycle.at.means, cycle.mechanism
-    on_drive, useful = beside_the_drive(mechanism), useful_springs(mechanism)
-    storing = [name for name in mechanism.springs if name not in useful] if not run.cycle.periodic else []
+    """A warning of an efficiency above 1, with the work of each source beside the drives; else notes of loads that act
+    beside the drive and supply work."""
+    run, means = cycle.run, cycle.at.means
+    on_drive = beside_the_drive(cycle.mechanism)
     above = means.efficiency > 1 + ROUNDED + means.efficiency_error
-    if not (above or on_drive or storing) or run.cycle.duration <= 0 or not np.isfinite(means.drive_power.value):
+    if not (above or on_drive) or run.cycle.duration <= 0 or not np.isfinite(means.drive_power.value):
         return
     drive = means.drive_power.net * run.cycle.duration
     every = _work(cycle, means)
@@ -598,12 +470,6 @@ def _uncounted_work(cycle: Cycle) -> Iterator[Finding]:
         figures = {"efficiency": means.efficiency, "drive": drive, "work": work}
         yield Finding.warning("efficiency.above_one", "", what, remedy, **figures)
         return
-    for name in storing:
-        if (stored := -every[f"spring {name}"]) > MUCH * drive > 0:
-            what = f"at the end of the range it has stored {readable(stored, 'J')} of the {readable(drive, 'J')} that "
-            what += "the drive supplies; the efficiency counts them as lost"
-            remedy = "mark it useful: true if it stands for the work"
-            yield Finding.note("spring.stores", f"springs.{name}", what, remedy, stored=stored, drive=drive)
     for name in on_drive:
         if (supplied := work.get(f"load {name}")) is not None:
             what = f"beside the drive, which supplies {readable(drive, 'J')}, this load supplies "
@@ -753,67 +619,8 @@ def _joined(spans: Sequence[tuple[float, float]], apart: float) -> list[tuple[fl
     return joined
 
 
-def _moved_jumps(cycle: Cycle) -> Iterator[Finding]:
-    """Changes of efforts by the errors that are a jump at another place; and the largest change elsewhere."""
-    if cycle.course is None or not cycle.run.erring:
-        return
-    course, edges, units = cycle.course, cycle.course.courses.edges, effort_units(cycle.run.system)
-    for i, (name, unit) in enumerate(zip(cycle.mechanism.drivers, units, strict=True)):
-        jumps = course.jumps("drive_effort", i)
-        without = jumps - course.jumps("drive_effort_change", i)
-        left = course.sound.copy()
-        tops = []
-        for built, meant in _moved(jumps, without, JUMP * course.largest("drive_effort"), edges):
-            between = _between(built, meant, len(left))
-            left[between] = False
-            inside = np.isin(np.arange(len(left)), between) & course.sound
-            top = course.extreme("drive_effort_change", i, of=magnitude, panels=inside)
-            if top is not None:
-                tops.append((top, built, meant))
-        if tops:
-            top, built, meant = max(tops, key=lambda top: top[0].value)
-            rest = course.extreme("drive_effort_change", i, of=magnitude, panels=left)
-            places = [course.told(Place(0.0, float(edges[k + 1]))) for k in (built, meant)]
-            what = f"the change by the errors at {course.told(top).removeprefix('at ')} is that of a jump whose place "
-            what += f"they move: with them it is {places[0]}, without them {places[1]}; elsewhere the effort changes "
-            what += f"by at most {readable(rest.value if rest else 0.0, unit)}"
-            remedy = "compare the extremes with and without errors, not single positions beside the jump"
-            figures = {
-                "at": course.told(top).removeprefix("at "),
-                "built": places[0],
-                "meant": places[1],
-                "rest": rest.value if rest else 0.0,
-                "unit": unit,
-            }
-            yield Finding.note("errors.jump_moved", f"drivers.{name}", what, remedy, **figures)
-
-
-def _moved(jumps: Array, without: Array, least: float, edges: Array) -> Iterator[tuple[int, int]]:
-    """Numbers of edges, of a jump of the mechanism with errors and of that without to which it belongs."""
-    alone = [
-        np.flatnonzero((np.abs(mine) > least) & (np.abs(other) < ALIKE * np.abs(mine)))
-        for mine, other in ((jumps, without), (without, jumps))
-    ]
-    span = edges[-1] - edges[0]
-    for built in alone[0]:
-        away = np.abs(edges[1:][alone[1]] - edges[1:][built])
-        away = np.minimum(away, span - away)
-        same = np.abs(without[alone[1]] - jumps[built]) < ALIKE * np.abs(jumps[built])
-        away = np.where(same, away, np.inf)
-        if np.min(away, initial=np.inf) < NEAR * span:
-            yield int(built), int(alone[1][np.argmin(away)])
-
-
-def _between(start: int, other: int, count: int) -> NDArray[np.intp]:
-    """Panels between two edges, each of which ends the panel of its number, the shorter way round."""
-    ways = [
-        np.arange(low + 1, low + 1 + (high - low) % count) % count for low, high in ((start, other), (other, start))
-    ]
-    return min(ways, key=len)
-
-
 QUESTIONS: tuple[Callable[[Cycle], Iterable[Finding]], ...] = (
     _of_the_model, _not_assembled, _undecided_senses, _singular, _undefined, _locked, _badly_solved, _resting,
-    _ranges, _no_common_period, _driving_resistances, _springs, _slack, _idle_loads, _beside_gaps, _moved_jumps,
+    _ranges, _no_common_period, _driving_resistances, _springs, _slack, _idle_loads, _beside_gaps,
     _uncounted_work, _lost_contacts,
 )  # fmt: skip

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.findings import Cycle, findings, shared_dimensions
+from trunnion.cycle.findings import Cycle, findings
+from trunnion.cycle.model_findings import shared_dimensions
 from trunnion.cycle.positions import positions
 from trunnion.cycle.scene import pitch_circles
 from trunnion.errors import Finding, MechanismError, Severity

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.cycle.analyse import analyse_run
-from trunnion.cycle.findings import beside_the_drive
 from trunnion.cycle.locking_course import (
     HELD_AND_DRIVEN,
     NEAR,
@@ -21,7 +20,7 @@ from trunnion.cycle.locking_course import (
 )  # fmt: skip
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import member_units
-from trunnion.errors import Finding, MechanismError, Status, agreeing
+from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, codes, encoded, finding_rows
@@ -123,16 +122,6 @@ def _notes(run: Run) -> list[Finding]:
         what += "where it locks forward; all else is of pins in the middle of their play: the other states and their "
         what += "ranges, the motion backward, critical multiples of single joints"
         notes.append(Finding.note("locking.pins_centred", "joints", what, joints=[seat.joint for seat in run.seats]))
-    mechanism = run.system.mechanism
-    on_drive = beside_the_drive(mechanism) if rubbing(run.system) else []
-    if on_drive:
-        what = f"{', '.join(on_drive)} {agreeing(len(on_drive), 'acts', 'act')} on a driven link beside the drive and "
-        what += f"{agreeing(len(on_drive), 'is', 'are')} not useful: backward "
-        what += f"{agreeing(len(on_drive), 'it acts', 'they act')} too, which moves the ranges"
-        remedy = "leave out a load that stands for the drive itself, such as the force of a hand"
-        notes.append(
-            Finding.note("locking.load_beside_drive", "loads", what, remedy, loads=on_drive, count=len(on_drive))
-        )
     return notes
 
 
@@ -149,7 +138,6 @@ def report_figures(run: Run) -> list[Figure]:
     figures = [
         course.margin_figure(f"locking margin{what}", ""),
         *course.critical_figures(),
-        course.sign_figure(),
         *course.holding_figures(),
         *course.reversing_figures(),
         course.reverse_figure() or none,

@@ -10,14 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import pairwise
 from math import floor, isfinite, isnan, log10
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Accuracy, Courses
+from trunnion.algebra.course import Accuracy, Courses, Place
 from trunnion.algebra.dual import primal
 from trunnion.algebra.panels import CANCELLED
 from trunnion.algebra.roots import root
@@ -44,7 +43,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "HEAD", "HELD_AND_DRIVEN", "NEAR", "NO_MARGIN", "LockingCourse", "LockingRange", "LockingState", "Passage",
-    "critical_figure", "critical_multiples", "holding_multiples", "locking_course", "locks", "multiples_at", "passed",
+    "critical_figure", "critical_multiples", "holding_multiples", "least_margin", "locking_course", "locks",
+    "multiples_at", "passed",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -207,6 +207,11 @@ def multiples_at(run: Run, time: Array, most: float) -> dict[str, Array]:
 def multiple_of(rows: Array) -> Array:
     """A multiple of friction, which is 0 at least: polynomials through its values pass that by their tolerance."""
     return np.asarray(np.maximum(rows[0], 0.0))
+
+
+def least_margin(course: CycleCourse) -> Place | None:
+    """Where the locking margin of a course is the least; None where it is beyond what was looked for."""
+    return course.extreme("locking_margin", of=multiple_of, sign=-1.0, panels=course.valid)
 
 
 def _alone(problem: FrictionProblem, masks: NDArray[np.bool_], most: float) -> Array:
@@ -472,17 +477,6 @@ class LockingCourse:
             rows.append({"state": state, **place, "cells": part.cells(near), "ends": part.ends})
         return {"of": dial.of, "unit": dial.unit.strip(), "positions": len(time), "near": near, "rows": rows}
 
-    def sign_figure(self) -> Figure | None:
-        """Where friction no longer holds the loads that push forward: there the drive effort changes its sign."""
-        ranges = [part for part in self.ranges() if part.state is not None]
-        places = [
-            after.places[0] for before, after in pairwise(ranges) if {before.state, after.state} == HELD_AND_DRIVEN
-        ]
-        if not places:
-            return None
-        where = ", ".join(places[:MOST_PLACES]) + f" and {len(places) - MOST_PLACES} more" * (len(places) > MOST_PLACES)
-        return Figure("drive_effort_sign", f"the drive effort changes sign{centred(self.run, ',')} at", where)
-
     # ---- the margin and the joint that decides ----------------------------------------------------------------
 
     @cached_property
@@ -495,7 +489,7 @@ class LockingCourse:
         name, margins = "locking_margin", self.margins
         if margins is None:
             return None
-        least = margins.extreme(name, of=multiple_of, sign=-1.0, panels=margins.valid)
+        least = least_margin(margins)
         if least is not None:
             return Figure(name, subject, least.value, aspect="minimum", place=margins.told(least), note=note)
         if np.any(margins.valid & (margins.status < Status.LOAD_UNDEFINED)):
@@ -511,7 +505,7 @@ class LockingCourse:
         margins = self.margins
         if margins is None:
             return None
-        least = margins.extreme("locking_margin", of=multiple_of, sign=-1.0, panels=margins.valid)
+        least = least_margin(margins)
         if least is None:
             return None
         time = np.array([margins.side(least, "locking_margin", -1.0)])

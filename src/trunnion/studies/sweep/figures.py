@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Place
 from trunnion.cycle.course import CycleCourse, Means, magnitude
+from trunnion.cycle.locking_course import least_margin
 from trunnion.errors import Finding, MechanismError, Status, agreeing
 from trunnion.joints.pairs import PAIRS
 from trunnion.measures.measures import Measure, named
@@ -56,24 +57,27 @@ FIGURES: dict[str, Variable] = {
 Reduced = dict[str, Any]
 
 
-def reduced(arrays: Arrays, course: CycleCourse | None, ideal: Means | None, system: System) -> Reduced:
+def reduced(
+    arrays: Arrays, course: CycleCourse | None, ideal: Means | None, margin: CycleCourse | None, system: System
+) -> Reduced:
     """The figures of FIGURES of one cycle; numbers, or rows over drivers or joints.
 
-    arrays: over positions, by the names of `results.VARIABLES`: status, and locking_margin if it was looked for;
-    course: over the cycle, None where a position has no answer; ideal: means of the mechanism without errors, None if
-    it has none.
+    arrays: over positions, by the names of `results.VARIABLES`, the status among them; course: over the cycle, None
+    where a position has no answer; ideal: means of the mechanism without errors, None if it has none; margin: that of
+    the locking margin, if it was looked for.
     """
     status = arrays["status"]
     missing = int(np.count_nonzero(status >= Status.NOT_CONVERGED))
     figures: Reduced = {"status": int(np.max(status)), "without_answer": missing}
     figures["not_valid"] = int(np.count_nonzero(status == Status.CONTACT_LOST))
-    if "locking_margin" in arrays:
-        valid = status != Status.CONTACT_LOST
-        figures["locking_margin"] = float(np.min(arrays["locking_margin"][valid], initial=np.inf))
+    if margin is not None:
+        least, answered = least_margin(margin), np.all(status < Status.LOAD_UNDEFINED)
+        figures["locking_margin"] = np.nan if not answered else np.inf if least is None else least.value
     if ideal:
         figures["efficiency_ideal"] = ideal.efficiency
     if missing or course is None or not np.any(course.sound):  # contact is lost everywhere
         return figures
+    figures["status"] = max(figures["status"], int(np.max(course.status)))  # it may lock between two positions
     means = course.means
     joints, drivers = range(len(system.joints)), range(len(system.mechanism.drivers))
     if ideal:

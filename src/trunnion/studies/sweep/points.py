@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.cycle.course import CycleCourse, Means
+from trunnion.cycle.course import CycleCourse, margin_of
 from trunnion.cycle.cycle_kernel import Many
 from trunnion.cycle.fill import CONDITIONS
-from trunnion.cycle.findings import of_run
+from trunnion.cycle.model_findings import of_run
 from trunnion.cycle.positions import check_steps, positions
 from trunnion.dynamics.measured import courses_in_time
 from trunnion.errors import Finding, MechanismError, Severity, Status
@@ -51,7 +51,6 @@ FEWEST = 24  # positions on which a change point between them shows
 PROBES = 24  # values of a name at which a mechanism of its own is looked at
 PROBES_FOLLOWED = 5  # the same with groups that are followed, which takes long
 SAME = 1e-6  # of a figure: what two ways to the same assembly may differ by
-WANTED = ("locking_margin",)
 Array = NDArray[np.float64]
 Index = tuple[int, ...]
 
@@ -121,8 +120,9 @@ class Points:
     def _alone(self, index: Index, run: Run | None = None) -> Reduced:
         run = run or (self._prepared(index) if any(index) else self.run)
         with named(self.swept, index):
-            cycle = positions(run, self.steps, self.method, margin=self.margin)
-        return self._reduced(cycle.arrays, cycle.course, cycle.ideal)
+            cycle = positions(run, self.steps, self.method, margin=False)
+            margin = margin_of(run, _with_margin(self.method)) if self.margin else None
+        return reduced(cycle.arrays, cycle.course, cycle.ideal, margin, run.system)
 
     def measured(self, index: Index, names: Sequence[str]) -> dict[str, float]:
         """Figures of measures at a point."""
@@ -133,12 +133,6 @@ class Points:
             of_cycle = [measure for measure in measures if not measure.in_time]
             figures = figures_of(run, of_cycle, self.method) if of_cycle else {}
             return figures | {name: float(np.ravel(parts[0])[0]) for name, parts in timed.items()}
-
-    def _reduced(self, arrays: Mapping[str, Array], course: CycleCourse | None, ideal: Means | None) -> Reduced:
-        kept_arrays = (
-            arrays if self.margin else {key: array for key, array in arrays.items() if key != "locking_margin"}
-        )
-        return reduced(kept_arrays, course, ideal, self.run.system)
 
     # ---- in one pass ------------------------------------------------------------------------------------------
 
@@ -212,24 +206,25 @@ class Points:
         cycles = self._cycles(points, values)
         time = np.array([cycle.times(self.steps) for cycle in cycles])
         time = time[0] if np.all(time == time[0]) else time
-        method = _with_margin(self.method) if self.margin else self.method
         errs = _differ(values, ideal_values, len(points))
         self.erring = self.erring or bool(errs.any())
         with np.errstate(all="ignore"):
             ours = _as_chosen(run, values, len(points))
             meant = ideal_values if errs.any() else None
-            arrays, ideal = self._many.filled(values, meant, time, shape, WANTED, method, self.method)
+            arrays, ideal = self._many.filled(values, meant, time, shape, (), self.method, self.method)
             ours &= ~_may_change(run.system, arrays[CONDITIONS], run.cycle.periodic)
             if self._followed:
                 ours &= np.all(arrays["status"] != Status.NOT_ASSEMBLED, axis=1)
             answered = ours & _answered(arrays)
             courses = self._courses(values, meant, cycles, answered)
+            margins = self._margins(values, cycles, ours) if self.margin else {}
             likes = self._courses(ideal_values, None, cycles, ours & errs & _answered(ideal)) if errs.any() else {}
         figures: list[Reduced | None] = []
         for i in range(len(points)):
             rows = {name: array[..., i, :] for name, array in arrays.items()}
             meant_means = likes[i].means if i in likes else None
-            figures.append(self._reduced(rows, courses.get(i), meant_means) if ours[i] else None)
+            parts = rows, courses.get(i), meant_means, margins.get(i), run.system
+            figures.append(reduced(*parts) if ours[i] else None)
         return figures
 
     def _some(self, values: Mapping[str, Number], cycles: Sequence[Cycle], rows: NDArray[np.intp]) -> Mechanisms:
@@ -251,6 +246,14 @@ class Points:
             return {}
         without = None if ideal is None else self._some(ideal, cycles, rows).values
         courses = self._many.courses(self._some(values, cycles, rows), without, self.method)
+        return dict(zip(rows.tolist(), courses, strict=True))
+
+    def _margins(
+        self, values: Mapping[str, Number], cycles: Sequence[Cycle], lanes_asked: NDArray[np.bool_]
+    ) -> dict[int, CycleCourse]:
+        """The courses of the locking margin of those mechanisms of a batch that are wanted, by their number."""
+        rows = np.flatnonzero(lanes_asked)
+        courses = self._many.margins(self._some(values, cycles, rows), _with_margin(self.method)) if len(rows) else []
         return dict(zip(rows.tolist(), courses, strict=True))
 
     def _check(self, points: Sequence[Index], values: Mapping[str, Number]) -> None:

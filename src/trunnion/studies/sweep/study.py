@@ -148,8 +148,8 @@ def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iter
         if code.solved or not mask.any():
             continue
         (of, first, figures), missing = _places(swept, mask), int(arrays["without_answer"][mask][0])
-        what = f"{of} {agreeing(figures['points'], 'has', 'have')} no result, {first} "
-        what += f"({counted(missing, 'position')} not solved): {code.text}"
+        where = f"{counted(missing, 'position')} not solved" if missing else "between the positions"
+        what = f"{of} {agreeing(figures['points'], 'has', 'have')} no result, {first} ({where}): {code.text}"
         figures |= {"at": first.removeprefix("the first at "), "positions": missing, "status": code.text}
         yield Finding.error("sweep.no_answer", names, what, remedy, **figures)
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.findings import of_run, shared_dimensions
+from trunnion.cycle.model_findings import of_run, shared_dimensions
 from trunnion.cycle.scales import scales_of
 from trunnion.dynamics.measured import LONGER, not_steady
 from trunnion.errors import Finding, Severity, Status, agreeing, counted

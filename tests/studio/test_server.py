@@ -17,8 +17,9 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+import trunnion
 from served import served as serving
-from studio.asking import EXAMPLES, unpacked
+from studio.asking import EXAMPLES, model_of, unpacked
 
 
 @pytest.fixture(scope="module")
@@ -335,3 +336,17 @@ def test_nobody_else_may_ask(served, how):
     how = {"origin": f"http://127.0.0.1:{served.port}", "Cookie": f"trunnion_studio_{served.port}={served.token}"} | how
     with pytest.raises(InvalidStatus, match="403"):
         socket_of(served, **how)
+
+
+def test_a_dropped_file_of_another_program_becomes_a_model(served, tmp_path) -> None:
+    mechanism = model_of(EXAMPLES["durango-fourbar"])
+    path = tmp_path / "arm.urdf"
+    trunnion.exchange.export_model(mechanism, path, at="60 deg")
+    status, _, content = raw(served, "PUT", "/import/arm.urdf", path.read_bytes())
+    assert status == 200
+    model = model_of(json.loads(content)["text"])
+    assert set(model.links) == set(mechanism.links)
+    status, _, content = raw(served, "PUT", "/import/arm.urdf", b"<robot><link")
+    assert status == 400
+    assert "arm.urdf" in json.loads(content)["error"].lower()
+    assert raw(served, "PUT", "/import/arm.urdf", b"", token=False)[0] == 403

@@ -17,6 +17,7 @@ import logging
 import mimetypes
 import os
 import secrets
+import tempfile
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -32,6 +33,7 @@ from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from trunnion.errors import MechanismError
 from trunnion.files import whole
 from trunnion.studio.jobs import Jobs
 from trunnion.studio.page import document, found, script
@@ -98,6 +100,7 @@ class Studio:
             Route("/files", self._admitted(self._files)),
             Route("/file/{name:path}", self._admitted(self._read)),
             Route("/file/{name:path}", self._admitted(self._write), methods=["PUT"]),
+            Route("/import/{name}", self._admitted(_imported), methods=["PUT"]),
             Route("/jobs", self._admitted(self._jobs)),
             Route("/jobs", self._admitted(self._start), methods=["PUT"]),
             Route("/jobs/{number}", self._admitted(self._stop), methods=["DELETE"]),
@@ -313,6 +316,30 @@ class Studio:
             with contextlib.suppress(WebSocketDisconnect):
                 while (question := await socket.receive())["type"] == "websocket.receive":
                     answering.create_task(tell(question.get("bytes") or (question.get("text") or "").encode()))
+
+
+async def _imported(request: Request) -> Response:
+    """The text of a model made of a dropped file of another program, `{text, says}`."""
+    text, says = await run_in_threadpool(_import, request.path_params["name"], await request.body())
+    return JSONResponse({"text": text, "says": says})
+
+
+def _import(name: str, content: bytes) -> tuple[str, list[str]]:
+    from trunnion.exchange.formats import import_file
+    from trunnion.exchange.model_file import model_text
+
+    with tempfile.TemporaryDirectory(prefix="trunnion-import-") as folder:
+        path = Path(folder) / f"dropped{Path(name).suffix}"
+        path.write_bytes(content)
+        try:
+            draft = import_file(path)
+        except MechanismError as error:
+            why = "; ".join(
+                f"{finding.what}{f' ({finding.remedy})' if finding.remedy else ''}" for finding in error.findings[:3]
+            )
+            raise ValueError(f"{name[:80]} {why}") from None
+    draft.source, draft.name = name, Path(name).stem if draft.name == "dropped" else draft.name
+    return model_text(draft), [f"{finding.where}: {finding.what}" for finding in draft.findings]
 
 
 def _warm(text: str) -> None:

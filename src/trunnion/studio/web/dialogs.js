@@ -5,6 +5,7 @@ import { openFile, openText, save } from "./actions.js";
 import { Examples } from "./gallery.js";
 import { stemOf } from "./geometry.js";
 import { Keys } from "./keysheet.js";
+import { request } from "./socket.js";
 import * as state from "./state.js";
 import { Studies } from "./studies.js";
 import { Button, html } from "./ui.js";
@@ -60,7 +61,11 @@ function Save() {
 /** Open a model from elsewhere. */
 async function openDropped(file) {
   if (/\.(ya?ml|json|txt)$/i.test(file.name)) return openText(await file.text(), `${file.name} opened`);
-  state.say(`${file.name} is no model file: make one of it on the command line, trunnion import ${file.name}.`, true);
+  const reply = await request(`/import/${encodeURIComponent(file.name)}`, { method: "PUT", body: await file.arrayBuffer() });
+  const told = await reply.json().catch(() => ({ error: `${file.name} could not be read.` }));
+  if (told.error) return state.say(told.error, true);
+  await openText(told.text, `${file.name} imported`);
+  state.say(`${file.name} imported. ${told.says.length ? `To look at: ${told.says.slice(0, 3).join("; ")}${told.says.length > 3 ? ` and ${told.says.length - 3} more` : ""}.` : ""}`);
 }
 
 /** Files dropped on the page are opened. */

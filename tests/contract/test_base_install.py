@@ -93,6 +93,7 @@ def ends(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[int, str]]:
     return [(code, told) for code, told in json.loads(done.stdout.splitlines()[-1])]
 
 
+@pytest.mark.slow
 def test_every_verb_works(ends: list[tuple[int, str]]) -> None:
     """Findings about the mechanism (1) are none about the installation."""
     assert {words[0] for words in WORK} | {"studio", "import"} == {one.name for one in VERBS}

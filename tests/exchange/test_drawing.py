@@ -89,6 +89,7 @@ def test_what_is_drawn_comes_back(name: str, tmp_path: Path) -> None:
 TURNED = (four_bar, slider_crank, inverted_slider_crank, watt_six_bar, class_three, scotch_yoke, elliptic_bar)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=8)
 @given(made=st.sampled_from(TURNED), turn=st.floats(-180, 180), shift=st.floats(-10, 10), mirror=st.booleans())
 def test_what_is_drawn_comes_back_in_any_frame(
@@ -110,7 +111,7 @@ def test_what_is_drawn_comes_back_in_any_frame(
             assert abs(read.axis @ pair.axis) == pytest.approx(np.linalg.norm(pair.axis), rel=1e-9)
 
 
-@pytest.mark.spread(1, *QUICK)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", FORCED)
 def test_every_force_polygon_of_the_file_closes_head_to_tail(name: str, tmp_path: Path) -> None:
     mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")

@@ -317,6 +317,8 @@ def saved(document: Any, folder: Path) -> bytes:
     return (folder / "saved.dxf").read_bytes()
 
 
+@pytest.mark.sample(15)
+@pytest.mark.spread(6)
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_a_hostile_file_is_a_sentence_within_seconds(kind: str, tmp_path: Path) -> None:
     path = tmp_path / "hostile.dxf"

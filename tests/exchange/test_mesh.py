@@ -222,6 +222,8 @@ def refused(path: Path) -> None:
     assert len(caught.value.findings) == 1
 
 
+@pytest.mark.sample(15)
+@pytest.mark.spread(5)
 @pytest.mark.parametrize("kind", HOSTILE_3MF)
 def test_a_hostile_3mf_is_a_sentence(kind: str, tmp_path: Path) -> None:
     refused(HOSTILE_3MF[kind](tmp_path))
@@ -280,7 +282,7 @@ def example(name: str) -> Mechanism:
     return trunnion.read(Path("examples") / f"{name}.yaml")
 
 
-@pytest.mark.spread(1, "rssr")
+@pytest.mark.spread(0, "rssr")
 @pytest.mark.parametrize(
     "name", ["durango-fourbar", "scotch-yoke", "jansen", "rssr", "double-cardan", "swash-plate-pump"]
 )
@@ -334,6 +336,7 @@ def test_z_points_up_in_space(tmp_path: Path) -> None:
     np.testing.assert_allclose(Rotation.from_quat(root["rotation"]).apply([0, 0, 1]), [0, 1, 0], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_positions_without_a_solution_are_left_out_and_counted(tmp_path: Path) -> None:
     mechanism = example("durango-fourbar").with_values({"AD": "7.5 m"})  # longest and shortest link are too long
     noted = export_model(mechanism, tmp_path / "out.glb", frames=36)

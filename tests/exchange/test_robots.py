@@ -161,6 +161,7 @@ def test_joints_of_one_body_are_the_pair_that_they_make(kind: str, tmp_path: Pat
 # MuJoCo as the reference
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", ["durango-fourbar", "slider-crank", "rssr", "double-cardan", "rccc", "jansen"])
 def test_inverse_dynamics_of_mujoco_agrees(name: str, tmp_path: Path) -> None:
     """M(q) q̈ + c(q, q̇) of MuJoCo, projected on the velocity, is the drive torque; the loops are closed."""
@@ -241,6 +242,7 @@ def closures(mujoco, model, data) -> np.ndarray:
     return np.vstack(rows)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["slider-crank", "rssr", "double-cardan"])
 def test_the_tree_of_a_urdf_is_what_mujoco_reads(name: str, tmp_path: Path) -> None:
     mujoco = pytest.importorskip("mujoco")
@@ -485,6 +487,7 @@ BOMB = '<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;">]><
 OUTSIDE = '<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]><{0}>&a;</{0}>'
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("suffix", "root"), [(".mjcf", "mujoco"), (".sdf", "sdf"), (".urdf", "robot")])
 def test_hostile_files_are_one_sentence(suffix: str, root: str, tmp_path: Path) -> None:
     name = f"hostile{suffix}"

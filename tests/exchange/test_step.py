@@ -100,6 +100,7 @@ def shapes(split):
     }
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("split", ["seam", "halves", "none"])
 @pytest.mark.parametrize("degrees", [False, True])
 def test_moments_are_exact_for_every_kind_of_face(tmp_path, split, degrees):
@@ -142,6 +143,7 @@ def test_edges_that_are_splines(tmp_path):
     expect_body(import_file(path).bodies["plate"], [(plate(), *STILL)])
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("split", ["seam", "halves", "none"])
 @pytest.mark.parametrize(("rotation", "shift"), [(np.eye(3), (0, 0, 0)), (turn((1, 2, 3), 0.7), (100, -50, 30))])
 def test_slider_crank(tmp_path, split, rotation, shift):
@@ -547,6 +549,8 @@ HOSTILE = {
 }
 
 
+@pytest.mark.sample(15)
+@pytest.mark.spread(5)
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_hostile_files_are_one_sentence(tmp_path, kind):
     path = tmp_path / "a.step"
@@ -608,6 +612,7 @@ def test_a_free_form_solid_has_the_mass_of_a_mesh_and_says_so(tmp_path):
     assert any("by a mesh, to about" in comment for comment in body.comments)
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("rotation", [np.eye(3), turn((1, 2, 3), 0.7)])
 @pytest.mark.parametrize("turned_by", [0.0, 40.0, 200.0])
 def test_parts_of_the_original_are_moved(tmp_path, rotation, turned_by):
@@ -639,6 +644,7 @@ def test_relations_from_the_parent_to_the_part(tmp_path):
         expect_body(again.bodies[name], [part])
 
 
+@pytest.mark.slow
 def test_welded_parts_move_with_their_link_and_edited_models_are_refused(tmp_path):
     path = written(tmp_path / "a.step", four_bar())
     draft = import_file(path, ground="ground")
@@ -675,6 +681,7 @@ def skeleton(path):
     return found
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["slider-crank", "rssr", "universal-joint"])
 def test_the_skeleton_has_the_points_of_the_position(tmp_path, name):
     mechanism = trunnion.read(f"examples/{name}.yaml")
@@ -688,7 +695,7 @@ def test_the_skeleton_has_the_points_of_the_position(tmp_path, name):
                 np.testing.assert_allclose(points[link][pair.name], pair.at, atol=1e-9)
 
 
-@pytest.mark.spread(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "factor"), [("fourbar-with-play", 500.0), ("pezzuti-cardan-as-built", 20.0)])
 def test_errors_are_magnified(tmp_path, name, factor):
     """Displacements from the ideal mechanism are so many times larger; links stay rigid."""

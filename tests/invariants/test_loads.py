@@ -147,6 +147,7 @@ def test_resistance_that_varies_and_one_that_drives() -> None:
     assert "loads.cut.resisting_force: is -3 N, which is negative" in refused(**data)
 
 
+@pytest.mark.slow
 def test_a_resistance_in_space_that_only_touches_0_does_not_drive() -> None:
     laws = {"abs(sin(2 * drive + 0.5))": 0, "(cos(drive)^2 + sin(drive)^2 - 1)": 0, "sin(2 * drive + 0.5)": 1}
     for law, count in laws.items():
@@ -395,6 +396,7 @@ def test_what_makes_no_sense_is_refused(kind: str, stated: Any, words: str) -> N
 FREE = 0.62  # m: within the lengths that the spring goes through
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("preload", [0.0, 15.0])
 @pytest.mark.parametrize("damping", [0.0, 20.0])
 def test_a_rope_and_a_bumper_are_halves_of_the_spring(damping: float, preload: float) -> None:

@@ -63,6 +63,7 @@ def played(mechanism: Mechanism, *measures: str) -> xr.Dataset:
     return trunnion.play(mechanism, list(measures) or None, STEPS)
 
 
+@pytest.mark.slow
 @settings(max_examples=3)
 @given(st.lists(clearances, min_size=3, max_size=3))
 def test_joints_add_up(found: list[float]) -> None:
@@ -83,6 +84,7 @@ def test_joints_add_up(found: list[float]) -> None:
     np.testing.assert_allclose(together["deviation_total"] ** 2, scatter, rtol=1e-12)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["slider-crank", "class III"])
 def test_which_link_has_the_hole_does_not_matter(name: str) -> None:
     """To first order: pins and holes changed over have the same worst case; a turn has the other sign."""

@@ -92,6 +92,7 @@ def test_why_it_is_not_assembled(lengths: tuple[float, ...], ever: bool, why: st
     assert np.isnan(float(result["efficiency"]))
 
 
+@pytest.mark.slow
 def test_general_group_not_assembled_over_part_of_the_turn() -> None:
     """A rod shorter than the crank reaches the guide only where |e − r sin q| ≤ l; both parts of the turn count."""
     r, length, e = 0.5, 0.4, 0.0
@@ -253,6 +254,7 @@ def example(name: str) -> trunnion.Mechanism:
     return trunnion.read(EXAMPLES / f"{name}.yaml")
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["durango-fourbar", "fourbar-with-play", "rssr"])
 def test_an_analysis_again_is_that_of_a_mechanism_read_anew(name: str) -> None:
     mechanism = example(name)

@@ -78,6 +78,7 @@ def test_points_come_from_a_csv_file(program: Run, tmp_path: Path) -> None:
     assert "motion.csv:2: error: '60 deg' is not a finite number — " in outcome.err
 
 
+@pytest.mark.slow
 def test_check_lists_the_ways_and_draws_them(program: Run, tmp_path: Path) -> None:
     done = program("check", FOUR_BAR, "--assemblies", "ways.svg")
     assert done.code == 0
@@ -206,6 +207,7 @@ def test_missing_file_folder_and_huge_file(program: Run, tmp_path: Path) -> None
     assert "MB" in done.err
 
 
+@pytest.mark.slow
 def test_names_with_spaces_and_greek_letters_are_fine(program: Run, tmp_path: Path) -> None:
     def rename(text: str) -> str:
         return text.replace("crank", '"κ link 1"').replace("coupler", '"Kоppel θ"').replace("gamma", "γ")

@@ -44,6 +44,7 @@ def test_parameters_of_a_law_that_an_option_names(program: Run, verb: tuple[obje
     assert done[0] == done[1]
 
 
+@pytest.mark.slow
 def test_a_seat_that_is_set_stands_against_that_of_all_joints(program: Run, tmp_path: Path) -> None:
     slider = EXAMPLES / "toleranced-slider-crank.yaml"
     done = [
@@ -200,6 +201,7 @@ def test_the_help_has_each_verb_once_under_a_question_with_examples_that_are_rea
             command.make_context(name, example.split(), resilient_parsing=False)
 
 
+@pytest.mark.slow
 def test_tolerances_are_written_as_asked(program: Run, tmp_path: Path) -> None:
     """Tables, the whole result, a figure and a page of one run; with a row of units where that is asked for."""
     files = ["t.csv", "t.parameters.csv", "t.nc", "t.json", "t.svg"]

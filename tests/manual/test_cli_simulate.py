@@ -27,6 +27,7 @@ def test_a_steady_cycle_is_written_as_a_cycle(program: Run, tmp_path: Path) -> N
     assert program("simulate", PRESS, "--steady", "--kind", "phase", "--out", "c.png").code == 2
 
 
+@pytest.mark.slow
 def test_a_press_that_stalls_is_an_error(program: Run) -> None:
     code, out, err = program("simulate", PRESS, "--set", "force=1000kN", "--set", "breakdown_effort=20Nm", "--time=2s")
     assert code == 1
@@ -71,6 +72,7 @@ def test_the_command_line_tells_where_a_motion_ends(program: Run, tmp_path: Path
 DRAWING, FREE = EXAMPLES / "drawing-press.yaml", EXAMPLES / "durango-fourbar.yaml"
 
 
+@pytest.mark.slow
 def test_ranges_and_files(program: Run, tmp_path: Path) -> None:
     files = ["l.csv", "l.json", "l.nc", "l.png"]
     code, out, _ = program("locking", DRAWING, "--steps", 24, "--near", 5, *(f"--out={name}" for name in files))

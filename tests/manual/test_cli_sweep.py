@@ -31,6 +31,7 @@ def files(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
+@pytest.mark.slow
 def test_table_csv_netcdf_and_figure(program: Run, tmp_path: Path) -> None:
     done = program(
         "sweep",
@@ -61,6 +62,7 @@ def test_table_csv_netcdf_and_figure(program: Run, tmp_path: Path) -> None:
     assert ElementTree.parse(tmp_path / "s.svg").getroot().tag.endswith("svg")
 
 
+@pytest.mark.slow
 def test_a_grid_in_csv_has_a_row_a_point(program: Run, tmp_path: Path) -> None:
     options = ("--over", "B.friction.coefficient=0.1,0.3", "--over", "AB=1.6m,2.6 m", "--steps", 72)
     done = program("sweep", FOUR_BAR, *options, "--out", "g.csv", "--out", "g.png", "--units-row")

@@ -155,6 +155,7 @@ def test_up_to_how_many_positions_samples_are_averaged(tmp_path: Path) -> None:
     assert scatter[120] < 0.7 * scatter[130]
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("rate", [400.0, 5000.0])  # a cubic between samples, and means of them
 @pytest.mark.parametrize("changes", [{}, {"channels/torque-in/range": "30 N m"}], ids=["spikes", "range"])
 @pytest.mark.parametrize("low_pass", [{}, {"filter": {"cut_off": "100 Hz", "order": 2}}], ids=["plain", "filtered"])

@@ -59,7 +59,7 @@ FORMS: dict[str, Callable[[float], str]] = {
 }
 
 
-@pytest.mark.spread(4)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("unit", ["", " [hh:mm:ss]"])
 def test_time_stamps(columns: Columns, tmp_path: Path, form: str, unit: str) -> None:

@@ -201,6 +201,7 @@ def test_the_turn_of_a_universal_joint_is_a_hint(name: str) -> None:
     assert selected_by_what_is_printed(mechanism) == len(choice.ways)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("name", "share"), [("four-bar", 0.7), ("class III", 0.7), ("in space", 0.2)])
 def test_a_hint_holds_where_its_driver_is(name: str, share: float) -> None:
     """Of every assembly the places at a position of the driver select it, though at the start others are nearer."""

@@ -161,6 +161,7 @@ def test_positions_in_line_have_no_forces() -> None:
     assert np.flatnonzero(np.isnan(effort)).tolist() == [0, 18]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["deltoid", pytest.param("antiparallelogram", marks=pytest.mark.slow)])
 def test_in_space(kind: str) -> None:
     """A general group, which is followed by Newton's method, goes on as the closed form does."""

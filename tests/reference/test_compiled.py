@@ -265,6 +265,7 @@ def test_failures_of_samples_are_those_of_numpy() -> None:
     assert {int(Status.NOT_ASSEMBLED), int(Status.SOLVED)} <= set(status.ravel())
 
 
+@pytest.mark.slow
 def test_a_whole_study_and_its_engine_by_size(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same random numbers, the same moments and counts."""
 

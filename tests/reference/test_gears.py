@@ -203,6 +203,7 @@ def test_driven_rack_turns_the_pinion() -> None:
     np.testing.assert_allclose(turned - turned[4], np.linspace(-0.1, 0.1, 9) / RADIUS, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("joint", "ends"), [("P", (0.0, 1000.0)), ("S", (-900.0, -1000.0))])
 def test_many_turns_away(joint: str, ends: tuple[float, float]) -> None:
     """Thousands of radii from where the rack is drawn, and turns by hundreds from one position to the next."""
@@ -294,6 +295,7 @@ def jack(friction: float | None, speed: float, order: str = "WS") -> Data:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("friction", "order"), [(None, "WS"), (0.15, "SW")])
 def test_scissor_jack(friction: float | None, order: str) -> None:
     """P r tan(λ + φ) raises and P r tan(λ − φ) lowers, with the screw's pull P = F w/h; one turn moves the lead."""

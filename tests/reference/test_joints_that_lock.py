@@ -123,6 +123,7 @@ def test_a_slider_alone_jams_where_its_push_turns_round() -> None:
     assert findings(data)["simulate.several_accelerations"]["time"] == 0.0  # also T/(m (1 − κ)) obeys
 
 
+@pytest.mark.slow
 def test_without_rest_there_is_no_acceleration_and_the_figure_says_by_how_much() -> None:
     """A law that is smooth at rest cannot hold it: the motion ends, with ∂E/∂q̈ = m (1 − κ) of m."""
     smooth = {"law": "brown-mcphee", "coefficient": F, "static": F, "transition_speed": 1e-3}

@@ -322,6 +322,7 @@ def unbalanced(result: Any) -> float:
     return float(abs(result["energy_residual"]).max()) / turned_over
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("example", MOVING)
 def test_the_account_of_the_examples_as_they_begin(example: str) -> None:
     assert unbalanced(simulate(read(EXAMPLES / f"{example}.yaml"), MOVING[example], 200)) < 1e-8

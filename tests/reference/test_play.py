@@ -73,6 +73,7 @@ def test_one_position_is_that_of_the_cycle(at: str | float) -> None:
         np.testing.assert_allclose(one[name].values[..., 0], cycle[name].values[..., here], rtol=1e-9, atol=1e-15)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("hole_on", ["rocker", "ground"])
 def test_rssr(hole_on: str) -> None:
     """0.044402° by the formula."""

@@ -57,7 +57,7 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.spread(3)  # not a thousand times: friction that would bear it is searched for long
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", CASES)
 def test_what_explains_a_misfit(folder: Path, name: str) -> None:
     old, new, kind, size, near = CASES[name]

@@ -90,6 +90,7 @@ def test_layers_are_switched(user):
     assert sum(user.page.locator(kind).count() for kind in kinds) == 0
 
 
+@pytest.mark.slow
 def test_the_radius_of_a_friction_circle_is_that_of_coulomb(user):
     """f′ r = 0.40 · 7.5 mm; the two forces and the moment together act along a line that touches the circle."""
     show(user, "Friction circles")
@@ -163,6 +164,7 @@ def test_every_column_of_the_table_can_be_a_curve() -> None:
     np.testing.assert_allclose(found["columns"]["coupler.angle_velocity"]["values"], expected, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_curves_are_chosen_over_another_and_the_table_of_joints_has_the_largest(user):
     page = user.page
     page.get_by_role("tab", name="Plots").click()

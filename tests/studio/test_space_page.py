@@ -104,6 +104,7 @@ def test_what_is_chosen_in_the_picture_is_lit_and_moved_along_an_axis(user):
     assert user.state("s.text.value") == before
 
 
+@pytest.mark.slow
 def test_end_loads_and_the_section_of_a_pin_have_the_numbers_of_analyse(user):
     """Arrows times the scale that is stated; offset and tilt from the seats of both ends."""
     user.of("actions", "m.openFile('rssr-with-play.yaml')")
@@ -130,6 +131,7 @@ def test_end_loads_and_the_section_of_a_pin_have_the_numbers_of_analyse(user):
         np.testing.assert_allclose(quantity(tilt, "rad"), np.diff(ends[:, axis])[0] / 0.02, rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_cardan_joint_is_built_from_an_empty_sheet_by_its_table(user):
     """One revolute and three cylindrical joints; tan(out) = tan(in) / cos(angle of the shafts) to 1e-12."""
     user.page.click("summary:has-text('File')")

@@ -134,6 +134,7 @@ def test_a_menu_is_gone_through_by_arrows(user):
     assert user.page.locator("details[open]").count() == 0
 
 
+@pytest.mark.slow
 def test_with_a_mistake_the_mechanism_stays_as_it_was_drawn(user):
     user.until("s.solved.value")
     slot = "document.querySelector('.slot .slit').getAttribute('d').match(/-?[\\d.]+/g).map(Number)"

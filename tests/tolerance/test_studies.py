@@ -233,6 +233,7 @@ def press(seat: str | None = "loaded") -> Mechanism:
     return mechanism if seat is None else mechanism.with_seats(seat)
 
 
+@pytest.mark.slow
 def test_the_plays_of_a_press_add_up_by_virtual_work() -> None:
     """By Σ Q·c = F δ each pin moves the punch by ρ |Q|/F: 1/cos α of a toggle's pins, 2 tan α of the cylinder's."""
     found = trunnion.tolerance(press(), methods=["linear", "worst-case", "monte-carlo"], samples=24, jobs=1)

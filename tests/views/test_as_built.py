@@ -117,6 +117,7 @@ def test_ends_stand_side_by_side_and_their_pins_touch_the_wall(cardan):
             assert np.hypot(*pin.center) + pin.get_radius() == pytest.approx(hole.get_radius(), rel=1e-4), name
 
 
+@pytest.mark.slow
 def test_the_locus_has_the_offsets_and_no_jump(slider):
     axes = _drawn(plots.figure(slider, "seat"))["Q"]
     loci = [one for one in axes.collections if isinstance(one, LineCollection)]

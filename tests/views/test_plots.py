@@ -24,8 +24,8 @@ from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
 PLAIN = [name for name in PLOTS if name not in READY]  # of results without errors
 
 
+@pytest.mark.spread(1)
 @pytest.mark.sample(9)
-@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", PLAIN)
 def test_every_figure_of_every_result(name, case, tmp_path):
     kind, result = case

@@ -96,6 +96,7 @@ def test_every_pair_has_a_symbol():
     assert all(len(solids(shown)) > 2 * len(shown.joints) for shown in drawn)
 
 
+@pytest.mark.spread(5)
 def test_poses_and_frames_put_the_joints_where_the_points_are(spatial):
     """What the drawings are made of gives the places that the result tells, on both links."""
     kind, result = spatial
@@ -117,6 +118,7 @@ def test_poses_and_frames_put_the_joints_where_the_points_are(spatial):
             assert shown.slides(joint) == pytest.approx(slide, abs=1e-9 * size, nan_ok=True), joint
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", ["RSSR", "Cardan", *CHAINS])
 def test_facets_look_outwards(name):
     """The volume that the facets of each solid enclose is positive, and that of what is grown is larger."""

@@ -246,6 +246,7 @@ def test_a_table_has_the_ends_of_an_effort_that_lie_beyond_zero(least, most, sho
     assert [one for one in table.head if one.startswith("input.effort")] == [f"input.effort {k} [N m]" for k in shown]
 
 
+@pytest.mark.slow
 def test_a_point_that_locks_leaves_the_others_their_numbers():
     """Its effort and reactions have no bound, beside which all others would be rounding."""
     name, head = "joint_defaults.friction.coefficient", "A.effort max [N m]"

@@ -212,6 +212,7 @@ def test_the_trade_off_marks_the_stated_limits_and_what_cannot_be_kept():
     assert stepped.axes[0].lines[0].get_drawstyle() == "steps-post"
 
 
+@pytest.mark.slow
 def test_corners_indices_and_failures_are_told():
     read = readings(toleranced(72))[0]
     table = corners(read)

@@ -231,11 +231,3 @@ def test_curves_of_points_are_drawn_over_the_cycle(tmp_path: Path) -> None:
             atol=1e-9,
         )  # fmt: skip
     assert curves["~curve coupler E"].is_closed
-
-
-def test_names_that_dxf_forbids_are_changed_and_noted(tmp_path: Path) -> None:
-    text = DURANGO.read_text("utf-8").replace("coupler", '"rod/1"').replace("crank", "Rod_1").replace("rocker", "~é")
-    (tmp_path / "model.yaml").write_text(text, "utf-8")
-    noted = export_model(trunnion.read(tmp_path / "model.yaml"), tmp_path / "out.dxf")
-    assert [finding.where for finding in noted if finding.code == "exchange.name"] == ["links.rod/1", "links.~é"]
-    assert set(import_file(tmp_path / "out.dxf").bodies) == {"ground", "Rod_1", "rod_1-2", "é"}

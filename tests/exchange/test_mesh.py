@@ -145,14 +145,6 @@ def test_an_open_mesh_has_no_mass_and_says_so(faces: Any, tmp_path: Path) -> Non
     assert "open_mesh" in codes(draft)
 
 
-def test_two_shells_in_one_mesh_are_one_body_and_noted(tmp_path: Path) -> None:
-    corners = np.vstack([BOX * CORNERS, BOX * CORNERS + 100])
-    draft = import_file(written(tmp_path, stl(corners, np.vstack([FACES, FACES + 8]))))
-    assert "shells" in codes(draft)
-    assert draft.bodies["part"].mass == pytest.approx(2 * 7850 * np.prod(1e-3 * BOX), rel=1e-9)
-    np.testing.assert_allclose(draft.bodies["part"].centre, 1e-3 * (BOX / 2 + 50), atol=1e-9)
-
-
 def test_a_cavity_is_subtracted(tmp_path: Path) -> None:
     corners = np.vstack([BOX * CORNERS, BOX * (0.25 + 0.5 * CORNERS)])
     draft = import_file(written(tmp_path, stl(corners, np.vstack([FACES, FACES[:, ::-1] + 8]))))

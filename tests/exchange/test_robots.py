@@ -590,14 +590,3 @@ def test_the_drive_of_an_mjcf_holds_its_speed(name: str, tmp_path: Path) -> None
     for _ in range(50):
         mujoco.mj_step(model, data)
     assert data.qvel[model.jnt_dofadr[model.actuator_trnid[0, 0]]] == pytest.approx(data.ctrl[0], rel=0.01)
-
-
-def test_a_link_called_world_is_written_under_another_name(tmp_path: Path) -> None:
-    text = (Path("examples") / "durango-fourbar.yaml").read_text("utf-8").replace("coupler", "world")
-    model = tmp_path / "m.yaml"
-    model.write_text(text, "utf-8")
-    for suffix in ("mjcf", "sdf", "urdf"):
-        path = tmp_path / f"m.{suffix}"
-        said = trunnion.exchange.export_model(trunnion.read(model), path)
-        assert "exchange.name" in {finding.code for finding in said}
-        assert "world-link" in trunnion.exchange.import_file(path).bodies

@@ -24,8 +24,6 @@ from trunnion.cli.app import app
 from trunnion.errors import MechanismError
 from trunnion.exchange import export_model, import_file, model_text
 from trunnion.exchange.brep import Geometry
-from trunnion.exchange.draft import Body, Draft
-from trunnion.exchange.mating import joined
 from trunnion.exchange.part21 import Part21
 from trunnion.exchange.skeleton import positions_of
 from trunnion.exchange.step_assembly import Assembly
@@ -282,23 +280,6 @@ drivers: {{A: {{speed: 600 rpm}}}}
     draft = import_file(tmp_path / "a.step", ground="frame", drive=shaft, speed="600 rpm")
     imported, expected = torques(draft, tmp_path, by_hand, steps=24)
     np.testing.assert_allclose(imported, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
-
-
-def test_chamfers_fillets_and_blind_holes(tmp_path):
-    """A pin with a chamfer and a fillet in a blind hole with a conical bottom and a chamfered edge."""
-    base = box((-30, -30, -20), (30, 30, 0)).feature("top", (0, 0, 0), [(11, 0), (10, -1), (10, -15), (0, -18)])
-    profile = [(12, 0), (10, 2, (12, 2)), (10, 13), (9, 14), (0, 14)]
-    lever = box((-15, -15, 0), (80, 15, 8)).feature("bottom", (0, 0, 0), profile)
-    parts = {"base": (base, *STILL), "lever": (lever, np.eye(3), np.array([0, 0, 1.0]))}
-    draft = import_file(written(tmp_path / "a.step", parts))
-    for name, part in parts.items():
-        expect_body(draft.bodies[name], [part])
-    pair = joint(draft, "base", "lever")
-    assert pair.type == "cylindrical"  # nothing holds it along the axis
-    # the pin's cylinder from z = -1 to -12, the hole's from -1 to -15
-    np.testing.assert_allclose([pair.pin_radius, pair.hole_radius, pair.length], [0.01, 0.01, 0.011], atol=1e-12)
-    np.testing.assert_allclose(pair.at, [0, 0, -0.0065], atol=1e-12)
-    assert len(draft.pairs) == 1
 
 
 def test_patterns_of_equal_holes_are_bolted(tmp_path):
@@ -773,44 +754,6 @@ def test_the_command_line_imports_and_moves(tmp_path):
     over = run(app, [*moved[:3], str(path), *moved[4:]])
     assert isinstance(over.exception, MechanismError)
     assert path.read_text() == written(tmp_path / "c.step", slider_crank()).read_text()
-
-
-def test_two_coaxial_pins_of_different_parts_on_one_axis(tmp_path):
-    """Two levers turn on the two ends of one axle that stands still: two joints, not three."""
-    axle = turned([(0, 0), (6, 0), (6, 10), (9, 10), (9, 20), (6, 20), (6, 30), (0, 30)])
-    block = boss(box((-20, -20, -40), (20, 20, -30)), "top", (10, 10, -30), 5, 5)
-    lever = bar(60, [(0, 12.04)], 0, 10)
-    levers = {"left": (lever, *STILL), "right": (lever, turn((0, 0, 1), 1), np.array([0, 0, 20.0]))}
-    draft = import_file(written(tmp_path / "a.step", {"axle": (axle, *STILL)} | levers), ground="axle")
-    assert {frozenset(pair.links) for pair in draft.pairs.values()} == {
-        frozenset(("axle", "left")),
-        frozenset(("axle", "right")),
-    }
-    assert all(pair.length == pytest.approx(0.01) for pair in draft.pairs.values())
-    assert "unconnected" in codes(
-        import_file(
-            written(tmp_path / "b.step", {"axle": (axle, *STILL), "block": (block, *STILL)} | levers), ground="axle"
-        )
-    )
-
-
-def test_half_a_hole_is_asked(tmp_path):
-    """A bearing of which only half is there holds its pin from one side: no joint without a question."""
-    base, arm = bar(80, [(0, 10.02)], 0, 10, split="halves"), bar(60, [], 10, 20, split="halves")
-    parts = {"base": (base, *STILL), "arm": (boss(arm, "bottom", (0, 0, 10), 10, 10), *STILL)}
-    file = Part21(written(tmp_path / "a.step", parts))
-    geometry = Geometry(file, 1e-3, 1.0)
-    solids = [geometry.solid(number) for number in file.of("MANIFOLD_SOLID_BREP")]
-    for halves in (2, 1):
-        faces = {name: list(solid.faces) for name, solid in zip(parts, solids, strict=True)}
-        hole = [face for face in faces["base"] if face.kind == "cylinder"]
-        assert len(hole) == 2
-        faces["base"] = [face for face in faces["base"] if face.kind != "cylinder"] + hole[:halves]
-        draft = Draft(bodies={name: Body(name, 1.0) for name in parts})
-        joined(draft, faces, 0.5e-3)
-        kinds = [pair.type for pair in draft.pairs.values() if pair.type != "fixed"]
-        assert kinds == (["cylindrical"] if halves == 2 else [])
-        assert ("half" in codes(draft)) == (halves == 1)
 
 
 def test_a_pin_in_a_slot_is_asked(tmp_path):

@@ -268,14 +268,6 @@ def test_a_press_force_over_the_height_of_the_ram(name: str) -> None:
         assert one[key].values == pytest.approx(other[key].values, rel=0, abs=1e-12 * size), key
 
 
-@pytest.mark.slow
-def test_it_is_the_same_in_time() -> None:
-    """Tabulated, with the places found at which the force jumps or bends."""
-    one, other = (simulate(pressed(PRESS.format(HEIGHTS[key])), 0.1, 5) for key in ("named slide", "drive"))
-    assert one["drive_rate"].values == pytest.approx(other["drive_rate"].values, rel=1e-9)
-    assert np.abs(one["energy_residual"]).max() < 1e-8 * np.abs(one["work_drive"]).max()
-
-
 def test_a_driven_joint_turns_as_the_drive_does() -> None:
     """In time its turns begin again, so that a wave over the angle is one at every turn."""
     one, other = (brief(pressed(f"-50 N * sin({name})"), 24) for name in ("O.rotation", "drive"))

@@ -15,8 +15,7 @@ import xarray as xr
 import trunnion
 from manual.conftest import Run
 from played import four_bar
-from trunnion.results.attributes import summary_of
-from trunnion.views.play import figure, tables
+from trunnion.views.play import figure
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
@@ -164,50 +163,6 @@ def test_the_figure_stacks_the_joints_up_to_the_sum() -> None:
     assert total[:-1, 1] == pytest.approx(result["worst_case_total"].values[0] * 1e6)
     assert len(axes.collections) == 4
     assert axes.get_ylabel() == "worst case of piston.Q.x [µm]"
-
-
-def test_a_place_and_joints_without_effect_are_told(tmp_path: Path) -> None:
-    """The table and the summary of a measure with a place have its figure there."""
-    model = tmp_path / "model.yaml"
-    text = (EXAMPLES / "fourbar-with-play.yaml").read_text(encoding="utf-8")
-    assert "measures:" not in text
-    model.write_text(
-        f"{text}\nmeasures:\n  place: {{angle: rocker, at: 90 deg}}\n  held: {{angle: crank}}\n", encoding="utf-8"
-    )
-    result = trunnion.play(trunnion.read(model), steps=8)
-    findings = {one.code: one for one in result.trunnion.findings}
-    there = float(result["worst_case_total"].sel(measure="place").isel(position=2))  # 90° of 0°, 45°, 90° …
-    assert float(result["extreme_worst_case"].sel(measure="place").sum()) == pytest.approx(there, rel=1e-9)
-    assert there < float(result["worst_case_total"].sel(measure="place").max())
-    assert summary_of(result)[0].value == pytest.approx(there, rel=1e-9)
-    assert tables(result)[0].title == "place, at 90°"
-    assert findings["play.no_effect"].figures["measure"] == "held"
-
-
-def test_an_extreme_is_of_its_place_and_other_statistics_are_left_out(tmp_path: Path) -> None:
-    """To first order an extreme changes as the course does at its place."""
-    model = tmp_path / "model.yaml"
-    text = (EXAMPLES / "fourbar-with-play.yaml").read_text(encoding="utf-8")
-    model.write_text(
-        f"{text}\nmeasures:\n  course: {{angle: rocker}}\n  least: {{angle: rocker, as: minimum}}\n"
-        "  most: {angle: rocker, as: maximum}\n  swing: {angle: rocker, as: peak-to-peak}\n",
-        encoding="utf-8",
-    )
-    result = trunnion.play(trunnion.read(model), steps=720)
-    assert result["measure"].values.tolist() == ["course", "least", "most"]
-    figures = {one.name: one.value for one in result.trunnion.summary}
-    course = result.sel(measure="course")
-    for name, pick in (("least", np.argmin), ("most", np.argmax)):
-        there = course.isel(position=int(pick(course["value"].values)))
-        own = result.sel(measure=name)
-        assert own["extreme_worst_case"].values == pytest.approx(there["worst_case"].values, rel=1e-2, abs=1e-9)
-        assert figures[f"{name}.worst_case"] == pytest.approx(float(own["extreme_worst_case"].sum()), rel=1e-12)
-        assert float(own["extreme_time"]) == pytest.approx(float(there["time"]), abs=2e-3)
-    assert figures["course.worst_case"] == pytest.approx(float(course["worst_case_total"].max()), rel=1e-4)
-    assert "play.measures_left_out" in [one.code for one in result.trunnion.findings]
-    titles = [one.title for one in tables(result)]
-    assert titles[1].startswith("least, the minimum at ")
-    assert figure(result).axes
 
 
 @pytest.fixture

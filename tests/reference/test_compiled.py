@@ -263,23 +263,3 @@ def test_failures_of_samples_are_those_of_numpy() -> None:
     run = prepare(trunnion.read(DURANGO))
     _, status = same_as_numpy(run, ["AB", "BC", "CD"], run.cycle.times(90), 0.2)
     assert {int(Status.NOT_ASSEMBLED), int(Status.SOLVED)} <= set(status.ravel())
-
-
-@pytest.mark.slow
-def test_a_whole_study_and_its_engine_by_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same random numbers, the same moments and counts."""
-
-    def toleranced(engine: Any, samples: int) -> Any:
-        model = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
-        return trunnion.tolerance(model, methods=["monte-carlo"], steps=36, engine=engine, jobs=1, samples=samples)
-
-    numpy, found = (toleranced(engine, 700) for engine in ("numpy", "compiled"))
-    for name, variable in numpy.data_vars.items():
-        if variable.dtype.kind == "f":
-            scale = np.nanmax(np.abs(variable.values), initial=0.0)
-            np.testing.assert_allclose(found[name], variable, rtol=1e-7, atol=1e-9 * scale, err_msg=name)
-        else:
-            assert np.array_equal(found[name], variable), name
-    assert toleranced("auto", 200).attrs["engine"] == "numpy"
-    monkeypatch.setattr("trunnion.studies.tolerance.kernel.WORTH_COMPILING", 7_000)
-    assert toleranced("auto", 200).attrs["engine"] == "compiled"

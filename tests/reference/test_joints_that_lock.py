@@ -123,18 +123,6 @@ def test_a_slider_alone_jams_where_its_push_turns_round() -> None:
     assert findings(data)["simulate.several_accelerations"]["time"] == 0.0  # also T/(m (1 − κ)) obeys
 
 
-@pytest.mark.slow
-def test_without_rest_there_is_no_acceleration_and_the_figure_says_by_how_much() -> None:
-    """A law that is smooth at rest cannot hold it: the motion ends, with ∂E/∂q̈ = m (1 − κ) of m."""
-    smooth = {"law": "brown-mcphee", "coefficient": F, "static": F, "transition_speed": 1e-3}
-    data = simulate(slider("1 N - time/(1 s)*2 N", smooth), 1.0, 8)
-    found = findings(data)["simulate.no_acceleration"]
-    assert found["growth"] == pytest.approx(1 - JAM, rel=1e-3)
-    assert found["time"] == pytest.approx(0.5, abs=1e-6)
-    known = np.isfinite(data.drive_rate.values[0])
-    assert known.tolist() == (data.time.values <= found["time"]).tolist()
-
-
 # ---- Painlevé's rod -------------------------------------------------------------------------------------------
 
 ROD, HALF, SLIDER, ROUGH = 1.0, 0.5, 0.02, 2.0

@@ -370,19 +370,3 @@ def test_samples_that_do_not_start_are_outside_every_limit() -> None:
     shares = found["yield"].values
     assert shares[0] == 1.0
     assert shares[1] < 0.7
-
-
-def test_a_sweep_has_the_figures_of_each_point() -> None:
-    mechanism = wheel(LINEAR)
-    inertias = [0.03, 0.05, 0.08]
-    swept = trunnion.sweep(
-        mechanism, {"links.wheel.inertia": inertias}, 24, measures=["starting_time:A", "peak_effort:A"]
-    )
-    # ten cycles at 100 rad/s: too short for it to run steadily, so that there is none
-    assert np.all(np.isnan(swept["starting_time:A"]))
-    assert "sweep.not_steady" in {one.code for one in swept.trunnion.findings}
-    np.testing.assert_allclose(swept["peak_effort:A"], 4.0, rtol=1e-8)
-    longer = stated(mechanism, measures={"start": MEASURE})
-    found = trunnion.sweep(longer, {"links.wheel.inertia": inertias}, 24, measures=["start"])["start"].values
-    np.testing.assert_allclose(found, [starting_time(one) for one in inertias], rtol=1e-7)
-    assert swept["peak_effort:A"].attrs["units"] == "N m"

@@ -7,7 +7,6 @@ cos θ = (x₀² + r² − l²)/(2 r x₀). The useful work of a turn is F (r + 
 
 from __future__ import annotations
 
-import re
 from itertools import product
 from typing import Any
 
@@ -75,15 +74,6 @@ def test_the_start_of_a_cycle_is_beside_its_end() -> None:
     assert found["O.effort_max"].value == pytest.approx(FORCE * arm(BEGIN), rel=1e-6)
 
 
-@pytest.mark.parametrize("steps", [20, 180])
-def test_every_point_of_a_sweep_has_it(steps: int) -> None:
-    """Solved in one pass or, of few positions, each by itself."""
-    rods = np.linspace(0.15, 0.3, 7)
-    swept = trunnion.sweep(cut(), {"l": rods}, steps=steps, measures=["maximum:effort:O"])
-    assert swept["drive_effort_max"].values[0] == pytest.approx(FORCE * arm(BEGIN, rod=rods), rel=1e-6)
-    assert swept["drive_effort_max"].values[0] == pytest.approx(swept["maximum:effort:O"].values, rel=1e-6)
-
-
 def test_a_jump_above_the_top_of_a_sample_is_met() -> None:
     """Of the nominal mechanism the top is smooth, of samples it may be beside the jump."""
     forces = ["-50 kN * wide / 20 mm * between(drive, 320.3 deg, 350 deg)", "35.58 kN * max(sin(drive), 0)"]
@@ -100,30 +90,6 @@ def test_a_jump_above_the_top_of_a_sample_is_met() -> None:
     assert figures == pytest.approx(tops, rel=7e-5)  # what a step of 100,000 may leave out
     assert figures[-1] > 1.005 * nominal.figure > 1.004 * figures[0]
     assert figures[-1] == pytest.approx(FORCE * wide[-1] / 0.02 * arm(BEGIN), rel=1e-7)
-
-
-def seated(clearance: str) -> Mechanism:
-    """With the pin of P held to one side; the cut begins at a place of the ram."""
-    force = "-50 kN * between(S.slide, 217.9 mm, 229 mm) * between(drive, 200 deg, 360 deg)"
-    data = cut(force).data()
-    data["joints"]["P"] |= {"pin": {"radius": "25 mm", "clearance": clearance}, "seat": {"xi": "0 deg"}}
-    return Mechanism(**data)
-
-
-def test_a_jump_that_the_seats_move_is_told_with_both_places() -> None:
-    """Without errors by the law of cosines, with them where dense positions jump; elsewhere as dense positions say."""
-    result, fine = (trunnion.analyse(seated("1 mm"), steps) for steps in (720, 36_000))
-    (jump_moved,) = (one.figures for one in result.trunnion.findings if one.code == "errors.jump_moved")
-    meant, built = ([float(place) for place in re.findall(r"[\d.]+", jump_moved[key])] for key in ("meant", "built"))
-    begin = 360 - np.degrees(np.arccos((0.03**2 + 0.2179**2 - 0.2**2) / (2 * 0.03 * 0.2179)))
-    assert meant == [pytest.approx(begin, abs=0.06)]
-    effort, drive = fine["drive_effort"].values[0], fine["drive"].values
-    jump = drive[int(np.argmax(np.diff(effort)))] % 360
-    assert built == [pytest.approx(jump, abs=0.06)]
-    change, away = np.abs(fine["drive_effort_change"].values[0]), np.abs(drive % 360 - begin) > abs(jump - begin) + 1
-    assert jump_moved["rest"] == pytest.approx(np.max(change[away]), rel=0.05)
-    tight = trunnion.analyse(seated("1 um"), 180).trunnion.findings
-    assert not [one for one in tight if one.code == "errors.jump_moved"]
 
 
 def test_the_drive_of_a_press_whose_load_jumps() -> None:
@@ -322,19 +288,6 @@ def test_figures_of_many_are_those_of_each_alone_and_of_the_closed_form(start: f
         exact = single(touching(start, {"touch": float(touch[k])}))
         for name in FIGURES:
             assert found[name][k] == pytest.approx(exact[name], rel=2e-7, abs=1e-9), (name, k)
-
-
-def test_a_study_has_the_part_of_the_place_at_which_the_load_begins() -> None:
-    half, numbers = 2e-4, ("r", "l", "touch")
-    mechanism = touching(tolerances=dict.fromkeys(numbers, half), measures={"up": FIGURES["power"]})
-    found = trunnion.tolerance(mechanism, samples=2000, seed=5, steps=24).sel(measure="up")
-    for name, sign in zip(numbers, (-1, -1, 1), strict=True):
-        sensitivity = float(found["sensitivity"].sel(parameter=f"dimensions.{name}"))
-        assert sensitivity == pytest.approx(sign * PUSH / TIME, rel=1e-6)
-    whole = 3 * PUSH / TIME * half
-    assert float(found["worst_case_upper"]) == pytest.approx(whole, rel=1e-6)
-    assert float(found["searched_upper"]) == pytest.approx(whole, rel=1e-6)
-    assert float(found["deviation"]) == pytest.approx(float(found["deviation_linear"]), rel=0.06)
 
 
 def test_pins_in_seats_move_the_place_at_which_the_load_begins() -> None:

@@ -301,27 +301,6 @@ def pressed(depth: float, play: float) -> Mechanism:
     )
 
 
-@pytest.mark.parametrize(("depth", "told"), [(1e-4, True), (4e-4, False)])
-def test_a_spring_that_comes_free_is_told_by_side(depth: float, told: bool) -> None:
-    """In line the slider goes where its pin goes, by its play to either side: −k ρ, and + k ρ or all of the force."""
-    mechanism = pressed(depth, 3e-4)
-    run = prepare(mechanism)
-    (play,) = plays(run.system, run.values).values()
-    ((radius,),) = (play.radii,)
-    most = 1e6 * float(np.ravel(radius)[0])
-    result = trunnion.play(mechanism, at=0.0)
-    assert result["worst_case_total"].item() == pytest.approx(most, rel=1e-9)
-    found = [one.figures for one in findings_of(result) if one.code == "play.beyond_first_order"]
-    assert bool(found) == told
-    for figures in found:
-        assert figures["first"] == pytest.approx(most, rel=1e-9)
-        assert figures["low"] == pytest.approx(-most, rel=1e-9)
-        assert figures["high"] == pytest.approx(1e6 * depth, rel=1e-9)
-    of_the_model = [one.figures for one in findings_of(trunnion.play(mechanism, steps=11))]
-    places = [one for one in of_the_model if one.get("high") == pytest.approx(1e6 * depth, rel=1e-9)]
-    assert bool(places) == told
-
-
 @pytest.mark.parametrize("play", [2e-5, 5e-4])
 def test_pins_move_the_corner_of_a_largest_effort(play: float) -> None:
     """A press whose force begins at x = 115 mm, passed both ways: M = F r sin(θ + φ)/cos φ there, of the crank

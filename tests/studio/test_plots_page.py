@@ -6,7 +6,6 @@ Every test fails on an error of the page, on one in its console, and on a reques
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ import pytest
 from studio.asking import EXAMPLES, analysed, unpacked
 from trunnion.studio.answers import answer
 
-ROOT = Path(__file__).resolve().parents[2]
 FLOAT = 1e-6  # of the peak
 
 
@@ -50,44 +48,6 @@ def show(user, *names):
     for name in names:
         user.page.get_by_label(name, exact=True).click()
     user.keys("Escape")
-
-
-def go(user, index):
-    user.of("motion", "m.crank.go(given)", index)
-
-
-def laid_words(user):
-    return user.page.locator(".layer.overlay text").all_text_contents()
-
-
-@pytest.mark.slow
-def test_layers_are_switched(user):
-    names = (
-        "Friction circles",
-        "Transmission angles",
-        "Instant centres against the ground",
-        "Instant centres between links",
-    )
-    kinds = {"circle.friction-circle": 5, "path.centre": 6}  # one circle is of the key
-    for kind in kinds:
-        assert user.page.locator(kind).count() == 0
-    show(user, *names, "Values of the reactions")
-    user.page.wait_for_selector("path.centre")
-    go(user, 60)
-    for kind, count in kinds.items():
-        assert user.page.locator(kind).count() == count, kind
-    result, words = analysed(user.state("s.text.value")), laid_words(user)
-    reaction = result["reaction_force"].sel(joint="B").values[:, 60]
-    (told,) = [one.removeprefix("B on coupler ") for one in words if one.startswith("B on coupler ")]
-    assert told.endswith("kN")
-    assert 1000 * number(told) == pytest.approx(float(np.hypot(*reaction)), rel=1e-3)
-    assert [one for one in words if one.startswith("C: r = ")] == ["C: r = 3.000\u00a0mm"]
-    assert any("friction circles × " in one for one in words)
-    (angle,) = [one for one in words if one.startswith("transmission angle")]
-    assert angle.endswith("°")
-    show(user, *names)
-    user.idle()
-    assert sum(user.page.locator(kind).count() for kind in kinds) == 0
 
 
 @pytest.mark.slow

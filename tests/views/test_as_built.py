@@ -8,21 +8,15 @@ import shutil
 import numpy as np
 import pytest
 from as_built_models import EXAMPLES, four_bar, four_bar_model, loaded
-from matplotlib.collections import LineCollection
-from matplotlib.patches import Circle
 
 import trunnion
-from trunnion.errors import MechanismError, Status
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.deviations import (
-    continued,
     losses,
     seated,
     with_worst_case,
 )
-from trunnion.views.cycle.plots import drawable, save
 from trunnion.views.cycle.scene import scene
-from trunnion.views.cycle.seats import PIN
 
 
 @pytest.fixture(scope="module")
@@ -78,56 +72,6 @@ def test_the_band_lies_about_the_error_of_the_dimensions():
     assert np.isnan(result["transmission_centre"].sel(joint="B")).all()
 
 
-@pytest.mark.slow
-def test_positions_without_an_answer_are_gaps(slider, tmp_path):
-    blank = slider.copy(deep=True)
-    hole = np.arange(blank.sizes["position"]) // 10 == 2
-    for name in ("point_error", "joint_slide_error", "seat_offset", "seat_xi", "seat_beta", "end_force"):
-        blank[name] = blank[name].where(~np.asarray(hole))
-    blank["status"] = ("position", np.where(hole, int(Status.LOCKED), 0).astype(np.int8))
-    drawn = _label(plots.figure(blank, "error").axes[0], "piston.Q").get_ydata()
-    assert np.isnan(drawn[20:30]).all()
-    assert np.isfinite(drawn[[19, 30]]).all()
-    save(plots.figure(blank, "seat"), tmp_path / "seat.png")
-    curve = _label(plots.figure(blank, "beta").axes[0], "Q")
-    inside = (curve.get_xdata() > 100) & (curve.get_xdata() < 145)
-    assert np.isnan(curve.get_ydata()[inside]).all()
-    everywhere = blank.assign(seat_offset=blank["seat_offset"] * np.nan)
-    assert "seat" not in drawable(everywhere)
-    with pytest.raises(MechanismError, match="no position is solved"):
-        plots.figure(everywhere, "seat")
-
-
-def _drawn(figure):
-    """Diagrams by title."""
-    return {axes.get_title(loc="left"): axes for axes in figure.axes if axes.get_title(loc="left")}
-
-
-@pytest.mark.slow
-def test_ends_stand_side_by_side_and_their_pins_touch_the_wall(cardan):
-    diagrams = _drawn(plots.figure(cardan, "seat"))
-    assert list(diagrams) == [
-        f"{joint}, end {end}" for joint in ("input", "pin-1", "pin-2", "output") for end in (1, 2)
-    ]
-    for name, axes in diagrams.items():
-        assert axes.get_xlabel().startswith("x [µm]\npin of ")
-        circles = [patch for patch in axes.patches if isinstance(patch, Circle)]
-        hole = next(one for one in circles if one.get_radius() == pytest.approx((1 + PIN) * 10))
-        for pin in (one for one in circles if one.get_radius() == pytest.approx(PIN * 10)):
-            assert np.hypot(*pin.center) + pin.get_radius() == pytest.approx(hole.get_radius(), rel=1e-4), name
-
-
-@pytest.mark.slow
-def test_the_locus_has_the_offsets_and_no_jump(slider):
-    axes = _drawn(plots.figure(slider, "seat"))["Q"]
-    loci = [one for one in axes.collections if isinstance(one, LineCollection)]
-    offset = 1e6 * slider.seat_offset.sel(joint="Q", end="1").transpose("position", "axis").values
-    pieces = [piece for locus in loci for piece in locus.get_segments()]
-    drawn = np.concatenate(pieces)
-    assert all(np.min(np.linalg.norm(offset - place, axis=1)) < 1e-9 for place in drawn)
-    assert max(np.linalg.norm(np.diff(piece, axis=0)) for piece in pieces) < 20
-
-
 def test_a_seat_that_is_given_is_drawn_where_it_is():
     result = four_bar()
     (one,) = seated(result)
@@ -135,20 +79,6 @@ def test_a_seat_that_is_given_is_drawn_where_it_is():
     axes = plots.figure(result, "beta").axes
     assert len(axes) == 1  # no β in the plane
     assert axes[0].lines[1].get_ydata() == pytest.approx(30.0)
-
-
-def test_beta_stays_within_a_turn():
-    """Ends of which one goes round and round against the other."""
-    way = np.linspace(0.0, 6 * np.pi, 400)
-    beta = np.angle(np.exp(1j * way))  # as it is told, in (−π, π]
-    xi = np.angle(np.exp(1j * (0.3 + np.round((beta - way) / (2 * np.pi)) * np.pi)))
-    shown, direction = continued(beta, xi)
-    assert np.abs(shown).max() <= 2 * np.pi * (1 + 1e-6)
-    for sign in (1.0, -1.0):  # the same places of both ends
-        one, other = xi + sign * beta / 2, direction + sign * shown / 2
-        assert np.allclose(np.cos(one - other), 1.0)
-    steps = np.abs(np.diff(shown))
-    assert np.count_nonzero(steps > 1.0) <= 3  # whole turns only, at which the curve is broken
 
 
 def test_no_line_crosses_a_jump_and_losses_are_marked(slider, cardan):

@@ -18,7 +18,6 @@ from test_report import Page
 import trunnion
 from rig_measurements import measured, rocker
 from trunnion.cli.app import main
-from trunnion.results.tables.studies import COMPARISON as TABLES
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.views.compare import (
     efficiencies,
@@ -91,15 +90,6 @@ def test_courses_have_band_model_and_residual():
     assert below.get_xlabel() == "drive angle A [°]"
 
 
-def test_gaps_are_drawn_as_gaps():
-    result = case("wrong").copy(deep=True)
-    result["measured"][0, 0, 5:9] = np.nan
-    above, _ = figure(result, "overlay", channel="torque").axes
-    lines = {line.get_label(): line for line in above.lines}
-    assert np.isnan(lines["measured"].get_ydata()[5:9]).all()
-    assert np.isfinite(lines["model"].get_ydata()[5:9]).all()
-
-
 def test_difference_of_efficiencies_is_measured_less_model():
     """A reading of the drive torque that is too large makes the measured efficiency too small."""
     result = case("wrong")
@@ -107,15 +97,6 @@ def test_difference_of_efficiencies_is_measured_less_model():
     assert measured_ < model - 0.01
     assert difference == pytest.approx(measured_ - model, abs=1.5e-4)
     assert difference == pytest.approx(float(result.efficiency[0] - result.efficiency_model[0]), abs=6e-5)
-
-
-def test_what_was_set_stands_beside_the_courses_of_its_condition():
-    result = case("family")
-    columns = {name: values for name, _, values in TABLES["courses"](result)}
-    for name in ("brake.resisting_torque", "A.speed"):
-        own = dict(zip(result["condition"].values, result["value"].sel({"set": name}).values, strict=True))
-        assert len(set(own.values())) > 1
-        assert columns[name].tolist() == [own[one] for one in columns["condition"]]
 
 
 @cache

@@ -30,7 +30,7 @@ from trunnion.results.tables import columns
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.scene import scene
 from trunnion.views.motion.figure import KINDS, OF_CONTACTS, figure
-from trunnion.views.motion.report import MOST_ROWS, motion_scene, report
+from trunnion.views.motion.report import motion_scene, report
 from trunnion.views.motion.shown import shown
 
 FREE = {"O": {"speed": 100, "free": True, "initial": {"speed": 60}}}
@@ -118,16 +118,6 @@ def test_a_motion_that_ends_early_is_shown_to_its_end() -> None:
     assert np.isfinite(motion.rows["drive_rate"].values).all()
     words = " ".join(Page(report(result)).words)
     assert "then the motion ends" in words
-
-
-def test_many_rows_are_thinned_and_events_are_not() -> None:
-    result = simulate(wheel({"kind": "constant", "effort": 4}), 1.0, 3 * MOST_ROWS)
-    scene = motion_scene(shown(result))
-    assert scene["count"] <= MOST_ROWS
-    assert scene["thinned"] == 3 * MOST_ROWS + 1
-    assert [one["word"] for one in scene["motion"]["events"]] == ["starts"]
-    assert f"{scene['count']} rows shown with every peak" in " ".join(report(result).split())
-    assert scene["time"][-1] == pytest.approx(1.0)
 
 
 def test_the_speed_over_a_cycle_is_drawn_where_it_varies() -> None:
@@ -230,20 +220,6 @@ def test_each_end_of_a_pin_in_space_has_its_hole() -> None:
     named = [name for name, *_ in columns(result) if "offset" in name]
     assert named[:3] == [f"Q.end_1.contact_offset.{axis}" for axis in "xyz"]
     assert len(named) == 3 * 4
-
-
-@pytest.mark.slow
-def test_the_report_has_force_gap_orbit_and_spectrum() -> None:
-    page = Page(report(rattled()))
-    assert not page.open
-    (contact,) = page.scene()["motion"]["contacts"]
-    assert contact["name"] == "Q"
-    assert max(contact["force"]) == pytest.approx(float(rattled()["contact_normal_force"].max()), rel=1e-6)
-    assert contact["gap"] == pytest.approx(rattled()["contact_gap"].values[0], rel=1e-6)
-    pictures = [attrs["alt"] for tag, attrs in page.tags if tag == "img"]
-    assert len(pictures) == 2
-    assert "holes" in pictures[0]
-    assert "frequency" in pictures[1]
 
 
 def test_columns_of_contacts_and_impacts() -> None:

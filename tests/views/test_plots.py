@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -10,13 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from stand_in import blank, four_bar, slider
+from stand_in import four_bar, slider
 
 import trunnion
 from trunnion.cycle.locking import LockingState
 from trunnion.errors import MechanismError, Status
-from trunnion.views.common.cycle import abscissa, intervals, thin
-from trunnion.views.common.drawing import cylinder, picture
+from trunnion.views.common.cycle import abscissa, thin
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.courses import turned_from_start
 from trunnion.views.cycle.plots import PLOTS, READY, mechanism, save
@@ -90,32 +88,10 @@ def test_a_position_without_an_answer_says_so():
     assert "locked by friction" in figure.axes[0].get_title(loc="left")
 
 
-def test_a_spring_is_dotted_where_it_does_not_act() -> None:
-    result = four_bar(36)
-    stated = json.loads(result.attrs["scene"])
-    stated["springs"] = {"S": {"between": ["ground.A", "coupler.E"], "joint": None}}
-    pull = np.where(np.arange(36) < 18, 0.0, 5.0)[np.newaxis]
-    result = result.assign_coords(spring=["S"]).assign(spring_force=(("spring", "position"), pull))
-    result.attrs["scene"] = json.dumps(stated)
-    for index, line in ((3, ":"), (20, "-")):
-        coils = [one for one in mechanism(result, index=index).axes[0].lines if len(one.get_xdata()) == 20]
-        assert [one.get_linestyle() for one in coils] == [line]
-
-
 def test_a_drive_turning_backwards_closes_too(plain):
     back = plain.assign_coords(drive=-plain.drive)
     back.drive.attrs = plain.drive.attrs
     assert abscissa(back).period == pytest.approx(-360.0)
-
-
-def test_intervals_name_each_run_without_an_answer(plain):
-    twice = blank(blank(plain, 10, 20, Status.LOCKED), 300, 360, Status.NOT_ASSEMBLED)
-    twice["status"][5] = Status.ZERO_SLIP  # solved, only flagged
-    runs = intervals(twice)
-    assert [(run.start, run.stop, run.text) for run in runs] == [
-        (10, 20, Status.LOCKED.text),
-        (300, 360, Status.NOT_ASSEMBLED.text),
-    ]
 
 
 @given(st.lists(st.floats(-1e6, 1e6) | st.just(np.nan), min_size=1, max_size=400), st.integers(4, 60))
@@ -178,37 +154,6 @@ def test_a_crank_in_space_turns_on_and_a_rocker_comes_back():
     hole[:, 20:25] = np.nan
     assert np.isnan(turned_from_start(hole)[20:25]).all()
     assert turned_from_start(hole)[25:] == pytest.approx(angle[25:], abs=1e-7)
-
-
-def test_curves_that_coincide_are_named_together_and_have_the_colour_of_the_first():
-    result = four_bar(36)
-    forces = result["reaction_force"].values
-    forces[3] = -forces[2]
-    figure = plots.figure(result.assign(reaction_force=(result["reaction_force"].dims, forces)), "reactions")
-    labels = figure.axes[0].get_legend_handles_labels()[1]
-    assert labels == ["A", "B", "C = D"]
-    alone = plots.figure(result.isel(joint=[0, 1, 2]), "reactions")
-    assert _line(figure.axes[0], "C = D").get_color() == _line(alone.axes[0], "C").get_color()
-
-
-def test_a_cylinder_is_a_barrel_with_a_rod_in_it():
-    """0.95 m shut, a stroke of 0.75 m: the barrel stays off the rod's eye, and the rod off the foot."""
-    result = trunnion.analyse(trunnion.read(EXAMPLES / "inverted-slider-crank.yaml"), 24)
-    shown = picture(result)
-    parts = cylinder(shown, "S")
-    assert (parts.barrel, parts.rod) == ("barrel.A", "rod.B")
-    rod, barrel = parts.long
-    apart = np.hypot(*(shown.tracks[parts.rod] - shown.tracks[parts.barrel]))
-    assert [apart.min(), apart.max()] == pytest.approx([0.95, 1.70], rel=1e-6)
-    assert barrel < apart.min()
-    assert rod < apart.min()
-    assert rod + barrel > apart.max()
-    drawn = plots.figure(result, "mechanism", at="375 mm")
-    ends = [line.get_xydata() for line in drawn.axes[0].lines if line.get_linewidth() == 17.0]
-    foot = shown.tracks["barrel.A"][:, 0]
-    assert [end[0] for end in ends] == [pytest.approx(foot)]
-    press = picture(trunnion.analyse(trunnion.read(EXAMPLES / "slider-crank.yaml"), 12))
-    assert cylinder(press, "S") is None  # on the ground
 
 
 STEPS = 24

@@ -12,7 +12,7 @@ from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
 
 import trunnion
 from trunnion import Status, save
-from trunnion.views.scales import Scale, arrange, on_scale
+from trunnion.views.scales import arrange
 from trunnion.views.sweep import figure, tables
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -74,51 +74,10 @@ def test_unsorted_values_are_drawn_in_order_and_the_gap_is_told():
     assert [text.get_text() for text in axes.texts] == ["locked"]
 
 
-def test_scales_are_logarithmic_where_the_values_are_spaced_so():
-    kinds = {
-        "log": ([1, 2, 5, 10, 20, 50], [0.001, 0.01, 0.1, 1], [30, 1, 10, 3, 10]),
-        "linear": ([0, 1, 10], [1, 2, 5], [50, 100, 150, 1000], [-1, -10, -100], [5], [1, 100], SPEED[0]),
-    }
-    for kind, rows in kinds.items():
-        for row in rows:
-            assert on_scale(Scale("x", "", np.array(row, float))) == kind, row
-    axes = figure(swept({"c": scale([1, 2, 5, 10, 20], "m", "um", 1e-6)})).axes[0]
-    assert axes.get_xscale() == "log"
-    assert [text.get_text() for text in axes.get_xticklabels()] == ["1", "2", "5", "10", "20"]
-    assert axes.get_xlabel() == "c [µm]"
-
-
 def gappy(angle, speed, *_):
     if speed > 1000 and angle > 20:
         return Status.LOCKED
     return Status.NOT_ASSEMBLED if angle > 26 else Status.CONTACT_LOST if 10 < angle < 15 and speed < 400 else 0
-
-
-def test_no_contour_enters_a_cell_without_a_number_at_each_corner():
-    result = swept(GRID, cardan, gappy)
-    sheet = figure(result, kind="map")
-    axes = sheet.axes[0]
-    x, y = ANGLE[0], SPEED[0]
-    bad = np.isnan(result["efficiency"].values)
-    cells = bad[:-1, :-1] | bad[1:, :-1] | bad[:-1, 1:] | bad[1:, 1:]
-    found = [path for one in axes.collections if type(one).__name__ == "QuadContourSet" for path in one.get_paths()]
-    places = np.concatenate([path.interpolated(7).vertices for path in found])
-    inside = lambda values, grid: (np.searchsorted(grid, values, side="left") - 1).clip(0)  # noqa: E731
-    strictly = (~np.isclose(places[:, :1], x).any(axis=1)) & (~np.isclose(places[:, 1:], y).any(axis=1))
-    rows, columns = inside(places[strictly, 0], x), inside(places[strictly, 1], y)
-    assert strictly.sum() > 100
-    assert not cells[rows, columns].any()
-    told = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert told == ["locked", "cannot be assembled", "contact lost at some position"]
-    hindered = {patch.get_label(): patch for patch in axes.patches if patch.get_label() in told}
-    for code, word in ((Status.LOCKED, "locked"), (Status.NOT_ASSEMBLED, "cannot be assembled")):
-        path = hindered[word].get_path()
-        edge = 1e-6 * np.array([1, 1])
-        centre = np.array([x.mean(), y.mean()])
-        for (i, k), here in np.ndenumerate(result["status"].values == code):
-            point = np.array([x[i], y[k]])
-            assert path.contains_point(point + edge * np.sign(centre - point)) == here
-    assert len(axes.get_lines()[-1].get_xdata()) == (result["status"].values == Status.CONTACT_LOST).sum()
 
 
 def test_lines_of_a_map_lie_where_the_field_has_their_number():
@@ -134,15 +93,6 @@ def test_lines_of_a_map_lie_where_the_field_has_their_number():
     for level, path in zip(lines.levels, lines.get_paths(), strict=True):
         c, angle = path.vertices.T
         assert np.log10(c) + angle / 30 == pytest.approx(level, abs=6e-3)
-
-
-def test_a_margin_that_is_known_where_it_locks_is_drawn_there():
-    result = swept(GRID, cardan, gappy)
-    axes = figure(result, "locking_margin", kind="map").axes[0]
-    look = {patch.get_label(): patch for patch in axes.patches}
-    assert look["locked"].get_facecolor()[3] == 0  # hatched, and the colours are seen
-    assert look["cannot be assembled"].get_facecolor()[3] == 1
-    assert "∞" in look
 
 
 PANELS = {"misalignment": ANGLE, "input.speed": FEW, "joint_defaults.friction.coefficient": FRICTION, "r": RADIUS}

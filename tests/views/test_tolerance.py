@@ -28,7 +28,6 @@ from trunnion.views.tolerance import (
     indices,
     inputs,
     overview,
-    sheet,
     tables,
 )
 
@@ -82,14 +81,6 @@ def test_every_figure_of_every_result_stays_on_its_sheet(case, kind):
             figure(case, kind, few(case))
         return
     assert not outside(figure(case, kind, few(case)))
-
-
-@pytest.mark.slow
-def test_the_legend_of_correlated_tolerances_stays_on_a_sheet_of_three_columns():
-    """ "RSS, uncorrelated" is longer than "RSS"."""
-    result = toleranced(24, 500, measures=2, measure={"angle": "rocker"}).assign_attrs(correlated=1)
-    plain = result.drop_vars([name for name in result if str(name).startswith("searched")])
-    assert not outside(sheet(plain))
 
 
 @pytest.mark.slow
@@ -161,16 +152,6 @@ def test_contributions_are_sorted_and_add_up():
     assert sum(widths) == pytest.approx(100)
     assert line(axes, "RSS², added up")[-1, 0] == pytest.approx(100)
     assert axes.get_yticklabels()[0].get_text().endswith("±0.07\u00a0mm")
-
-
-def test_intervals_shrink_with_independent_samples_and_are_told_of_all_others_at_the_end_only():
-    plain = figure(toleranced(24), "convergence").axes
-    assert [len(axes.collections) for axes in plain] == [1, 1, 1]
-    quasi = figure(CASES["sobol"](), "convergence").axes
-    assert all(axes.containers for axes in quasi)
-    half = np.ptp(quasi[2].containers[0][2][0].get_segments()[0][:, 1]) / 2
-    result = CASES["sobol"]()
-    assert half == pytest.approx(50 * float(result.yield_high[0] - result.yield_low[0]), rel=1e-6)
 
 
 HALF = np.geomspace(5e-6, 3e-4, 30)
@@ -268,41 +249,3 @@ def test_a_measure_that_is_undefined_has_a_row_that_says_so():
     data["dimensions"] = {**data["dimensions"], "l2": "200 mm"}
     (table,) = tables(trunnion.tolerance(trunnion.Mechanism(**data), ["least"], methods=("linear",), steps=12))
     assert table.rows == [["nominal", "undefined"]]
-
-
-def test_the_interval_of_few_samples_stays_within_what_can_be():
-    """Of σ not below 0, of a yield not beyond 0 and 100 %."""
-    result = toleranced(24)
-    wide = result.assign(convergence_deviation=result["convergence_deviation"] * 1e-3)
-    for case in (result, wide):
-        _, sigma, passed = figure(case, "convergence").axes
-        for axes, least, most in ((sigma, 0.0, np.inf), (passed, 0.0, 100.0)):
-            for band in axes.collections:
-                for path in band.get_paths():
-                    assert path.vertices[:, 1].min() >= least
-                    assert path.vertices[:, 1].max() <= most
-
-
-def test_bins_of_uneven_width_are_drawn_over_even_ones():
-    result = toleranced(72, 2000)
-    edges = result["edge"].values[0]
-    uneven = np.sort(np.append(edges, 0.5 * (edges[:60] + edges[1:61])))
-    total = np.interp(uneven, edges, np.append(0, np.cumsum(result["histogram"].values[0])))
-    other = result.drop_vars(["edge", "histogram"])
-    other["edge"], other["histogram"] = (("measure", "edge"), [uneven]), (("measure", "bin"), [np.diff(total)])
-    drawn = figure(other, "histogram").axes[0].patches[0].get_data()
-    assert np.ptp(np.diff(drawn.edges)) < 1e-9
-    counted = np.interp(np.radians(drawn.edges), uneven, total)
-    assert np.cumsum(drawn.values) == pytest.approx(counted[1:] - counted[0], abs=1e-6)
-
-
-def test_samples_outside_the_picture_are_counted():
-    result = toleranced(72, 2000)
-    edges = np.append(result["edge"].values[0], np.radians([5.0, 5.1]))
-    counts = np.append(result["histogram"].values[0], [0, 1])
-    other = result.drop_vars(["edge", "histogram"])
-    other["edge"], other["histogram"] = (("measure", "edge"), [edges]), (("measure", "bin"), [counts])
-    other["most"] = (("measure",), [np.radians(5.05)])
-    (axes,) = figure(other, "histogram").axes
-    assert axes.get_xlim()[1] < 0.5
-    assert axes.texts[0].get_text() == f"1 sample outside, up to {readings(other)[0].say(np.radians(5.05))}"

@@ -206,6 +206,7 @@ def test_friction_settled_otherwise_is_left_to_numpy(method: FrictionMethod, mon
     assert np.array_equal(found.arrays["friction_change"], expected.arrays["friction_change"], equal_nan=True)
 
 
+@pytest.mark.slow
 def test_auto_takes_numpy_where_a_mechanism_cannot_be_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("trunnion.cycle.cycle_kernel.WORTH_COMPILING", 1)
     mechanism = trunnion.read(EXAMPLES / "bennett.yaml")  # over-constrained

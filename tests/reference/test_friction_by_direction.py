@@ -36,6 +36,7 @@ def by_direction() -> Data:
     return {"coefficient": FORWARD, "backward": BACKWARD}
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(
     ("name", "joint", "engine"),
     [("durango-fourbar", "D", "numpy"), ("offset-slider-crank", "S", "compiled"), ("rssr", "D", "numpy")],
@@ -134,6 +135,7 @@ def test_a_loaded_roller() -> None:
     assert found["drive_effort"].values == pytest.approx(np.full((1, 4), 5e-4 * 50 * G), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_tolerances_know_the_backward_coefficient() -> None:
     """Its exact sensitivity against a central difference."""
     data = trunnion.read("examples/durango-fourbar.yaml").data()

@@ -346,6 +346,7 @@ def test_driven_at_the_nut(friction: float) -> None:
         np.testing.assert_allclose(at(result, "drive_effort", driver="S"), force, rtol=1e-10)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("friction", "torque"), [(0.05, 0.0), (0.05, 1.5), (0.6, 0.4)])
 def test_a_free_screw(friction: float, torque: float) -> None:
     """(J + m p r tan(λ ± φ)) ω̇ = T − F r tan(λ ± φ), p = lead/2π; at rest between the two torques."""

@@ -109,6 +109,7 @@ def slider(force: str, friction: float | dict[str, Any] = F) -> Mechanism:
     return Mechanism(**data)
 
 
+@pytest.mark.slow
 def test_a_slider_alone_jams_where_its_push_turns_round() -> None:
     """As above: q̈ = T/(m (1 + κ)) ahead, a stop at once, and back by as much."""
     data = simulate(slider("1 N - time/(1 s)*2 N"), 1.0, 8)
@@ -165,6 +166,7 @@ def solutions(torque: float, rough: float) -> int:
     return count
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_painleves_rod_stops_by_the_momentum_about_its_pin(friction: float) -> None:
     """No acceleration: the slider stops at once. Of J Δω − m a sin φ Δv = ∓ f r |S|, S the impulse on the rod's end,

@@ -41,7 +41,7 @@ def test_random_mechanisms(space: str, seeds: Any) -> None:
     assert sum(one.statuses[0] for one in found) > 0.6 * STEPS * len(found)
 
 
-@pytest.mark.spread(2)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("space", "seed"), [("planar", 3), ("planar", 8097), ("planar", 8260), ("spatial", 0)])
 def test_the_quick_way_has_the_same_numbers(space: str, seed: int) -> None:
     """What leaves out the locking margin publishes what `analyse` does, bit by bit."""

@@ -345,6 +345,7 @@ def starting_time(inertia: float) -> float:
     return float(brentq(lambda t: takes(t) - limit, 2.0 * tau, DURATION, xtol=1e-13))
 
 
+@pytest.mark.slow
 def test_first_order_of_the_starting_time() -> None:
     """The sensitivity to the inertia, by differences of the closed form; samples scatter about it."""
     mechanism = stated(wheel(LINEAR), tolerances={"links.wheel.inertia": 0.001}, measures={"start": MEASURE})
@@ -358,6 +359,7 @@ def test_first_order_of_the_starting_time() -> None:
     assert float(found["yield_all"]) == 1.0
 
 
+@pytest.mark.slow
 def test_samples_that_do_not_start_are_outside_every_limit() -> None:
     """Torques about the drag: half of them do not start."""
     motor = {**LINEAR, "stall_effort": 0.6}

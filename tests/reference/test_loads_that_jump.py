@@ -183,6 +183,7 @@ def test_the_worst_case_found_includes_a_play() -> None:
         assert float(result[key][0]) == pytest.approx(worst, rel=0.01)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(
     ("criterion", "code"), [("worst-case", "allocation.worst_case_beyond"), ("yield", "yield.missed")]
 )

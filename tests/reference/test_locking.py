@@ -383,6 +383,7 @@ def margins_of(mechanism: Mechanism) -> Any:
     return brief(mechanism, POSITIONS)["locking_margin"].values
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("coefficient", "aside"), [(0.4, 0.0), (2.0, 400.0)])
 def test_below_the_margin_nothing_locks_and_above_it_something_does(coefficient: float, aside: float) -> None:
     """Whether it runs, one group locks or both, and whatever loads the inner one beside the outer."""
@@ -394,6 +395,7 @@ def test_below_the_margin_nothing_locks_and_above_it_something_does(coefficient:
         assert np.any(status == Status.LOCKED) == expected
 
 
+@pytest.mark.slow
 def test_joints_of_a_group_without_loads_have_no_critical_multiple() -> None:
     found = locking(ram(2.0), POSITIONS)
     locked = found["status"].values == Status.LOCKED

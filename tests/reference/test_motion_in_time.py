@@ -240,6 +240,7 @@ def test_a_pulled_mass_with_bristles() -> None:
 # ---- limits -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_huge_flywheel_runs_as_the_analysis_prescribes() -> None:
     """The difference of the efforts of a turn at constant speed falls as 1/J."""
     data = slider_crank().data()
@@ -322,7 +323,7 @@ def unbalanced(result: Any) -> float:
     return float(abs(result["energy_residual"]).max()) / turned_over
 
 
-@pytest.mark.spread(2)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("example", MOVING)
 def test_the_account_of_the_examples_as_they_begin(example: str) -> None:
     assert unbalanced(simulate(read(EXAMPLES / f"{example}.yaml"), MOVING[example], 200)) < 1e-8
@@ -491,6 +492,7 @@ def crank(duration: float, **clutch: Any) -> Any:
     return simulate(Mechanism(**data), duration, 10, 1e-10)
 
 
+@pytest.mark.slow
 def test_a_clutch_that_never_slips_is_none() -> None:
     """With friction, a gear's loss and a start from rest."""
     plain, other = crank(0.1), crank(0.1, clutch=100)

@@ -210,6 +210,7 @@ def test_end_float() -> None:
     assert float(result["sensitivity"].values[0, 0, 2, 2, 0]) == pytest.approx(-6.11075, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_totals_and_attributes() -> None:
     mechanism = trunnion.read(EXAMPLES / "toleranced-slider-crank.yaml")
     result = trunnion.play(mechanism, steps=36)

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
-import xarray as xr
 
-import trunnion
 from manual.conftest import Run
 from timed import PARALLELOGRAM, beside, driven_four_bar, swinging
 from trunnion import Mechanism
@@ -70,27 +66,6 @@ def test_the_command_line_tells_where_a_motion_ends(program: Run, tmp_path: Path
 
 
 DRAWING, FREE = EXAMPLES / "drawing-press.yaml", EXAMPLES / "durango-fourbar.yaml"
-
-
-@pytest.mark.slow
-def test_ranges_and_files(program: Run, tmp_path: Path) -> None:
-    files = ["l.csv", "l.json", "l.nc", "l.png"]
-    code, out, _ = program("locking", DRAWING, "--steps", 24, "--near", 5, *(f"--out={name}" for name in files))
-    assert code == 0
-    assert {path.name for path in tmp_path.iterdir()} == set(files)
-    assert "ranges of Z" in out
-    assert "margin below 5" in out
-    with (tmp_path / "l.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    result = trunnion.locking(trunnion.read(DRAWING), 24)
-    margins = [float(row["locking_margin"]) for row in rows]
-    assert margins == pytest.approx(result["locking_margin"].values)
-    assert {"time", "drive", "B.critical_multiple", "Z.effort", "Z.effort_reverse", "locking_state"} <= set(rows[0])
-    meanings = result["locking_state"].attrs["flag_meanings"].split()
-    assert [row["locking_state"] for row in rows] == [meanings[code] for code in result["locking_state"].values]
-    assert "locking_state" in json.loads((tmp_path / "l.json").read_text())["data_vars"]
-    with xr.open_dataset(tmp_path / "l.nc") as read:
-        np.testing.assert_array_equal(read["locking_state"].values, result["locking_state"].values)
 
 
 def test_without_friction_the_ranges_are_those_of_coefficients_of_zero(program: Run) -> None:

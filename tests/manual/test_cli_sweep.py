@@ -61,25 +61,6 @@ def test_table_csv_netcdf_and_figure(program: Run, tmp_path: Path) -> None:
     assert ElementTree.parse(tmp_path / "s.svg").getroot().tag.endswith("svg")
 
 
-@pytest.mark.slow
-def test_a_grid_in_csv_has_a_row_a_point(program: Run, tmp_path: Path) -> None:
-    options = ("--over", "B.friction.coefficient=0.1,0.3", "--over", "AB=1.6m,2.6 m", "--steps", 72)
-    done = program("sweep", FOUR_BAR, *options, "--out", "g.csv", "--out", "g.png", "--units-row")
-    assert done.code == 1  # AB = 2.6 m cannot be assembled all the way
-    units, *found = rows(tmp_path / "g.csv")
-    assert (units["AB"], units["A.effort_max"], units["B.reaction_max"], units["status"]) == ("m", "N m", "N", "")
-    points = [(float(row["B.friction.coefficient"]), float(row["AB"])) for row in found]
-    assert points == [(0.1, 1.6), (0.1, 2.6), (0.3, 1.6), (0.3, 2.6)]
-    assert [row["status"] for row in found][1::2] == ["not_assembled"] * 2
-    assert [row["efficiency"] for row in found][1::2] == ["", ""]
-    assert [row["A.effort_max"] == "" for row in found] == [False, True, False, True]
-    assert "cannot be assembled" in done.out
-    assert (
-        "2 of 4 points have no result, the first at B.friction.coefficient = 0.1, AB = 2.6 m (5 positions" in done.err
-    )
-    assert (tmp_path / "g.png").read_bytes().startswith(b"\x89PNG")
-
-
 def test_options_of_the_model_come_first(program: Run, tmp_path: Path) -> None:
     same = ("--over", "AB=2m,2.1m", "--steps", 12)
     program("sweep", FOUR_BAR, *same, "--friction", "off", "--set", "BC=6.2m", "--out", "s.csv")
@@ -122,27 +103,6 @@ def test_bad_sweeps_are_refused_with_a_message(program: Run, tmp_path: Path, cas
 
 
 SLIDER = EXAMPLES / "toleranced-slider-crank.yaml"
-
-
-@pytest.mark.slow
-def test_tables_and_files(program: Run, tmp_path: Path) -> None:
-    files = [f"p{end}" for end in (".csv", ".json", ".nc", ".svg", ".png")]
-    code, out, _ = program("play", SLIDER, "--steps", 36, "--units-row", *(f"--out={name}" for name in files))
-    assert code == 0
-    assert {path.name for path in tmp_path.iterdir()} == set(files)
-    assert "stroke-position, largest at 90°" in out
-    assert "all, worst case" in out
-    assert all(f"wrote {name}" in out for name in files)
-    with (tmp_path / "p.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert rows[0]["stroke-position"] == "m"
-    result = trunnion.play(trunnion.read(SLIDER), steps=36)
-    column = [float(row["drive-torque.O.worst_case"]) for row in rows[1:]]
-    assert column == pytest.approx(result["worst_case"].sel(measure="drive-torque", joint="O").values)
-    with xr.open_dataset(tmp_path / "p.nc") as read:
-        np.testing.assert_array_equal(read["sensitivity"].values, result["sensitivity"].values)
-    assert json.loads((tmp_path / "p.json").read_text())["attrs"]["drive"] == "O"
-    ElementTree.parse(tmp_path / "p.svg")
 
 
 def test_a_limit_is_a_finding_with_the_line_of_the_file(program: Run, tmp_path: Path) -> None:

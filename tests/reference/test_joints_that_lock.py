@@ -394,47 +394,6 @@ def pendulum() -> Mechanism:
     )
 
 
-def _pendulum_parts(y: Array) -> tuple[Array, Array]:
-    """Lagrange's equations in relative angles: M q̈ + h = 0."""
-    (a, b, u, v) = y
-    couple = M[1] * LENGTH * C[1]
-    lower = M[1] * C[1] ** 2 + J[1]
-    upper = M[0] * C[0] ** 2 + J[0] + M[1] * LENGTH**2
-    mass = np.array([
-        [upper + lower + 2 * couple * np.cos(b), lower + couple * np.cos(b)],
-        [lower + couple * np.cos(b), lower],
-    ])  # fmt: skip
-    weight = M[1] * G * C[1] * np.cos(a + b)
-    h = np.array([
-        -couple * np.sin(b) * (2 * u * v + v * v) + (M[0] * C[0] + M[1] * LENGTH) * G * np.cos(a) + weight,
-        couple * np.sin(b) * u * u + weight,
-    ])  # fmt: skip
-    return mass, h
-
-
-def _pendulum_limits(y: Array, second: Array) -> Array:
-    """f r |R| of both pins, from Newton's law for the centres of mass."""
-    a, b, u, v = y
-    one, other = np.exp(1j * a), np.exp(1j * (a + b))
-    first = (1j * second[0] - u * u) * one
-    last = LENGTH * first + C[1] * (1j * (second[0] + second[1]) - (u + v) ** 2) * other
-    at_b = M[1] * (last + 1j * G)
-    at_a = at_b + M[0] * (C[0] * first + 1j * G)
-    return ROUGHNESS * PIN * np.abs([at_a, at_b])
-
-
-@pytest.mark.slow
-def test_a_double_pendulum_comes_to_rest_in_friction_as_its_equations_say() -> None:
-    data = simulate(pendulum(), 3.0, 50)
-    end, told = Reference(_pendulum_parts, _pendulum_limits, np.eye(2)).run(np.array([-0.3, 0.5, 0.0, 0.0]), 3.0)
-    found = [one for one in times_of(data) if one[2] > 0]
-    assert [(kind, "AB"[k]) for kind, k, _ in told] == [(kind, of) for kind, of, _ in found]
-    assert len(told) > 3
-    assert [time for *_, time in found] == pytest.approx([time for *_, time in told], abs=1e-6)
-    assert data.drive_coordinate[:, -1].values == pytest.approx(end[:2], abs=1e-6)
-    assert float(abs(data.energy_residual).max()) < 1e-8 * float(data.work_friction[-1])
-
-
 # ---- coordinates that know nothing of each other --------------------------------------------------------------
 
 

@@ -1,7 +1,7 @@
 """Spatial mechanisms against the Newton–Euler equations of all links at once, which share nothing with Trunnion.
 
 The oracle has its own motion, in maximal coordinates; from Trunnion it takes only the frames of the links, which tell
-its Newton the assembly, and finds friction by its own law. MuJoCo has a motion and forces of its own.
+its Newton the assembly, and finds friction by its own law.
 """
 
 from __future__ import annotations

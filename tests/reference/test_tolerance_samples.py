@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,8 +28,7 @@ from toleranced import (
 )  # fmt: skip
 from trunnion import Mechanism
 from trunnion.statistics.streams import SobolStream, uniforms
-from trunnion.studies.tolerance.first_order import ToleranceStudy, study
-from trunnion.studies.tolerance.sampled import sampled
+from trunnion.studies.tolerance.first_order import study
 
 Law = Callable[[Array], Array]
 MM = 1e-3
@@ -273,24 +271,3 @@ def test_large_tolerances_against_brute_force() -> None:
     assert 0.5 < both < min(inside) < 0.99
     assert result["searched_upper"].values[0] >= np.max(own) - nominal - 1e-12
     assert result["searched_lower"].values[0] <= np.min(own) - nominal + 1e-12
-
-
-SEEDS = 200
-
-
-def intervals(mechanism: Mechanism, method: str, samples: int) -> dict[str, Array]:
-    """(seed, measure) each: ends of the intervals, of the yields with that of all measures together."""
-    found = study(mechanism)
-    first = found.sampling(method, samples, 0).prepare()
-    rows = [_arrays(found, first, seed) for seed in range(SEEDS)]
-    return {key: np.array([row[key] for row in rows]) for key in rows[0]}
-
-
-def _arrays(found: ToleranceStudy, first: Any, seed: int) -> dict[str, Array]:
-    batch = replace(first, job=replace(first.job, seed=seed))
-    arrays = sampled(batch.job.joined([batch(block) for block in range(batch.job.blocks)]), found).arrays
-    keys = ("mean", "deviation", "quantile")
-    kept = {f"{key}_{end}": arrays[f"{key}_{end}"] for key in keys for end in ("low", "high")}
-    for end in ("low", "high"):
-        kept[f"yield_{end}"] = np.append(arrays[f"yield_{end}"], arrays[f"yield_all_{end}"])
-    return kept

@@ -19,7 +19,6 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 GRID = {"misalignment": ANGLE, "input.speed": SPEED}
 FEW = scale([50, 500, 1000, 1500], "rad/s", "rpm", RPM)
 FRICTION = scale([0.05, 0.1, 0.2])
-RADIUS = scale([10, 20, 30], "m", "mm", 1e-3)
 
 
 def curves(axes, count):
@@ -74,12 +73,6 @@ def test_unsorted_values_are_drawn_in_order_and_the_gap_is_told():
     assert [text.get_text() for text in axes.texts] == ["locked"]
 
 
-def gappy(angle, speed, *_):
-    if speed > 1000 and angle > 20:
-        return Status.LOCKED
-    return Status.NOT_ASSEMBLED if angle > 26 else Status.CONTACT_LOST if 10 < angle < 15 and speed < 400 else 0
-
-
 def test_lines_of_a_map_lie_where_the_field_has_their_number():
     """Of a field linear in both, and of one linear in the logarithm of a length."""
     result = swept(GRID, lambda angle, speed: 0.9 - 0.01 * angle - 0.0001 * speed)
@@ -93,67 +86,6 @@ def test_lines_of_a_map_lie_where_the_field_has_their_number():
     for level, path in zip(lines.levels, lines.get_paths(), strict=True):
         c, angle = path.vertices.T
         assert np.log10(c) + angle / 30 == pytest.approx(level, abs=6e-3)
-
-
-PANELS = {"misalignment": ANGLE, "input.speed": FEW, "joint_defaults.friction.coefficient": FRICTION, "r": RADIUS}
-TINY = scale(np.linspace(-3e-7, 3e-7, 5), "m")
-ONE = {"misalignment": ANGLE}
-TWICE = {"a": scale([3, 1, 2, 1]), "b": scale([5, 4, 4])}
-HUGE = {"k": scale(np.linspace(1e9, 3e9, 4), "N/m"), "a": FEW}
-
-
-def peaked(angle, *_):
-    return 1 / ((angle / 30 - 0.5) ** 2 + 1e-4)
-
-
-def everywhere(*_):
-    return Status.LOCKED
-
-
-def product(*values):
-    return np.prod(values)
-
-
-ODD = {
-    "one point": lambda: figure(swept({"misalignment": scale([5], "rad", "deg", DEG)})),
-    "all locked": lambda: figure(swept(GRID, status=everywhere)),
-    "all locked, map": lambda: figure(swept(GRID, status=everywhere), kind="map"),
-    "no value": lambda: figure(swept(ONE, lambda _: np.nan)),
-    "no value, map": lambda: figure(swept(GRID, lambda *_: np.nan), kind="map"),
-    "all infinite": lambda: figure(swept(ONE, lambda _: 0.9), "locking_margin"),
-    "constant": lambda: figure(swept(GRID, lambda a, _: 1 + 1e-16 * a)),
-    "constant, map": lambda: figure(swept(GRID, lambda *_: 0.83), kind="map"),
-    "zero, map": lambda: figure(swept(GRID, lambda *_: 0), "friction_power_mean", kind="map"),
-    "hundred curves": lambda: figure(swept({"a": scale([1, 2]), "b": scale(range(100))}, product)),
-    "hundred alike": lambda: figure(swept({"a": scale([1, 2]), "b": scale([3.0] * 100)}, product)),
-    "duplicates, map": lambda: figure(swept(TWICE, product), kind="map"),
-    "peak, map": lambda: figure(swept(GRID, peaked), "Ω.effort_max", kind="map"),
-    "peak below, map": lambda: figure(swept(GRID, lambda *place: -peaked(*place)), kind="map"),
-    "odd names": lambda: figure(swept({"offset": TINY, "曲柄_$角$": FRICTION}, product), "$x_1$.reaction_max"),
-    "huge": lambda: figure(swept(HUGE, product), kind="map"),
-    "ideal": lambda: figure(swept({"misalignment": ANGLE, "input.speed": FEW}, cardan, ideal=True)),
-    "gaps": lambda: figure(swept(GRID, cardan, gappy)),
-    "panels": lambda: figure(swept(PANELS, cardan, gappy)),
-    "panels, map": lambda: figure(swept(PANELS, cardan, gappy), kind="map"),
-    "panels, peak": lambda: figure(swept(PANELS, peaked), "input.effort_max"),
-}
-
-
-@pytest.mark.spread(2)
-@pytest.mark.parametrize("case", ODD)
-def test_odd_cases_are_drawn_and_nothing_is_cut_off(case):
-    """Warnings are errors here; all that is drawn lies within the sheet, and no legend on the title."""
-    sheet = ODD[case]()
-    sheet.canvas.draw()
-    drawn, size = sheet.get_tightbbox(), sheet.bbox_inches
-    assert drawn.x0 > 0
-    assert drawn.y0 > 0
-    assert drawn.x1 < size.x1
-    assert drawn.y1 < size.y1
-    title = sheet._suptitle.get_window_extent()
-    for axes in sheet.axes:
-        if axes.get_legend():
-            assert not axes.get_legend().get_window_extent().overlaps(title)
 
 
 def test_a_table_for_each_value_of_further_names():

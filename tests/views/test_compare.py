@@ -18,6 +18,7 @@ from test_report import Page
 import trunnion
 from rig_measurements import measured, rocker
 from trunnion.cli.app import main
+from trunnion.results.tables.studies import COMPARISON as TABLES
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.views.compare import (
     efficiencies,
@@ -97,6 +98,15 @@ def test_difference_of_efficiencies_is_measured_less_model():
     assert measured_ < model - 0.01
     assert difference == pytest.approx(measured_ - model, abs=1.5e-4)
     assert difference == pytest.approx(float(result.efficiency[0] - result.efficiency_model[0]), abs=6e-5)
+
+
+def test_what_was_set_stands_beside_the_courses_of_its_condition():
+    result = case("family")
+    columns = {name: values for name, _, values in TABLES["courses"](result)}
+    for name in ("brake.resisting_torque", "A.speed"):
+        own = dict(zip(result["condition"].values, result["value"].sel({"set": name}).values, strict=True))
+        assert len(set(own.values())) > 1
+        assert columns[name].tolist() == [own[one] for one in columns["condition"]]
 
 
 @cache

@@ -194,7 +194,7 @@ def test_ways_that_nearly_meet_are_told_apart(turn: float, crank: float, longer:
     assert selected_by_what_is_printed(build(data)) == 2
 
 
-@pytest.mark.spread(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["swash-plate-pump", "double-cardan"])
 def test_the_turn_of_a_universal_joint_is_a_hint(name: str) -> None:
     """Its place is the same in several ways; its turn about its first pin is not."""
@@ -263,6 +263,7 @@ def jacked(first: str, **tube: Any) -> Mechanism:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_half_turns_of_a_strut_are_no_assemblies_of_their_own() -> None:
     """The ball of the arm meets a sphere about U on two places; a cross holds the tube in two turns at each."""
     (choice,) = trunnion.check(jacked("universal"), 12).choices

@@ -236,6 +236,7 @@ def random_change_point_linkage(rng: np.random.Generator) -> Mechanism:
     return Mechanism(**data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("first", "count"), [(0, 10), pytest.param(10, 30, marks=pytest.mark.slow)])
 def test_no_rate_jumps_at_a_change_point_but_where_it_is_stated(first: int, count: int) -> None:
     passed = jumped = 0

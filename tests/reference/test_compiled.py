@@ -146,6 +146,7 @@ def test_kept_code_of_another_law_is_not_taken(monkeypatch: pytest.MonkeyPatch, 
         agree(*both(changed, 40))
 
 
+@pytest.mark.slow
 def test_samples_are_the_same_by_any_number_of_threads() -> None:
     mechanism = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
     one, other = (

@@ -318,6 +318,7 @@ def test_a_falling_slider_bounces_ever_lower_and_comes_to_rest(restitution: floa
     assert not codes(result)
 
 
+@pytest.mark.slow
 def test_an_impact_that_closes_a_contact_tears_a_joint_loose() -> None:
     """The crank sticks until the slider, which falls, has landed; nothing of its energy is lost but in friction."""
     data = guide(0.0, {**RIGID, "restitution": 0.0}).data()

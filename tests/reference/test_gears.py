@@ -203,7 +203,7 @@ def test_driven_rack_turns_the_pinion() -> None:
     np.testing.assert_allclose(turned - turned[4], np.linspace(-0.1, 0.1, 9) / RADIUS, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.spread(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("joint", "ends"), [("P", (0.0, 1000.0)), ("S", (-900.0, -1000.0))])
 def test_many_turns_away(joint: str, ends: tuple[float, float]) -> None:
     """Thousands of radii from where the rack is drawn, and turns by hundreds from one position to the next."""

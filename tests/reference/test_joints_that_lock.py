@@ -85,6 +85,7 @@ def test_a_slider_jams_where_its_push_turns_round_and_the_block_on_it_keeps_its_
     assert findings(data)["simulate.several_accelerations"]["time"] == 0.0  # also T/(m (1 − κ)) obeys
 
 
+@pytest.mark.slow
 def test_what_sticks_to_a_slider_that_jams_is_torn_away() -> None:
     """Braked by more than its friction at low accelerations, the slider has no acceleration, and jams; the block that
     stuck to it slides on with the speed that it had, and with its own friction."""

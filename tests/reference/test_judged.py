@@ -91,7 +91,7 @@ def test_the_judge_sees_a_wrong_number(space: str, name: str, check: str) -> Non
 LET_GO = (1, 2, 12, 5, 10, 24, 34)
 
 
-@pytest.mark.spread(0, "2")
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", LET_GO)
 def test_they_move_as_all_their_links_must(seed: int) -> None:
     """Gravity, forces, springs, dampers, and friction in pins and guides by its law from the multipliers."""

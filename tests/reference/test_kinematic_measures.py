@@ -199,6 +199,7 @@ def test_measures_are_the_numbers_of_the_analysis() -> None:
     assert found["friction_energy:B"] == pytest.approx(lost, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_forces_in_space_are_those_of_the_analysis() -> None:
     """Effort, reaction and its size, power lost, of an RSSR with friction."""
     run = prepare(Mechanism(**rssr(friction=0.1).data))

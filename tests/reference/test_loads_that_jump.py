@@ -217,6 +217,7 @@ def test_a_sweep_has_no_efficiency_where_the_load_never_acts() -> None:
     assert np.isnan(result["efficiency"].values).tolist() == [True, True, False]
 
 
+@pytest.mark.slow
 def test_two_corners_that_are_as_high_do_not_cancel() -> None:
     """A press in line whose force acts both ways: a slide off the line raises one of its peaks as it lowers the other.
     That of half a turn alone is the same size."""
@@ -271,6 +272,7 @@ def single(mechanism: Mechanism) -> dict[str, float]:
     return figures_of(run, named(mechanism, FIGURES, run.values), FrictionMethod())
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("start", [326.9, 100.0])
 def test_figures_of_many_are_those_of_each_alone_and_of_the_closed_form(start: float) -> None:
     """Near the nominal place, far from it, and where the ram does not come to the load, or is at it throughout.

@@ -471,6 +471,7 @@ def test_critical_multiples_are_where_it_locks(name: str) -> None:
     assert checked >= 6
 
 
+@pytest.mark.slow
 def test_locking_says_nothing_where_there_is_no_answer() -> None:
     """Positions that cannot be assembled have no margin and no multiple."""
     found = locking(build(four_bar(2.0, 1.5, 1.5, 4.0)), 36)

@@ -281,6 +281,7 @@ def test_locking_margin() -> None:
     assert float(np.ravel(primal(slope))[0]) == pytest.approx(found, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_locking_margin_beyond_what_is_looked_for_is_infinite() -> None:
     """In a result, a sweep and samples; the summary says "more than"; its place does not exist."""
     statistics = ["minimum", "mean", "place-of-minimum"]

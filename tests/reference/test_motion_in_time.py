@@ -86,6 +86,7 @@ def test_a_motor_too_weak_does_not_start() -> None:
     assert np.all(result["resting"].values == 1)
 
 
+@pytest.mark.slow
 def test_a_motor_too_weak_stalls() -> None:
     """It gets slower by (0.6 − 0.5) N m/J and stops for good; a motor switched off, braked, or of no torque by then
     does not stall, nor does one that breaks away again."""

@@ -245,6 +245,7 @@ def test_limit(place: dict[str, str]) -> None:
         assert bool(json.loads(result.attrs["missed"])) == (factor < 1)
 
 
+@pytest.mark.slow
 def test_redundant_constraints_make_it_a_bound() -> None:
     mechanism = trunnion.read(EXAMPLES / "fourbar-in-space.yaml")
     if mechanism.over_constraint == "refuse":

@@ -357,7 +357,7 @@ def test_friction_that_is_not_whole_leaves_the_motion():
     assert not worse["bare"]
 
 
-@pytest.mark.spread(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("index", [8, 200])
 def test_of_many_joints_the_forces_are_those_of_the_position_that_is_shown(index):
     """A chain of 82 links: its paths are there, thinned, and its forces are those of the model that has the number."""

@@ -214,6 +214,7 @@ def test_links_wires_and_curves_are_reached_by_keys(user):
     assert f"torque {effort:.2f} [N m]" in page.locator(".notice").inner_text()
 
 
+@pytest.mark.slow
 def test_a_mechanism_is_built_of_blocks_by_the_keyboard(user):
     page = user.page
     user.new_sheet()

@@ -67,6 +67,7 @@ def spot(user, name):
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
+@pytest.mark.slow
 def test_what_is_chosen_in_the_picture_is_lit_and_moved_along_an_axis(user):
     """By click, key and arrow; the joint goes so far along x; nothing else moves at the position that is shown."""
     user.page.mouse.click(*spot(user, "rod"))  # the middle of its body

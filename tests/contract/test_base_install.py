@@ -102,6 +102,7 @@ def test_every_verb_works(ends: list[tuple[int, str]]) -> None:
         assert "pip install" not in told, (words, told)
 
 
+@pytest.mark.slow
 def test_what_an_extra_brings_is_asked_for_by_its_name(ends: list[tuple[int, str]]) -> None:
     # SciPy writes NetCDF too, and a notebook has no command line
     assert REFUSED.keys() == extras().keys() - {"netcdf", "notebook"}

@@ -90,6 +90,7 @@ def test_steps_that_repeat_are_a_source(tmp_path: Path) -> None:
     assert 0.6 < np.mean([float(one["reduced_chi_squared"]) for one in found[120.0]]) < 1.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.02, pytest.param(0.1, marks=pytest.mark.slow)])
 def test_a_file_that_spans_three_steps_has_those_of_the_others(tmp_path: Path, noise: float) -> None:
     """The torque into a Cardan joint at 5°, whose two levels tell no step; of 12 rigs of a true 95 % one misses."""

@@ -71,6 +71,7 @@ def compressor(load: dict[str, Any]) -> trunnion.Mechanism:
     return trunnion.Mechanism(**{**data, "loads": {"air": load}})
 
 
+@pytest.mark.slow
 def test_the_corners_of_a_pressure_table_are_left_out(tmp_path: Path) -> None:
     """With them the model does not fit: χ² is 1.7, for the resampling rounds the corners off by up to 13 u."""
     machine = trunnion.read("examples/slider-crank.yaml")

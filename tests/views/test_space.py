@@ -70,6 +70,7 @@ def test_no_mechanism_is_seen_on_its_edge():
         assert np.prod(np.linalg.svd(seen, compute_uv=False)) > 0.3 * true
 
 
+@pytest.mark.slow
 def test_every_pair_has_a_symbol():
     from trunnion.joints.pairs import PAIRS
 
@@ -190,7 +191,7 @@ if shutil.which("node"):  # as in test_scene.py
     def test_arithmetic_of_the_drawing():
         run("space.test.mjs")
 
-    @pytest.mark.spread(1)
+    @pytest.mark.spread(0)
     def test_every_spatial_result_is_shown(spatial, tmp_path):
         kind, result = spatial
         shown = page(result, tmp_path, result)
@@ -215,6 +216,7 @@ if shutil.which("node"):  # as in test_scene.py
         assert "20" in space["keys"][0]
         assert "mm" in space["keys"][0]
 
+    @pytest.mark.slow
     def test_python_and_browser_look_alike(tmp_path):
         """The first view of the page is that of the figure: its triad points the same way."""
         result = rssr(24)

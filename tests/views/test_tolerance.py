@@ -128,6 +128,7 @@ def test_the_envelope_has_the_bands_of_the_result_and_closes_the_turn():
     assert {round(one.get_ydata()[0], 9) for one in axes.lines if str(one.get_linestyle()) != "-"} >= {0.1, -0.1}
 
 
+@pytest.mark.slow
 def test_a_gap_breaks_the_envelope_and_other_measures_positions_do_not():
     result = CASES["gap"]()
     (axes,) = figure(result, "envelope").axes

@@ -18,6 +18,7 @@ from trunnion import FrictionMethod, Mechanism, Status
 from trunnion.algebra.dual import derivative, primal, seed
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PlanarContactLoad, Reaction
+from trunnion.solve import continuation
 from trunnion.solve.friction import Contact, Settled, settle
 from trunnion.solve.run import prepare
 
@@ -154,3 +155,40 @@ def test_single_positions_of_an_eccentric_press() -> None:
         sides.add(force > couple)
         assert abs(friction) == pytest.approx(0.49 * max(force, couple), rel=1e-10)
     assert sides == {True, False}
+
+
+def _pins(x, share, start, gain, signs):
+    """Residual and Jacobian of pins in a loop of influence: φ_k = f_k |R_k0 + Σ G_kl φ_l|."""
+    reactions = [[start[k][i] + sum(gain[k][j][i] * x[j] for j in range(3)) for i in range(2)] for k in range(3)]
+    sizes = [np.hypot(*r) for r in reactions]
+    residual = [x[k] - share * signs[k] * sizes[k] for k in range(3)]
+    jacobian = [
+        [
+            (1.0 if k == j else 0.0)
+            - share * signs[k] * sum(a * b for a, b in zip(reactions[k], gain[k][j], strict=True)) / sizes[k]
+            for j in range(3)
+        ]
+        for k in range(3)
+    ]
+    return residual, jacobian
+
+
+def _drawn(rng: np.random.Generator, lanes: int):
+    """Random pins with strong friction: reactions without it, influences, senses, lane last."""
+    start, gain = rng.normal(size=(3, 2, lanes)), rng.normal(size=(3, 3, 2, lanes)) * 0.6
+    return start, gain, rng.choice([-1.0, 1.0], size=(3, lanes))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "lanes"), [(0, 400), pytest.param(2, 2000, marks=pytest.mark.slow)])
+def test_lanes_lock_at_the_share_to_which_small_steps_lead(
+    seed: int, lanes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Folds, solutions that run to infinity and kinks, at up to six times the friction."""
+    drawn, start = _drawn(np.random.default_rng(seed), lanes), [np.zeros(lanes)] * 3
+    shares = continuation.follow(lambda x, s: _pins(x, s, *drawn), start, 6.0)[1]
+    for name, value in {"FIRST_STEP": 0.004, "LONGEST_STEP": 0.004, "STRAIGHT": 0.0, "MOST_TRIALS": 3000}.items():
+        monkeypatch.setattr(continuation, name, value)
+    finely = continuation.follow(lambda x, s: _pins(x, s, *drawn), start, 6.0)[1]
+    assert np.count_nonzero(shares < 6.0) > 0.95 * lanes
+    assert np.allclose(shares, finely, rtol=1e-8, atol=1e-8)

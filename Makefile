@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 OUT ?= out
 EXAMPLE ?= examples/durango-fourbar.yaml
 
-.PHONY: demo test test-all bench docs clean types pages
+.PHONY: demo test test-all bench docs clean types pages found
 
 # What is imported is compiled once, not by each of the hundreds of processes that tests start.
 unexport PYTHONDONTWRITEBYTECODE
@@ -23,16 +23,19 @@ demo: $(VENV)/.base
 test: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(MAKE) --no-print-directory --jobs=2 types pages
+	$(MAKE) --no-print-directory --jobs=2 types pages found
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 
 types: $(VENV)/.dev
 	$(BIN)/mypy
 
-# Beside the types: layers, the text of the documentation, and finding the tests, which compiles them for both processes.
+# Beside the types: layers, the text of the documentation.
 pages: $(VENV)/.dev
 	$(BIN)/lint-imports
 	NO_MKDOCS_2_WARNING=1 TRUNNION_DOCS=text $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site
+
+# Beside whichever of these two takes longer: finding the tests, which compiles them for both processes.
+found: $(VENV)/.dev
 	@$(BIN)/python -m pytest --collect-only -qq > $(VENV)/tests-found 2>&1 || { cat $(VENV)/tests-found; exit 1; }
 
 # What `make test` leaves out: every example, long counts, further oracles, every page of the documentation.

@@ -43,14 +43,14 @@ class User:
         return self.page.evaluate(taken, given)
 
     def idle(self):
-        self.page.wait_for_timeout(80)
+        self.page.wait_for_timeout(40)
         for _ in range(200):
             if self.state("s.connected.value && s.busy.value === 0"):
                 break
-            self.page.wait_for_timeout(50)
+            self.page.wait_for_timeout(25)
         else:
             pytest.fail("the page is never idle")
-        self.page.wait_for_timeout(40)
+        self.page.wait_for_timeout(20)
 
     def until(self, words):
         for _ in range(400):
@@ -81,7 +81,7 @@ class User:
         self.page.mouse.click(x, y)
         if shift:
             self.page.keyboard.up("Shift")
-        self.page.wait_for_timeout(40)
+        self.page.wait_for_timeout(20)
 
     def handle(self, name):
         box = self.page.locator(f'.handle[data-name="{name}"]').bounding_box()

@@ -29,7 +29,7 @@ gc.set_threshold(50_000, 20, 50)
 
 collect_ignore = [] if find_spec("uvicorn") else ["studio"]  # the extra studio is not installed
 
-AT_MOST = 3  # slow cases of a test with like cases, where the test does not say how many
+AT_MOST = 2  # slow cases of a test with like cases, where the test does not say how many
 
 # Every run the same cases, no database on disk, no deadline that a loaded machine could miss.
 settings.register_profile(

@@ -36,6 +36,7 @@ def names(result: xr.Dataset, *wanted: str) -> list[str]:
     return [name for name, _, _ in selected(result, wanted or None)]
 
 
+@pytest.mark.spread(2)
 def test_a_group_holds_what_it_says(result: xr.Dataset) -> None:
     usual, motion, everything = names(result), names(result, "motion"), names(result, "all")
     assert everything[: len(usual)] == usual

@@ -93,6 +93,7 @@ def ends(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[int, str]]:
     return [(code, told) for code, told in json.loads(done.stdout.splitlines()[-1])]
 
 
+@pytest.mark.slow
 def test_every_verb_works(ends: list[tuple[int, str]]) -> None:
     """Findings about the mechanism (1) are none about the installation."""
     assert {words[0] for words in WORK} | {"studio", "import"} == {one.name for one in VERBS}
@@ -101,6 +102,7 @@ def test_every_verb_works(ends: list[tuple[int, str]]) -> None:
         assert "pip install" not in told, (words, told)
 
 
+@pytest.mark.slow
 def test_what_an_extra_brings_is_asked_for_by_its_name(ends: list[tuple[int, str]]) -> None:
     # SciPy writes NetCDF too, and a notebook has no command line
     assert REFUSED.keys() == extras().keys() - {"netcdf", "notebook"}

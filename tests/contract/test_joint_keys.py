@@ -119,6 +119,7 @@ def figures(mechanism: trunnion.Mechanism) -> np.ndarray[Any, Any]:
     return np.concatenate([arrays[name].ravel() for name in names if name in arrays])
 
 
+@pytest.mark.sample(80)
 @pytest.mark.slow
 @pytest.mark.parametrize(("space", "kind", "key"), samples())
 def test_a_key_changes_something_or_is_told(

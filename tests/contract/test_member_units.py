@@ -105,6 +105,8 @@ STUDIES: dict[str, tuple[Callable[[], xr.Dataset], dict[str, tuple[str, dict[str
 }  # fmt: skip
 
 
+@pytest.mark.sample(15)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("study", STUDIES)
 def test_members_have_the_units_of_each(study: str) -> None:
     made, wanted = STUDIES[study]
@@ -119,6 +121,7 @@ def test_members_have_the_units_of_each(study: str) -> None:
         assert result["sensitivity"].attrs["units"] == "(N or N m)/(m or 1)"
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("ending", ["nc", "zarr", "json"])
 def test_files_keep_the_unit_of_each(ending: str, tmp_path: Path) -> None:
     readers: dict[str, Callable[[Path], xr.Dataset]] = {"nc": xr.load_dataset, "zarr": xr.open_zarr}

@@ -30,6 +30,7 @@ def four_bar() -> xr.Dataset:
     return trunnion.analyse(example("durango-fourbar"), STEPS)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(
     ("name", "label"),
     [("durango-fourbar", "angle of A [°]"), ("five-bar-robot", "time [s]"), ("swash-plate-pump", "angle of shaft [°]")],
@@ -52,8 +53,8 @@ def read(page: str) -> tuple[set[str], str]:
     return {tag for tag, _ in found.tags}, "".join(found.words)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.sample(6)
-@pytest.mark.spread(3, "misaligned-fourbar")
 @pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.yaml")))
 def test_every_example_is_shown(name: str) -> None:
     mechanism = example(name)

@@ -32,6 +32,7 @@ def four_bar() -> Draft:
 TURNED = ("durango-fourbar", "slider-crank", "jansen", "rssr", "double-cardan", "rccc", "whitworth-quick-return")
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=6)
 @given(name=st.sampled_from(TURNED), seed=st.integers(0, 2**31 - 1))
 def test_the_drive_torque_does_not_depend_on_the_frame(

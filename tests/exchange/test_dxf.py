@@ -317,6 +317,8 @@ def saved(document: Any, folder: Path) -> bytes:
     return (folder / "saved.dxf").read_bytes()
 
 
+@pytest.mark.sample(15)
+@pytest.mark.spread(6)
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_a_hostile_file_is_a_sentence_within_seconds(kind: str, tmp_path: Path) -> None:
     path = tmp_path / "hostile.dxf"
@@ -352,25 +354,6 @@ def test_damage_anywhere_is_no_traceback(
     (folder / "damaged.dxf").write_bytes(data)
     draft, findings = tried(folder / "damaged.dxf")
     assert findings or (draft and model_text(draft))
-
-
-def test_circles_of_two_arcs_are_pins_and_centre_lines_no_links(tmp_path: Path) -> None:
-    """A crank on a frame, its pin drawn as two half arcs, with axes on a layer of their own and by their linetype."""
-    document = ezdxf.new("R2010", setup=True, units=4)
-    space = document.modelspace()
-    draw(space, "frame", [("circle", (0, 0), 10.02), ("line", (0, 0), (300, 0))])
-    for start, end in ((0, 180), (180, 360)):
-        space.add_arc((0, 0), 10, start, end, dxfattribs={"layer": "crank"})
-    draw(space, "crank", [("line", (0, 0), (50, 80))])
-    draw(space, "CENTER", [("line", (-40, 0), (40, 0))])
-    space.add_line((0, -40), (0, 40), dxfattribs={"layer": "frame", "linetype": "DASHDOT"})
-    path = tmp_path / "crank.dxf"
-    document.saveas(path)
-    draft = import_file(path, ground="frame")
-    assert set(draft.bodies) == {"frame", "crank"}
-    (pair,) = draft.pairs.values()
-    assert (pair.type, pair.pin_radius, pair.hole_radius) == ("revolute", pytest.approx(0.01), pytest.approx(0.01002))
-    assert any("2 centre line" in finding.what for finding in draft.findings)
 
 
 def test_what_lies_on_layer_0_of_a_block_is_on_the_layer_of_the_block(tmp_path: Path) -> None:

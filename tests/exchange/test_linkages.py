@@ -217,15 +217,6 @@ def test_a_slider_of_pylinkage_is_a_pin_on_a_line(tmp_path: Path) -> None:
     np.testing.assert_allclose(place[:, 0], [-60, -math.sqrt(7200), -120, -math.sqrt(7200)], atol=1e-9)
 
 
-def test_a_linkage_of_older_versions_hangs_joint_by_joint(tmp_path: Path) -> None:
-    draft = import_file(written(OLD, tmp_path), unit="m")
-    assert set(draft.bodies) == {"ground", "A-B", "B-C", "D-C", "C-S", "S block"}
-    assert draft.bodies["B-C"].points["T"] == pytest.approx([1.5, 2.5, 0.0])
-    assert draft.pairs["S slide"].links == ("ground", "S block")
-    assert {draft.pairs[name].links for name in ("C", "C-2")} == {("B-C", "D-C"), ("B-C", "C-S")}
-    assert np.all(analyse(model(draft, tmp_path), 24)["status"].values == 0)
-
-
 def damaged() -> list[Any]:
     """Files with something taken out or replaced, everywhere."""
     found: list[Any] = ["", "[1, 2", "{}", "[]", "null", '{"joints": 3}', '{"joints": []}', "[" * 100_000, "\x00\xff"]

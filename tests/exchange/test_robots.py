@@ -161,6 +161,7 @@ def test_joints_of_one_body_are_the_pair_that_they_make(kind: str, tmp_path: Pat
 # MuJoCo as the reference
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", ["durango-fourbar", "slider-crank", "rssr", "double-cardan", "rccc", "jansen"])
 def test_inverse_dynamics_of_mujoco_agrees(name: str, tmp_path: Path) -> None:
     """M(q) q̈ + c(q, q̇) of MuJoCo, projected on the velocity, is the drive torque; the loops are closed."""
@@ -241,6 +242,7 @@ def closures(mujoco, model, data) -> np.ndarray:
     return np.vstack(rows)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["slider-crank", "rssr", "double-cardan"])
 def test_the_tree_of_a_urdf_is_what_mujoco_reads(name: str, tmp_path: Path) -> None:
     mujoco = pytest.importorskip("mujoco")
@@ -485,6 +487,7 @@ BOMB = '<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;">]><
 OUTSIDE = '<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]><{0}>&a;</{0}>'
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("suffix", "root"), [(".mjcf", "mujoco"), (".sdf", "sdf"), (".urdf", "robot")])
 def test_hostile_files_are_one_sentence(suffix: str, root: str, tmp_path: Path) -> None:
     name = f"hostile{suffix}"
@@ -587,14 +590,3 @@ def test_the_drive_of_an_mjcf_holds_its_speed(name: str, tmp_path: Path) -> None
     for _ in range(50):
         mujoco.mj_step(model, data)
     assert data.qvel[model.jnt_dofadr[model.actuator_trnid[0, 0]]] == pytest.approx(data.ctrl[0], rel=0.01)
-
-
-def test_a_link_called_world_is_written_under_another_name(tmp_path: Path) -> None:
-    text = (Path("examples") / "durango-fourbar.yaml").read_text("utf-8").replace("coupler", "world")
-    model = tmp_path / "m.yaml"
-    model.write_text(text, "utf-8")
-    for suffix in ("mjcf", "sdf", "urdf"):
-        path = tmp_path / f"m.{suffix}"
-        said = trunnion.exchange.export_model(trunnion.read(model), path)
-        assert "exchange.name" in {finding.code for finding in said}
-        assert "world-link" in trunnion.exchange.import_file(path).bodies

@@ -24,8 +24,6 @@ from trunnion.cli.app import app
 from trunnion.errors import MechanismError
 from trunnion.exchange import export_model, import_file, model_text
 from trunnion.exchange.brep import Geometry
-from trunnion.exchange.draft import Body, Draft
-from trunnion.exchange.mating import joined
 from trunnion.exchange.part21 import Part21
 from trunnion.exchange.skeleton import positions_of
 from trunnion.exchange.step_assembly import Assembly
@@ -100,6 +98,7 @@ def shapes(split):
     }
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("split", ["seam", "halves", "none"])
 @pytest.mark.parametrize("degrees", [False, True])
 def test_moments_are_exact_for_every_kind_of_face(tmp_path, split, degrees):
@@ -142,6 +141,7 @@ def test_edges_that_are_splines(tmp_path):
     expect_body(import_file(path).bodies["plate"], [(plate(), *STILL)])
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("split", ["seam", "halves", "none"])
 @pytest.mark.parametrize(("rotation", "shift"), [(np.eye(3), (0, 0, 0)), (turn((1, 2, 3), 0.7), (100, -50, 30))])
 def test_slider_crank(tmp_path, split, rotation, shift):
@@ -280,23 +280,6 @@ drivers: {{A: {{speed: 600 rpm}}}}
     draft = import_file(tmp_path / "a.step", ground="frame", drive=shaft, speed="600 rpm")
     imported, expected = torques(draft, tmp_path, by_hand, steps=24)
     np.testing.assert_allclose(imported, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
-
-
-def test_chamfers_fillets_and_blind_holes(tmp_path):
-    """A pin with a chamfer and a fillet in a blind hole with a conical bottom and a chamfered edge."""
-    base = box((-30, -30, -20), (30, 30, 0)).feature("top", (0, 0, 0), [(11, 0), (10, -1), (10, -15), (0, -18)])
-    profile = [(12, 0), (10, 2, (12, 2)), (10, 13), (9, 14), (0, 14)]
-    lever = box((-15, -15, 0), (80, 15, 8)).feature("bottom", (0, 0, 0), profile)
-    parts = {"base": (base, *STILL), "lever": (lever, np.eye(3), np.array([0, 0, 1.0]))}
-    draft = import_file(written(tmp_path / "a.step", parts))
-    for name, part in parts.items():
-        expect_body(draft.bodies[name], [part])
-    pair = joint(draft, "base", "lever")
-    assert pair.type == "cylindrical"  # nothing holds it along the axis
-    # the pin's cylinder from z = -1 to -12, the hole's from -1 to -15
-    np.testing.assert_allclose([pair.pin_radius, pair.hole_radius, pair.length], [0.01, 0.01, 0.011], atol=1e-12)
-    np.testing.assert_allclose(pair.at, [0, 0, -0.0065], atol=1e-12)
-    assert len(draft.pairs) == 1
 
 
 def test_patterns_of_equal_holes_are_bolted(tmp_path):
@@ -547,6 +530,8 @@ HOSTILE = {
 }
 
 
+@pytest.mark.sample(15)
+@pytest.mark.spread(5)
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_hostile_files_are_one_sentence(tmp_path, kind):
     path = tmp_path / "a.step"
@@ -608,6 +593,7 @@ def test_a_free_form_solid_has_the_mass_of_a_mesh_and_says_so(tmp_path):
     assert any("by a mesh, to about" in comment for comment in body.comments)
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("rotation", [np.eye(3), turn((1, 2, 3), 0.7)])
 @pytest.mark.parametrize("turned_by", [0.0, 40.0, 200.0])
 def test_parts_of_the_original_are_moved(tmp_path, rotation, turned_by):
@@ -639,6 +625,7 @@ def test_relations_from_the_parent_to_the_part(tmp_path):
         expect_body(again.bodies[name], [part])
 
 
+@pytest.mark.slow
 def test_welded_parts_move_with_their_link_and_edited_models_are_refused(tmp_path):
     path = written(tmp_path / "a.step", four_bar())
     draft = import_file(path, ground="ground")
@@ -675,6 +662,7 @@ def skeleton(path):
     return found
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["slider-crank", "rssr", "universal-joint"])
 def test_the_skeleton_has_the_points_of_the_position(tmp_path, name):
     mechanism = trunnion.read(f"examples/{name}.yaml")
@@ -688,7 +676,7 @@ def test_the_skeleton_has_the_points_of_the_position(tmp_path, name):
                 np.testing.assert_allclose(points[link][pair.name], pair.at, atol=1e-9)
 
 
-@pytest.mark.spread(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "factor"), [("fourbar-with-play", 500.0), ("pezzuti-cardan-as-built", 20.0)])
 def test_errors_are_magnified(tmp_path, name, factor):
     """Displacements from the ideal mechanism are so many times larger; links stay rigid."""
@@ -766,44 +754,6 @@ def test_the_command_line_imports_and_moves(tmp_path):
     over = run(app, [*moved[:3], str(path), *moved[4:]])
     assert isinstance(over.exception, MechanismError)
     assert path.read_text() == written(tmp_path / "c.step", slider_crank()).read_text()
-
-
-def test_two_coaxial_pins_of_different_parts_on_one_axis(tmp_path):
-    """Two levers turn on the two ends of one axle that stands still: two joints, not three."""
-    axle = turned([(0, 0), (6, 0), (6, 10), (9, 10), (9, 20), (6, 20), (6, 30), (0, 30)])
-    block = boss(box((-20, -20, -40), (20, 20, -30)), "top", (10, 10, -30), 5, 5)
-    lever = bar(60, [(0, 12.04)], 0, 10)
-    levers = {"left": (lever, *STILL), "right": (lever, turn((0, 0, 1), 1), np.array([0, 0, 20.0]))}
-    draft = import_file(written(tmp_path / "a.step", {"axle": (axle, *STILL)} | levers), ground="axle")
-    assert {frozenset(pair.links) for pair in draft.pairs.values()} == {
-        frozenset(("axle", "left")),
-        frozenset(("axle", "right")),
-    }
-    assert all(pair.length == pytest.approx(0.01) for pair in draft.pairs.values())
-    assert "unconnected" in codes(
-        import_file(
-            written(tmp_path / "b.step", {"axle": (axle, *STILL), "block": (block, *STILL)} | levers), ground="axle"
-        )
-    )
-
-
-def test_half_a_hole_is_asked(tmp_path):
-    """A bearing of which only half is there holds its pin from one side: no joint without a question."""
-    base, arm = bar(80, [(0, 10.02)], 0, 10, split="halves"), bar(60, [], 10, 20, split="halves")
-    parts = {"base": (base, *STILL), "arm": (boss(arm, "bottom", (0, 0, 10), 10, 10), *STILL)}
-    file = Part21(written(tmp_path / "a.step", parts))
-    geometry = Geometry(file, 1e-3, 1.0)
-    solids = [geometry.solid(number) for number in file.of("MANIFOLD_SOLID_BREP")]
-    for halves in (2, 1):
-        faces = {name: list(solid.faces) for name, solid in zip(parts, solids, strict=True)}
-        hole = [face for face in faces["base"] if face.kind == "cylinder"]
-        assert len(hole) == 2
-        faces["base"] = [face for face in faces["base"] if face.kind != "cylinder"] + hole[:halves]
-        draft = Draft(bodies={name: Body(name, 1.0) for name in parts})
-        joined(draft, faces, 0.5e-3)
-        kinds = [pair.type for pair in draft.pairs.values() if pair.type != "fixed"]
-        assert kinds == (["cylindrical"] if halves == 2 else [])
-        assert ("half" in codes(draft)) == (halves == 1)
 
 
 def test_a_pin_in_a_slot_is_asked(tmp_path):

@@ -17,7 +17,7 @@ from trunnion.model.tolerances import ProcessChoice
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import AllocationProblem, Answer, Contribution, Criterion, SampledYield
 from trunnion.studies.allocation.solve import solve
-from trunnion.studies.allocation.yields import Verify, normal_yield
+from trunnion.studies.allocation.yields import Verify
 
 COST, HALF_WIDTH = 1e-6, 1e-3  # the gap that is claimed, and its root: the cost is flat at its least
 SEEDS = st.integers(0, 10**6)
@@ -133,33 +133,6 @@ def test_a_limit_next_to_impossible_leaves_the_others_their_room() -> None:
     stroke, torque = answer.problem.margins()
     assert 2.57 < torque < 2.8 < stroke < 3.5
     assert np.all(answer.price * 0.1 < answer.cost)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("correlated", [False, True])
-@settings(max_examples=10, deadline=None)
-@given(seed=SEEDS)
-def test_what_is_known_to_do_is_not_refused(correlated: bool, seed: int) -> None:
-    """Half widths of which the yield is known: it is met again, for no more but what a split of margins leaves."""
-    rng = np.random.default_rng(seed)
-    parts = (*bought(random_costs(rng, 4), least=0.02, most=0.3), Contribution("fixed", 1.0))
-    effect = rng.normal(size=(3, 5))
-    effect[:, 4] *= rng.choice([0.0, 0.3], 3)
-    problem = AllocationProblem(parts, replace(rows(effect, rng.uniform(0.3, 0.6, 3)), labels=("a", "b", "c")), "yield")
-    if correlated:
-        half = rng.normal(size=(5, 5))
-        whole = half @ half.T + 2 * np.eye(5)
-        size = np.sqrt(np.diag(whole))
-        problem = replace(problem, effects=replace(problem.effects, correlation=whole / np.outer(size, size)))
-    known = np.append(rng.uniform(0.02, 0.15, 4), 1.0)
-    target = normal_yield(problem, known) - 1e-4
-    if not 0.9 < target < 0.9999:
-        return
-    answer = solve(problem, target=target)  # correlated rows may need other than the narrowest half widths
-    assert not refused(answer)
-    assert answer.expected >= target - 1e-9
-    cost = sum(one.cost.value(float(t)) for one, t in zip(parts, known, strict=True) if one.cost)
-    assert answer.cost <= 1.01 * cost
 
 
 @pytest.mark.parametrize("discrete", [False, True])

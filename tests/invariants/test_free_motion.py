@@ -73,6 +73,7 @@ def compared(mechanism: Mechanism, lanes: int = 5) -> None:
         assert np.abs(found.works - wanted.works).max() < 1e-9 * size
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("law", LAWS)
 def test_machine_code_is_what_walks_find(law: str) -> None:
     compared(
@@ -146,6 +147,7 @@ def rocker(friction: float) -> Mechanism:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("friction", "close"), [(0.0, 1e-6), pytest.param(0.1, 1e-4, marks=pytest.mark.slow)])
 def test_a_driven_joint_ends_at_its_dead_centre(friction: float, close: float) -> None:
     """It is foreseen, told with its place and time, and reached in some hundred evaluations."""
@@ -294,6 +296,7 @@ def test_a_motion_ends_at_a_change_point(space: str, several: bool) -> None:
     assert not any("reaction" in one.name for one in result.trunnion.summary)
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 @pytest.mark.parametrize(("kind", "places"), [(ANTIPARALLELOGRAM, (np.pi, 0.0)), (DELTOID, (2 * np.pi, 0.0))])
 def test_other_linkages_end_at_theirs(kind: Any, places: tuple[float, float], sense: float) -> None:

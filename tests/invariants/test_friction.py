@@ -179,6 +179,7 @@ def _drawn(rng: np.random.Generator, lanes: int):
     return start, gain, rng.choice([-1.0, 1.0], size=(3, lanes))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "lanes"), [(0, 400), pytest.param(2, 2000, marks=pytest.mark.slow)])
 def test_lanes_lock_at_the_share_to_which_small_steps_lead(
     seed: int, lanes: int, monkeypatch: pytest.MonkeyPatch

@@ -63,6 +63,7 @@ def played(mechanism: Mechanism, *measures: str) -> xr.Dataset:
     return trunnion.play(mechanism, list(measures) or None, STEPS)
 
 
+@pytest.mark.slow
 @settings(max_examples=3)
 @given(st.lists(clearances, min_size=3, max_size=3))
 def test_joints_add_up(found: list[float]) -> None:
@@ -83,6 +84,7 @@ def test_joints_add_up(found: list[float]) -> None:
     np.testing.assert_allclose(together["deviation_total"] ** 2, scatter, rtol=1e-12)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", ["slider-crank", "class III"])
 def test_which_link_has_the_hole_does_not_matter(name: str) -> None:
     """To first order: pins and holes changed over have the same worst case; a turn has the other sign."""
@@ -141,39 +143,6 @@ def test_a_stretch_without_load_is_one_loss_of_contact() -> None:
     (finding,) = told(result, "contact.unloaded")  # of all joints at once, and no loss of any of them
     assert finding["figures"] == {"joints": ["O", "P", "Q"], "at": "between 40° and 180°"}
     assert not told(result, "contact.lost")
-
-
-@pytest.mark.slow
-def test_figures_say_which_positions_they_are_of_where_contact_is_lost() -> None:
-    """No load from 40° to 180°."""
-    data = massless_compressor()
-    data["measures"] = {"course": {"slide": "S"}, "stroke": {"stroke": "S"}, "mean": {"slide": "S", "as": "rms"}}
-    data["measures"] |= {one: {"slide": "S", "as": one} for one in ("minimum", "maximum")}
-    window = {"slide": "S", "over": ["50 deg", "170 deg"]}
-    data["measures"] |= {"low": window | {"as": "minimum"}, "swing": window | {"as": "peak-to-peak"}}
-    data["measures"]["there"] = {"slide": "S", "at": "90 deg"}
-    result = analyse(Mechanism(**data), steps=360)
-    valid = result["status"].values != 3
-    slide = result["joint_slide"].sel(joint="S").values
-    figures = {one.name: one for one in result.trunnion.summary}
-    share = np.count_nonzero(~valid) / 360
-    assert figures["S.stroke"].note == f"without {share:.2g} of the cycle"
-    assert figures["S.stroke"].value == pytest.approx(figures["stroke"].value, rel=1e-4)
-    assert figures["course.max"].value == pytest.approx(np.max(slide[valid]))
-    dense = analyse(Mechanism(**data), steps=20_000)
-    slide = dense["joint_slide"].sel(joint="S").values[dense["status"].values != 3]
-    for name, pick in (("minimum", np.min), ("maximum", np.max)):
-        assert figures[name].value == pytest.approx(pick(slide), rel=1e-5)  # valid, next to the stretch
-    found = {one.where: one for one in result.trunnion.findings if one.code == "measure.contact_lost"}
-    for name in ("low", "swing", "there"):
-        assert figures[name].value is None
-        assert "loses contact" in figures[name].note
-        told = found[f"measures.{name}"].figures["at"]  # where, for a place or a window beside it
-        assert told.endswith("°")
-        assert told in figures[name].note
-        assert np.isnan(result["measure_figure"].sel(measure=name))
-    assert figures["mean"].value is not None
-    assert "loses contact at " in figures["mean"].note
 
 
 @pytest.mark.slow

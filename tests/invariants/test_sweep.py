@@ -13,10 +13,8 @@ import pytest
 import xarray as xr
 
 import trunnion
-from brief import brief
 from manual.conftest import Run, program  # noqa: F401
 from trunnion import Mechanism, MechanismError, Status
-from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.sweep.grid import grid as grid_of
 from trunnion.studies.sweep.points import Points
@@ -212,61 +210,9 @@ def test_what_is_wrong_at_a_point_says_at_which() -> None:
         trunnion.sweep(mechanism, inertia, 4)
 
 
-@pytest.mark.slow
-def test_a_mechanism_with_errors_stands_beside_the_ideal_one() -> None:
-    """Table II's errors and loaded seats: each point as `analyse` has it, the ideal joint more efficient throughout."""
-    mechanism = trunnion.read(CARDAN.with_name("pezzuti-cardan-as-built.yaml"))
-    swept = trunnion.sweep(mechanism, {"misalignment": ["10 deg", "20 deg"]}, STEPS)
-    assert np.all(swept["efficiency"] < swept["efficiency_ideal"])
-    one = trunnion.analyse(mechanism.with_values({"misalignment": "20 deg"}), STEPS)
-    assert float(swept["efficiency"][1]) == float(one["efficiency"])
-    assert float(swept["efficiency_ideal"][1]) == float(one["efficiency_ideal"])
-    dense = brief(mechanism.with_values({"misalignment": "20 deg"}), 7200)
-    errors = np.abs(dense["joint_rotation_error"].sel(joint="output").values[dense["status"].values == 0])
-    assert float(swept["transmission_error_max"].sel(joint="output")[1]) == pytest.approx(np.max(errors), rel=1e-6)
-    unit, _ = figures_of(swept)["output.transmission_error_max"]
-    assert unit == "rad"
-
-
 def model(name: str, measures: dict[str, object]) -> Mechanism:
     data = trunnion.read(EXAMPLES / f"{name}.yaml").data()
     return Mechanism(**{**data, "measures": {**data.get("measures", {}), **measures}})
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-def test_each_point_is_an_analysis_of_its_own(space: str) -> None:
-    """Extremes, a place, a root mean square, a stroke, the efficiency: of each point what an analysis of it has."""
-    name, out, over = {
-        "planar": ("durango-fourbar", "D", {"AB": ["1.9 m", "2 m", "2.1 m"]}),
-        "spatial": ("rssr", "D", {"joint_defaults.friction.coefficient": [0.05, 0.1]}),
-    }[space]
-    stated = {
-        "there": {"rotation": out, "at": "60 deg"}, "swing": {"stroke": out}, "power": {"efficiency": "cycle"},
-        "torque": {"effort": "A", "as": "rms"}, "least": {"effort": "A", "as": "minimum"},
-    }  # fmt: skip
-    mechanism = model(name, stated)
-    start = {"drivers.A.start": 0}
-    result = trunnion.sweep(mechanism.with_values(start), over, 72, measures=[*stated, "mean:effort:A"])
-    (swept,) = over
-    for k, value in enumerate(over[swept]):
-        one = trunnion.analyse(mechanism.with_values({**start, swept: value}), 72)
-        effort, turned = one["drive_effort"].sel(driver="A"), one["joint_rotation"].sel(joint=out).values
-        speed = float(one["joint_rotation_velocity"].sel(joint="A").mean())
-        rms = float(one["drive_effort_rms"].item())
-        assert float(result["torque"][k]) == pytest.approx(rms, rel=1e-5)
-        mean = float(one["drive_power_mean"]) / speed
-        assert float(result["mean:effort:A"][k]) == pytest.approx(mean, abs=1e-5 * rms)
-        assert float(result["least"][k]) <= float(effort.min())
-        many = brief(mechanism.with_values({**start, swept: value}), 500 * 72)["drive_effort"]
-        assert float(result["least"][k]) == pytest.approx(float(many.min()), rel=2e-3, abs=2e-4 * float(many.max()))
-        apart = float(result["there"][k]) - turned[72 // 6]
-        assert np.sin(apart / 2) == pytest.approx(0, abs=1e-9)
-        assert float(result["swing"][k]) == pytest.approx(np.ptp(np.unwrap(turned)), rel=1e-2)
-        if np.isfinite(one.attrs.get("efficiency", np.nan)):
-            assert float(result["power"][k]) == pytest.approx(float(one.attrs["efficiency"]), rel=1e-6)
-    assert result["swing"].attrs["units"] == "rad"
-    assert "not in this sweep" not in result.attrs["findings"]
 
 
 def test_a_point_without_an_answer_has_no_figure() -> None:

@@ -51,6 +51,7 @@ def test_power_balance(name: str, friction: float | None) -> None:
         assert float(result["friction_power"].sum("joint").mean()) > 1e-5 * peak
 
 
+@pytest.mark.spread(8)
 @pytest.mark.parametrize("name", MODELS)
 def test_velocities_and_accelerations_are_derivatives(name: str) -> None:
     """Eighth-order differences of positions and of velocities along the cycle."""
@@ -131,8 +132,8 @@ def as_seen(data: Data, kind: str) -> tuple[Data, dict[str, Any]]:
     return scaled(data, length, mass, time), units | {"reaction_moment": force * length, "link_angle": 1.0}
 
 
+@pytest.mark.spread(6)
 @pytest.mark.sample(12)
-@pytest.mark.spread(15)
 @pytest.mark.parametrize("kind", [*SHIFTS, "mirrored", *UNITS])
 @pytest.mark.parametrize("name", MODELS)
 def test_a_machine_told_otherwise_is_the_same(name: str, kind: str) -> None:

@@ -155,6 +155,7 @@ def test_a_folder_is_no_file(result: Any, tmp_path: Path) -> None:
     assert list((tmp_path / "r.csv").iterdir()) == []
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("mode", [0o600, 0o664, 0o444])
 @pytest.mark.parametrize("name", ["r.csv", "r.nc", "r.json"])
 def test_a_file_that_is_replaced_hands_on_its_permissions(result: Any, tmp_path: Path, name: str, mode: int) -> None:
@@ -196,6 +197,7 @@ STEPS = 60
 ASKED = [["reaction_force"], ["joint_rotation", "point_position"], ["locking_margin"], ["drive_effort_lower"], []]
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(
     ("example", "engine"),
     [("durango-fourbar", "compiled"), ("drawing-press", "numpy"), ("rssr", "numpy"), ("fourbar-by-grades", "compiled")],

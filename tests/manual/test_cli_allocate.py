@@ -154,18 +154,6 @@ def test_limits_are_written_where_they_stand(program: Run, tmp_path: Path) -> No
     assert float(worst.max()) <= np.radians(0.2)
 
 
-def test_entries_are_added_without_moving_the_others(program: Run, tmp_path: Path) -> None:
-    (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
-    added = ("--set", "costs.l1.most=30 um", "--set", "tolerances.l2.distribution=uniform")
-    code, _, err = program("allocate", "m.yaml", "--steps", 24, "--samples", 0, *added, "--write", "b.yaml")
-    assert code == 0, err
-    text = (tmp_path / "b.yaml").read_text("utf-8")
-    assert "  l1: {model: power, B: 1,   k: 0.45, unit: mm, least: 1 um, most: 30 um}\n" in text
-    assert "  crank:   {points: {A: [0, 0],  B: [l2, 0]}}\n" in text
-    assert "# turned\n  l2: {distribution: uniform}\ncosts:\n" in text
-    assert trunnion.read(tmp_path / "b.yaml").prices()[0].most == pytest.approx(3e-5)
-
-
 def test_no_model_of_limits_that_are_not_kept(program: Run, tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(INLINE, "utf-8")
     narrow = ("--set", "measures.angle.limit=±0.01 deg", "--set", "measures.place.limit=±0.001 mm")

@@ -138,6 +138,7 @@ def test_workers_end_with_the_program(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "seconds"),
     [

@@ -44,24 +44,6 @@ def test_parameters_of_a_law_that_an_option_names(program: Run, verb: tuple[obje
     assert done[0] == done[1]
 
 
-def test_a_seat_that_is_set_stands_against_that_of_all_joints(program: Run, tmp_path: Path) -> None:
-    slider = EXAMPLES / "toleranced-slider-crank.yaml"
-    done = [
-        program("analyse", slider, "--steps", 12, "--out", f"{k}.csv", *options).code
-        for k, options in enumerate([
-            ("--seat", "loaded", "--set", "P.seat=free"),
-            ("--set", "P.seat=free", "--seat", "loaded"),
-        ])
-    ]  # fmt: skip
-    assert done[0] in (0, 1)
-    texts = [(tmp_path / f"{k}.csv").read_text("utf-8") for k in range(2)]
-    assert texts[0] == texts[1]
-    assert "S.seat_1_x" in texts[0]
-    assert "P.seat_1_x" not in texts[0]
-    mechanism = trunnion.read(slider).with_seats("loaded").with_values({"P.seat": "free"})
-    assert mechanism.effective_joints["P"].seat == "free"
-
-
 def test_points_of_a_grid_are_all_combinations() -> None:
     assert points(over(["a=0deg:30deg:7", "b=1,2,3"])) == 21
     assert points({}) == 1
@@ -200,6 +182,7 @@ def test_the_help_has_each_verb_once_under_a_question_with_examples_that_are_rea
             command.make_context(name, example.split(), resilient_parsing=False)
 
 
+@pytest.mark.slow
 def test_tolerances_are_written_as_asked(program: Run, tmp_path: Path) -> None:
     """Tables, the whole result, a figure and a page of one run; with a row of units where that is asked for."""
     files = ["t.csv", "t.parameters.csv", "t.nc", "t.json", "t.svg"]

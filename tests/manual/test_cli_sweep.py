@@ -15,8 +15,7 @@ import xarray as xr
 import trunnion
 from manual.conftest import Run
 from played import four_bar
-from trunnion.results.attributes import summary_of
-from trunnion.views.play import figure, tables
+from trunnion.views.play import figure
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"
@@ -31,6 +30,7 @@ def files(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
+@pytest.mark.slow
 def test_table_csv_netcdf_and_figure(program: Run, tmp_path: Path) -> None:
     done = program(
         "sweep",
@@ -59,24 +59,6 @@ def test_table_csv_netcdf_and_figure(program: Run, tmp_path: Path) -> None:
         assert row["status"] in ("solved", "zero_slip")
         assert row["without_answer"] == "0"
     assert ElementTree.parse(tmp_path / "s.svg").getroot().tag.endswith("svg")
-
-
-def test_a_grid_in_csv_has_a_row_a_point(program: Run, tmp_path: Path) -> None:
-    options = ("--over", "B.friction.coefficient=0.1,0.3", "--over", "AB=1.6m,2.6 m", "--steps", 72)
-    done = program("sweep", FOUR_BAR, *options, "--out", "g.csv", "--out", "g.png", "--units-row")
-    assert done.code == 1  # AB = 2.6 m cannot be assembled all the way
-    units, *found = rows(tmp_path / "g.csv")
-    assert (units["AB"], units["A.effort_max"], units["B.reaction_max"], units["status"]) == ("m", "N m", "N", "")
-    points = [(float(row["B.friction.coefficient"]), float(row["AB"])) for row in found]
-    assert points == [(0.1, 1.6), (0.1, 2.6), (0.3, 1.6), (0.3, 2.6)]
-    assert [row["status"] for row in found][1::2] == ["not_assembled"] * 2
-    assert [row["efficiency"] for row in found][1::2] == ["", ""]
-    assert [row["A.effort_max"] == "" for row in found] == [False, True, False, True]
-    assert "cannot be assembled" in done.out
-    assert (
-        "2 of 4 points have no result, the first at B.friction.coefficient = 0.1, AB = 2.6 m (5 positions" in done.err
-    )
-    assert (tmp_path / "g.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_options_of_the_model_come_first(program: Run, tmp_path: Path) -> None:
@@ -123,27 +105,6 @@ def test_bad_sweeps_are_refused_with_a_message(program: Run, tmp_path: Path, cas
 SLIDER = EXAMPLES / "toleranced-slider-crank.yaml"
 
 
-@pytest.mark.slow
-def test_tables_and_files(program: Run, tmp_path: Path) -> None:
-    files = [f"p{end}" for end in (".csv", ".json", ".nc", ".svg", ".png")]
-    code, out, _ = program("play", SLIDER, "--steps", 36, "--units-row", *(f"--out={name}" for name in files))
-    assert code == 0
-    assert {path.name for path in tmp_path.iterdir()} == set(files)
-    assert "stroke-position, largest at 90°" in out
-    assert "all, worst case" in out
-    assert all(f"wrote {name}" in out for name in files)
-    with (tmp_path / "p.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert rows[0]["stroke-position"] == "m"
-    result = trunnion.play(trunnion.read(SLIDER), steps=36)
-    column = [float(row["drive-torque.O.worst_case"]) for row in rows[1:]]
-    assert column == pytest.approx(result["worst_case"].sel(measure="drive-torque", joint="O").values)
-    with xr.open_dataset(tmp_path / "p.nc") as read:
-        np.testing.assert_array_equal(read["sensitivity"].values, result["sensitivity"].values)
-    assert json.loads((tmp_path / "p.json").read_text())["attrs"]["drive"] == "O"
-    ElementTree.parse(tmp_path / "p.svg")
-
-
 def test_a_limit_is_a_finding_with_the_line_of_the_file(program: Run, tmp_path: Path) -> None:
     data = four_bar("C").data() | {"measures": {"swing": {"rotation": "D", "limit": "0.01 deg"}}}
     trunnion.Mechanism(**data).write(tmp_path / "bar.yaml")
@@ -162,50 +123,6 @@ def test_the_figure_stacks_the_joints_up_to_the_sum() -> None:
     assert total[:-1, 1] == pytest.approx(result["worst_case_total"].values[0] * 1e6)
     assert len(axes.collections) == 4
     assert axes.get_ylabel() == "worst case of piston.Q.x [µm]"
-
-
-def test_a_place_and_joints_without_effect_are_told(tmp_path: Path) -> None:
-    """The table and the summary of a measure with a place have its figure there."""
-    model = tmp_path / "model.yaml"
-    text = (EXAMPLES / "fourbar-with-play.yaml").read_text(encoding="utf-8")
-    assert "measures:" not in text
-    model.write_text(
-        f"{text}\nmeasures:\n  place: {{angle: rocker, at: 90 deg}}\n  held: {{angle: crank}}\n", encoding="utf-8"
-    )
-    result = trunnion.play(trunnion.read(model), steps=8)
-    findings = {one.code: one for one in result.trunnion.findings}
-    there = float(result["worst_case_total"].sel(measure="place").isel(position=2))  # 90° of 0°, 45°, 90° …
-    assert float(result["extreme_worst_case"].sel(measure="place").sum()) == pytest.approx(there, rel=1e-9)
-    assert there < float(result["worst_case_total"].sel(measure="place").max())
-    assert summary_of(result)[0].value == pytest.approx(there, rel=1e-9)
-    assert tables(result)[0].title == "place, at 90°"
-    assert findings["play.no_effect"].figures["measure"] == "held"
-
-
-def test_an_extreme_is_of_its_place_and_other_statistics_are_left_out(tmp_path: Path) -> None:
-    """To first order an extreme changes as the course does at its place."""
-    model = tmp_path / "model.yaml"
-    text = (EXAMPLES / "fourbar-with-play.yaml").read_text(encoding="utf-8")
-    model.write_text(
-        f"{text}\nmeasures:\n  course: {{angle: rocker}}\n  least: {{angle: rocker, as: minimum}}\n"
-        "  most: {angle: rocker, as: maximum}\n  swing: {angle: rocker, as: peak-to-peak}\n",
-        encoding="utf-8",
-    )
-    result = trunnion.play(trunnion.read(model), steps=720)
-    assert result["measure"].values.tolist() == ["course", "least", "most"]
-    figures = {one.name: one.value for one in result.trunnion.summary}
-    course = result.sel(measure="course")
-    for name, pick in (("least", np.argmin), ("most", np.argmax)):
-        there = course.isel(position=int(pick(course["value"].values)))
-        own = result.sel(measure=name)
-        assert own["extreme_worst_case"].values == pytest.approx(there["worst_case"].values, rel=1e-2, abs=1e-9)
-        assert figures[f"{name}.worst_case"] == pytest.approx(float(own["extreme_worst_case"].sum()), rel=1e-12)
-        assert float(own["extreme_time"]) == pytest.approx(float(there["time"]), abs=2e-3)
-    assert figures["course.worst_case"] == pytest.approx(float(course["worst_case_total"].max()), rel=1e-4)
-    assert "play.measures_left_out" in [one.code for one in result.trunnion.findings]
-    titles = [one.title for one in tables(result)]
-    assert titles[1].startswith("least, the minimum at ")
-    assert figure(result).axes
 
 
 @pytest.fixture

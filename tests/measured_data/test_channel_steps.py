@@ -58,6 +58,7 @@ def test_what_counts_of_steps(
     assert np.median(course.uncertainty) == pytest.approx(np.radians(expected), rel=0.3 if noise else 1e-3)
 
 
+@pytest.mark.spread(6)
 @pytest.mark.parametrize("samples", [20, 200, 1000, 4000])
 @pytest.mark.parametrize("step", [0.001, 0.1, 0.5, 2.0, 20 / 2**7])
 def test_steps_count_where_turns_repeat(tmp_path: Path, step: float, samples: int) -> None:

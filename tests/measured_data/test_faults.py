@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -146,15 +145,7 @@ def test_a_code_for_an_overload_changes_nothing_else(run: Columns, tmp_path: Pat
     assert sound.resolution == pytest.approx(0.2)
 
 
-def test_up_to_how_many_positions_samples_are_averaged(tmp_path: Path) -> None:
-    """500 samples a turn are four at each of 125 positions: with fewer positions the scatter falls."""
-    columns = recorded()
-    rows = {count: read(columns, tmp_path, {"positions": count}) for count in (130, 120)}
-    assert any("with up to 125 positions they are means" in one for one in rows[130].done)
-    scatter = {count: np.median(found.conditions[0].courses["brake"].scatter) for count, found in rows.items()}
-    assert scatter[120] < 0.7 * scatter[130]
-
-
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("rate", [400.0, 5000.0])  # a cubic between samples, and means of them
 @pytest.mark.parametrize("changes", [{}, {"channels/torque-in/range": "30 N m"}], ids=["spikes", "range"])
 @pytest.mark.parametrize("low_pass", [{}, {"filter": {"cut_off": "100 Hz", "order": 2}}], ids=["plain", "filtered"])
@@ -173,13 +164,6 @@ def test_a_bad_reading_beside_the_turns_does_not_reach_into_them(
         found = read(spoilt, tmp_path, changes)
         assert off(found.conditions[0]) < best + (0.1 if rate > 1000 else 0.5), row - first
         assert any("left out" in one.what for one in found.findings), row - first
-
-
-def test_a_slope_at_the_end_of_a_file_is_no_spike(tmp_path: Path) -> None:
-    run = recorded(rate=400.0)
-    for end in range(-20, -1):
-        found = read({name: values[:end] for name, values in run.items()}, tmp_path)
-        assert "data.readings.spikes" not in codes(found)
 
 
 def test_a_spike_in_an_unloaded_stretch_does_not_move_the_zero(run: Columns, tmp_path: Path) -> None:
@@ -238,17 +222,6 @@ def test_drift_is_removed_from_when_the_zero_was_read(run: Columns, tmp_path: Pa
     assert codes(found) == {"data.zero.drift_files"}
     assert off(found.conditions[0]) < 0.06
     assert found.conditions[0].courses["torque-in"].accuracy.zero > 0
-
-
-@pytest.mark.parametrize("conditions", [1, 2])
-def test_drift_is_told_over_the_time_it_took(run: Columns, tmp_path: Path, conditions: int) -> None:
-    """What the mean changes by, over the time it is said to take, is the slope that was put in."""
-    run["T1"] += 0.05 * run["t"]
-    run["m"] = np.where(run["t"] < 1.2, 5.0, 5.0 * conditions)
-    changes = {"set": {"misalignment": {"column": "m", "unit": "deg"}}, "drift": "remove"}
-    (one,) = read(run, tmp_path, changes).findings
-    change, seconds = re.findall(r"changes by ([-0-9.e]+) N m in ([0-9.]+) s", one.what)[0]
-    assert float(change) / float(seconds) == pytest.approx(0.5, rel=0.01)
 
 
 def test_a_zero_that_differs_between_unloaded_stretches_is_uncertain(run: Columns, tmp_path: Path) -> None:

@@ -59,7 +59,7 @@ FORMS: dict[str, Callable[[float], str]] = {
 }
 
 
-@pytest.mark.spread(4)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("unit", ["", " [hh:mm:ss]"])
 def test_time_stamps(columns: Columns, tmp_path: Path, form: str, unit: str) -> None:
@@ -157,14 +157,3 @@ def test_rows_of_words_below_the_names(tmp_path: Path) -> None:
     assert (found["t"].unit, found["x"].unit, found["x"].texts) == ("Sekunden", "Newtonmeter", 0)
     path.write_text("t;x\n0;ERR\n1;2,5\n", encoding="utf-8")
     assert read_table(path, ["t", "x"]).columns["x"].texts == 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("encoding", ["utf-8", "cp1252", "utf-16"])
-def test_header_of_any_length(columns: Columns, tmp_path: Path, encoding: str) -> None:
-    wide = {f"Temperatur des Gehäuses, Stelle {k}": np.zeros(2500) for k in range(2500)}
-    wide |= {key: one[:2500] for key, one in columns.items()} | {"Übertemperatur": np.ones(2500)}
-    (tmp_path / "run.csv").write_bytes(text_of(wide, ";", ",").encode(encoding))
-    found = read_table(tmp_path / "run.csv", ["t", "T1", "Übertemperatur"]).columns
-    np.testing.assert_array_equal(found["T1"].values, columns["T1"][:2500])
-    assert found["Übertemperatur"].values.min() == 1.0

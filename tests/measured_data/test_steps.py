@@ -37,6 +37,7 @@ def rounded_mean(true: Array, noise: float) -> Array:
     return np.asarray(steps[0] + np.sum(ndtr((true[:, None] - steps - 0.5) / noise), axis=1))
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("samples", [250.0, 2000.0])  # interpolated, and means of some
 @pytest.mark.parametrize("noise", [0.05, 0.25])
 def test_errors_of_samples_that_gain_whole_steps_are_alike(samples: float, noise: float) -> None:

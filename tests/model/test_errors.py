@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 
 from trunnion.algebra.dual import Dual
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import MechanismError, Severity
 from trunnion.model.checks.check import check_model
 from trunnion.model.joint_parts import has_play, play
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Misalignment, Seat
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-FindingsOf = Callable[..., tuple[Finding, ...]]
 FOURBAR, RSSR, CARDAN, SLIDER, PLAYING = (
     Mechanism.read(EXAMPLES / f"{name}.yaml")
     for name in ("durango-fourbar", "rssr-with-play", "pezzuti-cardan", "toleranced-slider-crank", "fourbar-with-play")
@@ -262,27 +261,6 @@ def test_what_does_not_go_together_is_refused() -> None:
     ball = {"B.pin.clearance": "1 um", "B.seat.xi": 1}
     assert "the seat of a ball is stated by a direction, not by angles" in refusal(RSSR, ball)
     assert RSSR.with_values({"A.misalignment.tilt": "45 deg"})  # the limit itself, whatever it rounds to
-
-
-@pytest.mark.parametrize(
-    ("fit", "what"),
-    [
-        ("20 mm H7/g17", "the grade of 'g17' is not in the tables"),
-        ("20 mm H7/a6", "the class 'a6' is not in the tables"),
-        ("600 mm H7/g6", "the size 600 mm is not in the tables"),
-        ("20 mm ± 0.1 mm H7/g6", "has a tolerance of its own"),
-    ],
-)
-def test_fits_stated_wrongly(fit: str, what: str) -> None:
-    """Of a joint, and once for all joints that follow the defaults."""
-    for place in ("joints.B", "joint_defaults"):
-        data = FOURBAR.data()
-        (data["joints"]["B"] if place == "joints.B" else data["joint_defaults"])["pin"] = {"fit": fit}
-        with pytest.raises(MechanismError) as error:
-            Mechanism(**data)
-        (finding,) = error.value.findings
-        assert what in finding.what
-        assert finding.where == f"{place}.pin.fit"
 
 
 @pytest.mark.parametrize(

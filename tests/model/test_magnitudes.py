@@ -197,6 +197,7 @@ def test_an_angle_without_a_unit(
     assert all(figure in one.what for one in found)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("stated", "values"), [("10 deg", (-10, 0, 3)), ("0 deg", [10, 3])])
 def test_plain_angles_of_a_sweep_are_told_once(tmp_path: Path, stated: str, values: object) -> None:
     (tmp_path / "shaft.yaml").write_text(shaft(TURNED, f"  phase: {stated}\n"), encoding="utf-8")

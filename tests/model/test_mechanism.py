@@ -259,6 +259,8 @@ GIVES = [
 ]  # fmt: skip
 
 
+@pytest.mark.sample(15)
+@pytest.mark.spread(10)
 @pytest.mark.parametrize(("kind", "keys"), GIVES)
 def test_what_a_measure_gives(varied: Mechanism, kind: str, keys: dict[str, str]) -> None:
     """A limit of another kind is a finding."""

@@ -120,6 +120,7 @@ def test_yield() -> None:
     assert kept == pytest.approx(0.95, abs=0.012)
 
 
+@pytest.mark.slow
 def test_options_as_stated_cost_what_keeps_them() -> None:
     """A half width between two options is bought as the cheapest that keeps it; one below all has no cost."""
     data = trunnion.read(EXAMPLES / "fourbar-by-grades.yaml").data()
@@ -151,6 +152,7 @@ def test_several_limits_have_one_margin() -> None:
     assert float(both.cdf(np.ones(2), lower_limit=-np.ones(2))) == pytest.approx(target, abs=3e-4)
 
 
+@pytest.mark.slow
 def test_a_yield_that_is_to_be_sure_has_it_at_the_lower_end_of_fresh_samples() -> None:
     model = trunnion.read(EXAMPLES / "piston-by-cost.yaml")
     plain, sure = (

@@ -268,42 +268,6 @@ def test_dependent_shifted_rows_agree_with_scipy() -> None:
     assert normal_yield(problem, t) == pytest.approx(float(exact), abs=3e-4)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("wider", [0.7, 1.3])
-def test_what_is_sampled_tightens_and_loosens(wider: float) -> None:
-    """Deviations wider than reckoned by a factor need half widths narrower by it."""
-    problem = four_bar("yield")
-    answer = solve(problem, target=0.99, verify=sampled(problem, wider))
-    assert answer.sampled is not None
-    assert answer.sampled.low <= 0.99 <= answer.sampled.high
-    assert 2 <= len(answer.trials) <= 10
-    assert answer.tolerances == pytest.approx(solve(problem, target=0.99).tolerances / wider, rel=2e-2)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("sure", [False, True])
-def test_fresh_samples_correct_those_that_chose(sure: bool) -> None:
-    """Samples that chose flatter the answer (here by 3 % of its deviations): fresh ones raise the margin."""
-    problem = four_bar("yield")
-    flattering, honest, numbers = sampled(problem, 0.97), sampled(problem), []
-
-    def verify(t: Array, number: int) -> SampledYield:
-        if number:
-            numbers.append(number)
-        return (honest if number else flattering)(t, number)
-
-    answer = solve(problem, target=0.99, verify=verify, sure=sure)
-    plain = solve(problem, target=0.99, verify=flattering)
-    assert answer.checked is not None
-    assert answer.sampled is not None
-    assert plain.sampled is not None
-    assert 0.99 <= plain.sampled.share < answer.sampled.share
-    assert (answer.checked.low if sure else answer.checked.high) >= 0.99 > honest(plain.tolerances, 1).high
-    assert answer.cost > plain.cost
-    assert numbers == [*range(1, len(numbers) + 1)]
-    assert all(finding.severity is Severity.NOTE for finding in answer.findings)
-
-
 @pytest.mark.parametrize("sure", [False, True])
 @pytest.mark.parametrize("low_and_high", [(0.45, 0.55), (0.87, 0.91)])
 def test_a_yield_that_fresh_samples_never_have_is_told(low_and_high: tuple[float, float], sure: bool) -> None:
@@ -349,34 +313,6 @@ def test_samples_decide_where_the_distribution_has_no_tail(room: float, kept: bo
         assert costs[1] < costs[0]
     else:
         assert [finding.severity for finding in answer.findings] == [Severity.ERROR]
-
-
-PLAY = 0.038  # of two pins in the direction of the limit, of ±0.08 m: within it, though normal deviations are not
-
-
-def with_pins(t: Array, seed: int, count: int = 100_000) -> SampledYield:
-    """A yield with two pins anywhere in their holes, and three lengths that are normal."""
-    rng = np.random.default_rng(seed)
-    holes = PLAY * np.sqrt(rng.random((2, count))) * np.cos(2 * np.pi * rng.random((2, count)))
-    return share_of(np.abs(np.sum(holes, axis=0) + rng.normal(size=(count, 3)) @ t[2:] / 3) <= 0.08)
-
-
-def test_plays_that_nearly_fill_a_limit_leave_the_others_what_samples_say() -> None:
-    """Normal deviations would fail whatever is bought. Three equal lengths have one half width, found by bisection."""
-    pins = (Contribution("one", 1.0), Contribution("other", 1.0))
-    effects = rows(np.array([[1.5 * PLAY, 1.5 * PLAY, 1.0, 1.0, 1.0]]), 0.08)
-    problem = AllocationProblem((*pins, *bought([PLAIN] * 3, least=0.002)), effects, "yield")
-    assert solve(problem, target=0.998).findings
-    answer = solve(problem, target=0.998, verify=lambda t, number: with_pins(t, 1 + number))
-    low, high = 0.002, 0.08
-    while high - low > 1e-6:
-        half = (low + high) / 2
-        enough = with_pins(np.array([1.0, 1.0, half, half, half]), 99, 400_000)[0] >= 0.998
-        low, high = (half, high) if enough else (low, half)
-    assert answer.cost == pytest.approx(3 / low, rel=0.05)
-    assert answer.cost < 0.2 * 3 / 0.002
-    assert len(answer.trials) <= 12
-    assert all(finding.severity is Severity.NOTE for finding in answer.findings)
 
 
 @pytest.mark.parametrize("mean", [0.4, -0.4])

@@ -170,6 +170,7 @@ def selected_by_what_is_printed(mechanism: Mechanism) -> int:
     return count
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("space", [planar, spatial], ids=["planar", "spatial"])
 @given(seed=st.integers(0, 10**6))
 @settings(max_examples=4, deadline=None)
@@ -183,6 +184,7 @@ def test_the_printed_places_of_a_way_of_any_mechanism_select_it(space: Any, seed
     selected_by_what_is_printed(mechanism)
 
 
+@pytest.mark.slow
 @given(turn=st.floats(-1e-3, 1e-3), crank=st.floats(0.1, 0.5), longer=st.sampled_from([0.0, 1e-9, 1e-6, 1e-3, 0.1]))
 @settings(max_examples=15, deadline=None)
 def test_ways_that_nearly_meet_are_told_apart(turn: float, crank: float, longer: float) -> None:
@@ -192,6 +194,7 @@ def test_ways_that_nearly_meet_are_told_apart(turn: float, crank: float, longer:
     assert selected_by_what_is_printed(build(data)) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["swash-plate-pump", "double-cardan"])
 def test_the_turn_of_a_universal_joint_is_a_hint(name: str) -> None:
     """Its place is the same in several ways; its turn about its first pin is not."""
@@ -201,6 +204,7 @@ def test_the_turn_of_a_universal_joint_is_a_hint(name: str) -> None:
     assert selected_by_what_is_printed(mechanism) == len(choice.ways)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("name", "share"), [("four-bar", 0.7), ("class III", 0.7), ("in space", 0.2)])
 def test_a_hint_holds_where_its_driver_is(name: str, share: float) -> None:
     """Of every assembly the places at a position of the driver select it, though at the start others are nearer."""
@@ -259,6 +263,7 @@ def jacked(first: str, **tube: Any) -> Mechanism:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_half_turns_of_a_strut_are_no_assemblies_of_their_own() -> None:
     """The ball of the arm meets a sphere about U on two places; a cross holds the tube in two turns at each."""
     (choice,) = trunnion.check(jacked("universal"), 12).choices

@@ -161,6 +161,7 @@ def test_positions_in_line_have_no_forces() -> None:
     assert np.flatnonzero(np.isnan(effort)).tolist() == [0, 18]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["deltoid", pytest.param("antiparallelogram", marks=pytest.mark.slow)])
 def test_in_space(kind: str) -> None:
     """A general group, which is followed by Newton's method, goes on as the closed form does."""
@@ -235,6 +236,7 @@ def random_change_point_linkage(rng: np.random.Generator) -> Mechanism:
     return Mechanism(**data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("first", "count"), [(0, 10), pytest.param(10, 30, marks=pytest.mark.slow)])
 def test_no_rate_jumps_at_a_change_point_but_where_it_is_stated(first: int, count: int) -> None:
     passed = jumped = 0

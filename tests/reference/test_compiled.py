@@ -146,6 +146,7 @@ def test_kept_code_of_another_law_is_not_taken(monkeypatch: pytest.MonkeyPatch, 
         agree(*both(changed, 40))
 
 
+@pytest.mark.slow
 def test_samples_are_the_same_by_any_number_of_threads() -> None:
     mechanism = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
     one, other = (
@@ -206,6 +207,7 @@ def test_friction_settled_otherwise_is_left_to_numpy(method: FrictionMethod, mon
     assert np.array_equal(found.arrays["friction_change"], expected.arrays["friction_change"], equal_nan=True)
 
 
+@pytest.mark.slow
 def test_auto_takes_numpy_where_a_mechanism_cannot_be_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("trunnion.cycle.cycle_kernel.WORTH_COMPILING", 1)
     mechanism = trunnion.read(EXAMPLES / "bennett.yaml")  # over-constrained
@@ -263,22 +265,3 @@ def test_failures_of_samples_are_those_of_numpy() -> None:
     run = prepare(trunnion.read(DURANGO))
     _, status = same_as_numpy(run, ["AB", "BC", "CD"], run.cycle.times(90), 0.2)
     assert {int(Status.NOT_ASSEMBLED), int(Status.SOLVED)} <= set(status.ravel())
-
-
-def test_a_whole_study_and_its_engine_by_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same random numbers, the same moments and counts."""
-
-    def toleranced(engine: Any, samples: int) -> Any:
-        model = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
-        return trunnion.tolerance(model, methods=["monte-carlo"], steps=36, engine=engine, jobs=1, samples=samples)
-
-    numpy, found = (toleranced(engine, 700) for engine in ("numpy", "compiled"))
-    for name, variable in numpy.data_vars.items():
-        if variable.dtype.kind == "f":
-            scale = np.nanmax(np.abs(variable.values), initial=0.0)
-            np.testing.assert_allclose(found[name], variable, rtol=1e-7, atol=1e-9 * scale, err_msg=name)
-        else:
-            assert np.array_equal(found[name], variable), name
-    assert toleranced("auto", 200).attrs["engine"] == "numpy"
-    monkeypatch.setattr("trunnion.studies.tolerance.kernel.WORTH_COMPILING", 7_000)
-    assert toleranced("auto", 200).attrs["engine"] == "compiled"

@@ -318,6 +318,7 @@ def test_a_falling_slider_bounces_ever_lower_and_comes_to_rest(restitution: floa
     assert not codes(result)
 
 
+@pytest.mark.slow
 def test_an_impact_that_closes_a_contact_tears_a_joint_loose() -> None:
     """The crank sticks until the slider, which falls, has landed; nothing of its energy is lost but in friction."""
     data = guide(0.0, {**RIGID, "restitution": 0.0}).data()
@@ -327,29 +328,6 @@ def test_an_impact_that_closes_a_contact_tears_a_joint_loose() -> None:
     kinds = [kind for kind, *_ in attribute(found, "events")]
     assert kinds == ["stick", "impact", "impact", "break-away", "closes", "closes", "stick"]
     assert balanced(found)
-
-
-@pytest.mark.slow
-def test_a_slider_comes_to_rest_on_its_wall() -> None:
-    """At a friction of 1.5 gravity does not move the crank on: it rests for good, held within the cone."""
-    result = simulate(guide(1.5, {"law": "rigid", "restitution": 0.5}, coordinate=1.0, speed=20), 0.6, 20)
-    assert np.all(np.abs(result["drive_rate"].values[0, -5:]) < 1e-12)
-    touching = result["contact_touching"].values[:, -1]
-    assert touching.tolist() == [0, 0, 1, 1]  # on the lower wall
-    normal, friction = (result[f"contact_{name}_force"].values[2:, -1] for name in ("normal", "friction"))
-    assert np.all(np.abs(friction) < 1.5 * normal)
-    assert balanced(result)
-
-
-@pytest.mark.slow
-def test_a_guide_that_jams_says_so_and_keeps_what_was_found() -> None:
-    result = simulate(guide(3.0, {"law": "rigid", "restitution": 0.5}, coordinate=1.0, speed=20), 0.2, 20)
-    (jam,) = [one for one in result.trunnion.findings if one.code == "simulate.no_contact_force"]
-    (lowered,) = [one for one in result.trunnion.findings if one.code == "simulate.restitution_lowered"]
-    assert 0 < lowered.figures["share"] < 1
-    rate, time = result["drive_rate"].values[0], result["time"].values
-    assert np.all(np.isfinite(rate) == (time <= jam.figures["time"]))
-    assert balanced(result)
 
 
 def test_a_pin_closes_in_its_hole_and_the_account_is_right() -> None:

@@ -36,6 +36,7 @@ def by_direction() -> Data:
     return {"coefficient": FORWARD, "backward": BACKWARD}
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(
     ("name", "joint", "engine"),
     [("durango-fourbar", "D", "numpy"), ("offset-slider-crank", "S", "compiled"), ("rssr", "D", "numpy")],
@@ -104,6 +105,7 @@ def on_slope(found: Any, slope: float, speed: float, friction: tuple[float, floa
     return np.where(time <= top, speed * time - 0.5 * up * time**2, 0.5 * speed**2 / up - after)
 
 
+@pytest.mark.slow
 def test_two_blocks_of_which_one_stays() -> None:
     """Of several freedoms each joint sticks and slips for itself."""
     slope, cases = np.radians(30), {"S": (2.0, (0.1, 0.35)), "R": (1.5, (0.2, 0.8))}
@@ -134,6 +136,7 @@ def test_a_loaded_roller() -> None:
     assert found["drive_effort"].values == pytest.approx(np.full((1, 4), 5e-4 * 50 * G), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_tolerances_know_the_backward_coefficient() -> None:
     """Its exact sensitivity against a central difference."""
     data = trunnion.read("examples/durango-fourbar.yaml").data()
@@ -223,6 +226,7 @@ def test_a_guide_in_the_plane() -> None:
     assert float(trunnion.analyse(model, steps=4).measure_figure[0]) == pytest.approx(175.0, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_bearing_in_space_by_its_reaction() -> None:
     """|F⊥/2 ∓ M⊥ × u/L|, of the force and moment in the table of the result."""
     model = trunnion.read("examples/rssr.yaml").data()
@@ -287,6 +291,7 @@ def test_a_massless_cross_by_its_normal() -> None:
     assert np.ptp(moment) > 5.0
 
 
+@pytest.mark.slow
 def test_friction_of_a_cross_counts_these_loads() -> None:
     """μ r Σ|Q| ω of each pin: the friction of one bears on the other."""
     found = trunnion.analyse(trunnion.read("examples/double-cardan.yaml"), steps=40, engine="numpy")
@@ -297,6 +302,7 @@ def test_friction_of_a_cross_counts_these_loads() -> None:
     assert found["friction_power"].sel(joint="B").values == pytest.approx(lost, rel=1e-7)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(
     ("name", "joint", "engine"), [("double-cardan", "A", "numpy"), ("offset-slider-crank", "S", "compiled")]
 )

@@ -203,6 +203,7 @@ def test_driven_rack_turns_the_pinion() -> None:
     np.testing.assert_allclose(turned - turned[4], np.linspace(-0.1, 0.1, 9) / RADIUS, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("joint", "ends"), [("P", (0.0, 1000.0)), ("S", (-900.0, -1000.0))])
 def test_many_turns_away(joint: str, ends: tuple[float, float]) -> None:
     """Thousands of radii from where the rack is drawn, and turns by hundreds from one position to the next."""
@@ -253,62 +254,6 @@ def test_a_falling_load_turns_its_wheel() -> None:
 
 
 ARM, LEAD, MEAN, LOAD = 0.15, 0.004, 0.006, 5000.0
-SLOPE = np.arctan(LEAD / (2 * np.pi * MEAN))
-
-
-def jack(friction: float | None, speed: float, order: str = "WS") -> Data:
-    """A scissor jack whose screw turns in one block and pulls the nut in the other, from 40 deg on."""
-    c, s = ARM * np.cos(np.radians(40)), ARM * np.sin(np.radians(40))
-    ends = [0.0, 60.0] if speed > 0 else [60.0, 0.0]
-    thread = {} if friction is None else {"friction": friction, "pin": {"radius": MEAN}}
-    return {
-        "gravity": [0, 0],
-        "links": {
-            "ground": {"points": {"A": [0, 0], "B": [0, 0], "G": slide(0, 0, np.pi / 2)}},
-            "lower_left": {"points": {"A": [0, 0], "C": [ARM, 0]}},
-            "lower_right": {"points": {"B": [0, 0], "D": [ARM, 0]}},
-            "upper_left": {"points": {"E": [0, 0], "H": [ARM, 0]}},
-            "upper_right": {"points": {"F": [0, 0], "K": [ARM, 0]}},
-            "saddle": {"points": {"E": [0, 0], "F": [0, 0], "G": slide(0, 0, np.pi / 2)}},
-            "nut": {"points": {"C": [0, 0], "H": [0, 0], "S": slide(0, 0)}},
-            "block": {"points": {"D": [0, 0], "K": [0, 0], "S": slide(0, 0), "W": [0.04, 0]}},
-            "screw": {"points": {"W": [0, 0]}},
-        },
-        "joints": {
-            "A": revolute("ground", "lower_left"),
-            "B": revolute("ground", "lower_right"),
-            "C": revolute("lower_left", "nut"),
-            "D": revolute("lower_right", "block"),
-            "H": revolute("upper_left", "nut"),
-            "K": revolute("upper_right", "block"),
-            "E": revolute("saddle", "upper_left"),
-            "F": revolute("saddle", "upper_right"),
-            "G": prismatic("ground", "saddle"),
-            "S": prismatic("nut", "block"),
-            "W": {**revolute("block", "screw"), **thread},
-        },
-        "gears": {"thread": {"joints": list(order), "lead": -LEAD, "phase": 2 * c}},
-        "drivers": {"W": {"speed": speed, "range": ends}},
-        "loads": {"car": {"link": "saddle", "at": "E", "force": [0, -LOAD], "useful": True}},
-        "assembly": {"C": [-c, s], "D": [c, s], "E": [0, 2 * s]},
-    }
-
-
-@pytest.mark.parametrize(("friction", "order"), [(None, "WS"), (0.15, "SW")])
-def test_scissor_jack(friction: float | None, order: str) -> None:
-    """P r tan(λ + φ) raises and P r tan(λ − φ) lowers, with the screw's pull P = F w/h; one turn moves the lead."""
-    angle = np.arctan(friction or 0.0)
-    for speed, tangent in ((-10.0, np.tan(SLOPE - angle)), (10.0, np.tan(SLOPE + angle))):
-        result = trunnion.analyse(Mechanism(**jack(friction, speed, order)), 7)
-        turned = np.linspace(*((0.0, 60.0) if speed > 0 else (60.0, 0.0)), 7)
-        width = 2 * ARM * np.cos(np.radians(40)) - LEAD * turned / (2 * np.pi)
-        pull = LOAD * width / np.sqrt(4 * ARM**2 - width**2)
-        np.testing.assert_allclose(at(result, "joint_slide", joint="S"), width, rtol=1e-12)
-        np.testing.assert_allclose(at(result, "drive_effort", driver="W"), pull * MEAN * tangent, rtol=1e-12)
-        np.testing.assert_allclose(at(result, "gear_torque", gear="thread"), -pull * MEAN * tangent, rtol=1e-12)
-        np.testing.assert_allclose(at(result, "gear_force", "x", gear="thread"), -pull, rtol=1e-12)
-        assert np.abs(result["power_residual"]).max() < 1e-12 * np.abs(result["drive_power"]).max()
-    assert float(result["efficiency"]) == pytest.approx(np.tan(SLOPE) / np.tan(SLOPE + angle), rel=1e-12)
 
 
 def press(friction: float, driver: Data, lead: float = 0.02, **more: Any) -> Data:
@@ -344,6 +289,7 @@ def test_driven_at_the_nut(friction: float) -> None:
         np.testing.assert_allclose(at(result, "drive_effort", driver="S"), force, rtol=1e-10)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("friction", "torque"), [(0.05, 0.0), (0.05, 1.5), (0.6, 0.4)])
 def test_a_free_screw(friction: float, torque: float) -> None:
     """(J + m p r tan(λ ± φ)) ω̇ = T − F r tan(λ ± φ), p = lead/2π; at rest between the two torques."""

@@ -41,7 +41,7 @@ def test_random_mechanisms(space: str, seeds: Any) -> None:
     assert sum(one.statuses[0] for one in found) > 0.6 * STEPS * len(found)
 
 
-@pytest.mark.spread(2)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("space", "seed"), [("planar", 3), ("planar", 8097), ("planar", 8260), ("spatial", 0)])
 def test_the_quick_way_has_the_same_numbers(space: str, seed: int) -> None:
     """What leaves out the locking margin publishes what `analyse` does, bit by bit."""
@@ -91,7 +91,7 @@ def test_the_judge_sees_a_wrong_number(space: str, name: str, check: str) -> Non
 LET_GO = (1, 2, 12, 5, 10, 24, 34)
 
 
-@pytest.mark.spread(0, "2")
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", LET_GO)
 def test_they_move_as_all_their_links_must(seed: int) -> None:
     """Gravity, forces, springs, dampers, and friction in pins and guides by its law from the multipliers."""

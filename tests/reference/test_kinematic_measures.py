@@ -199,6 +199,7 @@ def test_measures_are_the_numbers_of_the_analysis() -> None:
     assert found["friction_energy:B"] == pytest.approx(lost, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_forces_in_space_are_those_of_the_analysis() -> None:
     """Effort, reaction and its size, power lost, of an RSSR with friction."""
     run = prepare(Mechanism(**rssr(friction=0.1).data))
@@ -345,6 +346,7 @@ def starting_time(inertia: float) -> float:
     return float(brentq(lambda t: takes(t) - limit, 2.0 * tau, DURATION, xtol=1e-13))
 
 
+@pytest.mark.slow
 def test_first_order_of_the_starting_time() -> None:
     """The sensitivity to the inertia, by differences of the closed form; samples scatter about it."""
     mechanism = stated(wheel(LINEAR), tolerances={"links.wheel.inertia": 0.001}, measures={"start": MEASURE})
@@ -358,6 +360,7 @@ def test_first_order_of_the_starting_time() -> None:
     assert float(found["yield_all"]) == 1.0
 
 
+@pytest.mark.slow
 def test_samples_that_do_not_start_are_outside_every_limit() -> None:
     """Torques about the drag: half of them do not start."""
     motor = {**LINEAR, "stall_effort": 0.6}
@@ -370,19 +373,3 @@ def test_samples_that_do_not_start_are_outside_every_limit() -> None:
     shares = found["yield"].values
     assert shares[0] == 1.0
     assert shares[1] < 0.7
-
-
-def test_a_sweep_has_the_figures_of_each_point() -> None:
-    mechanism = wheel(LINEAR)
-    inertias = [0.03, 0.05, 0.08]
-    swept = trunnion.sweep(
-        mechanism, {"links.wheel.inertia": inertias}, 24, measures=["starting_time:A", "peak_effort:A"]
-    )
-    # ten cycles at 100 rad/s: too short for it to run steadily, so that there is none
-    assert np.all(np.isnan(swept["starting_time:A"]))
-    assert "sweep.not_steady" in {one.code for one in swept.trunnion.findings}
-    np.testing.assert_allclose(swept["peak_effort:A"], 4.0, rtol=1e-8)
-    longer = stated(mechanism, measures={"start": MEASURE})
-    found = trunnion.sweep(longer, {"links.wheel.inertia": inertias}, 24, measures=["start"])["start"].values
-    np.testing.assert_allclose(found, [starting_time(one) for one in inertias], rtol=1e-7)
-    assert swept["peak_effort:A"].attrs["units"] == "N m"

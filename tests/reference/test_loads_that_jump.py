@@ -74,15 +74,6 @@ def test_the_start_of_a_cycle_is_beside_its_end() -> None:
     assert found["O.effort_max"].value == pytest.approx(FORCE * arm(BEGIN), rel=1e-6)
 
 
-@pytest.mark.parametrize("steps", [20, 180])
-def test_every_point_of_a_sweep_has_it(steps: int) -> None:
-    """Solved in one pass or, of few positions, each by itself."""
-    rods = np.linspace(0.15, 0.3, 7)
-    swept = trunnion.sweep(cut(), {"l": rods}, steps=steps, measures=["maximum:effort:O"])
-    assert swept["drive_effort_max"].values[0] == pytest.approx(FORCE * arm(BEGIN, rod=rods), rel=1e-6)
-    assert swept["drive_effort_max"].values[0] == pytest.approx(swept["maximum:effort:O"].values, rel=1e-6)
-
-
 def test_a_jump_above_the_top_of_a_sample_is_met() -> None:
     """Of the nominal mechanism the top is smooth, of samples it may be beside the jump."""
     forces = ["-50 kN * wide / 20 mm * between(drive, 320.3 deg, 350 deg)", "35.58 kN * max(sin(drive), 0)"]
@@ -192,6 +183,7 @@ def test_the_worst_case_found_includes_a_play() -> None:
         assert float(result[key][0]) == pytest.approx(worst, rel=0.01)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(
     ("criterion", "code"), [("worst-case", "allocation.worst_case_beyond"), ("yield", "yield.missed")]
 )
@@ -225,6 +217,7 @@ def test_a_sweep_has_no_efficiency_where_the_load_never_acts() -> None:
     assert np.isnan(result["efficiency"].values).tolist() == [True, True, False]
 
 
+@pytest.mark.slow
 def test_two_corners_that_are_as_high_do_not_cancel() -> None:
     """A press in line whose force acts both ways: a slide off the line raises one of its peaks as it lowers the other.
     That of half a turn alone is the same size."""
@@ -279,6 +272,7 @@ def single(mechanism: Mechanism) -> dict[str, float]:
     return figures_of(run, named(mechanism, FIGURES, run.values), FrictionMethod())
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("start", [326.9, 100.0])
 def test_figures_of_many_are_those_of_each_alone_and_of_the_closed_form(start: float) -> None:
     """Near the nominal place, far from it, and where the ram does not come to the load, or is at it throughout.
@@ -297,19 +291,6 @@ def test_figures_of_many_are_those_of_each_alone_and_of_the_closed_form(start: f
         exact = single(touching(start, {"touch": float(touch[k])}))
         for name in FIGURES:
             assert found[name][k] == pytest.approx(exact[name], rel=2e-7, abs=1e-9), (name, k)
-
-
-def test_a_study_has_the_part_of_the_place_at_which_the_load_begins() -> None:
-    half, numbers = 2e-4, ("r", "l", "touch")
-    mechanism = touching(tolerances=dict.fromkeys(numbers, half), measures={"up": FIGURES["power"]})
-    found = trunnion.tolerance(mechanism, samples=2000, seed=5, steps=24).sel(measure="up")
-    for name, sign in zip(numbers, (-1, -1, 1), strict=True):
-        sensitivity = float(found["sensitivity"].sel(parameter=f"dimensions.{name}"))
-        assert sensitivity == pytest.approx(sign * PUSH / TIME, rel=1e-6)
-    whole = 3 * PUSH / TIME * half
-    assert float(found["worst_case_upper"]) == pytest.approx(whole, rel=1e-6)
-    assert float(found["searched_upper"]) == pytest.approx(whole, rel=1e-6)
-    assert float(found["deviation"]) == pytest.approx(float(found["deviation_linear"]), rel=0.06)
 
 
 def test_pins_in_seats_move_the_place_at_which_the_load_begins() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -384,6 +383,7 @@ def margins_of(mechanism: Mechanism) -> Any:
     return brief(mechanism, POSITIONS)["locking_margin"].values
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("coefficient", "aside"), [(0.4, 0.0), (2.0, 400.0)])
 def test_below_the_margin_nothing_locks_and_above_it_something_does(coefficient: float, aside: float) -> None:
     """Whether it runs, one group locks or both, and whatever loads the inner one beside the outer."""
@@ -395,6 +395,7 @@ def test_below_the_margin_nothing_locks_and_above_it_something_does(coefficient:
         assert np.any(status == Status.LOCKED) == expected
 
 
+@pytest.mark.slow
 def test_joints_of_a_group_without_loads_have_no_critical_multiple() -> None:
     found = locking(ram(2.0), POSITIONS)
     locked = found["status"].values == Status.LOCKED
@@ -471,18 +472,6 @@ def test_critical_multiples_are_where_it_locks(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_where_all_friction_locks_so_does_that_of_a_joint() -> None:
-    """At reversals too, for which both figures are those beside; 0 where no joint alone can free its group."""
-    data, options = FRICTIONAL["slider-crank"]
-    mechanism = build(data(), **{**options, "friction": 0.9})
-    result = brief(mechanism, 8)
-    locked = result["locking_margin"].values < 1
-    multiples = np.array(list(multiples_of(mechanism, 8).values()))
-    assert np.any(locked & (result["status"].values == Status.ZERO_SLIP))
-    assert np.all(np.nanmin(multiples, axis=0)[locked] < 1)
-    assert np.any(multiples == 0)
-
-
 def test_locking_says_nothing_where_there_is_no_answer() -> None:
     """Positions that cannot be assembled have no margin and no multiple."""
     found = locking(build(four_bar(2.0, 1.5, 1.5, 4.0)), 36)
@@ -492,32 +481,6 @@ def test_locking_says_nothing_where_there_is_no_answer() -> None:
     for name in ("locking_margin", "critical_multiple"):
         assert np.all(np.isnan(found[name].values[..., gone]))
         assert not np.any(np.isnan(found[name].values[..., found["status"].values < Status.NOT_CONVERGED]))
-
-
-@pytest.mark.slow
-def test_the_joint_that_need_be_lowered_alone_is_one_with_which_it_runs() -> None:
-    """At 0° a pin of the cross is at rest for a moment: what locks there is what locks on either side of it.
-
-    Without the friction of any one joint it locks as printed; with an output that is smooth, pin-1 decides.
-    """
-    mechanism = trunnion.read(EXAMPLES / "pezzuti-cardan-10mm.yaml")
-
-    def locks(**coefficients: float) -> dict[str, Any] | None:
-        numbers = {f"joints.{joint}.friction.coefficient": value for joint, value in coefficients.items()}
-        result = trunnion.analyse(mechanism.with_values(numbers), steps=360)
-        rows = [row for row in json.loads(result.attrs["findings"]) if row["code"] == "friction.locked"]
-        return rows[0]["figures"] if rows else None
-
-    printed = locks()
-    assert printed is not None
-    assert printed["decides"] is None
-    assert locks(**{"pin-1": 0.0})
-    assert locks(output=0.0)
-    smooth = locks(output=0.01)
-    assert smooth is not None
-    assert smooth["decides"] == "pin-1"
-    assert locks(output=0.01, **{"pin-1": 1.001 * 0.42 * smooth["multiple"]})
-    assert locks(output=0.01, **{"pin-1": 0.999 * 0.42 * smooth["multiple"]}) is None
 
 
 @pytest.mark.slow

@@ -109,13 +109,6 @@ def test_a_position_in_the_dead_centre_is_of_the_state_behind_it(steps: int) -> 
     assert set(states(locking(Mechanism(**data), steps))) == {LockingState.BACKDRIVABLE, LockingState.DRIVEN_ON}
 
 
-def test_a_load_without_power_pushes_neither_way() -> None:
-    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
-    data["loads"]["weight"]["force"] = [0.0, "-100 N * between(drive, 0, 1.2)"]
-    found = locking(Mechanism(**data), 40)
-    np.testing.assert_array_equal(states(found) == LockingState.RUNS, found["drive"].values > np.degrees(1.2))
-
-
 def test_ends_of_a_range_near_locking_are_where_the_margin_passes_it() -> None:
     """Of positions very near an end the margin is below 7 on one side only."""
     mechanism = eccentric_press()
@@ -235,20 +228,6 @@ def test_effort_to_open_a_clamp_past_its_dead_centre(share: float) -> None:
     assert row.place == "at 3°"
     assert row.value == pytest.approx(opens, rel=1e-9)
     assert float(found["drive_effort_reverse"].max()) > 0  # where the spring opens it, it is held back
-
-
-def test_a_return_spring_that_supplies_work_leaves_no_efficiency() -> None:
-    """Work of a spring that is not useful is not that of the useful loads."""
-    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
-    data["drivers"]["A"]["range"] = [0.2, 1.2]
-    bare = prepare(Mechanism(**data))
-    (row,) = [one for one in report_figures(bare) if one.name == "efficiency_reverse"]
-    assert row.value is not None
-    data["springs"] = {"back": {"joint": "A", "stiffness": 0.1, "free_angle": 0.0}}
-    sprung = Mechanism(**data)
-    run = prepare(sprung)
-    (row,) = [one for one in report_figures(run) if one.name == "efficiency_reverse"]
-    assert (row.value, row.note) == (None, "springs supply work too")
 
 
 def test_a_short_range_ends_where_the_loads_cease_to_push() -> None:

@@ -78,6 +78,7 @@ def test_efficiency_does_not_depend_on_the_number_of_positions(force: str) -> No
     assert all(0 <= float(one["efficiency_error"]) < 1e-6 * values[0] for one in found)
 
 
+@pytest.mark.slow
 def test_a_sweep_has_the_efficiencies_of_the_analysis_at_any_number_of_positions() -> None:
     lengths = ["110 mm", "130 mm", "160 mm", "200 mm"]
     few, many = (trunnion.sweep(press(), {"l": lengths}, steps) for steps in (60, 720))

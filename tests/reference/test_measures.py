@@ -11,14 +11,13 @@ from scipy import optimize
 from scipy.spatial.transform import Rotation
 
 import trunnion
-from measured import figures, many
+from measured import figures
 from mechanisms import DURANGO, build, four_bar, slider_crank
 from mechanisms_space import rssr
 from trunnion import Mechanism
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import plan
-from trunnion.model.measure_table import MEASURES, STATISTICS
 from trunnion.results.attributes import summary_of
 from trunnion.results.figure import MORE_THAN
 from trunnion.solve.friction_method import MARGIN
@@ -282,6 +281,7 @@ def test_locking_margin() -> None:
     assert float(np.ravel(primal(slope))[0]) == pytest.approx(found, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_locking_margin_beyond_what_is_looked_for_is_infinite() -> None:
     """In a result, a sweep and samples; the summary says "more than"; its place does not exist."""
     statistics = ["minimum", "mean", "place-of-minimum"]
@@ -327,63 +327,6 @@ def test_turn_of_a_link_in_space(scale: float) -> None:
         )
         slope = (ends[axis][0] - ends[axis][1]) / (2 * step)
         assert float(np.ravel(derivative(slopes[axis]))[0]) == pytest.approx(slope, rel=1e-6, abs=1e-7)
-
-
-SUBJECTS = {
-    "point": ("piston.P", "x"), "path_error": ("piston.P", ""), "straightness": ("rod.P", ""), "angle": ("rod", ""),
-    "rotation": ("P", ""), "slide": ("C", ""), "transmission_error": ("C", ""), "stroke": ("C", ""),
-    "dead_centre": ("C", ""), "time_ratio": ("C", ""), "rate": ("P", ""), "joint_acceleration": ("C", ""),
-    "load": ("press", ""),
-    "spring_force": ("coil", ""), "spring_elongation": ("coil", ""),
-    "velocity": ("rod.P", "y"), "acceleration": ("rod.P", ""), "angular_velocity": ("rod", ""),
-    "angular_acceleration": ("rod", ""), "transmission_angle": ("P", ""), "pressure_angle": ("C", ""),
-    "power": ("press", ""), "friction_power": ("C", ""), "friction_energy": ("C", ""),
-    "effort": ("A", ""), "reaction": ("P", ""), "end_load": ("C", ""), "efficiency": ("cycle", ""),
-    "locking_margin": ("mechanism", ""),
-}  # fmt: skip
-
-
-# the others are in `test_kinematic_measures`
-OF_CYCLES = [kind for kind, one in MEASURES.items() if not one.in_time and kind != "expression"]
-
-
-def every_measure() -> list[Measure]:
-    made = [
-        Measure(f"{kind} {statistic}", kind, *SUBJECTS[kind], statistic=statistic, within=(-0.1, 0.1))
-        for kind in OF_CYCLES
-        for statistic in ("", *STATISTICS)
-        if statistic != "value"
-    ]
-    return [*made, *(Measure(f"{kind} at", kind, *SUBJECTS[kind], at=1.0) for kind in OF_CYCLES)]
-
-
-@pytest.mark.slow
-def test_every_kind_with_every_statistic(crank: Run) -> None:
-    """A figure, a picture and a unit for each; of samples and of dual numbers the same."""
-    measures = every_measure()
-    made, change = many(crank, measures), crank.system.mechanism.parameters
-    values = change({"links.crank.points.B.x": R * np.array([[1.0], [1.001]])})
-    made.tune(values)
-    nominal, found = (
-        made.figures,
-        made.read(values, dict.fromkeys((one.name for one in measures), crank.cycle.times(24))),
-    )
-    slopes = made.read(change({"links.crank.points.B.x": Dual(1.001 * R, 1.0)}))
-    for one in measures:
-        read = found[one.name]
-        assert np.shape(read.figure) == (2,), one.name
-        if one.kind not in ("efficiency", "locking_margin") and "at" not in one.name:
-            assert np.all(np.isfinite(read.figure)), one.name
-        np.testing.assert_allclose(read.figure[0], nominal[one.name], rtol=1e-12, atol=1e-12, err_msg=one.name)
-        assert np.shape(read.shown) == (2, 1 if one.at is not None else 24)
-        assert one.figure_unit(crank.system, crank.values) in {
-            kind.unit for one in MEASURES.values() for kind in one.quantities
-        }
-        dual = np.ravel(primal(slopes[one.name].figure))[0]
-        if one.kind not in ("load", "power", "friction_power") or not one.of_place:  # these have several places
-            size = np.max(np.nan_to_num(np.abs(read.shown[1])))  # of a power that touches zero rounding is left
-            np.testing.assert_allclose(dual, read.figure[1], rtol=1e-8, atol=1e-12 + 1e-9 * size, err_msg=one.name)
-        assert np.all((read.least <= read.most) | np.isnan(read.most))
 
 
 def press(**driver: Any) -> Run:

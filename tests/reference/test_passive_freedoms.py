@@ -156,6 +156,7 @@ def wishbone() -> Mechanism:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_double_wishbone_with_a_strut() -> None:
     """8 × 8: equilibrium of the upright, and of both arms about their axes; two spins, of the strut and the tie rod."""
     result = analyse(wishbone(), 9)

@@ -25,6 +25,7 @@ def test_a_long_pin_is_a_pin_in_the_plane() -> None:
     assert float(abs(space["energy_residual"]).max()) < 1e-8 * float(abs(space["work_drive"]).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("duration", [7e-3, pytest.param(0.02, marks=pytest.mark.slow)])
 def test_a_shaft_that_is_let_go_in_its_hole(duration: float) -> None:
     """It tilts, so that one end touches first, slips with friction and comes against a shoulder: by own equations of

@@ -73,6 +73,7 @@ def test_one_position_is_that_of_the_cycle(at: str | float) -> None:
         np.testing.assert_allclose(one[name].values[..., 0], cycle[name].values[..., here], rtol=1e-9, atol=1e-15)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("hole_on", ["rocker", "ground"])
 def test_rssr(hole_on: str) -> None:
     """0.044402° by the formula."""
@@ -209,6 +210,7 @@ def test_end_float() -> None:
     assert float(result["sensitivity"].values[0, 0, 2, 2, 0]) == pytest.approx(-6.11075, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_totals_and_attributes() -> None:
     mechanism = trunnion.read(EXAMPLES / "toleranced-slider-crank.yaml")
     result = trunnion.play(mechanism, steps=36)
@@ -243,6 +245,7 @@ def test_limit(place: dict[str, str]) -> None:
         assert bool(json.loads(result.attrs["missed"])) == (factor < 1)
 
 
+@pytest.mark.slow
 def test_redundant_constraints_make_it_a_bound() -> None:
     mechanism = trunnion.read(EXAMPLES / "fourbar-in-space.yaml")
     if mechanism.over_constraint == "refuse":
@@ -298,27 +301,6 @@ def pressed(depth: float, play: float) -> Mechanism:
         springs={"work": spring},
         measures={"force": {"spring_force": "work", "at": 0.0}},
     )
-
-
-@pytest.mark.parametrize(("depth", "told"), [(1e-4, True), (4e-4, False)])
-def test_a_spring_that_comes_free_is_told_by_side(depth: float, told: bool) -> None:
-    """In line the slider goes where its pin goes, by its play to either side: −k ρ, and + k ρ or all of the force."""
-    mechanism = pressed(depth, 3e-4)
-    run = prepare(mechanism)
-    (play,) = plays(run.system, run.values).values()
-    ((radius,),) = (play.radii,)
-    most = 1e6 * float(np.ravel(radius)[0])
-    result = trunnion.play(mechanism, at=0.0)
-    assert result["worst_case_total"].item() == pytest.approx(most, rel=1e-9)
-    found = [one.figures for one in findings_of(result) if one.code == "play.beyond_first_order"]
-    assert bool(found) == told
-    for figures in found:
-        assert figures["first"] == pytest.approx(most, rel=1e-9)
-        assert figures["low"] == pytest.approx(-most, rel=1e-9)
-        assert figures["high"] == pytest.approx(1e6 * depth, rel=1e-9)
-    of_the_model = [one.figures for one in findings_of(trunnion.play(mechanism, steps=11))]
-    places = [one for one in of_the_model if one.get("high") == pytest.approx(1e6 * depth, rel=1e-9)]
-    assert bool(places) == told
 
 
 @pytest.mark.parametrize("play", [2e-5, 5e-4])

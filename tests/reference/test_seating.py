@@ -155,7 +155,7 @@ def test_power_of_the_settled_linkage(name: str, friction: float) -> None:
         assert np.max(np.abs(less)) < np.max(np.abs(lost)) / 10
 
 
-@pytest.mark.spread(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LINKAGES)
 def test_reactions_of_a_result_are_those_of_the_whole_motion(name: str) -> None:
     """Inertia by the accelerations of the settled places: as the oracle's, to what its differences leave."""
@@ -187,6 +187,7 @@ def test_rates_are_the_derivatives_of_the_offsets(name: str) -> None:
         np.testing.assert_allclose(here.acceleration[axis], second, rtol=0, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_where_a_pin_crosses_or_lifts_off_does_not_depend_on_the_positions() -> None:
     """At 90° of the crank in closed form; a pin that its load cannot hold on its way lifts off in the same stretch."""
     crank = prepare(trunnion.Mechanism(trunnion=1, **one_crank()))

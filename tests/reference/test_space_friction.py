@@ -176,6 +176,7 @@ def test_hinges_share_the_load_as_two_ends_of_a_bearing_each_do(apart: float, be
     assert finding.figures["change"] == pytest.approx(1 - (1 + share) / (1 + 1.125 * share), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_hinges_of_stated_stiffness_are_a_rigid_beam_on_springs() -> None:
     """Three hinges: deflections δ and rotation φ from the balance of forces and moments, F = k (δ + z φ), M = κ φ."""
     heights, radial = np.array([0.1, 0.7, 1.6]), np.array([3e6, 1e6, 8e6])
@@ -255,7 +256,7 @@ def raised(data: Data) -> Data:
     }
 
 
-@pytest.mark.spread(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [None, 0.12])
 @pytest.mark.parametrize("name", NAMES)
 def test_planar_mechanism_in_space(name: str, friction: float | None) -> None:

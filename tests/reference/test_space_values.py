@@ -154,6 +154,7 @@ def test_ideal_cardan(delta: float, general: bool) -> None:
         np.testing.assert_allclose(value(result, "joint_slide", joint), 0, rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_no_bennett() -> None:
     """Without sin α : a = sin β : b four pins in space do not move: there is no number, and it is said why."""
     data = loop("RRRR", (40, 100, 40, 100), (0.2, 0.2, 0.2, 0.2), start=0.1, over_constraint="minimum-norm")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ from scipy import stats
 
 import trunnion
 from mechanisms import Array
-from mechanisms_parts import prismatic
 from toleranced import (
     CLUTCH,
     FOURBAR,
@@ -30,8 +28,7 @@ from toleranced import (
 )  # fmt: skip
 from trunnion import Mechanism
 from trunnion.statistics.streams import SobolStream, uniforms
-from trunnion.studies.tolerance.first_order import ToleranceStudy, study
-from trunnion.studies.tolerance.sampled import QUANTILES, sampled
+from trunnion.studies.tolerance.first_order import study
 
 Law = Callable[[Array], Array]
 MM = 1e-3
@@ -274,86 +271,3 @@ def test_large_tolerances_against_brute_force() -> None:
     assert 0.5 < both < min(inside) < 0.99
     assert result["searched_upper"].values[0] >= np.max(own) - nominal - 1e-12
     assert result["searched_lower"].values[0] <= np.min(own) - nominal + 1e-12
-
-
-SEEDS = 200
-
-
-def sledge() -> Mechanism:
-    """A slide whose point is where three normal lengths put it: y = a + b + c + drive, σ = (1, 2, 2)/3 · 0.01 mm."""
-    limits = {
-        "all": {"limit": "±0.015 mm"},
-        "most": {"limit": "±0.02 mm"},
-        "half": {"limit": "+0.004/-0.01 mm"},
-        "above": {"at_least": "59.985 mm"},
-        "rare": {"limit": "±0.028 mm"},
-    }
-    return Mechanism(
-        dimensions={"a": "10 mm", "b": "20 mm", "c": "30 mm"},
-        links={
-            "ground": {"points": {"X": {"at": ["a", 0], "axis": [1, 0]}}},
-            "ram": {"points": {"X": {"at": ["-b", 0], "axis": [1, 0]}, "P": ["c", 0]}},
-        },
-        joints={"X": prismatic("ground", "ram")},
-        drivers={"X": {"speed": 0.01, "range": [-0.01, 0.01]}},
-        tolerances={"a": "±0.01 mm", "b": "±0.02 mm", "c": "±0.02 mm"},
-        measures={name: {"point": "ram.P", "axis": "x", "at": "0 mm", **limit} for name, limit in limits.items()},
-    )
-
-
-def of_sledge() -> list[float]:
-    """Yields by the normal distribution, σ = 0.01 mm, of each measure and of all."""
-    ends = [(-0.015, 0.015), (-0.02, 0.02), (-0.01, 0.004), (-0.015, np.inf), (-0.028, 0.028)]
-    found = [float(stats.norm.cdf(high / 0.01) - stats.norm.cdf(low / 0.01)) for low, high in ends]
-    return [*found, found[2]]
-
-
-def intervals(mechanism: Mechanism, method: str, samples: int) -> dict[str, Array]:
-    """(seed, measure) each: ends of the intervals, of the yields with that of all measures together."""
-    found = study(mechanism)
-    first = found.sampling(method, samples, 0).prepare()
-    rows = [_arrays(found, first, seed) for seed in range(SEEDS)]
-    return {key: np.array([row[key] for row in rows]) for key in rows[0]}
-
-
-def _arrays(found: ToleranceStudy, first: Any, seed: int) -> dict[str, Array]:
-    batch = replace(first, job=replace(first.job, seed=seed))
-    arrays = sampled(batch.job.joined([batch(block) for block in range(batch.job.blocks)]), found).arrays
-    keys = ("mean", "deviation", "quantile")
-    kept = {f"{key}_{end}": arrays[f"{key}_{end}"] for key in keys for end in ("low", "high")}
-    for end in ("low", "high"):
-        kept[f"yield_{end}"] = np.append(arrays[f"yield_{end}"], arrays[f"yield_all_{end}"])
-    return kept
-
-
-def covered(rows: dict[str, Array], key: str, true: Any) -> Array:
-    """Share of the seeds whose interval covers the true figure."""
-    return np.mean((rows[f"{key}_low"] <= true) & (true <= rows[f"{key}_high"]), axis=0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("method", "samples"), [("monte-carlo", 1000), ("quasi-monte-carlo", 1024)])
-def test_intervals_are_honest(method: str, samples: int) -> None:
-    """Over 200 seeds the 95 % interval covers the true yield in 95 ± 3 %: of each measure, and of all together.
-
-    Sobol points, turned to the gradient of this linear measure, leave counts that are all but certain: of them the
-    intervals are on the safe side.
-    """
-    rows = intervals(sledge(), method, samples)
-    share = covered(rows, "yield", of_sledge())
-    assert np.all(share >= 0.92 - 1e-12), share
-    if method == "monte-carlo":
-        assert np.all(share <= 0.98 + 1e-12), share
-        assert abs(np.mean(share) - 0.95) < 0.015
-    for key, true in (("mean", 0.06), ("deviation", 1e-5)):
-        assert np.all(np.abs(covered(rows, key, true) - 0.95) <= 0.04)
-    if method == "monte-carlo":
-        quantiles_are_covered(rows)
-
-
-def quantiles_are_covered(rows: dict[str, Array]) -> None:
-    """Never below 95 % but for chance."""
-    true = 0.06 + 1e-5 * stats.norm.ppf(QUANTILES)
-    known = np.all(np.isfinite(rows["quantile_low"][:, 0] + rows["quantile_high"][:, 0]), axis=0)
-    assert np.count_nonzero(known) >= len(QUANTILES) - 2
-    assert np.all(covered(rows, "quantile", true)[0, known] >= 0.87)

@@ -155,7 +155,7 @@ def deviations(one: Any, two: Any, nominal: Run, measure: Measure) -> tuple[Arra
 SMOOTH = ("mean", "rms", "maximum", "minimum", "efficiency", "peak-to-peak", "stroke", "straightness")
 
 
-@pytest.mark.spread(2)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(
     "name", ["four-bar", "class III", "geared five-bar", "Cardan", "lamp", "RCCC", "lugre friction"]
 )

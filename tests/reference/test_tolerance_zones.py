@@ -98,6 +98,7 @@ def slope_of_rod() -> float:
     return float((slider_place(R, L + 1e-6, 0.0) - slider_place(R, L - 1e-6, 0.0)) / 2e-6)
 
 
+@pytest.mark.slow
 def test_a_tilt_that_points_anywhere_takes_the_offset_along() -> None:
     """In space an offset without a direction of its own follows that of the tilt."""
     mechanism = rssr(tolerances={"joints.D.misalignment.tilt": {"limits": "+0.05/0 deg", "direction": "uniform"}})
@@ -177,7 +178,7 @@ def swing(**change: Any) -> float:
     return float(np.ptp(np.unwrap(rssr_angle(**{k: np.full_like(crank, v) for k, v in at.items()}, crank=crank))))
 
 
-@pytest.mark.spread(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("links", BOTH)
 def test_a_ball_in_space_has_the_worse_of_two_seats(links: list[str]) -> None:
     """On the crank the ball moves along its radius or its axis, across as if driven earlier; on the rod along it."""

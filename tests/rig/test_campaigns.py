@@ -78,6 +78,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     return measured
 
 
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", CAMPAIGNS)
 def test_verdicts(campaign: Campaign, name: str) -> None:
     """Torque at the drive of a joint whose friction is not the model's is not within; everything else is."""
@@ -87,6 +88,7 @@ def test_verdicts(campaign: Campaign, name: str) -> None:
     assert set(other.tolist()) <= {Verdict.NOT}
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize(
     ("name", "efficiency", "expanded"),
     [
@@ -102,6 +104,7 @@ def test_efficiencies(campaign: Campaign, name: str, efficiency: list[float], ex
     assert found.efficiency_expanded.values == pytest.approx(expanded, rel=2e-3)
 
 
+@pytest.mark.spread(2)
 @pytest.mark.parametrize(
     ("name", "path", "estimate", "uncertainty", "reduced"),
     [

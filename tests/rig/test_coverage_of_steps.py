@@ -90,6 +90,7 @@ def test_steps_that_repeat_are_a_source(tmp_path: Path) -> None:
     assert 0.6 < np.mean([float(one["reduced_chi_squared"]) for one in found[120.0]]) < 1.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.02, pytest.param(0.1, marks=pytest.mark.slow)])
 def test_a_file_that_spans_three_steps_has_those_of_the_others(tmp_path: Path, noise: float) -> None:
     """The torque into a Cardan joint at 5°, whose two levels tell no step; of 12 rigs of a true 95 % one misses."""
@@ -127,9 +128,8 @@ def test_frictions_of_two_joints_add() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("noise", "seeds"), [(0.25, 300), (0.1, 150)])
-def test_coverage_where_steps_repeat(tmp_path: Path, noise: float, seeds: int) -> None:
-    """Of 300 measurements 88 % at least: of a true 93 % that fails in 0.03 % of cases, of 80 % in all but 0.03 %."""
-    every = np.array([held(identified(tmp_path, seed, noise)) for seed in range(seeds)])
+def test_coverage_where_steps_repeat(tmp_path: Path) -> None:
+    """Of 150 measurements 88 % at least, of each parameter; of all parameters 90 to 99 %."""
+    every = np.array([held(identified(tmp_path, seed, 0.25)) for seed in range(150)])
     assert np.all(np.mean(every, axis=0) >= 0.88), np.mean(every, axis=0)
     assert 0.9 <= np.mean(every) <= 0.99

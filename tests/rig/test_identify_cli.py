@@ -58,6 +58,7 @@ def call(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFi
     return run
 
 
+@pytest.mark.slow
 def test_estimates_of_a_model_that_does_not_fit_are_not_written(  # type: ignore[no-untyped-def]
     folder: Path, call, monkeypatch: pytest.MonkeyPatch
 ) -> None:

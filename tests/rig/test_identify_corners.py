@@ -71,6 +71,7 @@ def compressor(load: dict[str, Any]) -> trunnion.Mechanism:
     return trunnion.Mechanism(**{**data, "loads": {"air": load}})
 
 
+@pytest.mark.slow
 def test_the_corners_of_a_pressure_table_are_left_out(tmp_path: Path) -> None:
     """With them the model does not fit: χ² is 1.7, for the resampling rounds the corners off by up to 13 u."""
     machine = trunnion.read("examples/slider-crank.yaml")
@@ -90,10 +91,7 @@ def test_the_corners_of_a_pressure_table_are_left_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("load", "rate", "noise"),
-    [(PRESSURE, "5 kHz", "0.2 N m"), (PRESSURE, "12 kHz", "0.1 N m"), (JUMP, "5 kHz", "0.1 N m")],
-)
+@pytest.mark.parametrize(("load", "rate", "noise"), [(PRESSURE, "5 kHz", "0.2 N m"), (JUMP, "5 kHz", "0.1 N m")])
 def test_coverage_with_a_load_that_has_corners(tmp_path: Path, load: dict[str, Any], rate: str, noise: str) -> None:
     """Of 60 rigs with errors of their own, read from their files, 90 to 99 % of the 95 % intervals hold."""
     machine = compressor(load)

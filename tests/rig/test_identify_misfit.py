@@ -57,7 +57,7 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.spread(3)  # not a thousand times: friction that would bear it is searched for long
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("name", CASES)
 def test_what_explains_a_misfit(folder: Path, name: str) -> None:
     old, new, kind, size, near = CASES[name]
@@ -78,7 +78,7 @@ def corrected(folder: Path, result: Any) -> Any:
     return trunnion.rig.read(folder / "corrected.yaml")
 
 
-@pytest.mark.spread(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("parameters", [{"mu": [GUIDE]}, {"mu": [GUIDE], "encoder": ["drivers.O.start"]}])
 def test_a_mapping_with_the_angle_that_is_found_agrees_with_the_model(
     folder: Path, parameters: dict[str, list[str]]
@@ -101,6 +101,7 @@ def test_a_mapping_with_the_angle_that_is_found_agrees_with_the_model(
         assert with_estimates(machine, result).parameters()["drivers.O.start"] == 0.0
 
 
+@pytest.mark.slow
 def test_a_zero_explains_a_misfit_and_tells_the_estimate(folder: Path) -> None:
     right = identified(folder)
     assert "fit.cause" not in {one.code for one in right.trunnion.findings}
@@ -129,6 +130,7 @@ def test_an_error_of_the_model_is_not_laid_on_a_sensor(folder: Path) -> None:
     assert "fit.cause" not in codes
 
 
+@pytest.mark.slow
 def test_a_wrong_unit_is_no_error_of_a_gain_that_is_stated(folder: Path) -> None:
     """Readings of lbf ft as N m are off by 26 %, 130 times the 0.2 % that are stated."""
     result = identified(folder, "    accuracy: {zero", "    gain: 0.7376\n    accuracy: {gain: 0.2 %, zero")

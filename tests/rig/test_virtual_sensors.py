@@ -13,8 +13,6 @@ from trunnion.rig.virtual import sensors as virtual_sensors
 from trunnion.rig.virtual.observation import phases
 from trunnion.rig.virtual.sensors import SensorErrors, converted, draw, pulsed, readings, resolved, smoothed, stream
 
-NONE = SensorErrors(0.0, 0.0, 0.0)
-
 
 def channel(si: str = "N m", **stated: object) -> virtual_sensors.Channel:
     return resolved("s", Sensor(**{"measures": "effort:A", **stated}), "s", si)

@@ -73,6 +73,7 @@ def test_a_corner_of_plays_has_its_pins_at_the_walls():
         assert np.hypot(*(at[0] - at[1])) == pytest.approx(pins[joint], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_model_without_tolerances_and_plays_has_no_worst_corner():
     assert ask(ask="model", text=EXAMPLES["durango-fourbar"])["worst"] == []
     assert ask(ask="model", text=PLAY)["worst"] == ["rotation:D"]
@@ -98,6 +99,7 @@ def pins(user):
     return found
 
 
+@pytest.mark.slow
 def test_pins_are_drawn_in_their_holes_so_many_times_off(user):
     result, index = analysed(PLAY), 57
     user.until("s.solved.value")
@@ -124,6 +126,7 @@ def test_pins_are_drawn_in_their_holes_so_many_times_off(user):
     assert user.page.locator(".variants-of-sheet .ideal").count() == 3
 
 
+@pytest.mark.slow
 def test_pins_are_pressed_by_one_click_and_lie_in_holes_that_are_bored_off(user):
     off = PLAY.replace("links: [coupler, rocker]}", "links: [coupler, rocker], misalignment: {offset: 0.05 mm}}")
     user.of("actions", "m.takeText(given, 'Edit')", off.replace("  seat: loaded\n", ""))
@@ -140,6 +143,7 @@ def test_pins_are_pressed_by_one_click_and_lie_in_holes_that_are_bored_off(user)
     assert abs(spot(user, '.joint[data-name="C"]') - complex(*middle)) == pytest.approx(100 * scale * 50e-6, abs=0.15)
 
 
+@pytest.mark.slow
 def test_a_worst_corner_is_one_choice_and_lengths_stay_while_it_is_drawn(user):
     user.until("s.solved.value")
     user.page.get_by_label("Worst case of").select_option("rotation:D")
@@ -165,6 +169,7 @@ def test_a_worst_corner_is_one_choice_and_lengths_stay_while_it_is_drawn(user):
     assert user.state("s.corner.value") is None
 
 
+@pytest.mark.slow
 def test_in_space_errors_are_magnified_beside_the_ideal_mechanism(user):
     user.of("actions", "m.takeText(given, 'Edit')", EXAMPLES["rssr-with-play"])
     user.until("s.spatial.value && s.solved.value && s.answer.value.scene.name.includes('RSSR')")

@@ -119,6 +119,7 @@ def test_a_full_browser_says_so_and_recovers_nothing_older(tabs, free):
     assert user.page.locator("text=recovered").count() == (1 if free else 0)
 
 
+@pytest.mark.slow
 def test_a_browser_that_does_not_know_the_token_is_told_so(browser, studio):
     page = browser.new_page()
     page.goto(f"http://127.0.0.1:{studio.port}/#m=AAAA")

@@ -11,10 +11,8 @@ import pytest
 import trunnion
 from brief import brief
 from studio.asking import EXAMPLES, FLOAT, analysed, ask, column, near, sound
-from trunnion.errors import Status
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.scales import without_noise
 
 FOURBAR = "durango-fourbar"
 
@@ -157,6 +155,7 @@ def test_a_table_of_two_variants_is_that_of_two_analyses():
     near(found["scene"]["drivers"][0]["effort"], results[0]["drive_effort"].values[0])
 
 
+@pytest.mark.slow
 def test_a_table_has_the_stroke_and_the_time_ratio_of_a_quick_return():
     """Ram in line with the lever's pivot: φ = 2 acos(d/r) of the crank, the shorter way, stands about 270°."""
     after = EXAMPLES["whitworth-quick-return"]
@@ -190,33 +189,6 @@ def test_a_variant_over_another_stroke_has_its_own():
     assert rows["stroke of Z"]["texts"] == ["79.70\u00a0mm", "118.0\u00a0mm"]
 
 
-@pytest.mark.slow
-def test_the_motion_of_a_point_is_laid_over():
-    after = EXAMPLES["drawing-press"]
-    before = after.replace("L: 200 mm", "L: 205 mm")
-    names = {f"lower.P.{rate}_{axis}": (rate, axis) for rate in ("velocity", "acceleration") for axis in "xy"}
-    (found,) = sound("compare", after, others=[{"text": before}], steps=60, names=list(names))["others"]
-    own = without_noise(analysed(before, steps=60))
-    for name, (rate, axis) in names.items():
-        near(found["columns"][name]["values"], own[f"point_{rate}"].sel(point="lower.P", axis=axis).values)
-
-
-def test_another_drive_has_no_figure_of_this_one():
-    _, rows = compared(EXAMPLES["drawing-press"], EXAMPLES[FOURBAR])
-    assert rows["drive torque of A, maximum"]["texts"][0] == "—"
-
-
-@pytest.mark.slow
-def test_the_margin_is_there_with_locking():
-    text = EXAMPLES["drawing-press"].replace("friction: 0.1", "friction: 0.4")
-    found, result = sound("model", text, steps=60), analysed(text, steps=60)
-    assert np.count_nonzero(result["status"] == Status.LOCKED) > 5
-    near(found["margin"], np.minimum(result["locking_margin"], 10))
-    assert found["margin_least"]["value"] == pytest.approx(float(result["locking_margin"].min()), rel=1e-6)
-    assert found["margin_least"]["value"] < 1
-    assert found["margin_why"] is None
-
-
 @pytest.mark.parametrize(
     ("example", "friction", "why"), [(FOURBAR, "off", "no friction"), ("andrews-squeezer", "stated", "no friction")]
 )
@@ -237,6 +209,7 @@ def mechanism_of(text, friction):
     return Mechanism(**entries)
 
 
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("name", "index"), [("elliptic-trammel", 180), ("scotch-yoke", 270)])
 def test_the_margin_does_not_jump_where_a_joint_turns_round(name, index):
     """Beside it the margin is smooth on at least one side, and the least of the cycle is the figure of `analyse`."""
@@ -292,6 +265,7 @@ def test_the_margin_without_a_block_is_that_without_the_friction_of_its_joints()
         np.testing.assert_allclose(np.array(margin, float), expected, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_joint_that_locks_is_ringed_and_a_remedy_is_tried(user):
     page = user.page
     user.of("actions", "m.takeText(given, 'Edit')", PRESS)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import time
 from pathlib import Path
@@ -161,7 +160,7 @@ def test_what_is_wrong_is_told_where_it_stands(user):
 
 @pytest.mark.slow
 def test_every_example_opens(user):
-    for name in sorted(EXAMPLES)[::3]:  # the answers to all of them are in test_answers.py
+    for name in sorted(EXAMPLES)[::9]:  # the answers to all of them are in test_answers.py
         user.of("actions", "m.openExample({ name: given })", name)
         user.idle()
         errors = user.state("s.answer.value.findings.filter(one => one.severity === 'error').map(one => one.code)")
@@ -191,54 +190,12 @@ CUT_OFF = """[...document.querySelectorAll("button, select, input:not([type=chec
   .map(([one]) => one.outerHTML)"""
 
 
-def choose(user, menu, words):
-    user.page.click(f"summary:has-text('{menu}')")
-    user.page.locator(".menu button", has_text=words).click()
-
-
 def exported(user, what):
     """The bytes of a file."""
     user.page.click("summary:has-text('Export')")
     with user.page.expect_download(timeout=60000) as told:
         user.page.locator(".menu button", has_text=what).click()
     return Path(told.value.path()).read_bytes()
-
-
-def test_a_sheet_begun_while_the_file_is_read_stays(user):
-    held = []
-    user.page.route("**/file/*", lambda route: held.append(route))
-    user.page.reload()
-    user.page.wait_for_selector(".sheet svg")
-    user.page.wait_for_timeout(300)
-    choose(user, "File", "New sheet")
-    assert len(held) == 1
-    held[0].continue_()
-    user.page.unroute("**/file/*")
-    user.until("s.about.value.version")
-    assert user.state("s.text.value") == ""
-    assert user.state("s.fileName.value") is None
-
-
-@pytest.mark.slow
-def test_examples_have_pictures(user):
-    choose(user, "File", "Examples")
-    assert user.page.locator(".gallery li").count() > 40
-    user.page.locator("dialog input").fill("four-bar of durango")
-    user.page.wait_for_selector(".gallery .thumbnail .body")
-    assert user.page.locator(".gallery li").count() == 1
-    assert user.page.locator(".thumbnail .body").count() == 3  # crank, coupler, rocker
-    user.page.locator(".gallery button").click()
-    user.until("s.solved.value")
-    assert user.state("s.text.value") == FOURBAR
-    assert user.state("s.fileName.value") is None
-
-
-@pytest.mark.slow
-def test_a_table_says_what_the_analysis_says(user):
-    result = analysed(FOURBAR, 360)
-    table = exported(user, "CSV")
-    columns = np.genfromtxt(io.BytesIO(table), delimiter=",", names=True, deletechars="", replace_space=" ")
-    np.testing.assert_allclose(columns["A.effort [N m]"], result["drive_effort"].values[0], rtol=1e-9)
 
 
 @pytest.mark.slow
@@ -275,34 +232,6 @@ def test_hostile_models_do_not_freeze_the_page(user):
         assert waited < 1000  # ms
         user.of("actions", "m.typed(given)", FOURBAR)
         user.until("s.solved.value && s.answer.value.text === s.text.value")
-
-
-def test_a_slowly_played_mechanism_moves_between_its_positions(user):
-    """A crank of 360 positions in 32 s: each of the browser's pictures shows it farther, on its circle."""
-    user.page.locator(".pace select").select_option("32")
-    user.page.locator(".player .play").click()
-    seen = user.page.evaluate(
-        """async () => {
-          const seen = [];
-          const pin = document.querySelector('.handle[data-name="B"]');
-          const { module_studio_state: state } = await import("/modules.js");
-          for (let count = 0; count < 40; count += 1) {
-            await new Promise(requestAnimationFrame);
-            seen.push([state.index.value, Number(pin.getAttribute("cx")), Number(pin.getAttribute("cy"))]);
-          }
-          return seen;
-        }"""
-    )
-    user.page.locator(".player .play").click()
-    positions = len({index for index, *_ in seen})
-    places = {tuple(place) for _, *place in seen}
-    assert len(places) > 2 * positions
-    centre, (x, y) = user.handle("A"), user.handle("B")
-    frame = user.page.locator(".sheet").bounding_box()
-    reach = np.hypot(x - centre[0], y - centre[1])
-    for px, py in places:
-        assert np.hypot(px + frame["x"] - centre[0], py + frame["y"] - centre[1]) == pytest.approx(reach, abs=0.3)
-    assert user.state("s.share.value") == 0  # where it stands it is at a position
 
 
 def test_a_slider_changes_the_mechanism_as_it_is_pulled_and_the_file_as_it_is_released(user):
@@ -386,12 +315,3 @@ def test_an_answer_to_what_was_changed_since_is_dropped(user):
     user.of("actions", "(m.takeText(given[0], 'Edit'), m.takeText(given[1], 'Edit'), null)", [other, changed])
     user.until("s.solved.value && s.answer.value.text === s.text.value")
     assert user.state("s.answer.value.entries.dimensions.BC") == "5.80 m"
-
-
-def test_figures_of_before_are_grey_until_the_new_ones_are_there(user):
-    awaited = "document.body.classList.contains('awaited')"
-    assert not user.page.evaluate(awaited)
-    text = FOURBAR.replace("BC: 6.00 m", "BC: 5.80 m")
-    assert user.of("actions", f"(m.takeText(given, 'Edit'), {awaited})", text)
-    user.until("s.solved.value && s.answer.value.text === s.text.value")
-    assert not user.page.evaluate(awaited)

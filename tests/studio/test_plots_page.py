@@ -6,7 +6,6 @@ Every test fails on an error of the page, on one in its console, and on a reques
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ import pytest
 from studio.asking import EXAMPLES, analysed, unpacked
 from trunnion.studio.answers import answer
 
-ROOT = Path(__file__).resolve().parents[2]
 FLOAT = 1e-6  # of the peak
 
 
@@ -52,44 +50,7 @@ def show(user, *names):
     user.keys("Escape")
 
 
-def go(user, index):
-    user.of("motion", "m.crank.go(given)", index)
-
-
-def laid_words(user):
-    return user.page.locator(".layer.overlay text").all_text_contents()
-
-
 @pytest.mark.slow
-def test_layers_are_switched(user):
-    names = (
-        "Friction circles",
-        "Transmission angles",
-        "Instant centres against the ground",
-        "Instant centres between links",
-    )
-    kinds = {"circle.friction-circle": 5, "path.centre": 6}  # one circle is of the key
-    for kind in kinds:
-        assert user.page.locator(kind).count() == 0
-    show(user, *names, "Values of the reactions")
-    user.page.wait_for_selector("path.centre")
-    go(user, 60)
-    for kind, count in kinds.items():
-        assert user.page.locator(kind).count() == count, kind
-    result, words = analysed(user.state("s.text.value")), laid_words(user)
-    reaction = result["reaction_force"].sel(joint="B").values[:, 60]
-    (told,) = [one.removeprefix("B on coupler ") for one in words if one.startswith("B on coupler ")]
-    assert told.endswith("kN")
-    assert 1000 * number(told) == pytest.approx(float(np.hypot(*reaction)), rel=1e-3)
-    assert [one for one in words if one.startswith("C: r = ")] == ["C: r = 3.000\u00a0mm"]
-    assert any("friction circles × " in one for one in words)
-    (angle,) = [one for one in words if one.startswith("transmission angle")]
-    assert angle.endswith("°")
-    show(user, *names)
-    user.idle()
-    assert sum(user.page.locator(kind).count() for kind in kinds) == 0
-
-
 def test_the_radius_of_a_friction_circle_is_that_of_coulomb(user):
     """f′ r = 0.40 · 7.5 mm; the two forces and the moment together act along a line that touches the circle."""
     show(user, "Friction circles")
@@ -163,6 +124,7 @@ def test_every_column_of_the_table_can_be_a_curve() -> None:
     np.testing.assert_allclose(found["columns"]["coupler.angle_velocity"]["values"], expected, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_curves_are_chosen_over_another_and_the_table_of_joints_has_the_largest(user):
     page = user.page
     page.get_by_role("tab", name="Plots").click()

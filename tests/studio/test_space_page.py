@@ -67,6 +67,7 @@ def spot(user, name):
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
+@pytest.mark.slow
 def test_what_is_chosen_in_the_picture_is_lit_and_moved_along_an_axis(user):
     """By click, key and arrow; the joint goes so far along x; nothing else moves at the position that is shown."""
     user.page.mouse.click(*spot(user, "rod"))  # the middle of its body
@@ -104,6 +105,7 @@ def test_what_is_chosen_in_the_picture_is_lit_and_moved_along_an_axis(user):
     assert user.state("s.text.value") == before
 
 
+@pytest.mark.slow
 def test_end_loads_and_the_section_of_a_pin_have_the_numbers_of_analyse(user):
     """Arrows times the scale that is stated; offset and tilt from the seats of both ends."""
     user.of("actions", "m.openFile('rssr-with-play.yaml')")
@@ -130,6 +132,7 @@ def test_end_loads_and_the_section_of_a_pin_have_the_numbers_of_analyse(user):
         np.testing.assert_allclose(quantity(tilt, "rad"), np.diff(ends[:, axis])[0] / 0.02, rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_cardan_joint_is_built_from_an_empty_sheet_by_its_table(user):
     """One revolute and three cylindrical joints; tan(out) = tan(in) / cos(angle of the shafts) to 1e-12."""
     user.page.click("summary:has-text('File')")

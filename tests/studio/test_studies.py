@@ -49,6 +49,7 @@ def test_every_study_has_the_options_of_its_verb() -> None:
         assert {field["flag"] for field in form["fields"]} <= flags - {"--out", "--report", "--write", "--checkpoint"}
 
 
+@pytest.mark.slow
 def test_the_report_of_a_study_is_that_of_its_verb(jobs, tmp_path) -> None:
     number = jobs.start(
         {"text": PLAYING, "verb": "play", "options": {"--steps": "36", "--measure": ["effort:A", "rocker.C.x"]}},
@@ -112,6 +113,7 @@ def test_a_value_is_never_an_option(jobs) -> None:
     assert "at: " in job["output"]
 
 
+@pytest.mark.slow
 def test_a_chip_opens_its_study_and_the_report_is_read_in_the_page(user) -> None:
     user.until("s.solved.value")
     page = user.page

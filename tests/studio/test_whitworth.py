@@ -101,30 +101,3 @@ def test_words_that_mean_something_make_none(typed):
     entries = entries_of(put(TEXT, ["joint_defaults", "friction"], typed))[0]
     assert entries["dimensions"] == {"crank": "30 mm"}
     assert entries["joint_defaults"]["friction"] == typed
-
-
-def focused(user):
-    return user.page.evaluate("document.activeElement.textContent.trim()")
-
-
-@pytest.mark.slow
-def test_a_menu_is_gone_through_by_arrows(user):
-    user.page.focus("summary:has-text('File')")
-    seen = []
-    for key in ("ArrowDown", "ArrowDown", "ArrowUp", "End", "ArrowDown"):
-        user.keys(key)
-        seen.append(focused(user))
-    assert seen == ["New sheet", "Open …", "New sheet", "Keys …", "New sheet"]
-    user.keys("Escape")
-    assert focused(user) == "File"
-    assert user.page.locator("details[open]").count() == 0
-
-
-def test_with_a_mistake_the_mechanism_stays_as_it_was_drawn(user):
-    user.until("s.solved.value")
-    slot = "document.querySelector('.slot .slit').getAttribute('d').match(/-?[\\d.]+/g).map(Number)"
-    x1, y1, x2, y2 = user.page.evaluate(slot)
-    user.of("actions", "m.typed(given)", TEXT.replace("[100 mm, 0]", "[rodd, 0]"))
-    user.until("s.answer.value.findings.some(({ severity }) => severity === 'error')")
-    a1, b1, a2, b2 = user.page.evaluate(slot)
-    assert (b2 - b1) * (x2 - x1) == pytest.approx((y2 - y1) * (a2 - a1), abs=1.0)

@@ -105,6 +105,7 @@ def cell(browser, widget):
     page.close()
 
 
+@pytest.mark.slow
 def test_a_cell_opens_drags_and_gives_the_changed_mechanism_back(cell, widget) -> None:
     frame, pump = cell
     pump(lambda: frame.locator(".formula .term").count() == 2)

@@ -19,7 +19,6 @@ from trunnion.statistics.streams import uniforms
 from trunnion.studies.tolerance.first_order import study
 
 LIMIT = {"angle": {"angle": "rocker", "at": "60 deg", "limit": "±0.1 deg"}}
-ALL = ("linear", "worst-case", "monte-carlo")
 
 
 def findings(result: Any) -> list[str]:
@@ -204,19 +203,6 @@ def test_a_dimension_of_two_links_is_named_by_check_and_by_tolerance() -> None:
         assert "ram.T.x" in found.what
 
 
-def test_an_allocated_clearance_keeps_its_stated_tolerance_and_that_is_said() -> None:
-    """Both are in the worst case: 0.05 mm allocated and 0.01 mm stated make a play of 0.06 mm."""
-    result = trunnion.allocate(slider(), steps=12, samples=0)
-    (found,) = coded(result, "allocation.play_tolerance")
-    assert found.where == "costs.O.clearance"
-    assert (found.figures["lower_um"], found.figures["upper_um"]) == pytest.approx((0.0, 10.0))
-    play = result.sel(parameter="joints.O.clearance")
-    size = float(play["tolerance"]) + 10e-6
-    assert float(play["parameter_upper"]) == pytest.approx(size)
-    worst = float(play["contribution_worst_case"].sel(measure="tip"))
-    assert worst == pytest.approx(size * abs(float(play["sensitivity"].sel(measure="tip"))), rel=1e-6)
-
-
 PLAYS = ("O", "A", "P", "K")
 ALPHA = np.arcsin(1.02 / 200)  # of both toggle links to the line: 1 mm from it, and the play of the cylinder's pin
 
@@ -233,6 +219,7 @@ def press(seat: str | None = "loaded") -> Mechanism:
     return mechanism if seat is None else mechanism.with_seats(seat)
 
 
+@pytest.mark.slow
 def test_the_plays_of_a_press_add_up_by_virtual_work() -> None:
     """By Σ Q·c = F δ each pin moves the punch by ρ |Q|/F: 1/cos α of a toggle's pins, 2 tan α of the cylinder's."""
     found = trunnion.tolerance(press(), methods=["linear", "worst-case", "monte-carlo"], samples=24, jobs=1)
@@ -273,18 +260,6 @@ def test_play_alone_is_about_the_middle_of_the_holes() -> None:
     mechanism = trunnion.read(EXAMPLES / "fourbar-with-play.yaml")
     loaded, free = (trunnion.play(mechanism.with_seats(seat), steps=36) for seat in ("loaded", "free"))
     assert loaded.worst_case.values == pytest.approx(free.worst_case.values, rel=1e-9)
-
-
-def test_indices_of_a_play_and_its_size() -> None:
-    """The angle by a pin anywhere in a hole: the size of the hole does nothing alone, the place in it nearly all."""
-    joints = fourbar().data()["joints"]
-    joints["C"]["pin"] = {"radius": "5 mm", "clearance": "0.2 mm ± 0.1 mm"}
-    result = trunnion.tolerance(fourbar(tolerances={}, joints=joints), methods=["linear", "sobol"], samples=16_000)
-    first, total = result["first_order"].values[0], result["total_order"].values[0]
-    # y = ρ c: V(E(y|ρ)) = 0, V(E(y|c)) = E(ρ)² E(c²); all V = E(ρ²) E(c²)
-    known = 0.2**2 / (0.2**2 + (0.1 / 3) ** 2)
-    np.testing.assert_allclose(first, [0, known], rtol=0, atol=0.02)
-    np.testing.assert_allclose(total, [1 - known, 1], rtol=0, atol=0.02)
 
 
 def test_the_only_number_has_the_whole_scatter_of_the_only_measure() -> None:

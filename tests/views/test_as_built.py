@@ -8,19 +8,14 @@ import shutil
 import numpy as np
 import pytest
 from as_built_models import EXAMPLES, four_bar, loaded
-from matplotlib.collections import LineCollection
-from matplotlib.patches import Circle
 
 import trunnion
-from trunnion.errors import MechanismError, Status
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.deviations import (
     losses,
     seated,
 )
-from trunnion.views.cycle.plots import drawable, save
 from trunnion.views.cycle.scene import scene
-from trunnion.views.cycle.seats import PIN
 
 
 @pytest.fixture(scope="module")
@@ -50,55 +45,6 @@ def test_errors_are_those_of_the_result(slider):
     dotted = [line for line in place.lines if str(line.get_linestyle()) == "--" and len(line.get_xdata()) == 2]
     assert len(dotted) >= len(np.unique(np.concatenate(list(losses(slider).values()))))
     assert "contact lost: S" in [text.get_text() for text in place.get_legend().get_texts()]
-
-
-@pytest.mark.slow
-def test_positions_without_an_answer_are_gaps(slider, tmp_path):
-    blank = slider.copy(deep=True)
-    hole = np.arange(blank.sizes["position"]) // 10 == 2
-    for name in ("point_error", "joint_slide_error", "seat_offset", "seat_xi", "seat_beta", "end_force"):
-        blank[name] = blank[name].where(~np.asarray(hole))
-    blank["status"] = ("position", np.where(hole, int(Status.LOCKED), 0).astype(np.int8))
-    drawn = _label(plots.figure(blank, "error").axes[0], "piston.Q").get_ydata()
-    assert np.isnan(drawn[20:30]).all()
-    assert np.isfinite(drawn[[19, 30]]).all()
-    save(plots.figure(blank, "seat"), tmp_path / "seat.png")
-    curve = _label(plots.figure(blank, "beta").axes[0], "Q")
-    inside = (curve.get_xdata() > 100) & (curve.get_xdata() < 145)
-    assert np.isnan(curve.get_ydata()[inside]).all()
-    everywhere = blank.assign(seat_offset=blank["seat_offset"] * np.nan)
-    assert "seat" not in drawable(everywhere)
-    with pytest.raises(MechanismError, match="no position is solved"):
-        plots.figure(everywhere, "seat")
-
-
-def _drawn(figure):
-    """Diagrams by title."""
-    return {axes.get_title(loc="left"): axes for axes in figure.axes if axes.get_title(loc="left")}
-
-
-@pytest.mark.slow
-def test_ends_stand_side_by_side_and_their_pins_touch_the_wall(cardan):
-    diagrams = _drawn(plots.figure(cardan, "seat"))
-    assert list(diagrams) == [
-        f"{joint}, end {end}" for joint in ("input", "pin-1", "pin-2", "output") for end in (1, 2)
-    ]
-    for name, axes in diagrams.items():
-        assert axes.get_xlabel().startswith("x [µm]\npin of ")
-        circles = [patch for patch in axes.patches if isinstance(patch, Circle)]
-        hole = next(one for one in circles if one.get_radius() == pytest.approx((1 + PIN) * 10))
-        for pin in (one for one in circles if one.get_radius() == pytest.approx(PIN * 10)):
-            assert np.hypot(*pin.center) + pin.get_radius() == pytest.approx(hole.get_radius(), rel=1e-4), name
-
-
-def test_the_locus_has_the_offsets_and_no_jump(slider):
-    axes = _drawn(plots.figure(slider, "seat"))["Q"]
-    loci = [one for one in axes.collections if isinstance(one, LineCollection)]
-    offset = 1e6 * slider.seat_offset.sel(joint="Q", end="1").transpose("position", "axis").values
-    pieces = [piece for locus in loci for piece in locus.get_segments()]
-    drawn = np.concatenate(pieces)
-    assert all(np.min(np.linalg.norm(offset - place, axis=1)) < 1e-9 for place in drawn)
-    assert max(np.linalg.norm(np.diff(piece, axis=0)) for piece in pieces) < 20
 
 
 def test_a_seat_that_is_given_is_drawn_where_it_is():

@@ -91,15 +91,6 @@ def test_courses_have_band_model_and_residual():
     assert below.get_xlabel() == "drive angle A [°]"
 
 
-def test_gaps_are_drawn_as_gaps():
-    result = case("wrong").copy(deep=True)
-    result["measured"][0, 0, 5:9] = np.nan
-    above, _ = figure(result, "overlay", channel="torque").axes
-    lines = {line.get_label(): line for line in above.lines}
-    assert np.isnan(lines["measured"].get_ydata()[5:9]).all()
-    assert np.isfinite(lines["model"].get_ydata()[5:9]).all()
-
-
 def test_difference_of_efficiencies_is_measured_less_model():
     """A reading of the drive torque that is too large makes the measured efficiency too small."""
     result = case("wrong")

@@ -30,7 +30,7 @@ from trunnion.results.tables import columns
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.scene import scene
 from trunnion.views.motion.figure import KINDS, OF_CONTACTS, figure
-from trunnion.views.motion.report import MOST_ROWS, motion_scene, report
+from trunnion.views.motion.report import motion_scene, report
 from trunnion.views.motion.shown import shown
 
 FREE = {"O": {"speed": 100, "free": True, "initial": {"speed": 60}}}
@@ -118,16 +118,6 @@ def test_a_motion_that_ends_early_is_shown_to_its_end() -> None:
     assert np.isfinite(motion.rows["drive_rate"].values).all()
     words = " ".join(Page(report(result)).words)
     assert "then the motion ends" in words
-
-
-def test_many_rows_are_thinned_and_events_are_not() -> None:
-    result = simulate(wheel({"kind": "constant", "effort": 4}), 1.0, 3 * MOST_ROWS)
-    scene = motion_scene(shown(result))
-    assert scene["count"] <= MOST_ROWS
-    assert scene["thinned"] == 3 * MOST_ROWS + 1
-    assert [one["word"] for one in scene["motion"]["events"]] == ["starts"]
-    assert f"{scene['count']} rows shown with every peak" in " ".join(report(result).split())
-    assert scene["time"][-1] == pytest.approx(1.0)
 
 
 def test_the_speed_over_a_cycle_is_drawn_where_it_varies() -> None:

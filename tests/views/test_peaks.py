@@ -119,6 +119,7 @@ def test_beside_positions_without_an_answer(code):
     assert np.flatnonzero(ease(result_of(condition, status)) < 1.0).tolist() == [8, 9]
 
 
+@pytest.mark.slow
 def test_plot_and_report_can_show_all(tmp_path):
     """The page is told that no position may be cut."""
     file, page, picture = (tmp_path / name for name in ("engine.yaml", "page.html", "picture.svg"))

@@ -165,6 +165,7 @@ def _page(text: str) -> str:
     return text
 
 
+@pytest.mark.slow
 def test_play() -> None:
     result = play(read(EXAMPLES / "fourbar-with-play.yaml"), ["rotation:C", "rotation:D"], steps=12)
     page = _page(trunnion.report(result))
@@ -174,6 +175,7 @@ def test_play() -> None:
     assert "0.02 mm" in page  # the input data
 
 
+@pytest.mark.slow
 def test_sweep() -> None:
     result = sweep(read(EXAMPLES / "toleranced-fourbar.yaml"), {JOINT: [0.0, 0.1, 0.2]}, steps=12)
     page = _page(trunnion.report(result, measures=["efficiency", "friction_power_mean"]))

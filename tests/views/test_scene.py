@@ -134,6 +134,7 @@ if NODE:  # not a skip: what must hold everywhere is tested in Python; this is t
         shown = page(plain, tmp_path)
         assert (shown["loads"], shown["moments"]) == (2, 1)
 
+    @pytest.mark.slow
     def test_springs_and_following_forces_are_drawn(tmp_path):
         result = four_bar(36)
         stated = json.loads(result.attrs["scene"])
@@ -148,6 +149,7 @@ if NODE:  # not a skip: what must hold everywhere is tested in Python; this is t
         idle = result.assign_coords(spring=["S"]).assign(spring_force=(("spring", "position"), np.zeros((1, 36))))
         assert page(idle, tmp_path)["dashes"] == ["2 3"]  # it acts one way and does not here
 
+    @pytest.mark.slow
     def test_slots_on_moving_links_are_drawn(tmp_path):
         """The slit is as long as the slide travels and the block needs; a guide on the ground has none."""
         result = analyse(MODELS["inverted slider-crank"](), 24)

@@ -8,19 +8,17 @@ from pathlib import Path as File
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.path import Path
 from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
 
 import trunnion
 from trunnion import Status, save
-from trunnion.views.scales import Scale, arrange, on_scale
+from trunnion.views.scales import arrange
 from trunnion.views.sweep import figure, tables
 
 EXAMPLES = File(__file__).parents[2] / "examples"
 GRID = {"misalignment": ANGLE, "input.speed": SPEED}
 FEW = scale([50, 500, 1000, 1500], "rad/s", "rpm", RPM)
 FRICTION = scale([0.05, 0.1, 0.2])
-RADIUS = scale([10, 20, 30], "m", "mm", 1e-3)
 
 
 def curves(axes, count):
@@ -75,53 +73,6 @@ def test_unsorted_values_are_drawn_in_order_and_the_gap_is_told():
     assert [text.get_text() for text in axes.texts] == ["locked"]
 
 
-def test_scales_are_logarithmic_where_the_values_are_spaced_so():
-    kinds = {
-        "log": ([1, 2, 5, 10, 20, 50], [0.001, 0.01, 0.1, 1], [30, 1, 10, 3, 10]),
-        "linear": ([0, 1, 10], [1, 2, 5], [50, 100, 150, 1000], [-1, -10, -100], [5], [1, 100], SPEED[0]),
-    }
-    for kind, rows in kinds.items():
-        for row in rows:
-            assert on_scale(Scale("x", "", np.array(row, float))) == kind, row
-    axes = figure(swept({"c": scale([1, 2, 5, 10, 20], "m", "um", 1e-6)})).axes[0]
-    assert axes.get_xscale() == "log"
-    assert [text.get_text() for text in axes.get_xticklabels()] == ["1", "2", "5", "10", "20"]
-    assert axes.get_xlabel() == "c [µm]"
-
-
-def gappy(angle, speed, *_):
-    if speed > 1000 and angle > 20:
-        return Status.LOCKED
-    return Status.NOT_ASSEMBLED if angle > 26 else Status.CONTACT_LOST if 10 < angle < 15 and speed < 400 else 0
-
-
-def test_no_contour_enters_a_cell_without_a_number_at_each_corner():
-    result = swept(GRID, cardan, gappy)
-    sheet = figure(result, kind="map")
-    axes = sheet.axes[0]
-    x, y = ANGLE[0], SPEED[0]
-    bad = np.isnan(result["efficiency"].values)
-    cells = bad[:-1, :-1] | bad[1:, :-1] | bad[:-1, 1:] | bad[1:, 1:]
-    found = [path for one in axes.collections if type(one).__name__ == "QuadContourSet" for path in one.get_paths()]
-    places = np.concatenate([path.interpolated(7).vertices for path in found])
-    inside = lambda values, grid: (np.searchsorted(grid, values, side="left") - 1).clip(0)  # noqa: E731
-    strictly = (~np.isclose(places[:, :1], x).any(axis=1)) & (~np.isclose(places[:, 1:], y).any(axis=1))
-    rows, columns = inside(places[strictly, 0], x), inside(places[strictly, 1], y)
-    assert strictly.sum() > 100
-    assert not cells[rows, columns].any()
-    told = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert sorted(told) == ["cannot be assembled", "contact lost at some position", "locked"]
-    hindered = {one.get_label(): one for one in axes.collections if one.get_label() in told}
-    for code, word in ((Status.LOCKED, "locked"), (Status.NOT_ASSEMBLED, "cannot be assembled")):
-        path = Path.make_compound_path(*hindered[word].get_paths())
-        edge = 1e-6 * np.array([1, 1])
-        centre = np.array([x.mean(), y.mean()])
-        for (i, k), here in np.ndenumerate(result["status"].values == code):
-            point = np.array([x[i], y[k]])
-            assert path.contains_point(point + edge * np.sign(centre - point)) == here
-    assert len(axes.get_lines()[-1].get_xdata()) == (result["status"].values == Status.CONTACT_LOST).sum()
-
-
 def test_lines_of_a_map_lie_where_the_field_has_their_number():
     """Of a field linear in both."""
     result = swept(GRID, lambda angle, speed: 0.9 - 0.01 * angle - 0.0001 * speed)
@@ -129,76 +80,6 @@ def test_lines_of_a_map_lie_where_the_field_has_their_number():
     for level, path in zip(lines.levels, lines.get_paths(), strict=True):
         angle, speed = path.vertices.T
         assert 0.9 - 0.01 * angle - 0.0001 * speed == pytest.approx(level, abs=1e-9)
-
-
-def test_a_margin_that_is_known_where_it_locks_is_drawn_there():
-    result = swept(GRID, cardan, gappy)
-    axes = figure(result, "locking_margin", kind="map").axes[0]
-    look = {one.get_label(): one for one in axes.collections}
-    assert len(look["locked"].get_facecolor()) == 0  # hatched, and the colours are seen
-    assert look["cannot be assembled"].get_facecolor()[0, 3] == 1
-    assert "∞" in look
-
-
-PANELS = {"misalignment": ANGLE, "input.speed": FEW, "joint_defaults.friction.coefficient": FRICTION, "r": RADIUS}
-TINY = scale(np.linspace(-3e-7, 3e-7, 5), "m")
-ONE = {"misalignment": ANGLE}
-TWICE = {"a": scale([3, 1, 2, 1]), "b": scale([5, 4, 4])}
-HUGE = {"k": scale(np.linspace(1e9, 3e9, 4), "N/m"), "a": FEW}
-
-
-def peaked(angle, *_):
-    return 1 / ((angle / 30 - 0.5) ** 2 + 1e-4)
-
-
-def everywhere(*_):
-    return Status.LOCKED
-
-
-def product(*values):
-    return np.prod(values)
-
-
-ODD = {
-    "one point": lambda: figure(swept({"misalignment": scale([5], "rad", "deg", DEG)})),
-    "all locked": lambda: figure(swept(GRID, status=everywhere)),
-    "all locked, map": lambda: figure(swept(GRID, status=everywhere), kind="map"),
-    "no value": lambda: figure(swept(ONE, lambda _: np.nan)),
-    "no value, map": lambda: figure(swept(GRID, lambda *_: np.nan), kind="map"),
-    "all infinite": lambda: figure(swept(ONE, lambda _: 0.9), "locking_margin"),
-    "constant": lambda: figure(swept(GRID, lambda a, _: 1 + 1e-16 * a)),
-    "constant, map": lambda: figure(swept(GRID, lambda *_: 0.83), kind="map"),
-    "zero, map": lambda: figure(swept(GRID, lambda *_: 0), "friction_power_mean", kind="map"),
-    "hundred curves": lambda: figure(swept({"a": scale([1, 2]), "b": scale(range(100))}, product)),
-    "hundred alike": lambda: figure(swept({"a": scale([1, 2]), "b": scale([3.0] * 100)}, product)),
-    "duplicates, map": lambda: figure(swept(TWICE, product), kind="map"),
-    "peak, map": lambda: figure(swept(GRID, peaked), "Ω.effort_max", kind="map"),
-    "peak below, map": lambda: figure(swept(GRID, lambda *place: -peaked(*place)), kind="map"),
-    "odd names": lambda: figure(swept({"offset": TINY, "曲柄_$角$": FRICTION}, product), "$x_1$.reaction_max"),
-    "huge": lambda: figure(swept(HUGE, product), kind="map"),
-    "ideal": lambda: figure(swept({"misalignment": ANGLE, "input.speed": FEW}, cardan, ideal=True)),
-    "gaps": lambda: figure(swept(GRID, cardan, gappy)),
-    "panels": lambda: figure(swept(PANELS, cardan, gappy)),
-    "panels, map": lambda: figure(swept(PANELS, cardan, gappy), kind="map"),
-    "panels, peak": lambda: figure(swept(PANELS, peaked), "input.effort_max"),
-}
-
-
-@pytest.mark.spread(2)
-@pytest.mark.parametrize("case", ODD)
-def test_odd_cases_are_drawn_and_nothing_is_cut_off(case):
-    """Warnings are errors here; all that is drawn lies within the sheet, and no legend on the title."""
-    sheet = ODD[case]()
-    sheet.canvas.draw()
-    drawn, size = sheet.get_tightbbox(), sheet.bbox_inches
-    assert drawn.x0 > 0
-    assert drawn.y0 > 0
-    assert drawn.x1 < size.x1
-    assert drawn.y1 < size.y1
-    title = sheet._suptitle.get_window_extent()
-    for axes in sheet.axes:
-        if axes.get_legend():
-            assert not axes.get_legend().get_window_extent().overlaps(title)
 
 
 def test_a_table_for_each_value_of_further_names():
@@ -241,6 +122,7 @@ def test_a_table_has_the_ends_of_an_effort_that_lie_beyond_zero(least, most, sho
     assert [one for one in table.head if one.startswith("input.effort")] == [f"input.effort {k} [N m]" for k in shown]
 
 
+@pytest.mark.slow
 def test_a_point_that_locks_leaves_the_others_their_numbers():
     """Its effort and reactions have no bound, beside which all others would be rounding."""
     name, head = "joint_defaults.friction.coefficient", "A.effort max [N m]"

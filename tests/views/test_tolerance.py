@@ -28,7 +28,6 @@ from trunnion.views.tolerance import (
     indices,
     inputs,
     overview,
-    sheet,
     tables,
 )
 
@@ -85,14 +84,6 @@ def test_every_figure_of_every_result_stays_on_its_sheet(case, kind):
 
 
 @pytest.mark.slow
-def test_the_legend_of_correlated_tolerances_stays_on_a_sheet_of_three_columns():
-    """ "RSS, uncorrelated" is longer than "RSS"."""
-    result = toleranced(24, 500, measures=2, measure={"angle": "rocker"}).assign_attrs(correlated=1)
-    plain = result.drop_vars([name for name in result if str(name).startswith("searched")])
-    assert not outside(sheet(plain))
-
-
-@pytest.mark.slow
 def test_every_result_makes_tables(case):
     for table in [*tables(case), inputs(case), overview(case)]:
         assert table.title
@@ -134,6 +125,7 @@ def test_the_envelope_has_the_bands_of_the_result_and_closes_the_turn():
     assert {round(one.get_ydata()[0], 9) for one in axes.lines if str(one.get_linestyle()) != "-"} >= {0.1, -0.1}
 
 
+@pytest.mark.slow
 def test_a_gap_breaks_the_envelope_and_other_measures_positions_do_not():
     result = CASES["gap"]()
     (axes,) = figure(result, "envelope").axes
@@ -173,6 +165,7 @@ def test_the_trade_off_marks_the_stated_limits_and_what_cannot_be_kept():
     assert stepped.axes[0].lines[0].get_drawstyle() == "steps-post"
 
 
+@pytest.mark.slow
 def test_corners_indices_and_failures_are_told():
     read = readings(toleranced(72))[0]
     table = corners(read)

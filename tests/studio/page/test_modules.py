@@ -38,6 +38,7 @@ def test_names_only_become_text():
         assert not markup.search(module.read_text(encoding="utf-8")), module.name
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(TSC is None, reason="no TypeScript compiler here (npm install --global typescript@5.9.3)")
 def test_types_of_the_modules(tmp_path):
     served(tmp_path)

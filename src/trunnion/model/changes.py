@@ -16,6 +16,7 @@ __all__ = [
     "assign",
     "not_stated",
     "part_types",
+    "stated_at",
     "with_law",
 ]
 
@@ -35,6 +36,18 @@ def assign(
             holder[key] = {} if key == "seat" else short  # the short form, of tolerances and of friction
         holder = holder[key]
     holder[location[-1]] = value
+
+
+def stated_at(data: Any, location: Location) -> Any:
+    """What plain data state at a place, a short form as what it stands for; None if nothing."""
+    for key in location:
+        if isinstance(data, str) or (key == "at" and isinstance(data, list)):
+            continue
+        try:
+            data = data[key]
+        except (LookupError, TypeError):
+            return None
+    return data
 
 
 def with_law(data: dict[str, Any], law: str, complete: bool = False) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from trunnion.model.changes import assign, not_stated, with_law
 from trunnion.model.checks.check import check_model
 from trunnion.model.csv_table import TableFiles, place_findings, with_points
 from trunnion.model.entry import ReadOnlyDict
-from trunnion.model.findings import repair, schema_findings
+from trunnion.model.findings import schema_findings
 from trunnion.model.joint_parts import has_play, play
 from trunnion.model.limits import DIGITS
 from trunnion.model.merge import DEFAULT_LAW
@@ -81,24 +81,13 @@ class Mechanism(Numbers):
     """
 
     def __init__(self, **data: Any) -> None:
-        """Validate and check; MechanismError with every finding of severity error."""
-        findings: list[Finding] = []
-        lost: frozenset[str] = frozenset()
+        """Validate and check; MechanismError with what is wrong: keys first, then names, then numbers."""
         try:
             super().__init__(**data)
         except ValidationError as error:
-            findings = schema_findings(error, Mechanism, data)
-            try:  # what can still be checked without the unreadable entries is, so that all is said in one go
-                mended, lost = repair(error, data, findings)
-                super().__init__(**mended)
-            except ValidationError:
-                raise MechanismError(findings) from None
-            sections = {field.alias or name for name, field in type(self).model_fields.items()}
-            if lost & sections:  # a whole section: the rest would speak of nothing else
-                raise MechanismError(findings) from None
-        result = self.__dict__["checked"] = check_model(self, lost)
-        findings += [finding for finding in result if finding.severity is Severity.ERROR]
-        if findings:
+            raise MechanismError(schema_findings(error, Mechanism, data)) from None
+        self.__dict__["checked"] = check_model(self)
+        if findings := [finding for finding in self.checked if finding.severity is Severity.ERROR]:
             raise MechanismError(findings)
 
     @cached_property
@@ -190,7 +179,7 @@ class Mechanism(Numbers):
 
         A tolerance in `joint_defaults` is one of each joint that has it: the joints vary independently.
         """
-        return written_limits(self.parameter_set)
+        return written_limits(self)
 
     def tolerated(self) -> list[Tolerance]:
         """Every number that varies, in the order of `parameters`: those of `tolerances`, and those stated with ±."""

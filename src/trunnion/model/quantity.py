@@ -44,7 +44,6 @@ __all__ = [
     "Stiffness",
     "Time",
     "TorsionalStiffness",
-    "deviation_spans",
     "evaluation_order",
     "nominal_dimensions",
     "term",
@@ -71,7 +70,7 @@ class Quantity:
     def read(cls, source: object, kind: Kind = ANY) -> Quantity:
         """A quantity from a number (SI) or a text; UnitError if it is none or of the wrong kind."""
         if isinstance(source, Quantity):
-            if source is UNREADABLE or source.kind == kind:
+            if source.kind == kind:
                 return source
             source = source.source
         if isinstance(source, (bool, np.bool_)) or not isinstance(source, (int, float, str, np.number)):
@@ -89,6 +88,11 @@ class Quantity:
     def names(self) -> tuple[str, ...]:
         """The dimensions its expression speaks of."""
         return self.expression.names if self.expression else ()
+
+    @property
+    def alone(self) -> float | str:
+        """It as written, without the limits that stand with it."""
+        return _split(normalise(self.source), self.kind)[0].strip() if isinstance(self.source, str) else self.source
 
     def evaluate(self, values: Mapping[str, Number] | None = None) -> Number:
         """The value in SI, from those of `names`: floats, arrays (sample, 1) or duals; nan or inf where undefined."""
@@ -145,10 +149,6 @@ def _read_text(text: str, kind: Kind) -> tuple[tuple[float, float] | None, Expre
         quantity.check({})
         _finite(quantity.evaluate(), text)
     return tolerance, expression
-
-
-# Stands for a quantity that could not be read while the rest of the model is checked; every check passes over it.
-UNREADABLE = Quantity(math.nan)
 
 
 def _needed(kind: Kind) -> str:
@@ -227,13 +227,6 @@ def _share(percent: str, value: re.Match[str]) -> str:
     """A deviation in percent of a value, as it is to be written."""
     share = float(percent) / 100 * float(value["number"])
     return f"{share:.6g} {value['unit'] or ''}".strip()
-
-
-def deviation_spans(text: str) -> list[tuple[int, int]]:
-    """Where the deviations of a tolerance, with their signs, stand in a text of plain signs; empty if it has none."""
-    if match := _SYMMETRIC.match(text):
-        return [match.span(2)]
-    return [match.span(2), match.span(3)] if (match := _LIMITS.match(text)) else []
 
 
 def term(text: str) -> tuple[str, str]:
@@ -320,12 +313,9 @@ def evaluation_order(
 
 
 def nominal_dimensions(dimensions: Mapping[str, Quantity]) -> dict[str, Number]:
-    """The dimensions without errors; nan where one has no value."""
-    order, circles = evaluation_order(dimensions)
-    lost = {name for circle in circles for name in circle}
+    """The dimensions without errors; those without a value, which are findings of their own, left out."""
     names: dict[str, Number] = {}
-    for name in order:
-        quantity = dimensions[name]
-        sound = name not in lost and set(quantity.names) <= names.keys()
-        names[name] = quantity.evaluate(names) if sound else np.nan
+    for name in evaluation_order(dimensions)[0]:
+        if set(dimensions[name].names) <= names.keys():
+            names[name] = dimensions[name].evaluate(names)
     return names

@@ -30,6 +30,7 @@ __all__ = [
     "group_findings",
     "limit_findings",
     "markers",
+    "stated_wrongly",
 ]
 
 ROUNDING = 1e-12  # of a limit: 180 deg as 3.14159265358980 rad is no more than it
@@ -278,6 +279,11 @@ def key_findings(model: Any) -> Iterator[Finding]:
             for rule in rules:
                 if isinstance(rule, Refers | InSpace | OnlyWith | Selects) and getattr(part, key) is not None:
                     yield from rule.findings(key, part, where, model)
+
+
+def stated_wrongly(*rows: tuple[bool, str, str, str]) -> Iterator[Finding]:
+    """Findings of the rows whose first is true: what is wrong, where, and what to do about it."""
+    yield from (Finding(what, where, remedy) for wrong, what, where, remedy in rows if wrong)
 
 
 # ---- where rules stand ----------------------------------------------------------------------------------------

@@ -322,7 +322,7 @@ RSSR_PIN = {key: value for key, value in RSSR.data()["joints"]["D"]["pin"].items
         (PLAYING, "B", {"seat_on": "frame"}, "joints.B.seat_on: 'frame' is no link of this joint"),
         (SLIDER, "S", {"seat_on": "frame"}, "joints.S.seat_on: a prismatic joint in the plane needs none"),
         (PLAYING, "B", {"seat": {"xi": 0.5}, "seat_on": PLAYING.joints["B"].links[0]}, "keep one of seat and seat_on"),
-        *((RSSR, "A", {"type": kind, "seat": "loaded", "friction": 0, "pin": {}}, f"a {kind} joint in space has no play that is modelled")
+        *((RSSR, "A", {"type": kind, "seat": "loaded", "friction": 0, "pin": {}}, f"a {kind} joint in space has no pl")
           for kind in ("universal", "planar", "fixed")),
         (RSSR, "A", {"type": "helical", "pitch": 1e-3, "seat": "loaded", "pin": {}}, "in space has no play that"),
     ],

@@ -134,7 +134,7 @@ MISTAKES = {
             ("k: 0.45", "costs.AB", "states no unit"),
             ("k: 0.45, unit: kg", "costs.AB.unit", "'kg' is the unit of a mass")],
         "least: 5 um": [
-            ("least: 1 mm", "costs.AB.least", "above the most"), ("least: -1 mm", "costs.AB.least", "which is negative")],
+            ("least: 1 mm", "costs.AB.least", "above the most"), ("least: -1 mm", "AB.least", "is negative")],
         "  AB: {model": [("  t: {model", "costs.t", "'dimensions.t' has no tolerance")],
         "  A.clearance: {model": [
             ("  D.clearance: {model", "costs.D.clearance", "states no clearance"),

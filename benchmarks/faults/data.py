@@ -208,8 +208,8 @@ _MODEL = (
     Fault(
         "defaults-over-what-is-stated",
         "model/tolerances.py",
-        "return {**shared, **varied}",
-        "return {**varied, **shared}",
+        "return {**of_all, **own}",
+        "return {**own, **of_all}",
         ("tests/model/test_tolerances.py",),
     ),
 )

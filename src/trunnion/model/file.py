@@ -29,7 +29,7 @@ from trunnion.model.text import read_text
 
 __all__ = [
     "Lines", "composed", "entries_of", "place", "placed", "read_entries", "read_model", "text_of",
-    "version_findings", "write_model",
+    "version_findings", "write_model", "yaml_writer",
 ]  # fmt: skip
 
 MAX_BYTES = 1_000_000  # some ten thousand links; parsing takes seconds
@@ -122,19 +122,20 @@ def write_model(data: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
             json.dump(data, stream, indent=2, ensure_ascii=False)
             stream.write("\n")
         else:
-            _yaml().dump(data, stream)
+            yaml_writer().dump(data, stream)
 
 
 def text_of(data: Mapping[str, Any]) -> str:
     """The plain data of a model as YAML."""
     stream = StringIO()
-    _yaml().dump(data, stream)
+    yaml_writer().dump(data, stream)
     return stream.getvalue()
 
 
-def _yaml() -> YAML:
+def yaml_writer() -> YAML:
+    """What writes plain data: the innermost groups on one line."""
     yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = None  # the innermost groups on one line
+    yaml.default_flow_style = None
     yaml.allow_unicode = True
     yaml.width = 110
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # keys as stated

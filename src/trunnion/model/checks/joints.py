@@ -92,11 +92,14 @@ USES: Mapping[str, tuple[Applies, str]] = {
 }
 # and what is a remark, not a mistake
 REMARKS: Mapping[str, tuple[Applies, str]] = {
-    "pin.length": (lambda joint, pair, spatial: _long(joint, pair, spatial), "does not use it"),
-    "pin.bearing": (lambda joint, pair, spatial: _long(joint, pair, spatial), "does not use it"),
-    "guide.height": (lambda joint, pair, spatial: joint.contact is not None, "uses it where it is in play alone"),
-    "stiffness.axial": (lambda joint, pair, spatial: spatial, "does not carry it"),
-    "stiffness.tilting": (lambda joint, pair, spatial: spatial or not pair.turns, "does not carry it"),
+    "pin.length": (lambda joint, pair, spatial: _long(joint, pair, spatial), "has no use for it: it is not used"),
+    "pin.bearing": (lambda joint, pair, spatial: _long(joint, pair, spatial), "has no use for it: it is not used"),
+    "guide.height": (lambda joint, pair, spatial: joint.contact is not None, "is not in play: it is not used"),
+    "stiffness.axial": (lambda joint, pair, spatial: spatial, "carries nothing with it: it is not used"),
+    "stiffness.tilting": (
+        lambda joint, pair, spatial: spatial or not pair.turns,
+        "carries nothing with it: it is not used",
+    ),
 }
 
 
@@ -331,8 +334,12 @@ def joint_values(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterat
         if value(path) > 1:
             remedy = "check it: dry metals have 0.1 to 0.6"
             yield Finding(f"is {value(path):g}, above 1", at(path), remedy, Severity.WARNING)
-    radius = ("pin.radius",) if _law(joint) != "rolling" else ()
-    for size in (*radius, "guide.length", *(("pin.bearing", "guide.width") if spatial else ())):
+    rolls = _law(joint) == "rolling"
+    for size in (
+        "guide.length" if rolls else "pin.radius",
+        "guide.length",
+        *(("pin.bearing", "guide.width") if spatial else ()),
+    ):
         if joint.friction is not None and value(size) == 0:
             yield Finding("is 0, where friction needs it", at(size), "give a value above 0")
     for part, size in (("pin", "radius"), ("guide", "length")):
@@ -343,8 +350,9 @@ def joint_values(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterat
     yield from _contact_values(joint, values, where)
     gap, more = clearance(name, values) or 0.0, value("pin.cylindricity", 0.0)
     if has_pin(joint.type) and joint.type not in PLAY_PAIRS and (gap != 0 or more != 0):
-        what = f"the play of a {joint.type} joint, {_um(float(gap) + more)}, is not modelled"
-        remedy = "state pin: {clearance: 0, cylindricity: 0} and the radius here, or use revolute joints"
+        what = f"the play of {_um(float(gap) + more)} of a {joint.type} joint is not modelled"
+        radius = f"radius: {1e3 * value('pin.radius'):.6g} mm, " * (value("pin.radius") >= 0)
+        remedy = f"state pin: {{{radius}clearance: 0, cylindricity: 0}} here, or use revolute joints"
         yield Finding(what, f"{where}.pin", remedy)
     if has_play(joint):
         yield from _fitted(mechanism, name, joint, value("pin.radius"), value("pin.hole_radius"), at)

@@ -13,9 +13,8 @@ import pytest
 from trunnion.algebra.dual import Dual
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.checks.check import check_model
-from trunnion.model.joint_parts import has_play, play
+from trunnion.model.joint_parts import Misalignment, Seat, has_play, play
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.parts import Misalignment, Seat
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FindingsOf = Callable[..., tuple[Finding, ...]]

@@ -14,9 +14,9 @@ from ruamel.yaml import YAML
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.checks.check import check_model
 from trunnion.model.file import placed
+from trunnion.model.joint_parts import Joint
 from trunnion.model.mechanism import Mechanism, read_mechanism
 from trunnion.model.names import as_key
-from trunnion.model.parts import Joint
 
 FindingsOf = Callable[..., tuple[Finding, ...]]
 

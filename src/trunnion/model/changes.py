@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from itertools import pairwise
 from typing import Any, get_args
 
@@ -14,7 +14,6 @@ from trunnion.model.quantity import Quantity
 
 __all__ = [
     "assign",
-    "not_stated",
     "part_types",
     "stated_at",
     "with_law",
@@ -74,26 +73,6 @@ def _kept(friction: Any, declared: Collection[str]) -> dict[str, Any]:
         return {}
     parameters = friction if isinstance(friction, Mapping) else {"coefficient": friction}
     return {key: value for key, value in parameters.items() if key in ("model", *declared)}
-
-
-def not_stated(model: BaseModel, name: str) -> str:
-    """The path of what an entry of a model could state, by a name such as `A.initial.speed`; or ""."""
-    keys = name.split(".")
-    for section in type(model).model_fields:
-        entries = getattr(model, section)
-        owner, *below = keys[1:] if keys[0] == section else keys
-        part = entries.get(owner) if isinstance(entries, dict) and below else None
-        if isinstance(part, BaseModel) and _has(type(part), below):
-            return ".".join([section, owner, *below])
-    return ""
-
-
-def _has(kind: type[BaseModel], keys: Sequence[str]) -> bool:
-    """Whether entries of a kind have such a key, and those below it too."""
-    fields = {field.alias or name: field for name, field in kind.model_fields.items()}
-    if keys[0] not in fields:
-        return False
-    return len(keys) == 1 or any(_has(part, keys[1:]) for part in part_types(fields[keys[0]].annotation))
 
 
 def part_types(annotation: object) -> Iterator[type[BaseModel]]:

@@ -12,9 +12,9 @@ from pydantic_core import ErrorDetails
 
 from trunnion.errors import Finding
 from trunnion.model.changes import part_types
+from trunnion.model.entry import FORMS
 from trunnion.model.names import nearest
 from trunnion.model.parameters import item_name
-from trunnion.model.parts import FORMS
 
 __all__ = ["schema_findings"]
 

@@ -9,9 +9,9 @@ from contextlib import suppress
 from trunnion.errors import Finding
 from trunnion.model.expression import parse
 from trunnion.model.fields import Fields
+from trunnion.model.joint_parts import freedoms
 from trunnion.model.measure_table import MEASURES, Measure
 from trunnion.model.names import nearest
-from trunnion.model.parts import freedoms
 from trunnion.model.quantity import Quantity, evaluation_order
 from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError, si_unit
 

@@ -19,14 +19,14 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.entry import ReadOnlyDict
-from trunnion.model.expression import MOTION, PLACED, RESERVED
+from trunnion.model.expression import MOTION, PLACED
 from trunnion.model.fields import Fields
+from trunnion.model.joint_parts import Contact, Friction, Joint, Losses, freedoms
 from trunnion.model.limits import Limits
-from trunnion.model.measure_table import Measure
 from trunnion.model.measure_units import course_kind, dimension_kinds, drive_kind, figure_kind, is_place, place_kind
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import ERRORS, ParameterNames
-from trunnion.model.parts import AT, Contact, Driver, Friction, Gear, Joint, Losses, Point, freedoms
+from trunnion.model.parts import AT, Driver, Gear, Point
 from trunnion.model.quantity import Quantity, evaluation_order
 from trunnion.model.rules import Within, markers
 from trunnion.model.tolerance_parts import Variation
@@ -40,7 +40,6 @@ __all__ = [
     "dimension_errors",
     "entries",
     "measured",
-    "placed_measures",
     "walk",
 ]
 
@@ -132,27 +131,16 @@ def _numbers(mechanism: Fields) -> Iterator[Entry]:
             yield from walk(getattr(loop_joint, key), f"loop.{loop_joint.joint}.{key}", ("loop", row, key))
     for name, joint in mechanism.effective_joints.items():
         yield from _joint_entries(mechanism, name, joint)
-    placed = placed_measures(mechanism)
+    moving = {*MOTION, *mechanism.tables}
     for section in ("gears", "drivers", "tables", "loads", "springs", "assembly", "measures"):
         for name, part in getattr(mechanism, section).items():
             complete = part.complete() if isinstance(part, Driver | Gear) else part
             for entry in walk(complete, f"{section}.{name}", (section, name)):
-                kind = _narrow(mechanism, section, name, entry)
-                moving = {*MOTION, *mechanism.tables}
-                quantity = _of_motion(entry.quantity, placed) if section == "loads" else entry.quantity
-                varies = section == "loads" and any(
-                    operand in moving or PLACED in operand for operand in quantity.names
-                )
+                spoken = entry.quantity.names if section == "loads" else ()
+                varies = any(operand in moving or PLACED in operand for operand in spoken)
                 signed = section == "springs" and part.between is None and entry.location[-1] == "free_length"
                 rules = () if signed else entry.rules  # a length along a slide has a sign
-                yield replace(entry, quantity=quantity, kind=kind, varies=varies, rules=rules)
-
-
-def _of_motion(quantity: Quantity, placed: Mapping[str, str]) -> Quantity:
-    """A quantity of a load that speaks of motions by the names of results where it speaks of measures."""
-    if quantity.expression is None or placed.keys().isdisjoint(quantity.names):
-        return quantity
-    return replace(quantity, expression=quantity.expression.renamed(placed))
+                yield replace(entry, kind=_narrow(mechanism, section, name, entry), varies=varies, rules=rules)
 
 
 def walk(value: object, path: str, location: Location, rules: Rules = ()) -> Iterator[Entry]:
@@ -417,26 +405,6 @@ def _is_error(path: str) -> bool:
     section, _, rest = path.partition(".")
     misaligned = section == "joints" and rest.endswith((".misalignment.tilt", ".misalignment.offset"))
     return misaligned or path.startswith(ERRORS)
-
-
-def placed_measures(mechanism: Fields) -> dict[str, str]:
-    """Measures that are a place or a speed at every position, by the names that a load has for these."""
-    others = {*RESERVED, *MOTION, *mechanism.tables, *mechanism.dimensions}
-    measures = {name: _placed(mechanism, measure) for name, measure in mechanism.measures.items() if name not in others}
-    return {name: placed for name, placed in measures.items() if placed}
-
-
-def _placed(mechanism: Fields, measure: Measure) -> str:
-    if measure.at is not None or measure.over is not None or measure.statistic or measure.along:
-        return ""
-    joint = mechanism.effective_joints.get(measure.subject)
-    if measure.kind in ("rotation", "slide"):
-        return f"{measure.subject}{PLACED}{measure.kind}"
-    if measure.kind == "rate" and joint is not None:
-        freedom = "rotation" if "rotation" in freedoms(joint.type) else "slide"
-        return f"{measure.subject}{PLACED}{freedom}_velocity"
-    component = {"point": "", "velocity": "velocity_"}.get(measure.kind)
-    return f"{measure.subject}{PLACED}{component}{measure.axis}" if component is not None and measure.axis else ""
 
 
 class Numbers(Fields):

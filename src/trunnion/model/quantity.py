@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
 from graphlib import CycleError, TopologicalSorter
@@ -118,19 +117,10 @@ class Quantity:
             assert dimension is not None  # None fits every kind
             raise UnitError(
                 f"'{self.source}' is {dimension_text(dimension)} where {_needed(kind)} is needed",
-                f"write {self.respelt(kind) or f'{_needed(kind)} such as {kind.example}'}"
+                f"write {_needed(kind)} such as {kind.example}"
                 + ("; a percentage of another value is not read" if "%" in str(self.source) else ""),
             )
         return dimension
-
-    def respelt(self, kind: Kind | None = None) -> str:
-        """What is likely meant where it is no quantity of its kind: 10 lbf in by 10 lb-in, 100 lbf by 100 lb."""
-        spaced = re.sub(r"(?<=[^\W\d_])-(?=[^\W\d_])", " ", str(self.source))
-        for text in (spaced, re.sub(r"\b(lb|oz|kg|g)s?\b", r"\1f", spaced)):
-            with suppress(UnitError):
-                if text != self.source and not Quantity.read(text, kind or self.kind).names:
-                    return text
-        return ""
 
 
 @lru_cache(maxsize=4096)

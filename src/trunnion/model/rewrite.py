@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ruamel.yaml.error import YAMLError
-from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
@@ -106,7 +106,7 @@ def _edited(text: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> s
     return text
 
 
-def _edits(text: str, node: Node, before: Any, after: Any) -> Iterator[Edit]:
+def _edits(text: str, node: Any, before: Any, after: Any) -> Iterator[Edit]:
     """What brings a node from one state to another: of a group its entries, of a list its items, else all of it."""
     if before == after:
         return
@@ -164,7 +164,7 @@ def _removed(text: str, parent: MappingNode, place: int) -> Edit:
     return text.rfind("\n", 0, key.start_mark.index) + 1, end or len(text), ""
 
 
-def _last(node: Node) -> Node:
+def _last(node: Any) -> Any:
     """The node that ends where this one does in the text: a block itself ends behind the blank lines after it."""
     while not isinstance(node, ScalarNode) and not node.flow_style:
         node = node.value[-1][1] if isinstance(node, MappingNode) else node.value[-1]

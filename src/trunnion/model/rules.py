@@ -9,7 +9,7 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Annotated, Any, Protocol, Union, get_args, get_origin
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
@@ -164,17 +164,7 @@ def group_findings(path: str, part: BaseModel, values: Values) -> Iterator[Findi
 # ---- of names and keys ----------------------------------------------------------------------------------------
 
 
-class Model(Protocol):
-    """What these rules ask of a model."""
-
-    @property
-    def coordinates(self) -> int:
-        """How many a point has."""
-        ...
-
-    def named(self, noun: str) -> Collection[str]:
-        """The names of its links, joints, points …"""
-        ...
+Model = Any  # a `Fields`, which stands above: it has `coordinates`, how many a point has, and `named`
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ it can be assembled) is checked where the structure is known.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -133,9 +132,7 @@ def _quantities(mechanism: Numbers) -> Iterator[Finding]:
             continue
         missing = [name for name in quantity.names if name not in sayable]
         for name in missing:
-            respelt = quantity.respelt(entry.kind)
-            finding = unknown_name(mechanism, name, entry.where, quantity.source, dimensions)
-            yield replace(finding, remedy=f"write {respelt}") if respelt else finding
+            yield unknown_name(mechanism, name, entry.where, quantity.source, dimensions)
         if quantity.tolerance and (entry.varies or ends_motion(entry.path)):
             what = f"'{quantity.source}' has a tolerance, and does not vary: it is where the motion is compared at"
             what = f"'{quantity.source}' varies with the motion and has a tolerance" if entry.varies else what

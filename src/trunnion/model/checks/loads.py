@@ -10,10 +10,9 @@ import numpy as np
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.model.expression import MOTION, PLACED, RESERVED
-from trunnion.model.joint_parts import motions
+from trunnion.model.joint_parts import freedoms, motions
 from trunnion.model.names import as_key, nearest
 from trunnion.model.parameters import Numbers
-from trunnion.model.parts import freedoms
 from trunnion.model.quantity import Quantity
 from trunnion.model.rules import stated_wrongly
 from trunnion.model.units import ANGLE, ANY, KINDS, Dimension, UnitError, dimension_text, fits
@@ -96,9 +95,6 @@ def unknown_name(mechanism: Numbers, name: str, path: str, source: object, names
         moves = motion_dimensions(mechanism, names)
         sayable += moves
         placed = [label for label in moves if PLACED in label]
-        if name in mechanism.measures:
-            what = f"'{source}' refers to the measure '{name}', which is no coordinate or speed at every position"
-            sayable = []
         remedy = nearest(name, sayable)
         if not remedy.startswith("did you mean"):
             slides = [label for label in placed if label.endswith("slide_velocity")] or placed[:1]

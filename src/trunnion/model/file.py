@@ -207,7 +207,7 @@ def _parse_yaml(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         what = f"is not {kind}: {error.problem or error.context}" + (f" (column {mark.column + 1})" if mark else "")
-        remedy = _remedy(text, mark.index if mark else 0)
+        remedy = "check indentation, brackets and quotes; a name with brackets stands in quotation marks"
         raise MechanismError(Finding(what, remedy=remedy, line=mark.line + 1 if mark else None)) from error
     except YAMLError as error:
         what = f"is not {kind}: {str(error).splitlines()[0]}"
@@ -347,19 +347,6 @@ class _Builder:
             line = node.start_mark.line + 1
             self.findings.append(Finding(f"'{text[:40]}' is not a number", path, remedy, line=line))
         return text
-
-
-def _remedy(text: str, at: int) -> str:
-    """What to do about a text that YAML cannot read on from a place: of a name with brackets, quotation marks."""
-    line, rest = text[:at].rpartition("\n")[2], text[at:].partition("\n")[0]
-    begun, closed = _BEGUN.search(line), _CLOSED.match(rest)
-    if begun is None or closed is None:
-        return "check indentation, brackets and quotes"
-    return f'put the name in quotation marks: "{begun[1]}{closed[0].rstrip()}"'
-
-
-_BEGUN = re.compile(r"""[:,\[{]\s+([^\s"'{}\[\],:&*!|>#][^"{}\[\],:]*)$""")  # a value without quotation marks
-_CLOSED = re.compile(r"""\[[^"\[\],{}]*\][^"\[\],{}]*""")
 
 
 def _balanced(text: str) -> str:

@@ -86,7 +86,7 @@ def _of_key(mechanism: Numbers, name: str) -> Iterator[tuple[str, Location]]:
     rows = [row.joint for row in mechanism.loop]
     for path, location, part, below in holders:
         looped = location[0] == "joints" and location[-1] in rows
-        place: Location = ("loop", rows.index(location[-1])) if looped else location
+        place: Location = ("loop", rows.index(str(location[-1]))) if looped else location
         index: tuple[int, ...] = ()
         annotation = field_of(type(part), below)
         if annotation is None and below[-1:] and below[-1] in "xyz":  # of a direction

@@ -7,21 +7,14 @@ it can be assembled) is checked where the structure is known.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from trunnion.errors import Finding, Severity
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.checks.drivers import driver_findings, gears
-from trunnion.model.checks.forgotten_units import (
-    Bare,
-    forgotten_units,
-    plain_angles,
-    plain_dimensions,
-    thousands,
-    unitless_angles,
-)
+from trunnion.model.checks.forgotten_units import forgotten_units, plain_angles, thousands
 from trunnion.model.checks.joints import joint_findings
 from trunnion.model.checks.loads import expression_name, load_findings, motion_dimensions, springs, tables, unknown_name
 from trunnion.model.checks.loops import coordinates, loop
@@ -30,7 +23,7 @@ from trunnion.model.checks.tolerances import cost_values, meant, tolerance_names
 from trunnion.model.checks.values import check_values
 from trunnion.model.joint_parts import motions
 from trunnion.model.names import ERRORS, nearest
-from trunnion.model.parameters import Numbers, dimension_errors
+from trunnion.model.parameters import Entry, Numbers, dimension_errors
 from trunnion.model.parts import AT
 from trunnion.model.quantity import evaluation_order
 from trunnion.model.rules import InSpace, Refers, key_findings
@@ -124,7 +117,7 @@ def _quantities(mechanism: Numbers) -> Iterator[Finding]:
     yield from _dimensions(mechanism, dimensions)
     yield from tables(mechanism, dimensions)
     moving = {**motion_dimensions(mechanism, dimensions), **dimensions}
-    plain, bare = plain_dimensions(mechanism.dimensions), list[Bare]()
+    sound: list[tuple[Entry, Mapping[str, Dimension | None]]] = []
     entries = (*mechanism.entries, *further_entries(mechanism))
     for entry in entries:
         quantity, sayable = entry.quantity, moving if entry.varies else dimensions
@@ -140,10 +133,10 @@ def _quantities(mechanism: Numbers) -> Iterator[Finding]:
         if not missing and entry.path.partition(".")[0] != "dimensions":
             try:
                 yield from thousands(entry.where, quantity, quantity.check(sayable, entry.kind))
-                bare += unitless_angles(mechanism, entry, sayable, plain)
+                sound.append((entry, sayable))
             except UnitError as error:
                 yield Finding(error.what, entry.where, error.remedy)
-    yield from plain_angles(mechanism, bare)
+    yield from plain_angles(mechanism, sound)
     used = {name for entry in entries for name in entry.quantity.names}
     rubs = any(joint.friction is not None for joint in mechanism.effective_joints.values())
     remedy = "remove it" if rubs else "remove it, unless it is of friction, which is off"

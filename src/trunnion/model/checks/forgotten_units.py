@@ -13,16 +13,7 @@ from trunnion.model.quantity import Quantity, evaluation_order
 from trunnion.model.tolerances import further_entries
 from trunnion.model.units import KINDS, NUMBER, Dimension, Kind, UnitError, unit
 
-__all__ = [
-    "Bare",
-    "bare_number",
-    "forgotten_units",
-    "in_radians",
-    "plain_angles",
-    "plain_dimensions",
-    "thousands",
-    "unitless_angles",
-]
+__all__ = ["bare_number", "forgotten_units", "in_radians", "plain_angles", "thousands"]
 
 FAR = 20.0  # times the largest length with a unit: a plain length above it is none of this mechanism
 WIDE = 0.01  # of that length: a plain tolerance, cost or limit above it is likely in another unit
@@ -122,34 +113,46 @@ def bare_number(numbers: ParameterSet, path: str, value: float) -> Iterator[Find
 
 # ---- plain angles ---------------------------------------------------------------------------------------------
 
-Bare = tuple[str, float, bool]  # where a number without a unit stands, its value, whether in an expression
+Sayable = Mapping[str, Dimension | None]  # what an expression may speak of, and what each measures
 
 
-def plain_dimensions(dimensions: Mapping[str, Quantity]) -> dict[str, tuple[str, ...]]:
-    """Dimensions made of numbers without a unit alone, each with those of them that its numbers stand in."""
-    plain: dict[str, tuple[str, ...]] = {}
-    for name in evaluation_order(dimensions)[0]:
-        quantity = dimensions[name]
+def plain_angles(mechanism: Numbers, entries: Iterable[tuple[Entry, Sayable]]) -> Iterator[Finding]:
+    """What numbers without a unit mean that are taken as radians, of the rows of a table the largest.
+
+    entries: with what their expressions may speak of. In a model without any unit all is in SI, and only many turns are
+    told.
+    """
+    plain: dict[str, tuple[str, ...]] = {}  # dimensions of plain numbers alone, with those that these stand in
+    for name in evaluation_order(mechanism.dimensions)[0]:
+        quantity = mechanism.dimensions[name]
         if quantity.expression is None or quantity.expression.is_plain(plain):
             plain[name] = tuple(origin for other in quantity.names for origin in plain[other]) or (name,)
-    return plain
+    largest: dict[str, tuple[str, float, str]] = {}  # by group: where it stands, its value and a verb for it
+    for entry, names in entries:
+        for where, value, verb in _radians(mechanism, entry, names, plain):
+            group = where if where.startswith("links.") else where.partition(".points.")[0]
+            if math.isfinite(value) and abs(value) > abs(largest.get(group, ("", 0.0))[1]):
+                largest[group] = (where, value, verb)
+    stated = (entry.quantity for entry in mechanism.entries if entry.quantity is not USUAL_PRESSURE_ANGLE)
+    with_units = any(_literal_unit(quantity) for quantity in stated)
+    for finding, value in ((in_radians(*number), number[1]) for number in largest.values()):
+        if with_units or (finding.severity is Severity.WARNING and abs(value) > 2 * math.pi):
+            yield finding
 
 
-def unitless_angles(
-    mechanism: Numbers, entry: Entry, names: Mapping[str, Dimension | None], plain: Mapping[str, tuple[str, ...]]
-) -> Iterator[Bare]:
+def _radians(
+    mechanism: Numbers, entry: Entry, names: Sayable, plain: Mapping[str, tuple[str, ...]]
+) -> Iterator[tuple[str, float, str]]:
     """The numbers without a unit that an entry takes as radians, in itself or in the dimensions that it speaks of."""
-    quantity, angle = entry.quantity, entry.kind is KINDS["angle"]
-    if quantity.expression is None:
-        if angle:
-            yield entry.where, float(quantity.evaluate()), False
-        return
-    for number in quantity.expression.unitless_angles(names, plain, angle):
+    expression, angle = entry.quantity.expression, entry.kind is KINDS["angle"]
+    if expression is None and angle:
+        yield entry.where, float(entry.quantity.evaluate()), "is"
+    for number in expression.unitless_angles(names, plain, angle) if expression else ():
         if isinstance(number, float):
-            yield entry.where, number, True
-            continue
-        for name in plain[number]:
-            yield f"dimensions.{name}", float(mechanism.dimensions[name].evaluate()), False
+            yield entry.where, number, f"takes {number:g} for"
+        else:
+            for name in plain[number]:
+                yield f"dimensions.{name}", float(mechanism.dimensions[name].evaluate()), "is"
 
 
 def thousands(where: str, quantity: Quantity, dimension: Dimension | None) -> Iterator[Finding]:
@@ -162,25 +165,6 @@ def thousands(where: str, quantity: Quantity, dimension: Dimension | None) -> It
 
 
 _GROUPED = re.compile(r"(?<![\w.])[1-9][0-9]{0,2}\.[0-9]00(?=\s*[^\W\d])")  # and a unit
-
-
-def plain_angles(mechanism: Numbers, bare: Iterable[Bare]) -> Iterator[Finding]:
-    """What these numbers mean, of the rows of a table the largest.
-
-    In a model without any unit all is in SI, and only many turns are told.
-    """
-    stated = (entry.quantity for entry in mechanism.entries if entry.quantity is not USUAL_PRESSURE_ANGLE)
-    with_units = any(_literal_unit(quantity) for quantity in stated)
-    largest: dict[str, Bare] = {}
-    for number in bare:
-        where, value, _ = number
-        group = where if where.startswith("links.") else where.partition(".points.")[0]
-        if value and math.isfinite(value) and abs(value) > abs(largest.get(group, ("", 0.0))[1]):
-            largest[group] = number
-    for where, value, in_expression in largest.values():
-        finding = in_radians(where, value, f"takes {value:g} for" if in_expression else "is")
-        if with_units or (finding.severity is Severity.WARNING and abs(value) > 2 * math.pi):
-            yield finding
 
 
 def in_radians(where: str, value: float, verb: str = "is") -> Finding:

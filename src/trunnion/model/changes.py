@@ -49,21 +49,17 @@ def stated_at(data: Any, location: Location) -> Any:
     return data
 
 
-def with_law(data: dict[str, Any], law: str, complete: bool = False) -> dict[str, Any]:
+def with_law(data: dict[str, Any], law: str) -> dict[str, Any]:
     """The data, which are changed, with a friction law wherever there is friction, or for "off" without friction.
 
-    Parameters that the laws share are kept. complete: with a 1, in SI, for each parameter that the law needs and that
-    is not stated.
+    Parameters that the laws share are kept.
     """
     declared = {} if law == "off" else FRICTION_LAWS[law].parameters
-    needed = {key: 1.0 for key, entry in declared.items() if complete and entry.default is None and not entry.optional}
-    shared = _kept(data.get("joint_defaults", {}).get("friction"), declared)
     holders = [data.get("joint_defaults", {}), *data.get("joints", {}).values(), *data.get("loop", [])]
     for holder in (entry for entry in holders if "friction" in entry):
         parameters_of_law = _kept(holder.pop("friction"), declared)
         if law != "off":
-            missing = {key: entry for key, entry in needed.items() if key not in shared}
-            holder["friction"] = {"law": law, **missing, **parameters_of_law}
+            holder["friction"] = {"law": law, **parameters_of_law}
     return data
 
 

@@ -32,13 +32,6 @@ _MEANINGS: Mapping[str, tuple[str, str]] = {
     "too_long": ("has more than the {max_length} entries it can have", "remove what is too much"),
 }
 
-# of a motor: how its keys begin on a data sheet, and what is stated instead
-_OF_DATA_SHEETS = ("power", "rated", "nominal", "slip", "breakdown_ratio", "voltage", "poles")
-DATA_SHEET = (
-    "kind: induction takes breakdown_effort = k P/ω and breakdown_slip = s (k + √(k² − 1)), with the rated power P, "
-    "speed ω and slip s and the breakdown ratio k of the data sheet; see docs/how-to/simulate.md"
-)
-
 
 def schema_findings(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any]) -> list[Finding]:
     """One finding for each thing that pydantic found, with its path."""
@@ -71,8 +64,6 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
         what, remedy = context["what"], context["remedy"]
     elif kind == "extra_forbidden":
         what, remedy = f"the key '{key[:80]}' is unknown", nearest(key, _fields(model, location[:-1]))
-        if location[-2:-1] == ("motor",) and key.startswith(_OF_DATA_SHEETS):
-            remedy = DATA_SHEET
     elif kind == "string_pattern_mismatch":  # the only texts with a pattern
         what = f"'{error['input'][:40]}' is not the name of an assembly mode"
         remedy = "write way-1, way-2, … as `check` lists them, or folds"

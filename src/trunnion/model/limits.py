@@ -106,21 +106,17 @@ CLOSE = 1e-9  # of a number: what rounding down takes for the number itself
 def half_width(limits: object, kind: Kind, name: str) -> float:
     """A half width in SI, of a number in SI or a text with a unit such as ±0.02 mm; MechanismError for others."""
     remedy = f"give a number of at least 0 in {kind.unit}, or a text such as ±{kind.example}"
+    written = f"{limits:g}" if isinstance(limits, float) else f"'{str(limits)[:40]}'"
     try:
         text = _EITHER.sub(r"\1", normalise(limits)) if isinstance(limits, str) else limits
         quantity = Quantity.read(text, kind)
         if quantity.tolerance or quantity.names or "%" in str(text):
             raise UnitError("is no number with a unit")
-        value = float(quantity.evaluate())
+        if (value := float(quantity.evaluate())) < 0:
+            raise UnitError("is negative")
     except UnitError as error:
-        raise MechanismError(Finding(f"a half width of {_told(limits)} is none: {error.what}", name, remedy)) from None
-    if value < 0:
-        raise MechanismError(Finding(f"a half width of {_told(limits)} is none", name, remedy))
+        raise MechanismError(Finding(f"a half width of {written} is none: {error.what}", name, remedy)) from None
     return value
-
-
-def _told(limits: object) -> str:
-    return f"{limits:g}" if isinstance(limits, float) else f"'{str(limits)[:40]}'"
 
 
 def written(value: float, kind: Kind, digits: int = DIGITS) -> str:

@@ -238,9 +238,7 @@ class Mechanism(Numbers):
             changed = self.with_values(values) if values else self
             return Mechanism(**kept(changed, with_law(changed.data(), law)))
         data = with_law(self.data(), law)
-        if values:
-            # names are those of a mechanism that states all parameters of the law, as it does with the values
-            Mechanism(**kept(self, with_law(self.data(), law, complete=True)))._replace(values, data)
+        self._replace(values or {}, data)
         return Mechanism(**kept(self, data))
 
     def with_seats(self, seat: str) -> Mechanism:

@@ -137,7 +137,8 @@ def _read_text(text: str, kind: Kind) -> tuple[tuple[float, float] | None, Expre
     quantity = Quantity(text, kind, tolerance, expression)
     if not expression.names:
         quantity.check({})
-        _finite(quantity.evaluate(), text)
+        if not np.isfinite(value := quantity.evaluate()):
+            raise UnitError(f"'{text}' has no finite value ({value})", "check divisions and roots")
     return tolerance, expression
 
 
@@ -163,11 +164,6 @@ def _plain(number: Any) -> float:
     return value  # type: ignore[no-any-return]
 
 
-def _finite(value: Number, source: str) -> None:
-    if not np.isfinite(value):
-        raise UnitError(f"'{source}' has no finite value ({value})", "check divisions and roots")
-
-
 def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
     """Value text and tolerance in SI; a unit stated once serves the value and the tolerance."""
     if match := _SYMMETRIC.match(text):
@@ -185,8 +181,7 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
     unit_of_value = value["unit"] or "" if value else ""
     unit = next((named for _, named in reversed(terms) if named), unit_of_value)
     if value and unit == "%" and unit_of_value != unit:
-        shares = ", ".join(f"{number.lstrip('+')} % is {_share(number, value)}" for number, _ in terms)
-        raise UnitError(f"the tolerance in '{text}' is in percent, the value is not", f"write the deviation: {shares}")
+        raise UnitError(f"the tolerance in '{text}' is in percent, the value is not", "write the deviation itself")
     if value and not unit_of_value and unit:
         main = f"{main.strip()} {unit}"
     if not unit and not value and kind.dimensions != KINDS["number"].dimensions:
@@ -211,12 +206,6 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
             raise UnitError(f"the tolerance in '{text}' has a sign after ±", "write ± 0.05 mm")
         deviations.append(-deviations[0])
     return main, (min(deviations), max(deviations))
-
-
-def _share(percent: str, value: re.Match[str]) -> str:
-    """A deviation in percent of a value, as it is to be written."""
-    share = float(percent) / 100 * float(value["number"])
-    return f"{share:.6g} {value['unit'] or ''}".strip()
 
 
 def term(text: str) -> tuple[str, str]:

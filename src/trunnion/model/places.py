@@ -110,7 +110,7 @@ def field_of(kind: type[BaseModel], keys: Sequence[str]) -> Any:
     if not keys or keys[0] not in fields:
         return None
     below = (field_of(part, keys[1:]) for part in part_types(fields[keys[0]]))
-    return fields[keys[0]] if len(keys) == 1 else next((found for found in below if found is not None), None)
+    return fields[keys[0]] if len(keys) == 1 else next((inner for inner in below if inner is not None), None)
 
 
 def _is_number(annotation: Any) -> bool:

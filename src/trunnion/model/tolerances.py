@@ -136,13 +136,13 @@ def towards(path: str, entries: Mapping[str, Entry]) -> str:
 def variations(mechanism: Numbers) -> dict[str, tuple[str, Variation]]:
     """Name and entry of `tolerances` by path; what is stated of a joint goes before what is stated of all."""
     numbers = mechanism.parameter_set
-    own: dict[str, tuple[str, Variation]] = {}
+    single: dict[str, tuple[str, Variation]] = {}
     of_all: dict[str, tuple[str, Variation]] = {}
     for name, variation in mechanism.variations.items():
         for path in named_paths(mechanism, [name]):
             if may_vary(numbers.entries[path]):
-                (own if numbers.resolve(name) == path else of_all).setdefault(path, (name, variation))
-    return {**of_all, **own}
+                (single if numbers.resolve(name) == path else of_all).setdefault(path, (name, variation))
+    return {**of_all, **single}
 
 
 def written_limits(mechanism: Numbers) -> dict[str, tuple[float, float]]:
@@ -354,8 +354,8 @@ def keep_limits(mechanism: Numbers, name: str, value: Any, data: dict[str, Any])
         again = Quantity.read(value, entry.kind).tolerance is not None
     except (MechanismError, UnitError):  # no number, or a finding of its own
         return
-    own = not entry.alias or entry.alias.startswith(DEFAULTS)
-    if again or entry.quantity.tolerance is None or not own or not may_vary(entry):
+    follows = entry.alias and not entry.alias.startswith(DEFAULTS)
+    if again or entry.quantity.tolerance is None or follows or not may_vary(entry):
         return
     lower, upper = entry.quantity.tolerance
     section = data.setdefault("tolerances", {})

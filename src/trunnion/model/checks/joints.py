@@ -124,11 +124,13 @@ def _vain(mechanism: Numbers) -> Iterator[Finding]:
         spatial, lost = mechanism.space == "spatial", set[str]()
         for key, (applies, why) in {**USES, **REMARKS}.items():
             part = key.partition(".")[0]
-            own, default = (_value(holder, key) for holder in (mechanism.stated_joints[name], mechanism.joint_defaults))
-            unstated = own is None and default is None
+            by_joint, by_default = (
+                _value(holder, key) for holder in (mechanism.stated_joints[name], mechanism.joint_defaults)
+            )
+            unstated = by_joint is None and by_default is None
             if unstated or part in lost or _value(joint, key) in (None, "free") or _is_off(joint.friction, key):
                 continue
-            where = f"joint_defaults.{key}" if own is None and part != "friction" else f"joints.{name}.{key}"
+            where = f"joint_defaults.{key}" if by_joint is None and part != "friction" else f"joints.{name}.{key}"
             if applies(joint, PAIRS[joint.type], spatial):
                 used.add(where)
                 continue
@@ -162,7 +164,7 @@ def joint_findings(mechanism: Numbers) -> Iterator[Finding]:
     """Whether each joint has its links and points, and what its parts need."""
     yield from _vain(mechanism)
     for name, joint in mechanism.effective_joints.items():
-        where, own = f"joints.{name}", mechanism.stated_joints[name]
+        where, stated_joint = f"joints.{name}", mechanism.stated_joints[name]
         if mechanism.space == "planar" and not PAIRS[joint.type].planar:
             flat = ", ".join(pair for pair in PAIRS if PAIRS[pair].planar)
             yield Finding(f"a {joint.type} joint does not exist in the plane", where, f"use one of {flat}")
@@ -172,12 +174,12 @@ def joint_findings(mechanism: Numbers) -> Iterator[Finding]:
             if lacking:
                 yield Finding(f"{what} without {lack}", where, remedy)
         if joint.friction is not None:
-            at = "joint_defaults.friction" if own.friction is None else f"{where}.friction"
+            at = "joint_defaults.friction" if stated_joint.friction is None else f"{where}.friction"
             yield from _parameters_of_law(joint.friction, at)
         if joint.seat_on is not None and joint.seat_on not in joint.links:
             what = f"'{joint.seat_on}' is no link of this joint"
             yield Finding(what, f"{where}.seat_on", f"name {' or '.join(joint.links)}")
-        yield from _choices(mechanism, name, own)
+        yield from _choices(mechanism, name, stated_joint)
         if joint.contact is not None:
             yield from _in_play(mechanism, name)
         if isinstance(limits := _fit(mechanism, name), Finding):
@@ -273,9 +275,9 @@ def _parameters_of_law(friction: Friction, where: str) -> Iterator[Finding]:
             yield Finding(f"the friction law {law} needs '{key}'", where, remedy)
 
 
-def _choices(mechanism: Numbers, name: str, own: Joint) -> Iterator[Finding]:
+def _choices(mechanism: Numbers, name: str, stated_joint: Joint) -> Iterator[Finding]:
     """Things of which a joint, or the defaults, may state one."""
-    for part, at in ((own, f"joints.{name}"), (mechanism.joint_defaults, "joint_defaults")):
+    for part, at in ((stated_joint, f"joints.{name}"), (mechanism.joint_defaults, "joint_defaults")):
         pin, seat = stated(part.pin).keys(), part.seat
         rest = pin & {"radius", "hole_radius", "clearance"}
         if "fit" in pin and rest:
@@ -288,10 +290,10 @@ def _choices(mechanism: Numbers, name: str, own: Joint) -> Iterator[Finding]:
             yield Finding("states no position", f"{at}.seat", remedy)
         elif isinstance(seat, Seat) and "direction" in stated(seat) and len(stated(seat)) > 1:
             yield Finding("states a direction, of a ball, and angles, of a pin", f"{at}.seat", "keep one of them")
-    if own.seat_on is not None and isinstance(mechanism.effective_joints[name].seat, Seat):
+    if stated_joint.seat_on is not None and isinstance(mechanism.effective_joints[name].seat, Seat):
         what = "the seat is given, and seat_on is for a pin without a stated seat"
         yield Finding(what, f"joints.{name}.seat_on", "keep one of seat and seat_on")
-    contact = own.contact
+    contact = stated_joint.contact
     if contact is not None and contact.stiffness is not None and contact.modulus is not None:
         yield Finding("states both stiffness and modulus", f"joints.{name}.contact", "keep one of them")
 

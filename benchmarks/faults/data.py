@@ -208,8 +208,8 @@ _MODEL = (
     Fault(
         "defaults-over-what-is-stated",
         "model/tolerances.py",
-        "return {**shared, **varied}",
-        "return {**varied, **shared}",
+        "return {**of_all, **single}",
+        "return {**single, **of_all}",
         ("tests/model/test_tolerances.py",),
     ),
 )

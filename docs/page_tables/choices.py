@@ -140,8 +140,7 @@ def pairs_table() -> str:
     """Every pair of the model file: where it exists and what it needs."""
     from trunnion.joints.clearance import CLEARANCE_MODELS
     from trunnion.joints.pairs import PAIRS
-    from trunnion.model.joint_parts import contact_lacks, has_guide, has_pin, motions
-    from trunnion.model.parts import Joint
+    from trunnion.model.joint_parts import Joint, contact_lacks, has_guide, has_pin, motions
 
     where = {("planar", "spatial"): "always", ("spatial",): "in space", (): "no"}
     rows = []

@@ -41,9 +41,11 @@ def section(name: str) -> str:
 
 
 def _class(name: str) -> type[BaseModel]:
-    from trunnion.model import mechanism, parts
+    from trunnion.model import joint_parts, measure_table, mechanism, parts, tolerance_parts
 
-    return mechanism.Mechanism if name == "Mechanism" else getattr(parts, name)
+    modules = (mechanism, parts, joint_parts, tolerance_parts, measure_table)
+    found: type[BaseModel] = next(getattr(module, name) for module in modules if hasattr(module, name))
+    return found
 
 
 def _takes(field: Any) -> str:

@@ -13,9 +13,8 @@ import pytest
 from trunnion.algebra.dual import Dual
 from trunnion.errors import MechanismError, Severity
 from trunnion.model.checks.check import check_model
-from trunnion.model.joint_parts import has_play, play
+from trunnion.model.joint_parts import Misalignment, Seat, has_play, play
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.parts import Misalignment, Seat
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FOURBAR, RSSR, CARDAN, SLIDER, PLAYING = (
@@ -231,17 +230,27 @@ def test_the_end_float_of_the_defaults_is_for_revolute_joints() -> None:
         (FOURBAR, "errors.AB", "AB / 1000", "is defined by itself: AB → AB"),
         (FOURBAR, "errors.AB", "CX / 1000", "errors.AB: 'CX / 1000' refers to 'CX'"),
         (FOURBAR, "errors.AB", [1, 2], "errors.AB"),
-        (FOURBAR, "B.misalignment.tilt", "1 deg", "joints.B.misalignment.tilt: a planar joint cannot tilt"),
-        (SLIDER, "S.misalignment.offset", "1 mm", "the misalignment of a prismatic joint is not modelled"),
-        (RSSR, "B.misalignment.tilt", "1 deg", "the misalignment of a spherical joint is not modelled"),
+        (
+            FOURBAR,
+            "B.misalignment.tilt",
+            "1 deg",
+            "joints.B.misalignment.tilt: a revolute joint in the plane cannot tilt",
+        ),
+        (SLIDER, "S.misalignment.offset", "1 mm", "a prismatic joint in the plane has no plain pin whose misalignment"),
+        (RSSR, "B.misalignment.tilt", "1 deg", "a spherical joint in space has no plain pin whose misalignment"),
         (RSSR, "A.misalignment.tilt", "46 deg", "is 46 deg, which is not at least -45 deg and at most 45 deg"),
-        (FOURBAR, "joints.B.seat", "loaded", "joints.B.seat: a seat without play"),
+        (FOURBAR, "joints.B.seat", "loaded", "joints.B: a seat without play"),
         (FOURBAR, "B.pin.clearance", "-1 mm", "is -0.001 m, which is negative"),
         (FOURBAR, "B.pin.hole_radius", "7 mm", "is 7 mm, less than the radius 7.5 mm of the pin"),
-        (FOURBAR, "joint_defaults.pin.end_float", "1 mm", "there is no end float in the plane"),
-        (RSSR, "B.pin.end_float", "1 mm", "an end float is the play along the axis of a revolute joint in space"),
-        (PLAYING, "B.seat.beta", "3 deg", "a planar pin does not tilt: its beta is 0"),
-        (PLAYING, "B.seat.direction.x", 1, "the seat of a pin is stated by angles"),
+        (
+            FOURBAR,
+            "joint_defaults.pin.end_float",
+            "1 mm",
+            "joint_defaults.pin.end_float: a revolute joint in the plane has no play along",
+        ),
+        (RSSR, "B.pin.end_float", "1 mm", "a spherical joint in space has no play along an axis"),
+        (PLAYING, "B.seat.beta", "3 deg", "joints.B.seat.beta: a revolute joint in the plane does not tilt"),
+        (PLAYING, "B.seat.direction.x", 1, "has its seat stated by angles"),
         (PLAYING, "joints.A.seat", "tight", "'tight' is not one of 'free' or 'loaded'"),
         (PLAYING, "joints.A.seat", [1, 2], "takes free, loaded or a group"),
         (PLAYING, "fits", "meen", "'minimum', 'mean' or 'maximum'"),
@@ -259,7 +268,7 @@ def test_what_does_not_go_together_is_refused() -> None:
     both = {"B.pin.hole_radius": "8 mm", "B.pin.clearance": "1 um"}
     assert "by its radius and by the clearance" in refusal(FOURBAR, both)
     ball = {"B.pin.clearance": "1 um", "B.seat.xi": 1}
-    assert "the seat of a ball is stated by a direction, not by angles" in refusal(RSSR, ball)
+    assert "joints.B.seat.xi: a spherical joint in space has its seat stated by a direction" in refusal(RSSR, ball)
     assert RSSR.with_values({"A.misalignment.tilt": "45 deg"})  # the limit itself, whatever it rounds to
 
 
@@ -288,11 +297,11 @@ RSSR_PIN = {key: value for key, value in RSSR.data()["joints"]["D"]["pin"].items
         (RSSR, "D", {"pin": RSSR_PIN, "friction": 0}, "joints.D: a seat without the length of the pin"),
         (PLAYING, "A", {"seat": {}}, "joints.A.seat: states no position"),
         (PLAYING, "B", {"seat_on": "frame"}, "joints.B.seat_on: 'frame' is no link of this joint"),
-        (SLIDER, "S", {"seat_on": "frame"}, "joints.S.seat_on: the seat of a prismatic joint needs no seat_on"),
+        (SLIDER, "S", {"seat_on": "frame"}, "joints.S.seat_on: a prismatic joint in the plane needs none"),
         (PLAYING, "B", {"seat": {"xi": 0.5}, "seat_on": PLAYING.joints["B"].links[0]}, "keep one of seat and seat_on"),
-        *((RSSR, "A", {"type": kind, "seat": "loaded", "friction": 0, "pin": {}}, f"the play of a {kind} joint")
+        *((RSSR, "A", {"type": kind, "seat": "loaded", "friction": 0, "pin": {}}, f"a {kind} joint in space has no pl")
           for kind in ("universal", "planar", "fixed")),
-        (RSSR, "A", {"type": "helical", "pitch": 1e-3, "seat": "loaded", "pin": {}}, "the play of a helical joint"),
+        (RSSR, "A", {"type": "helical", "pitch": 1e-3, "seat": "loaded", "pin": {}}, "in space has no play that"),
     ],
 )  # fmt: skip
 def test_joints_with_seats_stated_wrongly(mechanism: Mechanism, joint: str, keys: dict[str, Any], what: str) -> None:

@@ -21,11 +21,11 @@ from trunnion.measures.curves import AXES, CURVES, MOTIONS
 from trunnion.model.checks.measures import check_measure
 from trunnion.model.expression import Expression
 from trunnion.model.joint_parts import motions
-from trunnion.model.measure_kinds import course_kind, operands
 from trunnion.model.measure_table import MEASURES, STATISTICS, MeasureKind
+from trunnion.model.measure_table import Measure as Stated
+from trunnion.model.measure_units import course_kind, operands
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
-from trunnion.model.parts import Measure as Stated
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work

@@ -14,8 +14,8 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.angles import within
 from trunnion.measures.measures import Measure
-from trunnion.model.checks.magnitudes import in_radians
-from trunnion.model.measure_kinds import place_kind
+from trunnion.model.checks.forgotten_units import in_radians
+from trunnion.model.measure_units import place_kind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import UnitError

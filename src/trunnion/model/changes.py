@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from itertools import pairwise
 from typing import Any, get_args
 
@@ -14,8 +14,8 @@ from trunnion.model.quantity import Quantity
 
 __all__ = [
     "assign",
-    "not_stated",
     "part_types",
+    "stated_at",
     "with_law",
 ]
 
@@ -37,21 +37,29 @@ def assign(
     holder[location[-1]] = value
 
 
-def with_law(data: dict[str, Any], law: str, complete: bool = False) -> dict[str, Any]:
+def stated_at(data: Any, location: Location) -> Any:
+    """What plain data state at a place, a short form as what it stands for; None if nothing."""
+    for key in location:
+        if isinstance(data, str) or (key == "at" and isinstance(data, list)):
+            continue
+        try:
+            data = data[key]
+        except (LookupError, TypeError):
+            return None
+    return data
+
+
+def with_law(data: dict[str, Any], law: str) -> dict[str, Any]:
     """The data, which are changed, with a friction law wherever there is friction, or for "off" without friction.
 
-    Parameters that the laws share are kept. complete: with a 1, in SI, for each parameter that the law needs and that
-    is not stated.
+    Parameters that the laws share are kept.
     """
     declared = {} if law == "off" else FRICTION_LAWS[law].parameters
-    needed = {key: 1.0 for key, entry in declared.items() if complete and entry.default is None and not entry.optional}
-    shared = _kept(data.get("joint_defaults", {}).get("friction"), declared)
     holders = [data.get("joint_defaults", {}), *data.get("joints", {}).values(), *data.get("loop", [])]
     for holder in (entry for entry in holders if "friction" in entry):
         parameters_of_law = _kept(holder.pop("friction"), declared)
         if law != "off":
-            missing = {key: entry for key, entry in needed.items() if key not in shared}
-            holder["friction"] = {"law": law, **missing, **parameters_of_law}
+            holder["friction"] = {"law": law, **parameters_of_law}
     return data
 
 
@@ -61,26 +69,6 @@ def _kept(friction: Any, declared: Collection[str]) -> dict[str, Any]:
         return {}
     parameters = friction if isinstance(friction, Mapping) else {"coefficient": friction}
     return {key: value for key, value in parameters.items() if key in ("model", *declared)}
-
-
-def not_stated(model: BaseModel, name: str) -> str:
-    """The path of what an entry of a model could state, by a name such as `A.initial.speed`; or ""."""
-    keys = name.split(".")
-    for section in type(model).model_fields:
-        entries = getattr(model, section)
-        owner, *below = keys[1:] if keys[0] == section else keys
-        part = entries.get(owner) if isinstance(entries, dict) and below else None
-        if isinstance(part, BaseModel) and _has(type(part), below):
-            return ".".join([section, owner, *below])
-    return ""
-
-
-def _has(kind: type[BaseModel], keys: Sequence[str]) -> bool:
-    """Whether entries of a kind have such a key, and those below it too."""
-    fields = {field.alias or name: field for name, field in kind.model_fields.items()}
-    if keys[0] not in fields:
-        return False
-    return len(keys) == 1 or any(_has(part, keys[1:]) for part in part_types(fields[keys[0]].annotation))
 
 
 def part_types(annotation: object) -> Iterator[type[BaseModel]]:

@@ -24,7 +24,7 @@ from trunnion.model.expression import literal
 from trunnion.model.names import nearest
 from trunnion.model.quantity import Quantity
 from trunnion.model.text import MOST_FILES, OF_A_FILE, in_folder, read_text, stated_files
-from trunnion.model.units import ANY, KINDS, Kind, UnitError, dimension_text, unit
+from trunnion.model.units import ANY, KINDS, NUMBER, Kind, UnitError, dimension_text, unit
 
 __all__ = ["TableFiles", "TablePoints", "column", "place_findings", "with_own_points", "with_points"]
 
@@ -75,12 +75,10 @@ def with_points(data: Mapping[str, Any], files: TableFiles) -> tuple[dict[str, A
 def _put(data: dict[str, Any], section: str, key: str, points: TablePoints) -> None:
     """Points in place of those that a driver or table states, or of the file that it names."""
     entry = data[section][key]
-    entry_kept = (
-        {key: value for key, value in entry.items() if key not in OF_A_FILE} if isinstance(entry, Mapping) else {}
-    )
-    if section == "drivers" and entry_kept.get("law") != "table":
-        entry_kept = {"law": "table"}
-    data[section] = {**data[section], key: {**entry_kept, "points": points.rows}}
+    rest = {key: value for key, value in entry.items() if key not in OF_A_FILE} if isinstance(entry, Mapping) else {}
+    if section == "drivers" and rest.get("law") != "table":
+        rest = {"law": "table"}
+    data[section] = {**data[section], key: {**rest, "points": points.rows}}
 
 
 def with_own_points(data: Mapping[str, Any], model: Path) -> tuple[dict[str, Any], list[TablePoints]]:
@@ -88,39 +86,30 @@ def with_own_points(data: Mapping[str, Any], model: Path) -> tuple[dict[str, Any
 
     MechanismError with every finding: about a name where it stands in the model, about the content with file and line.
     """
-    changed, read = dict(data), []
+    changed, read = dict(data), list[TablePoints]()
     findings: list[Finding] = []
-    size = rows = 0
+    size = 0
     for count, (section, key, name) in enumerate(stated_files(data), start=1):
-        where, names = f"{section}.{key}", data[section][key].get("columns")
-        if names is not None and not (isinstance(names, list) and list(map(type, names)) == [str, str]):
-            what = "is not the headers of two columns"
-            findings.append(Finding(what, f"{where}.columns", "write two texts: columns: [time, pressure]"))
-            continue
-        if count > MOST_FILES:
-            what = f"the model names more than {MOST_FILES} files"
-            findings.append(Finding(what, f"{where}.file", "state some of the points in the model"))
-            break
-        if "points" in data[section][key]:
-            findings.append(Finding("states both points and a file", where, "remove one of them"))
-            continue
+        where, entry = f"{section}.{key}", data[section][key]
+        names = entry.get("columns")
         try:
+            if names is not None and not (isinstance(names, list) and list(map(type, names)) == [str, str]):
+                what, remedy = "is not the headers of two columns", "write two texts: columns: [time, pressure]"
+                raise MechanismError(Finding(what, f"{where}.columns", remedy))
+            if "points" in entry:
+                raise MechanismError(Finding("states both points and a file", where, "remove one of them"))
             path = in_folder(model.resolve().parent, name, f"{where}.file")
             size += path.stat().st_size
-            if size > MAX_BYTES or rows > MAX_OWN_ROWS:
-                what = (
-                    f"the files that the model names are too long: over {MAX_BYTES / 1e6:g} MB or {MAX_OWN_ROWS} rows"
-                )
-                findings.append(
-                    Finding(what, f"{where}.file", "use fewer points: values between them are interpolated")
-                )
+            if count > MOST_FILES or size > MAX_BYTES or sum(len(points.rows) for points in read) > MAX_OWN_ROWS:
+                what = f"the files that the model names are too many or too long: more than {MOST_FILES} files, over "
+                what += f"{MAX_BYTES / 1e6:g} MB or {MAX_OWN_ROWS} rows"
+                findings.append(Finding(what, f"{where}.file", "use fewer points: values between are interpolated"))
                 break
             points = _points(path, f"{where}.points", _kinds(data, section, key), str(model.parent / name), names)
         except MechanismError as error:
             findings += error.findings
             continue
         read.append(points)
-        rows += len(points.rows)
         _put(changed, section, key, points)
     if findings:
         raise MechanismError(findings)
@@ -172,23 +161,15 @@ def _holder(data: Mapping[str, Any], name: str) -> tuple[str, str]:
 
 
 def _kinds(data: Mapping[str, Any], section: str, key: str) -> tuple[Kind, Kind]:
-    """What the two columns measure."""
-    if section == "drivers":
-        return KINDS["time"], _coordinate(data, key)
-    over = data["tables"][key].get("over", "drive") if isinstance(data["tables"][key], Mapping) else "drive"
-    drivers = data.get("drivers")
-    first = next(iter(drivers), "") if isinstance(drivers, Mapping) else ""
-    return KINDS["time"] if over == "time" else _coordinate(data, first), ANY
-
-
-def _coordinate(data: Mapping[str, Any], joint: str) -> Kind:
-    """What the coordinate of a joint measures; a model that does not tell is refused elsewhere."""
-    joints = data.get("joints")
-    joint_entry = joints.get(joint) if isinstance(joints, Mapping) else None
-    pair = PAIRS.get(str(joint_entry.get("type"))) if isinstance(joint_entry, Mapping) else None
-    if pair is None:
-        return KINDS["angle"] | KINDS["length"]
-    return KINDS["angle" if "rotation" in pair.freedoms else "length"]
+    """What the two columns measure; a model that does not tell is refused elsewhere."""
+    entry, drivers, joints = data[section][key], data.get("drivers"), data.get("joints")
+    in_time = section == "drivers" or (isinstance(entry, Mapping) and entry.get("over") == "time")
+    joint = key if section == "drivers" else next(iter(drivers), "") if isinstance(drivers, Mapping) else ""
+    stated = joints.get(joint) if isinstance(joints, Mapping) else None
+    pair = PAIRS.get(str(stated.get("type"))) if isinstance(stated, Mapping) else None
+    either = KINDS["angle"] | KINDS["length"]
+    coordinate = either if pair is None else KINDS["angle" if pair.turns else "length"]
+    return KINDS["time"] if in_time else coordinate, coordinate if section == "drivers" else ANY
 
 
 # ---- the file -------------------------------------------------------------------------------------------------
@@ -203,11 +184,12 @@ def _points(
     """
     units, rows = _columns(path, kinds, label or str(path), names)
     if names:  # of another program, which writes numbers of SI without their unit
-        units = [unit_text or (kind.unit if kind in (KINDS["time"], KINDS["angle"], KINDS["length"]) else "")
-                 for unit_text, kind in zip(units, kinds, strict=True)]  # fmt: skip
-    points: list[list[float | str]] = []
-    for _, cells in rows:
-        points.append([f"{cell} {unit}" if unit else float(cell) for cell, unit in zip(cells, units, strict=True)])
+        plain = (KINDS["time"], KINDS["angle"], KINDS["length"])
+        units = [text or kind.unit * (kind in plain) for text, kind in zip(units, kinds, strict=True)]
+    points: list[list[float | str]] = [
+        [f"{cell} {unit}" if unit else float(cell) for cell, unit in zip(cells, units, strict=True)]
+        for _, cells in rows
+    ]
     return TablePoints(where, label or str(path), points, [line for line, _ in rows])
 
 
@@ -342,31 +324,20 @@ def _units(header: Row, kinds: Sequence[Kind]) -> list[str]:
     for cell, kind in zip(cells, kinds, strict=True):
         bracketed, rounded = _IN_BRACKETS.search(cell), _IN_PARENTHESES.search(cell)
         text = bracketed[1].strip() if bracketed else ""
-        text = "" if text in _NO_UNIT else text
-        units.append(text)
-        if text:
-            findings += [
-                Finding(f"{cell[:40]}: {what[:120]}", remedy=to_do, line=line) for what, to_do in _unfit(text, kind)
-            ]
-        elif rounded and not bracketed and _is_unit(rounded[1]):
-            remedy = f"write [{rounded[1]}]"
-            findings.append(Finding(f"{cell[:40]}: a unit stands in brackets", remedy=remedy, line=line))
+        units.append("" if text in _NO_UNIT else text)
+        remedy = f"write a unit of {kind.name} in the brackets, or none for SI"
+        try:
+            if rounded and not bracketed and _is_unit(rounded[1]):
+                remedy = f"write [{rounded[1]}]"
+                raise UnitError("a unit stands in brackets")
+            if units[-1] and not kind.accepts(dimension := Quantity.read(f"1 {text}").check({})):
+                what = f"its unit is that of {dimension_text(dimension or NUMBER)}, the column is of {kind.name}"
+                raise UnitError(what)
+        except UnitError as error:
+            findings.append(Finding(f"{cell[:40]}: {error.what[:120]}", remedy=remedy, line=line))
     if findings:
         raise MechanismError(findings)
     return units
-
-
-def _unfit(text: str, kind: Kind) -> Iterator[tuple[str, str]]:
-    """What is wrong with the unit of a column, and what to do."""
-    remedy = f"write a unit of {kind.name} in the brackets, or none for SI"
-    try:
-        dimension = unit(text)[1]
-        Quantity.read(f"1 {text}")
-    except UnitError as error:
-        yield error.what, remedy
-        return
-    if not kind.accepts(dimension):
-        yield f"its unit is that of {dimension_text(dimension)}, the column is of {kind.name}", remedy
 
 
 def _is_unit(text: str) -> bool:

@@ -106,12 +106,6 @@ class Expression:
         """Compiled anew in another process: closures cannot be pickled."""
         return _expression, (self._tree, self._operands)
 
-    def renamed(self, names: Mapping[str, str]) -> Expression:
-        """The same that speaks of some by other names."""
-        return _expression(
-            self._tree, {key: names.get(str(operand), operand) for key, operand in self._operands.items()}
-        )
-
     def dimension(self, names: Dimensions) -> Dimension | None:
         """Dimension of the value, from those of the names (None: unknown); UnitError if terms do not fit."""
         return _dimension(self._tree, self._operands, names)
@@ -223,15 +217,11 @@ def _depth(tree: ast.expr) -> int:
     return 1 + max((_depth(child) for child in ast.iter_child_nodes(tree) if isinstance(child, ast.expr)), default=0)
 
 
-def _divide(a: Number, b: Number) -> Number:
-    return a / b
-
-
 _OPERATORS: Mapping[type[ast.operator], Callable[[Number, Number], Number]] = {
     ast.Add: lambda a, b: a + b,
     ast.Sub: lambda a, b: a - b,
     ast.Mult: lambda a, b: a * b,
-    ast.Div: _divide,
+    ast.Div: lambda a, b: a / b,
     ast.Pow: lambda a, b: a**b,
 }
 
@@ -247,10 +237,7 @@ def _compile(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Evaluator
         case ast.UnaryOp(op=ast.UAdd(), operand=inner):
             return _compile(inner, operands)
         case ast.BinOp(op=ast.Pow(), left=base, right=exponent) if (power := _integer(exponent, operands)) is not None:
-            value, integer_power = (
-                _compile(base, operands),
-                power,
-            )  # an int, so that duals of negative numbers have powers
+            value, integer_power = _compile(base, operands), power  # an int: duals of negative numbers have powers
             return lambda names: value(names) ** integer_power
         case ast.BinOp(op=operator, left=left, right=right) if type(operator) in _OPERATORS:
             combine, first, second = _OPERATORS[type(operator)], _compile(left, operands), _compile(right, operands)
@@ -353,8 +340,7 @@ def _dimension(tree: ast.expr, operands: Mapping[str, Literal | str], names: Dim
             first, second = of(left), of(right)
             if first is None or second is None:
                 return None
-            sign = 1 if isinstance(operator, ast.Mult) else -1
-            return _combine(first, second, sign)
+            return _combine(first, second, Fraction(1 if isinstance(operator, ast.Mult) else -1))
         case ast.BinOp(left=left, right=right):
             return _same([of(left), of(right)], "added")
         case ast.Call(func=ast.Name(id=key), args=arguments):
@@ -393,13 +379,9 @@ def _unitless_angles(
         yield from _unitless_angles(part, operands, names, plain, angle)
 
 
-def _combine(first: Dimension, second: Dimension, sign: int) -> Dimension:
-    length, mass, time, angle = (a + sign * b for a, b in zip(first, second, strict=True))
-    return length, mass, time, angle
-
-
-def _scale(dimension: Dimension, factor: Fraction) -> Dimension:
-    length, mass, time, angle = (exponent * factor for exponent in dimension)
+def _combine(first: Dimension, second: Dimension, power: Fraction) -> Dimension:
+    """The dimension of a product with a power."""
+    length, mass, time, angle = (a + power * b for a, b in zip(first, second, strict=True))
     return length, mass, time, angle
 
 
@@ -413,7 +395,7 @@ def _power(
     integer_power = _integer(tree, operands)
     if integer_power is None:
         raise UnitError(f"{dimension_text(base)} is raised to a power that is not a whole number", "use sqrt or ^2")
-    return _scale(base, Fraction(integer_power))
+    return _combine(NUMBER, base, Fraction(integer_power))
 
 
 def _same(dimensions: list[Dimension | None], verb: str) -> Dimension | None:
@@ -441,6 +423,6 @@ def _function_dimension(name: str, arguments: list[Dimension | None]) -> Dimensi
         "angle": ANGLE,
         "number": NUMBER,
         "same": common,
-        "root": None if common is None else _scale(common, Fraction(1, 2)),
+        "root": None if common is None else _combine(NUMBER, common, Fraction(1, 2)),
     }
     return results[function.gives]

@@ -8,31 +8,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from trunnion.model.entry import ReadOnlyDict
-from trunnion.model.joint_parts import freedoms, motions
+from trunnion.model.entry import Name, Part, ReadOnlyDict
+from trunnion.model.joint_parts import Joint, JointDefaults, LoopJoint, freedoms, motions
+from trunnion.model.measure_table import Measure
 from trunnion.model.merge import FitChoice, merge_joint
-from trunnion.model.parts import (
-    Correlation,
-    Cost,
-    Driver,
-    Gear,
-    Hint,
-    Joint,
-    JointDefaults,
-    Link,
-    Load,
-    LoopJoint,
-    Measure,
-    Name,
-    Part,
-    Spring,
-    Table,
-    Variation,
-    VariationDefaults,
-)
+from trunnion.model.parts import Driver, Gear, Hint, Link, Load, Spring, Table
 from trunnion.model.quantity import Acceleration, AnyQuantity, nominal_dimensions
 from trunnion.model.rules import InSpace, Refers
-from trunnion.model.tolerance_parts import Process
+from trunnion.model.tolerance_parts import Correlation, Cost, Process, Variation, VariationDefaults
 
 __all__ = ["Fields"]
 
@@ -91,19 +74,8 @@ class Fields(Part):
         """Every joint as it was stated; a row of the loop joins the link before it to its own."""
         joints = dict(self.joints)
         for before, row in zip((*self.loop[-1:], *self.loop[:-1]), self.loop, strict=True):
-            joints[row.joint] = Joint(
-                type=row.type,
-                links=(before.link, row.link),
-                pitch=row.pitch,
-                pin=row.pin,
-                guide=row.guide,
-                friction=row.friction,
-                losses=row.losses,
-                stiffness=row.stiffness,
-                misalignment=row.misalignment,
-                seat_on=row.seat_on,
-                seat=row.seat,
-            )
+            parts = {key: getattr(row, key) for key in Joint.model_fields if key != "links" and hasattr(row, key)}
+            joints[row.joint] = Joint(links=(before.link, row.link), **parts)
         return ReadOnlyDict(joints)
 
     @cached_property

@@ -29,7 +29,7 @@ from trunnion.model.text import read_text
 
 __all__ = [
     "Lines", "composed", "entries_of", "place", "placed", "read_entries", "read_model", "text_of",
-    "version_findings", "write_model",
+    "version_findings", "write_model", "yaml_writer",
 ]  # fmt: skip
 
 MAX_BYTES = 1_000_000  # some ten thousand links; parsing takes seconds
@@ -122,19 +122,20 @@ def write_model(data: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
             json.dump(data, stream, indent=2, ensure_ascii=False)
             stream.write("\n")
         else:
-            _yaml().dump(data, stream)
+            yaml_writer().dump(data, stream)
 
 
 def text_of(data: Mapping[str, Any]) -> str:
     """The plain data of a model as YAML."""
     stream = StringIO()
-    _yaml().dump(data, stream)
+    yaml_writer().dump(data, stream)
     return stream.getvalue()
 
 
-def _yaml() -> YAML:
+def yaml_writer() -> YAML:
+    """What writes plain data: the innermost groups on one line."""
     yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = None  # the innermost groups on one line
+    yaml.default_flow_style = None
     yaml.allow_unicode = True
     yaml.width = 110
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # keys as stated
@@ -206,7 +207,7 @@ def _parse_yaml(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         what = f"is not {kind}: {error.problem or error.context}" + (f" (column {mark.column + 1})" if mark else "")
-        remedy = _remedy(text, mark.index if mark else 0)
+        remedy = "check indentation, brackets and quotes; a name with brackets stands in quotation marks"
         raise MechanismError(Finding(what, remedy=remedy, line=mark.line + 1 if mark else None)) from error
     except YAMLError as error:
         what = f"is not {kind}: {str(error).splitlines()[0]}"
@@ -346,19 +347,6 @@ class _Builder:
             line = node.start_mark.line + 1
             self.findings.append(Finding(f"'{text[:40]}' is not a number", path, remedy, line=line))
         return text
-
-
-def _remedy(text: str, at: int) -> str:
-    """What to do about a text that YAML cannot read on from a place: of a name with brackets, quotation marks."""
-    line, rest = text[:at].rpartition("\n")[2], text[at:].partition("\n")[0]
-    begun, closed = _BEGUN.search(line), _CLOSED.match(rest)
-    if begun is None or closed is None:
-        return "check indentation, brackets and quotes"
-    return f'put the name in quotation marks: "{begun[1]}{closed[0].rstrip()}"'
-
-
-_BEGUN = re.compile(r"""[:,\[{]\s+([^\s"'{}\[\],:&*!|>#][^"{}\[\],:]*)$""")  # a value without quotation marks
-_CLOSED = re.compile(r"""\[[^"\[\],{}]*\][^"\[\],{}]*""")
 
 
 def _balanced(text: str) -> str:

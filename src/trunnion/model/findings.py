@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 import typing
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -13,12 +12,11 @@ from pydantic_core import ErrorDetails
 
 from trunnion.errors import Finding
 from trunnion.model.changes import part_types
+from trunnion.model.entry import FORMS
 from trunnion.model.names import nearest
 from trunnion.model.parameters import item_name
-from trunnion.model.parts import FORMS
-from trunnion.model.quantity import UNREADABLE
 
-__all__ = ["repair", "schema_findings"]
+__all__ = ["schema_findings"]
 
 # What the other types of pydantic errors mean here; {…} are filled from the error's context.
 _MEANINGS: Mapping[str, tuple[str, str]] = {
@@ -33,13 +31,6 @@ _MEANINGS: Mapping[str, tuple[str, str]] = {
     "too_short": ("has {actual_length} entries, at least {min_length} are needed", "give them all"),
     "too_long": ("has more than the {max_length} entries it can have", "remove what is too much"),
 }
-
-# of a motor: how its keys begin on a data sheet, and what is stated instead
-_OF_DATA_SHEETS = ("power", "rated", "nominal", "slip", "breakdown_ratio", "voltage", "poles")
-DATA_SHEET = (
-    "kind: induction takes breakdown_effort = k P/ω and breakdown_slip = s (k + √(k² − 1)), with the rated power P, "
-    "speed ω and slip s and the breakdown ratio k of the data sheet; see docs/how-to/simulate.md"
-)
 
 
 def schema_findings(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any]) -> list[Finding]:
@@ -73,8 +64,6 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
         what, remedy = context["what"], context["remedy"]
     elif kind == "extra_forbidden":
         what, remedy = f"the key '{key[:80]}' is unknown", nearest(key, _fields(model, location[:-1]))
-        if location[-2:-1] == ("motor",) and key.startswith(_OF_DATA_SHEETS):
-            remedy = DATA_SHEET
     elif kind == "string_pattern_mismatch":  # the only texts with a pattern
         what = f"'{error['input'][:40]}' is not the name of an assembly mode"
         remedy = "write way-1, way-2, … as `check` lists them, or folds"
@@ -132,71 +121,3 @@ def _fields(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str
         reached = [part for field in fields for part in part_types(field.annotation)]
         named = any(typing.get_origin(field.annotation) in (Mapping, tuple) for field in fields)
     return [field.alias or name for kind in reached for name, field in kind.model_fields.items()]
-
-
-def repair(
-    error: ValidationError, data: Mapping[str, Any], findings: Sequence[Finding]
-) -> tuple[dict[str, Any], frozenset[str]]:
-    """The data without what could not be read, to check the rest; and the names of the entries lost with it.
-
-    findings: `schema_findings`; an unknown key with one that was meant counts as that one.
-    """
-    mended = {key: _mutable(value) for key, value in data.items()}
-    lost: set[str] = set()
-    # from the end, so that places in lists stay right
-    for pydantic_error, finding in reversed(list(zip(_errors(error), findings, strict=True))):
-        location = _plain(pydantic_error["loc"])
-        if pydantic_error["type"] == "extra_forbidden":
-            meant = re.fullmatch(r"did you mean '([^']*)'.*", finding.remedy)
-            _at(mended, location, partial(_renamed, name=meant and meant[1]))
-        elif pydantic_error["type"] == "quantity":
-            _at(mended, location, _unreadable)
-        else:
-            entry = location[: 2 if len(location) > 1 and location[0] not in ("gravity", "loop") else 1]
-            _at(mended, entry, lambda holder, key: holder.pop(key))
-            lost.update(str(part) for part in entry[-1:])
-    return mended, frozenset(lost)
-
-
-def _mutable(value: Any) -> Any:
-    """A copy whose groups and lists can be changed."""
-    if isinstance(value, Mapping):
-        return {key: _mutable(item) for key, item in value.items()}
-    return [_mutable(item) for item in value] if isinstance(value, (list, tuple)) else value
-
-
-def _renamed(holder: Any, key: int | str, name: str | None) -> None:
-    value = holder.pop(key)
-    if name and name not in holder:
-        holder[name] = value
-
-
-def _unreadable(holder: Any, key: int | str) -> None:
-    if isinstance(holder[key], (dict, list)):
-        holder.pop(key)
-    else:
-        holder[key] = UNREADABLE
-
-
-def _at(data: Any, location: tuple[int | str, ...], change: Callable[[Any, Any], Any]) -> None:
-    """Apply a change at a location; a short form has no such place, and its entry is changed as a whole."""
-    if not location:
-        return
-    holder = data
-    *path, key = location
-    for part in path:
-        below = holder[part] if _has(holder, part) else None
-        if part == "at" and isinstance(holder, list):
-            continue
-        if not isinstance(below, (dict, list)):
-            key = part
-            break
-        holder = below
-    if _has(holder, key):
-        change(holder, key)
-
-
-def _has(holder: Any, key: Any) -> bool:
-    if isinstance(holder, list):
-        return isinstance(key, int) and key < len(holder)
-    return isinstance(holder, dict) and key in holder

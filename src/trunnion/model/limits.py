@@ -13,8 +13,7 @@ from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.entry import problem
-from trunnion.model.expression import LITERAL, literal
-from trunnion.model.quantity import Quantity, deviation_spans, term
+from trunnion.model.quantity import Quantity, term
 from trunnion.model.units import Kind, UnitError, normalise
 
 __all__ = [
@@ -23,7 +22,6 @@ __all__ = [
     "Limits",
     "half_width",
     "limits_text",
-    "number_with",
     "written",
 ]
 
@@ -108,21 +106,17 @@ CLOSE = 1e-9  # of a number: what rounding down takes for the number itself
 def half_width(limits: object, kind: Kind, name: str) -> float:
     """A half width in SI, of a number in SI or a text with a unit such as ±0.02 mm; MechanismError for others."""
     remedy = f"give a number of at least 0 in {kind.unit}, or a text such as ±{kind.example}"
+    written = f"{limits:g}" if isinstance(limits, float) else f"'{str(limits)[:40]}'"
     try:
         text = _EITHER.sub(r"\1", normalise(limits)) if isinstance(limits, str) else limits
         quantity = Quantity.read(text, kind)
         if quantity.tolerance or quantity.names or "%" in str(text):
             raise UnitError("is no number with a unit")
-        value = float(quantity.evaluate())
+        if (value := float(quantity.evaluate())) < 0:
+            raise UnitError("is negative")
     except UnitError as error:
-        raise MechanismError(Finding(f"a half width of {_told(limits)} is none: {error.what}", name, remedy)) from None
-    if value < 0:
-        raise MechanismError(Finding(f"a half width of {_told(limits)} is none", name, remedy))
+        raise MechanismError(Finding(f"a half width of {written} is none: {error.what}", name, remedy)) from None
     return value
-
-
-def _told(limits: object) -> str:
-    return f"{limits:g}" if isinstance(limits, float) else f"'{str(limits)[:40]}'"
 
 
 def written(value: float, kind: Kind, digits: int = DIGITS) -> str:
@@ -139,38 +133,6 @@ def limits_text(middle: float, half: float, kind: Kind, digits: int = DIGITS) ->
     size = _down(half * factor, digits)
     ends = (f"{middle * factor + side * size:+.{DIGITS}g} {unit}".strip() for side in (1, -1))
     return "/".join(ends)
-
-
-def number_with(quantity: Quantity, half: float, digits: int = DIGITS) -> str | None:
-    """The text of a number with other limits about the same middle, in the same units; None if it cannot be had."""
-    if not isinstance(quantity.source, str) or quantity.tolerance is None:
-        return None
-    text = normalise(quantity.source)
-    spans = deviation_spans(text)
-    numbers = [number for start, end in spans if (number := LITERAL.search(text, start, end))]
-    if not numbers or len(numbers) < len(spans):
-        return None
-    units = [number["unit"] or "" for number in numbers]
-    unit_stated = next((unit for unit in reversed(units) if unit), "")
-    if not unit_stated and (value := LITERAL.fullmatch(text[: spans[0][0]].strip(" -+±/"))):
-        unit_stated = value["unit"] or ""
-    lower, upper = quantity.tolerance
-    middle = (lower + upper) / 2
-    falling = len(spans) == 1 or text[spans[0][0]] == "+" or text[spans[1][0]] == "-"  # the upper limit comes first
-    for k in reversed(range(len(spans))):
-        factor = literal("1", units[k] or unit_stated).value
-        size = _down(half / factor, digits)
-        if len(spans) == 1:
-            written = f"{size:.{DIGITS}g}"
-        else:
-            written = f"{middle / factor + (size if falling == (k == 0) else -size):+.{DIGITS}g}"
-        text = text[: spans[k][0]] + written + text[numbers[k].end("number") :]
-    try:
-        again = Quantity.read(text, quantity.kind).tolerance
-    except UnitError:
-        return None
-    right = again and abs(sum(again) / 2 - middle) <= CLOSE * (abs(middle) + half) and again[1] - again[0] >= 0
-    return text if right else None
 
 
 def _unit(kind: Kind) -> tuple[str, float]:

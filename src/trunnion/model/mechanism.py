@@ -6,7 +6,6 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, Self
@@ -20,33 +19,20 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.motion import MotionLaw
 from trunnion.model.arguments import strict_arguments
-from trunnion.model.changes import assign, not_stated, with_law
+from trunnion.model.changes import assign, with_law
 from trunnion.model.checks.check import check_model
 from trunnion.model.csv_table import TableFiles, place_findings, with_points
 from trunnion.model.entry import ReadOnlyDict
-from trunnion.model.findings import repair, schema_findings
-from trunnion.model.joint_parts import has_play, play
+from trunnion.model.findings import schema_findings
+from trunnion.model.joint_parts import Joint, Seat, has_play, play
 from trunnion.model.limits import DIGITS
-from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import nearest
-from trunnion.model.parameters import Location, Numbers
-from trunnion.model.parts import (
-    Contact,
-    Guide,
-    Joint,
-    Misalignment,
-    Motor,
-    Part,
-    Pin,
-    Seat,
-    Variation,
-)
+from trunnion.model.parameters import Numbers
+from trunnion.model.places import place_of
 from trunnion.model.tolerances import (
-    FORMULA,
     Price,
     Tolerance,
     correlation,
-    cost_paths,
     keep_limits,
     kept,
     prices,
@@ -62,15 +48,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Mechanism", "read_mechanism"]
 
-# Parts of a joint whose numbers can be set before the file states them.
-_JOINT_PARTS: Mapping[str, type[Part]] = {
-    "pin": Pin,
-    "guide": Guide,
-    "contact": Contact,
-    "misalignment": Misalignment,
-    "seat": Seat,
-}
-
 
 @strict_arguments
 class Mechanism(Numbers):
@@ -81,24 +58,13 @@ class Mechanism(Numbers):
     """
 
     def __init__(self, **data: Any) -> None:
-        """Validate and check; MechanismError with every finding of severity error."""
-        findings: list[Finding] = []
-        lost: frozenset[str] = frozenset()
+        """Validate and check; MechanismError with what is wrong: keys first, then names, then numbers."""
         try:
             super().__init__(**data)
         except ValidationError as error:
-            findings = schema_findings(error, Mechanism, data)
-            try:  # what can still be checked without the unreadable entries is, so that all is said in one go
-                mended, lost = repair(error, data, findings)
-                super().__init__(**mended)
-            except ValidationError:
-                raise MechanismError(findings) from None
-            sections = {field.alias or name for name, field in type(self).model_fields.items()}
-            if lost & sections:  # a whole section: the rest would speak of nothing else
-                raise MechanismError(findings) from None
-        result = self.__dict__["checked"] = check_model(self, lost)
-        findings += [finding for finding in result if finding.severity is Severity.ERROR]
-        if findings:
+            raise MechanismError(schema_findings(error, Mechanism, data)) from None
+        self.__dict__["checked"] = check_model(self)
+        if findings := [finding for finding in self.checked if finding.severity is Severity.ERROR]:
             raise MechanismError(findings)
 
     @cached_property
@@ -190,7 +156,7 @@ class Mechanism(Numbers):
 
         A tolerance in `joint_defaults` is one of each joint that has it: the joints vary independently.
         """
-        return written_limits(self.parameter_set)
+        return written_limits(self)
 
     def tolerated(self) -> list[Tolerance]:
         """Every number that varies, in the order of `parameters`: those of `tolerances`, and those stated with ±."""
@@ -224,9 +190,8 @@ class Mechanism(Numbers):
     def with_values(self, values: Mapping[str, float | str]) -> Mechanism:
         """The mechanism with some entries replaced, by names as in `parameters`; texts are read as in a file.
 
-        So are the choices `over_constraint`, `fits`, `joint_defaults.friction.model`, `joint_defaults.seat` and the
-        last two of a joint. Sizes, seat and misalignment of a joint, the error of a number and its tolerance, such as
-        `tolerances.AB` or one key of it, `tolerances.AB.cp`, need not be stated yet, nor `at` and `over` of a measure.
+        A name may be that of any key that the file may state, stated or not: `fits`, `joint_defaults.seat`,
+        `B.pin.clearance`, `A.motor.limit`, `errors.AB`, `tolerances.AB` or one key of it, `tolerances.AB.cp`.
         `measures.NAME.limit` is one text, and so is `measures.NAME.over`, such as "10 deg, 50 deg".
         """
         data = self.data()
@@ -236,7 +201,7 @@ class Mechanism(Numbers):
     def _replace(self, values: Mapping[str, float | str], data: dict[str, Any]) -> None:
         """Put values into plain data of this mechanism, or of one whose numbers have the same names."""
         for name, value in values.items():
-            location = self._location(name)
+            _, location = place_of(self, name)
             window = isinstance(value, str) and location[0] == "measures" and location[-1] == "over"
             put: Any = [end.strip() for end in str(value).strip("[] ").split(",")] if window else value
             assign(data, location, put, self.coordinates)
@@ -244,127 +209,7 @@ class Mechanism(Numbers):
 
     def path_of(self, name: str) -> str:
         """The path of the number that a name means in `with_values`, stated or not; MechanismError if it means none."""
-        try:
-            return self.parameter_set.resolve(name)
-        except MechanismError:
-            entry = self._unstated(name)
-            part = any(
-                f".{name}." in f".{stated_path}" for stated_path in self.parameter_set.entries
-            )  # of which some number is stated
-            if not entry and not part and (path := not_stated(self, name)):
-                remedy = "write it into the model file: then this name changes it"
-                raise MechanismError(Finding(f"the model states no {path}", name, remedy)) from None
-            if not entry:
-                raise
-            return entry[0]
-
-    def _location(self, name: str) -> Location:
-        """Where what a name means stands, or would stand; MechanismError if it means nothing."""
-        choice = self._choice(name) or self._limits(name) or self._price(name)
-        if choice:
-            return choice
-        entry = self.parameter_set.entries.get(self.path_of(name))
-        if entry and entry.is_limit:
-            remedy = f"set {entry.where}, as ±0.1 deg or +0.2/-0.1 deg"
-            raise MechanismError(Finding("a limit is stated with the other", name, remedy))
-        if entry:
-            return entry.location
-        unstated = self._unstated(name)
-        assert unstated is not None  # or it would have no path
-        return unstated[1]
-
-    def _choice(self, name: str) -> Location | None:
-        """Where a choice among words stands; None if the name is of a number."""
-        if name in ("over_constraint", "fits"):
-            return (name,)
-        for choice in ("friction.model", "seat", "pin.fit"):
-            holder = self._holder(name.removesuffix(f".{choice}")) if name.endswith(f".{choice}") else None
-            if holder:
-                return (*holder, *choice.split("."))
-        return None
-
-    def _limits(self, name: str) -> Location | None:
-        """Where limits or place of a measure, limits or another key of a tolerance stand; None if not meant."""
-        section, _, rest = name.partition(".")
-        of, _, key = rest.rpartition(".")
-        if section == "measures" and of in self.measures and key in ("limit", "at", "over"):
-            return (section, of, key)
-        if section != "tolerances":
-            return None
-        if key not in Variation.model_fields or not of:
-            of, key = rest, "limits"
-        try:
-            path = self.parameter_set.resolve(of)
-        except MechanismError as error:
-            raise MechanismError([replace(item, where=name) for item in error.findings]) from None
-        names = (item for item in self.variations if self.parameter_set.resolve(item) == path)
-        of = next(names, of)
-        short = key == "limits" and (of not in self.variations or self.variations[of].model_fields_set == {"limits"})
-        return (section, of) if short else (section, of, key)
-
-    def _price(self, name: str) -> Location | None:
-        """Where a number of a cost stands, or would stand, by any name of what it is a cost of; None if not meant."""
-        section, _, rest = name.partition(".")
-        of, _, key = rest.rpartition(".")
-        if section != "costs" or key not in (*FORMULA, "least", "most"):
-            return None
-        try:
-            path = self.parameter_set.resolve(of)
-        except MechanismError:
-            path = ""
-        names = [cost for cost in self.costs if cost == of or (path and path in cost_paths(self, cost))]
-        return (section, names[0], key) if names else None
-
-    def _unstated(self, name: str) -> tuple[str, Location] | None:
-        """Path and place of the error of a number, or of a number of a joint, that the file may state and does not."""
-        if name.startswith("errors."):
-            named = name.removeprefix("errors.")
-            try:
-                return f"errors.{self.parameter_set.resolve(named)}", ("errors", named)
-            except MechanismError as error:
-                raise MechanismError([replace(finding, where=name) for finding in error.findings]) from None
-        for part, kind in _JOINT_PARTS.items():
-            before, middle, rest = name.rpartition(f".{part}.")
-            holder = self._holder(before) if middle else None
-            key, *below = rest.split(".")
-            if (
-                not holder
-                or key not in kind.model_fields
-                or (holder == ("joint_defaults",) and part in ("misalignment", "contact"))
-            ):
-                continue
-            owner = before if before.startswith("joint") and before not in self.stated_joints else f"joints.{before}"
-            path = f"{owner}.{part}.{rest}"
-            if key == "direction" and below in (["x"], ["y"], ["z"]):
-                return path, (*holder, part, key, "xyz".index(below[0]))
-            return None if below or key in ("fit", "direction", "law") else (path, (*holder, part, key))
-        before, middle, key = name.rpartition(".motor.")
-        driver = before.removeprefix("drivers.")
-        if middle and key in Motor.model_fields and driver in self.drivers and self.drivers[driver].motor is not None:
-            return f"drivers.{driver}.motor.{key}", ("drivers", driver, "motor", key)
-        if name == "joint_defaults.friction":  # as a file has it: a plain number is the coefficient
-            name += ".coefficient"
-        before, middle, key = name.rpartition(".friction.")
-        if before == "joint_defaults" and key in FRICTION_LAWS[self._default_law].parameters:
-            return name, (before, "friction", key)
-        return None
-
-    @property
-    def _default_law(self) -> str:
-        """The friction law of joints that state none."""
-        friction = self.joint_defaults.friction
-        return (friction and friction.law) or DEFAULT_LAW
-
-    def _holder(self, name: str) -> Location | None:
-        """Where `joint_defaults`, or a joint by its name or path, stands."""
-        joint = name.removeprefix("joints.")
-        if joint in self.stated_joints:
-            return self._joint_location(joint)
-        return ("joint_defaults",) if name == "joint_defaults" else None
-
-    def _joint_location(self, joint: str) -> Location:
-        rows = [row.joint for row in self.loop]
-        return ("loop", rows.index(joint)) if joint in rows else ("joints", joint)
+        return place_of(self, name)[0] or self.parameter_set.resolve(name)
 
     def with_table(self, name: str, path: str | os.PathLike[str]) -> Mechanism:
         """The mechanism with the points of a driver or table replaced by the two columns of a CSV file.
@@ -393,9 +238,7 @@ class Mechanism(Numbers):
             changed = self.with_values(values) if values else self
             return Mechanism(**kept(changed, with_law(changed.data(), law)))
         data = with_law(self.data(), law)
-        if values:
-            # names are those of a mechanism that states all parameters of the law, as it does with the values
-            Mechanism(**kept(self, with_law(self.data(), law, complete=True)))._replace(values, data)
+        self._replace(values or {}, data)
         return Mechanism(**kept(self, data))
 
     def with_seats(self, seat: str) -> Mechanism:
@@ -454,26 +297,9 @@ class Mechanism(Numbers):
     @cached_property
     def digest(self) -> str:
         """Hash of the content, 16 hexadecimal digits: equal mechanisms have equal digests."""
-        data = self.model_dump(mode="json", by_alias=True)
-        for measure in data["measures"].values():
-            for key in [key for key, value in measure.items() if value is None and key not in HASHED]:
-                del measure[key]
-        for driver in data["drivers"].values():  # nor for those that analyses of a prescribed motion do not know
-            for key in [key for key in ("free", "motor", "initial") if not driver[key]]:
-                del driver[key]
-        for spring in data["springs"].values():  # the hash of a spring is older than what may make it useful
-            if not spring["useful"]:
-                del spring["useful"]
+        data = self.model_dump(mode="json", by_alias=True, exclude_defaults=True)
         text = json.dumps(_canonical(data), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-# keys of a measure that count in the hash unset too: it is not to change with what a measure may be besides
-HASHED = (
-    *("point", "axis", "path_error", "straightness", "angle", "rotation", "slide", "transmission_error", "stroke"),
-    *("dead_centre", "rate", "effort", "load", "reaction", "efficiency", "locking_margin"),
-    *("at", "as", "over", "limit", "at_least", "at_most"),
-)
 
 
 class WorkedOut(dict[str, Any]):

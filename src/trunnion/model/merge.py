@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Literal
 
-import numpy as np
 from pydantic import BaseModel
 
 from trunnion.algebra.namespace import Number
@@ -35,6 +34,7 @@ __all__ = ["DEFAULT_LAW", "FitChoice", "merge_joint", "stated"]
 
 DEFAULT_LAW = "coulomb"
 NO_FRICTION = Quantity(0)
+RADII = {"radius", "hole_radius", "clearance"}  # what a fit states
 FitChoice = Literal["minimum", "mean", "maximum"]
 
 
@@ -51,9 +51,8 @@ def merge_joint(
     """
     pin, guide = joint.pin, joint.guide
     if has_pin(joint.type) and (pin or defaults.pin):
-        default = {
-            key: quantity for key, quantity in stated(defaults.pin).items() if key != "end_float" or _floats(joint)
-        }
+        floats = PAIRS[joint.type].pivot
+        default = {key: size for key, size in stated(defaults.pin).items() if key != "end_float" or floats}
         pin = Pin(**_pin(default, stated(pin), limits, dimensions or {}))
     if has_guide(joint.type) and (guide or defaults.guide):
         guide = Guide(**{**stated(defaults.guide), **stated(guide)})
@@ -77,25 +76,14 @@ def stated(part: BaseModel | None) -> Mapping[str, Any]:
     return {} if part is None else {key: getattr(part, key) for key in sorted(part.model_fields_set)}
 
 
-def _floats(joint: Joint) -> bool:
-    """Whether a default end float means this joint."""
-    return PAIRS[joint.type].pivot
-
-
 def _pin(
     default: Mapping[str, Any], own_pin: Mapping[str, Any], limits: FitChoice, dimensions: Mapping[str, Number]
 ) -> dict[str, Any]:
     """A pin's own values over the defaults; one way to state the play replaces the others."""
-    if "fit" in own_pin:
-        default = {
-            key: quantity for key, quantity in default.items() if key not in ("radius", "hole_radius", "clearance")
-        }
-    elif own_pin.keys() & {"radius", "hole_radius", "clearance"}:
-        default = {key: quantity for key, quantity in default.items() if key != "fit"}
-    for key, other in (("clearance", "hole_radius"), ("hole_radius", "clearance")):
-        if key in own_pin and other not in own_pin:
-            default = {name: quantity for name, quantity in default.items() if name != other}
-    merged = {**default, **own_pin}
+    instead = {"fit": RADII, "radius": {"fit"}}
+    instead |= {"clearance": {"fit", "hole_radius"}, "hole_radius": {"fit", "clearance"}}
+    replaced = {other for key in own_pin for other in instead.get(key, ())}
+    merged = {**{key: size for key, size in default.items() if key not in replaced}, **own_pin}
     if merged.get("fit"):
         for key, radius in _radii(merged["fit"], limits, dimensions).items():
             merged[key] = merged.get(key) or radius
@@ -105,11 +93,9 @@ def _pin(
 def _radii(stated_fit: Fit, limits: FitChoice, dimensions: Mapping[str, Number]) -> dict[str, Quantity]:
     """Radii of pin and hole of a fit with their tolerances; half the size for the pin alone where it has no limits."""
     size = stated_fit.size
-    evaluable = set(size.names) <= dimensions.keys()
-    value = float(size.evaluate(dimensions)) if evaluable else np.nan
     try:
-        fit_limits = fit(value, stated_fit.hole, stated_fit.shaft)
-    except MechanismError:  # a finding of its own
+        fit_limits = fit(float(size.evaluate(dimensions)), stated_fit.hole, stated_fit.shaft)
+    except (MechanismError, KeyError):  # a finding of its own
         return {"radius": _half(size, 0.0, None)}
     radii = {}
     # the smallest play is that of the largest pin in the smallest hole

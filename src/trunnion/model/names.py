@@ -99,22 +99,14 @@ class ParameterNames:
             return paths[0]
         if not paths and name.startswith(ERRORS):
             return self._error(name)
-        if paths:
-            examples = ", ".join(paths[:6]) + (", …" if len(paths) > 6 else "")
-            raise MechanismError(
-                Finding(f"the name '{name}' stands for {len(paths)} numbers", remedy=f"say which: {examples}")
-            )
-        below = [path for path in self.paths if f".{path}.".find(f".{name}.") >= 0]
+        below = [path for path in self.paths if f".{name}." in f".{path}."]
         short = [path for path in below if path.endswith(f"{name}.{SHORT_FORM}")]
         if len(short) == 1 and name.endswith("friction"):  # `friction: 0.1` in a file is the coefficient, so here too
             return short[0]
-        if below and name == "friction":
-            joint = next(path for path in below if path.startswith("joints.")).split(".")[1]
-            remedy = f"set joint_defaults.friction, or that of one joint, such as {joint}.friction"
-            raise MechanismError(Finding(f"'{name}' is not one number", remedy=remedy))
-        if below:
-            examples = ", ".join(below[:6]) + (", …" if len(below) > 6 else "")
-            raise MechanismError(Finding(f"'{name}' is not one number", remedy=f"set one of {examples}"))
+        if several := paths or below:
+            examples = ", ".join(several[:6]) + (", …" if len(several) > 6 else "")
+            what = f"the name '{name}' stands for {len(several)} numbers: it is not one number"
+            raise MechanismError(Finding(what, remedy=f"say which: {examples}"))
         dimensions = [path.partition(".")[2] for path in self.paths if path.startswith("dimensions.")]
         # a short name is most likely a mistyped dimension; endings such as `x` resemble everything
         every = [*self.paths, *self.endings]

@@ -13,23 +13,23 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
-import numpy as np
 from pydantic import BaseModel
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.entry import ReadOnlyDict
-from trunnion.model.expression import MOTION, PLACED, RESERVED
+from trunnion.model.expression import MOTION, PLACED
 from trunnion.model.fields import Fields
+from trunnion.model.joint_parts import Contact, Friction, Joint, Losses, freedoms
 from trunnion.model.limits import Limits
-from trunnion.model.measure_kinds import course_kind, dimension_kinds, drive_kind, figure_kind, is_place, place_kind
-from trunnion.model.measure_table import Measure
+from trunnion.model.measure_units import course_kind, dimension_kinds, drive_kind, figure_kind, is_place, place_kind
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import ERRORS, ParameterNames
-from trunnion.model.parts import AT, Contact, Driver, Friction, Gear, Joint, Losses, Point, freedoms
+from trunnion.model.parts import AT, Driver, Gear, Point
 from trunnion.model.quantity import Quantity, evaluation_order
 from trunnion.model.rules import Within, markers
+from trunnion.model.tolerance_parts import Variation
 from trunnion.model.units import ANY, KINDS, Kind, unit
 
 __all__ = [
@@ -40,7 +40,7 @@ __all__ = [
     "dimension_errors",
     "entries",
     "measured",
-    "placed_measures",
+    "walk",
 ]
 
 Location = tuple[str | int, ...]
@@ -112,49 +112,38 @@ def entries(mechanism: Fields) -> list[Entry]:
 
 def _numbers(mechanism: Fields) -> Iterator[Entry]:
     """Every number of a mechanism but its errors."""
-    yield from _walk(mechanism.dimensions, "dimensions", ("dimensions",))
-    for entry in _walk(mechanism.joint_defaults, "joint_defaults", ("joint_defaults",)):
+    yield from walk(mechanism.dimensions, "dimensions", ("dimensions",))
+    for entry in walk(mechanism.joint_defaults, "joint_defaults", ("joint_defaults",)):
         friction = mechanism.joint_defaults.friction if entry.location[1] == "friction" else None
         yield _of_law(friction, entry) if friction else entry
     zero = Quantity(0, KINDS["acceleration"])
     size = mechanism.coordinates
-    yield from _walk(mechanism.gravity or (zero,) * size, "gravity", ("gravity",))
+    yield from walk(mechanism.gravity or (zero,) * size, "gravity", ("gravity",))
     for name, link in mechanism.effective_links.items():
-        for entry in _walk(link, f"links.{name}", ("links", name)):
+        for entry in walk(link, f"links.{name}", ("links", name)):
             if size == 2 or entry.location[-1] != "inertia" or "inertia" in link.model_fields_set:
                 yield entry  # a spatial link has a tensor or nothing, never one number
         if link.centre is None:
             origin = (Quantity(0, KINDS["length"]),) * size
-            yield from _walk(origin, f"links.{name}.centre", ("links", name, "centre"))
+            yield from walk(origin, f"links.{name}.centre", ("links", name, "centre"))
     for row, loop_joint in enumerate(mechanism.loop):
         for key in ("twist", "distance", "slide", "rotation"):
-            yield from _walk(getattr(loop_joint, key), f"loop.{loop_joint.joint}.{key}", ("loop", row, key))
+            yield from walk(getattr(loop_joint, key), f"loop.{loop_joint.joint}.{key}", ("loop", row, key))
     for name, joint in mechanism.effective_joints.items():
         yield from _joint_entries(mechanism, name, joint)
-    placed = placed_measures(mechanism)
+    moving = {*MOTION, *mechanism.tables}
     for section in ("gears", "drivers", "tables", "loads", "springs", "assembly", "measures"):
         for name, part in getattr(mechanism, section).items():
             complete = part.complete() if isinstance(part, Driver | Gear) else part
-            for entry in _walk(complete, f"{section}.{name}", (section, name)):
-                kind = _narrow(mechanism, section, name, entry)
-                moving = {*MOTION, *mechanism.tables}
-                quantity = _of_motion(entry.quantity, placed) if section == "loads" else entry.quantity
-                varies = section == "loads" and any(
-                    operand in moving or PLACED in operand for operand in quantity.names
-                )
+            for entry in walk(complete, f"{section}.{name}", (section, name)):
+                spoken = entry.quantity.names if section == "loads" else ()
+                varies = any(operand in moving or PLACED in operand for operand in spoken)
                 signed = section == "springs" and part.between is None and entry.location[-1] == "free_length"
                 rules = () if signed else entry.rules  # a length along a slide has a sign
-                yield replace(entry, quantity=quantity, kind=kind, varies=varies, rules=rules)
+                yield replace(entry, kind=_narrow(mechanism, section, name, entry), varies=varies, rules=rules)
 
 
-def _of_motion(quantity: Quantity, placed: Mapping[str, str]) -> Quantity:
-    """A quantity of a load that speaks of motions by the names of results where it speaks of measures."""
-    if quantity.expression is None or placed.keys().isdisjoint(quantity.names):
-        return quantity
-    return replace(quantity, expression=quantity.expression.renamed(placed))
-
-
-def _walk(value: object, path: str, location: Location, rules: Rules = ()) -> Iterator[Entry]:
+def walk(value: object, path: str, location: Location, rules: Rules = ()) -> Iterator[Entry]:
     """The quantities below a part of the model; coordinates are x, y, z and the position of a point is itself.
 
     rules: those of the field.
@@ -164,21 +153,24 @@ def _walk(value: object, path: str, location: Location, rules: Rules = ()) -> It
             yield Entry(path, location, value, value.kind, rules=rules)
         case Limits():
             for key in LIMITS:
-                yield from _walk(getattr(value, key), f"{path}.{key}", (*location, key))
+                yield from walk(getattr(value, key), f"{path}.{key}", (*location, key))
         case BaseModel():
             extra = value.parameters.items() if isinstance(value, Friction) else ()
             field_rules = markers(type(value))
             for key, item in (*((key, getattr(value, key)) for key in type(value).model_fields), *extra):
                 if item is None or isinstance(item, str):
                     continue  # most of what could be stated is not
-                below = path if isinstance(value, Point) and key == "at" else f"{path}.{key}"
-                yield from _walk(item, below, (*location, key), field_rules.get(key, ()))
+                itself = (isinstance(value, Point) and key == "at") or (
+                    isinstance(value, Variation) and key == "limits"
+                )
+                below = path if itself else f"{path}.{key}"
+                yield from walk(item, below, (*location, key), field_rules.get(key, ()))
         case Mapping():
             for key, item in value.items():
-                yield from _walk(item, f"{path}.{key}", (*location, key))
+                yield from walk(item, f"{path}.{key}", (*location, key))
         case tuple():
             for index, item in enumerate(value):
-                yield from _walk(item, f"{path}.{item_name(location, index)}", (*location, index))
+                yield from walk(item, f"{path}.{item_name(location, index)}", (*location, index))
 
 
 # of anything but coordinates
@@ -208,12 +200,12 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
     """Numbers of a joint with its defaults: what is not its own follows `joint_defaults`."""
     rows = [row.joint for row in mechanism.loop]
     location: Location = ("loop", rows.index(name)) if name in rows else ("joints", name)
-    yield from _walk(joint.pitch, f"joints.{name}.pitch", (*location, "pitch"), markers(Joint)["pitch"])
+    yield from walk(joint.pitch, f"joints.{name}.pitch", (*location, "pitch"), markers(Joint)["pitch"])
     for key in ("pin", "guide", "friction", "losses", "stiffness", "seat"):
         part, default = getattr(joint, key), getattr(mechanism.joint_defaults, key, None)
         place = f"joints.{name}.{key}"
-        shared = {number.path: number.quantity for number in _walk(default, place, ())}
-        for entry in _walk(part, place, (*location, key)):
+        shared = {number.path: number.quantity for number in walk(default, place, ())}
+        for entry in walk(part, place, (*location, key)):
             if isinstance(part, Friction):
                 entry = _of_law(part, entry)
             elif isinstance(part, Losses):
@@ -221,7 +213,7 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
             follows = shared.get(entry.path) is entry.quantity
             alias = f"joint_defaults.{entry.path.removeprefix(f'joints.{name}.')}" if follows else ""
             yield replace(entry, alias=alias)
-    for entry in _walk(joint.contact, f"joints.{name}.contact", (*location, "contact")):
+    for entry in walk(joint.contact, f"joints.{name}.contact", (*location, "contact")):
         stiff = entry.location[-1] == "stiffness"
         yield replace(entry, kind=_contact_stiffness(joint.contact)) if stiff and joint.contact else entry
     yield from _misalignment(joint, f"joints.{name}.misalignment", (*location, "misalignment"))
@@ -234,7 +226,7 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
 def _misalignment(joint: Joint, path: str, location: Location) -> Iterator[Entry]:
     """How the axis of a joint lies off; the direction of its offset follows that of its tilt while it has no own."""
     misalignment = joint.misalignment
-    yield from _walk(misalignment, path, location)
+    yield from walk(misalignment, path, location)
     if misalignment and misalignment.towards and misalignment.offset_towards is None:
         towards = misalignment.towards
         yield Entry(f"{path}.offset_towards", (*location, "offset_towards"), towards, towards.kind, f"{path}.towards")
@@ -319,11 +311,9 @@ def measured(mechanism: Fields, entries: Iterable[Entry]) -> dict[str, Kind]:
 
 
 class ParameterSet:
-    """The numbers of one mechanism, compiled; `unreadable` paths are nan and so is what depends on them."""
+    """The numbers of one mechanism, compiled."""
 
-    def __init__(
-        self, entries: Iterable[Entry], dimensions: Mapping[str, Quantity], unreadable: Iterable[str] = ()
-    ) -> None:
+    def __init__(self, entries: Iterable[Entry], dimensions: Mapping[str, Quantity]) -> None:
         listed = list(entries)
         order, _ = evaluation_order(dimensions, dimension_errors(listed))
         place = {f"dimensions.{name}": rank for rank, name in enumerate(order)}
@@ -337,7 +327,6 @@ class ParameterSet:
         listed.sort(key=rank)  # stable: the rest keeps its order
         self.entries: dict[str, Entry] = {entry.path: entry for entry in listed}
         self.names = ParameterNames(self.entries)
-        self._unreadable = frozenset(unreadable)
         numbers = [entry for entry in self.entries.values() if not entry.varies]
         self._dependent = [entry for entry in numbers if entry.depends]
         self._ideal = {entry.path: 0.0 for entry in numbers if _is_error(entry.path)}
@@ -392,18 +381,8 @@ class ParameterSet:
                 touched.add(entry.path)
         return values
 
-    def is_unreadable(self, path: str) -> bool:
-        """Whether the path was given as one without a value."""
-        return path in self._unreadable
-
     def _evaluate(self, entry: Entry, values: dict[str, Number], names: dict[str, Number]) -> None:
-        value: Number
-        if entry.path in self._unreadable:
-            value = np.nan
-        elif entry.alias:
-            value = values[entry.alias]
-        else:
-            value = entry.quantity.evaluate(names)
+        value = values[entry.alias] if entry.alias else entry.quantity.evaluate(names)
         if entry.error:
             value = value + values[entry.error]
         _put(entry.path, value, values, names)
@@ -428,26 +407,6 @@ def _is_error(path: str) -> bool:
     return misaligned or path.startswith(ERRORS)
 
 
-def placed_measures(mechanism: Fields) -> dict[str, str]:
-    """Measures that are a place or a speed at every position, by the names that a load has for these."""
-    others = {*RESERVED, *MOTION, *mechanism.tables, *mechanism.dimensions}
-    measures = {name: _placed(mechanism, measure) for name, measure in mechanism.measures.items() if name not in others}
-    return {name: placed for name, placed in measures.items() if placed}
-
-
-def _placed(mechanism: Fields, measure: Measure) -> str:
-    if measure.at is not None or measure.over is not None or measure.statistic or measure.along:
-        return ""
-    joint = mechanism.effective_joints.get(measure.subject)
-    if measure.kind in ("rotation", "slide"):
-        return f"{measure.subject}{PLACED}{measure.kind}"
-    if measure.kind == "rate" and joint is not None:
-        freedom = "rotation" if "rotation" in freedoms(joint.type) else "slide"
-        return f"{measure.subject}{PLACED}{freedom}_velocity"
-    component = {"point": "", "velocity": "velocity_"}.get(measure.kind)
-    return f"{measure.subject}{PLACED}{component}{measure.axis}" if component is not None and measure.axis else ""
-
-
 class Numbers(Fields):
     """A model with its numbers by path. Checks, tolerances and prices read it; `Mechanism` is one that is sound."""
 
@@ -455,6 +414,11 @@ class Numbers(Fields):
     def entries(self) -> tuple[Entry, ...]:
         """Every number of the mechanism and where it stands, defaults filled in; see `model.parameters.entries`."""
         return tuple(entries(self))
+
+    @cached_property
+    def parameter_names(self) -> ParameterNames:
+        """Their names, also where not every number has a value."""
+        return ParameterNames(entry.path for entry in self.entries)
 
     @cached_property
     def parameter_set(self) -> ParameterSet:

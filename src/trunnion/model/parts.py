@@ -26,24 +26,7 @@ from pydantic_core import CoreSchema
 
 from trunnion.joints.motion import MOTION_LAWS, MotionLaw
 from trunnion.joints.motors import MOTORS, MotorKind
-from trunnion.model.entry import FORMS, Direction, Name, Part, Position, forms, known, shape
-from trunnion.model.joint_parts import (
-    FRICTION_MODELS,
-    JOINT_TYPES,
-    Contact,
-    Fit,
-    Friction,
-    Guide,
-    Joint,
-    JointDefaults,
-    LoopJoint,
-    Losses,
-    Misalignment,
-    Pin,
-    Seat,
-    freedoms,
-)
-from trunnion.model.measure_table import Measure
+from trunnion.model.entry import Direction, Name, Part, Position, forms, known, shape
 from trunnion.model.quantity import (
     Angle,
     AngleOrLength,
@@ -63,48 +46,24 @@ from trunnion.model.quantity import (
     Time,
 )
 from trunnion.model.rules import InSpace, NotNegative, NotZero, OnlyWith, Positive, Refers, Rising, Selects, Within
-from trunnion.model.tolerance_parts import Correlation, Cost, CostOption, Variation, VariationDefaults
 from trunnion.model.units import KINDS
 
 __all__ = [
     "AT",
     "FOLDS",
-    "FORMS",
-    "FRICTION_MODELS",
-    "JOINT_TYPES",
     "USUAL_PRESSURE_ANGLE",
-    "Contact",
-    "Correlation",
-    "Cost",
-    "CostOption",
     "Driver",
-    "Fit",
-    "Friction",
     "Gear",
-    "Guide",
     "Hint",
     "InertiaTensor",
     "Initial",
-    "Joint",
-    "JointDefaults",
     "Link",
     "Load",
-    "LoopJoint",
-    "Losses",
-    "Measure",
-    "Misalignment",
     "Motor",
-    "Name",
-    "Part",
-    "Pin",
     "Point",
     "PolarPoint",
-    "Seat",
     "Spring",
     "Table",
-    "Variation",
-    "VariationDefaults",
-    "freedoms",
 ]
 
 _check_motion, _schema_motion = known(tuple(MOTION_LAWS), "motion law")

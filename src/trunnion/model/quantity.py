@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
 from graphlib import CycleError, TopologicalSorter
@@ -44,7 +43,6 @@ __all__ = [
     "Stiffness",
     "Time",
     "TorsionalStiffness",
-    "deviation_spans",
     "evaluation_order",
     "nominal_dimensions",
     "term",
@@ -71,7 +69,7 @@ class Quantity:
     def read(cls, source: object, kind: Kind = ANY) -> Quantity:
         """A quantity from a number (SI) or a text; UnitError if it is none or of the wrong kind."""
         if isinstance(source, Quantity):
-            if source is UNREADABLE or source.kind == kind:
+            if source.kind == kind:
                 return source
             source = source.source
         if isinstance(source, (bool, np.bool_)) or not isinstance(source, (int, float, str, np.number)):
@@ -89,6 +87,11 @@ class Quantity:
     def names(self) -> tuple[str, ...]:
         """The dimensions its expression speaks of."""
         return self.expression.names if self.expression else ()
+
+    @property
+    def alone(self) -> float | str:
+        """It as written, without the limits that stand with it."""
+        return _split(normalise(self.source), self.kind)[0].strip() if isinstance(self.source, str) else self.source
 
     def evaluate(self, values: Mapping[str, Number] | None = None) -> Number:
         """The value in SI, from those of `names`: floats, arrays (sample, 1) or duals; nan or inf where undefined."""
@@ -114,19 +117,10 @@ class Quantity:
             assert dimension is not None  # None fits every kind
             raise UnitError(
                 f"'{self.source}' is {dimension_text(dimension)} where {_needed(kind)} is needed",
-                f"write {self.respelt(kind) or f'{_needed(kind)} such as {kind.example}'}"
+                f"write {_needed(kind)} such as {kind.example}"
                 + ("; a percentage of another value is not read" if "%" in str(self.source) else ""),
             )
         return dimension
-
-    def respelt(self, kind: Kind | None = None) -> str:
-        """What is likely meant where it is no quantity of its kind: 10 lbf in by 10 lb-in, 100 lbf by 100 lb."""
-        spaced = re.sub(r"(?<=[^\W\d_])-(?=[^\W\d_])", " ", str(self.source))
-        for text in (spaced, re.sub(r"\b(lb|oz|kg|g)s?\b", r"\1f", spaced)):
-            with suppress(UnitError):
-                if text != self.source and not Quantity.read(text, kind or self.kind).names:
-                    return text
-        return ""
 
 
 @lru_cache(maxsize=4096)
@@ -143,12 +137,9 @@ def _read_text(text: str, kind: Kind) -> tuple[tuple[float, float] | None, Expre
     quantity = Quantity(text, kind, tolerance, expression)
     if not expression.names:
         quantity.check({})
-        _finite(quantity.evaluate(), text)
+        if not np.isfinite(value := quantity.evaluate()):
+            raise UnitError(f"'{text}' has no finite value ({value})", "check divisions and roots")
     return tolerance, expression
-
-
-# Stands for a quantity that could not be read while the rest of the model is checked; every check passes over it.
-UNREADABLE = Quantity(math.nan)
 
 
 def _needed(kind: Kind) -> str:
@@ -173,11 +164,6 @@ def _plain(number: Any) -> float:
     return value  # type: ignore[no-any-return]
 
 
-def _finite(value: Number, source: str) -> None:
-    if not np.isfinite(value):
-        raise UnitError(f"'{source}' has no finite value ({value})", "check divisions and roots")
-
-
 def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
     """Value text and tolerance in SI; a unit stated once serves the value and the tolerance."""
     if match := _SYMMETRIC.match(text):
@@ -195,8 +181,7 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
     unit_of_value = value["unit"] or "" if value else ""
     unit = next((named for _, named in reversed(terms) if named), unit_of_value)
     if value and unit == "%" and unit_of_value != unit:
-        shares = ", ".join(f"{number.lstrip('+')} % is {_share(number, value)}" for number, _ in terms)
-        raise UnitError(f"the tolerance in '{text}' is in percent, the value is not", f"write the deviation: {shares}")
+        raise UnitError(f"the tolerance in '{text}' is in percent, the value is not", "write the deviation itself")
     if value and not unit_of_value and unit:
         main = f"{main.strip()} {unit}"
     if not unit and not value and kind.dimensions != KINDS["number"].dimensions:
@@ -221,19 +206,6 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
             raise UnitError(f"the tolerance in '{text}' has a sign after ±", "write ± 0.05 mm")
         deviations.append(-deviations[0])
     return main, (min(deviations), max(deviations))
-
-
-def _share(percent: str, value: re.Match[str]) -> str:
-    """A deviation in percent of a value, as it is to be written."""
-    share = float(percent) / 100 * float(value["number"])
-    return f"{share:.6g} {value['unit'] or ''}".strip()
-
-
-def deviation_spans(text: str) -> list[tuple[int, int]]:
-    """Where the deviations of a tolerance, with their signs, stand in a text of plain signs; empty if it has none."""
-    if match := _SYMMETRIC.match(text):
-        return [match.span(2)]
-    return [match.span(2), match.span(3)] if (match := _LIMITS.match(text)) else []
 
 
 def term(text: str) -> tuple[str, str]:
@@ -320,12 +292,9 @@ def evaluation_order(
 
 
 def nominal_dimensions(dimensions: Mapping[str, Quantity]) -> dict[str, Number]:
-    """The dimensions without errors; nan where one has no value."""
-    order, circles = evaluation_order(dimensions)
-    lost = {name for circle in circles for name in circle}
+    """The dimensions without errors; those without a value, which are findings of their own, left out."""
     names: dict[str, Number] = {}
-    for name in order:
-        quantity = dimensions[name]
-        sound = name not in lost and set(quantity.names) <= names.keys()
-        names[name] = quantity.evaluate(names) if sound else np.nan
+    for name in evaluation_order(dimensions)[0]:
+        if set(dimensions[name].names) <= names.keys():
+            names[name] = dimensions[name].evaluate(names)
     return names

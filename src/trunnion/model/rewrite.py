@@ -5,36 +5,24 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Iterator, Mapping
 from io import StringIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import YAMLError
-from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
-from trunnion.model.file import composed, entries_of, read_entries, text_of
+from trunnion.model.file import composed, entries_of, read_entries, text_of, yaml_writer
 from trunnion.model.mechanism import Mechanism, read_mechanism
 from trunnion.model.text import OF_A_FILE, stated_files
 
 __all__ = ["changed_text", "rewrite_mechanism"]
 
 YAMLS = (".yaml", ".yml")
-Location = tuple[str | int, ...]
-
-
-class Renamed(NamedTuple):
-    """The new name of an entry."""
-
-    name: str
-
-
-class Gone(NamedTuple):
-    """Of an entry that is left out."""
+Edit = tuple[int, int, str]  # from where to where a text is replaced, and by what
 
 
 def rewrite_mechanism(
@@ -49,12 +37,12 @@ def rewrite_mechanism(
         raise MechanismError(Finding("is the model itself", str(path), "name another file, or add --force"))
     both_yaml = {source.suffix.lower(), path.suffix.lower()} <= set(YAMLS)
     same_folder = source.resolve().parent == path.resolve().parent
+    text = _edited_source(mechanism, source, same_folder) if both_yaml else None
     with whole(path) as temporary:
-        for text in _texts(mechanism, source, same_folder) if both_yaml else ():
+        if text is not None:
             temporary.write_text(text, encoding="utf-8", newline="\n")
-            if _holds(temporary, mechanism):
-                return
-        mechanism.write(temporary)  # a way of writing that was not foreseen: without the comments then
+        if text is None or not _holds(temporary, mechanism):  # a way of writing that was not foreseen
+            mechanism.write(temporary)
 
 
 def changed_text(text: str, after: Mapping[str, Any]) -> str:
@@ -63,16 +51,11 @@ def changed_text(text: str, after: Mapping[str, Any]) -> str:
     MechanismError if the text cannot be read.
     """
     before = entries_of(text)[0]
-    if before == after:
-        return text
-    for change in (_edited, _rewritten):
-        try:
-            edited = change(text, before, after)
-            if edited is not None and entries_of(edited)[0] == after:
-                return edited
-        except (MechanismError, YAMLError, ValueError, TypeError, LookupError):
-            continue  # a way of writing that was not foreseen
-    return text_of(after)
+    edited = _edited(text, before, after)
+    try:
+        return edited if edited is not None and entries_of(edited)[0] == after else text_of(after)
+    except MechanismError:  # a way of writing that was not foreseen
+        return text_of(after)
 
 
 def _holds(path: Path, mechanism: Mechanism) -> bool:
@@ -82,22 +65,17 @@ def _holds(path: Path, mechanism: Mechanism) -> bool:
         return False
 
 
-def _texts(mechanism: Mechanism, source: Path, same_folder: bool) -> Iterator[str]:
-    """Texts of the mechanism that are to be tried, the one that is most like the source first.
+def _edited_source(mechanism: Mechanism, source: Path, same_folder: bool) -> str | None:
+    """The text of the source with what is different in the mechanism; None if it cannot be had.
 
     same_folder: whether it is to stand in the folder of the source, where the files are that this names.
     """
     try:
         text, before = source.read_text("utf-8"), read_mechanism(source).data()
         _name_files(before, mechanism.data(), source, same_folder)
-        edited = _edited(text, before, mechanism.data())
-    except (MechanismError, YAMLError, OSError, ValueError, TypeError, LookupError):
-        return
-    if edited is not None:
-        yield edited
-    again = _rewritten(text, before, mechanism.data())
-    if again is not None:
-        yield again
+    except (MechanismError, OSError, ValueError):
+        return None
+    return _edited(text, before, mechanism.data())
 
 
 def _name_files(before: dict[str, Any], after: Mapping[str, Any], source: Path, same_folder: bool) -> None:
@@ -110,191 +88,106 @@ def _name_files(before: dict[str, Any], after: Mapping[str, Any], source: Path, 
             before[section][name] = {key: value for key, value in entry.items() if key != "points"} | of_the_file
 
 
-# ---- values alone ---------------------------------------------------------------------------------------------
+# ---- where the text changes -----------------------------------------------------------------------------------
 
 
 def _edited(text: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> str | None:
-    """The text with values changed where they stand, and entries renamed, added and left out; None if there is more."""
-    root = composed(text)
-    edits = [_edit(text, root, location, value) for location, value in _changed(before, after)]
-    for edit in sorted((change for change in edits if change), key=lambda change: change[0])[::-1]:
-        start, end, new = edit
+    """The text with what differs put in where it stands; None where it is written in a way that was not foreseen."""
+    try:
+        edits = sorted(_edits(text, composed(text), before, after))
+    except (MechanismError, YAMLError, ValueError, TypeError, LookupError):
+        return None
+    for start, end, new in reversed(edits):
         rest = text[end:]
         blanks = len(rest) - len(rest.lstrip(" "))
         if end > start and rest[blanks : blanks + 1] == "#":  # the comment behind it stays in its column
             rest = " " * max(1, blanks + end - start - len(new)) + rest[blanks:]
         text = text[:start] + new + rest
-    return None if None in edits else text
+    return text
 
 
-def _edit(text: str, root: Node, location: Location, value: Any) -> tuple[int, int, str] | None:
-    """From where to where a text is to be replaced by what; None if a value cannot be put in so."""
-    if not location:
-        return None
-    node, parent, key = _node(root, location), _node(root, location[:-1]), location[-1]
-    if isinstance(value, Renamed | Gone):
-        return _entry(text, parent, str(key), value) if isinstance(parent, MappingNode) else None
-    if isinstance(node, ScalarNode) and isinstance(value, (str, int, float)):
-        return node.start_mark.index, node.end_mark.index, _scalar(value, quoted=bool(node.style))
-    if node is not None or not isinstance(parent, MappingNode) or not parent.value or value is None:
-        return None
-    entry = f"{_scalar(key, quoted=False)}: {_flow(value)}"
+def _edits(text: str, node: Any, before: Any, after: Any) -> Iterator[Edit]:
+    """What brings a node from one state to another: of a group its entries, of a list its items, else all of it."""
+    if before == after:
+        return
+    if isinstance(node, MappingNode) and isinstance(before, Mapping) and isinstance(after, Mapping):
+        places = {key.value: place for place, (key, _) in enumerate(node.value)}
+        gone, come = [key for key in before if key not in after], [key for key in after if key not in before]
+        names = dict(zip(come, gone, strict=True)) if len(gone) == len(come) == 1 else {}
+        apart = len(gone) < 2 if node.flow_style else len(gone) < len(node.value)  # no edit touches another
+        if {*map(str, before)} <= places.keys() and (names or (apart and len(gone) < len(node.value))):
+            for new, old in names.items():  # where one entry goes and another comes, it is renamed
+                key = node.value[places[str(old)]][0]
+                yield key.start_mark.index, key.end_mark.index, _scalar(new, quoted=bool(key.style))
+            for key, value in after.items():
+                old = names.get(key, key)
+                if old in before:
+                    yield from _edits(text, node.value[places[str(old)]][1], before[old], value)
+                else:
+                    yield _added(text, node, key, value)
+            yield from (_removed(text, node, places[str(key)]) for key in gone if key not in names.values())
+            return
+    if isinstance(node, SequenceNode) and isinstance(after, list) and len(node.value) == len(before) == len(after):
+        for item, old, new in zip(node.value, before, after, strict=True):
+            yield from _edits(text, item, old, new)
+        return
+    indent = "\n" + " " * node.start_mark.column
+    inline = isinstance(node, ScalarNode) or node.flow_style or not isinstance(after, Mapping | list)
+    new = _flow(after, quoted=bool(getattr(node, "style", None))) if inline else indent.join(_block(after))
+    yield node.start_mark.index, _last(node).end_mark.index, new
+
+
+def _added(text: str, parent: MappingNode, key: Any, value: Any) -> Edit:
+    """An entry behind the last one of a group; a group of the model with a line for each of its entries."""
+    last = _last(parent)
+    entry = f"{_scalar(key)}: {_flow(value)}"
     if parent.flow_style:
         end = parent.end_mark.index - 1
         return end, end, f", {entry}"
-    if parent is root and isinstance(value, Mapping):
-        lines = (f"  {_scalar(name, quoted=False)}: {_flow(child)}\n" for name, child in value.items())
-        return len(text), len(text), f"{'' if text.endswith(chr(10)) else chr(10)}{key}:\n{''.join(lines)}"
-    first, last = parent.value[0][0], parent.value[-1][1]
-    if not (isinstance(last, ScalarNode) or last.flow_style):
-        return None
     end = text.find("\n", last.end_mark.index)
-    end = len(text) if end < 0 else end
-    return end, end, f"\n{' ' * first.start_mark.column}{entry}"
+    end, column = len(text) if end < 0 else end, parent.start_mark.column
+    if not column and isinstance(value, Mapping):
+        entry = "\n".join(
+            [f"{_scalar(key)}:", *(f"  {_scalar(name)}: {_flow(child)}" for name, child in value.items())]
+        )
+    return end, end, f"\n{' ' * column}{entry}"
 
 
-def _entry(text: str, parent: MappingNode, name: str, change: Renamed | Gone) -> tuple[int, int, str] | None:
-    """The same for an entry that is renamed or left out; None for one that stands alone."""
-    place = next((place for place, (key, _) in enumerate(parent.value) if key.value == name), None)
-    if place is None:
-        return None
+def _removed(text: str, parent: MappingNode, place: int) -> Edit:
+    """An entry taken out of a group that has others."""
     key, node = parent.value[place]
-    if isinstance(change, Renamed):
-        return key.start_mark.index, key.end_mark.index, _scalar(change.name, quoted=bool(key.style))
-    if len(parent.value) == 1:
-        return None
+    if parent.flow_style and place:
+        return parent.value[place - 1][1].end_mark.index, node.end_mark.index, ""
     if parent.flow_style:
-        if place:
-            return parent.value[place - 1][1].end_mark.index, node.end_mark.index, ""
         return key.start_mark.index, parent.value[1][0].start_mark.index, ""
-    while not (isinstance(node, ScalarNode) or node.flow_style):  # a block ends behind the blank lines after it
-        node = node.value[-1][1] if isinstance(node, MappingNode) else node.value[-1]
-    end = text.find("\n", node.end_mark.index) + 1
+    end = text.find("\n", _last(node).end_mark.index) + 1
     return text.rfind("\n", 0, key.start_mark.index) + 1, end or len(text), ""
 
 
-def _flow(value: Any) -> str:
-    """A value on one line."""
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{_scalar(key, quoted=False)}: {_flow(item)}" for key, item in value.items()) + "}"
-    return f"[{', '.join(map(_flow, value))}]" if isinstance(value, list) else _scalar(value, quoted=False)
-
-
-def _changed(before: Any, after: Any, location: Location = ()) -> Iterator[tuple[Location, Any]]:
-    """Where two sets of plain data differ, and what the second has there.
-
-    Where one entry of a group goes and another comes, it is renamed.
-    """
-    if before == after:
-        return
-    if isinstance(before, Mapping) and isinstance(after, Mapping):
-        gone, come = [key for key in before if key not in after], [key for key in after if key not in before]
-        names: dict[Any, Any] = dict(zip(come, gone, strict=True)) if len(gone) == len(come) == 1 else {}
-        for key, value in after.items():
-            old: Any = names.get(key, key)
-            if key in names:
-                yield (*location, old), Renamed(key)
-            if old in before:
-                yield from _changed(before[old], value, (*location, old))
-            else:
-                yield (*location, key), value
-        yield from (((*location, key), Gone()) for key in gone if key not in names.values())
-    elif isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
-        for index, value in enumerate(after):
-            yield from _changed(before[index], value, (*location, index))
-    else:
-        yield location, after
-
-
-def _node(root: Node, location: Location) -> Node | None:
-    """The node of a value; None if there is none, as where the file has a short form of it."""
-    node = root
-    for key in location:
-        if isinstance(node, MappingNode):
-            child = next((value for name, value in node.value if name.value == str(key)), None)
-        else:
-            inside = isinstance(node, SequenceNode) and isinstance(key, int) and key < len(node.value)
-            child = node.value[key] if inside else None
-        if child is None:
-            return None
-        node = child
+def _last(node: Any) -> Any:
+    """The node that ends where this one does in the text: a block itself ends behind the blank lines after it."""
+    while not isinstance(node, ScalarNode) and not node.flow_style:
+        node = node.value[-1][1] if isinstance(node, MappingNode) else node.value[-1]
     return node
 
 
-def _scalar(value: float | str, *, quoted: bool) -> str:
+def _block(value: Any) -> list[str]:
+    """The lines of a value, the innermost groups on one each."""
+    stream = StringIO()
+    yaml_writer().dump(value, stream)
+    return stream.getvalue().splitlines()
+
+
+def _flow(value: Any, quoted: bool = False) -> str:
+    """A value on one line."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_scalar(key)}: {_flow(item)}" for key, item in value.items()) + "}"
+    return f"[{', '.join(map(_flow, value))}]" if isinstance(value, list) else _scalar(value, quoted=quoted)
+
+
+def _scalar(value: float | str, *, quoted: bool = False) -> str:
     """A value as it stands in a file, in quotation marks if they were there or are needed."""
     if not isinstance(value, str):
         return json.dumps(value)
     plain = re.fullmatch(r"[\w±+.-][^\n:#,\[\]{}\"']*", value) and value == value.strip()
     return value if plain and not quoted else json.dumps(value, ensure_ascii=False)
-
-
-# ---- entries that came or went --------------------------------------------------------------------------------
-
-
-def _rewritten(text: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> str | None:
-    """The text of the source with what is different put in; None if it cannot be had."""
-    yaml = YAML(typ="rt", pure=True)
-    yaml.preserve_quotes = True
-    yaml.allow_unicode = True
-    yaml.width = 4096  # lines stay as long as they are
-    try:
-        yaml.composer.warn_double_anchors = False  # nothing may refer to one
-        tree = yaml.load(text)
-        _change(tree, before, after)
-        stream = StringIO()
-        yaml.dump(tree, stream)
-    except (MechanismError, YAMLError, OSError, ValueError, TypeError, KeyError):
-        return None
-    return stream.getvalue()
-
-
-def _change(tree: MutableMapping[Any, Any], before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
-    """Bring a group of entries from one state to another, both as `Mechanism.data` gives them."""
-    keys = {str(key): key for key in tree}
-    for key in [key for key in before if key not in after]:
-        del tree[keys[key]]
-    for key, value in after.items():
-        if key in before and before[key] == value:
-            continue
-        entry_key = keys.get(key, key)
-        current = tree.get(entry_key)
-        if isinstance(current, MutableMapping) and isinstance(value, Mapping) and isinstance(before.get(key), Mapping):
-            _change(current, before[key], value)
-        elif not _rows_changed(current, before.get(key), value):
-            tree[entry_key] = _laid_out(_short(value))
-
-
-def _rows_changed(current: Any, before: Any, after: Any) -> bool:
-    """Take rows out of a list of groups and put others in, whose other rows stay as written; whether that was all."""
-    lists = [parts for parts in (current, before, after) if isinstance(parts, list)]
-    if len(lists) < 3 or not all(isinstance(row, Mapping) for parts in lists for row in parts):
-        return False
-    rows = list(before)
-    for index in range(len(rows) - 1, -1, -1):
-        if rows[index] not in after:
-            del current[index], rows[index]
-    for index, row in enumerate(after):
-        if rows[index : index + 1] != [row]:
-            current.insert(index, _laid_out(row))
-            rows.insert(index, row)
-    return bool(rows == after)
-
-
-def _laid_out(value: Any) -> Any:
-    """A new value as models are usually written: lists, and the innermost groups, on one line."""
-    if isinstance(value, list):
-        row = CommentedSeq(map(_laid_out, value))
-        row.fa.set_flow_style()
-        return row
-    if not isinstance(value, Mapping):
-        return value
-    group = CommentedMap((key, _laid_out(item)) for key, item in value.items())
-    if not any(isinstance(item, Mapping) for item in value.values()):
-        group.fa.set_flow_style()
-    return group
-
-
-def _short(value: Any) -> Any:
-    """Limits alone as they are usually written."""
-    return value["limits"] if isinstance(value, Mapping) and list(value) == ["limits"] else value

@@ -9,7 +9,7 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Annotated, Any, Protocol, Union, get_args, get_origin
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
@@ -30,6 +30,7 @@ __all__ = [
     "group_findings",
     "limit_findings",
     "markers",
+    "stated_wrongly",
 ]
 
 ROUNDING = 1e-12  # of a limit: 180 deg as 3.14159265358980 rad is no more than it
@@ -163,17 +164,7 @@ def group_findings(path: str, part: BaseModel, values: Values) -> Iterator[Findi
 # ---- of names and keys ----------------------------------------------------------------------------------------
 
 
-class Model(Protocol):
-    """What these rules ask of a model."""
-
-    @property
-    def coordinates(self) -> int:
-        """How many a point has."""
-        ...
-
-    def named(self, noun: str) -> Collection[str]:
-        """The names of its links, joints, points …"""
-        ...
+Model = Any  # a `Fields`, which stands above: it has `coordinates`, how many a point has, and `named`
 
 
 @dataclass(frozen=True)
@@ -278,6 +269,11 @@ def key_findings(model: Any) -> Iterator[Finding]:
             for rule in rules:
                 if isinstance(rule, Refers | InSpace | OnlyWith | Selects) and getattr(part, key) is not None:
                     yield from rule.findings(key, part, where, model)
+
+
+def stated_wrongly(*rows: tuple[bool, str, str, str]) -> Iterator[Finding]:
+    """Findings of the rows whose first is true: what is wrong, where, and what to do about it."""
+    yield from (Finding(what, where, remedy) for wrong, what, where, remedy in rows if wrong)
 
 
 # ---- where rules stand ----------------------------------------------------------------------------------------

@@ -77,25 +77,19 @@ def in_folder(folder: Path, name: str, where: str) -> Path:
 
     parts = PureWindowsPath(name)  # knows both kinds of slash, and drives
     here = "put the file into the folder of the model and give its name, such as gas.csv"
-    if len(name) > MOST_SIGNS or not name.strip() or not name.isprintable():
-        raise refused("is no name of a file", here)
+    device = any(part.split(".")[0].strip().upper() in _DEVICES for part in parts.parts)
+    odd = len(name) > MOST_SIGNS or not name.strip() or not name.isprintable() or "\\" in name or device
     if parts.drive or parts.root or ".." in parts.parts:
         raise refused("leads out of the folder of the model", here)
-    if "\\" in name:
-        raise refused("has a backslash", f"write {name.replace(chr(92), '/')}, which every system reads")
-    if parts.suffix.lower() != ".csv":
-        raise refused("is no CSV file by its name", f"call it {parts.stem}.csv, or name it by --table")
-    if any(part.split(".")[0].strip().upper() in _DEVICES for part in parts.parts):
-        raise refused("is a device on some systems", "call the file otherwise")
+    if odd or parts.suffix.lower() != ".csv":
+        raise refused("is no name of a CSV file that every system reads, with / between folders", here)
     try:
         home = folder.resolve()
         path = (home / name).resolve()
         if not path.is_relative_to(home):
             raise refused("leads out of the folder of the model by a link", here)
-        if not path.exists():
-            raise refused("is not in the folder of the model", f"put it into {home}, or correct the name")
         if not path.is_file():
-            raise refused("is not a file", "name a CSV file")
+            raise refused("is no file in the folder of the model", f"put it into {home}, or correct the name")
     except MechanismError:
         raise
     except (OSError, RuntimeError, ValueError) as error:  # a link to itself, a folder that may not be entered

@@ -22,7 +22,7 @@ from trunnion.joints.fits import GRADES
 from trunnion.model.entry import Name, Part, known, problem
 from trunnion.model.limits import Limits, LimitText
 from trunnion.model.quantity import AnyQuantity, Dimensionless
-from trunnion.model.rules import Refers
+from trunnion.model.rules import NotNegative, Positive, Refers, Within
 
 __all__ = [
     "COST_MODELS",
@@ -61,12 +61,12 @@ class Variation(Part):
 
     limits: LimitText | None = None
     distribution: DistributionName | None = None
-    cp: Dimensionless | None = None
+    cp: Annotated[Dimensionless | None, Positive] = None
     cpk: Dimensionless | None = None
     shift: AnyQuantity | None = None
     mode: AnyQuantity | None = None
-    alpha: Dimensionless | None = None
-    beta: Dimensionless | None = None
+    alpha: Annotated[Dimensionless | None, Positive] = None
+    beta: Annotated[Dimensionless | None, Positive] = None
     values: Annotated[tuple[AnyQuantity, ...], Field(min_length=2)] | None = None
     direction: Literal["uniform"] | None = None
 
@@ -92,10 +92,10 @@ class VariationDefaults(Part):
     """How every toleranced number varies that does not say; also those stated with ± or by a fit alone."""
 
     distribution: DistributionName = "normal"
-    cp: Dimensionless | None = None
+    cp: Annotated[Dimensionless | None, Positive] = None
     cpk: Dimensionless | None = None
-    alpha: Dimensionless | None = None
-    beta: Dimensionless | None = None
+    alpha: Annotated[Dimensionless | None, Positive] = None
+    beta: Annotated[Dimensionless | None, Positive] = None
 
 
 class Correlation(Part):
@@ -105,7 +105,7 @@ class Correlation(Part):
     """
 
     of: Annotated[tuple[str, ...], Field(min_length=1)]
-    coefficient: Dimensionless
+    coefficient: Annotated[Dimensionless, Within(-1, 1)]
 
 
 COST_MODELS = ("power", "exponential")
@@ -128,7 +128,7 @@ Process = Annotated[Mapping[Grade, Dimensionless], Field(min_length=1)]  # cost 
 class CostOption(Part):
     """One way to make a dimension: the half width of the tolerance it keeps, and what it costs."""
 
-    tolerance: AnyQuantity
+    tolerance: Annotated[AnyQuantity, Positive]
     cost: Dimensionless
 
 
@@ -141,11 +141,11 @@ class Cost(Part):
 
     model: Annotated[str, _check_model, _schema_model] | None = None
     A: Dimensionless | None = None
-    B: Dimensionless | None = None
-    k: Dimensionless | None = None
+    B: Annotated[Dimensionless | None, Within(0, remedy="a wider tolerance would cost more")] = None
+    k: Annotated[Dimensionless | None, Within(0, ends="(]", remedy="a wider tolerance would cost more")] = None
     unit: str | None = None
-    least: AnyQuantity | None = None
-    most: AnyQuantity | None = None
+    least: Annotated[AnyQuantity | None, NotNegative] = None
+    most: Annotated[AnyQuantity | None, Positive] = None
     group: Name | None = None
     process: Annotated[str | None, Refers("process")] = None
     options: Annotated[Mapping[Name, CostOption], Field(min_length=1)] | None = None

@@ -7,25 +7,24 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from itertools import combinations, pairwise
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.fits import standard_tolerance
-from trunnion.model.changes import assign
+from trunnion.model.changes import assign, stated_at
 from trunnion.model.csv_table import column
-from trunnion.model.limits import DIGITS, Limits, half_width, limits_text, number_with, written
-from trunnion.model.names import ParameterNames
-from trunnion.model.parameters import Entry, Location, Numbers, ParameterSet, measured
+from trunnion.model.limits import DIGITS, half_width, limits_text, written
+from trunnion.model.parameters import Entry, Numbers, measured, walk
 from trunnion.model.quantity import Quantity
 from trunnion.model.tolerance_parts import DISTRIBUTIONS, Cost, Variation
-from trunnion.model.units import KINDS, Kind, UnitError, unit
+from trunnion.model.units import ANY, KINDS, UnitError, unit
 
 __all__ = [
     "Price",
@@ -33,13 +32,14 @@ __all__ = [
     "Tolerance",
     "clearance_of",
     "correlation",
-    "cost_entries",
     "cost_paths",
     "ends_motion",
-    "followers",
+    "further_entries",
+    "keep_limits",
     "kept",
     "may_vary",
     "named_paths",
+    "price",
     "prices",
     "tolerated",
     "towards",
@@ -51,6 +51,7 @@ __all__ = [
 
 DEFAULTS = "joint_defaults."
 FULL_TURN = "direction"  # the distribution over all directions
+FORMULA = ("A", "B", "k")
 
 
 @dataclass(frozen=True)
@@ -81,41 +82,13 @@ class Tolerance:
         return "values" not in self.options and self.distribution != FULL_TURN
 
 
-def tolerated(mechanism: Numbers, numbers: ParameterSet | None = None) -> list[Tolerance]:
-    """Every number that varies, in the order of the parameters.
-
-    numbers: those of the mechanism, where some of it could not be read.
-    """
-    numbers = numbers or mechanism.parameter_set
-    varied, written = variations(mechanism, numbers), written_limits(numbers)
-    return [
-        _tolerance(mechanism, numbers, entry, varied.get(path, ("", Variation()))[1], written.get(path))
-        for path, entry in numbers.entries.items()
-        if path in varied or (path in written and may_vary(entry))
-    ]
-
-
-def written_limits(numbers: ParameterSet) -> dict[str, tuple[float, float]]:
-    """(lower, upper) signed deviations, SI, of every number that is stated with them, by path.
-
-    Those in `joint_defaults` are of each joint that follows it.
-    """
-    return {
-        path: entry.quantity.tolerance
-        for path, entry in numbers.entries.items()
-        if entry.quantity.tolerance
-        and not path.startswith(DEFAULTS)
-        and (not entry.alias or entry.alias.startswith(DEFAULTS))
-    }
+# ---- what names mean ------------------------------------------------------------------------------------------
 
 
 def may_vary(entry: Entry) -> bool:
     """Whether a number is one of the mechanism itself: not of its measures, nor of where it begins and ends."""
-    return (
-        not entry.varies
-        and entry.path.partition(".")[0] not in ("measures", "assembly")
-        and not ends_motion(entry.path)
-    )
+    outside = entry.path.partition(".")[0] in ("measures", "assembly")
+    return not entry.varies and not outside and not ends_motion(entry.path)
 
 
 def ends_motion(path: str) -> bool:
@@ -123,293 +96,146 @@ def ends_motion(path: str) -> bool:
     return path.startswith("drivers.") and path.split(".")[2:3] in (["start"], ["range"])
 
 
-def variations(mechanism: Numbers, numbers: ParameterSet) -> dict[str, tuple[str, Variation]]:
-    """Name and entry of `tolerances` by path; names that mean nothing are left out, as findings of their own."""
-    varied: dict[str, tuple[str, Variation]] = {}
-    shared: dict[str, tuple[str, Variation]] = {}
-    for name, variation in mechanism.variations.items():
-        try:
-            path = numbers.resolve(name)
-        except MechanismError:
-            continue
-        of_all = path.startswith(DEFAULTS)
-        for follower in followers(numbers, path) if of_all else [path]:
-            if may_vary(numbers.entries[follower]):
-                (shared if of_all else varied).setdefault(follower, (name, variation))
-    return {**shared, **varied}
-
-
-def followers(numbers: ParameterSet, path: str) -> list[str]:
-    """The paths that a name of `joint_defaults` means: those of the joints that follow it."""
-    return [entry.path for entry in numbers.entries.values() if entry.alias == path]
-
-
-def towards(path: str, numbers: ParameterSet) -> str:
-    """The angle of the direction in which a tilt or an offset of a misaligned axis points; empty for others."""
-    for key, angle in (("tilt", "towards"), ("offset", "offset_towards")):
-        before = path.removesuffix(f".misalignment.{key}")
-        if before != path and f"{before}.misalignment.{angle}" in numbers.entries:
-            return f"{before}.misalignment.{angle}"
-    return ""
-
-
-def _tolerance(
-    mechanism: Numbers,
-    numbers: ParameterSet,
-    entry: Entry,
-    variation: Variation,
-    written: tuple[float, float] | None,
-) -> Tolerance:
-    """written: limits that stand with the number itself."""
-    distribution, options = _distribution(mechanism, variation)
-    values = {key: _value(option, numbers.dimension_values) for key, option in options.items()}
-    sample = values.get("values")
-    if variation.limits is not None:
-        lower, upper = (
-            _number(limit, numbers.dimension_values) for limit in (variation.limits.lower, variation.limits.upper)
-        )
-    elif written is not None:
-        lower, upper = written
-    elif isinstance(sample, tuple):
-        lower, upper = min(sample), max(sample)
-    else:
-        lower, upper = (-np.pi, np.pi) if distribution == FULL_TURN else (np.nan, np.nan)
-    direction = towards(entry.path, numbers) if variation.direction else ""
-    nominal = float(numbers.nominal[entry.path])
-    return Tolerance(entry.path, nominal, lower, upper, distribution, values, direction)
-
-
-def _distribution(mechanism: Numbers, variation: Variation) -> tuple[str, dict[str, Quantity | tuple[Quantity, ...]]]:
-    """Its name and what it is told; defaults are for what the distribution takes and the entry does not say."""
-    defaults = mechanism.tolerance_defaults
-    name = variation.distribution or defaults.distribution
-    options = {}
-    for key in DISTRIBUTIONS[name]:
-        option = getattr(variation, key)
-        # a default cpk is one beside the default cp
-        spoken = key == "cpk" and variation.cp is not None
-        value = option if option is not None or spoken else getattr(defaults, key, None)
-        if value is not None:
-            options[key] = value
-    return name, options
-
-
-def _value(option: Quantity | tuple[Quantity, ...], dimensions: Mapping[str, Number]) -> float | tuple[float, ...]:
-    if isinstance(option, tuple):
-        return tuple(_number(item, dimensions) for item in option)
-    return _number(option, dimensions)
-
-
-def _number(quantity: Quantity, dimensions: Mapping[str, Number]) -> float:
-    """The value; nan if it cannot be known, which is a finding of its own."""
-    return float(quantity.evaluate(dimensions)) if set(quantity.names) <= dimensions.keys() else np.nan
-
-
-# ---- correlation ----------------------------------------------------------------------------------------------
-
-
-def correlation(mechanism: Numbers, numbers: ParameterSet | None = None) -> NDArray[np.float64]:
-    """The matrix of the correlations of all tolerated numbers, in the order of `tolerated`."""
-    numbers = numbers or mechanism.parameter_set
-    place = {tolerance.path: index for index, tolerance in enumerate(tolerated(mechanism, numbers))}
-    matrix = np.eye(len(place))
-    for correlation in mechanism.correlations:
-        paths = [path for path in named_paths(numbers, correlation.of) if path in place]
-        value = _number(correlation.coefficient, numbers.dimension_values)
-        for first, other in combinations(dict.fromkeys(paths), 2):
-            matrix[place[first], place[other]] = matrix[place[other], place[first]] = value
-    return matrix
-
-
-def named_paths(numbers: ParameterSet, names: Iterable[str]) -> list[str]:
+def named_paths(mechanism: Numbers, names: Iterable[str]) -> list[str]:
     """The paths that names mean, those of `joint_defaults` as the numbers of the joints; unknown ones left out."""
-    paths: list[str] = []
+    numbers, paths = mechanism.parameter_set, list[str]()
     for name in names:
-        try:
+        with suppress(MechanismError):
             path = numbers.resolve(name)
-        except MechanismError:
-            continue
-        paths += followers(numbers, path) if path.startswith(DEFAULTS) else [path]
+            all_joints = [entry.path for entry in numbers.entries.values() if entry.alias == path]
+            paths += all_joints if path.startswith(DEFAULTS) else [path]
     return paths
 
 
-# ---- other tolerances -----------------------------------------------------------------------------------------
-
-
-def clearance_of(mechanism: Numbers, name: str, numbers: ParameterSet | None = None) -> str:
+def clearance_of(mechanism: Numbers, name: str) -> str:
     """The path of the clearance that `joints.B.clearance` or `B.clearance` means, of pin or guide; empty if none.
 
     The play of a joint is meant, and not a tolerance of the number that states it, which is `joints.B.pin.clearance`.
     """
     joint = name.removeprefix("joints.").removesuffix(".clearance")
-    if not name.endswith(".clearance") or joint not in mechanism.effective_joints:
-        return ""
-    entries = (numbers or mechanism.parameter_set).entries
-    paths = [f"joints.{joint}.{part}.clearance" for part in ("pin", "guide")]
-    return next((path for path in paths if path in entries), "")
+    paths = [f"joints.{joint}.{part}.clearance" for part in ("pin", "guide")] if name.endswith(".clearance") else []
+    return next((path for path in paths if path in mechanism.parameter_set.entries), "")
 
 
-def with_tolerances(mechanism: Numbers, half_widths: Mapping[str, float | str], digits: int = DIGITS) -> dict[str, Any]:
-    """Plain data of the mechanism with other half widths of tolerances, and other clearances, SI or text, by name."""
+def cost_paths(mechanism: Numbers, name: str) -> list[str]:
+    """The paths that a name in `costs` means: those of numbers, or `joints.B.clearance`; none if it means nothing."""
+    clearance = clearance_of(mechanism, name)
+    return [f"joints.{clearance.split('.')[1]}.clearance"] if clearance else named_paths(mechanism, [name])
+
+
+def towards(path: str, entries: Mapping[str, Entry]) -> str:
+    """The angle of the direction in which a tilt or an offset of a misaligned axis points; empty for others."""
+    before, _, key = path.rpartition(".misalignment.")
+    angle = f"{before}.misalignment." + {"tilt": "towards", "offset": "offset_towards"}.get(key, "")
+    return angle if angle in entries else ""
+
+
+# ---- what varies ----------------------------------------------------------------------------------------------
+
+
+def variations(mechanism: Numbers) -> dict[str, tuple[str, Variation]]:
+    """Name and entry of `tolerances` by path; what is stated of a joint goes before what is stated of all."""
     numbers = mechanism.parameter_set
-    kinds = measured(mechanism, numbers.entries.values())
-    tolerances = {item.path: item for item in tolerated(mechanism)}
-    varied = variations(mechanism, numbers)
-    clearances: dict[str, str] = {}
-    texts: list[tuple[Location, str]] = []
-    entries: dict[str, Any] = {}
-    findings: list[Finding] = []
-    for name, half_width_text in half_widths.items():
-        if play := clearance_of(mechanism, name):
-            half = _half(half_width_text, KINDS["length"], name, findings)
-            clearances[play] = written(half, KINDS["length"], digits)
-            continue
-        path = numbers.resolve(name)
-        tolerance = tolerances.get(path)
-        if tolerance is None or not tolerance.can_be_chosen:
-            what = "has no tolerance" if tolerance is None else "varies as measured or over a full turn"
-            findings.append(Finding(f"'{name}' {what}, none can be replaced", remedy="state limits in tolerances: {…}"))
-            continue
-        half = _half(half_width_text, kinds[path], name, findings)
-        key, variation = varied.get(path, ("", Variation()))
-        if variation.limits is None and (deviation := _in_place(mechanism, numbers.entries[path], half, digits)):
-            texts.append(deviation)
-            continue
-        text = limits_text((tolerance.lower + tolerance.upper) / 2, half, kinds[path], digits)
-        own_key = key if key and not numbers.resolve(key).startswith(DEFAULTS) else path
-        group = variation.model_copy(update={"limits": Limits.read(text)})
-        entries[own_key] = Variation(**{item: getattr(group, item) for item in {*variation.model_fields_set, "limits"}})
-    if findings:
-        raise MechanismError(findings)
-    data = mechanism.data()
-    for play, text in clearances.items():
-        assign(data, numbers.entries[play].location, text, mechanism.coordinates)
-        keep_limits(mechanism, play, text, data)
-    for location, text in texts:
-        holder, last = _holder(data, location)
-        holder[last] = text
-    if entries:
-        plain = {key: item.model_dump(mode="json", exclude_unset=True) for key, item in entries.items()}
-        data["tolerances"] = {**data.get("tolerances", {}), **plain}
-    return data
+    single: dict[str, tuple[str, Variation]] = {}
+    of_all: dict[str, tuple[str, Variation]] = {}
+    for name, variation in mechanism.variations.items():
+        for path in named_paths(mechanism, [name]):
+            if may_vary(numbers.entries[path]):
+                (single if numbers.resolve(name) == path else of_all).setdefault(path, (name, variation))
+    return {**of_all, **single}
 
 
-def keep_limits(mechanism: Numbers, name: str, value: Any, data: dict[str, Any]) -> None:
-    """Write the limits that stood with a number, as in `40 mm ± 0.02 mm`, into `tolerances` where it is replaced by one
-    without: another nominal value is no other tolerance.
+def written_limits(mechanism: Numbers) -> dict[str, tuple[float, float]]:
+    """(lower, upper) signed deviations, SI, of every number that is stated with them, by path.
+
+    Those in `joint_defaults` are of each joint that follows it.
     """
-    numbers = mechanism.parameter_set
-    entry = next(
-        (candidate for candidate in (numbers.entries.get(path) for path in _paths(numbers, name)) if candidate), None
-    )
-    if entry is None or entry.quantity.tolerance is None or not may_vary(entry):
-        return
-    if entry.alias and not entry.alias.startswith(DEFAULTS):
-        return
-    try:
-        if Quantity.read(value, entry.kind).tolerance is not None:
-            return
-    except UnitError:  # a finding of its own
-        return
-    lower, upper = entry.quantity.tolerance
-    section = data.setdefault("tolerances", {})
-    previous = variations(mechanism, numbers).get(entry.path, ("", Variation()))
-    key = previous[0] or entry.path
-    kind = measured(mechanism, numbers.entries.values())[entry.path]
-    text = limits_text((lower + upper) / 2, (upper - lower) / 2, kind, DIGITS)
-    if previous[1].limits is None:
-        own = section.get(key, {})
-        section[key] = {**(own if isinstance(own, dict) else {}), "limits": text}
+    return {
+        path: entry.quantity.tolerance
+        for path, entry in mechanism.parameter_set.entries.items()
+        if entry.quantity.tolerance
+        and not path.startswith(DEFAULTS)
+        and (not entry.alias or entry.alias.startswith(DEFAULTS))
+    }
 
 
-def _paths(numbers: ParameterSet, name: str) -> list[str]:
-    try:
-        return [numbers.resolve(name)]
-    except MechanismError:
-        return []
-
-
-def _half(text: float | str, kind: Kind, name: str, findings: list[Finding]) -> float:
-    """A half width in SI; 0 and a finding if it is none."""
-    try:
-        return half_width(text, kind, name)
-    except MechanismError as error:
-        findings += error.findings
-        return 0.0
-
-
-def _in_place(mechanism: Numbers, entry: Entry, half: float, digits: int) -> tuple[Location, str] | None:
-    """Where the text of a number that carries its own limits stands, and the text with others; None if it has none."""
-    if entry.alias or not entry.quantity.tolerance:
-        return None
-    try:
-        holder, last = _holder(mechanism.data(), entry.location)
-        there = holder[last]
-    except (KeyError, IndexError, TypeError):
-        return None
-    text = number_with(entry.quantity, half, digits) if there == entry.quantity.source else None
-    return None if text is None else (entry.location, text)
-
-
-def _holder(data: dict[str, Any], location: Location) -> tuple[Any, Any]:
-    """The group or list in which an entry of plain data stands, and its key there; short forms are looked through."""
-    holder: Any = data
-    for key, following in pairwise(location):
-        if isinstance(holder[key], str):  # a coefficient of friction by itself
-            return holder, key
-        if following == "at" and isinstance(holder[key], list):  # a point that is nothing but its place
-            return holder[key], location[-1]
-        holder = holder[key]
-    return holder, location[-1]
-
-
-# ---- numbers that are no more ---------------------------------------------------------------------------------
-
-
-def kept(mechanism: Numbers, data: Mapping[str, Any]) -> dict[str, Any]:
-    """Plain data made of that of a mechanism, without errors, tolerances and costs of numbers that it no longer has.
-
-    So a mechanism without friction has no tolerance of a coefficient. MechanismError if the data make no mechanism.
-    """
-    named = [key for key in ("errors", "tolerances", "costs") if data.get(key)]
-    if not named:
-        return dict(data)
-    bare = {key: value for key, value in data.items() if key not in (*named, "correlations", "processes")}
-    other = type(mechanism)(**bare)
-
-    def known(name: str) -> bool:
-        try:
-            return bool(clearance_of(other, name) or other.parameter_set.resolve(name.removeprefix("errors.")))
-        except MechanismError:
-            return False
-
-    rest = {key: {name: item for name, item in data[key].items() if known(name)} for key in named}
-    rows = [{**row, "of": [name for name in row["of"] if known(name)]} for row in data.get("correlations", ())]
-    together = [
-        row
-        for row, correlation_row in zip(rows, data.get("correlations", ()), strict=True)
-        if row["of"] == correlation_row["of"] or len(row["of"]) > 1
+def tolerated(mechanism: Numbers) -> list[Tolerance]:
+    """Every number that varies, in the order of the parameters."""
+    varied, limits_written = variations(mechanism), written_limits(mechanism)
+    return [
+        _tolerance(mechanism, entry, varied.get(path, ("", Variation()))[1], limits_written.get(path))
+        for path, entry in mechanism.parameter_set.entries.items()
+        if path in varied or (path in limits_written and may_vary(entry))
     ]
-    return {**data, **rest, **({"correlations": together} if rows else {})}
 
 
-def with_samples(mechanism: Numbers, name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Plain data of the mechanism with a number that varies as the deviations in a file; limits stated are kept."""
-    numbers = mechanism.parameter_set
-    target = numbers.resolve(name)
-    if target not in numbers.entries:
-        raise MechanismError(Finding(f"the model states no '{target}'", "--sample", "state it, then its deviations"))
-    deviations = column(Path(path), measured(mechanism, numbers.entries.values())[target])
-    key, variation = variations(mechanism, numbers).get(target, (target, None))
-    data = mechanism.data()
-    limits_kept = {} if variation is None or variation.limits is None else {"limits": variation.limits.source}
-    own_key = key if numbers.resolve(key) == target else target
-    entry = {**limits_kept, "distribution": "sample", "values": deviations}
-    data["tolerances"] = {**data.get("tolerances", {}), own_key: entry}
-    return data
+def _tolerance(
+    mechanism: Numbers, entry: Entry, variation: Variation, limits_written: tuple[float, float] | None
+) -> Tolerance:
+    """Of a number, by its entry of `tolerances` and the limits that stand with the number itself.
+
+    Defaults are for what the distribution takes and the entry does not say; a default cpk is that beside the default
+    cp.
+    """
+    numbers, defaults = mechanism.parameter_set, mechanism.tolerance_defaults
+    dimensions = numbers.dimension_values
+    distribution = variation.distribution or defaults.distribution
+    options: dict[str, float | tuple[float, ...]] = {}
+    for key in DISTRIBUTIONS[distribution]:
+        option = getattr(variation, key)
+        if option is None and not (key == "cpk" and variation.cp is not None):
+            option = getattr(defaults, key, None)
+        if isinstance(option, tuple):
+            options[key] = tuple(float(item.evaluate(dimensions)) for item in option)
+        elif option is not None:
+            options[key] = float(option.evaluate(dimensions))
+    sample = options.get("values")
+    if variation.limits is not None:
+        ends = (variation.limits.lower, variation.limits.upper)
+        lower, upper = (float(end.evaluate(dimensions)) for end in ends)
+    elif limits_written is not None:
+        lower, upper = limits_written
+    elif isinstance(sample, tuple):
+        lower, upper = min(sample), max(sample)
+    else:
+        lower, upper = (-np.pi, np.pi) if distribution == FULL_TURN else (np.nan, np.nan)
+    direction = towards(entry.path, numbers.entries) if variation.direction else ""
+    return Tolerance(entry.path, float(numbers.nominal[entry.path]), lower, upper, distribution, options, direction)
 
 
-FORMULA = ("A", "B", "k")
+def correlation(mechanism: Numbers) -> NDArray[np.float64]:
+    """The matrix of the correlations of all tolerated numbers, in the order of `tolerated`."""
+    place = {tolerance.path: index for index, tolerance in enumerate(tolerated(mechanism))}
+    matrix = np.eye(len(place))
+    for pair in mechanism.correlations:
+        paths = [path for path in named_paths(mechanism, pair.of) if path in place]
+        value = float(pair.coefficient.evaluate(mechanism.parameter_set.dimension_values))
+        for first, other in combinations(dict.fromkeys(paths), 2):
+            matrix[place[first], place[other]] = matrix[place[other], place[first]] = value
+    return matrix
+
+
+def further_entries(mechanism: Numbers) -> list[Entry]:
+    """Every quantity of the sections about tolerances and costs: what is no number of the mechanism itself.
+
+    What may be any quantity measures what the number does that the entry is of, of a cost of a play a length.
+    """
+    kinds, listed = measured(mechanism, mechanism.entries), list[Entry]()
+    for key in ("tolerance_defaults", "tolerances", "correlations", "costs", "processes"):
+        section = getattr(mechanism, "variations" if key == "tolerances" else key)
+        parts = section.items() if isinstance(section, Mapping) else [("", section)]
+        for name, part in parts:
+            kind = ANY
+            if key in ("tolerances", "costs"):
+                kind = KINDS["length"] if key == "costs" else ANY
+                with suppress(MechanismError):  # a finding of its own
+                    kind = kinds[mechanism.parameter_names.resolve(name)]
+            for entry in walk(part, f"{key}.{name}".rstrip("."), (key, name) if name else (key,)):
+                listed.append(replace(entry, kind=kind) if entry.kind is ANY else entry)
+    return listed
+
+
+# ---- what it costs --------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -452,86 +278,125 @@ def prices(mechanism: Numbers) -> list[Price]:
     return [price(mechanism, path, cost) for path, cost in paths if path not in fixed]
 
 
-def cost_paths(mechanism: Numbers, name: str, numbers: ParameterSet | None = None) -> list[str]:
-    """The paths that a name in `costs` means: those of numbers, or `joints.B.clearance`; none if it means nothing.
+def price(mechanism: Numbers, path: str, cost: Cost) -> Price:
+    """The numbers of a cost of a number or play; MechanismError where a process has no grade of its size."""
+    numbers = mechanism.parameter_set
 
-    numbers: those of the mechanism, where some of it could not be read.
-    """
-    numbers = numbers or mechanism.parameter_set
-    clearance = clearance_of(mechanism, name, numbers)
-    if clearance:
-        return [f"joints.{clearance.split('.')[1]}.clearance"]
-    return named_paths(numbers, [name])
+    def value(quantity: Quantity | None, absent: float = 0.0) -> float:
+        return absent if quantity is None else float(quantity.evaluate(numbers.dimension_values))
 
-
-def price(mechanism: Numbers, path: str, cost: Cost, numbers: ParameterSet | None = None) -> Price:
-    """The numbers of a cost; nan where one cannot be known, which is a finding of its own."""
-    numbers = numbers or mechanism.parameter_set
-    names = numbers.dimension_values
-    parameters = {key: _number(getattr(cost, key), names) for key in FORMULA if getattr(cost, key) is not None}
+    parameters = {key: value(getattr(cost, key)) for key in FORMULA if getattr(cost, key) is not None}
     if cost.model:
-        parameters = {"A": 0.0, **parameters, "unit": _unit(cost.unit)}
+        parameters = {"A": 0.0, **parameters, "unit": float(unit(cost.unit)[0]) if cost.unit else 1.0}
+    ways = cost.options or {}
+    choices = [ProcessChoice(name, value(way.tolerance), value(way.cost)) for name, way in ways.items()]
+    for grade, paid in mechanism.processes[cost.process].items() if cost.process else ():
+        half = standard_tolerance(abs(float(numbers.nominal[path])), int(grade)) / 2
+        choices.append(ProcessChoice(f"IT{grade}", half, value(paid)))
     return Price(
         path,
         path not in numbers.entries,
         cost.model or "",
         parameters,
-        0.0 if cost.least is None else _number(cost.least, names),
-        np.inf if cost.most is None else _number(cost.most, names),
+        value(cost.least),
+        value(cost.most, np.inf),
         cost.group or "",
-        tuple(sorted(_choices(mechanism, path, cost, numbers), key=lambda choice: (choice.cost, choice.tolerance))),
+        tuple(sorted(choices, key=lambda choice: (choice.cost, choice.tolerance))),
     )
 
 
-def _choices(mechanism: Numbers, path: str, cost: Cost, numbers: ParameterSet) -> list[ProcessChoice]:
-    names = numbers.dimension_values
-    if cost.options is not None:
-        return [
-            ProcessChoice(name, _number(offer.tolerance, names), _number(offer.cost, names))
-            for name, offer in cost.options.items()
-        ]
-    if cost.process is None or cost.process not in mechanism.processes:
-        return []
-    size = float(numbers.nominal.get(path, np.nan))
-    choices = []
-    for grade, offer in mechanism.processes[cost.process].items():
+# ---- other tolerances -----------------------------------------------------------------------------------------
+
+
+def with_tolerances(mechanism: Numbers, half_widths: Mapping[str, float | str], digits: int = DIGITS) -> dict[str, Any]:
+    """Plain data of the mechanism with other half widths of tolerances, and other clearances, SI or text, by name."""
+    numbers, data = mechanism.parameter_set, mechanism.data()
+    kinds, varied = measured(mechanism, numbers.entries.values()), variations(mechanism)
+    tolerances = {item.path: item for item in tolerated(mechanism)}
+    findings: list[Finding] = []
+    for name, half_width_text in half_widths.items():
+        play = clearance_of(mechanism, name)
+        path = play or numbers.resolve(name)
+        tolerance, kind = tolerances.get(path), KINDS["length"] if play else kinds[path]
+        if not play and (tolerance is None or not tolerance.can_be_chosen):
+            what = "has no tolerance" if tolerance is None else "varies as measured or over a full turn"
+            findings.append(Finding(f"'{name}' {what}, none can be replaced", remedy="state limits in tolerances: {…}"))
+            continue
         try:
-            half = standard_tolerance(abs(size), int(grade)) / 2
-        except MechanismError:  # a finding of its own
-            half = np.nan
-        choices.append(ProcessChoice(f"IT{grade}", half, _number(offer, names)))
-    return choices
+            half = half_width(half_width_text, kind, name)
+        except MechanismError as error:
+            findings += error.findings
+            continue
+        if play or tolerance is None:
+            text = written(half, kind, digits)
+            assign(data, numbers.entries[play].location, text, mechanism.coordinates)
+            keep_limits(mechanism, play, text, data)
+            continue
+        section, entry = data.setdefault("tolerances", {}), numbers.entries[path]
+        key = varied.get(path, (path,))[0]
+        others = section.get(key) if isinstance(section.get(key), dict) else {}
+        text = limits_text((tolerance.lower + tolerance.upper) / 2, half, kind, digits)
+        own_key = path if numbers.resolve(key).startswith(DEFAULTS) else key
+        section[own_key] = {**others, "limits": text} if others.keys() - {"limits"} else text
+        if entry.quantity.tolerance and stated_at(data, entry.location) == entry.quantity.source:
+            assign(data, entry.location, entry.quantity.alone, mechanism.coordinates)  # its limits stand there now
+    if findings:
+        raise MechanismError(findings)
+    return data
 
 
-def _unit(text: str | None) -> float:
+def keep_limits(mechanism: Numbers, name: str, value: Any, data: dict[str, Any]) -> None:
+    """Write the limits that stood with a number, as in `40 mm ± 0.02 mm`, into `tolerances` where it is replaced by one
+    without: another nominal value is no other tolerance.
+    """
     try:
-        return float(unit(text)[0]) if text else 1.0
-    except UnitError:  # a finding of its own
-        return np.nan
+        entry = mechanism.parameter_set.entries[mechanism.parameter_set.resolve(name)]
+        again = Quantity.read(value, entry.kind).tolerance is not None
+    except (MechanismError, UnitError):  # no number, or a finding of its own
+        return
+    follows = entry.alias and not entry.alias.startswith(DEFAULTS)
+    if again or entry.quantity.tolerance is None or follows or not may_vary(entry):
+        return
+    lower, upper = entry.quantity.tolerance
+    section = data.setdefault("tolerances", {})
+    key, variation = variations(mechanism).get(entry.path, (entry.path, Variation()))
+    if variation.limits is None:
+        kind = measured(mechanism, mechanism.entries)[entry.path]
+        others = section.get(key) if isinstance(section.get(key), dict) else {}
+        section[key] = {**others, "limits": limits_text((lower + upper) / 2, (upper - lower) / 2, kind)}
 
 
-def cost_entries(mechanism: Numbers, names: ParameterNames, kinds: Mapping[str, Kind]) -> list[Entry]:
-    """Every quantity of costs and processes, with where it stands and what it has to measure."""
-    listed: list[Entry] = []
+def kept(mechanism: Numbers, data: Mapping[str, Any]) -> dict[str, Any]:
+    """Plain data made of that of a mechanism, without errors, tolerances and costs of numbers that it no longer has.
 
-    def add(quantity: Quantity | None, where: str, kind: Kind) -> None:
-        if quantity is not None:
-            listed.append(Entry(where, tuple(where.split(".")), quantity, kind))
+    So a mechanism without friction has no tolerance of a coefficient. MechanismError if the data make no mechanism.
+    """
+    named = [key for key in ("errors", "tolerances", "costs") if data.get(key)]
+    if not named:
+        return dict(data)
+    bare = {key: value for key, value in data.items() if key not in (*named, "correlations", "processes")}
+    other = type(mechanism)(**bare)
 
-    for name, cost in mechanism.costs.items():
-        where = f"costs.{name}"
-        try:
-            kind = kinds[names.resolve(name)]
-        except MechanismError:  # a play, or a finding of its own
-            kind = KINDS["length"]
-        for key in FORMULA:
-            add(getattr(cost, key), f"{where}.{key}", KINDS["number"])
-        for key in ("least", "most"):
-            add(getattr(cost, key), f"{where}.{key}", kind)
-        for option, offer in (cost.options or {}).items():
-            add(offer.tolerance, f"{where}.options.{option}.tolerance", kind)
-            add(offer.cost, f"{where}.options.{option}.cost", KINDS["number"])
-    for process, grades in mechanism.processes.items():
-        for grade, paid in grades.items():
-            add(paid, f"processes.{process}.{grade}", KINDS["number"])
-    return listed
+    def has(name: str) -> bool:
+        with suppress(MechanismError):
+            return bool(clearance_of(other, name) or other.parameter_set.resolve(name.removeprefix("errors.")))
+        return False
+
+    rest: dict[str, Any] = {key: {name: item for name, item in data[key].items() if has(name)} for key in named}
+    if "correlations" in data:
+        rows = [(row["of"], {**row, "of": [name for name in row["of"] if has(name)]}) for row in data["correlations"]]
+        rest["correlations"] = [row for before, row in rows if row["of"] == before or len(row["of"]) > 1]
+    return {**data, **rest}
+
+
+def with_samples(mechanism: Numbers, name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Plain data of the mechanism with a number that varies as the deviations in a file; limits stated are kept."""
+    numbers = mechanism.parameter_set
+    target = numbers.resolve(name)
+    deviations = column(Path(path), measured(mechanism, mechanism.entries)[target])
+    key, variation = variations(mechanism).get(target, (target, Variation()))
+    limits = {} if variation.limits is None else {"limits": variation.limits.source}
+    data = mechanism.data()
+    own_key = key if numbers.resolve(key) == target else target
+    data.setdefault("tolerances", {})[own_key] = {**limits, "distribution": "sample", "values": deviations}
+    return data

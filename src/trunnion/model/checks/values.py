@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from itertools import combinations
 
 import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.model.checks.drivers import driver_values, gear_values
-from trunnion.model.checks.errors import error_sizes, play_values
 from trunnion.model.checks.joints import joint_values
 from trunnion.model.checks.loads import spring_values, table_values
-from trunnion.model.checks.space import direction_values
+from trunnion.model.checks.loops import direction_values
+from trunnion.model.checks.measures import measure_values
+from trunnion.model.joint_parts import has_pin
+from trunnion.model.names import ERRORS
 from trunnion.model.parameters import Numbers, ParameterSet
-from trunnion.model.parts import InertiaTensor, Link, freedoms
+from trunnion.model.parts import InertiaTensor, Link
 from trunnion.model.rules import group_findings, limit_findings
 
 __all__ = ["check_values"]
 
 Values = Mapping[str, Number]
+WILD = 0.1  # of a length: an error above it is more likely a slip of the unit
 # of the largest moment, by which a flat body may violate the triangle inequality: of four digits, of three or two
 INERTIA_SLACK, INERTIA_ROUNDING = 1e-3, 1e-2
 
@@ -28,7 +30,7 @@ INERTIA_SLACK, INERTIA_ROUNDING = 1e-3, 1e-2
 def check_values(
     mechanism: Numbers, numbers: ParameterSet, changed: Collection[str] | None = None
 ) -> Iterator[Finding]:
-    """Findings about the nominal values; a nan in them stands for what is reported already and passes every check.
+    """Findings about the nominal values of a model whose names and units are sound.
 
     changed: paths of those that differ from the numbers of a sound mechanism, all if not given: errors that follow from
     no other number are found, and of warnings some.
@@ -37,6 +39,7 @@ def check_values(
     yield from _each(numbers, numbers.entries if changed is None else changed)
     yield from _unfollowed(numbers) if changed is None else ()
     parts = None if changed is None else {tuple(path.split(".", 2)[:2]) for path in changed}
+    sections = {section for section, _ in parts} if parts is not None else {*type(mechanism).model_fields}
 
     def among(section: str, names: Iterable[str]) -> Iterator[str]:
         return (name for name in names if parts is None or (section, name) in parts)
@@ -50,19 +53,29 @@ def check_values(
     for name in among("joints", mechanism.effective_joints):
         yield from group_findings(f"joints.{name}", mechanism.effective_joints[name], values)
         yield from joint_values(mechanism, name, numbers)
-        yield from play_values(mechanism, name, numbers)
     for name in among("drivers", mechanism.drivers):
         yield from driver_values(mechanism, name, values)
-    sections = None if parts is None else {section for section, _ in parts}
-    if sections is None or "errors" in sections:
-        yield from error_sizes(numbers)
+    if "errors" in sections:
+        yield from _error_sizes(numbers)
     yield from gear_values(mechanism, values)
-    if sections is None or not sections.isdisjoint(("tables", "drivers")):
+    if not sections.isdisjoint(("tables", "drivers")):
         yield from table_values(mechanism, values)
     yield from spring_values(mechanism, values)
-    if sections is None or "links" in sections:
+    if "links" in sections:
         yield from direction_values(mechanism, values)
         yield from _sides(mechanism, values)
+    if "measures" in sections:
+        yield from measure_values(mechanism, numbers)
+
+
+def _error_sizes(numbers: ParameterSet) -> Iterator[Finding]:
+    """Errors so large that their unit is in doubt."""
+    for path, error in numbers.nominal.items():
+        if path.startswith(ERRORS):
+            meant = float(numbers.nominal[path.removeprefix(ERRORS)]) - error
+            if abs(error) > WILD * abs(meant) > 0:
+                what = f"is {error:g} (SI), {100 * abs(error / meant):.3g} % of the {meant:g} that are meant"
+                yield Finding(what, path, "check its unit: a plain number is SI", Severity.WARNING)
 
 
 def _weight(mechanism: Numbers, link: Link, values: Values, where: str) -> Iterator[Finding]:
@@ -88,57 +101,49 @@ def _each(numbers: ParameterSet, paths: Iterable[str]) -> Iterator[Finding]:
         if path not in values:  # an expression of the motion
             continue
         entry = numbers.entries[path]
-        undefined = any(np.isnan(values[name]) for name in entry.depends if name in values)
-        if entry.quantity.names and not undefined and not np.isfinite(values[path]) and not numbers.is_unreadable(path):
-            yield Finding(
-                f"'{entry.quantity.source}' has no finite value ({values[path]})",
-                entry.where,
-                "check divisions and roots",
-            )
+        follows = any(not np.isfinite(values[name]) for name in entry.depends if name in values)
+        if entry.quantity.names and not follows and not np.isfinite(values[path]):
+            what = f"'{entry.quantity.source}' has no finite value ({values[path]})"
+            yield Finding(what, entry.where, "check divisions and roots")
         if not entry.alias:
             yield from limit_findings(entry.rules, values[path], entry.kind, path)
-
-
-def _letters(values: Values, path: str) -> list[str]:
-    return [letter for letter in "xyz" if f"{path}.{letter}" in values]
 
 
 def _sides(mechanism: Numbers, values: Values) -> Iterator[Finding]:
     """A link of two turning joints at one point has no length to transmit motion with."""
     if mechanism.space == "spatial":
         return
-    holding: dict[str, list[str]] = {name: [] for name in mechanism.links}
-    for key, joint in mechanism.effective_joints.items():
-        for name in dict.fromkeys(joint.links):
-            if name in holding and key in mechanism.links[name].points:
-                holding[name].append(key)
-    for name, joints in holding.items():
-        if len(joints) != 2 or any("rotation" not in freedoms(mechanism.effective_joints[key].type) for key in joints):
+    geared = {
+        joint for gear in mechanism.gears.values() for joint in gear.joints
+    }  # a shaft with two passes on a torque
+    for name, link in mechanism.links.items():
+        joints = [
+            key for key, joint in mechanism.effective_joints.items() if name in joint.links and key in link.points
+        ]
+        turns = all(has_pin(mechanism.effective_joints[key].type) for key in joints)
+        if len(joints) != 2 or not turns or not geared.isdisjoint(joints):
             continue
-        if any(key in gear.joints for gear in mechanism.gears.values() for key in joints):
-            continue  # a shaft with two gears passes on a torque
-        for first, second in combinations(joints, 2):
-            a, b = ([values[f"links.{name}.points.{key}.{axis}"] for axis in "xy"] for key in (first, second))
-            if a == b:
-                severity = Severity.WARNING if name == mechanism.fixed_link else Severity.ERROR
-                what = f"the joints '{first}' and '{second}' of the link '{name}' are at one point"
-                yield Finding(what, f"links.{name}.points", "move one of them", severity)
+        first, second = ([values[f"links.{name}.points.{key}.{axis}"] for axis in "xy"] for key in joints)
+        if first == second:
+            severity = Severity.WARNING if name == mechanism.fixed_link else Severity.ERROR
+            what = f"the joints '{joints[0]}' and '{joints[1]}' of the link '{name}' are at one point"
+            yield Finding(what, f"links.{name}.points", "move one of them", severity)
 
 
 def _inertia(mechanism: Numbers, link: Link, values: Values, where: str) -> Iterator[Finding]:
     """Whether a body can be so: principal moments about its centre, each at most the sum of the others."""
     mass = values[f"{where}.mass"]
-    centre = np.array([values[f"{where}.centre.{axis}"] for axis in _letters(values, f"{where}.centre")], dtype=float)
-    if not len(centre):
+    letters = "xyz"[: mechanism.coordinates]
+    centre = np.array([float(values.get(f"{where}.centre.{axis}", np.nan)) for axis in letters])
+    if np.isnan(centre).all():
         distance, angle = values[f"{where}.centre.distance"], values[f"{where}.centre.angle"]
         centre = distance * np.array([np.cos(angle), np.sin(angle)])
-    path = f"{where}.inertia"
+    path, about_origin = f"{where}.inertia", link.inertia_about == "origin"
     spatial = isinstance(link.inertia, InertiaTensor)
     if spatial != (mechanism.space == "spatial") and "inertia" in link.model_fields_set:
         form = "{xx: …, yy: …, zz: …}" if mechanism.space == "spatial" else "one number"
         yield Finding(f"the inertia of a {mechanism.space} link is {form}", path, f"write {form}")
         return
-    about_origin = link.inertia_about == "origin"
     if path not in values and not spatial:
         return  # a spatial link without a tensor is a point mass
     if not spatial:

@@ -10,7 +10,7 @@ import numpy as np
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.measure_kinds import dimension_kinds
+from trunnion.model.measure_units import dimension_kinds
 from trunnion.model.mechanism import Mechanism
 from trunnion.studies.tolerance.effects import NOBODY, EffectRow
 from trunnion.studies.tolerance.first_order import ToleranceStudy, study

@@ -256,7 +256,7 @@ def _of_tolerances(outcome: Outcome) -> Iterator[Finding]:
     refuse, or a length turn round, each name once."""
     study, mechanism = outcome.study, outcome.study.run.system.mechanism
     numbers, kinds = copy(mechanism.parameter_set), measured(mechanism, mechanism.parameter_set.entries.values())
-    names, paths_seen = variations(mechanism, numbers), set()
+    names, paths_seen = variations(mechanism), set()
     far = TURNED * float(np.ravel(primal(study.run.system.size(study.run.values)))[0])
     for tolerance in study.inputs.tolerances:
         values = np.atleast_1d(np.asarray(tolerance.options.get("values", 0.0)))

@@ -9,9 +9,9 @@ from contextlib import suppress
 from trunnion.errors import Finding
 from trunnion.model.expression import parse
 from trunnion.model.fields import Fields
+from trunnion.model.joint_parts import freedoms
 from trunnion.model.measure_table import MEASURES, Measure
 from trunnion.model.names import nearest
-from trunnion.model.parts import freedoms
 from trunnion.model.quantity import Quantity, evaluation_order
 from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError, si_unit
 
@@ -147,60 +147,44 @@ def expression_findings(mechanism: Fields, measure: Measure, where: str) -> Iter
     """What is wrong with the expression of a measure: its text, its names, that it speaks of itself, its units."""
     text = measure.subject
     try:
-        formula = parse(text)
-    except UnitError as error:
-        yield Finding(error.what, where, error.remedy)
-        return
-    parts = operands(mechanism, measure)
-    wrong = [*_wrong_operands(mechanism, parts, where)]
-    if not wrong and _circular(mechanism, measure):
-        wrong = [Finding(f"'{text}' depends on itself", where, "remove the circle")]
-    if not wrong and not any(part is not None for part in parts.values()):
-        wrong = [Finding(f"'{text}' has no measure in it: it never changes", where, "name one, or a joint's rotation")]
-    if wrong:
+        formula, parts = parse(text), operands(mechanism, measure)
+        wrong = [*_wrong_operands(mechanism, parts, where)]
+        if not wrong and _circular(mechanism, measure):
+            wrong = [Finding(f"'{text}' depends on itself", where, "remove the circle")]
+        if not wrong and not any(parts.values()):
+            what, remedy = f"'{text}' has no measure in it: it never changes", "name one, or a joint's rotation"
+            wrong = [Finding(what, where, remedy)]
         yield from wrong
-        return
-    try:
-        formula.dimension(_dimensions(mechanism, measure))
+        if not wrong:
+            formula.dimension(_dimensions(mechanism, measure))
     except UnitError as error:
         yield Finding(error.what, where, error.remedy)
 
 
 def _wrong_operands(mechanism: Fields, parts: Mapping[str, Measure | None], where: str) -> Iterator[Finding]:
     """What is wrong with the names in an expression."""
+    columns = "name a measure, a dimension, JOINT.rotation, JOINT.slide, DRIVER.effort or LINK.POINT.x"
     for name, part in parts.items():
-        if part is None and name not in mechanism.dimensions:
-            near = nearest(name, [*mechanism.measures, *mechanism.dimensions])
-            columns = "name a measure, a dimension, JOINT.rotation, JOINT.slide, DRIVER.effort or LINK.POINT.x"
-            yield Finding(f"there is no measure or dimension '{name}'", where, columns if "." in name else near)
-        elif part is None:
-            continue
-        elif name in mechanism.dimensions:
+        dimension, noun = name in mechanism.dimensions, str(MEASURES[part.kind].of) if part and part.kind else ""
+        if part is None and not dimension:
+            near = columns if "." in name else nearest(name, [*mechanism.measures, *mechanism.dimensions])
+            yield Finding(f"there is no measure or dimension '{name}'", where, near)
+        elif part is not None and dimension:
             yield Finding(f"'{name}' is a measure and a dimension", where, "give one of them another name")
-        elif name not in mechanism.measures and (missing := _missing(mechanism, part)):
-            yield Finding(f"there is no {missing}", where, "name a joint, a driver or a link.point of the model")
-        elif why := _no_operand(part):
-            yield Finding(f"the measure '{name}' {why}", where, "name measures that are one number at every position")
+        elif part is not None and name not in mechanism.measures and part.subject not in mechanism.named(noun):
+            yield Finding(f"there is no {noun} '{part.subject}'", where, columns)
+        elif part is not None and not _runs(part):
+            what = f"the measure '{name}' is no number at every position of one mechanism"
+            yield Finding(what, where, "name measures without place, range and statistic, that are no deviation")
 
 
-def _missing(mechanism: Fields, column: Measure) -> str:
-    """The part of a column of a result that the model has not; empty if it has all."""
-    noun = MEASURES[column.kind].of
-    return "" if column.subject in mechanism.named(str(noun)) else f"{noun} '{column.subject}'"
-
-
-def _no_operand(part: Measure) -> str:
-    """Why a measure is no number at every position of one mechanism; empty if it is."""
-    if not part.kind:
-        return "measures nothing"
-    if part.at is not None or part.over is not None or part.statistic:
-        return "is taken at a place or over a range"
+def _runs(part: Measure) -> bool:
+    """Whether a measure is a number at every position of one mechanism: no figure, and no deviation from nominal."""
+    if not part.kind or part.at is not None or part.over is not None or part.statistic or part.reduced:
+        return False
     kind = MEASURES[part.kind]
-    if part.reduced or kind.in_time or kind.rule not in ("deviation", "ratio"):
-        return "is one number of the whole cycle"
-    if kind.against or (part.kind == "angle" and part.axis):
-        return "is a deviation from the nominal mechanism"
-    return ""
+    deviates = kind.against or (part.kind == "angle" and part.axis is not None)
+    return not kind.in_time and kind.rule in ("deviation", "ratio") and not deviates
 
 
 def _circular(mechanism: Fields, measure: Measure) -> bool:

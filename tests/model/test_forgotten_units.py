@@ -120,8 +120,8 @@ costs:
         ("28 um", "28", Severity.WARNING, "costs.B.clearance.options.g6.tolerance", "311 times the largest length"),
         ("least: 0.01 mm", "least: 1e-5", Severity.NOTE, "costs.AB.least", "is 1e-05 m, "),
         ("AB: ±0.05 mm", "AB: 0.05", Severity.WARNING, "tolerances.AB", "is 0.05 m, "),
-        ("costs:", f"{STATED}limit: 0.1}}}}\ncosts:", Severity.WARNING, "measures.end.limit.upper", "1.11 times"),
-        ("costs:", f"{STATED}limit: 1e-4}}}}\ncosts:", Severity.NOTE, "measures.end.limit.upper", "is 0.0001 m, "),
+        ("costs:", f"{STATED}limit: 0.1}}}}\ncosts:", Severity.WARNING, "measures.end.limit", "1.11 times"),
+        ("costs:", f"{STATED}limit: 1e-4}}}}\ncosts:", Severity.NOTE, "measures.end.limit", "is 0.0001 m, "),
         ("costs:", f"{STATED}at_least: 0.05}}}}\ncosts:", Severity.NOTE, "measures.end.at_least", "is 0.05 m, "),
     ],
 )

@@ -75,7 +75,7 @@ _STUDIES = (
     ),
     Fault(
         "allocation-drift-forgotten-on-one-side",
-        "studies/allocation/task.py",
+        "studies/allocation/solve.py",
         "np.concatenate([(worst + drift)[keep[0]], (worst - drift)[keep[1]]])",
         "np.concatenate([(worst + drift)[keep[0]], worst[keep[1]]])",
         ("tests/reference/test_allocation.py",),

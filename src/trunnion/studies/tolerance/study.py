@@ -25,7 +25,7 @@ from trunnion.studies.tolerance.first_order import FEW, Outcome, ToleranceStudy,
 from trunnion.studies.tolerance.kernel import engine_for
 from trunnion.studies.tolerance.result import dataset
 
-__all__ = ["DEFAULT_METHODS", "Method", "tolerance"]
+__all__ = ["DEFAULT_METHODS", "Method", "check_share", "tolerance"]
 
 Method = Literal["linear", "worst-case", "monte-carlo", "quasi-monte-carlo", "sobol"]
 DEFAULT_METHODS: tuple[Method, ...] = ("linear", "worst-case", "monte-carlo")
@@ -147,10 +147,16 @@ def _check(methods: Sequence[str], samples: int, seed: int, target: float | None
         findings.append(Finding(f"{samples} samples", "samples", remedy))
     if not 0 <= seed < 1 << 63:
         findings.append(Finding(f"a seed of {seed}", "seed", "give a whole number from 0"))
-    if target is not None and not 0 < target < 1:
-        what = f"a yield of {target:g} is not possible"
-        findings.append(Finding(what, "yield", "give a share above 0 and below 1, such as 0.9973"))
-    elif target is not None and not any(method in SAMPLINGS for method in methods):
+    findings += check_share(target)
+    if target is not None and not any(method in SAMPLINGS for method in methods):
         findings.append(Finding("a yield is one of samples", "yield", f"add the method {' or '.join(SAMPLINGS)}"))
     if findings:
         raise MechanismError(findings)
+
+
+def check_share(share: float | None) -> list[Finding]:
+    """What is wrong with a yield that is asked for."""
+    if share is None or 0 < share < 1:
+        return []
+    what = f"a yield of {share:g} is not possible"
+    return [Finding(what, "yield", "give a share above 0 and below 1, such as 0.9973")]

@@ -46,9 +46,9 @@ def run(
     threads
         Whether threads take the place of processes: for what leaves Python's interpreter lock most of the time.
     cluster
-        "local", a Dask cluster of so many processes here, or the address of a Dask scheduler.
+        The address of a Dask scheduler.
     checkpoint
-        File that every finished block is added to; the blocks that it holds already are not done again.
+        Folder that every finished block is added to; the blocks that it holds already are not done again.
     progress
         Called with the share of the blocks done, in this thread.
 
@@ -60,13 +60,13 @@ def run(
     if jobs is not None and jobs < 1:
         raise MechanismError(Finding(f"{jobs} jobs", "jobs", "state 1 or more, or none for all cores"))
     tell = progress or (lambda share: None)
-    with Checkpoint(checkpoint, job) as done:
-        tell(len(done.parts) / job.blocks)
-        left = [block for block in range(job.blocks) if block not in done.parts]
-        with closing(_worked(job, left, jobs or os.cpu_count() or 1, threads, cluster)) as parts:
-            for block, part in parts:
-                done.add(block, part)
-                tell(len(done.parts) / job.blocks)
+    done = Checkpoint(checkpoint, job)
+    tell(len(done.parts) / job.blocks)
+    left = [block for block in range(job.blocks) if block not in done.parts]
+    with closing(_worked(job, left, jobs or os.cpu_count() or 1, threads, cluster)) as parts:
+        for block, part in parts:
+            done.add(block, part)
+            tell(len(done.parts) / job.blocks)
     return [done.parts[block] for block in range(job.blocks)], [done.trouble] if done.trouble else []
 
 
@@ -76,7 +76,7 @@ def _worked(job: Job, blocks: list[int], jobs: int, threads: bool, cluster: str 
     if cluster is not None and blocks:
         from trunnion.studies.cluster import connected  # its package is an extra
 
-        with connected(cluster, workers) as (executor, count):
+        with connected(cluster) as (executor, count):
             yield from _spread(partial(_work, pickle.dumps(job)), blocks, executor, count)
     elif workers <= 1:
         part_of = job.prepare() if blocks else None

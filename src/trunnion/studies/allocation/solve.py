@@ -282,7 +282,7 @@ def _conic(task: Task, rows: Rows) -> Optimum | None:
             block[0, g], block[2, place] = k * ratio, -1.0
             right[1], shares[place] = 1.0, cost.numbers()["B"]
             blocks.append((clarabel.ExponentialConeT(), block, right))
-    scale = float(np.sum(shares)) or 1.0
+    scale = sum(shares.tolist()) or 1.0
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.max_threads = False, 1
     settings.direct_solve_method = "faer"  # its factors leave half widths less open than those of the default

@@ -430,9 +430,8 @@ def _nominal(of: Of) -> Array:
 def _radii(inputs: Inputs, ends: int) -> Array:
     radii = np.full((len(inputs.loose), ends), np.nan)
     for row, joint in zip(radii, inputs.loose, strict=True):
-        play = inputs.play(joint, inputs.run.values)
-        assert play is not None  # else it would not be loose
-        row[: len(play.radii)] = [max(float(np.ravel(primal(radius))[0]), 0.0) for radius in play.radii]
+        radii_of = inputs.play(joint, inputs.run.values).radii
+        row[: len(radii_of)] = [max(float(np.ravel(primal(radius))[0]), 0.0) for radius in radii_of]
     return radii
 
 

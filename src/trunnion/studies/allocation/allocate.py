@@ -200,7 +200,7 @@ def _prices(study: ToleranceStudy) -> tuple[dict[str, Price], list[Finding]]:
         elif price.path in tolerances:
             values = mechanism.parameters(deviations={price.path: Dual(0.0, 1.0)})
             plays = {joint: inputs.play(joint, values) for joint in inputs.loose}
-            moved = [joint for joint, play in plays.items() if play and any(np.any(derivative(r)) for r in play.radii)]
+            moved = [joint for joint, play in plays.items() if any(np.any(derivative(r)) for r in play.radii)]
             if moved:
                 instead = f"state pin.clearance and a cost of {moved[0]}.clearance instead"
                 what = f"it changes the play of {', '.join(moved)}; {instead}"

@@ -56,10 +56,10 @@ FIGURES: dict[str, Variable] = {
 Reduced = dict[str, Any]
 
 
-def reduced(arrays: Arrays, course: CycleCourse | None, ideal: Means | None, system: System) -> Reduced:
+def reduced(arrays: Arrays, course: CycleCourse | None, ideal: Means | None, system: System, margin: bool) -> Reduced:
     """The figures of FIGURES of one cycle; numbers, or rows over drivers or joints.
 
-    arrays: over positions, by the names of `results.VARIABLES`: status, and locking_margin if it was looked for;
+    arrays: over positions, by the names of `results.VARIABLES`: status, and with a margin locking_margin;
     course: over the cycle, None where a position has no answer; ideal: means of the mechanism without errors, None if
     it has none.
     """
@@ -67,7 +67,7 @@ def reduced(arrays: Arrays, course: CycleCourse | None, ideal: Means | None, sys
     missing = int(np.count_nonzero(status >= Status.NOT_CONVERGED))
     figures: Reduced = {"status": int(np.max(status)), "without_answer": missing}
     figures["not_valid"] = int(np.count_nonzero(status == Status.CONTACT_LOST))
-    if "locking_margin" in arrays:
+    if margin:
         valid = status != Status.CONTACT_LOST
         figures["locking_margin"] = float(np.min(arrays["locking_margin"][valid], initial=np.inf))
     if ideal:

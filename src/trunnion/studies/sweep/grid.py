@@ -17,7 +17,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.units import Dimension, normalise, si_unit, unit
 from trunnion.studies.sweep.figures import FIGURES
 
-__all__ = ["MOST_NAMES", "MOST_POINTS", "Over", "Swept", "at", "grid", "named", "say"]
+__all__ = ["MOST_NAMES", "MOST_POINTS", "Over", "Swept", "grid", "named", "say"]
 
 MOST_POINTS = 100_000
 MOST_NAMES = 6
@@ -154,10 +154,6 @@ def _unit_of(mechanism: Mechanism, path: str) -> str:
     name = path.removeprefix("dimensions.")
     is_dimension = name in dimensions and name != path
     return si_unit(dimensions[name]) if is_dimension else mechanism.parameter_set.entries[path].kind.unit
-
-
-def at(swept: Sequence[Swept], index: tuple[int, ...]) -> dict[str, float | str]:
-    return {number.path: float(number.values[i]) for number, i in zip(swept, index, strict=True)}
 
 
 def say(swept: Sequence[Swept], index: Sequence[int]) -> str:

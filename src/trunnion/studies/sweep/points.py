@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.cycle.course import CycleCourse, Means
+from trunnion.cycle.course import CycleCourse
 from trunnion.cycle.cycle_kernel import Many
 from trunnion.cycle.fill import CONDITIONS
 from trunnion.cycle.findings import of_run
@@ -122,7 +122,7 @@ class Points:
         run = run or (self._prepared(index) if any(index) else self.run)
         with named(self.swept, index):
             cycle = positions(run, self.steps, self.method, margin=self.margin)
-        return self._reduced(cycle.arrays, cycle.course, cycle.ideal)
+        return reduced(cycle.arrays, cycle.course, cycle.ideal, run.system, self.margin)
 
     def measured(self, index: Index, names: Sequence[str]) -> dict[str, float]:
         """Figures of measures at a point."""
@@ -133,12 +133,6 @@ class Points:
             of_cycle = [measure for measure in measures if not measure.in_time]
             figures = figures_of(run, of_cycle, self.method) if of_cycle else {}
             return figures | {name: float(np.ravel(parts[0])[0]) for name, parts in timed.items()}
-
-    def _reduced(self, arrays: Mapping[str, Array], course: CycleCourse | None, ideal: Means | None) -> Reduced:
-        kept_arrays = (
-            arrays if self.margin else {key: array for key, array in arrays.items() if key != "locking_margin"}
-        )
-        return reduced(kept_arrays, course, ideal, self.run.system)
 
     # ---- in one pass ------------------------------------------------------------------------------------------
 
@@ -184,9 +178,11 @@ class Points:
             nominal_values[path] == value or np.array_equal(nominal_values[path], np.ravel(value)[0], True)
             for path, value in meant.items()
         )
-        open_runs = [run.determinacy.findings() if run.determinacy else () for run in (run, self.run)]
-        left_open = [[(finding.where, finding.what) for finding in findings] for findings in open_runs]
-        if not same or left_open[0] != left_open[1]:
+        left_open, others_open = (
+            [(finding.where, finding.what) for finding in (each.determinacy.findings() if each.determinacy else ())]
+            for each in (run, self.run)
+        )
+        if not same or left_open != others_open:
             return False
         if not self._followed:
             return True
@@ -208,12 +204,14 @@ class Points:
         """Figures of some points; None where a point has to be looked at alone."""
         run, shape = self.run, (len(points), self.steps)
         values, ideal_values = self._values(points), self._values(points, ideal=True)
-        self._check(points, values)
         cycles = self._cycles(points, values)
         time = np.array([cycle.times(self.steps) for cycle in cycles])
         time = time[0] if np.all(time == time[0]) else time
-        method = _with_margin(self.method) if self.margin else self.method
-        errs = _differ(values, ideal_values, len(points))
+        method = replace(self.method, margin_up_to=MARGIN) if self.margin else self.method
+        errs = np.zeros(len(points), bool)  # which are others than their ideal ones
+        for path, value in ideal_values.items():
+            if value is not values[path]:
+                errs |= np.broadcast_to(np.not_equal(value, values[path]), (len(points), 1))[:, 0]
         self.erring = self.erring or bool(errs.any())
         with np.errstate(all="ignore"):
             ours = _as_chosen(run, values, len(points))
@@ -222,21 +220,18 @@ class Points:
             ours &= ~_may_change(run.system, arrays[CONDITIONS], run.cycle.periodic)
             if self._followed:
                 ours &= np.all(arrays["status"] != Status.NOT_ASSEMBLED, axis=1)
-            answered = ours & _answered(arrays)
+            answered = ours & np.all(arrays["status"] < Status.NOT_CONVERGED, axis=1)
             courses = self._courses(values, meant, cycles, answered)
-            likes = self._courses(ideal_values, None, cycles, ours & errs & _answered(ideal)) if errs.any() else {}
+            likes: dict[int, CycleCourse] = {}
+            if errs.any():
+                answered = ours & errs & np.all(ideal["status"] < Status.NOT_CONVERGED, axis=1)
+                likes = self._courses(ideal_values, None, cycles, answered)
         figures: list[Reduced | None] = []
         for i in range(len(points)):
             rows = {name: array[..., i, :] for name, array in arrays.items()}
             meant_means = likes[i].means if i in likes else None
-            figures.append(self._reduced(rows, courses.get(i), meant_means) if ours[i] else None)
+            figures.append(reduced(rows, courses.get(i), meant_means, run.system, self.margin) if ours[i] else None)
         return figures
-
-    def _some(self, values: Mapping[str, Number], cycles: Sequence[Cycle], rows: NDArray[np.intp]) -> Mechanisms:
-        """Some mechanisms of a batch."""
-        run = self.run
-        everyone = Mechanisms(run.system, run.chosen.assembly, values, cycles)
-        return replace(everyone, values=everyone.picked(rows), cycles=[cycles[int(row)] for row in rows])
 
     def _courses(
         self,
@@ -249,40 +244,38 @@ class Points:
         rows = np.flatnonzero(lanes_asked)
         if not len(rows):
             return {}
-        without = None if ideal is None else self._some(ideal, cycles, rows).values
-        courses = self._many.courses(self._some(values, cycles, rows), without, self.method)
+        system, assembly, own_cycles = self.run.system, self.run.chosen.assembly, [cycles[row] for row in rows.tolist()]
+        picked, without = (
+            each and Mechanisms(system, assembly, Mechanisms(system, assembly, each, cycles).picked(rows), own_cycles)
+            for each in (values, ideal)
+        )
+        assert picked
+        courses = self._many.courses(picked, without.values if without else None, self.method)
         return dict(zip(rows.tolist(), courses, strict=True))
 
-    def _check(self, points: Sequence[Index], values: Mapping[str, Number]) -> None:
-        """MechanismError where the numbers of a point are none that a mechanism can have."""
-        mechanism = self.run.system.mechanism
+    def _cycles(self, points: Sequence[Index], values: Mapping[str, Number]) -> list[Cycle]:
+        """The cycle of every point; MechanismError where its numbers are none that a mechanism can have."""
+
+        def nth(number: Number, k: int) -> float:
+            return float(number[k, 0]) if np.ndim(number) else float(number)
+
+        mechanism, cycles = self.run.system.mechanism, []
         numbers: ParameterSet = copy.copy(mechanism.parameter_set)
         # the first point is a mechanism, and so sound
         changed = {path: value for path, value in values.items() if value is not self.run.values.get(path)}
-        numbers.nominal = {path: _nth(value, 0) for path, value in values.items()}
+        drive = {path: value for path, value in values.items() if path.startswith("drivers.")}
+        numbers.nominal = {path: nth(value, 0) for path, value in values.items()}
         for k, index in enumerate(points):
-            numbers.nominal.update((path, _nth(value, k)) for path, value in changed.items())
+            numbers.nominal.update((path, nth(value, k)) for path, value in changed.items())
             with named(self.swept, index), np.errstate(all="ignore"):
                 findings = check_values(mechanism, numbers, changed)
                 wrong = [finding for finding in findings if finding.severity is Severity.ERROR]
                 if wrong:
                     raise MechanismError(wrong)
-
-    def _cycles(self, points: Sequence[Index], values: Mapping[str, Number]) -> list[Cycle]:
-        """The cycle of every point."""
-        drive = {path: value for path, value in values.items() if path.startswith("drivers.")}
-        if not any(np.ndim(value) for value in drive.values()):
-            return [self.run.cycle] * len(points)
-        cycles = []
-        for k, index in enumerate(points):
-            with named(self.swept, index):
-                cycles.append(self.run.system.cycle({path: _nth(value, k) for path, value in drive.items()}))
+                varies = any(np.ndim(value) for value in drive.values())
+                own = {path: nth(value, k) for path, value in drive.items()}
+                cycles.append(self.run.system.cycle(own) if varies else self.run.cycle)
         return cycles
-
-
-def _answered(arrays: Mapping[str, Array]) -> NDArray[np.bool_]:
-    """Which mechanisms of a batch have an answer at every position."""
-    return np.asarray(np.all(arrays["status"] < Status.NOT_CONVERGED, axis=1))
 
 
 def _agree(together: Reduced, other: Reduced) -> bool:
@@ -294,24 +287,6 @@ def _agree(together: Reduced, other: Reduced) -> bool:
         for name in ("drive_effort_rms", "drive_effort_max", "reaction_max")
         if name in together
     )
-
-
-def _with_margin(method: FrictionMethod) -> FrictionMethod:
-    return replace(method, margin_up_to=MARGIN)
-
-
-def _nth(number: Number, k: int) -> float:
-    """The number of one mechanism of a batch."""
-    return float(number[k, 0]) if np.ndim(number) else float(number)
-
-
-def _differ(values: Mapping[str, Number], others: Mapping[str, Number], count: int) -> NDArray[np.bool_]:
-    """Which mechanisms of a batch are others than their ideal ones."""
-    differing = np.zeros(count, bool)
-    for path, value in others.items():
-        if value is not values[path]:
-            differing |= np.broadcast_to(np.not_equal(value, values[path]), (count, 1))[:, 0]
-    return differing
 
 
 def _as_chosen(run: Run, values: Mapping[str, Number], count: int) -> NDArray[np.bool_]:

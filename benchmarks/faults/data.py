@@ -30,7 +30,7 @@ _STATISTICS = (
     ),
     Fault(
         "half-a-block-is-taken",
-        "studies/checkpoint.py",
+        "studies/batch.py",
         "partial.replace(place)",
         "place.write_bytes(raw[: len(raw) // 2])",
         ("tests/tolerance/test_checkpoint.py",),

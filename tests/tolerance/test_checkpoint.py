@@ -19,9 +19,8 @@ import trunnion
 from toleranced import fourbar
 from toy_job import ToyJob, bits
 from trunnion import Mechanism, MechanismError
-from trunnion.studies import checkpoint as module
-from trunnion.studies.batch import run
-from trunnion.studies.checkpoint import Checkpoint, settings
+from trunnion.studies import batch as module
+from trunnion.studies.batch import Checkpoint, run, settings
 from trunnion.studies.tolerance.first_order import study
 
 EXPECTED = bits([ToyJob()(block) for block in range(37)])

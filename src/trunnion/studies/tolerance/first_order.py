@@ -88,8 +88,7 @@ class ToleranceStudy:
         engine = engine_for(engine, self.kernel, self.run.values, samples * len(self.plan.times))
         model, rotation = self.run.system.mechanism.data(), None
         if method == "quasi-monte-carlo" and self.inputs.tolerances:
-            count = len(self.inputs.tolerances)
-            rotation = towards(np.array([of.figure.gradient()[:count] for of in self.linear.measures]))
+            rotation = towards(np.array([of.figure.gradient() for of in self.linear.measures]))
         return Sampling(
             model, self.measures, self.steps, method, samples, seed, engine, self.friction, len(self.plan.times),
             rotation, bool(self.inputs.pressed),

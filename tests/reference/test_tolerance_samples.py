@@ -318,7 +318,7 @@ def intervals(mechanism: Mechanism, method: str, samples: int) -> dict[str, Arra
 
 def _arrays(found: ToleranceStudy, first: Any, seed: int) -> dict[str, Array]:
     batch = replace(first, job=replace(first.job, seed=seed))
-    arrays = sampled(batch.job.joined([batch(block) for block in range(batch.job.blocks)]), found).arrays
+    arrays = sampled(batch.job.joined([batch(block) for block in range(batch.job.blocks)]), found)
     keys = ("mean", "deviation", "quantile")
     kept = {f"{key}_{end}": arrays[f"{key}_{end}"] for key in keys for end in ("low", "high")}
     for end in ("low", "high"):

@@ -218,27 +218,26 @@ class AssemblyStudy:
         """Needs, openings, offsets and statuses at times, and the largest needs of the cycle."""
         arrays = _blank(self.system, self.values, time)
         exists, opened = self._open(time, arrays)
-        sizes, zero = (
-            [sum(len(end.axes) for end in ends) for ends in (self.stated, self.pins)],
-            np.where(exists, 0.0, np.nan),
-        )
+        zero, count = np.where(exists, 0.0, np.nan), len(time)
         shares, needs = (  # as they are where the loops close without any play
-            LeastPlay(zero, zero, zero, np.zeros((len(time), size)), np.zeros((len(time), len(ends))), zero, 0)
-            for size, ends in zip(sizes, (self.stated, self.pins), strict=True)
+            LeastPlay(zero, zero, zero, np.zeros((count, width)), np.zeros((count, len(ends))), zero, 0)
+            for ends in (self.stated, self.pins)
+            for width in [sum(len(end.axes) for end in ends)]
         )
         if np.any(opened):
             _check_lengths(self.system, self.values, self.pins)
             shares, needs = self.solve(time, stated=True), self.solve(time, stated=False)
-        for name in ("closure_residual", "certificate"):
-            rows = [
-                search.opening if name == "closure_residual"
-                else (search.least - search.bound) / np.where(search.least > 0, search.least, 1.0)
-                for search in (shares, needs)
-            ]  # fmt: skip
-            rows = [
-                np.where(np.isfinite(of.least), row, -np.inf) for of, row in zip((shares, needs), rows, strict=True)
-            ]
-            arrays[name] = np.where(np.isfinite(most := np.maximum(*rows)), most, np.nan)
+
+        def larger(of: Callable[[LeastPlay], Array]) -> Array:
+            """The larger of a number of both searches, of those that have an answer."""
+            rows = [np.where(np.isfinite(search.least), of(search), -np.inf) for search in (shares, needs)]
+            most = np.maximum(*rows)
+            return np.where(np.isfinite(most), most, np.nan)
+
+        def gap(search: LeastPlay) -> Array:
+            return (search.least - search.bound) / np.where(search.least > 0, search.least, 1.0)
+
+        arrays["closure_residual"], arrays["certificate"] = larger(lambda search: search.opening), larger(gap)
         arrays["needed_share"], arrays["needed_clearance"] = shares.least, needs.least
         self._place(shares, self.stated, arrays["stated_offset"], arrays["stated_part"])
         self._place(needs, self.pins, arrays["uniform_offset"], arrays["uniform_part"])

@@ -173,16 +173,12 @@ class Effects:
         path = number if isinstance(number, str) else self.inputs.tolerances[number].path
         return float(np.ravel(primal(self.inputs.run.values[path]))[0])
 
-    @cached_property
-    def deviations(self) -> tuple[Array, Array]:
-        """Standard deviation and mean deviation of every toleranced number, SI."""
-        return self.inputs.population.deviations, self.inputs.population.means
-
     def numbers(self) -> dict[str, Array]:
         """Of every parameter: nominal value, limits of its deviation, standard deviation and mean; of a clearance the
         radius, 0 and the play, and the standard deviation of an offset along one axis."""
+        population = self.inputs.population
         rows = [
-            (self.nominal(i), tolerance.lower, tolerance.upper, self.deviations[0][i], self.deviations[1][i])
+            (self.nominal(i), tolerance.lower, tolerance.upper, population.deviations[i], population.means[i])
             for i, tolerance in enumerate(self.inputs.tolerances)
         ]
         for joint in self.inputs.loose:
@@ -239,7 +235,7 @@ class Effects:
         values = self.inputs.run.system.mechanism.parameters(
             deviations={tolerance.path: Dual(0.0, seeds[i]) for i, tolerance in enumerate(tolerances)}
         )
-        (deviations, means), rooms = self.deviations, dict[str, list[tuple[float, float]]]()
+        population, rooms = self.inputs.population, dict[str, list[tuple[float, float]]]()
         lower, upper = (np.array([getattr(each, end) for each in tolerances]) for end in ("lower", "upper"))
         for joint in self.inputs.loose:
             rooms[joint] = []
@@ -247,7 +243,10 @@ class Effects:
                 start = float(np.ravel(primal(radius))[0])
                 slope = np.ravel(derivative(radius)) * np.ones(len(tolerances))
                 most = start + float(np.sum(np.maximum(slope * lower, slope * upper)))
-                mean, variance = start + float(slope @ means), float(np.sum((slope * deviations) ** 2))
+                mean, variance = (
+                    start + float(slope @ population.means),
+                    float(np.sum((slope * population.deviations) ** 2)),
+                )
                 rooms[joint].append((max(most, 0.0), max(mean, 0.0) ** 2 + variance))
         return rooms
 
@@ -289,14 +288,15 @@ class FirstOrder:
             pins = self.plays(i)
             most = np.max([pin.worst for pin in pins], axis=0)
             return Spread(-most, most, most, np.zeros_like(most), pins[0].deviation)
-        tolerance, (deviation, mean) = self.inputs.tolerances[i], (part[i] for part in self.effects.deviations)
+        tolerance, means = self.inputs.tolerances[i], self.inputs.population.means
+        deviation, mean = self.inputs.population.deviations[i], means[i]
         ring = self._harmonic(i, SIZE)
         if self.effects.is_zone(i):
             circle = self._harmonic(i, ANGLE)
             most = np.maximum(*(length(circle + end * ring) for end in (tolerance.lower, tolerance.upper)))
             middle = -_along(circle, self.effects.nominal(self.inputs.angle(i)))
             sizes = self.effects.sizes(i) if self.effects.turns(i) else ()  # a run-out has its own size
-            wider = [self.effects.deviations[1][j] * self._harmonic(j, SIZE) for j in sizes]
+            wider = [means[j] * self._harmonic(j, SIZE) for j in sizes]
             center = np.sum([circle + mean * ring, *wider], axis=0)
             scatter = np.sqrt(0.5 * (length(center) ** 2 + (deviation * length(ring)) ** 2))
             return Spread(middle - most, middle + most, most, middle, scatter)
@@ -384,7 +384,7 @@ class FirstOrder:
     def gradient(self) -> Array:
         """Derivatives of a figure by the normal scores of the toleranced numbers, to first order; 0 of directions."""
         return np.array([
-            0.0 if self.effects.is_zone(i) else self._steady(i) * self.effects.deviations[0][i]
+            0.0 if self.effects.is_zone(i) else self._steady(i) * self.inputs.population.deviations[i]
             for i in range(len(self.inputs.tolerances))
         ])  # fmt: skip
 

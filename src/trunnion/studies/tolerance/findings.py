@@ -7,7 +7,7 @@ yield is asked for, that alone decides.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -32,11 +32,11 @@ from trunnion.studies.tolerance.sampled import CAUSES
 if TYPE_CHECKING:
     from trunnion.studies.tolerance.first_order import Outcome
     from trunnion.studies.tolerance.linear import Of
-    from trunnion.studies.tolerance.sampled import Sampled
 
 __all__ = ["findings_of", "summary"]
 
 Array = NDArray[np.float64]
+Sampled = Mapping[str, Any]  # arrays by the names of `result.VARIABLES`
 TURNED = 0.01  # of the size of the mechanism: a shorter length may well turn round, as the offset of a slide
 FAR_OFF = 0.2  # between the worst cases of first order and of the search, of which it is said
 CLOSE, SLIGHT = 1e-6, 1e-3  # of a limit: rounding, and what first order leaves out where it was kept
@@ -69,13 +69,13 @@ def summary(outcome: Outcome, sampled: Sampled | None, units: Sequence[str], dia
                 low = "yield, least by the 95 % interval"
                 figures += [("yield", "yield", "1"), ("yield_low", low, "1"), ("cpk", "C_pk", "1")]
             for key, text, figure_unit in figures:
-                yield Figure(f"{name}.{key}", f"{name}, {text}", sampled.arrays[key][i], figure_unit)
+                yield Figure(f"{name}.{key}", f"{name}, {text}", sampled[key][i], figure_unit)
         yield from _contributions(outcome, of)
     if sampled is not None:
         if len(units) > 1:
-            yield Figure("yield", "yield, all measures", sampled.arrays["yield_all"])
-        yield Figure("samples", "samples", sampled.done)
-        yield Figure("samples_failed", "samples not solved", np.sum(sampled.arrays["failed"]))
+            yield Figure("yield", "yield, all measures", sampled["yield_all"])
+        yield Figure("samples", "samples", int(sampled["samples"]))
+        yield Figure("samples_failed", "samples not solved", np.sum(sampled["failed"]))
 
 
 def _contributions(outcome: Outcome, of: Of) -> Iterator[Figure]:
@@ -98,7 +98,7 @@ def findings_of(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
         if limited(of.measure) and (missed := _missed(outcome, sampled, i, of)) is not None:
             fine = False
             yield missed
-    if fine and target is not None and sampled is not None and float(sampled.arrays["yield_all_high"]) < target:
+    if fine and target is not None and sampled is not None and float(sampled["yield_all_high"]) < target:
         what = f"limits not met: all measures together: {_yield(sampled, 'yield_all')}, required {100 * target:.6g} %"
         remedy = "narrow the tolerances of the measure with the lowest yield first"
         yield Finding.error("limit.missed_together", "measures", what, remedy, target=target)
@@ -112,13 +112,13 @@ def findings_of(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
     for i, of in enumerate(study.linear.measures):
         yield from _first_order(outcome, sampled, i, of)
     if sampled is not None:
-        for code, count in enumerate(map(int, sampled.arrays["failed"])):
+        done = int(sampled["samples"])
+        for code, count in enumerate(map(int, sampled["failed"])):
             if count:
                 why = list(Status)[code].text if code < CAUSES - 1 else "a figure does not exist"
-                share = count / sampled.done
-                what = f"{count:,} of {counted(sampled.done, 'sample')} ({share:.2%}) could not be solved: {why}"
+                what = f"{count:,} of {counted(done, 'sample')} ({count / done:.2%}) could not be solved: {why}"
                 remedy = "they count as outside every limit; mean and standard deviation are of the others"
-                figures = {"count": count, "samples": sampled.done, "share": share}
+                figures = {"count": count, "samples": done, "share": count / done}
                 yield Finding.error("samples.no_answer", "tolerances", what, remedy, **figures)
     if outcome.indices is not None and (lost := outcome.indices.lost):
         what = f"{counted(lost, 'sample')} of the variance-based indices not solved, which count as the mean"
@@ -148,7 +148,7 @@ def _missed(outcome: Outcome, sampled: Sampled | None, i: int, of: Of) -> Findin
     if outside and target is None:
         parts.append(f"worst case {signed(low, factor, '')} to {signed(high, factor, unit)}")
     if sampled is not None:
-        figures |= {key: float(sampled.arrays[key][i]) for key in ("yield", "yield_low", "yield_high", "cpk")}
+        figures |= {key: float(sampled[key][i]) for key in ("yield", "yield_low", "yield_high", "cpk")}
         if figures["yield"] < 1 if target is None else figures["yield_high"] < target:
             parts.append(_yield(sampled, "yield", i))
         sure = np.isfinite(low) and np.isfinite(high) and not outside
@@ -171,7 +171,7 @@ def _missed(outcome: Outcome, sampled: Sampled | None, i: int, of: Of) -> Findin
 
 def _yield(sampled: Sampled, name: str, i: int | tuple[()] = ()) -> str:
     """A yield in words, with as many digits as its interval has."""
-    share, least, most = (float(sampled.arrays[f"{name}{end}"][i]) for end in ("", "_low", "_high"))
+    share, least, most = (float(sampled[f"{name}{end}"][i]) for end in ("", "_low", "_high"))
     middle, *ends = (f"{100 * part:.{decimals_of(most - least)}f}" for part in (share, least, most))
     return f"yield {middle} % (95 % interval {ends[0]} to {ends[1]} %)"
 
@@ -269,8 +269,8 @@ def _first_order(outcome: Outcome, sampled: Sampled | None, i: int, of: Of) -> I
             times = "∞" if np.isinf(ratio) else f"{ratio:.2f}"
             what = f"the worst case found by search is {times} times the first-order one"
             yield Finding.note("first_order.worst_case_differs", where, what, "use the searched one", ratio=ratio)
-    if sampled is not None and sampled.done >= ENOUGH and not by_position(of.reference):
-        drawn, linear = float(sampled.arrays["deviation"][i]), float(of.total.deviation)
+    if sampled is not None and int(sampled["samples"]) >= ENOUGH and not by_position(of.reference):
+        drawn, linear = float(sampled["deviation"][i]), float(of.total.deviation)
         if max(drawn, linear) > OTHERWISE * min(drawn, linear):  # not of NaN
             unit = of.measure.figure_unit(study.run.system, study.run.values)
             what = f"the standard deviation of the samples is {readable(drawn, unit)}, "

@@ -124,7 +124,7 @@ def dataset(outcome: Outcome, notes: Sequence[Finding]) -> xr.Dataset:
     counted = sampled(outcome.samples, study) if outcome.samples else None
     job = outcome.samples.job if outcome.samples else None
     findings = [*findings_of(outcome, counted), *notes]
-    arrays = {**_linear(study), **_worst(outcome), **(counted.arrays if counted else {})}
+    arrays = {**_linear(study), **_worst(outcome), **(counted or {})}
     arrays |= outcome.indices.arrays if outcome.indices else {}
     units = [measure.figure_unit(system, study.run.values) for measure in study.measures]
     curve_units = [measure.unit(system) for measure in study.measures]

@@ -119,18 +119,7 @@ class Sampling:
 
     def identity(self) -> Mapping[str, Any]:
         """All that the answer depends on."""
-        return {
-            "model": self.model,
-            "measures": [asdict(measure) for measure in self.measures],
-            "steps": self.steps,
-            "method": self.method,
-            "samples": self.samples,
-            "seed": self.seed,
-            "engine": self.engine,
-            "friction": asdict(self.friction),
-            "block": self.block_size,
-            "rotation": self.rotation,
-        }
+        return asdict(self)
 
     def prepare(self) -> Sampler:
         """The mechanism read and prepared; once in every process."""

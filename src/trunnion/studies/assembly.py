@@ -363,28 +363,30 @@ class Answer:
         yield from self.notes
         (share, time), need = self.share, self.clearance[0]
         place, times = _at(self.place("needed_share")), f"{_share(share)} times their size is needed"
-        faults = []
+        faults, figures = list[Finding](), {"share": share, "clearance": need}
         if at := self.at(AssemblyStatus.APART):
             remedy = "check the lengths, or limit the range of the driver"
-            faults.append(("assembly.apart", "links", f"{AssemblyStatus.APART.text} {at}", remedy))
+            faults.append(
+                Finding.error("assembly.apart", "links", f"{AssemblyStatus.APART.text} {at}", remedy, **figures)
+            )
         short = self.at(AssemblyStatus.SHORT)
         if short or (np.isfinite(share) and share > ENOUGH):  # or only between the positions
             takes = f"{times} {place}" if place == EVERYWHERE else f"{place} {times}"
             takes = f"{short}: {takes}" if short else f"near {self.where(time)}: {times}"
             what = f"the stated clearances are too small to close the loops {takes}"
-            faults.append(("assembly.clearance_short", "joints", what, self._remedy()))
+            faults.append(Finding.error("assembly.clearance_short", "joints", what, self._remedy(), **figures))
         if at := self.at(AssemblyStatus.RIGID):
             angle, length = (float(np.nanmax(self.arrays[name])) for name in ("open_angle", "open_length"))
             sizes = [f"{1e3 * length:.4g} mm"] * (length > 0) + [f"{np.degrees(angle):.4g}°"] * (angle > 0)
             which = "the joints with play cannot close the loops, however large the play (a clearance of 0 gives none)"
             which = which if self.played else "no play is stated (a clearance of 0 gives none)"
             what = f"{which}: the loops stay open by up to {' and '.join(sizes)} {at}"
-            faults.append(("assembly.no_play", "joints", what, self._remedy()))
+            faults.append(Finding.error("assembly.no_play", "joints", what, self._remedy(), **figures))
         if at := self.at(AssemblyStatus.UNSETTLED):
             remedy = "pins on a common axis block each other along it: give one an end float, or make it cylindrical"
-            faults.append(("assembly.unsettled", "joints", f"{AssemblyStatus.UNSETTLED.text} {at}", remedy))
-        for code, where, what, remedy in faults:
-            yield Finding.error(code, where, what, remedy, share=share, clearance=need)
+            what = f"{AssemblyStatus.UNSETTLED.text} {at}"
+            faults.append(Finding.error("assembly.unsettled", "joints", what, remedy, **figures))
+        yield from faults
         if not faults and self.of:
             what = "the loops close without any clearance"
             what = f"the stated clearances are sufficient: {times}, {place}" if share > 0 else what

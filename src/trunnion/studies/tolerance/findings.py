@@ -165,8 +165,7 @@ def _missed(outcome: Outcome, sampled: Sampled | None, i: int, of: Of) -> Findin
         bounds = {"at least": measure.at_least, "at most": measure.at_most, "nominal": nominal}
         parts += [f"{word} {signed(end, factor, unit, '')}" for word, end in bounds.items() if end is not None]
     what, where = f"limits not met: {'; '.join(parts)}", f"measures.{measure.name}"
-    code = "limit.missed" if target is None else "limit.missed_yield"
-    return Finding.error(code, where, what, _remedy(outcome, of), **figures)
+    return Finding.error("limit.missed", where, what, _remedy(outcome, of), **figures)
 
 
 def _yield(sampled: Sampled, name: str, i: int | tuple[()] = ()) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.studies.job import Part
+from trunnion.studies.batch import Part
 
 
 @dataclass(frozen=True)

@@ -23,19 +23,19 @@ from trunnion.studies.batch import run
 if __name__ == "__main__":
     job = ToyJob(blocks=400, pause=0.02)
     tell = lambda share: print(share, flush=True)
-    jobs, cluster, path = int(sys.argv[1]), sys.argv[2] or None, sys.argv[3]
+    jobs, path = int(sys.argv[1]), sys.argv[2]
     try:
-        run(job, jobs=jobs, cluster=cluster, checkpoint=path, progress=tell)
+        run(job, jobs=jobs, checkpoint=path, progress=tell)
     except KeyboardInterrupt:
         print("stopped")
 """
 
 
-def interrupted(folder: Path, jobs: int, cluster: str) -> tuple[list[str], str]:
+def interrupted(folder: Path, jobs: int) -> tuple[list[str], str]:
     """Lines and complaints of a program that is sent a Ctrl-C, with all its processes, in mid-run."""
     script = folder / "script.py"
     script.write_text(SCRIPT)
-    command = [sys.executable, "-W", "error", str(script), str(jobs), cluster, str(folder / "run.trn")]
+    command = [sys.executable, "-W", "error", str(script), str(jobs), str(folder / "run.trn")]
     pipe = subprocess.PIPE
     with subprocess.Popen(
         command, stdout=pipe, stderr=pipe, text=True, env=ENVIRONMENT, start_new_session=True

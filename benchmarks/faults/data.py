@@ -29,10 +29,10 @@ _STATISTICS = (
         ("tests/statistics/test_intervals.py",),
     ),
     Fault(
-        "damaged-block-is-taken",
-        "studies/checkpoint.py",
-        "or zlib.crc32(raw) != check",
-        "",
+        "half-a-block-is-taken",
+        "studies/batch.py",
+        "partial.replace(place)",
+        "place.write_bytes(raw[: len(raw) // 2])",
         ("tests/tolerance/test_checkpoint.py",),
     ),
     Fault(
@@ -75,7 +75,7 @@ _STUDIES = (
     ),
     Fault(
         "allocation-drift-forgotten-on-one-side",
-        "studies/allocation/task.py",
+        "studies/allocation/solve.py",
         "np.concatenate([(worst + drift)[keep[0]], (worst - drift)[keep[1]]])",
         "np.concatenate([(worst + drift)[keep[0]], worst[keep[1]]])",
         ("tests/reference/test_allocation.py",),

@@ -44,7 +44,7 @@ REFUSED = {
     "xlsx": ["analyse", FOUR_BAR, "--out", "a.xlsx"],
     "studio": ["studio", FOUR_BAR],
     "tdms": ["data", "lab/mapping.yaml", "lab/run.tdms"],
-    "cluster": ["tolerance", TOLERANCED, "--cluster", "local"],
+    "cluster": ["tolerance", TOLERANCED, "--cluster", "tcp://127.0.0.1:9"],
     "cad": ["export", FOUR_BAR, "--out", "a.urdf"],
 }
 # the packages of the extras are not there, nor found by who only looks for them

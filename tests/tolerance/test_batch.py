@@ -28,42 +28,33 @@ DASK = pytest.mark.skipif(not find_spec("distributed"), reason="the extra cluste
 EXPECTED = bits([ToyJob()(block) for block in range(37)])
 
 
-CLUSTER = pytest.param({"jobs": 2, "cluster": "local"}, marks=[pytest.mark.slow, DASK])
-WAYS = [{"jobs": 1}, {"jobs": 2}, CLUSTER]
+WAYS = [{"jobs": 1}, {"jobs": 2}]
 
 
 @pytest.mark.parametrize("way", [*WAYS, {"jobs": 1, "threads": True}, {"jobs": 2, "threads": True}])
 def test_the_same_bits_in_every_way(way: dict[str, Any], capfd: pytest.CaptureFixture[str]) -> None:
-    if "cluster" in way:
-        pytest.importorskip("distributed")  # which sets its level as it is imported
-    level, shares = logging.getLogger("distributed").level, list[float]()
+    shares: list[float] = []
     parts, trouble = run(ToyJob(), progress=shares.append, **way)
     assert bits(parts) == EXPECTED
     assert not trouble
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0, 1)
     assert capfd.readouterr() == ("", "")
-    assert logging.getLogger("distributed").level == level
 
 
 @POSIX
-@pytest.mark.parametrize(("way", "fault"), [({"jobs": 2}, ""), ({"jobs": 2}, "deaf"), *([*CLUSTER.values, ""],)])
-def test_a_killed_worker_costs_time_only(way: dict[str, Any], fault: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("fault", ["", "deaf"])
+def test_a_killed_worker_costs_time_only(fault: str, tmp_path: Path) -> None:
     """Also where others do not hear that they are to end."""
-    assert bits(run(ToyJob(fatal=17, folder=tmp_path, fault=fault), **way)[0]) == EXPECTED
+    assert bits(run(ToyJob(fatal=17, folder=tmp_path, fault=fault), jobs=2)[0]) == EXPECTED
     assert (tmp_path / "perished").exists()
 
 
 @pytest.mark.slow
 @POSIX
-@pytest.mark.parametrize(
-    ("way", "what"),
-    [({"jobs": 2}, r"3 workers died in turn, the next block being 17"),
-     pytest.param({"jobs": 1, "cluster": "local"}, "a block ended 3 workers of the cluster in turn", marks=DASK)],
-)  # fmt: skip
-def test_a_block_that_kills_every_worker_is_an_error(way: dict[str, Any], what: str) -> None:
-    with pytest.raises(MechanismError, match=what):
-        run(ToyJob(fatal=17), **way)
+def test_a_block_that_kills_every_worker_is_an_error() -> None:
+    with pytest.raises(MechanismError, match=r"3 workers died in turn, the next block being 1[67]"):
+        run(ToyJob(fatal=17), jobs=2)
     assert not multiprocessing.active_children()
 
 
@@ -80,9 +71,9 @@ def test_what_a_job_raises_arrives(way: dict[str, Any], tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @POSIX
-@pytest.mark.parametrize(("jobs", "cluster"), [(1, ""), (2, ""), pytest.param(2, "local", marks=DASK)])
-def test_ctrl_c_from_the_terminal_is_quiet(jobs: int, cluster: str, tmp_path: Path) -> None:
-    lines, complaints = interrupted(tmp_path, jobs, cluster)
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_ctrl_c_from_the_terminal_is_quiet(jobs: int, tmp_path: Path) -> None:
+    lines, complaints = interrupted(tmp_path, jobs)
     assert lines[-1] == "stopped"
     assert complaints == ""
     job = ToyJob(blocks=400)
@@ -163,8 +154,17 @@ def cluster(folder: Path, threads: int) -> Iterator[tuple[str, subprocess.Popen[
 @DASK
 @pytest.mark.slow
 def test_a_cluster_by_its_address(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Also where a block kills a worker once, or always."""
+    pytest.importorskip("distributed")  # which sets its level as it is imported
+    level = logging.getLogger("distributed").level
     with cluster(tmp_path, 2) as (address, _):
         assert bits(run(ToyJob(), cluster=address)[0]) == EXPECTED
+        assert bits(run(ToyJob(fatal=17, folder=tmp_path), cluster=address)[0]) == EXPECTED
+        with pytest.raises(MechanismError, match="a block ended one worker of the cluster after another"):
+            run(ToyJob(fatal=17), cluster=address)
+        with pytest.raises(ZeroDivisionError, match="block 5"):
+            run(ToyJob(fault="evaluate"), cluster=address)
+    assert logging.getLogger("distributed").level == level
     assert capfd.readouterr() == ("", "")
 
 
@@ -193,7 +193,9 @@ def test_no_scheduler_is_one_finding(monkeypatch: pytest.MonkeyPatch) -> None:
     from trunnion.studies import cluster as module
 
     monkeypatch.setattr(module, "CONNECT", 0.5)
-    with pytest.raises(MechanismError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9") as caught:
+    with pytest.raises(
+        MechanismError, match=r"no Dask scheduler with workers answers at tcp://127\.0\.0\.1:9"
+    ) as caught:
         run(ToyJob(), cluster="tcp://127.0.0.1:9")
     assert len(caught.value.findings) == 1
 
@@ -202,7 +204,7 @@ def test_without_dask_the_remedy_is_told() -> None:
     script = (
         "import sys; sys.modules['distributed'] = None\n"
         "from toy_job import ToyJob\nfrom trunnion.studies.batch import run\n"
-        "run(ToyJob(), cluster='local')"
+        "run(ToyJob(), cluster='tcp://127.0.0.1:9')"
     )
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENVIRONMENT, check=False)
     assert ended.stderr.splitlines()[-1].endswith(

@@ -113,9 +113,9 @@ def tolerance(
                help="Required share within limits, 0.99 or 99%; then it alone decides the exit status."),
     ] = None,
     samples: Samples = 10_000, seed: Seed = 1, steps: Steps = 360, jobs: Jobs = None, engine: Engine = "auto",
-    cluster: Annotated[str | None, Option("--cluster", help="Address of a Dask scheduler, or local.")] = None,
+    cluster: Annotated[str | None, Option("--cluster", help="Address of a Dask scheduler.")] = None,
     checkpoint: Annotated[
-        Path | None, Option("--checkpoint", help="File that keeps the samples done; the same command continues.")
+        Path | None, Option("--checkpoint", help="Folder that keeps the samples done; the same command continues.")
     ] = None,
     sample: Annotated[
         list[str] | None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -88,12 +89,12 @@ class Population:
         ]
         self._means, self._sigmas = np.array(parameters, dtype=np.float64).reshape(-1, 2, 1).transpose(1, 0, 2)
 
-    @property
+    @cached_property
     def means(self) -> Floats:
         """Mean deviations, (dims,)."""
         return np.array([marginal.mean for marginal in self.marginals], dtype=np.float64)
 
-    @property
+    @cached_property
     def deviations(self) -> Floats:
         """Standard deviations, (dims,)."""
         return np.array([marginal.deviation for marginal in self.marginals], dtype=np.float64)

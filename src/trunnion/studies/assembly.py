@@ -20,7 +20,6 @@ from trunnion.cycle.summary import inputs, member_units
 from trunnion.errors import Coded, Finding, MechanismError
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.model.arguments import strict_arguments
-from trunnion.model.joint_parts import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described, driven
@@ -219,26 +218,26 @@ class AssemblyStudy:
         """Needs, openings, offsets and statuses at times, and the largest needs of the cycle."""
         arrays = _blank(self.system, self.values, time)
         exists, opened = self._open(time, arrays)
+        zero, count = np.where(exists, 0.0, np.nan), len(time)
+        shares, needs = (  # as they are where the loops close without any play
+            LeastPlay(zero, zero, zero, np.zeros((count, width)), np.zeros((count, len(ends))), zero, 0)
+            for ends in (self.stated, self.pins)
+            for width in [sum(len(end.axes) for end in ends)]
+        )
         if np.any(opened):
             _check_lengths(self.system, self.values, self.pins)
             shares, needs = self.solve(time, stated=True), self.solve(time, stated=False)
-            arrays["closure_residual"] = _worst(shares, needs, lambda play_found: play_found.opening)
-            arrays["certificate"] = _worst(
-                shares,
-                needs,
-                lambda play_found: (
-                    (play_found.least - play_found.bound) / np.where(play_found.least > 0, play_found.least, 1.0)
-                ),
-            )
-        else:  # the loops close without any play
-            zero, none = np.where(exists, 0.0, np.nan), np.zeros((len(time), 0))
-            shares, needs = (
-                LeastPlay(
-                    zero, zero, none, np.zeros((len(time), sum(len(end.axes) for end in ends))),
-                    np.zeros((len(time), len(ends))), none, 0,
-                ) for ends in (self.stated, self.pins)
-            )  # fmt: skip
-            arrays["certificate"] = arrays["closure_residual"] = zero
+
+        def larger(of: Callable[[LeastPlay], Array]) -> Array:
+            """The larger of a number of both searches, of those that have an answer."""
+            rows = [np.where(np.isfinite(search.least), of(search), -np.inf) for search in (shares, needs)]
+            most = np.maximum(*rows)
+            return np.where(np.isfinite(most), most, np.nan)
+
+        def gap(search: LeastPlay) -> Array:
+            return (search.least - search.bound) / np.where(search.least > 0, search.least, 1.0)
+
+        arrays["closure_residual"], arrays["certificate"] = larger(lambda search: search.opening), larger(gap)
         arrays["needed_share"], arrays["needed_clearance"] = shares.least, needs.least
         self._place(shares, self.stated, arrays["stated_offset"], arrays["stated_part"])
         self._place(needs, self.pins, arrays["uniform_offset"], arrays["uniform_part"])
@@ -307,14 +306,6 @@ class AssemblyStudy:
         return float(most[top]), float(best[top])
 
 
-def _worst(shares: LeastPlay, other: LeastPlay, of: Callable[[LeastPlay], Array]) -> Array:
-    """The larger of a number of two searches, of those that have an answer."""
-    with np.errstate(invalid="ignore"):
-        rows = [np.where(np.isfinite(search.least), of(search), -np.inf) for search in (shares, other)]
-    most = np.maximum(*rows)
-    return np.where(np.isfinite(most), most, np.nan)
-
-
 def _check_lengths(system: System, values: Values, ends: Sequence[End]) -> None:
     """MechanismError for every play that has no length over which a pin or guide could lean."""
     findings = []
@@ -370,43 +361,36 @@ class Answer:
     def findings(self) -> Iterator[Finding]:
         """Where the clearances suffice and where not, and what would."""
         yield from self.notes
-        (share, time), need, settled = self.share, self.clearance[0], True
-        if apart := self.at(AssemblyStatus.APART):
-            remedy = "check the lengths, or limit the range of the driver"
-            yield Finding.error("assembly.apart", "links", f"{AssemblyStatus.APART.text} {apart}", remedy, at=apart)
-            settled = False
+        (share, time), need = self.share, self.clearance[0]
         place, times = _at(self.place("needed_share")), f"{_share(share)} times their size is needed"
+        faults, figures = list[Finding](), {"share": share, "clearance": need}
+        if at := self.at(AssemblyStatus.APART):
+            remedy = "check the lengths, or limit the range of the driver"
+            faults.append(
+                Finding.error("assembly.apart", "links", f"{AssemblyStatus.APART.text} {at}", remedy, **figures)
+            )
         short = self.at(AssemblyStatus.SHORT)
         if short or (np.isfinite(share) and share > ENOUGH):  # or only between the positions
             takes = f"{times} {place}" if place == EVERYWHERE else f"{place} {times}"
             takes = f"{short}: {takes}" if short else f"near {self.where(time)}: {times}"
             what = f"the stated clearances are too small to close the loops {takes}"
-            figures = {"share": share, "clearance": need}
-            yield Finding.error("assembly.clearance_short", "joints", what, self._remedy(), **figures)
-            settled = False
-        if rigid := self.at(AssemblyStatus.RIGID):
+            faults.append(Finding.error("assembly.clearance_short", "joints", what, self._remedy(), **figures))
+        if at := self.at(AssemblyStatus.RIGID):
             angle, length = (float(np.nanmax(self.arrays[name])) for name in ("open_angle", "open_length"))
             sizes = [f"{1e3 * length:.4g} mm"] * (length > 0) + [f"{np.degrees(angle):.4g}°"] * (angle > 0)
-            clearances = [clearance(name, self.values) for name in self.system.joints]
-            nil = any(size is not None and np.all(primal(size) == 0) for size in clearances)
-            which = "a stated clearance of 0 gives no play: the loops" if nil else "no play is stated: the loops"
-            if self.played:
-                zero = " (a clearance of 0 gives no play)" if nil else ""
-                which = f"the joints with play cannot close the loops, however large the play{zero}: they"
-            what = f"{which} stay open by up to {' and '.join(sizes)} {rigid}"
-            figures = {"angle": angle, "length": length, "clearance": need}
-            yield Finding.error("assembly.no_play", "joints", what, self._remedy(), **figures)
-            settled = False
-        if unsettled := self.at(AssemblyStatus.UNSETTLED):
-            what = f"{AssemblyStatus.UNSETTLED.text} {unsettled}"
+            which = "the joints with play cannot close the loops, however large the play (a clearance of 0 gives none)"
+            which = which if self.played else "no play is stated (a clearance of 0 gives none)"
+            what = f"{which}: the loops stay open by up to {' and '.join(sizes)} {at}"
+            faults.append(Finding.error("assembly.no_play", "joints", what, self._remedy(), **figures))
+        if at := self.at(AssemblyStatus.UNSETTLED):
             remedy = "pins on a common axis block each other along it: give one an end float, or make it cylindrical"
-            yield Finding.error("assembly.unsettled", "joints", what, remedy, at=unsettled)
-            settled = False
-        if settled and self.of and share > 0:
-            what = f"the stated clearances are sufficient: {times}, {place}"
-            yield Finding.note("assembly.clearance_enough", "joints", what, share=share)
-        elif settled and self.of:
-            yield Finding.note("assembly.fits", "joints", "the loops close without any clearance")
+            what = f"{AssemblyStatus.UNSETTLED.text} {at}"
+            faults.append(Finding.error("assembly.unsettled", "joints", what, remedy, **figures))
+        yield from faults
+        if not faults and self.of:
+            what = "the loops close without any clearance"
+            what = f"the stated clearances are sufficient: {times}, {place}" if share > 0 else what
+            yield Finding.note("assembly.fits", "joints", what, share=share)
 
     def _remedy(self) -> str:
         need = self.clearance[0]

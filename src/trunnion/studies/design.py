@@ -5,8 +5,9 @@ Everything is read off one run over the cycle: the poses of the dyads, the twist
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ from trunnion.measures.curves import pressure_angles
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.figure import Figure
-from trunnion.results.scales import EVERYWHERE, Scales
+from trunnion.results.scales import EVERYWHERE
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
@@ -38,14 +39,10 @@ __all__ = [
     "Design",
     "Extremes",
     "counterweights",
-    "curvature",
     "dead_centres",
     "design",
     "grashof",
-    "instant_centre",
     "instant_centres",
-    "limits",
-    "motor",
     "pressure_angles",
     "report_figures",
     "shaking",
@@ -146,17 +143,15 @@ def design(mechanism: Mechanism) -> Design:
     run = _planar(mechanism)
     motion, driver = _motion(run), next(iter(mechanism.drivers), "")
     angles = motion.named("pressure angle")
-    return Design(
-        grashof(mechanism, run),
-        {name: np.pi / 2 - motion.extreme([row], magnitude, motion.assembled).value for name, row in angles.items()},
-        {name: _extremes(run, motion, row) for name, row in angles.items()},
-        dead_centres(run),
-        limits(run),
-        motion.extreme(motion.rows("shaking force"), magnitude, motion.sound).value,
-        motion.extreme(motion.rows("shaking moment"), magnitude, motion.sound).value,
-        *(motor(run, driver) if driver else Motor()),
-        motion.mean_speed() if driver else 0.0,
+    largest = {name: motion.extreme([row], magnitude, motion.assembled).value for name, row in angles.items()}
+    force, moment = (
+        motion.extreme(motion.rows(kind), magnitude, motion.sound).value for kind in ("shaking force", "shaking moment")
     )
+    return Design(
+        grashof(mechanism, run), {name: np.pi / 2 - angle for name, angle in largest.items()},
+        {name: _extremes(run, motion, row) for name, row in angles.items()}, dead_centres(run), limits(run),
+        force, moment, *(motor(run, driver) if driver else Motor()), motion.mean_speed() if driver else 0.0,
+    )  # fmt: skip
 
 
 def _planar(mechanism: Mechanism) -> Run:
@@ -179,7 +174,7 @@ def transmission_angles(walk: Forward) -> dict[str, Array]:
 
 def _extremes(run: Run, motion: _Motion, row: int) -> Extremes:
     """Extremes of a pressure angle, with the drive coordinates where they are."""
-    low, high = (motion.extreme([row], _itself, motion.assembled, sign) for sign in (-1.0, 1.0))
+    low, high = (motion.extreme([row], lambda rows: rows[0], motion.assembled, sign) for sign in (-1.0, 1.0))
     times = [0.0 if place.everywhere else place.time for place in (low, high)]
     places = [_coordinate(run, time % run.cycle.duration if run.cycle.periodic else time) for time in times]
     return Extremes(low.value, places[0], high.value, places[1])
@@ -209,14 +204,6 @@ def shaking(walk: Forward) -> tuple[tuple[Number, Number], Number]:
     return (x, y), turn
 
 
-def instant_centre(walk: Forward, first: str, second: str) -> tuple[Array, Array]:
-    """Point (x, y), m, where two links have the same velocity; at infinity (±inf or NaN) where they turn alike."""
-    base, two = walk.motions[first], walk.motions[second]
-    w = np.asarray(two.twist.w - base.twist.w, float)
-    with np.errstate(all="ignore"):
-        return -(two.twist.y - base.twist.y) / w, (two.twist.x - base.twist.x) / w
-
-
 @dataclass(frozen=True)
 class Centre:
     """Instant centre of two links over a walk: x, y, m, where they have the same velocity.
@@ -229,7 +216,7 @@ class Centre:
     joint: str | None
     x: Array
     y: Array
-    far: tuple[Array, Array] | None
+    far: tuple[Array, ...] | None
 
 
 @np.errstate(all="ignore")
@@ -242,33 +229,26 @@ def instant_centres(walk: Forward, count: int, most: int) -> list[Centre]:
     mechanism = walk.system.mechanism
     links = sorted(mechanism.links, key=lambda link: link != mechanism.fixed_link)
     pivots = {frozenset(ends): name for name, (kind, ends) in walk.system.joints.items() if kind == "revolute"}
-    pairs = [(a, b) for i, a in enumerate(links) for b in links[i + 1 :] if i == 0 or len(links) <= most]
-    return [_centre(walk, pair, pivots.get(frozenset(pair)), count) for pair in pairs]
-
-
-def _centre(walk: Forward, pair: tuple[str, str], joint: str | None, count: int) -> Centre:
-    first, two = (walk.motions[link] for link in pair)
-    # velocity of the second against the first at the second's origin; the centre lies across it
-    speeds = plane.velocity_at(plane.minus(two.twist, first.twist), two.frame[:2])
-    numbers = (*instant_centre(walk, *pair), *speeds, two.twist.w - first.twist.w, walk.size, walk.pace)
-    x, y, vx, vy, turn, size, pace = (np.broadcast_to(np.asarray(primal(part), float), (count,)) for part in numbers)
-    speed = np.hypot(vx, vy)
-    still = (np.abs(turn) <= AT_REST * pace) & (speed <= AT_REST * pace * size)
-    away = ~(np.hypot(x, y) <= FAR * size) & (speed > AT_REST * pace * size)
-    x, y = (np.where(away | still, np.nan, part) for part in (x, y))
-    if not np.any(away):
-        return Centre(pair, joint, x, y, None)
-    sign = np.where(turn < 0, -1.0, 1.0)
-    far = (np.where(away, part / speed, np.nan) for part in (-sign * vy, sign * vx))
-    return Centre(pair, joint, x, y, (next(far), next(far)))
-
-
-def curvature(walk: Forward, link: str, point: str) -> Array:
-    """Curvature of the path of a point, 1/m: (v × a)/|v|³, positive where it bends to the left."""
-    motion = walk.point(link, point)
-    (vx, vy), (ax, ay) = motion.velocity, motion.acceleration
-    with np.errstate(all="ignore"):
-        return np.asarray((vx * ay - vy * ax) / np.hypot(vx, vy) ** 3, float)
+    centres = []
+    for pair in combinations(links, 2):
+        if len(links) > most and mechanism.fixed_link not in pair:
+            continue
+        first, two = (walk.motions[link] for link in pair)
+        between = plane.minus(two.twist, first.twist)
+        # velocity of the second against the first at the second's origin; the centre lies across it
+        speeds = plane.velocity_at(between, two.frame[:2])
+        numbers = (-between.y / between.w, between.x / between.w, *speeds, between.w, walk.size, walk.pace)
+        x, y, vx, vy, turn, size, pace = (
+            np.broadcast_to(np.asarray(primal(part), float), (count,)) for part in numbers
+        )
+        speed = np.hypot(vx, vy)
+        still = (np.abs(turn) <= AT_REST * pace) & (speed <= AT_REST * pace * size)
+        away = ~(np.hypot(x, y) <= FAR * size) & (speed > AT_REST * pace * size)
+        x, y = (np.where(away | still, np.nan, part) for part in (x, y))
+        sign = np.where(turn < 0, -1.0, 1.0)
+        far = tuple(np.where(away, part / speed, np.nan) for part in (-sign * vy, sign * vx)) if np.any(away) else None
+        centres.append(Centre(pair, pivots.get(frozenset(pair)), x, y, far))
+    return centres
 
 
 def grashof(mechanism: Mechanism, run: Run | None = None) -> str:
@@ -350,17 +330,9 @@ class _Motion(NamedTuple):
         return mean if least.value > RESTS * abs(mean) else 0.0
 
 
-def _itself(rows: Array) -> Array:
-    return np.asarray(rows[0])
-
-
 def _motion(run: Run) -> _Motion:
     """The courses of the motion, found once for a run."""
-    return run.once("design", lambda: _moved(run))
-
-
-def _moved(run: Run) -> _Motion:
-    system, places = run.system, dict[tuple[str, str], int]()
+    system, places, scales = run.system, dict[tuple[str, str], int](), scales_of(run)
 
     def look(time: Array) -> tuple[Array, NDArray[np.intp]]:
         walk = forward(system, run.values, run.chosen.assembly, time)
@@ -374,9 +346,11 @@ def _moved(run: Run) -> _Motion:
         least = {"shaking force": scales.force, "shaking moment": scales.force * scales.length, "pressure angle": 1.0}
         return np.maximum(sizes, [least.get(kind, 0.0) for kind, _ in places])
 
-    scales = scales_of(run)
-    knots = [time for _, time in knots_of(Mechanisms(system, run.chosen.assembly, run.values, [run.cycle]))]
-    return _Motion(places, run.courses(look, knots, EXACT, like))
+    def moved() -> _Motion:
+        knots = [time for _, time in knots_of(Mechanisms(system, run.chosen.assembly, run.values, [run.cycle]))]
+        return _Motion(places, run.courses(look, knots, EXACT, like))
+
+    return run.once("design", moved)
 
 
 def _numbers(walk: Forward, time: Array) -> dict[tuple[str, str], Number]:
@@ -503,7 +477,13 @@ def report_figures(mechanism: Mechanism, fluctuation: float = 0.05) -> list[Figu
     for name, angle in answer.transmission_angle.items():
         subject = f"transmission angle of {name}"
         figures.append(Figure(f"{name}.transmission_angle", subject, angle * 180 / np.pi, "°", "minimum"))
-    figures += [_pressure(name, extremes, scale, unit, scales) for name, extremes in answer.pressure_angle.items()]
+    for name, extremes in answer.pressure_angle.items():
+        low, high = np.degrees(extremes.least), np.degrees(extremes.largest)
+        at = scales.zeroed(scale * np.array([extremes.at_least, extremes.at_largest]), unit)
+        ends = " and ".join(f"{place:.5g}{'' if unit == '°' else ' '}{unit}" for place in at.tolist())
+        varies = high - low > scales.floor("°")
+        value, where = (f"{low:.6g} … {high:.6g}", f"at {ends}") if varies else (low, EVERYWHERE)
+        figures.append(Figure(f"{name}.pressure_angle", f"pressure angle of {name}", value, "°", place=where))
     for name, places in answer.dead_centres.items():
         if places:
             text = ", ".join(f"{place * scale:.6g}" for place in places)
@@ -524,30 +504,12 @@ def report_figures(mechanism: Mechanism, fluctuation: float = 0.05) -> list[Figu
         subject = f"flywheel for a fluctuation of {fluctuation:g}"
         figures.append(Figure("flywheel", subject, answer.flywheel(fluctuation), "kg m^2"))
     if any(PAIRS[kind].turns and mechanism.fixed_link in links for kind, links in run.system.joints.values()):
-        figures += _balanced(run, scales)
+        weights, left = counterweights(run)
+        if np.isfinite(left):  # without mass there is nothing to balance
+            for weight in weights:
+                x, y = scales.zeroed(np.array([weight.x, weight.y]), "kg m")
+                subject = f"counterweight on {weight.link}, mass × position in its frame"
+                figures.append(Figure(f"{weight.link}.counterweight", subject, f"({x:.5g}, {y:.5g})", "kg m"))
+            left, subject = float(scales.zeroed(np.array(left), "1")), "residual shaking force with counterweights"
+            figures.append(Figure("shaking_left", subject, left, "of its RMS"))
     return scales.of_figures(figures)
-
-
-def _pressure(name: str, extremes: Extremes, scale: float, unit: str, scales: Scales) -> Figure:
-    """The extremes of a pressure angle, in degrees, with their places; scale, unit: of the places."""
-    low, high = np.degrees(extremes.least), np.degrees(extremes.largest)
-    key, subject = f"{name}.pressure_angle", f"pressure angle of {name}"
-    if not high - low > scales.floor("°"):
-        return Figure(key, subject, low, "°", place=EVERYWHERE)
-    gap = "" if unit == "°" else " "
-    at = scales.zeroed(scale * np.array([extremes.at_least, extremes.at_largest]), unit)
-    places = " and ".join(f"{place:.5g}{gap}{unit}" for place in at.tolist())
-    return Figure(key, subject, f"{low:.6g} … {high:.6g}", "°", place=f"at {places}")
-
-
-def _balanced(run: Run, scales: Scales) -> Iterator[Figure]:
-    """The counterweights; without mass there is nothing to balance."""
-    weights, left = counterweights(run)
-    for weight in weights if np.isfinite(left) else ():
-        x, y = scales.zeroed(np.array([weight.x, weight.y]), "kg m")
-        place = f"({x:.5g}, {y:.5g})"
-        subject = f"counterweight on {weight.link}, mass × position in its frame"
-        yield Figure(f"{weight.link}.counterweight", subject, place, "kg m")
-    if np.isfinite(left):
-        left = float(scales.zeroed(np.array(left), "1"))
-        yield Figure("shaking_left", "residual shaking force with counterweights", left, "of its RMS")

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -47,7 +46,7 @@ from trunnion.statistics.population import Population
 from trunnion.studies.tolerance.effects import FirstOrder
 from trunnion.studies.tolerance.first_order import ToleranceStudy, stated_or_outputs
 from trunnion.studies.tolerance.inputs import Inputs, plays_of
-from trunnion.studies.tolerance.linear import Linear, Of, searched
+from trunnion.studies.tolerance.linear import Of, searched
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -102,13 +101,16 @@ class Played:
     """What play does to measures over the cycle, and at the one place of each.
 
     measures: as they were asked for; courses: of all of them at every position; figures: of each at its place, which is
-    a stated one, that of a maximum or minimum, or where its worst case is largest.
+    a stated one, that of a maximum or minimum, or where its worst case is largest; over_cycle, at_places: what the
+    joints do there.
     """
 
     run: Run
     measures: Sequence[Measure]
     courses: ToleranceStudy
     figures: ToleranceStudy
+    over_cycle: list[JointEffects]
+    at_places: list[JointEffects]
 
     @property
     def inputs(self) -> Inputs:
@@ -116,25 +118,14 @@ class Played:
         return self.courses.inputs
 
     @property
-    def course(self) -> Linear:
-        """First order at every position."""
-        return self.courses.linear
+    def status(self) -> NDArray[np.int8]:
+        """Of every position."""
+        return self.courses.linear.status
 
     @property
     def time(self) -> Array:
         """Times of the positions, s."""
-        return self.course.plan.times
-
-    @cached_property
-    def over_cycle(self) -> list[JointEffects]:
-        """Of each measure at every position; NaN where there is no answer."""
-        singular = self.course.status >= Status.SINGULAR
-        return [_by_joint(of.course, np.where(singular, np.nan, 0.0 * of.curve)) for of in self.course.measures]
-
-    @cached_property
-    def at_places(self) -> list[JointEffects]:
-        """Of each measure at its place."""
-        return [_by_joint(of.figure, np.zeros(())) for of in self.figures.linear.measures]
+        return self.courses.plan.times
 
     def place(self, i: int) -> str:
         """Where in the cycle the place of a measure is, in words."""
@@ -181,29 +172,47 @@ def play(
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    chosen_measures, notes = _measures(run, measures)
-    plays = _plays(run)
+    measures_chosen, notes = _measures(run, measures)
+    plays = plays_of(run)
+    if not plays:
+        remedy = "state joints.NAME.pin.clearance (guide.clearance), such as 20 um"
+        raise MechanismError(Finding("no joint states a clearance", "joints", remedy))
     value, timed = (None, False) if at is None else place_of(mechanism, at)
-    courses = [replace(measure, at=value, timed=timed, over=None, statistic="") for measure in chosen_measures]
+    courses = [replace(measure, at=value, timed=timed, over=None, statistic="") for measure in measures_chosen]
     if run.cycle.duration <= 0:  # there is one position
         courses = [replace(measure, statistic="value") for measure in courses]
-    over_cycle = figures = ToleranceStudy(run, plays, tuple(courses), steps, FrictionMethod())
+    inputs_of_plays = Inputs(run, (), tuple(plays), (), (), Population([], None))
+    over_cycle = figures = ToleranceStudy(run, inputs_of_plays, tuple(courses), steps, FrictionMethod())
     if at is not None or run.cycle.duration <= 0:
-        chosen_measures = courses
+        measures_chosen = courses
     else:
         largest = [of.time for of in over_cycle.linear.measures]
         placed = [
             replace(measure, at=time, timed=True) if measure.rule == "deviation" and np.isfinite(time) else measure
-            for measure, time in zip(chosen_measures, largest, strict=True)
+            for measure, time in zip(measures_chosen, largest, strict=True)
         ]
         figures = replace(over_cycle, measures=tuple(placed))
-    return _dataset(played := Played(run, chosen_measures, over_cycle, figures), [*_findings(played), *notes])
+    linear = over_cycle.linear
+    singular = np.where(linear.status >= Status.SINGULAR, np.nan, 0.0)  # there is no answer
+    played = Played(
+        run, measures_chosen, over_cycle, figures,
+        [_by_joint(of.course, singular + 0.0 * of.curve) for of in linear.measures],
+        [_by_joint(of.figure, np.zeros(())) for of in figures.linear.measures],
+    )  # fmt: skip
+    return _dataset(played, [*_findings(played), *notes])
 
 
 def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], list[Finding]]:
-    """The measures asked for; notes where they are chosen because none is stated, or some are left out."""
-    chosen_measures = chosen(run.system.mechanism, names, run.values)
-    others = [measure.name for measure in chosen_measures if not _covered(run, measure)]
+    """The measures asked for; notes where they are chosen because none is stated, or some are left out.
+
+    Each has one number at every position, and its figure is of one place: no mean, and no peak-to-peak.
+    """
+    measures = chosen(run.system.mechanism, names, run.values)
+    covered = [
+        measure for measure in measures
+        if (measure.kind in MOTIONS or measure.single(run.system)) and measure.statistic in ("", "value", *EXTREMES)
+    ]  # fmt: skip
+    others = [measure.name for measure in measures if measure not in covered]
     remedy, notes = "use `trunnion tolerance` for other measures", []
     if others and names is not None:
         what = f"this study covers measures with one value at every position, which {', '.join(others)} has not"
@@ -211,24 +220,8 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
     if others:
         what = f"left out: {', '.join(others)}, which have no one value at every position"
         notes = [Finding.note("play.measures_left_out", "measures", what, remedy, measures=others)]
-    measures, outputs_taken = stated_or_outputs(
-        run, [measure for measure in chosen_measures if measure.name not in others]
-    )
-    return measures, [*outputs_taken, *notes]
-
-
-def _covered(run: Run, measure: Measure) -> bool:
-    """Whether it has one number at every position, and its figure is of one place: no mean, and no peak-to-peak."""
-    return (measure.kind in MOTIONS or measure.single(run.system)) and measure.statistic in ("", "value", *EXTREMES)
-
-
-def _plays(run: Run) -> Inputs:
-    """The plays of all joints; MechanismError if there is none, or not all that is to know of one."""
-    plays = plays_of(run)
-    if not plays:
-        remedy = "state joints.NAME.pin.clearance (guide.clearance), such as 20 um"
-        raise MechanismError(Finding("no joint states a clearance", "joints", remedy))
-    return Inputs(run, (), tuple(plays), (), (), Population([], None))
+    covered, outputs_taken = stated_or_outputs(run, covered)
+    return covered, [*outputs_taken, *notes]
 
 
 def _by_joint(first: FirstOrder, blank: Array) -> JointEffects:
@@ -254,53 +247,20 @@ def _by_joint(first: FirstOrder, blank: Array) -> JointEffects:
 
 
 def _findings(played: Played) -> Iterator[Finding]:
-    run = played.run
+    run, mechanism, loose = played.run, played.run.system.mechanism, played.inputs.loose
     yield from of_run(run, notes=False)
     if run.determinacy is not None and any(part.redundant for part in run.determinacy.parts):
         what = "constraints are redundant: the worst case is an upper bound, because pins constrain one another"
         remedy = "the deviation assumes that each pin can be anywhere within its play"
         yield Finding.warning("play.redundant", "joints", what, remedy)
-    yield from _left_out(run, played.inputs.loose)
-    yield from _spinning(run, played.measures)
-    if run.seats:
-        what = "play is relative to the middle of the holes: the worst case is over all positions of the pins and "
-        what += f"does not use the seats of {', '.join(seat.joint for seat in run.seats)}"
-        remedy = "`trunnion analyse` has the deviation with these seats"
-        yield Finding.note("play.seats_not_taken", "joints", what, remedy, joints=[seat.joint for seat in run.seats])
-    yield from _fits(run, played.inputs.loose)
-    for i in range(len(played.measures)):
-        yield from _limit(played, i)
-    for i, of in enumerate(played.figures.linear.measures):
-        yield from _idle(played, i)
-        yield from _beyond_first_order(played, i, of)
-    dial, remedy = run.system.dial(run.values, played.time), "the effect of play is undefined there"
-    for code in Status:
-        where = np.flatnonzero(played.course.status == code)
-        if code >= Status.NOT_CONVERGED and len(where):
-            what, at = f"{code.text} {dial.intervals(where)}", dial.intervals(where)
-            yield Finding.error("play.no_answer", "", what, remedy, at=at, status=code.text)
-    for measure, effects, of in zip(played.measures, played.over_cycle, played.course.measures, strict=True):
-        lost = np.any(np.isnan(effects.worst_case), axis=0) & np.isfinite(_nominal(of))
-        where = np.flatnonzero(lost & (played.course.status < Status.SINGULAR))
-        if len(where):
-            what = f"a magnitude that is 0 has no derivative {dial.intervals(where)}"
-            yield Finding.warning("play.no_answer", f"measures.{measure.name}", what, remedy, at=dial.intervals(where))
-
-
-def _left_out(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
-    """Joints whose play has no model, or does more than the model of the mechanism knows."""
-    mechanism = run.system.mechanism
     models = CLEARANCE_MODELS[mechanism.space]
-    without_model = [
-        name
-        for name, (kind, _) in run.system.joints.items()
+    kinds = [
+        f"{name} ({kind})" for name, (kind, _) in run.system.joints.items()
         if kind not in models and clearance(name, run.values) is not None
-    ]
-    if without_model:
-        kinds = [f"{name} is {run.system.joints[name][0]}" for name in without_model]
-        what = f"the play of {', '.join(without_model)} is left out ({', '.join(kinds)} joints)"
-        remedy = f"play is modelled in {', '.join(models)} joints"
-        yield Finding.warning("play.left_out", "joints", what, remedy, joints=without_model)
+    ]  # fmt: skip
+    if kinds:
+        what, remedy = f"the play of {', '.join(kinds)} is left out", f"play is modelled in {', '.join(models)} joints"
+        yield Finding.warning("play.left_out", "joints", what, remedy, joints=kinds)
     toothed = sorted({
         joint for gear in mechanism.gears.values() if gear.touches for joint in gear.joints if joint in loose
     })  # fmt: skip
@@ -308,6 +268,34 @@ def _left_out(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
         what = f"gears turn in {', '.join(toothed)}: the effect of this play on the tooth contact is left out"
         remedy = "an offset e of a gear's centre across the line of centres turns the gear by e over its pitch radius"
         yield Finding.warning("play.gears", "gears", what, remedy, joints=toothed)
+    for _, (link, *ends), members in spins_of(run.system):
+        for measure in played.measures:
+            owner, _, point = measure.subject.partition(".")
+            if owner in members and (measure.kind == "angle" or (measure.kind == "point" and point not in ends)):
+                what = f"'{owner}' can spin about the line {ends[0]}-{ends[1]}; this study sets that spin to zero"
+                remedy, figures = "measure one of these two points", {"link": link, "points": list(ends)}
+                yield Finding.warning("play.spin", f"measures.{measure.name}", what, remedy, **figures)
+    if run.seats:
+        what = "play is relative to the middle of the holes: the worst case is over all positions of the pins and "
+        what += f"does not use the seats of {', '.join(seat.joint for seat in run.seats)}"
+        remedy = "`trunnion analyse` has the deviation with these seats"
+        yield Finding.note("play.seats_not_taken", "joints", what, remedy, joints=[seat.joint for seat in run.seats])
+    yield from _fits(run, loose)
+    dial, remedy = run.system.dial(run.values, played.time), "the effect of play is undefined there"
+    for i, measure in enumerate(played.measures):
+        yield from _of_measure(played, i)
+        yield from _beyond_first_order(played, i, played.figures.linear.measures[i])
+        lost = np.any(np.isnan(played.over_cycle[i].worst_case), axis=0)
+        lost &= np.isfinite(_nominal(played.courses.linear.measures[i])) & (played.status < Status.SINGULAR)
+        if lost.any():
+            at = dial.intervals(np.flatnonzero(lost))
+            what = f"a magnitude that is 0 has no derivative {at}"
+            yield Finding.warning("play.no_answer", f"measures.{measure.name}", what, remedy, at=at)
+    for code in Status:
+        where = np.flatnonzero(played.status == code)
+        if code >= Status.NOT_CONVERGED and len(where):
+            at = dial.intervals(where)
+            yield Finding.error("play.no_answer", "", f"{code.text} {at}", remedy, at=at, status=code.text)
 
 
 def _fits(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
@@ -329,18 +317,6 @@ def _fits(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
         yield Finding.note("play.mean_of_fits", "fits", what, remedy, **figures)
 
 
-def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
-    """Measures of links that may spin about the line of their joints."""
-    for _, (link, *ends), members in spins_of(run.system):
-        for measure in measures:
-            owner, _, point = measure.subject.partition(".")
-            if owner in members and (measure.kind == "angle" or (measure.kind == "point" and point not in ends)):
-                what = f"'{owner}' can spin about the line {ends[0]}-{ends[1]}; this study sets that spin to zero"
-                remedy = "measure one of these two points"
-                figures = {"link": link, "points": list(ends)}
-                yield Finding.warning("play.spin", f"measures.{measure.name}", what, remedy, **figures)
-
-
 def _judged_limit(measure: Measure) -> float | None:
     """The deviation that is allowed to either side where the measure is judged: at its place, or at every position."""
     sides = [abs(side) for side in (measure.limit, measure.upper, measure.lower) if side is not None]
@@ -348,40 +324,28 @@ def _judged_limit(measure: Measure) -> float | None:
     return min(sides) if placed and sides else measure.limit
 
 
-def _limit(played: Played, i: int) -> Iterator[Finding]:
-    """Whether the worst case of a measure keeps its limit."""
-    measure = played.measures[i]
-    limit, worst = _judged_limit(measure), float(np.sum(played.at_places[i].worst_case))
-    if limit is None or not np.isfinite(worst):
-        return
-    unit, where = measure.unit(played.run.system), f"measures.{measure.name}.limit"
-    factor, display_unit = (180 / np.pi, "deg") if unit == "rad" else (1e3, "mm") if unit == "m" else (1.0, unit)
-    figures = {"worst": factor * worst, "limit": factor * limit, "unit": display_unit, "at": played.place(i)}
-    reaches = f"the worst case to first order, {readable(factor * worst, display_unit)} at {played.place(i)}"
-    allowed = f"the limit of {readable(factor * limit, display_unit)}"
-    if worst <= limit:
-        yield Finding.note("limit.kept", where, f"{reaches}, is within {allowed}", **figures)
-    else:
-        remedy = "reduce the play of the joints with the largest share"
-        yield Finding.error("limit.exceeded", where, f"{reaches}, exceeds {allowed}", remedy, **figures)
-
-
-def _idle(played: Played, i: int) -> Iterator[Finding]:
-    """Joints whose play does nothing to a measure; of one that moves, likely another joint is driven in the machine."""
-    run, measure, course = played.run, played.measures[i], played.course.measures[i].curve
-    floor = scales_of(run).floor(measure.unit(run.system))
-    largest = [float(np.nanmax(row, initial=0.0)) for row in played.over_cycle[i].worst_case]
+def _of_measure(played: Played, i: int) -> Iterator[Finding]:
+    """Whether the worst case of a measure keeps its limit, and joints whose play does nothing to it."""
+    run, measure, course = played.run, played.measures[i], played.courses.linear.measures[i].curve
+    limit, worst, unit = _judged_limit(measure), float(np.sum(played.at_places[i].worst_case)), measure.unit(run.system)
+    if limit is not None and np.isfinite(worst):
+        where, figures = f"measures.{measure.name}.limit", {"worst": worst, "limit": limit, "at": played.place(i)}
+        what = f"the worst case to first order, {readable(worst, unit)} at {played.place(i)}, "
+        allowed = f"the limit of {readable(limit, unit)}"
+        if worst <= limit:
+            yield Finding.note("limit.kept", where, f"{what}is within {allowed}", **figures)
+        else:
+            remedy = "reduce the play of the joints with the largest share"
+            yield Finding.error("limit.exceeded", where, f"{what}exceeds {allowed}", remedy, **figures)
+    floor = scales_of(run).floor(unit)
+    largest = np.nanmax(played.over_cycle[i].worst_case.reshape(len(played.inputs.loose), -1), axis=1, initial=0.0)
     joints = [joint for joint, most in zip(played.inputs.loose, largest, strict=True) if most <= floor]
-    solved = course[np.isfinite(course)]
-    sized = np.any(np.nan_to_num(_radii(played.inputs, 3)) > 0, axis=1)
-    moves = bool(np.ptp(solved) > floor and np.any(sized)) if len(solved) else False
-    at = f" at {played.place(i)}" if len(played.time) == 1 else ""
-    if joints and len(solved):
-        what = f"the play of {', '.join(joints)} has no effect on {measure.name}{at}"
-        drivers = ", ".join(run.system.mechanism.drivers)
-        remedy = f"drive the joint that the machine drives, now {drivers}" if moves else ""
-        figures = {"joints": joints, "measure": measure.name}
-        yield Finding.note("play.no_effect", f"measures.{measure.name}", what, remedy, **figures)
+    if joints and np.any(np.isfinite(course)):
+        what, figures = (
+            f"the play of {', '.join(joints)} has no effect on it",
+            {"joints": joints, "measure": measure.name},
+        )
+        yield Finding.note("play.no_effect", f"measures.{measure.name}", what, **figures)
 
 
 def _beyond_first_order(played: Played, i: int, of: Of) -> Iterator[Finding]:
@@ -397,11 +361,9 @@ def _beyond_first_order(played: Played, i: int, of: Of) -> Iterator[Finding]:
         if np.ravel(status)[0] != Status.SOLVED:
             return
     least, largest = searched(study.many, study.linear, of)
-    if not (least.assembles and largest.assembles):  # pins that cannot get there
-        return
     low, high = least.value, largest.value
     off = max(abs(low + first), abs(high - first)) / first
-    if off > SLIGHT:
+    if off > SLIGHT and least.assembles and largest.assembles:  # else pins cannot get there
         unit, place = measure.unit(played.run.system), played.place(i)
         severity = Severity.WARNING if max(-low, high) > (1 + GRAVE) * first else Severity.NOTE
         what = f"to first order it changes by ±{readable(first, unit)} at {place}; the worst found on the mechanism "
@@ -420,7 +382,7 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
     worst, deviation, loads = (np.array(parts) for parts in zip(*played.over_cycle, strict=True))
     places = played.at_places
     arrays: dict[str, Array | NDArray[np.int8]] = {
-        "value": np.array([_nominal(of) for of in played.course.measures]),
+        "value": np.array([_nominal(of) for of in played.courses.linear.measures]),
         "worst_case": worst,
         "deviation": deviation,
         "worst_case_total": np.sum(worst, axis=1),
@@ -428,7 +390,7 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
         "deviation_total": np.sqrt(np.sum(deviation**2, axis=1)),
         "sensitivity": loads,
         "radius": _radii(played.inputs, loads.shape[2]),
-        "status": played.course.status,
+        "status": played.status,
         "extreme_worst_case": np.array([place.worst_case for place in places]),
         "extreme_deviation": np.array([place.deviation for place in places]),
         "extreme_time": np.array([of.time for of in played.figures.linear.measures]),
@@ -468,9 +430,8 @@ def _nominal(of: Of) -> Array:
 def _radii(inputs: Inputs, ends: int) -> Array:
     radii = np.full((len(inputs.loose), ends), np.nan)
     for row, joint in zip(radii, inputs.loose, strict=True):
-        play = inputs.play(joint, inputs.run.values)
-        assert play is not None  # else it would not be loose
-        row[: len(play.radii)] = [max(float(np.ravel(primal(radius))[0]), 0.0) for radius in play.radii]
+        radii_of = inputs.play(joint, inputs.run.values).radii
+        row[: len(radii_of)] = [max(float(np.ravel(primal(radius))[0]), 0.0) for radius in radii_of]
     return radii
 
 

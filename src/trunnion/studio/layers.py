@@ -123,7 +123,6 @@ def _scene(prepared: ToleranceStudy, numbers: Mapping[str, float], steps: int) -
     drawn_scene = scene(result, max_positions=steps)
     for joint in inputs.loose:
         play, links = inputs.play(joint, numbers), run.system.joints[joint][1]
-        assert play is not None  # else it would not be loose
         guide = play.model.size is not None and play.model.size[0] == "guide"
         drawn_scene["built"]["seats"].append({
             "joint": joint, "kind": "guide" if guide else "pin", "clearance": float(np.ravel(primal(play.radii[0]))[0]),

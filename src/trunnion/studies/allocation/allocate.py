@@ -8,7 +8,6 @@ they stay the same. Then the mechanism is analysed with the tolerances found: wo
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,25 +29,23 @@ from trunnion.studies.allocation.problem import (
     SampledYield,
     none,
 )
-from trunnion.studies.allocation.rows import Rows, joined, part_of, rows_of
-from trunnion.studies.allocation.solve import solve, trade_off
-from trunnion.studies.tolerance.first_order import ToleranceStudy
-from trunnion.studies.tolerance.linear import limits
-from trunnion.studies.tolerance.study import DEFAULT_SAMPLES, Method, tolerance
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 from trunnion.studies.allocation.result import (
     CLOSE,
     DEFAULT_YIELD,
     Allocated,
     AllocationRequest,
     Choice,
-    Way,
     dataset,
     share_of,
 )
+from trunnion.studies.allocation.rows import Rows, rows_of
+from trunnion.studies.allocation.solve import solve, trade_off
+from trunnion.studies.tolerance.first_order import ToleranceStudy
+from trunnion.studies.tolerance.linear import limits
+from trunnion.studies.tolerance.study import DEFAULT_SAMPLES, Method, check_share, tolerance
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["allocate", "half_widths"]
 
@@ -84,42 +81,68 @@ def allocate(
     """The tolerances and plays of least cost with which measures keep their limits, and what they do then.
 
     What is to be chosen are the tolerances and plays with a cost (`Mechanism.prices`); all others stay as they are.
-    measures: those with limits that are to be kept; all of the model if not given. criterion: one of `Criterion`:
-    worst-case, rss, or yield, of which target is the share of mechanisms within all limits, 0.9973 if not given; with
-    another criterion it is an error. choice: continuous, discrete, or auto: discrete where any cost is a list of
-    processes or options. steps: positions of a whole cycle; at: the place of measures that state none. samples, seed:
-    of the samples that verify it, none if 0; jobs: processes for them. curve: how many points of cost over accuracy,
-    all limits being multiplied by 0.5 to 2. friction_method: how friction and reactions are settled; Newton's method if
-    not given. progress: called with the samples done.
-    sure: of a yield, that the lower end of the 95 % interval of fresh samples meets the target, not its estimate.
-    exact: take limits narrower until the worst case found on the mechanism keeps them, and not first order alone.
-    Returns the Dataset of `tolerance` for the mechanism with the tolerances found (`half_widths`), and over
-    (parameter), (measure), (offer) those of `result.VARIABLES`.
-    Raises MechanismError if nothing has a cost, no measure a limit, or as `tolerance` does. That no tolerances keep the
-    limits is a finding of the result.
+
+    Parameters
+    ----------
+    measures
+        Those with limits that are to be kept; all of the model if not given.
+    criterion, target
+        One of `Criterion`: worst-case, rss, or yield, of which target is the share of mechanisms within all limits,
+        0.9973 if not given; with another criterion it is an error.
+    choice
+        continuous, discrete, or auto: discrete where any cost is a list of processes or options.
+    steps, at
+        Positions of a whole cycle; the place of measures that state none.
+    samples, seed, jobs
+        Of the samples that verify it, none if 0; processes for them.
+    curve
+        How many points of cost over accuracy, all limits being multiplied by 0.5 to 2.
+    exact
+        Take limits narrower until the worst case found on the mechanism keeps them, and not first order alone.
+    sure
+        Of a yield, that the lower end of the 95 % interval of fresh samples meets the target, not its estimate.
+    friction_method
+        How friction and reactions are settled; Newton's method if not given.
+    progress
+        Called with the samples done.
+
+    Returns
+    -------
+    Dataset
+        That of `tolerance` for the mechanism with the tolerances found (`half_widths`), and over (parameter),
+        (measure), (offer) the variables of `result.VARIABLES`. That no tolerances keep the limits is a finding of it.
+
+    Raises
+    ------
+    MechanismError
+        Nothing has a cost, no measure a limit, or as `tolerance` does.
     """
-    if target is not None and criterion != "yield":
-        what = f"the criterion {criterion} does not use a yield of {target:g}"
-        raise MechanismError(Finding(what, "yield", "leave it out, or use the criterion yield"))
-    if sure and criterion != "yield":
-        raise MechanismError(Finding("only a yield can be sure", "sure", "leave it out, or use the criterion yield"))
+    if criterion != "yield" and (sure or target is not None):
+        where, what = ("sure", "only a yield can be sure") if target is None else ("yield", f"{criterion} has no yield")
+        raise MechanismError(Finding(what, where, "leave it out, or use the criterion yield"))
     share = DEFAULT_YIELD if target is None else target
-    _check(share, samples, curve)
+    findings = check_share(share)
+    if samples < 0:
+        findings.append(Finding(f"{samples} samples", "samples", "give a number from 0"))
+    if not (curve == 0 or 2 <= curve <= MOST_FACTORS):
+        findings.append(Finding(f"a curve of {curve} points", "curve", f"give 2 to {MOST_FACTORS}"))
+    if findings:
+        raise MechanismError(findings)
     request = AllocationRequest(
         mechanism, _limited(mechanism, measures), criterion, share, choice, steps, at, samples, seed, friction_method,
         jobs, curve, exact, sure,
     )  # fmt: skip
-    allocated = _found(request)
+    allocated = _allocated(request)
     with_them = mechanism.with_tolerances(allocated.bought) if allocated.answer.found else mechanism
     names = [of.measure.name for of in allocated.study.linear.measures]
     methods: list[Method] = ["linear", "worst-case"] if allocated.answer.found else ["linear"]
     if samples and allocated.answer.found:
         methods.append("monte-carlo")
-    nominal_study = tolerance(
+    toleranced = tolerance(
         with_them, names, methods, max(samples, 1), seed, steps, at,
         friction_method=friction_method, jobs=jobs, progress=progress,
     )  # fmt: skip
-    return dataset(allocated, nominal_study)
+    return dataset(allocated, toleranced)
 
 
 def half_widths(result: xr.Dataset) -> dict[str, float]:
@@ -130,19 +153,6 @@ def half_widths(result: xr.Dataset) -> dict[str, float]:
     return {
         name: t for name, toleranced, t, was in zip(*columns, strict=True) if toleranced and abs(t - was) > 1e-12 * t
     }
-
-
-def _check(target: float, samples: int, curve: int) -> None:
-    findings = []
-    if not 0 < target < 1:
-        what = f"a yield of {target:g} is not possible"
-        findings.append(Finding(what, "yield", "give a share above 0 and below 1, such as 0.9973"))
-    if samples < 0:
-        findings.append(Finding(f"{samples} samples", "samples", "give a number from 0"))
-    if not (curve == 0 or 2 <= curve <= MOST_FACTORS):
-        findings.append(Finding(f"a curve of {curve} points", "curve", f"give 2 to {MOST_FACTORS}"))
-    if findings:
-        raise MechanismError(findings)
 
 
 def _limited(mechanism: Mechanism, measures: Sequence[str] | None) -> list[str]:
@@ -158,50 +168,14 @@ def _limited(mechanism: Mechanism, measures: Sequence[str] | None) -> list[str]:
     return limited
 
 
-def _found(request: AllocationRequest) -> Allocated:
-    """The allocation, with effects that belong to the tolerances found."""
-    mechanism = request.mechanism
-    if not mechanism.costs:
-        remedy = "state the costs of tolerances, as costs: {AB: {model: power, B: 1, k: 0.45, unit: mm}}"
-        raise MechanismError(Finding("no tolerance has a cost", "costs", remedy))
-    absent = {one.path: _start(one) for one in mechanism.prices() if one.play and not _clearance(mechanism, one.path)}
-    now = request.studied(absent)
-    prices, notes = _prices(now)
-    before = {**_stated(now, prices), **{path: 0.0 for path in absent if path in prices}}
-    listed = next((path for path, price in prices.items() if price.choices), "")
-    if listed and request.choice == "continuous":
-        what, remedy = "has a table of processes, which is no continuous choice", "choose discrete, or state a model"
-        raise MechanismError(Finding(what, f"costs.{listed}", remedy))
-    search = _Search(request, prices)
-    answer, now, rows, more = search.run(now)
-    if request.exact and request.criterion == "worst-case" and answer.found:
-        answer, now, rows, more = search.tightened(answer, now, rows, more)
-    offers: list[tuple[float, Answer]] = []
-    if request.curve and answer.found:
-        factors: list[float] = np.geomspace(*RANGE, request.curve).tolist()  # of a yield with the margin that it has
-        wider = trade_off(answer.problem, factors)
-        offers = [
-            (factor, answer if abs(factor - 1) < SAME else one) for factor, one in zip(factors, wider, strict=True)
-        ]
-    what = "the measure has no first-order result: its limits were ignored in the allocation"
-    remedy = "check with the samples whether they are met"
-    notes += [Finding.warning("allocation.unknown", f"measures.{name}", what, remedy) for name in rows.unknown]
-    answer_kind: Way = "discrete" if listed or request.choice == "discrete" else "continuous"
-    return Allocated(
-        request, now, rows, answer, answer_kind, prices, before, (*notes, *more), search.tight, tuple(offers)
-    )
-
-
 # ---- what is bought -------------------------------------------------------------------------------------------
 
 
 def _clearance(mechanism: Mechanism, path: str) -> float:
     """The radial clearance of a joint as it is stated."""
     numbers, joint = mechanism.parameter_set.nominal, path.split(".")[1]
-    return next(
-        (float(numbers[name]) for part in ("pin", "guide") if (name := f"joints.{joint}.{part}.clearance") in numbers),
-        0.0,
-    )
+    paths = (f"joints.{joint}.{part}.clearance" for part in ("pin", "guide"))
+    return next((float(numbers[path]) for path in paths if path in numbers), 0.0)
 
 
 def _start(price: Price) -> float:
@@ -213,7 +187,7 @@ def _start(price: Price) -> float:
 
 
 def _prices(study: ToleranceStudy) -> tuple[dict[str, Price], list[Finding]]:
-    """What can be bought of a study's numbers, by path, and what of the costs is of no use."""
+    """What can be bought of a study's numbers, by path, and a warning of each cost that is of no use."""
     mechanism, inputs = study.run.system.mechanism, study.inputs
     tolerances = {tolerance.path: tolerance for tolerance in inputs.tolerances}
     prices, findings = {}, []
@@ -223,9 +197,13 @@ def _prices(study: ToleranceStudy) -> tuple[dict[str, Price], list[Finding]]:
             what = "its pin has a stated seat, so the play does not vary"
         elif price.path in tolerances and tolerances[price.path].direction:
             what = "its direction is arbitrary, so the tolerance has no middle"
-        elif plays := _plays_of(study, price.path):
-            instead = f"state pin.clearance and a cost of {plays[0]}.clearance instead"
-            what = f"it changes the play of {', '.join(plays)}; {instead}"
+        elif price.path in tolerances:
+            values = mechanism.parameters(deviations={price.path: Dual(0.0, 1.0)})
+            plays = {joint: inputs.play(joint, values) for joint in inputs.loose}
+            moved = [joint for joint, play in plays.items() if any(np.any(derivative(r)) for r in play.radii)]
+            if moved:
+                instead = f"state pin.clearance and a cost of {moved[0]}.clearance instead"
+                what = f"it changes the play of {', '.join(moved)}; {instead}"
         if what:
             what = f"this tolerance is not allocated: {what}"
             remedy = "remove the cost; the tolerance stays as stated"
@@ -237,32 +215,87 @@ def _prices(study: ToleranceStudy) -> tuple[dict[str, Price], list[Finding]]:
     return prices, findings
 
 
-def _plays_of(study: ToleranceStudy, path: str) -> list[str]:
-    """Joints whose pins may lie anywhere in a play that the number changes."""
-    mechanism, inputs = study.run.system.mechanism, study.inputs
-    if not any(tolerance.path == path for tolerance in inputs.tolerances):
-        return []
-    values = mechanism.parameters(deviations={path: Dual(0.0, 1.0)})
-    plays = {joint: inputs.play(joint, values) for joint in inputs.loose}
-    return [
-        joint for joint, play in plays.items() if play and any(np.any(derivative(radius) != 0) for radius in play.radii)
-    ]
-
-
 def _stated(study: ToleranceStudy, prices: Mapping[str, Price]) -> dict[str, float]:
     """Half widths and clearances of a study, of what can be bought."""
+    widths = {tolerance.path: tolerance.half_width for tolerance in study.inputs.tolerances}
     mechanism = study.run.system.mechanism
-    half_widths_stated = {tolerance.path: tolerance.half_width for tolerance in study.inputs.tolerances}
-    return {
-        path: half_widths_stated[path] if path in half_widths_stated else _clearance(mechanism, path) for path in prices
+    return {path: widths[path] if path in widths else _clearance(mechanism, path) for path in prices}
+
+
+# ---- rounds ---------------------------------------------------------------------------------------------------
+
+
+def _allocated(request: AllocationRequest) -> Allocated:
+    """The allocation, with effects that belong to the tolerances found."""
+    mechanism = request.mechanism
+    if not mechanism.costs:
+        remedy = "state the costs of tolerances, as costs: {AB: {model: power, B: 1, k: 0.45, unit: mm}}"
+        raise MechanismError(Finding("no tolerance has a cost", "costs", remedy))
+    absent = {
+        price.path: _start(price)
+        for price in mechanism.prices()
+        if price.play and not _clearance(mechanism, price.path)
     }
+    now = request.studied(absent)
+    prices, notes = _prices(now)
+    before = {**_stated(now, prices), **{path: 0.0 for path in absent if path in prices}}
+    listed = next((path for path, price in prices.items() if price.choices), "")
+    if listed and request.choice == "continuous":
+        what, remedy = "has a table of processes, which is no continuous choice", "choose discrete, or state a model"
+        raise MechanismError(Finding(what, f"costs.{listed}", remedy))
+
+    tight: dict[str, float] = {}
+    answer, now, rows, more = _settled(request, prices, now, tight)
+    for _ in range(ROUNDS if request.exact and request.criterion == "worst-case" else 0):
+        excess = {} if not answer.found else _excess(now)
+        if max(excess.values(), default=0.0) <= 1 + CLOSE:
+            break
+        for name, share in excess.items():
+            if share > 1:  # limits are narrowed until the worst case on the mechanism keeps the stated ones
+                tight[name] = tight.get(name, 1.0) / (share * (1 + CLOSE / 2))
+        answer, now, rows, more = _settled(request, prices, now, tight)
+
+    offers: list[tuple[float, Answer]] = []
+    if request.curve and answer.found:
+        factors: list[float] = np.geomspace(*RANGE, request.curve).tolist()  # of a yield with the margin that it has
+        wider = trade_off(answer.problem, factors)
+        offers = [
+            (factor, answer if abs(factor - 1) < SAME else each) for factor, each in zip(factors, wider, strict=True)
+        ]
+    what = "the measure has no first-order result: its limits were ignored in the allocation"
+    remedy = "check with the samples whether they are met"
+    notes += [Finding.warning("allocation.unknown", f"measures.{name}", what, remedy) for name in rows.unknown]
+    kind = "discrete" if listed or request.choice == "discrete" else "continuous"
+    return Allocated(request, now, rows, answer, kind, prices, before, (*notes, *more), tuple(offers))
 
 
-def _contributions(study: ToleranceStudy, prices: Mapping[str, Price]) -> tuple[Contribution, ...]:
-    """All that varies: what can be bought with its price, the others with their effects as they are."""
-    return tuple(
-        _contribution(prices[name]) if name in prices else Contribution(name, 1.0) for name in study.inputs.names
+def _settled(
+    request: AllocationRequest, prices: Mapping[str, Price], now: ToleranceStudy, tight: Mapping[str, float]
+) -> tuple[Answer, ToleranceStudy, Rows, list[Finding]]:
+    """The answer with rows taken at its own tolerances, in rounds from those of a study: with that study and the rows.
+
+    Rows that move stay in the problem, so that the answer keeps all that they were.
+    """
+    contributions = tuple(
+        _contribution(prices[name]) if name in prices else Contribution(name, 1.0) for name in now.inputs.names
     )
+    rows = everything = rows_of(now, _stated(now, prices), request.criterion, tight)
+    for count in range(ROUNDS):
+        everything = rows.with_moving(everything) if count else rows
+        problem = AllocationProblem(contributions, everything.effects, request.criterion)
+        outside = _nominal_outside(now)
+        answer = none(problem, outside) if outside else _solved(request, prices, problem)
+        if not answer.found:
+            return answer, now, everything, []
+        bought = {name: t for name, t in answer.by_name.items() if name in prices}
+        after = request.studied(bought)
+        ahead = rows_of(after, bought, request.criterion, tight)
+        if _same(answer, rows, ahead):
+            return answer, after, everything, []
+        rows, last, now = ahead, now, after
+    what = f"the effects depend on the tolerances themselves and did not converge in {ROUNDS} iterations"
+    doubt = Finding.warning("allocation.unsettled", "costs", what, "use the verification", rounds=ROUNDS)
+    return answer, last, everything, [doubt]
 
 
 def _contribution(price: Price) -> Contribution:
@@ -270,110 +303,49 @@ def _contribution(price: Price) -> Contribution:
     return Contribution(price.path, 0.0, cost, price.choices, price.group, price.least, price.most)
 
 
-# ---- rounds ---------------------------------------------------------------------------------------------------
+def _solved(request: AllocationRequest, prices: Mapping[str, Price], problem: AllocationProblem) -> Answer:
+    """The answer of a problem; of a yield that of the samples."""
 
-Found = tuple[Answer, ToleranceStudy, Rows, list[Finding]]
+    def verify(tolerances: Array, number: int) -> SampledYield:
+        pairs = zip(problem.contributions, tolerances.tolist(), strict=True)
+        bought = {contribution.name: t for contribution, t in pairs if contribution.name in prices}
+        sampled = tolerance(
+            request.mechanism.with_tolerances(bought), request.measures, ["monte-carlo"], request.samples,
+            request.seed + FRESH * number, request.steps, request.at, friction_method=request.friction,
+            jobs=request.jobs,
+        )  # fmt: skip
+        return SampledYield(*(float(sampled[f"yield_all{end}"]) for end in ("", "_low", "_high")))
 
-
-@dataclass
-class _Search:
-    """Rounds of rows and answers until they belong together."""
-
-    asked: AllocationRequest
-    prices: Mapping[str, Price]
-    tight: dict[str, float] = field(default_factory=dict)
-
-    def run(self, now: ToleranceStudy) -> Found:
-        """The answer with rows taken at its own tolerances, from those of a study."""
-        rows_before: Rows | None = None
-        rows = self._rows(now, _stated(now, self.prices))
-        for count in range(1, ROUNDS + 1):
-            rows_joined = rows if rows_before is None else joined(rows, rows_before)
-            problem = AllocationProblem(_contributions(now, self.prices), rows_joined.effects, self.asked.criterion)
-            off = _off(now)
-            answer = none(problem, off) if off else self._solved(problem)
-            if not answer.found:
-                break
-            bought = self._bought(answer)
-            after = self.asked.studied(bought)
-            ahead = self._rows(after, bought)
-            if _same(answer.problem, answer.tolerances, rows, ahead):
-                return answer, after, rows_joined, []
-            if count < ROUNDS:
-                moving = part_of(rows, rows.moving)
-                rows_before = moving if rows_before is None else joined(moving, rows_before)
-                rows, now = ahead, after
-        else:
-            what = f"the effects depend on the tolerances themselves and did not converge in {ROUNDS} iterations"
-            doubt = Finding.warning("allocation.unsettled", "costs", what, "use the verification", rounds=ROUNDS)
-            return answer, now, rows_joined, [doubt]
-        return answer, now, rows_joined, []
-
-    def tightened(self, answer: Answer, now: ToleranceStudy, rows: Rows, findings: list[Finding]) -> Found:
-        """The same with limits narrowed until the worst case found on the mechanism keeps the stated ones."""
-        for _ in range(ROUNDS):
-            excess = {of.measure.name: share for of, share in zip(now.linear.measures, _beyond(now), strict=True)}
-            if max(excess.values()) <= 1 + CLOSE:
-                break
-            for name, share in excess.items():
-                if share > 1:
-                    self.tight[name] = self.tight.get(name, 1.0) / (share * (1 + CLOSE / 2))
-            answer, now, rows, findings = self.run(now)
-            if not answer.found:
-                break
-        return answer, now, rows, findings
-
-    def _rows(self, now: ToleranceStudy, bought: Mapping[str, float]) -> Rows:
-        return rows_of(now, bought, self.asked.criterion, self.tight)
-
-    def _bought(self, answer: Answer) -> dict[str, float]:
-        return {name: t for name, t in answer.by_name.items() if name in self.prices}
-
-    def _solved(self, problem: AllocationProblem) -> Answer:
-        """The answer of a problem; of a yield that of the samples."""
-        request, names = self.asked, [contribution.name for contribution in problem.contributions]
-
-        def verify(tolerances: Array, number: int) -> SampledYield:
-            bought = {name: float(t) for name, t in zip(names, tolerances, strict=True) if name in self.prices}
-            sampled = tolerance(
-                request.mechanism.with_tolerances(bought), request.measures, ["monte-carlo"], request.samples,
-                request.seed + FRESH * number, request.steps, request.at, friction_method=request.friction,
-                jobs=request.jobs,
-            )  # fmt: skip
-            return SampledYield(*(float(sampled[f"yield_all{end}"]) for end in ("", "_low", "_high")))
-
-        return solve(problem, request.target, verify if request.samples else None, request.sure)
+    return solve(problem, request.target, verify if request.samples else None, request.sure)
 
 
-def _same(problem: AllocationProblem, tolerances: Array, rows: Rows, ahead: Rows) -> bool:
+def _same(answer: Answer, rows: Rows, ahead: Rows) -> bool:
     """Whether the rows at the tolerances found take as much of their room as those they were found with."""
     if len(ahead.measure) != len(rows.measure):
         return False
-    before, after = (problem.with_effects(rows_at.effects).used(tolerances) for rows_at in (rows, ahead))
+    before, after = (answer.problem.with_effects(at.effects).used(answer.tolerances) for at in (rows, ahead))
     still = ~rows.moving
     return bool(np.all(np.abs(after - before)[still] <= SAME) and np.all(after[rows.moving] <= 1 + SAME))
 
 
-def _beyond(now: ToleranceStudy) -> list[float]:
-    """The worst case that is found on the mechanism, as a share of the limit it is nearest to, of each measure."""
-    shares = []
+def _excess(now: ToleranceStudy) -> dict[str, float]:
+    """The worst case that is found on the mechanism, as a share of the limit it is nearest to, by measure."""
+    shares = {}
     for of, (least, most) in zip(now.linear.measures, now.worst(), strict=True):
         lower, upper = limits(of)
-        shares.append(max(share_of(least.value, lower), share_of(most.value, upper)))
+        shares[of.measure.name] = max(share_of(least.value, lower), share_of(most.value, upper))
     return shares
 
 
-def _off(now: ToleranceStudy) -> list[Finding]:
+def _nominal_outside(now: ToleranceStudy) -> list[Finding]:
     """Measures whose nominal figure is beyond their bounds, which no tolerance mends."""
     findings = []
     for of in now.linear.measures:
-        lower, upper = limits(of)
+        (lower, upper), measure, nominal = limits(of), of.measure, of.reference.figure
         if lower > 0 or upper < 0:
-            measure, nominal = of.measure, of.reference.figure
             word, bound = ("at_least", nominal + lower) if lower > 0 else ("at_most", nominal + upper)
-            unit = measure.figure_unit(now.run.system, now.run.values)
-            factor, display_unit = drawn_in(bound, unit)
-            texts, limit = (signed(value, factor, display_unit, "", 6) for value in (nominal, bound))
+            scale = drawn_in(bound, measure.figure_unit(now.run.system, now.run.values))
+            texts, limit = (signed(value, *scale, "", 6) for value in (nominal, bound))
             what = f"the nominal value is {texts}, {word} is {limit}: tolerances cannot correct that"
             where, remedy = f"measures.{measure.name}", "change the mechanism or the bound"
             figures = {"nominal": nominal, "bound": bound}

@@ -20,7 +20,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, agreeing
+from trunnion.errors import Finding
 from trunnion.model.tolerances import ProcessChoice
 from trunnion.results.quantities import drawn_in, signed
 from trunnion.statistics.costs import Cost
@@ -88,14 +88,6 @@ class RowEffects:
     places: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
 
-    def label(self, row: int) -> str:
-        """Name of a row."""
-        return self.labels[row] if self.labels else f"row {row + 1}"
-
-    def place(self, row: int) -> str:
-        """Where in the cycle a row is, with a blank before it; empty if it is at no one place."""
-        return self.places[row] if self.places else ""
-
     def say(self, row: int, value: float) -> str:
         """A deviation of a row with its sign and unit, angles in degrees, lengths in mm."""
         factor, unit = drawn_in(value, self.units[row]) if self.units else (1.0, "")
@@ -156,6 +148,19 @@ class AllocationProblem:
                 together.setdefault(contribution.group or f"={contribution.name}", []).append(contribution)
         return together
 
+    def narrowest(self) -> Array:
+        """The least half widths that can be had, (contribution,)."""
+        place = {contribution.name: i for i, contribution in enumerate(self.contributions)}
+        least = np.array([contribution.value * contribution.fixed for contribution in self.contributions])
+        for members in self.groups().values():
+            rows, options = [place[member.name] for member in members], list(common_options(members).values())
+            if members[0].options:
+                widths = np.array([[option.tolerance for option in each] for each in options])
+                least[rows] = np.min(widths.reshape(-1, len(rows)), axis=0, initial=np.inf)
+            else:
+                least[rows] = max(member.least for member in members)
+        return least
+
     def costs(self, tolerances: Array) -> Array:
         """What the half widths cost by formula, (contribution,); 0 of the others."""
         pairs = zip(self.contributions, tolerances.tolist(), strict=True)
@@ -211,7 +216,7 @@ class Answer:
     bound: no allocation costs less than this; gap: cost minus bound, a share of the cost that tolerances change.
     proven: whether the gap proves a global optimum.
     price: what one more unit (rad, m, …) of a row's room would save, (row,); NaN for a discrete choice.
-    active: rows that limit; used: share of its room each row takes. rounds: of the solver.
+    used: share of its room each row takes.
     Of a yield: expected, of normal deviations, linearly; sampled, by those samples that chose the margin; checked, by
     fresh ones, which had no part in it; trials: all margins that were tried.
     """
@@ -226,7 +231,6 @@ class Answer:
     choices: dict[str, str] = field(default_factory=dict)
     price: Array = field(default_factory=lambda: np.zeros(0))
     findings: tuple[Finding, ...] = ()
-    rounds: int = 0
     expected: float = np.nan
     sampled: SampledYield | None = None
     checked: SampledYield | None = None
@@ -243,21 +247,10 @@ class Answer:
         return self.problem.used(self.tolerances)
 
     @property
-    def active(self) -> NDArray[np.intp]:
-        """Rows that limit, by their number."""
-        return np.flatnonzero(self.used > 1 - 1e-6)
-
-    @property
     def by_name(self) -> dict[str, float]:
         """Half widths by the names of the contributions."""
         names = [contribution.name for contribution in self.problem.contributions]
         return dict(zip(names, self.tolerances.tolist(), strict=True))
-
-    def __str__(self) -> str:
-        if not self.found:
-            return "no allocation meets the limits"
-        word = "global optimum" if self.proven else "best found"
-        return f"cost {self.cost:.8g}, {word} (lower bound {self.bound:.8g}, gap {self.gap:.1e})"
 
 
 def common_options(members: Sequence[Contribution]) -> dict[str, list[ProcessChoice]]:
@@ -269,69 +262,46 @@ def common_options(members: Sequence[Contribution]) -> dict[str, list[ProcessCho
 
 def none(problem: AllocationProblem, findings: Sequence[Finding]) -> Answer:
     """The answer that there is none."""
-    count, lost = len(problem.contributions), np.nan
-    no_price = np.full(len(problem.effects.worst), lost)
-    return Answer(
-        problem, np.full(count, lost), np.full(count, lost), lost, lost, lost, False, price=no_price,
-        findings=tuple(findings),
-    )  # fmt: skip
+    lost, no_price = np.full(len(problem.contributions), np.nan), np.full(len(problem.effects.worst), np.nan)
+    return Answer(problem, lost, lost, np.nan, np.nan, np.nan, False, {}, no_price, tuple(findings))
 
 
 def optimum(
-    problem: AllocationProblem, tolerances: Array, costs: Array, bound: float, gap: float, price: Array, rounds: int,
+    problem: AllocationProblem, tolerances: Array, costs: Array, bound: float, gap: float, price: Array,
     choices: dict[str, str],
 ) -> Answer:  # fmt: skip
     """The answer of a solver, with a doubt where its gap proves no global optimum."""
-    cost, doubts = float(np.sum(costs)), []
-    if not gap <= PROVEN:
-        what, remedy = f"the optimality gap is {gap:.1e} of the cost of the tolerances", "check the orders of magnitude"
-        remedy += " of costs and bounds"
-        doubts.append(Finding.warning("allocation.proven_roughly", "costs", what, remedy, gap=gap))
-    return Answer(
-        problem, tolerances, costs, cost, min(bound, cost), gap, not doubts, choices, price, tuple(doubts), rounds
-    )
+    cost, proven = float(np.sum(costs)), gap <= PROVEN
+    what, remedy = f"the optimality gap is {gap:.1e} of the cost of the tolerances", "check the orders of magnitude"
+    doubts = () if proven else (Finding.warning("allocation.proven_roughly", "costs", what, remedy, gap=gap),)
+    return Answer(problem, tolerances, costs, cost, min(bound, cost), gap, proven, choices, price, doubts)
 
 
 def shortfalls(problem: AllocationProblem, least: Array) -> list[Finding]:
-    """Of each measure with limits that are broken even with all tolerances at their least what they would have to be.
+    """Of each measure with a limit that is broken even with all tolerances at their least what they would have to be.
 
     least: the half widths, m or rad, that are the least to be had.
     """
-    used, effects = problem.used(least), problem.effects
-    by_measure: dict[str, list[int]] = {}
-    for row in range(len(used)):
-        by_measure.setdefault(effects.label(row) if effects.labels else "", []).append(row)
-    findings = []
-    for rows in by_measure.values():
-        over = [row for row in rows if used[row] > 1 + ALLOWED]
-        if over:
-            places, broken = (len({effects.place(row) for row in group}) for group in (rows, over))
-            exceed = agreeing(broken, "exceeds its", "exceed their")
-            more = f"; {broken} of {places} positions {exceed} limits" if places > 1 else ""
-            findings.append(_shortfall(problem, least, max(over, key=lambda row: used[row]), more))
+    used, effects, findings = problem.used(least), problem.effects, []
+    labels, places = (np.array(texts or [""] * len(used)) for texts in (effects.labels, effects.places))
+    broken, (low, high) = used > 1 + ALLOWED, problem.at(least)
+    for label in dict.fromkeys(labels[broken].tolist()):
+        row = int(np.argmax(np.where(labels == label, used, -np.inf)))
+        upwards = high[row] - effects.upper[row] >= effects.lower[row] - low[row]
+        over, limit = (high[row], effects.upper[row]) if upwards else (low[row], effects.lower[row])
+        largest = problem.contributions[int(np.argmax(effects.worst[row] * least))]
+        narrow = f"narrow '{largest.name}', which has no cost and" * largest.fixed
+        narrow = narrow or f"allow '{largest.name}' a smaller least: it"
+        what = f"the limit {effects.say(row, limit)} is infeasible: with all tolerances at their least the deviation "
+        what += f"is {effects.say(row, over)}{places[row]}"
+        if problem.criterion == "yield":
+            what += f" ({problem.margins()[row]:.3g} standard deviations of a normal distribution)"
+        count, beyond = (len(set(places[(labels == label) & which].tolist())) for which in (used >= 0, broken))
+        what += f"; {beyond} of {count} positions exceed their limits" * (count > 1)
+        remedy, figures = f"widen the limit, or first {narrow} has the largest share", {"limit": limit, "takes": over}
+        where = label or f"row {row + 1}"
+        findings.append(Finding.error("allocation.impossible", where, what, remedy, **figures, largest=largest.name))
     return findings
-
-
-def _shortfall(problem: AllocationProblem, least: Array, row: int, more: str) -> Finding:
-    """That a row cannot keep its limit, and what has the largest part in that."""
-    effects = problem.effects
-    low, high = (float(side[row]) for side in problem.at(least))
-    lower, upper = float(effects.lower[row]), float(effects.upper[row])
-    over, limit = (high, upper) if high - upper >= lower - low else (low, lower)
-    parts = effects.worst[row] * least
-    largest = problem.contributions[int(np.argmax(parts))]
-    name = f"'{largest.name}'"
-    narrow = f"narrow {name}, which has no cost and" if largest.fixed else f"allow {name} a smaller least: it"
-    ratio = f", {over / limit:.3g} times the limit" if over * limit > 0 else ""
-    what = f"the limit {effects.say(row, limit)} is infeasible: with all tolerances at their least the deviation is "
-    what += f"{effects.say(row, over)}{effects.place(row)}"
-    if problem.criterion == "yield":
-        what += f" ({problem.margins()[row]:.3g} standard deviations of a normal distribution)"
-    remedy, figures = f"widen the limit, or first {narrow} has the largest share", {"limit": limit, "takes": over}
-    where = effects.label(row)
-    return Finding.error(
-        "allocation.impossible", where, f"{what}{ratio}{more}", remedy, **figures, largest=largest.name
-    )
 
 
 def _norm(parts: Array, correlation: Array | None) -> Array:

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, Severity, agreeing
+from trunnion.errors import Finding, Severity
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.tolerances import Price
 from trunnion.results.attributes import encoded, finding_rows, findings_of, summary_of
 from trunnion.results.dataset import MemberUnits, Variable, described, units_along, with_variables
 from trunnion.results.figure import Figure
-from trunnion.results.quantities import readable
+from trunnion.results.quantities import drawn_in, signed
 from trunnion.results.scales import scales_in
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.statistics.costs import Cost
@@ -34,19 +34,15 @@ __all__ = [
     "Allocated",
     "AllocationRequest",
     "Choice",
-    "Way",
-    "cost_of",
     "dataset",
     "share_of",
 ]
 
 Array = NDArray[np.float64]
-Way = Literal["continuous", "discrete"]
 Choice = Literal["auto", "continuous", "discrete"]
 DEFAULT_YIELD = 0.9973
 CLOSE = 1e-6  # of a limit: how close to it the worst case found is brought
 TWICE = 2.0  # so many rejects as an RSS stands for are an error
-SHOWN = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
 ROUGH, SLIGHT = 0.01, 0.001  # of a limit: what first order may leave out before it is an error, and a warning
 M, P, T = ("measure",), ("parameter",), ("trial",)
 VARIABLES: dict[str, Variable] = {
@@ -115,20 +111,19 @@ class AllocationRequest:
 class Allocated:
     """What was found. study: of the tolerances that the rows of the answer belong to; way: how it was solved.
 
-    prices: of what could be bought, by path; before: half widths as stated; tight: what limits were multiplied by, by
-    measure, so that the mechanism itself keeps them; offers: factors of all limits with their answers.
+    prices: of what could be bought, by path; before: half widths as stated; offers: factors of all limits with their
+    answers.
     """
 
     asked: AllocationRequest
     study: ToleranceStudy
     rows: Rows
     answer: Answer
-    way: Way
+    way: str
     prices: Mapping[str, Price]
     before: Mapping[str, float]
     findings: tuple[Finding, ...]
-    tight: Mapping[str, float] = field(default_factory=dict)
-    offers: tuple[tuple[float, Answer], ...] = field(default=())
+    offers: tuple[tuple[float, Answer], ...] = ()
 
     @property
     def bought(self) -> dict[str, float]:
@@ -141,31 +136,23 @@ def share_of(value: float, limit: float) -> float:
     return max(value / limit, 0.0) if np.isfinite(limit) and limit != 0 and np.isfinite(value) else 0.0
 
 
-def cost_of(price: Price, t: float) -> float:
+def _cost_of(price: Price, t: float) -> float:
     """Cost of a half width, SI; of options, of the cheapest that keeps it, NaN if none does."""
     if price.model:
         return Cost(price.model, price.parameters).value(t)
     return min((choice.cost for choice in price.choices if choice.tolerance <= t * (1 + 1e-9)), default=np.nan)
 
 
-def stated_cost(allocated: Allocated) -> float:
-    """What all costs as it is stated; NaN where a half width has no cost."""
-    return float(np.sum([cost_of(price, allocated.before[name]) for name, price in allocated.prices.items()]))
-
-
 def dataset(allocated: Allocated, toleranced: xr.Dataset) -> xr.Dataset:
     """The result with the numbers of the allocation. toleranced: of the mechanism with these tolerances."""
-    arrays = {
-        **_bought(allocated, toleranced),
-        **_rows(allocated, toleranced),
-        **_whole(allocated, toleranced.sizes["measure"]),
-    }
+    arrays = {**_by_parameter(allocated, toleranced), **_by_measure(allocated, toleranced), **_totals(allocated)}
     parameters = MemberUnits("parameter", units_along(toleranced["parameter_nominal"], "parameter"))
     saving = MemberUnits("measure", [f"1/({unit})" for unit in units_along(toleranced["nominal"], "measure")])
     variables = described(arrays, VARIABLES, {"parameter": parameters, "saving": saving})
     # the criterion says what is to be kept
     findings_kept = [finding for finding in findings_of(toleranced) if not finding.code.startswith("limit.missed")]
     findings = list(_findings(allocated, toleranced))
+    errors = [finding for finding in findings if finding.severity is Severity.ERROR]
     attributes: dict[str, Any] = {
         "kind": "allocation",
         "found": int(allocated.answer.found),
@@ -173,236 +160,168 @@ def dataset(allocated: Allocated, toleranced: xr.Dataset) -> xr.Dataset:
         "target": allocated.asked.target,
         "choices": allocated.way,
         "proven": int(allocated.answer.proven),
-        "prices": [_plain(price) for price in allocated.prices.values()],
-        **scales_in(toleranced).summary([*_summary(allocated, toleranced, arrays), *summary_of(toleranced)]),
-        "findings": finding_rows([*findings, *findings_kept]),
-        "missed": [
-            f"{finding.where}: {finding.what}".lstrip(": ")
-            for finding in findings
-            if finding.severity is Severity.ERROR
+        "prices": [  # JSON has no infinite numbers
+            {**asdict(price), "most": price.most if np.isfinite(price.most) else None}
+            for price in allocated.prices.values()
         ],
+        **scales_in(toleranced).summary([*_summary(allocated, arrays, toleranced), *summary_of(toleranced)]),
+        "findings": finding_rows([*findings, *findings_kept]),
+        "missed": [f"{finding.where}: {finding.what}".lstrip(": ") for finding in errors],
     }
     return with_variables(toleranced, variables).assign_attrs(encoded(attributes))
 
 
-def _plain(price: Price) -> dict[str, Any]:
-    """A price for JSON, which has no infinite numbers."""
-    return {**asdict(price), "most": price.most if np.isfinite(price.most) else None}
-
-
-def _bought(allocated: Allocated, toleranced: xr.Dataset) -> dict[str, Any]:
-    """What is of each parameter."""
-    names = [str(name) for name in toleranced["parameter"].values]
-    answer, prices = allocated.answer, allocated.prices
+def _by_parameter(allocated: Allocated, toleranced: xr.Dataset) -> dict[str, Any]:
+    """What is of each parameter: NaN of one without a cost, but for its half width, which stays as stated."""
+    names, answer, prices = toleranced["parameter"].values.tolist(), allocated.answer, allocated.prices
+    plays = {f"joints.{joint}.clearance" for joint in allocated.study.inputs.loose}
     halves = (toleranced["parameter_upper"].values - toleranced["parameter_lower"].values) / 2
-    as_stated = [
-        float(toleranced["parameter_nominal"].values[i]) if _is_play(allocated, name) else float(halves[i])
-        for i, name in enumerate(names)
-    ]
+    stated = np.where([name in plays for name in names], toleranced["parameter_nominal"].values, halves)
     costs = dict(zip((item.name for item in answer.problem.contributions), answer.costs.tolist(), strict=True))
     chosen, before = allocated.bought, allocated.before
-    cost = np.array([costs[name] if name in prices else np.nan for name in names])
-    width = max((len(item.choices) for item in prices.values()), default=0)
-    options = np.full((2, len(names), width), np.nan)
-    for i, name in enumerate(names):
-        for k, item in enumerate(prices[name].choices if name in prices else ()):
-            options[:, i, k] = item.tolerance, item.cost
+
+    def of_prices(number: Callable[[str, Price], float]) -> Array:
+        return np.array([number(name, prices[name]) if name in prices else np.nan for name in names])
+
+    cost = of_prices(lambda name, _: costs[name])
     arrays: dict[str, Any] = {
-        "tolerance": np.array([chosen.get(name, half) for name, half in zip(names, as_stated, strict=True)]),
+        "tolerance": np.array([chosen.get(name, half) for name, half in zip(names, stated, strict=True)]),
         "bought": np.array([int(name in prices) for name in names], np.int8),
         "choice": np.array([answer.choices.get(name, "") for name in names], str),
         "cost": cost,
         "cost_share": cost / answer.cost if answer.cost else np.full(len(names), np.nan),
-        "tolerance_before": np.array([before.get(name, half) for name, half in zip(names, as_stated, strict=True)]),
-        "cost_before": np.array([cost_of(prices[name], before[name]) if name in prices else np.nan for name in names]),
-        "tolerance_least": np.array([prices[name].least if name in prices else np.nan for name in names]),
-        "tolerance_most": np.array([_most(prices[name]) if name in prices else np.nan for name in names]),
+        "tolerance_before": np.array([before.get(name, half) for name, half in zip(names, stated, strict=True)]),
+        "cost_before": of_prices(lambda name, price: _cost_of(price, before[name])),
+        "tolerance_least": of_prices(lambda _, price: price.least),
+        "tolerance_most": of_prices(lambda _, price: price.most if np.isfinite(price.most) else np.nan),
     }
-    if width:
+    if width := max(len(price.choices) for price in prices.values()):
+        options = np.full((2, len(names), width), np.nan)
+        for i, name in enumerate(names):
+            for k, item in enumerate(prices[name].choices if name in prices else ()):
+                options[:, i, k] = item.tolerance, item.cost
         arrays |= {"option_tolerance": options[0], "option_cost": options[1]}
     if allocated.offers:
         offered = [answer.by_name for _, answer in allocated.offers]
-        arrays["trade_off_tolerance"] = np.array([[item[name] if name in prices else np.nan for name in names]
-                                                  for item in offered])  # fmt: skip
+        arrays["trade_off_tolerance"] = np.array([of_prices(lambda name, _: item[name]) for item in offered])  # noqa: B023
     return arrays
 
 
-def _is_play(allocated: Allocated, name: str) -> bool:
-    return name.endswith(".clearance") and name.split(".")[1] in allocated.study.inputs.loose and name.count(".") == 2
-
-
-def _most(price: Price) -> float:
-    return price.most if np.isfinite(price.most) else np.nan
-
-
-def _rows(allocated: Allocated, toleranced: xr.Dataset) -> dict[str, Any]:
+def _by_measure(allocated: Allocated, toleranced: xr.Dataset) -> dict[str, Any]:
     """How much of its room each measure takes, and what more of it would save."""
-    count, positions = toleranced.sizes["measure"], toleranced.sizes["position"]
-    used, curve, saving = np.full(count, np.nan), np.full((count, positions), np.nan), np.full(count, np.nan)
-    margin = np.full(count, np.nan)
+    count, positions, rows = toleranced.sizes["measure"], toleranced.sizes["position"], allocated.rows
+    used, saving, curve = np.full(count, np.nan), np.full(count, np.nan), np.full((count, positions), np.nan)
     if allocated.answer.found:
-        shares = allocated.answer.used[: len(allocated.rows.measure)]
-        prices = allocated.answer.price[: len(allocated.rows.measure)]
-        margin = _margins(allocated, count)
-        for k in range(count):
-            rows_of_measure = allocated.rows.measure == k
-            if np.any(rows_of_measure):
-                used[k], saving[k] = float(np.max(shares[rows_of_measure])), float(np.sum(prices[rows_of_measure]))
-                placed = rows_of_measure & (allocated.rows.position >= 0)
-                curve[k, allocated.rows.position[placed]] = shares[placed]
+        shares, placed = allocated.answer.used, rows.position >= 0
+        for k in np.unique(rows.measure):
+            used[k], saving[k] = np.max(shares[rows.measure == k]), np.sum(allocated.answer.price[rows.measure == k])
+        curve[rows.measure[placed], rows.position[placed]] = shares[placed]
     arrays = {"used": used, "used_curve": curve, "saving": saving}
-    return {**arrays, "yield_margin": margin} if allocated.asked.criterion == "yield" else arrays
+    if allocated.asked.criterion == "yield":
+        arrays["yield_margin"] = np.full(count, np.nan)
+        if allocated.answer.found:
+            arrays["yield_margin"][rows.measure] = allocated.answer.problem.margins()
+    return arrays
 
 
-def _margins(allocated: Allocated, count: int, z: float | None = None) -> NDArray[np.float64]:
-    """The margin of each measure, NaN without limits: of the answer, or with another z."""
-    problem = allocated.answer.problem if z is None else replace(allocated.answer.problem, z=z)
-    margins = problem.margins()
-    first = {int(k): margins[np.flatnonzero(allocated.rows.measure == k)[0]] for k in np.unique(allocated.rows.measure)}
-    return np.array([first.get(k, np.nan) for k in range(count)])
-
-
-def _whole(allocated: Allocated, count: int) -> Mapping[str, Any]:
-    """What is of the whole."""
-    answer = allocated.answer
+def _totals(allocated: Allocated) -> Mapping[str, Any]:
+    """What is of all tolerances together, of the trials and of the curve of cost over accuracy."""
+    answer, before, rows = allocated.answer, allocated.before, allocated.rows
     arrays: dict[str, Any] = {
-        "cost_total": np.array(answer.cost),
-        "cost_total_before": np.array(stated_cost(allocated)),
-        "cost_bound": np.array(answer.bound),
-        "gap": np.array(answer.gap),
+        "cost_total": answer.cost,
+        "cost_total_before": sum(_cost_of(price, before[name]) for name, price in allocated.prices.items()),
+        "cost_bound": answer.bound,
+        "gap": answer.gap,
     }
     if allocated.asked.criterion == "yield":
-        arrays["yield_expected"] = np.array(answer.expected)
+        arrays["yield_expected"] = answer.expected
+    ends = ("", "_low", "_high")
     if answer.checked is not None:
-        ends = zip(("", "_low", "_high"), answer.checked, strict=True)
-        arrays |= {f"yield_checked{end}": np.array(number) for end, number in ends}
+        arrays |= {f"yield_checked{end}": share for end, share in zip(ends, answer.checked, strict=True)}
     if answer.trials:
-        arrays |= {
-            "trial_margin": np.array([np.nanmean(_margins(allocated, count, trial.z)) for trial in answer.trials]),
-            "trial_cost": np.array([trial.cost for trial in answer.trials]),
-            "trial_yield": np.array([trial.sampled.share for trial in answer.trials]),
-            "trial_yield_low": np.array([trial.sampled.low for trial in answer.trials]),
-            "trial_yield_high": np.array([trial.sampled.high for trial in answer.trials]),
-        }
+        first = np.unique(rows.measure, return_index=True)[1]
+        margins = [replace(answer.problem, z=trial.z).margins()[first] for trial in answer.trials]
+        arrays |= {"trial_margin": np.mean(margins, axis=1), "trial_cost": [trial.cost for trial in answer.trials]}
+        shares = np.array([trial.sampled for trial in answer.trials]).T
+        arrays |= {f"trial_yield{end}": share for end, share in zip(ends, shares, strict=True)}
     if allocated.offers:
-        arrays["trade_off_factor"] = np.array([factor for factor, _ in allocated.offers])
-        arrays["trade_off_cost"] = np.array([answer.cost for _, answer in allocated.offers])
-    return arrays
+        arrays["trade_off_factor"] = [factor for factor, _ in allocated.offers]
+        arrays["trade_off_cost"] = [offer.cost for _, offer in allocated.offers]
+    return {name: np.array(array) for name, array in arrays.items()}
 
 
 # ---- summary and findings --------------------------------------------------------------------------------------
 
 
-def _summary(allocated: Allocated, toleranced: xr.Dataset, arrays: Mapping[str, Any]) -> Iterator[Figure]:
+def _summary(allocated: Allocated, arrays: Mapping[str, Any], toleranced: xr.Dataset) -> Iterator[Figure]:
     """What all costs, and before; what of the room is taken."""
     answer = allocated.answer
     yield Figure("cost", "cost", answer.cost if answer.found else None, aspect="least")
     if np.isfinite(arrays["cost_total_before"]):
         yield Figure("cost_before", "cost as stated", arrays["cost_total_before"])
-    if answer.found:
-        yield Figure("cost_bound", "lower bound of the cost", answer.bound)
+    if not answer.found:
+        return
+    yield Figure("cost_bound", "lower bound of the cost", answer.bound)
     if answer.sampled is not None:
         yield Figure("yield_asked", "required yield", allocated.asked.target)
         yield Figure("yield", "yield of the samples", answer.sampled.share)
     if answer.checked is not None:
         yield Figure("yield_checked", "yield of fresh samples", answer.checked.share)
     for name, used in zip(toleranced["measure"].values.tolist(), arrays["used"].tolist(), strict=True):
-        if answer.found and np.isfinite(used):
+        if np.isfinite(used):
             yield Figure(f"{name}.used", f"{name}, share of the limits used", used)
 
 
 def _findings(allocated: Allocated, toleranced: xr.Dataset) -> Iterator[Finding]:
     """Why there is no allocation; limits that are not kept on the mechanism itself; what the criterion leaves out."""
-    answer, criterion = allocated.answer, allocated.asked.criterion
+    answer, criterion, inputs = allocated.answer, allocated.asked.criterion, allocated.study.inputs
     yield from allocated.findings
     yield from answer.findings
     if not answer.found:
         return
-    yield from _plays(allocated)
-    for name, share in allocated.tight.items():
-        what = f"its limits were narrowed by {100 * (1 - share):.2g} % so that the mechanism meets them exactly, not "
-        what += "to first order"
-        yield Finding.note("allocation.narrowed", f"measures.{name}", what, percent=100 * (1 - share))
+    for tolerance in inputs.tolerances:
+        joint, _, number = tolerance.path.removeprefix("joints.").partition(".")
+        path = f"joints.{joint}.clearance"
+        if path in allocated.prices and number in ("pin.clearance", "guide.clearance"):
+            lower, upper = 1e6 * tolerance.lower, 1e6 * tolerance.upper
+            what = f"the clearance is allocated; the tolerance {lower:+g}/{upper:+g} µm of {tolerance.path} stays as "
+            what += "stated, in addition to it, and the limits include it"
+            remedy = "remove this tolerance if the cost covers the largest clearance"
+            figures = {"number": tolerance.path, "lower_um": lower, "upper_um": upper}
+            yield Finding.note("allocation.play_tolerance", f"costs.{joint}.clearance", what, remedy, **figures)
     if criterion != "yield" and allocated.study.effects.correlated:
         what = f"the criterion {criterion} ignores the correlations"
         remedy = "use a yield, which includes them"
         yield Finding.warning("allocation.correlations_left_out", "correlations", what, remedy, criterion=criterion)
     if criterion == "worst-case":
         yield from _searched(allocated, toleranced)
-    if criterion == "rss" and "yield" in toleranced:
-        yield from _promised(toleranced)
-    factors_met = [factor for factor, offer in allocated.offers if offer.found]
-    if len(factors_met) < len(allocated.offers):
-        points, lost = len(allocated.offers), len(allocated.offers) - len(factors_met)
-        what = f"{lost} of the {points} points of the curve {agreeing(lost, 'is', 'are')} infeasible"
-        remedy = f"limits of at least {min(factors_met):.3g} times the stated ones are feasible" if factors_met else ""
-        yield Finding.note("allocation.curve_short", "", what, remedy, points=points, lost=lost)
-
-
-def _plays(allocated: Allocated) -> Iterator[Finding]:
-    """Allocated plays whose clearance has a tolerance of its own, which no cost is of."""
-    for path in allocated.prices:
-        joint = path.split(".")[1]
-        sizes = [f"joints.{joint}.{part}.clearance" for part in ("pin", "guide")]
-        for tolerance in allocated.study.inputs.tolerances:
-            if path == f"joints.{joint}.clearance" and tolerance.path in sizes:
-                lower, upper = 1e6 * tolerance.lower, 1e6 * tolerance.upper
-                what = (
-                    f"the clearance is allocated; the tolerance {lower:+g}/{upper:+g} µm of {tolerance.path} stays as "
-                )
-                what += "stated, in addition to it, and the limits include it"
-                remedy = "remove this tolerance if the cost covers the largest clearance"
-                figures = {"number": tolerance.path, "lower_um": lower, "upper_um": upper}
-                yield Finding.note("allocation.play_tolerance", f"costs.{joint}.clearance", what, remedy, **figures)
-
-
-def _promised(toleranced: xr.Dataset) -> Iterator[Finding]:
-    """Measures of whose samples fewer keep the limits than three deviations of a normal one would.
-
-    That is what RSS means where the tolerances are three deviations of theirs; other distributions, means off the
-    middle, and correlations make it another.
-    """
-    for name, share, high in zip(
-        *(toleranced[key].values.tolist() for key in ("measure", "yield", "yield_high")), strict=True
-    ):
-        if not high < DEFAULT_YIELD:
-            continue
-        severity = Severity.ERROR if 1 - high > TWICE * (1 - DEFAULT_YIELD) else Severity.WARNING
-        yield Finding.weighed(
-            severity,
-            "yield.below_rss",
-            f"measures.{name}",
-            f"the yield of the samples is {share:.6g}; an RSS within the limits implies {DEFAULT_YIELD:g}",
-            "require that yield instead, which uses distributions, means and correlations as stated",
-            share=share,
-            target=DEFAULT_YIELD,
-        )
+    if criterion == "rss" and "yield" in toleranced:  # three deviations of a normal distribution is what RSS stands for
+        columns = (toleranced[key].values.tolist() for key in ("measure", "yield", "yield_high"))
+        for name, share, high in zip(*columns, strict=True):
+            if high < DEFAULT_YIELD:
+                severity = Severity.ERROR if 1 - high > TWICE * (1 - DEFAULT_YIELD) else Severity.WARNING
+                what = f"the yield of the samples is {share:.6g}; an RSS within the limits implies {DEFAULT_YIELD:g}"
+                remedy = "require that yield instead, which uses distributions, means and correlations as stated"
+                figures = {"share": share, "target": DEFAULT_YIELD}
+                yield Finding.weighed(severity, "yield.below_rss", f"measures.{name}", what, remedy, **figures)
 
 
 def _searched(allocated: Allocated, toleranced: xr.Dataset) -> Iterator[Finding]:
     """Measures whose worst case, as found on the mechanism, is beyond a limit that first order keeps."""
     units = units_along(toleranced["nominal"], "measure")
     for k, of in enumerate(allocated.study.linear.measures):
-        lower, upper = limits(of)
-        low, high = float(toleranced["searched_lower"][k]), float(toleranced["searched_upper"][k])
-        shares = share_of(low, lower), share_of(high, upper)
-        excess = max(shares) - 1
-        if not excess > CLOSE:
-            continue
-        factor, unit = SHOWN.get(units[k], (1.0, units[k]))
-        value, limit = (high, upper) if shares[1] >= shares[0] else (low, lower)
-        severity = Severity.ERROR if excess > ROUGH else Severity.WARNING if excess > SLIGHT else Severity.NOTE
-        yield Finding.weighed(
-            severity,
-            "allocation.worst_case_beyond",
-            f"measures.{of.measure.name}",
-            f"the worst case of the mechanism, {readable(factor * value, unit)}, exceeds the "
-            f"limit {readable(factor * limit, unit)} by {100 * excess:.2g} %; to first order it "
-            f"is met (up to {100 * ROUGH:g} % beyond is accepted)",
-            "use --exact (in Python exact=True), which narrows the tolerances",
-            worst=factor * value,
-            unit=unit,
-            percent=100 * excess,
-            limit=factor * limit,
-            accepted=100 * ROUGH,
+        ends = [float(toleranced[f"searched_{end}"][k]) for end in ("lower", "upper")]
+        excess, worst, limit = max(
+            (share_of(value, limit) - 1, value, limit) for value, limit in zip(ends, limits(of), strict=True)
         )
+        if excess > CLOSE:
+            severity = Severity.ERROR if excess > ROUGH else Severity.WARNING if excess > SLIGHT else Severity.NOTE
+            texts = [signed(value, *drawn_in(limit, units[k]), "", 6) for value in (worst, limit)]
+            what = (
+                f"the worst case of the mechanism, {texts[0]}, exceeds the limit {texts[1]} by {100 * excess:.2g} %; "
+            )
+            what += f"to first order it is met (up to {100 * ROUGH:g} % beyond is accepted)"
+            remedy = "use --exact (in Python exact=True), which narrows the tolerances"
+            figures = {"worst": worst, "limit": limit, "percent": 100 * excess, "accepted": 100 * ROUGH}
+            where = f"measures.{of.measure.name}"
+            yield Finding.weighed(severity, "allocation.worst_case_beyond", where, what, remedy, **figures)

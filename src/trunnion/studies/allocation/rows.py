@@ -9,8 +9,9 @@ limits. These are taken as they are with the tolerances of the study, and again 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -19,16 +20,15 @@ from numpy.typing import NDArray
 from trunnion.model.tolerances import Tolerance
 from trunnion.statistics.population import Marginal
 from trunnion.studies.allocation.problem import Criterion, RowEffects
-from trunnion.studies.tolerance.effects import Spread
 from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.studies.tolerance.linear import Of, against, by_position, limits
 
-__all__ = ["Rows", "joined", "part_of", "rows_of"]
+__all__ = ["Rows", "rows_of"]
 
 Array = NDArray[np.float64]
-Rates = tuple[float, float, float]
-Texts = tuple[str, ...]
 ANY = 1e-6  # half width, SI, at which the shape of a distribution is taken where there is none yet
+NUMBERS = ("worst", "lower", "upper", "half", "deviation", "mean", "offset")  # of effects, by row
+TEXTS = ("labels", "places", "units")
 
 
 @dataclass(frozen=True)
@@ -44,98 +44,86 @@ class Rows:
     moving: NDArray[np.bool_]
     unknown: tuple[str, ...] = ()
 
-
-@dataclass(frozen=True)
-class _Block:
-    """Rows of one measure: sensitivities and spread (parameter, row), limits and positions (row,)."""
-
-    sensitivity: Array
-    spread: Spread
-    lower: float
-    upper: float
-    position: NDArray[np.intp]
-    moving: bool
-
-
-def _block(of: Of) -> _Block:
-    measure = of.measure
-    # without a derivative, but no further off than the worst position: kept where every position keeps it
-    root = against(of) and measure.rule == "rms"
-    root |= measure.kind == "path_error" and measure.rule in ("mean", "minimum", "peak-to-peak")
-    lower, upper = limits(of)
-    if (by_position(of.reference) and of.place >= 0) or root:
-        index = np.asarray(of.reference.window.index, np.intp)
-        moving = measure.kind == "path_error"
-        return _Block(of.course.sensitivity, of.course.spread, lower, upper, index, moving)
-    spread = Spread(*(np.asarray(part)[:, None] for part in of.figure.spread))
-    place = of.reference.window.index[of.place] if of.place >= 0 else -1
-    return _Block(of.figure.sensitivity[:, None], spread, lower, upper, np.array([place]), by_position(of.reference))
+    def with_moving(self, other: Rows) -> Rows:
+        """These rows, and those of others that move."""
+        first, more, which = self.effects, other.effects, other.moving
+        columns: dict[str, Any] = {
+            key: np.concatenate([getattr(first, key), getattr(more, key)[which]]) for key in NUMBERS
+        }
+        columns |= {key: getattr(first, key) + tuple(compress(getattr(more, key), which)) for key in TEXTS}
+        measure, position, moving = (
+            np.concatenate([getattr(self, key), getattr(other, key)[which]])
+            for key in ("measure", "position", "moving")
+        )
+        return Rows(replace(first, **columns), measure, position, moving, self.unknown)
 
 
 def rows_of(
-    study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, tight: Mapping[str, float] | None = None
+    study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, tight: Mapping[str, float]
 ) -> Rows:
     """The rows of a study. bought: half widths as they are in it, of what is to be chosen, by path.
 
     Effects of these are per unit of half width, of all others those of the whole tolerance (their half width being 1).
     tight: what the limits of a measure are multiplied by.
     """
-    blocks, which, unknown = [], [], []
+    names, system, values = study.inputs.names, study.run.system, study.run.values
+    slopes, spreads, ends = [np.zeros((len(names), 0))], [np.zeros((5, len(names), 0))], [np.zeros((2, 0))]
+    measure, position, moving, unknown = list[int](), list[int](), list[bool](), list[str]()
     for k, of in enumerate(study.linear.measures):
         if not np.any(np.isfinite(limits(of))):
             continue
-        block = _block(of)
-        finite = np.all(np.isfinite(block.spread.upper), axis=0)
-        if not np.any(finite):
+        first, index, moves = (of.course, of.reference.window.index, of.measure.kind == "path_error")
+        if not _everywhere(of):
+            first, moves = of.figure, by_position(of.reference)
+            index = np.array([index[of.place] if of.place >= 0 else -1])
+        spread = np.array(first.spread).reshape(5, len(names), -1)
+        finite = np.all(np.isfinite(spread[1]), axis=0)
+        count = int(np.sum(finite))
+        if not count:
             unknown.append(of.measure.name)
-            continue
-        share = (tight or {}).get(of.measure.name, 1.0)
-        blocks.append(replace(_taken(block, finite), lower=share * block.lower, upper=share * block.upper))
-        which.append(k)
-    none = np.zeros(0, np.intp)
-    if not blocks:
-        empty = RowEffects(np.zeros((0, len(study.inputs.names))), np.zeros(0), np.zeros(0))
-        return Rows(empty, none, none, none.astype(bool), tuple(unknown))
-    sizes = [len(block.position) for block in blocks]
-    position = np.concatenate([block.position for block in blocks])
-    measure = np.repeat(np.array(which, np.intp), sizes)
-    labels, places, units = _texts(study, measure, position)
+        slopes.append(first.sensitivity.reshape(len(names), -1)[:, finite])
+        spreads.append(spread[..., finite])
+        ends.append(np.repeat(tight.get(of.measure.name, 1.0) * np.array([limits(of)]).T, count, axis=1))
+        measure, position, moving = measure + count * [k], position + index[finite].tolist(), moving + count * [moves]
+
+    effects = _effects(study, bought, criterion, np.concatenate(slopes, axis=1), np.concatenate(spreads, axis=2))
+    lower, upper = np.concatenate(ends, axis=1)
+    dial, several = system.dial(values, study.plan.times), len(study.plan.times) > 1 and study.run.cycle.duration > 0
+    measures = [study.linear.measures[k].measure for k in measure]
     effects = replace(
-        _parts(study, bought, criterion, blocks),
-        lower=np.repeat([block.lower for block in blocks], sizes),
-        upper=np.repeat([block.upper for block in blocks], sizes),
-        correlation=_correlation(study) if criterion == "yield" else None,
-        labels=labels,
-        places=places,
-        units=units,
+        effects,
+        lower=lower,
+        upper=upper,
+        correlation=_correlation(study) if criterion == "yield" and study.effects.correlated else None,
+        labels=tuple(f"measures.{each.name}" for each in measures),
+        places=tuple(f" at {dial.at(place)}" if several and place >= 0 else "" for place in position),
+        units=tuple(each.figure_unit(system, values) for each in measures),
     )
-    return Rows(effects, measure, position, np.repeat([block.moving for block in blocks], sizes), tuple(unknown))
+    return Rows(effects, np.array(measure, int), np.array(position, int), np.array(moving, bool), tuple(unknown))
 
 
-def _taken(block: _Block, finite: NDArray[np.bool_]) -> _Block:
-    """The rows that have an answer."""
-    spread = Spread(*(part[:, finite] for part in block.spread))
-    return replace(block, sensitivity=block.sensitivity[:, finite], spread=spread, position=block.position[finite])
+def _everywhere(of: Of) -> bool:
+    """Whether a measure has a row at every position."""
+    rule, path_error = of.measure.rule, of.measure.kind == "path_error"
+    # without a derivative, but no further off than the worst position: kept where every position keeps it
+    root = (against(of) and rule == "rms") or (path_error and rule in ("mean", "minimum", "peak-to-peak"))
+    return root or (by_position(of.reference) and of.place >= 0)
 
 
-def _parts(
-    study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, blocks: Sequence[_Block]
+def _effects(
+    study: ToleranceStudy, bought: Mapping[str, float], criterion: Criterion, slopes: Array, spreads: Array
 ) -> RowEffects:
-    """Effects (row, contribution) without their limits."""
-    slopes = np.concatenate([block.sensitivity for block in blocks], axis=1)
-    lower, upper, half, shift, deviation = (
-        np.concatenate([getattr(block.spread, key) for block in blocks], axis=1)
-        for key in ("lower", "upper", "half", "shift", "deviation")
-    )
+    """Effects (row, contribution) without their limits, from what is (parameter, row)."""
+    lower, upper, half, shift, deviation = spreads
     offset, mean = np.zeros(slopes.shape[1]), np.zeros_like(slopes)
     for i, name in enumerate(study.inputs.names):
-        tolerance = study.inputs.tolerances[i] if i < len(study.inputs.tolerances) else None
-        if tolerance is None or tolerance.direction or tolerance.distribution == "direction":  # a zone
+        if study.effects.is_zone(i):
             size = bought.get(name, 1.0)
             offset += shift[i]  # of what turns about another place than its nominal one, and is not bought
             upper[i] = 0.5 * (upper[i] - lower[i]) / size
             half[i], deviation[i] = half[i] / size, deviation[i] / size
             continue
+        tolerance = study.inputs.tolerances[i]
         scatter, drift, constant = _rates(tolerance)
         size = 1.0 if name in bought else tolerance.half_width
         offset += slopes[i] * (tolerance.lower + tolerance.upper) / 2
@@ -147,7 +135,7 @@ def _parts(
     return RowEffects(upper.T, nothing, nothing, half.T, deviation.T, mean.T, offset)
 
 
-def _rates(tolerance: Tolerance) -> Rates:
+def _rates(tolerance: Tolerance) -> tuple[float, float, float]:
     """Standard deviation and drift of the mean from the middle of the limits per half width, and drift without any."""
     middle, half = (tolerance.lower + tolerance.upper) / 2, tolerance.half_width or ANY
     if "values" in tolerance.options:  # as measured: there is nothing to choose
@@ -161,55 +149,11 @@ def _rates(tolerance: Tolerance) -> Rates:
     return wide.deviation / half, drift, wide.mean - middle - drift * half
 
 
-def _correlation(study: ToleranceStudy) -> Array | None:
-    """Correlation of all that varies, by their covariance; None if there is none."""
+def _correlation(study: ToleranceStudy) -> Array:
+    """Correlation of all that varies, by their covariance."""
     covariance = study.inputs.population.covariance()
-    deviations = np.sqrt(np.diag(covariance))
-    if not np.any(covariance - np.diag(np.diag(covariance))):
-        return None
-    count = len(study.inputs.names)
-    matrix = np.eye(count)
-    size = np.outer(deviations, deviations)
-    inner = np.divide(covariance, size, out=np.zeros_like(covariance), where=size > 0)
-    np.fill_diagonal(inner, 1.0)
-    matrix[: len(inner), : len(inner)] = inner
+    size = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
+    matrix, count = np.eye(len(study.inputs.names)), len(covariance)
+    matrix[:count, :count] = np.divide(covariance, size, out=np.zeros_like(covariance), where=size > 0)
+    np.fill_diagonal(matrix, 1.0)
     return matrix
-
-
-def _texts(study: ToleranceStudy, measure: NDArray[np.intp], position: NDArray[np.intp]) -> tuple[Texts, Texts, Texts]:
-    """Names, places and units of rows."""
-    system, values = study.run.system, study.run.values
-    dial = system.dial(values, study.plan.times)
-    several = len(study.plan.times) > 1 and study.run.cycle.duration > 0
-    names = [f"measures.{of.measure.name}" for of in study.linear.measures]
-    units = [of.measure.figure_unit(system, values) for of in study.linear.measures]
-    places = tuple(f" at {dial.at(int(p))}" if several and p >= 0 else "" for p in position)
-    return tuple(names[k] for k in measure), places, tuple(units[k] for k in measure)
-
-
-NUMBERS = ("worst", "lower", "upper", "half", "deviation", "mean", "offset")  # of effects, by row
-TEXTS = ("labels", "places", "units")
-
-
-def joined(one: Rows, more: Rows) -> Rows:
-    """The rows of both."""
-    first, second = one.effects, more.effects
-    numbers: dict[str, Any] = {key: np.concatenate([getattr(first, key), getattr(second, key)]) for key in NUMBERS}
-    texts: dict[str, Any] = {key: getattr(first, key) + getattr(second, key) for key in TEXTS}
-    return Rows(
-        replace(first, **numbers, **texts),
-        np.concatenate([one.measure, more.measure]),
-        np.concatenate([one.position, more.position]),
-        np.concatenate([one.moving, more.moving]),
-        one.unknown,
-    )
-
-
-def part_of(rows: Rows, which: NDArray[np.bool_]) -> Rows:
-    """Some of the rows."""
-    of, places = rows.effects, np.flatnonzero(which).tolist()
-    numbers: dict[str, Any] = {key: getattr(of, key)[which] for key in NUMBERS}
-    texts: dict[str, Any] = {key: tuple(getattr(of, key)[k] for k in places) for key in TEXTS}
-    return Rows(
-        replace(of, **numbers, **texts), rows.measure[which], rows.position[which], rows.moving[which], rows.unknown
-    )

@@ -18,7 +18,7 @@ from scipy.special import chdtr, ndtr, ndtri
 
 from trunnion.errors import Finding, Severity
 from trunnion.statistics.streams import SobolStream, factor
-from trunnion.studies.allocation.problem import AllocationProblem, Answer, SampledYield, Trial, common_options
+from trunnion.studies.allocation.problem import AllocationProblem, Answer, SampledYield, Trial
 
 __all__ = ["Verify", "meet", "normal_yield"]
 
@@ -156,26 +156,11 @@ class _Margins:
 
 def _largest_margins(problem: AllocationProblem) -> Array:
     """The margin that each row can have at most, with the narrowest half widths, (row,): of a measure the least."""
-    effects = problem.effects
-    narrowest = np.array(
-        [
-            0.0 if contribution.options else contribution.value if contribution.fixed else contribution.least
-            for contribution in problem.contributions
-        ]
-    )
-    place = {contribution.name: i for i, contribution in enumerate(problem.contributions)}
-    for members in problem.groups().values():
-        rows = [place[contribution.name] for contribution in members]
-        options = list(common_options(members).values()) if members[0].options else []
-        if options:
-            narrowest[rows] = np.min([[option.tolerance for option in each] for each in options], axis=0)
-        elif not members[0].options:
-            narrowest[rows] = max(contribution.least for contribution in members)
-    sigma, room = _spread_and_room(problem, narrowest)
+    sigma, room = _spread_and_room(problem, problem.narrowest())
     deviation = np.sqrt(np.sum(sigma**2, axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):
         margins = np.where(deviation > 0, np.min(room, axis=0) / deviation, np.inf)
-    labels = np.array(effects.labels or [""] * len(margins))
+    labels = np.array(problem.effects.labels or [""] * len(margins))
     for label in set(labels.tolist()):
         margins[labels == label] = np.min(margins[labels == label])
     return np.maximum(margins, LEAST)

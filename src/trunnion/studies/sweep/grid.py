@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.units import Dimension, normalise, si_unit, unit
 from trunnion.studies.sweep.figures import FIGURES
 
-__all__ = ["MOST_NAMES", "MOST_POINTS", "Over", "Swept", "at", "grid", "named", "say"]
+__all__ = ["MOST_NAMES", "MOST_POINTS", "Over", "Swept", "grid", "named", "say"]
 
 MOST_POINTS = 100_000
 MOST_NAMES = 6
@@ -94,55 +93,35 @@ def _count(name: str, values: Any) -> int:
     return int(count)
 
 
-@dataclass(frozen=True)
-class _Value:
-    """A value as read: in SI; the number and the unit it was written in, if it is nothing but these."""
-
-    si: float
-    number: Fraction
-    unit: str
-    plain: bool
-
-
 def _swept(mechanism: Mechanism, name: str, path: str, sweep_values: Any) -> Swept:
+    """A number with its values: SI, the unit of its measure, and the unit that they were written in."""
     ends = sweep_values[:2] if isinstance(sweep_values, tuple) else sweep_values
-    read, measured = [], ""
+    read, measured, written, bare = list[float](), "", "", None
     for value in ends:
         value = value.item() if isinstance(value, np.generic) else value
-        with_it = mechanism.with_values({path: value})
-        measured = measured or _unit_of(with_it, path)
-        read.append(_read(with_it, path, value))
-    measured = measured or _unit_of(mechanism, path)  # plain numbers are in the unit of what they replace
-    written = next((end.unit for end in read if end.unit), "")
-    bare = next((value for end, value in zip(read, ends, strict=True) if end.plain and end.si), None)
+        changed = mechanism.with_values({path: value})
+        measured = measured or _unit_of(changed, path)
+        if path not in changed.parameters():
+            what = f"'{value}' is no number but changes with the motion"
+            raise MechanismError(Finding(what, path, "sweep over a dimension in it"))
+        read.append(float(changed.parameter_set.stated(path)))
+        text = normalise(value).strip().removeprefix("-").strip() if isinstance(value, str) else ""
+        literal = LITERAL.fullmatch(text)
+        own_unit = (literal["unit"] or literal["per"] or "") if literal else ""
+        written = written or own_unit
+        if not own_unit and read[-1] and (literal or not text):
+            bare = value if bare is None else bare
     if written and bare is not None:
         raise MechanismError(
             Finding(f"{bare} has no unit, and others have", name, f"write it with one, as {bare} {written}")
         )
-    factor = unit(written)[0] if written else Fraction(1)
-    values = [end.si for end in read]
-    if isinstance(sweep_values, tuple):
-        count = int(sweep_values[2])
-        exact = all(end.unit == written or not end.number for end in read)
-        low, high = (end.number if exact else Fraction(end.si) / factor for end in read)
-        # exact until rounded once, so that a point is the same float as when its value is written in a file
-        between = (float((low * (count - 1 - k) + high * k) / (count - 1) * factor) for k in range(1, count - 1))
-        values = [values[0], *between, values[1]]
-    return Swept(name, path, measured, np.array(values, float), written, float(factor))
-
-
-def _read(changed: Mechanism, path: str, value: float | str) -> _Value:
-    """A value that the mechanism took, as it was written."""
-    if path not in changed.parameters():
-        what = f"'{value}' is no number but changes with the motion"
-        raise MechanismError(Finding(what, path, "sweep over a dimension in it"))
-    si = float(changed.parameter_set.stated(path))
-    text = normalise(value).strip() if isinstance(value, str) else ""
-    literal = LITERAL.fullmatch(text.removeprefix("-").strip())
-    if not literal:
-        return _Value(si, Fraction(si), "", not text)
-    number = Fraction(literal["number"]) * (-1 if text.startswith("-") else 1)
-    return _Value(si, number, literal["unit"] or literal["per"] or "", not (literal["unit"] or literal["per"]))
+    values = (
+        np.linspace(read[0], read[1], int(sweep_values[2]))
+        if isinstance(sweep_values, tuple)
+        else np.array(read, float)
+    )
+    measured = measured or _unit_of(mechanism, path)  # plain numbers are in the unit of what they replace
+    return Swept(name, path, measured, values, written, float(unit(written)[0]) if written else 1.0)
 
 
 def _unit_of(mechanism: Mechanism, path: str) -> str:
@@ -154,10 +133,6 @@ def _unit_of(mechanism: Mechanism, path: str) -> str:
     name = path.removeprefix("dimensions.")
     is_dimension = name in dimensions and name != path
     return si_unit(dimensions[name]) if is_dimension else mechanism.parameter_set.entries[path].kind.unit
-
-
-def at(swept: Sequence[Swept], index: tuple[int, ...]) -> dict[str, float | str]:
-    return {number.path: float(number.values[i]) for number, i in zip(swept, index, strict=True)}
 
 
 def say(swept: Sequence[Swept], index: Sequence[int]) -> str:

@@ -121,7 +121,7 @@ class Points:
         run = run or (self._prepared(index) if any(index) else self.run)
         with named(self.swept, index):
             cycle = positions(run, self.steps, self.method, margin=False)
-            margin = margin_of(run, _with_margin(self.method)) if self.margin else None
+            margin = margin_of(run, replace(self.method, margin_up_to=MARGIN)) if self.margin else None
         return reduced(cycle.arrays, cycle.course, cycle.ideal, margin, run.system)
 
     def measured(self, index: Index, names: Sequence[str]) -> dict[str, float]:
@@ -178,9 +178,11 @@ class Points:
             nominal_values[path] == value or np.array_equal(nominal_values[path], np.ravel(value)[0], True)
             for path, value in meant.items()
         )
-        open_runs = [run.determinacy.findings() if run.determinacy else () for run in (run, self.run)]
-        left_open = [[(finding.where, finding.what) for finding in findings] for findings in open_runs]
-        if not same or left_open[0] != left_open[1]:
+        left_open, others_open = (
+            [(finding.where, finding.what) for finding in (each.determinacy.findings() if each.determinacy else ())]
+            for each in (run, self.run)
+        )
+        if not same or left_open != others_open:
             return False
         if not self._followed:
             return True
@@ -202,11 +204,13 @@ class Points:
         """Figures of some points; None where a point has to be looked at alone."""
         run, shape = self.run, (len(points), self.steps)
         values, ideal_values = self._values(points), self._values(points, ideal=True)
-        self._check(points, values)
         cycles = self._cycles(points, values)
         time = np.array([cycle.times(self.steps) for cycle in cycles])
         time = time[0] if np.all(time == time[0]) else time
-        errs = _differ(values, ideal_values, len(points))
+        errs = np.zeros(len(points), bool)  # which are others than their ideal ones
+        for path, value in ideal_values.items():
+            if value is not values[path]:
+                errs |= np.broadcast_to(np.not_equal(value, values[path]), (len(points), 1))[:, 0]
         self.erring = self.erring or bool(errs.any())
         with np.errstate(all="ignore"):
             ours = _as_chosen(run, values, len(points))
@@ -215,10 +219,13 @@ class Points:
             ours &= ~_may_change(run.system, arrays[CONDITIONS], run.cycle.periodic)
             if self._followed:
                 ours &= np.all(arrays["status"] != Status.NOT_ASSEMBLED, axis=1)
-            answered = ours & _answered(arrays)
+            answered = ours & np.all(arrays["status"] < Status.NOT_CONVERGED, axis=1)
             courses = self._courses(values, meant, cycles, answered)
             margins = self._margins(values, cycles, ours) if self.margin else {}
-            likes = self._courses(ideal_values, None, cycles, ours & errs & _answered(ideal)) if errs.any() else {}
+            likes: dict[int, CycleCourse] = {}
+            if errs.any():
+                answered = ours & errs & np.all(ideal["status"] < Status.NOT_CONVERGED, axis=1)
+                likes = self._courses(ideal_values, None, cycles, answered)
         figures: list[Reduced | None] = []
         for i in range(len(points)):
             rows = {name: array[..., i, :] for name, array in arrays.items()}
@@ -229,9 +236,8 @@ class Points:
 
     def _some(self, values: Mapping[str, Number], cycles: Sequence[Cycle], rows: NDArray[np.intp]) -> Mechanisms:
         """Some mechanisms of a batch."""
-        run = self.run
-        everyone = Mechanisms(run.system, run.chosen.assembly, values, cycles)
-        return replace(everyone, values=everyone.picked(rows), cycles=[cycles[int(row)] for row in rows])
+        every = Mechanisms(self.run.system, self.run.chosen.assembly, values, cycles)
+        return replace(every, values=every.picked(rows), cycles=[cycles[row] for row in rows.tolist()])
 
     def _courses(
         self,
@@ -253,39 +259,36 @@ class Points:
     ) -> dict[int, CycleCourse]:
         """The courses of the locking margin of those mechanisms of a batch that are wanted, by their number."""
         rows = np.flatnonzero(lanes_asked)
-        courses = self._many.margins(self._some(values, cycles, rows), _with_margin(self.method)) if len(rows) else []
+        courses = (
+            self._many.margins(self._some(values, cycles, rows), replace(self.method, margin_up_to=MARGIN))
+            if len(rows)
+            else []
+        )
         return dict(zip(rows.tolist(), courses, strict=True))
 
-    def _check(self, points: Sequence[Index], values: Mapping[str, Number]) -> None:
-        """MechanismError where the numbers of a point are none that a mechanism can have."""
-        mechanism = self.run.system.mechanism
+    def _cycles(self, points: Sequence[Index], values: Mapping[str, Number]) -> list[Cycle]:
+        """The cycle of every point; MechanismError where its numbers are none that a mechanism can have."""
+
+        def nth(number: Number, k: int) -> float:
+            return float(number[k, 0]) if np.ndim(number) else float(number)
+
+        mechanism, cycles = self.run.system.mechanism, []
         numbers: ParameterSet = copy.copy(mechanism.parameter_set)
         # the first point is a mechanism, and so sound
         changed = {path: value for path, value in values.items() if value is not self.run.values.get(path)}
-        numbers.nominal = {path: _nth(value, 0) for path, value in values.items()}
+        drive = {path: value for path, value in values.items() if path.startswith("drivers.")}
+        numbers.nominal = {path: nth(value, 0) for path, value in values.items()}
         for k, index in enumerate(points):
-            numbers.nominal.update((path, _nth(value, k)) for path, value in changed.items())
+            numbers.nominal.update((path, nth(value, k)) for path, value in changed.items())
             with named(self.swept, index), np.errstate(all="ignore"):
                 findings = check_values(mechanism, numbers, changed)
                 wrong = [finding for finding in findings if finding.severity is Severity.ERROR]
                 if wrong:
                     raise MechanismError(wrong)
-
-    def _cycles(self, points: Sequence[Index], values: Mapping[str, Number]) -> list[Cycle]:
-        """The cycle of every point."""
-        drive = {path: value for path, value in values.items() if path.startswith("drivers.")}
-        if not any(np.ndim(value) for value in drive.values()):
-            return [self.run.cycle] * len(points)
-        cycles = []
-        for k, index in enumerate(points):
-            with named(self.swept, index):
-                cycles.append(self.run.system.cycle({path: _nth(value, k) for path, value in drive.items()}))
+                varies = any(np.ndim(value) for value in drive.values())
+                own = {path: nth(value, k) for path, value in drive.items()}
+                cycles.append(self.run.system.cycle(own) if varies else self.run.cycle)
         return cycles
-
-
-def _answered(arrays: Mapping[str, Array]) -> NDArray[np.bool_]:
-    """Which mechanisms of a batch have an answer at every position."""
-    return np.asarray(np.all(arrays["status"] < Status.NOT_CONVERGED, axis=1))
 
 
 def _agree(together: Reduced, other: Reduced) -> bool:
@@ -297,24 +300,6 @@ def _agree(together: Reduced, other: Reduced) -> bool:
         for name in ("drive_effort_rms", "drive_effort_max", "reaction_max")
         if name in together
     )
-
-
-def _with_margin(method: FrictionMethod) -> FrictionMethod:
-    return replace(method, margin_up_to=MARGIN)
-
-
-def _nth(number: Number, k: int) -> float:
-    """The number of one mechanism of a batch."""
-    return float(number[k, 0]) if np.ndim(number) else float(number)
-
-
-def _differ(values: Mapping[str, Number], others: Mapping[str, Number], count: int) -> NDArray[np.bool_]:
-    """Which mechanisms of a batch are others than their ideal ones."""
-    differing = np.zeros(count, bool)
-    for path, value in others.items():
-        if value is not values[path]:
-            differing |= np.broadcast_to(np.not_equal(value, values[path]), (count, 1))[:, 0]
-    return differing
 
 
 def _as_chosen(run: Run, values: Mapping[str, Number], count: int) -> NDArray[np.bool_]:

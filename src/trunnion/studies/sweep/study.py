@@ -54,20 +54,32 @@ def sweep(
 ) -> xr.Dataset:
     """Figures of the cycle over a grid of some numbers of the mechanism.
 
-    over: by name, as for `Mechanism.with_values` (a path or an ending that is unique), a list of values, or from, to
-    and count: `{"misalignment": ("0 deg", "30 deg", 7), "input.speed": [50, 100]}`; plain numbers are SI.
-    steps: positions of each cycle.
-    friction_method: how friction and reactions are settled; Newton's method if not given.
-    margin: whether the locking margin is looked for as well, which takes many times as long as all else.
-    measures: names of the model's, or written as for `play`, each with one figure a cycle; none if not given.
-    engine: numpy, compiled, or auto: compiled where it pays and can do the mechanism.
-    Returns a Dataset with a dimension for each name, last, its coordinate in SI, and the variables of `FIGURES`. Where
-    any position of the cycle has no answer they are NaN, but for the locking margin of positions that lock: `status`
-    and `without_answer` tell. Extremes leave out what `analyse` leaves out of its summary: positions with a relative
-    speed of zero or close to a dead centre, unless there are no others.
-    progress: called with the number of points done.
-    Raises MechanismError for a name that is unknown or stands for several numbers, values that the model refuses (at
-    any point), none or more than MOST_POINTS of them, or a structure that does not determine the motion.
+    Parameters
+    ----------
+    over
+        By name, as for `Mechanism.with_values` (a path or an ending that is unique), a list of values, or from, to and
+        count: `{"misalignment": ("0 deg", "30 deg", 7), "input.speed": [50, 100]}`; plain numbers are SI.
+    steps, friction_method, engine
+        As for `analyse`; engine auto is compiled where it pays and can do the mechanism.
+    progress
+        Called with the number of points done.
+    margin
+        Whether the locking margin is looked for as well, which takes many times as long as all else.
+    measures
+        Names of the model's, or written as for `play`, each with one figure a cycle; none if not given.
+
+    Returns
+    -------
+    Dataset
+        A dimension for each name, last, its coordinate in SI, and the variables of `FIGURES`. Where any position of the
+        cycle has no answer they are NaN, but for the locking margin of positions that lock: `status` and
+        `without_answer` tell. Extremes leave out what `analyse` leaves out of its summary.
+
+    Raises
+    ------
+    MechanismError
+        A name is unknown or stands for several numbers, values that the model refuses (at any point), none or more than
+        MOST_POINTS of them, or a structure that does not determine the motion.
     """
     points = Points(mechanism, grid(mechanism, over), steps, friction_method or FrictionMethod(), margin, engine)
     labels = {"driver": list(mechanism.drivers), "joint": list(mechanism.effective_joints)}
@@ -91,7 +103,7 @@ def sweep(
             progress(done)
     findings = [*_answers(points.swept, arrays), *_shared(points), *left_out(mechanism, measures)]
     findings = _with_bare(mechanism, points.swept, findings)
-    findings += [*_no_efficiency(points, arrays), *_not_steady(points, watched.values(), arrays)]
+    findings += _undefined(points, watched.values(), arrays)
     if not points.erring:
         of_errors = {name for name, variable in FIGURES.items() if variable.part == "errors"}
         arrays = {name: array for name, array in arrays.items() if name not in of_errors}
@@ -136,7 +148,7 @@ def _places(swept: Sequence[Swept], mask: NDArray[np.bool_]) -> tuple[str, str, 
     where = np.argwhere(mask)
     first = say(swept, tuple(int(i) for i in where[0]))
     of = f"{len(where):,} of {counted(mask.size, 'point')}"
-    return of, f"the first at {first}", {"points": len(where), "of": mask.size}
+    return of, f"the first at {first}", {"points": len(where), "of": mask.size, "at": first}
 
 
 def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
@@ -150,30 +162,19 @@ def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iter
         (of, first, figures), missing = _places(swept, mask), int(arrays["without_answer"][mask][0])
         where = f"{counted(missing, 'position')} not solved" if missing else "between the positions"
         what = f"{of} {agreeing(figures['points'], 'has', 'have')} no result, {first} ({where}): {code.text}"
-        figures |= {"at": first.removeprefix("the first at "), "positions": missing, "status": code.text}
-        yield Finding.error("sweep.no_answer", names, what, remedy, **figures)
+        yield Finding.error("sweep.no_answer", names, what, remedy, **figures, positions=missing, status=code.text)
 
 
-def _no_efficiency(points: Points, arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
-    """A note for every reason for which points with an answer have no efficiency."""
-    work, undefined = arrays["drive_power_mean"], (arrays["without_answer"] == 0) & np.isnan(arrays["efficiency"])
-    reasons = {
-        "the driver does no net work": work == 0,
-        "the loads drive, the driver absorbs work": work < 0,
-        "the mean powers are not known": np.isnan(work),
-    }
-    if not has_useful_work(points.mechanism):
-        reasons = {f"{NOTHING_USEFUL}: {STATE_USEFUL}": np.ones(work.shape, bool)}
-    for why, so in reasons.items():
-        if np.any(undefined & so):
-            of, first, figures = _places(points.swept, undefined & so)
-            remedy = "see the mean powers there; `trunnion analyse` with these values tells where loads act"
-            what = f"the efficiency is undefined at {of}, {first}: {why}"
-            yield Finding.note("sweep.no_efficiency", "efficiency", what, remedy, **figures)
-
-
-def _not_steady(points: Points, watched: Iterable[Measure], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
-    """A warning for every measure of a motion in time that has no value at some points."""
+def _undefined(points: Points, watched: Iterable[Measure], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
+    """Points with an answer that have no efficiency, and measures of a motion in time that have no value there."""
+    undefined = (arrays["without_answer"] == 0) & np.isnan(arrays["efficiency"])
+    if np.any(undefined):
+        of, first, figures = _places(points.swept, undefined)
+        why, remedy = "the drivers supply no net work", "see the mean powers there"
+        if not has_useful_work(points.mechanism):
+            why, remedy = NOTHING_USEFUL, STATE_USEFUL
+        what = f"the efficiency is undefined at {of}, {first}: {why}"
+        yield Finding.note("sweep.no_efficiency", "efficiency", what, remedy, **figures)
     for measure in watched:
         mask = ~np.isfinite(arrays[measure.name])
         if measure.in_time and mask.any():

@@ -16,14 +16,14 @@ from trunnion.studies.tolerance.effects import NOBODY, EffectRow
 from trunnion.studies.tolerance.first_order import ToleranceStudy, study
 from trunnion.studies.tolerance.linear import Of, searched
 
-__all__ = ["Corner", "worst_corner"]
+__all__ = ["WorstCorner", "worst_corner"]
 
 SIDES = ("least", "largest")
 ROUNDS, AROUND = 4, 17  # in which the place is looked for, and places about it in each
 
 
 @dataclass(frozen=True)
-class Corner:
+class WorstCorner:
     """A corner of the tolerances and plays of a mechanism.
 
     deviations: least and largest of the measure, in `unit`; side: that of this corner, 0 or 1; time: where it stands
@@ -41,7 +41,7 @@ class Corner:
 
 
 @np.errstate(all="ignore")
-def worst_corner(mechanism: Mechanism, name: str, side: str | None, steps: int) -> Corner:
+def worst_corner(mechanism: Mechanism, name: str, side: str | None, steps: int) -> WorstCorner:
     """Return the corner at which a measure is "least" or "largest", or whichever of both is farther from nominal.
 
     Pins that loads would press to one side may lie anywhere in their holes, as in `tolerance --seat free`.
@@ -65,7 +65,7 @@ def worst_corner(mechanism: Mechanism, name: str, side: str | None, steps: int) 
             kind = kinds.get(tolerance.path)
             rows.append((tolerance.path, kind.unit if kind else "m", effects.nominal(i), numbers[tolerance.path]))
     unit, time = of.measure.figure_unit(run.system, run.values), _place(prepared, of, values_there, 2 * side_index - 1)
-    return Corner(prepared, (least, largest), unit, side_index, time, numbers, rows)
+    return WorstCorner(prepared, (least, largest), unit, side_index, time, numbers, rows)
 
 
 def _place(prepared: ToleranceStudy, of: Of, values_there: Mapping[str, Number], sign: int) -> float:

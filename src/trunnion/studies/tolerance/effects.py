@@ -137,7 +137,6 @@ class Effects:
         offsets: dict[str, Number] = {}
         for joint in self.inputs.loose if any(path.startswith(SHARE) for path in at) else ():
             play = self.inputs.play(joint, values)
-            assert play is not None
             for path in (f"{carrier}.{joint}" for carrier in self.inputs.carriers(joint)):
                 for end, radius in zip(play.model.ends, play.radii, strict=True):
                     room = namespace(radius).maximum(radius, 0.0)
@@ -169,24 +168,17 @@ class Effects:
         covariance: Array = self.inputs.population.covariance()
         return covariance - np.diag(np.diag(covariance))
 
-    def nominal(self, i: int) -> float:
-        """Nominal value of a toleranced number."""
-        return float(np.ravel(primal(self.inputs.run.values[self.inputs.tolerances[i].path]))[0])
-
-    def nominal_angle(self, path: str) -> float:
-        """Nominal value of an angle."""
+    def nominal(self, number: int | str) -> float:
+        """Nominal value of a toleranced number, or of a number by its path."""
+        path = number if isinstance(number, str) else self.inputs.tolerances[number].path
         return float(np.ravel(primal(self.inputs.run.values[path]))[0])
-
-    @cached_property
-    def deviations(self) -> tuple[Array, Array]:
-        """Standard deviation and mean deviation of every toleranced number, SI."""
-        return self.inputs.population.deviations, self.inputs.population.means
 
     def numbers(self) -> dict[str, Array]:
         """Of every parameter: nominal value, limits of its deviation, standard deviation and mean; of a clearance the
         radius, 0 and the play, and the standard deviation of an offset along one axis."""
+        population = self.inputs.population
         rows = [
-            (self.nominal(i), tolerance.lower, tolerance.upper, self.deviations[0][i], self.deviations[1][i])
+            (self.nominal(i), tolerance.lower, tolerance.upper, population.deviations[i], population.means[i])
             for i, tolerance in enumerate(self.inputs.tolerances)
         ]
         for joint in self.inputs.loose:
@@ -243,21 +235,19 @@ class Effects:
         values = self.inputs.run.system.mechanism.parameters(
             deviations={tolerance.path: Dual(0.0, seeds[i]) for i, tolerance in enumerate(tolerances)}
         )
-        deviations, means = self.deviations
-        rooms: dict[str, list[tuple[float, float]]] = {}
+        population, rooms = self.inputs.population, dict[str, list[tuple[float, float]]]()
+        lower, upper = (np.array([getattr(each, end) for each in tolerances]) for end in ("lower", "upper"))
         for joint in self.inputs.loose:
-            play = self.inputs.play(joint, values)
-            assert play is not None
             rooms[joint] = []
-            for radius in play.radii:
+            for radius in self.inputs.play(joint, values).radii:
                 start = float(np.ravel(primal(radius))[0])
                 slope = np.ravel(derivative(radius)) * np.ones(len(tolerances))
-                gain = [
-                    max(s * tolerance.lower, s * tolerance.upper)
-                    for s, tolerance in zip(slope, tolerances, strict=True)
-                ]
-                mean, variance = start + float(slope @ means), float(np.sum((slope * deviations) ** 2))
-                rooms[joint].append((max(start + sum(gain), 0.0), max(mean, 0.0) ** 2 + variance))
+                most = start + float(np.sum(np.maximum(slope * lower, slope * upper)))
+                mean, variance = (
+                    start + float(slope @ population.means),
+                    float(np.sum((slope * population.deviations) ** 2)),
+                )
+                rooms[joint].append((max(most, 0.0), max(mean, 0.0) ** 2 + variance))
         return rooms
 
 
@@ -294,35 +284,30 @@ class FirstOrder:
         return Spread(*(np.array(part) for part in zip(*parts, strict=True)))
 
     def _spread(self, i: int) -> Spread:
-        if i >= len(
-            self.inputs.tolerances
-        ):  # the worst of all links that may carry a pin's seat, the scatter of the first
+        if i >= len(self.inputs.tolerances):  # the worst of all links that may carry a seat, the scatter of the first
             pins = self.plays(i)
             most = np.max([pin.worst for pin in pins], axis=0)
             return Spread(-most, most, most, np.zeros_like(most), pins[0].deviation)
-        tolerance, (deviation, mean) = self.inputs.tolerances[i], (part[i] for part in self.effects.deviations)
+        tolerance, means = self.inputs.tolerances[i], self.inputs.population.means
+        deviation, mean = self.inputs.population.deviations[i], means[i]
         ring = self._harmonic(i, SIZE)
         if self.effects.is_zone(i):
             circle = self._harmonic(i, ANGLE)
             most = np.maximum(*(length(circle + end * ring) for end in (tolerance.lower, tolerance.upper)))
-            middle = -_along(circle, self.effects.nominal_angle(self.inputs.angle(i)))
+            middle = -_along(circle, self.effects.nominal(self.inputs.angle(i)))
             sizes = self.effects.sizes(i) if self.effects.turns(i) else ()  # a run-out has its own size
-            wider = [self.effects.deviations[1][j] * self._harmonic(j, SIZE) for j in sizes]
+            wider = [means[j] * self._harmonic(j, SIZE) for j in sizes]
             center = np.sum([circle + mean * ring, *wider], axis=0)
             scatter = np.sqrt(0.5 * (length(center) ** 2 + (deviation * length(ring)) ** 2))
             return Spread(middle - most, middle + most, most, middle, scatter)
         slope = self._steady(i)
-        ends, half, scatter = (
-            (slope * tolerance.lower, slope * tolerance.upper),
-            np.abs(slope) * tolerance.half_width,
-            np.abs(slope) * deviation,
-        )
+        half, scatter = np.abs(slope) * tolerance.half_width, np.abs(slope) * deviation
+        ends = slope * tolerance.lower, slope * tolerance.upper
         lower, upper = np.minimum(*ends), np.maximum(*ends)
         if i in self.inputs.turned:  # what it adds to the circle of a direction over the whole turn
             circle = self._harmonic(self.inputs.turned[i], ANGLE)
-            more = np.maximum(*(length(circle + end * ring) for end in (tolerance.lower, tolerance.upper))) - length(
-                circle
-            )
+            most = np.maximum(*(length(circle + end * ring) for end in (tolerance.lower, tolerance.upper)))
+            more = most - length(circle)
             lower, upper, half = lower - more, upper + more, half + np.abs(more)
             scatter = np.sqrt(scatter**2 + 0.5 * (deviation * length(ring)) ** 2)
         return Spread(lower, upper, half, slope * mean, scatter)
@@ -399,7 +384,7 @@ class FirstOrder:
     def gradient(self) -> Array:
         """Derivatives of a figure by the normal scores of the toleranced numbers, to first order; 0 of directions."""
         return np.array([
-            0.0 if self.effects.is_zone(i) else self._steady(i) * self.effects.deviations[0][i]
+            0.0 if self.effects.is_zone(i) else self._steady(i) * self.inputs.population.deviations[i]
             for i in range(len(self.inputs.tolerances))
         ])  # fmt: skip
 
@@ -427,7 +412,7 @@ class FirstOrder:
         if i not in self.inputs.turned:
             return slope
         path = self.inputs.angle(self.inputs.turned[i])
-        return slope - _along(self._harmonic(i, SIZE), (at or {}).get(path, self.effects.nominal_angle(path)))
+        return slope - _along(self._harmonic(i, SIZE), (at or {}).get(path, self.effects.nominal(path)))
 
     def plays(self, i: int) -> list[Pin]:
         """A pin in its hole, for each link that may carry its seat."""
@@ -435,9 +420,8 @@ class FirstOrder:
         ends, pins = self.inputs.ends(joint), []
         for carrier in self.inputs.carriers(joint):
             rows = iter(self.effects.places[i, carrier])
-            pins.append(
-                Pin([np.array([self.slope[next(rows)] for _ in end]) for end in ends], self.effects.rooms[joint])
-            )
+            loads = [np.array([self.slope[next(rows)] for _ in end]) for end in ends]
+            pins.append(Pin(loads, self.effects.rooms[joint]))
         return pins
 
 

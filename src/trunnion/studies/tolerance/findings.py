@@ -7,7 +7,7 @@ yield is asked for, that alone decides.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ from trunnion.algebra.dual import primal
 from trunnion.cycle.model_findings import of_run, shared_dimensions
 from trunnion.cycle.scales import scales_of
 from trunnion.dynamics.measured import LONGER, not_steady
-from trunnion.errors import Finding, Severity, Status, agreeing, counted
+from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.model.checks.values import check_values
 from trunnion.model.parameters import measured
 from trunnion.model.tolerances import variations
@@ -32,13 +32,13 @@ from trunnion.studies.tolerance.sampled import CAUSES
 if TYPE_CHECKING:
     from trunnion.studies.tolerance.first_order import Outcome
     from trunnion.studies.tolerance.linear import Of
-    from trunnion.studies.tolerance.sampled import Sampled
 
 __all__ = ["findings_of", "summary"]
 
 Array = NDArray[np.float64]
+Sampled = Mapping[str, Any]  # arrays by the names of `result.VARIABLES`
 TURNED = 0.01  # of the size of the mechanism: a shorter length may well turn round, as the offset of a slide
-FAR_OFF = 0.2  # between first order and what is found, of which it is said
+FAR_OFF = 0.2  # between the worst cases of first order and of the search, of which it is said
 CLOSE, SLIGHT = 1e-6, 1e-3  # of a limit: rounding, and what first order leaves out where it was kept
 OTHERWISE, ENOUGH = 1.5, 100  # ratio of standard deviations that first order does not explain, and samples for it
 
@@ -69,13 +69,13 @@ def summary(outcome: Outcome, sampled: Sampled | None, units: Sequence[str], dia
                 low = "yield, least by the 95 % interval"
                 figures += [("yield", "yield", "1"), ("yield_low", low, "1"), ("cpk", "C_pk", "1")]
             for key, text, figure_unit in figures:
-                yield Figure(f"{name}.{key}", f"{name}, {text}", sampled.arrays[key][i], figure_unit)
+                yield Figure(f"{name}.{key}", f"{name}, {text}", sampled[key][i], figure_unit)
         yield from _contributions(outcome, of)
     if sampled is not None:
         if len(units) > 1:
-            yield Figure("yield", "yield, all measures", sampled.arrays["yield_all"])
-        yield Figure("samples", "samples", sampled.done)
-        yield Figure("samples_failed", "samples not solved", np.sum(sampled.arrays["failed"]))
+            yield Figure("yield", "yield, all measures", sampled["yield_all"])
+        yield Figure("samples", "samples", int(sampled["samples"]))
+        yield Figure("samples_failed", "samples not solved", np.sum(sampled["failed"]))
 
 
 def _contributions(outcome: Outcome, of: Of) -> Iterator[Figure]:
@@ -91,26 +91,37 @@ def _contributions(outcome: Outcome, of: Of) -> Iterator[Figure]:
 
 
 def findings_of(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
-    """What is doubtful, beside what the model itself has to say."""
+    """Limits that are missed, and what is doubtful, beside what the model itself has to say."""
     study = outcome.study
-    run = study.run
-    yield from _missed(outcome, sampled)
-    yield from of_run(run, notes=False)
+    target, fine = outcome.target, True
+    for i, of in enumerate(study.linear.measures):
+        if limited(of.measure) and (missed := _missed(outcome, sampled, i, of)) is not None:
+            fine = False
+            yield missed
+    if fine and target is not None and sampled is not None and float(sampled["yield_all_high"]) < target:
+        what = f"limits not met: all measures together: {_yield(sampled, 'yield_all')}, required {100 * target:.6g} %"
+        remedy = "narrow the tolerances of the measure with the lowest yield first"
+        yield Finding.error("limit.missed_together", "measures", what, remedy, target=target)
+    yield from of_run(study.run, notes=False)
     if study.effects.correlated:
         what = "RSS and worst case ignore the correlations; standard deviation, shares of variance and samples include "
         yield Finding.note("tolerance.correlations_left_out", "correlations", f"{what}them")
-    yield from shared_dimensions(run.system.mechanism)
+    yield from shared_dimensions(study.run.system.mechanism)
     yield from _of_tolerances(outcome)
     yield from _nominal(outcome)
     for i, of in enumerate(study.linear.measures):
-        yield from _first_order(outcome, i, of)
+        yield from _first_order(outcome, sampled, i, of)
     if sampled is not None:
-        yield from _samples(outcome, sampled)
+        done = int(sampled["samples"])
+        for code, count in enumerate(map(int, sampled["failed"])):
+            if count:
+                why = list(Status)[code].text if code < CAUSES - 1 else "a figure does not exist"
+                what = f"{count:,} of {counted(done, 'sample')} ({count / done:.2%}) could not be solved: {why}"
+                remedy = "they count as outside every limit; mean and standard deviation are of the others"
+                figures = {"count": count, "samples": done, "share": count / done}
+                yield Finding.error("samples.no_answer", "tolerances", what, remedy, **figures)
     if outcome.indices is not None and (lost := outcome.indices.lost):
-        what = (
-            f"{counted(lost, 'sample')} of the variance-based indices {agreeing(lost, 'was', 'were')} not solved and "
-        )
-        what += f"{agreeing(lost, 'counts', 'count')} as the mean"
+        what = f"{counted(lost, 'sample')} of the variance-based indices not solved, which count as the mean"
         remedy = "narrow the tolerances, or take the measure at a position that all samples reach"
         yield Finding.warning("tolerance.indices_lost", "", what, remedy, count=lost)
 
@@ -118,49 +129,9 @@ def findings_of(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
 # ---- limits that are missed -----------------------------------------------------------------------------------
 
 
-def _missed(outcome: Outcome, sampled: Sampled | None) -> Iterator[Finding]:
-    """An error for each measure whose worst case, yield or capability is outside its limits, with what helps."""
-    target, fine = outcome.target, True
-    drawn = sampled.arrays if sampled is not None and sampled.done else None
-    for i, of in enumerate(outcome.study.linear.measures):
-        if not limited(of.measure):
-            continue
-        (low, high), outside = _worst(outcome, i, of)
-        figures: dict[str, Any] = {"worst_lower": low, "worst_upper": high}
-        parts = [_range(outcome, of, sampled, i, low, high)] if outside and target is None else []
-        if drawn is not None:
-            figures |= {key: float(drawn[key][i]) for key in ("yield", "yield_low", "yield_high", "cpk")}
-            share, least, most = (figures[key] for key in ("yield", "yield_low", "yield_high"))
-            if share < 1 if target is None else most < target:
-                middle, *ends = (
-                    f"{100 * share_end:.{decimals_of(most - least)}f}" for share_end in (share, least, most)
-                )
-                parts.append(f"yield {middle} % (95 % interval {ends[0]} to {ends[1]} %)")
-            sure = np.isfinite(low) and np.isfinite(high) and not outside
-            if figures["cpk"] < 1 and not sure and target is None:
-                parts.append(f"Cpk {figures['cpk']:.3g}")
-        if not parts:
-            continue
-        where, allowed = f"measures.{of.measure.name}", _allowed(outcome, of, sampled, i)
-        remedy = _remedy(outcome, of, sampled, i)
-        if target is None:
-            what = f"limits not met: {'; '.join(parts)}; {allowed}"
-            yield Finding.error("limit.missed", where, what, remedy, **figures)
-        else:
-            fine = False
-            what, figures["target_percent"] = f"limits not met: {parts[0]}, required {100 * target:.6g} %", 100 * target
-            yield Finding.error("limit.missed_yield", where, f"{what}; {allowed}", remedy, **figures)
-    if target is not None and drawn is not None and fine and float(drawn["yield_all_high"]) < target:
-        share, least, most = (100 * float(drawn[f"yield_all{end}"]) for end in ("", "_low", "_high"))
-        what = f"limits not met: yield of all measures together {share:.6g} % (95 % confidence interval {least:.5g} to "
-        what += f"{most:.5g} %), required {100 * target:.6g} %"
-        remedy = "narrow the tolerances of the measure with the lowest yield first"
-        figures = {"percent": share, "percent_low": least, "percent_high": most, "target_percent": 100 * target}
-        yield Finding.error("limit.missed_together", "measures", what, remedy, **figures)
-
-
-def _worst(outcome: Outcome, i: int, of: Of) -> tuple[tuple[float, float], bool]:
-    """Worst case to either side, as far as it was asked for, and whether it is outside the limits."""
+def _missed(outcome: Outcome, sampled: Sampled | None, i: int, of: Of) -> Finding | None:
+    """An error for a measure whose worst case, yield or capability is outside its limits, with what helps."""
+    study, measure, target = outcome.study, of.measure, outcome.target
     low, high, slight = np.nan, np.nan, CLOSE
     if "linear" in outcome.methods:
         low, high = float(of.total.lower), float(of.total.upper)
@@ -168,84 +139,53 @@ def _worst(outcome: Outcome, i: int, of: Of) -> tuple[tuple[float, float], bool]
         (low, high), slight = (corner.value for corner in outcome.worst[i]), SLIGHT
     lower, upper = limits(of)
     size = max([abs(end) for end in (lower, upper) if np.isfinite(end)], default=0.0)
-    return (low, high), low < lower - slight * size or high > upper + slight * size
+    outside = low < lower - slight * size or high > upper + slight * size
 
-
-def _scale(outcome: Outcome, of: Of, sampled: Sampled | None, i: int) -> tuple[float, str]:
-    """Factor and unit for deviations of a measure, as the tables have them."""
-    run, nominal = outcome.study.run, of.reference.figure
-    sizes = [end for end in (of.measure.lower, of.measure.upper) if end is not None]
-    sizes += [float(part) for part in of.total[:3]]
+    nominal, unit = of.reference.figure, measure.figure_unit(study.run.system, study.run.values)
+    sizes = [end for end in (measure.lower, measure.upper) if end is not None] + [float(part) for part in of.total[:3]]
+    factor, unit = scale_of(nominal if np.isfinite(nominal) else 0.0, sizes, unit)
+    parts, figures = [], {"worst_lower": low, "worst_upper": high}
+    if outside and target is None:
+        parts.append(f"worst case {signed(low, factor, '')} to {signed(high, factor, unit)}")
     if sampled is not None:
-        sizes.append(3 * float(sampled.arrays["deviation"][i]))
-    unit = of.measure.figure_unit(run.system, run.values)
-    return scale_of(nominal if np.isfinite(nominal) else 0.0, sizes, unit)
-
-
-def _range(outcome: Outcome, of: Of, sampled: Sampled | None, i: int, low: float, high: float) -> str:
-    """The worst case in words."""
-    factor, unit = _scale(outcome, of, sampled, i)
-    worst = "worst case" if outcome.worst is not None else "worst case, first order,"
-    lower, upper = limits(of)
-    if lower == -upper and low == 0.0:
-        return f"{worst} {signed(high, factor, unit, '')}"
-    return f"{worst} {signed(low, factor, '')} to {signed(high, factor, unit)}"
-
-
-def _allowed(outcome: Outcome, of: Of, sampled: Sampled | None, i: int) -> str:
-    """The limits in words: deviations, and bounds of the figure itself with the nominal one."""
-    measure, (factor, unit), parts = of.measure, _scale(outcome, of, sampled, i), []
+        figures |= {key: float(sampled[key][i]) for key in ("yield", "yield_low", "yield_high", "cpk")}
+        if figures["yield"] < 1 if target is None else figures["yield_high"] < target:
+            parts.append(_yield(sampled, "yield", i))
+        sure = np.isfinite(low) and np.isfinite(high) and not outside
+        if figures["cpk"] < 1 and not sure and target is None:
+            parts.append(f"Cpk {figures['cpk']:.3g}")
+    if not parts:
+        return None
     ends = [signed(end, factor, unit) for end in (measure.lower, measure.upper) if end is not None]
-    if ends:
-        parts.append(f"allowed {' to '.join(ends)}")
-    bounds = {"at least": measure.at_least, "at most": measure.at_most, "nominal": of.reference.figure}
+    if target is not None:
+        parts.append(f"required {100 * target:.6g} %")
+        figures["target_percent"] = 100 * target
+    parts += [f"allowed {' to '.join(ends)}"] if ends else []
     if measure.at_least is not None or measure.at_most is not None:
+        bounds = {"at least": measure.at_least, "at most": measure.at_most, "nominal": nominal}
         parts += [f"{word} {signed(end, factor, unit, '')}" for word, end in bounds.items() if end is not None]
-    return ", ".join(parts)
+    what, where = f"limits not met: {'; '.join(parts)}", f"measures.{measure.name}"
+    return Finding.error("limit.missed", where, what, _remedy(outcome, of), **figures)
 
 
-def _remedy(outcome: Outcome, of: Of, sampled: Sampled | None, i: int) -> str:
-    """What brings the measure within its limits: another nominal mechanism, other middles, or narrower tolerances."""
-    study, (lower, upper) = outcome.study, limits(of)
-    if lower > 0 or upper < 0:
-        return (
-            "the nominal value is outside the limits: change the mechanism or the limit, tolerances cannot correct it"
-        )
-    if _scatters(of, sampled, i):
-        return "first order does not describe this measure: use --method sobol to find what to narrow first"
-    spread, names = of.figure.spread, study.inputs.names
-    middles = 0.5 * (spread.lower + spread.upper)
-    middle = float(np.sum(middles))
-    if not np.isfinite(middle):
-        return "there is no first-order result: change the nominal mechanism, or narrow the tolerances and sample again"
-    if not lower < middle < upper:
-        factor, unit = _scale(outcome, of, sampled, i)
-        what = f"the middle of the tolerances is off by {signed(middle, factor, unit)}"
-        return f"{what}: centre them or change the nominal mechanism, narrower ones cannot correct it"
+def _yield(sampled: Sampled, name: str, i: int | tuple[()] = ()) -> str:
+    """A yield in words, with as many digits as its interval has."""
+    share, least, most = (float(sampled[f"{name}{end}"][i]) for end in ("", "_low", "_high"))
+    middle, *ends = (f"{100 * part:.{decimals_of(most - least)}f}" for part in (share, least, most))
+    return f"yield {middle} % (95 % interval {ends[0]} to {ends[1]} %)"
+
+
+def _remedy(outcome: Outcome, of: Of) -> str:
+    """What brings a measure within its limits: another nominal mechanism, or narrower tolerances."""
+    lower, upper = limits(of)
     # the variance decides a yield, and the worst case knows no correlation
-    parts = np.nan_to_num(of.figure.covariances if outcome.target is not None else spread.worst)
-    top, total = int(np.argmax(parts)), float(np.sum(parts))
-    share = float(parts[top]) / total if total > 0 else 0.0
-    of_what = "variance" if outcome.target is not None else "worst case"
-    narrow = f"narrow first '{names[top]}', {100 * share:.3g} % of the {of_what}"
-    prices = {price.path for price in study.run.system.mechanism.prices()}
-    if not prices:
-        return f"{narrow}; `trunnion allocate` finds the cheapest tolerances if the model states `costs`"
-    unpriced = np.array([name not in prices for name in names])
-    low, high = (float(np.sum(np.where(unpriced, end, middles))) for end in (spread.lower, spread.upper))
-    if outcome.target is None and not (lower <= low and high <= upper):
-        return f"{narrow}; tolerances without a cost, which `trunnion allocate` keeps, exceed the limits by themselves"
-    return f"{narrow}; `trunnion allocate` finds the cheapest tolerances"
-
-
-def _scatters(of: Of, sampled: Sampled | None, i: int) -> tuple[float, float] | None:
-    """Standard deviations of the samples and of first order, where they differ so much that the latter means little."""
-    if sampled is None or by_position(of.reference) or sampled.done < ENOUGH:
-        return None
-    drawn, linear = float(sampled.arrays["deviation"][i]), float(of.total.deviation)
-    if not np.isfinite(drawn + linear) or not max(drawn, linear) > 0:
-        return None
-    return None if 1 / OTHERWISE < drawn / max(linear, 1e-300) < OTHERWISE else (drawn, linear)
+    of_what = "worst case" if outcome.target is None else "variance"
+    parts = np.nan_to_num(of.figure.spread.worst if outcome.target is None else of.figure.covariances)
+    if lower > 0 or upper < 0 or not np.sum(parts) > 0:
+        return "change the nominal mechanism or the limit: tolerances cannot correct it"
+    top = int(np.argmax(parts))
+    narrow = f"narrow first '{outcome.study.inputs.names[top]}', {100 * parts[top] / np.sum(parts):.3g} % of the"
+    return f"{narrow} {of_what}; `trunnion allocate` finds the cheapest tolerances if the model states `costs`"
 
 
 # ---- what is doubtful -----------------------------------------------------------------------------------------
@@ -260,37 +200,28 @@ def _of_tolerances(outcome: Outcome) -> Iterator[Finding]:
     far = TURNED * float(np.ravel(primal(study.run.system.size(study.run.values)))[0])
     for tolerance in study.inputs.tolerances:
         values = np.atleast_1d(np.asarray(tolerance.options.get("values", 0.0)))
-        outside = np.count_nonzero((values < tolerance.lower) | (values > tolerance.upper))
-        if tolerance.distribution == "sample" and outside:
-            largest = float(values[np.argmax(np.abs(values))])
-            what = (
-                f"{outside:,} of {len(values):,} measured deviations are outside the tolerance {tolerance.lower:g} to "
-            )
-            what += f"{tolerance.upper:g}, the largest is {largest:g} (SI units)"
-            figures: dict[str, Any] = {"count": outside, "of": len(values), "farthest": largest}
-            yield Finding.warning(
-                "tolerance.measured_outside", tolerance.path, what, "check the unit of the data", **figures
-            )
+        outside = values[(values < tolerance.lower) | (values > tolerance.upper)]
+        if tolerance.distribution == "sample" and len(outside):
+            figures: dict[str, Any] = {"count": len(outside), "of": len(values), "farthest": np.max(np.abs(outside))}
+            what = f"{len(outside):,} of {len(values):,} measured deviations are outside the tolerance "
+            what += f"{tolerance.lower:g} to {tolerance.upper:g} (SI units)"
+            remedy = "check the unit of the data"
+            yield Finding.warning("tolerance.measured_outside", tolerance.path, what, remedy, **figures)
     for tolerance, end in product(study.inputs.tolerances, ("lower", "upper")):
         where = f"tolerances.{names[tolerance.path][0]}" if tolerance.path in names else tolerance.path
         deviation, unit = getattr(tolerance, end), kinds[tolerance.path].unit
         if (where, end) in paths_seen or not np.isfinite(deviation):
             continue
         paths_seen.add((where, end))
-        numbers.nominal = mechanism.parameters(
-            deviations={numbers.entries[tolerance.path].alias or tolerance.path: deviation}
-        )
+        alias = numbers.entries[tolerance.path].alias or tolerance.path
+        numbers.nominal = mechanism.parameters(deviations={alias: deviation})
         changed = [path for path, value in numbers.nominal.items() if value != mechanism.parameter_set.nominal[path]]
         checked = check_values(mechanism, numbers, changed)
-        refused = [finding for finding in checked if finding.severity is Severity.ERROR]
-        reached = tolerance.nominal + deviation
-        length = tolerance.path.startswith("dimensions.") and unit == "m" and tolerance.nominal > far
-        if reached < 0 <= tolerance.nominal and (refused or length):
-            what = f"its tolerance includes negative values, down to {readable(reached, unit)}"
-            yield Finding.warning("tolerance.negative", where, what, "narrow the tolerance", least=reached)
-        elif refused:
-            what = f"its tolerance includes {readable(reached, unit)}, which no model may have: {refused[0].where} "
-            what += refused[0].what
+        refused = next((finding for finding in checked if finding.severity is Severity.ERROR), None)
+        reached, long = tolerance.nominal + deviation, tolerance.path.startswith("dimensions.") and unit == "m"
+        if refused or (long and reached < 0 and tolerance.nominal > far):
+            why = f", which no model may have: {refused.where} {refused.what}" if refused else ""
+            what = f"its tolerance includes {readable(reached, unit)}{why}"
             yield Finding.warning("tolerance.impossible", where, what, "narrow the tolerance", value=reached)
 
 
@@ -300,78 +231,49 @@ def _nominal(outcome: Outcome) -> Iterator[Finding]:
     dial = study.run.system.dial(study.run.values, study.plan.times)
     for code in Status:
         places = np.flatnonzero(study.linear.status == code)
-        at = dial.intervals(places) if len(places) else ""
-        if code >= Status.NOT_CONVERGED and len(places):
+        if len(places) and (code >= Status.NOT_CONVERGED or code == Status.NEAR_SINGULAR):
+            severity = Severity.ERROR if code >= Status.NOT_CONVERGED else Severity.WARNING
+            at, remedy = dial.intervals(places), "the first-order result there is none to rely on: use the samples"
             what = f"nominal mechanism: {code.text} {at}"
-            yield Finding.error("tolerance.nominal_no_answer", "", what, "there is no result there", at=at)
-        elif code == Status.NEAR_SINGULAR and len(places):
-            what = f"close to a dead centre {at}: the first-order result is not reliable there"
-            yield Finding.warning("tolerance.near_singular", "", what, "use the samples there", at=at)
+            yield Finding.weighed(severity, "tolerance.nominal_no_answer", "", what, remedy, at=at)
     for of in study.linear.measures:
         if np.isnan(of.reference.figure):
-            where, what = f"measures.{of.measure.name}", f"{of.measure.name}: undefined for the nominal mechanism"
+            what, remedy = f"{of.measure.name}: undefined for the nominal mechanism", "take it where it is defined"
             if of.measure.in_time:
-                what = f"{what}: {not_steady(study.run, of.measure)}"
-                yield Finding.error("tolerance.nominal_not_steady", where, what, LONGER)
-            else:
-                remedy = "take it at a position, or over a range, where it is defined"
-                yield Finding.error("tolerance.nominal_no_figure", where, what, remedy)
+                what, remedy = f"{what}: {not_steady(study.run, of.measure)}", LONGER
+            yield Finding.error("tolerance.nominal_no_figure", f"measures.{of.measure.name}", what, remedy)
 
 
-def _first_order(outcome: Outcome, i: int, of: Of) -> Iterator[Finding]:
-    """A measure of which first order knows nothing, or whose worst case found is another."""
-    where, status = f"measures.{of.measure.name}", outcome.study.linear.status
-    if of.place >= 0 and not of.measure.of_motion and status[of.reference.window.index[of.place]] == Status.ZERO_SLIP:
-        what = "a joint is momentarily at rest there: friction jumps, and the first-order result is one-sided"
-        yield Finding.warning("first_order.one_sided", where, what, "use the samples")
+def _first_order(outcome: Outcome, sampled: Sampled | None, i: int, of: Of) -> Iterator[Finding]:
+    """A measure of which first order knows nothing, or whose worst case or scatter is another on the mechanism."""
+    study, where, remedy = outcome.study, f"measures.{of.measure.name}", "use the samples"
     lower, upper = float(of.total.lower), float(of.total.upper)
+    index = study.plan.windows[of.measure.name].index
+    rests = of.place >= 0 and study.linear.status[index[of.place]] == Status.ZERO_SLIP
+    if rests and not of.measure.of_motion:
+        what = "a joint is momentarily at rest there: friction jumps, and the first-order result is one-sided"
+        yield Finding.warning("first_order.one_sided", where, what, remedy)
     if not np.isfinite(upper):
-        what = "the first-order analysis has no result"
-        yield Finding.warning("first_order.no_answer", where, what, "use the samples")
-    if not np.isfinite(upper) or outcome.worst is None:
-        return
-    least, most = outcome.worst[i]
-    for end, corner in (("least", least), ("largest", most)):
-        if not corner.assembles and of.measure.in_time:
-            what = f"at the tolerance limits that give the {end} deviation to first order, "
-            what += not_steady(outcome.study.run, of.measure)
-            yield Finding.warning("first_order.corner_not_steady", where, what, LONGER)
-        elif not corner.assembles:
-            what = (
-                f"the mechanism cannot be solved at the tolerance limits that give the {end} deviation to first order"
-            )
-            remedy = "within these tolerances it cannot always be assembled"
-            yield Finding.warning("first_order.corner_open", where, what, remedy, end=end)
-    size, searched = max(-lower, upper), max(-least.value, most.value)
-    if np.isfinite(searched) and abs(searched - size) > FAR_OFF * max(size, searched) and max(size, searched) > 0:
-        ratio = searched / size if size else np.inf
-        what = (
-            f"the worst case found by search is {'∞' if np.isinf(ratio) else f'{ratio:.2f}'} times the first-order one"
-        )
-        remedy = "use the one found by search, and the samples"
-        yield Finding.note("first_order.worst_case_differs", where, what, remedy, ratio=ratio)
-
-
-def _samples(outcome: Outcome, sampled: Sampled) -> Iterator[Finding]:
-    """Samples without an answer; measures whose samples scatter quite otherwise than first order says."""
-    study, done = outcome.study, sampled.done
-    timed = any(of.measure.in_time for of in study.linear.measures)
-    absent = "a figure does not exist" + (", or a motion does not run steadily within its duration" if timed else "")
-    for code, count in enumerate(map(int, sampled.arrays["failed"])):
-        if count:
-            why = list(Status)[code].text if code < CAUSES - 1 else absent
-            what = f"{count:,} of {counted(done, 'sample')} ({count / done:.2%}) could not be solved: {why}"
-            remedy = "they count as outside every limit; mean and standard deviation are of the others"
-            figures = {"count": count, "samples": done, "share": count / done}
-            yield Finding.error("samples.no_answer", "tolerances", what, remedy, **figures)
-    for i, of in enumerate(study.linear.measures):
-        if differing := _scatters(of, sampled, i):
+        yield Finding.warning("first_order.no_answer", where, "the first-order analysis has no result", remedy)
+    elif outcome.worst is not None:
+        least, most = outcome.worst[i]
+        for end, corner in (("least", least), ("largest", most)):
+            if not corner.assembles:
+                what = f"no result at the tolerance limits that give the {end} deviation to first order"
+                steady = f": {not_steady(study.run, of.measure)}" if of.measure.in_time else ""
+                yield Finding.warning("first_order.corner_open", where, f"{what}{steady}", remedy, end=end)
+        size, searched = max(-lower, upper), max(-least.value, most.value)
+        if np.isfinite(searched) and abs(searched - size) > FAR_OFF * max(size, searched) > 0:
+            ratio = searched / size if size else np.inf
+            times = "∞" if np.isinf(ratio) else f"{ratio:.2f}"
+            what = f"the worst case found by search is {times} times the first-order one"
+            yield Finding.note("first_order.worst_case_differs", where, what, "use the searched one", ratio=ratio)
+    if sampled is not None and int(sampled["samples"]) >= ENOUGH and not by_position(of.reference):
+        drawn, linear = float(sampled["deviation"][i]), float(of.total.deviation)
+        if max(drawn, linear) > OTHERWISE * min(drawn, linear):  # not of NaN
             unit = of.measure.figure_unit(study.run.system, study.run.values)
-            drawn, linear = (readable(value, unit) for value in differing)
-            what = f"the standard deviation of the samples is {drawn}, the first-order one {linear}"
-            remedy = (
-                "first order and its contributions do not describe this measure: use the samples, and --method sobol "
-            )
-            remedy += "for the contributions"
-            figures = dict(zip(("found", "linear"), differing, strict=True))
-            yield Finding.warning("first_order.scatter_differs", f"measures.{of.measure.name}", what, remedy, **figures)
+            what = f"the standard deviation of the samples is {readable(drawn, unit)}, "
+            what += f"the first-order one {readable(linear, unit)}"
+            remedy = "use the samples, and --method sobol for the contributions"
+            figures = {"found": drawn, "linear": linear}
+            yield Finding.warning("first_order.scatter_differs", where, what, remedy, **figures)

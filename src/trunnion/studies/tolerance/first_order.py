@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from trunnion.cycle.cycle_kernel import Engine
 from trunnion.cycle.positions import check_steps
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.evaluation import NumpyKernel
@@ -21,7 +22,7 @@ from trunnion.solve.run import Run, prepare
 from trunnion.studies.tolerance.effects import Effects, effects_of
 from trunnion.studies.tolerance.indices import Indices
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
-from trunnion.studies.tolerance.kernel import kernel_of, many_of
+from trunnion.studies.tolerance.kernel import engine_for, kernel_of, many_of
 from trunnion.studies.tolerance.linear import Linear, Reference, linear, references, searched
 from trunnion.studies.tolerance.sampling import Samples, Sampling, towards
 from trunnion.studies.tolerance.search import Corner
@@ -82,13 +83,12 @@ class ToleranceStudy:
         """Least and largest deviation of every measure on the mechanism itself."""
         return [searched(self.many, self.linear, of) for of in self.linear.measures]
 
-    def sampling(self, method: Any, samples: int, seed: int, engine: str = "numpy") -> Sampling:
-        """The run of a sampling method."""
-        model = self.run.system.mechanism.data()
-        rotation = None
+    def sampling(self, method: Any, samples: int, seed: int, engine: Engine = "numpy") -> Sampling:
+        """The run of a sampling method. engine auto: see `engine_for`."""
+        engine = engine_for(engine, self.kernel, self.run.values, samples * len(self.plan.times))
+        model, rotation = self.run.system.mechanism.data(), None
         if method == "quasi-monte-carlo" and self.inputs.tolerances:
-            count = len(self.inputs.tolerances)
-            rotation = towards(np.array([of.figure.gradient()[:count] for of in self.linear.measures]))
+            rotation = towards(np.array([of.figure.gradient() for of in self.linear.measures]))
         return Sampling(
             model, self.measures, self.steps, method, samples, seed, engine, self.friction, len(self.plan.times),
             rotation, bool(self.inputs.pressed),

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.mechanism import Mechanism
 from trunnion.model.tolerances import FULL_TURN, Tolerance
 from trunnion.solve import shifts
 from trunnion.solve.run import Run
@@ -84,9 +83,7 @@ class Inputs:
 
     def ends(self, joint: str) -> Sequence[Sequence[str]]:
         """Names of the components of the pin's offset at each end of a joint's hole."""
-        play = self.play(joint, self.run.values)
-        assert play is not None  # else it would not be loose
-        return play.model.ends
+        return self.play(joint, self.run.values).model.ends
 
     def carriers(self, joint: str) -> tuple[str, ...]:
         """Which of `shifts.CARRIERS` may carry the seat of a pin as the joint turns; the first does in samples."""
@@ -99,11 +96,7 @@ class Inputs:
     @cached_property
     def turned(self) -> dict[int, int]:
         """Of each toleranced number that changes the size of what points anywhere, which of them is the direction."""
-        angles = [
-            i
-            for i, tolerance in enumerate(self.tolerances)
-            if tolerance.direction or tolerance.distribution == FULL_TURN
-        ]
+        angles = [i for i, each in enumerate(self.tolerances) if each.direction or each.distribution == FULL_TURN]
         if not angles:
             return {}
         count = len(self.tolerances)
@@ -113,12 +106,14 @@ class Inputs:
             path, seed = self.angle(i), Dual(0.0, seeds[count + i])
             deviations[path] = deviations[path] + seed if path in deviations else seed
         values = self.run.system.mechanism.parameters(deviations=deviations)
+
+        def moves(number: Number, i: int) -> bool:
+            return bool(np.any(np.broadcast_to(np.asarray(derivative(number), float), (2 * count, 1))[i]))
+
         directions: dict[int, int] = {}
         for sizes, angle in self._directed(values):
-            turning = [i for i in angles if np.any(_by(values[angle], count + i, 2 * count))]
-            numbers = [
-                i for i in range(count) if i not in angles and any(np.any(_by(size, i, 2 * count)) for size in sizes)
-            ]
+            turning = [i for i in angles if moves(values[angle], count + i)]
+            numbers = [i for i in range(count) if i not in angles and any(moves(size, i) for size in sizes)]
             directions.update({i: turning[0] for i in numbers if turning})
         return directions
 
@@ -131,15 +126,15 @@ class Inputs:
                 if {f"{path}.{size}", f"{path}.{angle}"} <= values.keys():
                     yield (values[f"{path}.{size}"],), f"{path}.{angle}"
         for joint in self.held:
-            play = self.play(joint, values)
-            assert play is not None  # a seat is one of a play
             for angle in (f"joints.{joint}.seat.{key}" for key in ("xi", "beta")):
                 if angle in values:
-                    yield play.radii, angle
+                    yield self.play(joint, values).radii, angle
 
-    def play(self, joint: str, values: Mapping[str, Number]) -> Play | None:
-        """The play of a joint with these numbers."""
-        return shifts.play_of(self.run.system.mechanism.space, self.run.system.joints[joint][0], values, joint)
+    def play(self, joint: str, values: Mapping[str, Number]) -> Play:
+        """The play of a loose or held joint with these numbers."""
+        play = shifts.play_of(self.run.system.mechanism.space, self.run.system.joints[joint][0], values, joint)
+        assert play is not None  # else it would be neither
+        return play
 
     def values(self, u: Array, rotation: Array | None = None) -> dict[str, Number]:
         """Every number of the mechanism, (sample, 1) where it varies, from u, (dims, sample), uniform in (0, 1).
@@ -165,25 +160,16 @@ class Inputs:
     def seat(self, joint: str, values: Mapping[str, Number]) -> dict[str, Number]:
         """Offsets of a pin whose seat is given."""
         play = self.play(joint, values)
-        assert play is not None  # a seat is one of a play
         return play.model.paths(f"seats.{joint}", given_offsets(values, joint, play))
 
     def _anywhere(self, joint: str, values: Mapping[str, Number], rest: Iterator[Array]) -> dict[str, Number]:
         """Offsets of a pin at each end, uniform over the interval, disc or ball, on the link that carries its seat."""
-        play = self.play(joint, values)
-        assert play is not None
-        offsets = []
+        play, offsets = self.play(joint, values), []
         for end, radius in zip(play.model.ends, play.radii, strict=True):
             unit = within([next(rest) for _ in end])
             room = np.maximum(radius, 0.0)  # a fit that presses leaves none
             offsets.append(tuple(room * part[:, None] for part in unit))
         return play.model.paths(f"{self.carriers(joint)[0]}.{joint}", offsets)
-
-
-def _by(number: Number, i: int, count: int) -> Array:
-    """Derivative of a number by the i-th of so many seeds."""
-    part: Array = np.broadcast_to(np.asarray(derivative(number), float), (count, 1))[i]
-    return part
 
 
 def within(u: Sequence[Array]) -> list[Array]:
@@ -210,23 +196,20 @@ def inputs_of(run: Run) -> Inputs:
     if not tolerances and not loose:
         remedy = "write `60 mm ± 0.05 mm`, an entry in `tolerances`, or a clearance of a joint without a seat"
         raise MechanismError(Finding("nothing has a tolerance or a clearance", "tolerances", remedy))
-    if findings := list(_uneven(mechanism, tolerances)):
+    findings = []
+    for tolerance in tolerances if len(mechanism.drivers) > 1 else ():
+        section, *rest = tolerance.path.split(".")
+        if section == "drivers" and rest[1:2] != ["start"]:
+            what = "it cannot vary alone: the drivers would have different cycle times"
+            remedy = "leave it out, or vary the start of the driver"
+            findings.append(Finding(what, f"tolerances.{tolerance.path}", remedy))
+    if findings:
         raise MechanismError(findings)
     marginals = [
         Marginal(tolerance.distribution, tolerance.lower, tolerance.upper, tolerance.options)
         for tolerance in tolerances
     ]
     return Inputs(run, tolerances, loose, seated, pressed, Population(marginals, mechanism.correlation()))
-
-
-def _uneven(mechanism: Mechanism, tolerances: Sequence[Tolerance]) -> Iterator[Finding]:
-    """Speeds and ranges that vary while there are other drivers, which would no longer be at the same positions."""
-    for tolerance in tolerances:
-        section, _, rest = tolerance.path.partition(".")
-        key = rest.partition(".")[2].partition(".")[0]
-        if section == "drivers" and len(mechanism.drivers) > 1 and key != "start":
-            what = "it cannot vary alone: the drivers would have different cycle times"
-            yield Finding(what, f"tolerances.{tolerance.path}", "leave it out, or vary the start of the driver")
 
 
 def plays_of(run: Run) -> dict[str, Play]:

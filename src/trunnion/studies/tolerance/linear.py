@@ -94,7 +94,6 @@ class Linear:
     """All measures to first order."""
 
     effects: Effects
-    plan: PositionPlan
     measures: Sequence[Of]
     status: NDArray[np.int8]
 
@@ -135,7 +134,7 @@ def linear(
         if by_position(reference):
             place = _placed(replace(kernel, measures=[measure]), effects, values, reference, many)
         orders.append(_of(reference, effects, courses[measure.name], read, place))
-    return Linear(effects, plan, orders, status[0])
+    return Linear(effects, orders, status[0])
 
 
 Course = list[Dual]  # parts, (row, position) each

@@ -25,8 +25,6 @@ from trunnion.studies.tolerance.sampled import QUANTILES, sampled
 if TYPE_CHECKING:
     import xarray as xr
 
-    from trunnion.studies.tolerance.linear import Of
-
 __all__ = ["VARIABLES", "course_text", "dataset", "text_of"]
 
 Array = NDArray[np.float64]
@@ -126,7 +124,7 @@ def dataset(outcome: Outcome, notes: Sequence[Finding]) -> xr.Dataset:
     counted = sampled(outcome.samples, study) if outcome.samples else None
     job = outcome.samples.job if outcome.samples else None
     findings = [*findings_of(outcome, counted), *notes]
-    arrays = {**_linear(study), **_worst(outcome), **(counted.arrays if counted else {})}
+    arrays = {**_linear(study), **_worst(outcome), **(counted or {})}
     arrays |= outcome.indices.arrays if outcome.indices else {}
     units = [measure.figure_unit(system, study.run.values) for measure in study.measures]
     curve_units = [measure.unit(system) for measure in study.measures]
@@ -150,7 +148,14 @@ def dataset(outcome: Outcome, notes: Sequence[Finding]) -> xr.Dataset:
         "sampling": job.method if job else "",
         "engine": job.engine if job else "numpy",
         "seed": job.seed if job else -1,
-        **_of_measures(study),
+        "measure_texts": [text_of(measure, system) for measure in study.measures],
+        "measure_rules": [measure.rule for measure in study.measures],
+        "curve_texts": [course_text(measure, system) for measure in study.measures],
+        "limits": [
+            None if (measure.lower, measure.upper) == (None, None) else [measure.lower, measure.upper]
+            for measure in study.measures
+        ],
+        "bounds": [[measure.at_least, measure.at_most] for measure in study.measures],
         "distributions": [
             *(each.distribution for each in study.inputs.tolerances),
             *("play" for _ in study.inputs.loose),
@@ -167,47 +172,38 @@ def dataset(outcome: Outcome, notes: Sequence[Finding]) -> xr.Dataset:
     return dataset_of("tolerance", variables, labels, attributes, {**quantiles, **driven(study.plan.times, *dial)})
 
 
-def _of_measures(study: ToleranceStudy) -> dict[str, list[Any]]:
-    """Attributes that are a list each, an entry for each measure."""
-    system, measures = study.run.system, study.measures
-    limits = [
-        None if (measure.lower, measure.upper) == (None, None) else [measure.lower, measure.upper]
-        for measure in measures
-    ]
-    return {
-        "measure_texts": [text_of(measure, system) for measure in measures],
-        "measure_rules": [measure.rule for measure in measures],
-        "curve_texts": [course_text(measure, system) for measure in measures],
-        "limits": limits,
-        "bounds": [[measure.at_least, measure.at_most] for measure in measures],
-    }
-
-
 def _units(
     figures: Sequence[str], courses: Sequence[str], parameters: Sequence[str], drive: str
 ) -> dict[str, str | MemberUnits]:
-    """The units that `Variable` names by a word."""
+    """The units that `Variable` names by a word; of a ratio "N m/m", "(N m or rad)/(m)" where several units meet."""
     figure, curve = MemberUnits("measure", figures), MemberUnits("measure", courses)
     parameter = MemberUnits("parameter", parameters)
+
+    def over(unit: MemberUnits) -> str:
+        several = len({*unit.each}) > 1 or len({*parameter.each}) > 1
+        return f"({unit.text})/({parameter.text})" if several else f"{unit.text}/{parameter.text}"
+
     return {
-        "measure": figure,
-        "curve": curve,
-        "parameter": parameter,
-        "ratio": _over(figure, parameter),
-        "curve ratio": _over(curve, parameter),
+        "measure": figure, "curve": curve, "parameter": parameter, "ratio": over(figure), "curve ratio": over(curve),
         "drive": drive.strip().replace("°", "deg"),
-    }
-
-
-def _over(unit: MemberUnits, other: MemberUnits) -> str:
-    """The unit of a ratio: "N m/m", "(N m or rad)/(m)" where several units meet."""
-    several = len({*unit.each}) > 1 or len({*other.each}) > 1
-    return f"({unit.text})/({other.text})" if several else f"{unit.text}/{other.text}"
+    }  # fmt: skip
 
 
 def _linear(study: ToleranceStudy) -> dict[str, Any]:
-    first, inputs = study.linear, study.inputs
-    rows = first.measures
+    """What first order says."""
+    rows, run = study.linear.measures, study.run
+
+    def over_positions(arrays: Sequence[Array]) -> Array:
+        """Numbers over the windows of measures as one array over all positions, NaN outside."""
+        spread = np.full((len(arrays), *arrays[0].shape[:-1], len(study.plan.times)), np.nan)
+        for row, array, of in zip(spread, arrays, rows, strict=True):
+            row[..., of.reference.window.index] = array
+        return spread
+
+    # drive coordinates at which figures are taken; NaN of those of no single position
+    placed = [np.isfinite(of.time) and run.cycle.duration > 0 for of in rows]
+    times = np.array([of.time % run.cycle.duration if run.cycle.periodic else of.time for of in rows])
+    places = [run.system.dial(run.values, times[[k]]).values[0] if at else np.nan for k, at in enumerate(placed)]
     total = Spread(*np.array([of.total for of in rows], float).reshape(-1, 5).T)
     halves = np.array([of.figure.spread.half for of in rows])
     scatter = np.array([of.figure.covariances for of in rows])
@@ -216,7 +212,7 @@ def _linear(study: ToleranceStudy) -> dict[str, Any]:
         variance = scatter / np.sum(scatter, axis=1, keepdims=True)
     return {
         "nominal": np.array([of.reference.figure for of in rows]),
-        "place": np.array([_place(study, of) for of in rows], float),
+        "place": np.array(places, float),
         **{f"parameter_{key}": array for key, array in study.effects.numbers().items()},
         "sensitivity": np.array([of.figure.sensitivity for of in rows]),
         "contribution_worst_case": np.array([of.figure.spread.worst for of in rows]),
@@ -224,43 +220,22 @@ def _linear(study: ToleranceStudy) -> dict[str, Any]:
         "contribution_variance": variance,
         "worst_case_lower": total.lower, "worst_case_upper": total.upper, "rss": total.half,
         "shift_linear": total.shift, "deviation_linear": total.deviation,
-        "curve": _spread_out(study, [of.curve for of in rows], ()),
-        "curve_sensitivity": _spread_out(study, [of.course.sensitivity for of in rows], (len(inputs.names),)),
-        **{f"curve_{name}": _spread_out(study, [getattr(of.course.total, part) for of in rows], ())
+        "curve": over_positions([of.curve for of in rows]),
+        "curve_sensitivity": over_positions([of.course.sensitivity for of in rows]),
+        **{f"curve_{name}": over_positions([getattr(of.course.total, part) for of in rows])
            for name, part in CURVES.items()},
-        "status": first.status,
+        "status": study.linear.status,
     }  # fmt: skip
 
 
-def _place(study: ToleranceStudy, of: Of) -> float:
-    """The drive coordinate at which a figure is taken; NaN if it is of no single position."""
-    run, time = study.run, of.time
-    if not np.isfinite(time) or run.cycle.duration <= 0:
-        return float("nan")
-    time = time % run.cycle.duration if run.cycle.periodic else time
-    return float(run.system.dial(run.values, np.array([time])).values[0])
-
-
-def _spread_out(study: ToleranceStudy, arrays: Sequence[Array], shape: tuple[int, ...]) -> Array:
-    """Numbers over the windows of measures as one array over all positions, NaN outside."""
-    spread = np.full((len(arrays), *shape, len(study.plan.times)), np.nan)
-    for row, array, of in zip(spread, arrays, study.linear.measures, strict=True):
-        row[..., of.reference.window.index] = array
-    return spread
-
-
 def _worst(outcome: Outcome) -> dict[str, Any]:
-    if outcome.worst is None:
-        return {}
-    study, inputs = outcome.study, outcome.study.inputs
-    radii = study.effects.numbers()["nominal"]
-    values = {}
-    for k, key in enumerate(("lower", "upper")):
-        corners = [pair[k] for pair in outcome.worst]
+    """What the search of the worst case came to."""
+    values: dict[str, Any] = {}
+    names, radii = outcome.study.inputs.names, outcome.study.effects.numbers()["nominal"]
+    for key, corners in zip(("lower", "upper"), zip(*(outcome.worst or ()), strict=True), strict=False):
         values[f"searched_{key}"] = np.array([corner.value for corner in corners])
-        values[f"corner_{key}"] = np.array(
-            [[corner.at.get(name, radii[i]) for i, name in enumerate(inputs.names)] for corner in corners]
-        )
+        at = [[corner.at.get(name, radii[i]) for i, name in enumerate(names)] for corner in corners]
+        values[f"corner_{key}"] = np.array(at)
     return values
 
 
@@ -294,25 +269,19 @@ def course_text(measure: Measure, system: System) -> str:
 
 
 def _where(measure: Measure, system: System) -> str:
-    """The place at which, or the range over which, a measure is taken; empty if it is the whole cycle."""
+    """The place at which, or the range over which, a measure is taken; empty if it is the whole cycle.
+
+    A coordinate of the first driver, or a time, in the unit in which places are told.
+    """
+    first = "" if measure.timed else next(iter(system.mechanism.drivers), "")
+
+    def at(place: float) -> str:
+        if not first:
+            return f"{place:.6g} s".replace("-", "−")
+        turns = system.turns(first)
+        return f"{math.degrees(place) if turns else 1e3 * place:.6g}{'°' if turns else ' mm'}".replace("-", "−")
+
+    of = f" of {first}" if first else ""
     if measure.at is not None:
-        return f" at {_named_place(measure, system, measure.at)}{_driver(measure, system)}"
-    if measure.over is not None:
-        first, last = (_named_place(measure, system, end) for end in measure.over)
-        return f" over {first} to {last}{_driver(measure, system)}"
-    return ""
-
-
-def _driver(measure: Measure, system: System) -> str:
-    first = next(iter(system.mechanism.drivers), "")
-    return f" of {first}" if first and not measure.timed else ""
-
-
-def _named_place(measure: Measure, system: System, place: float) -> str:
-    """A coordinate of the first driver, or a time, in the unit in which places are told."""
-    first = next(iter(system.mechanism.drivers), "")
-    if measure.timed or not first:
-        return f"{place:.6g} s".replace("-", "−")
-    turns = system.turns(first)
-    text = f"{math.degrees(place) if turns else 1e3 * place:.6g}".replace("-", "−")
-    return f"{text}{'°' if turns else ' mm'}"
+        return f" at {at(measure.at)}{of}"
+    return f" over {at(measure.over[0])} to {at(measure.over[1])}{of}" if measure.over is not None else ""

@@ -6,7 +6,6 @@ independently scrambled replicates (Student's t).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from trunnion.statistics.moments import Moments, moments_of
 from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.studies.tolerance.sampling import Samples
 
-__all__ = ["CAUSES", "QUANTILES", "Sampled", "limits_of", "sampled"]
+__all__ = ["CAUSES", "QUANTILES", "limits_of", "sampled"]
 
 Array = NDArray[np.float64]
 Interval = tuple[Any, Any]
@@ -32,17 +31,8 @@ LEAST = 1e-9, 1e-12  # width of the bins of a figure that does not scatter: of t
 SIZES = 12  # at which it is shown how figures converge
 
 
-@dataclass(frozen=True, eq=False)
-class Sampled:
-    """Arrays by the names of `result.VARIABLES`; done: samples; passed: within all limits."""
-
-    arrays: dict[str, Any]
-    done: int
-    passed: int
-
-
-def sampled(samples: Samples, study: ToleranceStudy) -> Sampled:
-    """All figures of the samples."""
+def sampled(samples: Samples, study: ToleranceStudy) -> dict[str, Any]:
+    """All figures of the samples: arrays by the names of `result.VARIABLES`."""
     job, figure, passed = samples.job, samples.figure, samples.passed
     count, done = figure.shape
     everything = np.concatenate([passed, np.all(passed, axis=0)[None]])
@@ -89,7 +79,7 @@ def sampled(samples: Samples, study: ToleranceStudy) -> Sampled:
     }
     for name, (low, high) in ends.items():
         arrays |= {f"{name}_low": low[:count], f"{name}_high": high[:count]}
-    return Sampled(arrays, done, int(np.sum(everything[-1])))
+    return arrays
 
 
 def _of_even_points(moments: Moments) -> Array:

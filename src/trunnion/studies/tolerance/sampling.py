@@ -22,7 +22,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
 from trunnion.statistics.streams import SobolStream, uniforms
-from trunnion.studies.job import Part
+from trunnion.studies.batch import Part
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
 from trunnion.studies.tolerance.kernel import batch_of, many_of
 
@@ -119,18 +119,7 @@ class Sampling:
 
     def identity(self) -> Mapping[str, Any]:
         """All that the answer depends on."""
-        return {
-            "model": self.model,
-            "measures": [asdict(measure) for measure in self.measures],
-            "steps": self.steps,
-            "method": self.method,
-            "samples": self.samples,
-            "seed": self.seed,
-            "engine": self.engine,
-            "friction": asdict(self.friction),
-            "block": self.block_size,
-            "rotation": self.rotation,
-        }
+        return asdict(self)
 
     def prepare(self) -> Sampler:
         """The mechanism read and prepared; once in every process."""
@@ -192,19 +181,17 @@ class Sampler:
         """Figures, whether they conform and gravest status of samples drawn, and the curves of the first of them."""
         reads = self.many.read(self.inputs.values(u, self.job.rotation), self.times if curves else {})
         count, measures = u.shape[1], self.job.measures
+        rows = [reads[measure.name] for measure in measures]
         part: Part = {
-            "figure": np.empty((len(measures), count)),
-            "passed": np.empty((len(measures), count), bool),
-            "status": np.zeros(count, np.int8),
+            "figure": np.array([np.broadcast_to(read.figure, count) for read in rows], float),
+            "status": np.max([np.broadcast_to(read.status, count) for read in rows], axis=0).astype(np.int8),
         }
-        for i, measure in enumerate(measures):
-            read = reads[measure.name]
-            part["figure"][i] = read.figure
-            part["passed"][i] = within_limits(measure, part["figure"][i], read.least, read.most)
-            part["status"] = np.maximum(part["status"], read.status)
-            shape = (count, len(self.times[measure.name]))
+        judged = zip(measures, part["figure"], rows, strict=True)
+        passed = [within_limits(measure, figure, read.least, read.most) for measure, figure, read in judged]
+        part["passed"] = np.array([np.broadcast_to(row, count) for row in passed], bool)
+        for i, (measure, read) in enumerate(zip(measures, rows, strict=True)):
             course = np.asarray(read.shown) if curves else np.empty((count, 1))
-            part[f"curve{i}"] = np.broadcast_to(course, shape)[:curves]
+            part[f"curve{i}"] = np.broadcast_to(course, (count, len(self.times[measure.name])))[:curves]
         return part
 
     def __call__(self, block: int) -> Part:

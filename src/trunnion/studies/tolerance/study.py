@@ -21,11 +21,10 @@ from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
 if TYPE_CHECKING:
     import xarray as xr
 
-from trunnion.studies.tolerance.first_order import FEW, Outcome, ToleranceStudy, study
-from trunnion.studies.tolerance.kernel import engine_for
+from trunnion.studies.tolerance.first_order import FEW, Outcome, study
 from trunnion.studies.tolerance.result import dataset
 
-__all__ = ["DEFAULT_METHODS", "Method", "tolerance"]
+__all__ = ["DEFAULT_METHODS", "Method", "check_share", "tolerance"]
 
 Method = Literal["linear", "worst-case", "monte-carlo", "quasi-monte-carlo", "sobol"]
 DEFAULT_METHODS: tuple[Method, ...] = ("linear", "worst-case", "monte-carlo")
@@ -91,14 +90,17 @@ def tolerance(
     MechanismError
         Nothing varies, a measure or method is unknown, or as `analyse` does.
     """
-    methods, notes, asked_engine = tuple(dict.fromkeys(methods)), list[Finding](), engine
+    methods, notes = tuple(dict.fromkeys(methods)), list[Finding]()
     _check(methods, samples, seed, target)
     prepared = study(mechanism, measures, steps, at, friction_method)
     worst = prepared.worst() if "worst-case" in methods else None
     drawn, shares = None, None
     if (method := next((sampling for sampling in methods if sampling in SAMPLINGS), None)) is not None:
-        engine, chosen = _engine(prepared, engine, samples, cluster)
-        job = prepared.sampling(method, samples, seed, engine)
+        # the workers of a cluster may have no other
+        job = prepared.sampling(method, samples, seed, "numpy" if cluster and engine == "auto" else engine)
+        if engine == "auto" and job.engine != "numpy":
+            what = f"the samples are computed by the engine {job.engine}"
+            notes.append(Finding.note("samples.engine", "samples", what, engine=job.engine))
         if jobs is None:
             jobs = 1 if job.work < FEW and cluster is None else None
 
@@ -108,33 +110,19 @@ def tolerance(
 
         try:
             parts, trouble = batch.run(
-                job, jobs=jobs, threads=engine == "compiled", cluster=cluster, checkpoint=checkpoint, progress=tell
+                job, jobs=jobs, threads=job.engine == "compiled", cluster=cluster, checkpoint=checkpoint, progress=tell
             )
         except KeyboardInterrupt:
             hint = (f"samples are in {checkpoint}: the same command goes on from them",) if checkpoint else ()
             raise KeyboardInterrupt(*hint) from None
         drawn = job.joined(parts)
         del parts  # as large as the samples
-        notes += [*chosen, *trouble]
+        notes += trouble
     if "sobol" in methods:
-        alone = _engine(prepared, asked_engine, samples, cluster=None)[0]
         # each number is to have its own coordinates of the points
-        plain = replace(prepared.sampling("quasi-monte-carlo", samples, seed, alone), rotation=None)
+        plain = replace(prepared.sampling("quasi-monte-carlo", samples, seed, engine), rotation=None)
         shares = indices(plain.prepare(), samples, seed)
     return dataset(Outcome(prepared, tuple(methods), worst, drawn, shares, target), [*prepared.told, *notes])
-
-
-def _engine(
-    prepared: ToleranceStudy, engine: Engine, samples: int, cluster: str | None
-) -> tuple[Engine, list[Finding]]:
-    """The engine to use, and a note if it is not NumPy, as it is on a cluster, whose workers may have no other."""
-    if engine != "auto":
-        return engine, []
-    many = samples * len(prepared.plan.times)
-    engine = "numpy" if cluster else engine_for(engine, prepared.kernel, prepared.run.values, many)
-    return engine, [
-        Finding.note("samples.engine", "samples", f"the samples are computed by the engine {engine}", engine=engine)
-    ] if engine != "numpy" else []
 
 
 def _check(methods: Sequence[str], samples: int, seed: int, target: float | None) -> None:
@@ -147,10 +135,16 @@ def _check(methods: Sequence[str], samples: int, seed: int, target: float | None
         findings.append(Finding(f"{samples} samples", "samples", remedy))
     if not 0 <= seed < 1 << 63:
         findings.append(Finding(f"a seed of {seed}", "seed", "give a whole number from 0"))
-    if target is not None and not 0 < target < 1:
-        what = f"a yield of {target:g} is not possible"
-        findings.append(Finding(what, "yield", "give a share above 0 and below 1, such as 0.9973"))
-    elif target is not None and not any(method in SAMPLINGS for method in methods):
+    findings += check_share(target)
+    if target is not None and not any(method in SAMPLINGS for method in methods):
         findings.append(Finding("a yield is one of samples", "yield", f"add the method {' or '.join(SAMPLINGS)}"))
     if findings:
         raise MechanismError(findings)
+
+
+def check_share(share: float | None) -> list[Finding]:
+    """What is wrong with a yield that is asked for."""
+    if share is None or 0 < share < 1:
+        return []
+    what = f"a yield of {share:g} is not possible"
+    return [Finding(what, "yield", "give a share above 0 and below 1, such as 0.9973")]

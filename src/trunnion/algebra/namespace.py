@@ -15,7 +15,7 @@ import numpy as np
 from trunnion.algebra.dual import Dual
 from trunnion.algebra.dual import functions as dual_functions
 
-__all__ = ["Number", "Traced", "UntraceableError", "apart", "looped", "namespace"]
+__all__ = ["Number", "Traced", "UntraceableError", "apart", "cut", "looped", "namespace"]
 
 # A float, a NumPy array, a dual number of them, or one that is recorded. Operators and `namespace` are all that is
 # assumed.
@@ -41,6 +41,16 @@ class Traced:
     def looped(cls, step: Step, start: Sequence[Any], rounds: int, done: Done | None) -> list[Any]:
         """See the function `looped`; rounds: at least 1, and one of the start at least is of this kind."""
         raise NotImplementedError
+
+    def cut(self) -> None:
+        """See the function `cut`."""
+        raise NotImplementedError
+
+
+def cut(number: Number) -> None:
+    """A part of a long computation ends: what is recorded from here on may be compiled by itself."""
+    if isinstance(number, Traced):
+        number.cut()
 
 
 def namespace(*numbers: Number) -> Any:

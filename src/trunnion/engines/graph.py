@@ -75,7 +75,12 @@ class Graph:
         self.loops: list[Loop] = []
         self.inputs: dict[str, int] = {}
         self.doubts: list[int] = []
+        self.cuts: list[int] = []  # nodes that begin a part which may be compiled by itself
         self._numbers: dict[Any, int] = {}
+
+    def cut(self) -> None:
+        """End a part here."""
+        self.cuts.append(len(self.nodes))
 
     # ---- making nodes -----------------------------------------------------------------------------------------
 

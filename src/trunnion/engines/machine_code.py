@@ -89,7 +89,7 @@ class MachineCode:
         with COMPILING:
             self._engine = _linked(code)
         kinds = [*[ctypes.c_int64] * 5, *[ctypes.c_void_p] * 6]
-        self._function = ctypes.CFUNCTYPE(None, *kinds)(self._engine.get_function_address("kernel"))
+        self.function = ctypes.CFUNCTYPE(None, *kinds)(self._engine.get_function_address("kernel"))
 
     def run(
         self,
@@ -128,7 +128,7 @@ class MachineCode:
         alive = inputs, outputs, table  # as long as their addresses are in use
 
         def call() -> None:
-            self._function(*arguments)
+            self.function(*arguments)
 
         call.held = alive  # type: ignore[attr-defined]
         return call
@@ -141,7 +141,7 @@ class MachineCode:
         made = np.empty((count, given.shape[1]))
         tables = [_pointers_to_rows(table) for table in (given, made)]
         (inputs, outputs), none = [table.__array_interface__["data"][0] for table in tables], None
-        self._function(0, 1, 0, given.shape[1], given.shape[1], none, none, none, inputs, outputs, none)
+        self.function(0, 1, 0, given.shape[1], given.shape[1], none, none, none, inputs, outputs, none)
         return made
 
 

@@ -88,6 +88,9 @@ class Recorded(Traced):
         first = [number_of(graph, number) for number in start]
         return recorded(graph.loop(further, first, rounds, stays if done is not None else None))
 
+    def cut(self) -> None:
+        self.graph.cut()
+
     def all(self, axis: Any = None) -> Any:
         return np.all(self, axis=axis)
 

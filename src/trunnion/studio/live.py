@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.solve.backward import Backward
-from trunnion.solve.forward import Forward, posed
+from trunnion.solve.forward import Forward
 from trunnion.solve.margin import least_beside, margin_for_sure, margin_in
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import pose_status, status_of
@@ -103,7 +103,7 @@ class Live:
     def walk(self) -> Forward:
         """Its motion over the cycle; of many joints the places alone."""
         cycle = self._cycle
-        return cycle.walk if cycle else posed(self.run.system, self.numbers, self.run.chosen.assembly, self.time)
+        return cycle.walk if cycle else self.run.posed(self.time, self.numbers)
 
     @cached_property
     def tracks(self) -> dict[str, Array]:

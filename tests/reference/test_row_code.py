@@ -1,4 +1,4 @@
-"""Machine code settles friction as NumPy does, also where it locks, turns round or cannot be assembled."""
+"""Machine code solves a row of modules as NumPy does, also where it locks, turns round or cannot be assembled."""
 
 from pathlib import Path
 
@@ -7,11 +7,13 @@ import pytest
 from benchmarks.studio import chain
 
 from trunnion.algebra.dual import Dual
+from trunnion.engines import parts
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
-from trunnion.solve import backward, settle_code
+from trunnion.solve import backward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.margin import margin_in
+from trunnion.solve.row_code import leaves_of
 from trunnion.solve.run import prepare
 from trunnion.solve.status import status_of
 
@@ -27,37 +29,54 @@ TEXTS = {
 
 @pytest.mark.parametrize("name", TEXTS)
 @pytest.mark.parametrize("positions", [slice(None), slice(7, 8), slice(0, 3)])
-def test_machine_code_settles_friction_as_numpy_does(name, positions, monkeypatch):
+def test_machine_code_solves_as_numpy_does(name, positions, monkeypatch):
     run = prepare(Mechanism(**entries_of(TEXTS[name])[0]))
     time = run.cycle.times(STEPS)[positions]
-    ran, run_code = [], settle_code._run
-    monkeypatch.setattr(settle_code, "_run", lambda *given: ran.append(given) or run_code(*given))
-    backs = []
+    ran, run_code = [], parts.Parts.run
+    monkeypatch.setattr(parts.Parts, "run", lambda *given: ran.append(given) or run_code(*given))
+    backs, turned = [], []
     with np.errstate(all="ignore"):
         for many in (10**9, 1):
             monkeypatch.setattr(backward, "MANY_MODULES", many)
             assert not ran
             backs.append(run.solve(time, method=FrictionMethod()))
+            turned.append(backward.backward(backs[-1].walk.backward(), FrictionMethod(), backward.Given()))
         plain, coded = backs
         margins = [np.broadcast_to(margin_in(back, 3.0), time.shape) for back in backs]
     assert ran
-    np.testing.assert_array_equal(*(status_of(back, time.shape) for back in backs))
+    for plain, coded in (backs, turned):
+        _same(plain, coded, time)
     np.testing.assert_allclose(margins[1], margins[0], rtol=1e-9)
-    parts = [np.ravel(np.abs(part)) for wrench in plain.reactions.values() for part in wrench]
-    size = np.fmax.reduce(np.concatenate(parts))  # NaN where all of it is locked
-    for joint, wrench in plain.reactions.items():
-        for part, other in zip(wrench, coded.reactions[joint], strict=True):
-            np.testing.assert_allclose(other, part, rtol=0, atol=1e-12 * np.nan_to_num(size))
+
+
+def _same(plain, coded, time):
+    """All numbers of both to 1e-10 of their sizes, statuses and rounds alike."""
+    np.testing.assert_array_equal(*(status_of(back, time.shape) for back in (plain, coded)))
+    for name in ("reactions", "friction", "losses", "efforts", "loads", "load_powers", "friction_wrenches"):
+        numbers = [np.array([np.broadcast_to(part, time.shape) for part in leaves_of(getattr(back, name))])
+                   for back in (plain, coded)]  # fmt: skip
+        size = np.nanmax(np.abs(numbers[0]), initial=0.0) if np.isfinite(numbers[0]).any() else 0.0
+        np.testing.assert_allclose(numbers[1], numbers[0], rtol=0, atol=1e-10 * size, err_msg=name)
+    for name in ("body_power", "gear_power"):
+        np.testing.assert_allclose(getattr(coded, name), getattr(plain, name), rtol=1e-9, atol=1e-12)
+    for link, motion in plain.walk.motions.items():
+        parts = [leaves_of(part) for part in (motion, coded.walk.motions[link])]
+        size = max(np.nanmax(np.abs(part), initial=1.0) for part in parts[0])
+        for part, other in zip(*parts, strict=True):
+            np.testing.assert_allclose(other, part, rtol=1e-9, atol=1e-12 * size)
     for settled, other in zip(plain.settled, coded.settled, strict=True):
         for what in ("iterations", "converged", "certain", "share"):
             np.testing.assert_allclose(getattr(other, what), getattr(settled, what), rtol=1e-9, err_msg=what)
 
 
-def test_equations_of_one_kind_share_their_code(monkeypatch):
-    monkeypatch.setattr(settle_code, "_codes", {})
-    run = prepare(Mechanism(**entries_of(chain(20))[0]))
-    run.solve(run.cycle.times(STEPS))
-    assert len(settle_code._codes) <= 2  # the last dyad, which the resisting torque loads, may have other zeros
+def test_modules_that_are_alike_share_their_code(monkeypatch):
+    monkeypatch.setattr(parts, "_codes", {})
+    counts = []
+    for dyads in (12, 20):
+        run = prepare(Mechanism(**entries_of(chain(dyads))[0]))
+        run.solve(run.cycle.times(STEPS))
+        counts.append(len(parts._codes))
+    assert counts[0] <= counts[1] <= 16  # driver, first and last dyad, contacts and masses of the links
 
 
 def test_derivatives_are_those_of_numpy(monkeypatch):

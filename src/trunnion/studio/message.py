@@ -2,8 +2,9 @@
 
 uint32 n (little-endian), n bytes of header (a multiple of 4), columns. In the header a column is
 `{"column": [first, count]}`, in numbers from the end of the header; NaN stands where there is none. `{"sum": [first,
-count]}` is the sum of two columns, one behind the other, which has 48 binary digits. A file is `{"bytes": [first,
-count]}`, in bytes from there.
+count]}` is the sum of two columns, one behind the other, which has 48 binary digits. `{"grid": [first, count], "names":
+…, "keys": …}` are columns of so many numbers for each name of each key. A file is `{"bytes": [first, count]}`, in bytes
+from there.
 """
 
 from __future__ import annotations
@@ -41,8 +42,21 @@ def packed(header: Mapping[str, Any]) -> bytes:
         count += numbers.size
         return {"column": [count - numbers.size, int(numbers.size)]}
 
+    def grid(value: Mapping[str, Any]) -> dict[str, Any] | None:
+        """Many entries of columns that are alike; None of others."""
+        rows = list(value.values())
+        if len(rows) < SHORTEST or not all(isinstance(row, dict) and row.keys() == rows[0].keys() for row in rows):
+            return None
+        numbers = [number for row in rows for number in row.values()]
+        if not (numbers and all(type(number) is np.ndarray and number.shape == numbers[0].shape for number in numbers)):
+            return None
+        first, size = column(np.array(numbers).ravel())["column"]
+        return {"grid": [first, size // len(numbers)], "names": list(rows[0]), "keys": list(map(str, value))}
+
     def plain(value: Any) -> Any:
         if isinstance(value, Mapping):
+            if (alike := grid(value)) is not None:
+                return alike
             return {str(key): plain(item) for key, item in value.items()}
         if isinstance(value, np.ndarray):
             return column(np.ravel(value))
